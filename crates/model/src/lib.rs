@@ -1,0 +1,1 @@
+//! Mechanics of a reaction-torque stand.

@@ -1,0 +1,2 @@
+//! The `torqcomp` command.
+fn main() {}
