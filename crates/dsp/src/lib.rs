@@ -1,1 +1,31 @@
-//! Signals of a reaction-torque stand.
+//! Signals of a reaction-torque stand: from recorded volts to the torque that acted.
+//!
+//! The crate knows nothing of beams and inertias: the stand's response comes in as a function of
+//! frequency, records come in as slices of uniformly sampled `f64`. It does no file I/O.
+//!
+//! ```text
+//! volts ── conversion (gage, bridge) ──► torque as recorded ── compensate ──► torque that acted
+//!                                              │
+//!                                              └─ harmonics (sine fit, order by order)
+//! ```
+//!
+//! # Conventions
+//! * Time dependence `e^{+jωt}`; a response `H(f)` is output over input.
+//! * A delay `τ` of the output is `H(f) = e^{-j2πfτ}`: a lagging phase is negative.
+//! * Amplitudes are peak values; a component is `A cos(2πft + φ)`.
+//! * Spectral densities are one-sided, in unit²/Hz. Transforms are unscaled forward, `1/N` inverse.
+//! * "Standard uncertainty" is one standard deviation (JCGM 100:2008), never an expanded one.
+
+pub mod band;
+pub mod bridge;
+pub mod compensate;
+pub mod conversion;
+mod error;
+pub mod gage;
+pub mod harmonics;
+pub mod noise;
+pub mod recorder;
+pub mod resample;
+pub mod spectrum;
+
+pub use error::Error;

@@ -1,1 +1,68 @@
 //! Mechanics of a reaction-torque stand.
+//!
+//! The stator of a machine sits on a stiff beam, a strain gage on the beam reads the reaction
+//! torque, and the stator rings on the beam. This crate holds the mechanics of that stand:
+//!
+//! ```text
+//! J θ'' + f θ' + K θ = T        stand, T the torque on the stator
+//! T_o = K θ                     torque the gage shows
+//! ```
+//!
+//! # Data path
+//!
+//! Text with units → [`Kind::parse`] → SI numbers, or an [`Estimate`] with its uncertainty →
+//! constants from the drawing ([`beam`], [`inertia`], [`damping`]) or from measurements
+//! ([`damping::FreeDecay`], [`calibration`]) → [`SecondOrder`] → [`SecondOrder::inverse`], the
+//! factor that turns the shown torque back into the torque that acted.
+//!
+//! There is no file access here and no signal processing.
+//!
+//! # Conventions
+//!
+//! - SI inside: kg, m, s, A, K, rad. Names of bare numbers end in the unit, as in
+//!   `stiffness_n_m_per_rad`. Ratios carry no suffix.
+//! - Time factor e^{+jωt}: the response of a stand lags, so the phase of [`SecondOrder::forward`]
+//!   runs from 0 to −π and the phase of [`SecondOrder::inverse`] from 0 to +π.
+//! - Positive angle, force at the beam and torque on the stator point the same way.
+//! - Frequencies ending in `_hz` are cycles per second; ω = 2π·frequency is in rad/s.
+//! - Uncertainties are standard uncertainties (one standard deviation) unless a name says else.
+//!   An unknown uncertainty is `None`, never 0.
+//!
+//! # Sources
+//!
+//! Equation numbers such as (16) or (C20) are those of T. P. Hertel, "The modeling, fabrication,
+//! and testing of an instantaneous torque measuring system", master's thesis.
+//!
+//! # Modules
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`quantity`] | units, physical kinds, numbers with uncertainty |
+//! | [`section`] | cross sections: area, second moment, shear coefficient |
+//! | [`beam`] | stiffness of the beam and strain on its surface |
+//! | [`inertia`] | mass moments of inertia of simple bodies |
+//! | [`damping`] | viscous coefficient, free decay |
+//! | [`response`] | transfer function and its inverse |
+//! | [`uncertainty`] | uncertainty of the inverse |
+//! | [`calibration`] | torque per volt from a static load |
+//! | [`error`] | errors of the mechanics |
+
+pub mod beam;
+pub mod calibration;
+mod check;
+pub mod damping;
+pub mod error;
+pub mod inertia;
+pub mod quantity;
+pub mod response;
+pub mod section;
+pub mod uncertainty;
+
+pub use beam::{Beam, Compliance, Segment};
+pub use damping::FreeDecay;
+pub use error::ModelError;
+pub use inertia::Part;
+pub use quantity::{Dimension, Estimate, Kind, QuantityError, Unit, UnitSystem};
+pub use response::SecondOrder;
+pub use section::Section;
+pub use uncertainty::{InverseGradient, InverseUncertainty, ParameterStd};

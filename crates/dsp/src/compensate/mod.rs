@@ -1,0 +1,228 @@
+//! Dividing the stand's response out of a record, up to a stated band.
+//!
+//! With the inverse response `H⁻¹(f)` (torque over recorded torque) and the band `W(f)`, the
+//! compensated spectrum is
+//!
+//! ```text
+//! T(f) = W(f) H⁻¹(f) T_o(f)                         (thesis, eq. 32, at every frequency)
+//! ```
+//!
+//! There are two ways to run it, which give the same answer:
+//!
+//! * [`whole_record`]: one transform over the record, each of its frequencies multiplied by the
+//!   exact `W H⁻¹`.
+//! * [`Stream`]: overlap-save with the impulse response of `W H⁻¹`, cut where it has died out, in
+//!   memory that does not grow with the record.
+//!
+//! Beyond both ends the record is continued by point reflection about its end sample
+//! (`2x₀ − x[k]`), so that nothing wraps round from one end to the other, a constant stays a
+//! constant, and a slope goes on as a slope. Within [`InverseFilter::half_length`] samples of an
+//! end the result leans on that continuation.
+
+mod blocks;
+mod whole;
+mod windows;
+
+use std::fmt;
+use std::sync::Arc;
+
+use num_complex::Complex64;
+use realfft::RealFftPlanner;
+
+use crate::Error;
+use crate::band::Band;
+
+pub use blocks::BlockConvolver;
+pub use whole::whole_record;
+pub use windows::{Stream, Windows};
+
+/// Part of the impulse response that may be cut off, relative to the static gain. It bounds the
+/// difference between the two ways to run a compensation, relative to the recorded full scale.
+const TAIL_TOLERANCE: f64 = 2e-10;
+/// Longest transform used to build a filter.
+const LONGEST_DESIGN: usize = 1 << 24;
+
+/// An inverse response as a function of frequency in Hz (`f >= 0`).
+pub type Inverse = Arc<dyn Fn(f64) -> Complex64 + Send + Sync>;
+
+/// The filter `W(f) H⁻¹(f)` and its impulse response.
+#[derive(Clone)]
+pub struct InverseFilter {
+    inverse: Inverse,
+    band: Band,
+    /// Impulse response, index `half_length` being time zero.
+    taps: Vec<f64>,
+    half_length: usize,
+}
+
+impl fmt::Debug for InverseFilter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("InverseFilter")
+            .field("band", &self.band)
+            .field("half_length", &self.half_length)
+            .finish_non_exhaustive()
+    }
+}
+
+impl InverseFilter {
+    /// Builds the filter for an inverse response and a band.
+    ///
+    /// The impulse response is the inverse transform of `W(f) H⁻¹(f)` on a grid that is refined
+    /// until the response dies out well inside it. It is cut where less than 2·10⁻¹⁰ of the static
+    /// gain is left (sum of magnitudes), and scaled so that its sum is the static gain exactly.
+    ///
+    /// # Errors
+    /// [`Error::InverseNotFinite`] if the inverse is infinite inside the band,
+    /// [`Error::NotPositive`] if its static value is not a positive number,
+    /// [`Error::FilterTooLong`] if it does not die out within 2²² samples.
+    ///
+    /// ```
+    /// use std::sync::Arc;
+    /// use num_complex::Complex64;
+    /// use torqcomp_dsp::{band::Band, compensate::InverseFilter};
+    ///
+    /// // An inverse of 2 everywhere: the filter doubles, and its taps add up to 2.
+    /// let band = Band::new(20_000.0, 2400.0)?;
+    /// let filter = InverseFilter::design(Arc::new(|_| Complex64::new(2.0, 0.0)), band)?;
+    /// assert!((filter.taps().iter().sum::<f64>() - 2.0).abs() < 1e-14);
+    /// # Ok::<(), torqcomp_dsp::Error>(())
+    /// ```
+    pub fn design(inverse: Inverse, band: Band) -> Result<Self, Error> {
+        let static_gain = inverse(0.0).re;
+        if !(static_gain > 0.0 && static_gain.is_finite()) {
+            return Err(Error::NotPositive {
+                name: "static gain of the inverse response",
+                value: static_gain,
+            });
+        }
+        let edge_width = band.end_hz() - band.top_hz();
+        // Some hundred points over the edge are where the response can start to die out.
+        let start = (64.0 * band.sample_rate_hz() / edge_width).max(1024.0) as usize;
+        let mut length = start.next_power_of_two();
+        while length <= LONGEST_DESIGN {
+            let circular = impulse_response(&inverse, &band, length)?;
+            if let Some(half_length) = half_length(&circular, TAIL_TOLERANCE * static_gain) {
+                let mut taps: Vec<f64> = (0..=2 * half_length)
+                    .map(|tap| circular[(length + tap - half_length) % length])
+                    .collect();
+                let scale = static_gain / taps.iter().sum::<f64>();
+                taps.iter_mut().for_each(|tap| *tap *= scale);
+                return Ok(Self {
+                    inverse,
+                    band,
+                    taps,
+                    half_length,
+                });
+            }
+            length *= 2;
+        }
+        Err(Error::FilterTooLong {
+            samples: LONGEST_DESIGN / 4,
+            seconds: (LONGEST_DESIGN / 4) as f64 / band.sample_rate_hz(),
+            band_hz: band.top_hz(),
+            sample_rate_hz: band.sample_rate_hz(),
+        })
+    }
+
+    /// The impulse response, an odd number of taps with time zero in the middle.
+    #[must_use]
+    pub fn taps(&self) -> &[f64] {
+        &self.taps
+    }
+
+    /// Samples before and after a sample that its result depends on.
+    #[must_use]
+    pub fn half_length(&self) -> usize {
+        self.half_length
+    }
+
+    /// The band that the filter covers.
+    #[must_use]
+    pub fn band(&self) -> &Band {
+        &self.band
+    }
+
+    /// `W(f) H⁻¹(f)`; zero at and above the band's end.
+    #[must_use]
+    pub fn response(&self, frequency_hz: f64) -> Complex64 {
+        response(&self.inverse, &self.band, frequency_hz)
+    }
+}
+
+fn response(inverse: &Inverse, band: &Band, frequency_hz: f64) -> Complex64 {
+    let gain = band.gain(frequency_hz);
+    // Above the band the inverse may be infinite; it is not asked.
+    if gain == 0.0 {
+        Complex64::ZERO
+    } else {
+        inverse(frequency_hz) * gain
+    }
+}
+
+/// `W(f) H⁻¹(f)` at the `length / 2 + 1` frequencies of a real transform of that length.
+fn response_on_grid(
+    inverse: &Inverse,
+    band: &Band,
+    length: usize,
+) -> Result<Vec<Complex64>, Error> {
+    let step_hz = band.sample_rate_hz() / length as f64;
+    let mut grid = Vec::with_capacity(length / 2 + 1);
+    for bin in 0..=length / 2 {
+        let frequency_hz = bin as f64 * step_hz;
+        let value = response(inverse, band, frequency_hz);
+        if !(value.re.is_finite() && value.im.is_finite()) {
+            return Err(Error::InverseNotFinite { frequency_hz });
+        }
+        grid.push(value);
+    }
+    // A real signal has real values at zero and at half the rate.
+    grid[0].im = 0.0;
+    if length % 2 == 0 {
+        grid[length / 2].im = 0.0;
+    }
+    Ok(grid)
+}
+
+/// Impulse response on a circle of `length` samples, time zero at index 0.
+fn impulse_response(inverse: &Inverse, band: &Band, length: usize) -> Result<Vec<f64>, Error> {
+    let mut spectrum = response_on_grid(inverse, band, length)?;
+    let mut response = vec![0.0; length];
+    RealFftPlanner::new()
+        .plan_fft_inverse(length)
+        .process(&mut spectrum, &mut response)
+        .expect("lengths come from one number and the ends are real");
+    let scale = 1.0 / length as f64;
+    response.iter_mut().for_each(|tap| *tap *= scale);
+    Ok(response)
+}
+
+/// Half-length beyond which at most `tolerance` is left on the circle; `None` if that is not
+/// within a quarter of the circle, where the two ends would start to run into each other.
+fn half_length(circular: &[f64], tolerance: f64) -> Option<usize> {
+    let length = circular.len();
+    let mut left = 0.0;
+    for lag in (1..=length / 2).rev() {
+        left += circular[lag].abs() + circular[length - lag].abs();
+        if left > tolerance {
+            return (lag <= length / 4).then_some(lag);
+        }
+    }
+    Some(0)
+}
+
+/// Sample `index` of a record that is continued by point reflection about its end samples, and
+/// held constant where the record is too short for that.
+fn continued(samples: &[f64], index: isize) -> f64 {
+    let last = samples.len() - 1;
+    if index < 0 {
+        2.0 * samples[0] - samples[index.unsigned_abs().min(last)]
+    } else if index as usize > last {
+        let beyond = index as usize - last;
+        2.0 * samples[last] - samples[last.saturating_sub(beyond)]
+    } else {
+        samples[index as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,127 @@
+//! What can go wrong when a record is processed.
+
+use thiserror::Error;
+
+/// Errors of the signal functions in this crate.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A rate, frequency or length that must be positive and finite is not.
+    #[error("{name} is {value}, expected a positive finite number")]
+    NotPositive {
+        /// Which quantity.
+        name: &'static str,
+        /// What was given.
+        value: f64,
+    },
+    /// The sampling rate cannot carry the requested band.
+    #[error(
+        "the record's rate of {sample_rate_hz} Hz carries frequencies below {nyquist_hz} Hz, \
+         the band asked for ends at {band_hz} Hz: record faster, or ask for a band of at most \
+         {highest_band_hz} Hz"
+    )]
+    RateTooLow {
+        /// Rate of the record.
+        sample_rate_hz: f64,
+        /// Half the rate.
+        nyquist_hz: f64,
+        /// The band that was asked for.
+        band_hz: f64,
+        /// The highest band that this rate allows.
+        highest_band_hz: f64,
+    },
+    /// The stand's inverse response is infinite or undefined at a frequency inside the band.
+    #[error(
+        "the inverse response is not finite at {frequency_hz} Hz: the stand passes nothing there, \
+         so nothing can be recovered; end the band below it"
+    )]
+    InverseNotFinite {
+        /// Where it happened.
+        frequency_hz: f64,
+    },
+    /// The inverse filter would have to be longer than is sensible.
+    #[error(
+        "the inverse filter does not die out within {samples} samples ({seconds} s): the band of \
+         {band_hz} Hz is very narrow for a rate of {sample_rate_hz} Hz, or the inverse response \
+         rings; lower the record's rate or widen the band"
+    )]
+    FilterTooLong {
+        /// Longest length tried, in samples.
+        samples: usize,
+        /// The same in seconds.
+        seconds: f64,
+        /// The band that was asked for.
+        band_hz: f64,
+        /// Rate of the record.
+        sample_rate_hz: f64,
+    },
+    /// The record has too few samples for what was asked.
+    #[error("the record has {got} samples, {what} needs at least {expected}: use a longer record")]
+    TooShort {
+        /// What needed more.
+        what: &'static str,
+        /// Samples needed.
+        expected: usize,
+        /// Samples at hand.
+        got: usize,
+    },
+    /// A sample is NaN or infinite.
+    #[error("sample {index} is {value}: remove or repair it before processing")]
+    NonFinite {
+        /// Index of the sample, from 0.
+        index: usize,
+        /// Its value.
+        value: f64,
+    },
+    /// Two component frequencies are too close for the length of the record.
+    #[error(
+        "components {first_hz} Hz and {second_hz} Hz cannot be told apart in {seconds} s: \
+         record at least {needed_s} s, or ask for fewer orders"
+    )]
+    NotSeparable {
+        /// Lower frequency.
+        first_hz: f64,
+        /// Higher frequency.
+        second_hz: f64,
+        /// Length of the record.
+        seconds: f64,
+        /// Length that would do.
+        needed_s: f64,
+    },
+    /// A component lies at or above half the sampling rate.
+    #[error(
+        "a component at {frequency_hz} Hz cannot be seen at a rate of {sample_rate_hz} Hz: \
+         ask for orders below {nyquist_hz} Hz"
+    )]
+    AboveNyquist {
+        /// The component.
+        frequency_hz: f64,
+        /// Rate of the record.
+        sample_rate_hz: f64,
+        /// Half of it.
+        nyquist_hz: f64,
+    },
+    /// No frequency near the given one fits the record.
+    #[error(
+        "the fundamental could not be refined from {start_hz} Hz: {why}; give it more exactly, or \
+         leave it as it is"
+    )]
+    NotRefined {
+        /// Where the search began.
+        start_hz: f64,
+        /// What went wrong.
+        why: &'static str,
+    },
+    /// Time stamps that do not increase cannot be resampled.
+    #[error(
+        "time stamp {index} ({time_s} s) does not lie after the one before it ({previous_s} s)"
+    )]
+    TimeNotIncreasing {
+        /// Index of the later stamp.
+        index: usize,
+        /// The later stamp.
+        time_s: f64,
+        /// The stamp before it.
+        previous_s: f64,
+    },
+}

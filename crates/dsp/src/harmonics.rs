@@ -1,0 +1,388 @@
+//! Component torques at a fundamental and its orders, by least-squares sine fit.
+//!
+//! The record is modelled as
+//!
+//! ```text
+//! x(t) = c + Σ_k A_k cos(2π n_k f₁ t + φ_k)
+//! ```
+//!
+//! with all components fitted at once, so neither whole periods nor a window are needed
+//! (IEEE Std 1057, sine fit with known frequency, for several frequencies). About the middle of
+//! the record the sums over products of cosines have closed forms, the cosine and sine parts
+//! decouple, and only the right-hand side has to pass over the data.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use num_complex::Complex64;
+use std::f64::consts::{PI, TAU};
+
+use crate::Error;
+use crate::spectrum::{Density, welch};
+
+mod refine;
+
+pub use refine::refine_fundamental;
+
+/// Steps after which a rotating phasor is set anew, so that rounding does not add up.
+const RESET_STEPS: usize = 512;
+/// Bins on either side of a component over which the residual's density is averaged.
+const NEAR_BINS: usize = 4;
+/// Fewest residual samples that a spectrum is made of; below, the residual is taken as white.
+const FEWEST_FOR_SPECTRUM: usize = 256;
+/// Variance of an amplitude over that of a well-separated one, above which components are refused.
+const LARGEST_INFLATION: f64 = 1e4;
+
+/// One component of a record.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Component {
+    /// Frequency over the fundamental.
+    pub order: f64,
+    /// Frequency in Hz.
+    pub frequency_hz: f64,
+    /// Complex amplitude `A e^{jφ}` of `A cos(2πft + φ)`, `t` counted from the reference.
+    pub phasor: Complex64,
+    /// Standard uncertainty of the amplitude, from the residual near the component.
+    pub std_amplitude: f64,
+    /// Standard uncertainty of the phase in rad, that of a refined fundamental included; `None`
+    /// if the amplitude does not exceed its own uncertainty.
+    pub std_phase_rad: Option<f64>,
+}
+
+/// Components of a record and what they leave over.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Harmonics {
+    /// The constant part.
+    pub mean: f64,
+    /// The components, in the order they were asked for.
+    pub components: Vec<Component>,
+    /// Root mean square of what the fit leaves over.
+    pub residual_rms: f64,
+}
+
+/// A fundamental frequency and how sure it is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fundamental {
+    /// Frequency in Hz.
+    pub frequency_hz: f64,
+    /// Standard uncertainty in Hz if it was found from the data, `None` if it was given.
+    pub std_hz: Option<f64>,
+}
+
+impl Fundamental {
+    /// A fundamental that is known.
+    #[must_use]
+    pub fn given(frequency_hz: f64) -> Self {
+        Self {
+            frequency_hz,
+            std_hz: None,
+        }
+    }
+}
+
+/// Fits the components of a uniformly sampled record.
+///
+/// `start_s` is the time of the first sample; phases refer to time 0. The standard uncertainty of
+/// an amplitude is `√(S(f) T⁻¹)` for a residual of one-sided density `S(f)` near the component and
+/// a record of length `T`, times the inflation by components that are close together.
+///
+/// # Errors
+/// [`Error::AboveNyquist`], [`Error::NotSeparable`] if the record is too short to tell two
+/// components (or one from the constant) apart, [`Error::TooShort`] for fewer samples than
+/// unknowns, [`Error::NotPositive`], [`Error::NonFinite`].
+///
+/// ```
+/// use torqcomp_dsp::harmonics::{fit, Fundamental};
+/// // 2.6 periods of 0.7 + 3 cos(2π 60 t + 30°): no whole number of periods, and yet exact.
+/// let rate = 5000.0;
+/// let x: Vec<f64> = (0..217)
+///     .map(|i| 0.7 + 3.0 * (std::f64::consts::TAU * 60.0 * i as f64 / rate + 0.5236).cos())
+///     .collect();
+/// let h = fit(&x, rate, 0.0, Fundamental::given(60.0), &[1.0])?;
+/// assert!((h.mean - 0.7).abs() < 1e-12);
+/// assert!((h.components[0].phasor.norm() - 3.0).abs() < 1e-12);
+/// assert!((h.components[0].phasor.arg() - 0.5236).abs() < 1e-12);
+/// # Ok::<(), torqcomp_dsp::Error>(())
+/// ```
+pub fn fit(
+    samples: &[f64],
+    sample_rate_hz: f64,
+    start_s: f64,
+    fundamental: Fundamental,
+    orders: &[f64],
+) -> Result<Harmonics, Error> {
+    let solution = SineFit::solve(samples, sample_rate_hz, fundamental.frequency_hz, orders)?;
+    let residual = solution.residual(samples);
+    let residual_rms = mean_square(&residual).sqrt();
+    let freedom = samples.len() as f64 - solution.unknowns() as f64;
+    let white = sum_squares(&residual) / freedom.max(1.0);
+    let density = residual_density(&residual, sample_rate_hz);
+    let middle_s = start_s + 0.5 * (samples.len() - 1) as f64 / sample_rate_hz;
+    let components = orders
+        .iter()
+        .enumerate()
+        .map(|(k, &order)| {
+            let frequency_hz = order * fundamental.frequency_hz;
+            let near = density.as_ref().map_or(white, |d| {
+                density_near(d, frequency_hz) * 0.5 * sample_rate_hz
+            });
+            let std_amplitude = (near * solution.variance_factor(k)).sqrt();
+            let centred = solution.phasor(k);
+            let turn = -TAU * frequency_hz * middle_s;
+            let drift = fundamental
+                .std_hz
+                .map_or(0.0, |s| TAU * order * s * middle_s);
+            let std_phase_rad = (centred.norm() > std_amplitude)
+                .then(|| (std_amplitude / centred.norm()).hypot(drift));
+            Component {
+                order,
+                frequency_hz,
+                phasor: centred * Complex64::from_polar(1.0, turn),
+                std_amplitude,
+                std_phase_rad,
+            }
+        })
+        .collect();
+    Ok(Harmonics {
+        mean: solution.mean(),
+        components,
+        residual_rms,
+    })
+}
+
+/// The linear fit about the middle of a record, frequencies given.
+struct SineFit {
+    /// Angular steps `2πf/f_s`, rad per sample.
+    steps: Vec<f64>,
+    length: usize,
+    /// Constant and cosine amplitudes.
+    even: DVector<f64>,
+    /// Sine amplitudes.
+    odd: DVector<f64>,
+    even_gram: Cholesky<f64, Dyn>,
+    odd_gram: Cholesky<f64, Dyn>,
+}
+
+impl SineFit {
+    fn solve(
+        samples: &[f64],
+        sample_rate_hz: f64,
+        fundamental_hz: f64,
+        orders: &[f64],
+    ) -> Result<Self, Error> {
+        check(samples, sample_rate_hz, fundamental_hz, orders)?;
+        let length = samples.len();
+        let steps: Vec<f64> = orders
+            .iter()
+            .map(|order| TAU * order * fundamental_hz / sample_rate_hz)
+            .collect();
+        let (even_gram, odd_gram) = gram(&steps, length);
+        let inseparable = || not_separable(orders, fundamental_hz, length as f64 / sample_rate_hz);
+        let even_gram = Cholesky::new(even_gram).ok_or_else(inseparable)?;
+        let odd_gram = Cholesky::new(odd_gram).ok_or_else(inseparable)?;
+        let (even, odd) = projections(samples, &steps);
+        let fit = Self {
+            even: even_gram.solve(&even),
+            odd: odd_gram.solve(&odd),
+            steps,
+            length,
+            even_gram,
+            odd_gram,
+        };
+        let inflated = (0..orders.len())
+            .any(|k| fit.variance_factor(k) * 0.5 * length as f64 > LARGEST_INFLATION);
+        if inflated {
+            Err(inseparable())
+        } else {
+            Ok(fit)
+        }
+    }
+
+    fn unknowns(&self) -> usize {
+        1 + 2 * self.steps.len()
+    }
+
+    fn mean(&self) -> f64 {
+        self.even[0]
+    }
+
+    /// `a cos + b sin = Re[(a − jb) e^{jωt}]`, about the middle of the record.
+    fn phasor(&self, k: usize) -> Complex64 {
+        Complex64::new(self.even[k + 1], -self.odd[k])
+    }
+
+    /// Variance of an amplitude per variance of white noise; `2/N` when all is well separated.
+    fn variance_factor(&self, k: usize) -> f64 {
+        let diagonal = |gram: &Cholesky<f64, Dyn>, index: usize, size: usize| {
+            let mut unit = DVector::zeros(size);
+            unit[index] = 1.0;
+            gram.solve(&unit)[index]
+        };
+        let n = self.steps.len();
+        diagonal(&self.even_gram, k + 1, n + 1).max(diagonal(&self.odd_gram, k, n))
+    }
+
+    fn residual(&self, samples: &[f64]) -> Vec<f64> {
+        let mut residual: Vec<f64> = samples.iter().map(|x| x - self.mean()).collect();
+        for (k, &step) in self.steps.iter().enumerate() {
+            let phasor = self.phasor(k);
+            rotate(self.length, step, |i, turn| {
+                residual[i] -= phasor.re * turn.re - phasor.im * turn.im;
+            });
+        }
+        residual
+    }
+}
+
+fn check(
+    samples: &[f64],
+    sample_rate_hz: f64,
+    fundamental_hz: f64,
+    orders: &[f64],
+) -> Result<(), Error> {
+    for (name, value) in [
+        ("sampling rate", sample_rate_hz),
+        ("fundamental", fundamental_hz),
+    ] {
+        if !(value > 0.0 && value.is_finite()) {
+            return Err(Error::NotPositive { name, value });
+        }
+    }
+    for &order in orders {
+        if !(order > 0.0 && order.is_finite()) {
+            return Err(Error::NotPositive {
+                name: "order",
+                value: order,
+            });
+        }
+        if order * fundamental_hz >= 0.5 * sample_rate_hz {
+            return Err(Error::AboveNyquist {
+                frequency_hz: order * fundamental_hz,
+                sample_rate_hz,
+                nyquist_hz: 0.5 * sample_rate_hz,
+            });
+        }
+    }
+    let unknowns = 2 * orders.len() + 1;
+    if samples.len() <= unknowns {
+        return Err(Error::TooShort {
+            what: "a fit of that many components",
+            expected: unknowns + 1,
+            got: samples.len(),
+        });
+    }
+    match samples.iter().position(|x| !x.is_finite()) {
+        Some(index) => Err(Error::NonFinite {
+            index,
+            value: samples[index],
+        }),
+        None => Ok(()),
+    }
+}
+
+/// The two closest of the frequencies, zero among them.
+fn not_separable(orders: &[f64], fundamental_hz: f64, seconds: f64) -> Error {
+    let mut sorted: Vec<f64> = orders.iter().map(|o| o * fundamental_hz).collect();
+    sorted.push(0.0);
+    sorted.sort_by(f64::total_cmp);
+    let closest = sorted
+        .windows(2)
+        .min_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])))
+        .expect("zero and at least one order");
+    Error::NotSeparable {
+        first_hz: closest[0],
+        second_hz: closest[1],
+        seconds,
+        needed_s: 1.0 / (closest[1] - closest[0]),
+    }
+}
+
+/// `Σ cos(ωm)` over `m = −(N−1)/2 … (N−1)/2` (Dirichlet kernel).
+fn cosine_sum(step: f64, length: usize) -> f64 {
+    let half = 0.5 * step;
+    // At a multiple of a full turn every term is 1 (or alternates, for half-integer m).
+    if (half / PI - (half / PI).round()).abs() < 1e-13 {
+        let turns = (half / PI).round();
+        let sign = if turns as i64 % 2 != 0 && length.is_multiple_of(2) {
+            -1.0
+        } else {
+            1.0
+        };
+        return sign * length as f64;
+    }
+    (length as f64 * half).sin() / half.sin()
+}
+
+/// Gram matrices of the even part (constant, cosines) and the odd part (sines).
+fn gram(steps: &[f64], length: usize) -> (DMatrix<f64>, DMatrix<f64>) {
+    let n = steps.len();
+    let with_zero = |i: usize| if i == 0 { 0.0 } else { steps[i - 1] };
+    let even = DMatrix::from_fn(n + 1, n + 1, |i, j| {
+        let (a, b) = (with_zero(i), with_zero(j));
+        0.5 * (cosine_sum(a - b, length) + cosine_sum(a + b, length))
+    });
+    let odd = DMatrix::from_fn(n, n, |i, j| {
+        let (a, b) = (steps[i], steps[j]);
+        0.5 * (cosine_sum(a - b, length) - cosine_sum(a + b, length))
+    });
+    (even, odd)
+}
+
+/// Sums of the samples times constant, cosines and sines about the middle.
+fn projections(samples: &[f64], steps: &[f64]) -> (DVector<f64>, DVector<f64>) {
+    let mut even = DVector::zeros(steps.len() + 1);
+    let mut odd = DVector::zeros(steps.len());
+    even[0] = samples.iter().sum();
+    for (k, &step) in steps.iter().enumerate() {
+        let mut sum = Complex64::ZERO;
+        rotate(samples.len(), step, |i, turn| sum += turn * samples[i]);
+        even[k + 1] = sum.re;
+        odd[k] = sum.im;
+    }
+    (even, odd)
+}
+
+/// Calls `visit(i, e^{jω(i − (N−1)/2)})` for every sample.
+fn rotate(length: usize, step: f64, mut visit: impl FnMut(usize, Complex64)) {
+    let advance = Complex64::from_polar(1.0, step);
+    let middle = 0.5 * (length - 1) as f64;
+    for start in (0..length).step_by(RESET_STEPS) {
+        let mut turn = Complex64::from_polar(1.0, step * (start as f64 - middle));
+        for i in start..(start + RESET_STEPS).min(length) {
+            visit(i, turn);
+            turn *= advance;
+        }
+    }
+}
+
+fn sum_squares(values: &[f64]) -> f64 {
+    values.iter().map(|x| x * x).sum()
+}
+
+fn mean_square(values: &[f64]) -> f64 {
+    sum_squares(values) / values.len() as f64
+}
+
+/// Density of the residual with about eight independent blocks, `None` for a short one.
+fn residual_density(residual: &[f64], sample_rate_hz: f64) -> Option<Density> {
+    if residual.len() < FEWEST_FOR_SPECTRUM {
+        return None;
+    }
+    let block = (residual.len() / 8 + 1)
+        .next_power_of_two()
+        .clamp(64, 1 << 16)
+        / 2;
+    welch(residual, sample_rate_hz, block).ok()
+}
+
+/// Mean density over the bins next to a frequency; a line of width zero keeps clear of the
+/// constant's bins.
+fn density_near(density: &Density, frequency_hz: f64) -> f64 {
+    let centre = (frequency_hz / density.step_hz).round() as usize;
+    let last = density.values.len() - 2;
+    let from = centre.saturating_sub(NEAR_BINS).clamp(1, last);
+    let to = (centre + NEAR_BINS).min(last);
+    let near = &density.values[from..=to.max(from)];
+    near.iter().sum::<f64>() / near.len() as f64
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,190 @@
+//! Finding the fundamental from the data.
+
+use nalgebra::DVector;
+use num_complex::Complex64;
+use realfft::RealFftPlanner;
+use std::f64::consts::TAU;
+
+use super::{Fundamental, SineFit, density_near, residual_density, rotate, sum_squares};
+use crate::Error;
+
+/// Longest piece that the search by spectrum looks at.
+const LONGEST_SEARCH: usize = 1 << 17;
+/// Steps of the refinement at one length of record.
+const STEPS: usize = 30;
+
+/// Finds the fundamental near `start_hz`, within `span` of it (0.01 is one per cent).
+///
+/// First the frequency with the most power at all its orders is looked up in a zero-padded
+/// spectrum, then the sum of squares of the sine fit is made least by Gauss-Newton steps, over
+/// twice the length of record at each stage so that no stage can slip by a period. The standard
+/// uncertainty comes from the residual's density at the orders, each weighed by its pull on the
+/// frequency.
+///
+/// # Errors
+/// Those of [`super::fit`], and [`Error::NotRefined`] if the best frequency lies at the end of the
+/// span or the steps do not settle.
+///
+/// ```
+/// use torqcomp_dsp::harmonics::refine_fundamental;
+/// let x: Vec<f64> = (0..20_000)
+///     .map(|i| (std::f64::consts::TAU * 59.873 * i as f64 / 10_000.0).cos())
+///     .collect();
+/// let found = refine_fundamental(&x, 10_000.0, 60.0, 0.01, &[1.0])?;
+/// assert!((found.frequency_hz - 59.873).abs() < 1e-9);
+/// # Ok::<(), torqcomp_dsp::Error>(())
+/// ```
+pub fn refine_fundamental(
+    samples: &[f64],
+    sample_rate_hz: f64,
+    start_hz: f64,
+    span: f64,
+    orders: &[f64],
+) -> Result<Fundamental, Error> {
+    let mut length = samples.len().min(LONGEST_SEARCH);
+    // Errors of the input are told before the search begins.
+    SineFit::solve(samples, sample_rate_hz, start_hz, orders)?;
+    let mut frequency_hz = search(&samples[..length], sample_rate_hz, start_hz, span, orders);
+    loop {
+        let piece = &samples[..length];
+        let refined = settle(piece, sample_rate_hz, frequency_hz, orders)?;
+        if (refined.frequency_hz / start_hz - 1.0).abs() > span {
+            return Err(Error::NotRefined {
+                start_hz,
+                why: "no clear maximum within the span searched",
+            });
+        }
+        if length == samples.len() {
+            return Ok(refined);
+        }
+        frequency_hz = refined.frequency_hz;
+        length = samples.len().min(2 * length);
+    }
+}
+
+/// Frequency with the largest power summed over its orders.
+fn search(samples: &[f64], rate_hz: f64, start_hz: f64, span: f64, orders: &[f64]) -> f64 {
+    let length = (4 * samples.len()).next_power_of_two();
+    let mean = samples.iter().sum::<f64>() / samples.len() as f64;
+    let mut padded = vec![0.0; length];
+    for (i, (slot, x)) in padded.iter_mut().zip(samples).enumerate() {
+        let turn = TAU * (i as f64 + 0.5) / samples.len() as f64;
+        *slot = (x - mean) * (0.5 - 0.5 * turn.cos());
+    }
+    let transform = RealFftPlanner::new().plan_fft_forward(length);
+    let mut spectrum: Vec<Complex64> = transform.make_output_vec();
+    transform
+        .process(&mut padded, &mut spectrum)
+        .expect("buffers were made for this length");
+    let power_at = |frequency_hz: f64| {
+        let place = frequency_hz / rate_hz * length as f64;
+        let bin = (place as usize).min(spectrum.len() - 2);
+        let part = place - bin as f64;
+        spectrum[bin].norm_sqr() * (1.0 - part) + spectrum[bin + 1].norm_sqr() * part
+    };
+    let highest = orders.iter().copied().fold(0.0, f64::max);
+    let step_hz = rate_hz / length as f64 / highest.max(1.0);
+    let count = (span * start_hz / step_hz).ceil() as i64;
+    (-count..=count)
+        .map(|i| start_hz + i as f64 * step_hz)
+        .map(|f| (f, orders.iter().map(|o| power_at(o * f)).sum::<f64>()))
+        .fold((start_hz, 0.0), |a, b| if b.1 > a.1 { b } else { a })
+        .0
+}
+
+/// Gauss-Newton on the frequency, the amplitudes being fitted anew at each step.
+fn settle(
+    samples: &[f64],
+    rate_hz: f64,
+    mut frequency_hz: f64,
+    orders: &[f64],
+) -> Result<Fundamental, Error> {
+    let start_hz = frequency_hz;
+    let duration_s = samples.len() as f64 / rate_hz;
+    for _ in 0..STEPS {
+        let fit = SineFit::solve(samples, rate_hz, frequency_hz, orders)?;
+        let residual = fit.residual(samples);
+        let slope = fit.slope(orders, rate_hz);
+        let pull = slope.iter().zip(&residual).map(|(d, r)| d * r).sum::<f64>();
+        let weight = sum_squares(&slope);
+        if weight <= 0.0 {
+            break;
+        }
+        let step_hz = pull / weight;
+        frequency_hz += step_hz;
+        if !(frequency_hz > 0.0 && frequency_hz.is_finite()) {
+            break;
+        }
+        // Rounding in the phase at the ends of the record is the floor.
+        if step_hz.abs() < 1e-10 / duration_s {
+            let std_hz = fit.std_of_frequency(&residual, rate_hz, frequency_hz, orders, weight);
+            return Ok(Fundamental {
+                frequency_hz,
+                std_hz: Some(std_hz),
+            });
+        }
+    }
+    Err(Error::NotRefined {
+        start_hz,
+        why: "the steps of the fit do not settle",
+    })
+}
+
+impl SineFit {
+    /// Derivative of the model by the fundamental, less what the amplitudes can take up.
+    fn slope(&self, orders: &[f64], rate_hz: f64) -> Vec<f64> {
+        let middle = 0.5 * (self.length - 1) as f64;
+        let mut slope = vec![0.0; self.length];
+        for (k, (&step, order)) in self.steps.iter().zip(orders).enumerate() {
+            let phasor = self.phasor(k) * (TAU * order / rate_hz);
+            rotate(self.length, step, |i, turn| {
+                // d/df of Re[P e^{jωm}] = Re[j (2π n m / f_s) P e^{jωm}].
+                slope[i] -= (i as f64 - middle) * (phasor * turn).im;
+            });
+        }
+        let (even, odd) = super::projections(&slope, &self.steps);
+        let taken = Self {
+            steps: self.steps.clone(),
+            length: self.length,
+            even: self.even_gram.solve(&even),
+            odd: self.odd_gram.solve(&odd),
+            even_gram: self.even_gram.clone(),
+            odd_gram: self.odd_gram.clone(),
+        };
+        taken.residual(&slope)
+    }
+
+    /// `σ²_f = Σ_k w_k S(f_k)(f_s/2) / (Σ w_k)²`, `w_k` being the part of the slope's square that
+    /// order `k` brings.
+    fn std_of_frequency(
+        &self,
+        residual: &[f64],
+        rate_hz: f64,
+        frequency_hz: f64,
+        orders: &[f64],
+        weight: f64,
+    ) -> f64 {
+        let freedom = (self.length as f64 - self.unknowns() as f64 - 1.0).max(1.0);
+        let white = sum_squares(residual) / freedom;
+        let density = residual_density(residual, rate_hz);
+        let pulls = DVector::from_iterator(
+            orders.len(),
+            orders
+                .iter()
+                .enumerate()
+                .map(|(k, n)| (n * self.phasor(k).norm()).powi(2)),
+        );
+        let total = pulls.sum();
+        let variance: f64 = pulls
+            .iter()
+            .zip(orders)
+            .map(|(pull, n)| {
+                let near = density
+                    .as_ref()
+                    .map_or(white, |d| density_near(d, n * frequency_hz) * 0.5 * rate_hz);
+                pull / total * near
+            })
+            .sum();
+        (variance / weight).sqrt()
+    }
+}

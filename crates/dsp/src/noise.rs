@@ -1,0 +1,165 @@
+//! What a compensation does to noise.
+//!
+//! Dividing a response out multiplies whatever the recorder adds by the inverse response, which
+//! grows with the square of frequency above the resonance. White noise of standard deviation `σ`
+//! leaves a filter with taps `g` with `σ √Σg²`; noise of density `S(f)` leaves it with density
+//! `S(f) |W(f) H⁻¹(f)|²`.
+
+use crate::compensate::InverseFilter;
+use crate::spectrum::Density;
+
+/// Sub-bands in which the record is compared with its noise floor.
+const SUB_BANDS: usize = 24;
+/// Mean density of a sub-band over the noise floor below which it carries nothing but noise: 3 dB.
+const LOST_RATIO: f64 = 2.0;
+/// Fewest bins above the band that a noise floor is taken from.
+const FEWEST_FLOOR_BINS: usize = 16;
+
+/// Gain of a compensation for noise, known without any record.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NoiseGain {
+    /// Standard deviation out over standard deviation in, for white noise up to half the rate:
+    /// `√Σg²`.
+    pub white: f64,
+    /// Largest `|W H⁻¹|` and the frequency in Hz where it is reached.
+    pub largest: (f64, f64),
+    /// `(frequency_hz, |W H⁻¹|)` at equally spaced frequencies from 0 to the band's top.
+    pub curve: Vec<(f64, f64)>,
+}
+
+impl NoiseGain {
+    /// Noise gain of a filter, its curve at `points` frequencies (at least 2).
+    ///
+    /// ```
+    /// use std::sync::Arc;
+    /// use num_complex::Complex64;
+    /// use torqcomp_dsp::{band::Band, compensate::InverseFilter, noise::NoiseGain};
+    ///
+    /// // A gain of 3 over 2000 Hz, with an edge of 400 Hz, of a band of 10 kHz: about 3 √0.22.
+    /// let band = Band::new(20_000.0, 2000.0)?;
+    /// let filter = InverseFilter::design(Arc::new(|_| Complex64::new(3.0, 0.0)), band)?;
+    /// let noise = NoiseGain::of(&filter, 5);
+    /// assert!((noise.white / (3.0 * 0.22_f64.sqrt()) - 1.0).abs() < 0.02);
+    /// assert_eq!(noise.curve[4], (2000.0, 3.0));
+    /// # Ok::<(), torqcomp_dsp::Error>(())
+    /// ```
+    #[must_use]
+    pub fn of(filter: &InverseFilter, points: usize) -> Self {
+        let band = filter.band();
+        let gain = |frequency_hz: f64| filter.response(frequency_hz).norm();
+        let grid =
+            |count: usize, end: f64| (0..count).map(move |i| end * i as f64 / (count - 1) as f64);
+        let largest = grid(4097, band.end_hz())
+            .map(|f| (gain(f), f))
+            .fold((0.0, 0.0), |a, b| if b.0 > a.0 { b } else { a });
+        Self {
+            white: filter.taps().iter().map(|g| g * g).sum::<f64>().sqrt(),
+            largest,
+            curve: grid(points.max(2), band.top_hz())
+                .map(|f| (f, gain(f)))
+                .collect(),
+        }
+    }
+}
+
+/// Noise of one record, before and after compensation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordNoise {
+    /// Density of the recorder's noise, unit²/Hz, one-sided: the median above the band.
+    pub floor_density: f64,
+    /// Where the floor was taken, in Hz.
+    pub floor_from_hz: f64,
+    /// End of that range, in Hz.
+    pub floor_to_hz: f64,
+    /// Noise within the band as recorded, rms: `√(S₀ ∫W² df)`.
+    pub recorded_rms: f64,
+    /// The same noise after compensation, rms: `√(S₀ ∫|W H⁻¹|² df)`.
+    pub compensated_rms: f64,
+    /// The whole record within the band after compensation, rms without its mean, noise included.
+    pub output_rms: f64,
+    /// Ranges within the band where the record does not rise 3 dB above the floor, in Hz.
+    pub lost: Vec<(f64, f64)>,
+}
+
+impl RecordNoise {
+    /// Noise of a record with that density; `None` if there is too little room between the band
+    /// and half the rate to see the floor, or the density there is zero.
+    ///
+    /// The floor is taken to be white: the same inside the band as above it.
+    #[must_use]
+    pub fn of(filter: &InverseFilter, density: &Density) -> Option<Self> {
+        let band = filter.band();
+        let nyquist_hz = 0.5 * band.sample_rate_hz();
+        // A window's leakage keeps clear of the edge, a recorder's own filter of the far end.
+        let from_hz = band.end_hz() + 4.0 * density.step_hz;
+        let to_hz = 0.9 * nyquist_hz;
+        let mut above: Vec<f64> = density.between(from_hz, to_hz).map(|(_, v)| v).collect();
+        if above.len() < FEWEST_FLOOR_BINS {
+            return None;
+        }
+        above.sort_by(f64::total_cmp);
+        let median = above[above.len() / 2];
+        // Median over mean of a chi-squared quantity with 2 degrees of freedom a block
+        // (E. B. Wilson, M. M. Hilferty, PNAS 17 (1931), 684).
+        let freedom = 2.0 * density.blocks as f64;
+        let floor_density = median / (1.0 - 2.0 / (9.0 * freedom)).powi(3);
+        if floor_density <= 0.0 {
+            return None;
+        }
+        let power = |weight: &dyn Fn(f64, f64) -> f64| -> f64 {
+            density
+                .between(0.0, band.end_hz())
+                .map(|(f, v)| weight(f, v) * density.step_hz)
+                .sum::<f64>()
+                .sqrt()
+        };
+        let gain_square = |f: f64| filter.response(f).norm_sqr();
+        Some(Self {
+            floor_density,
+            floor_from_hz: from_hz,
+            floor_to_hz: to_hz,
+            recorded_rms: power(&|f, _| floor_density * band.gain(f).powi(2)),
+            compensated_rms: power(&|f, _| floor_density * gain_square(f)),
+            // The first bins hold the mean, widened by the window.
+            output_rms: power(&|f, v| {
+                if f < 2.0 * density.step_hz {
+                    0.0
+                } else {
+                    v * gain_square(f)
+                }
+            }),
+            lost: lost_ranges(density, band.top_hz(), floor_density),
+        })
+    }
+
+    /// Start of the range up to the band's top in which the record is lost in noise.
+    #[must_use]
+    pub fn lost_from_hz(&self, band_top_hz: f64) -> Option<f64> {
+        self.lost
+            .last()
+            .filter(|(_, to)| *to >= band_top_hz * (1.0 - 1e-9))
+            .map(|(from, _)| *from)
+    }
+}
+
+/// Sub-bands of `0..top_hz` whose mean density is within 3 dB of the floor, neighbours joined.
+fn lost_ranges(density: &Density, top_hz: f64, floor: f64) -> Vec<(f64, f64)> {
+    let width = top_hz / SUB_BANDS as f64;
+    let mut ranges: Vec<(f64, f64)> = Vec::new();
+    for i in 0..SUB_BANDS {
+        let (from, to) = (width * i as f64, width * (i + 1) as f64);
+        let inside: Vec<f64> = density.between(from, to).map(|(_, v)| v).collect();
+        if inside.is_empty() {
+            continue;
+        }
+        let mean = inside.iter().sum::<f64>() / inside.len() as f64;
+        if mean >= LOST_RATIO * floor {
+            continue;
+        }
+        match ranges.last_mut() {
+            Some(last) if last.1 == from => last.1 = to,
+            _ => ranges.push((from, to)),
+        }
+    }
+    ranges
+}

@@ -1,0 +1,267 @@
+//! Bringing samples with irregular time stamps onto a uniform grid.
+
+use std::collections::VecDeque;
+
+use crate::Error;
+
+/// Points that a value is interpolated from where the stamps are close enough.
+const POINTS: usize = 8;
+/// Longest step, in grid steps, that is interpolated as a curve; anything longer is a gap.
+const LONGEST_STEP: f64 = 1.5;
+
+/// What a resampling did.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Resampled {
+    /// Samples taken in.
+    pub samples_in: usize,
+    /// Samples given out.
+    pub samples_out: usize,
+    /// Samples left out because their stamp repeats the one before.
+    pub repeated: usize,
+    /// Steps longer than 1.5 grid steps, bridged by a straight line.
+    pub gaps: usize,
+    /// Grid samples that lie within such gaps.
+    pub bridged: usize,
+    /// Longest step of the stamps, in seconds.
+    pub longest_step_s: f64,
+    /// Largest distance of a stamp from the uniform step, as a fraction of the step, gaps aside.
+    pub largest_jitter: f64,
+}
+
+/// Interpolates stamped samples on the grid `t₀ + k Δt`, `t₀` being the first stamp.
+///
+/// Between close stamps the polynomial through the eight nearest points is used (four on each
+/// side, Lagrange's formula), across a gap a straight line. It is a stream: results come out as
+/// soon as the points after them are there.
+#[derive(Debug)]
+pub struct Resampler {
+    step_s: f64,
+    start_s: f64,
+    next: usize,
+    points: VecDeque<(f64, f64)>,
+    done: Resampled,
+}
+
+impl Resampler {
+    /// A resampler to a grid step in seconds.
+    ///
+    /// # Errors
+    /// [`Error::NotPositive`] for a step that is not positive.
+    ///
+    /// ```
+    /// use torqcomp_dsp::resample::Resampler;
+    /// let mut out = Vec::new();
+    /// let mut resampler = Resampler::new(0.5)?;
+    /// // x = t² is a polynomial: it comes back exactly, whatever the stamps.
+    /// for t in [0.0_f64, 0.45, 1.1, 1.5, 2.0, 2.4, 3.1, 3.5, 4.0] {
+    ///     resampler.push(t, t * t, &mut out)?;
+    /// }
+    /// let done = resampler.finish(&mut out);
+    /// assert_eq!(out.len(), 9);
+    /// assert!(out.iter().enumerate().all(|(k, x)| (x - (0.5 * k as f64).powi(2)).abs() < 1e-12));
+    /// assert_eq!(done.gaps, 0);
+    /// # Ok::<(), torqcomp_dsp::Error>(())
+    /// ```
+    pub fn new(step_s: f64) -> Result<Self, Error> {
+        if !(step_s > 0.0 && step_s.is_finite()) {
+            return Err(Error::NotPositive {
+                name: "grid step",
+                value: step_s,
+            });
+        }
+        Ok(Self {
+            step_s,
+            start_s: 0.0,
+            next: 0,
+            points: VecDeque::new(),
+            done: Resampled::default(),
+        })
+    }
+
+    /// Takes a stamped sample; finished grid values are appended to `out`.
+    ///
+    /// # Errors
+    /// [`Error::TimeNotIncreasing`] if the stamp lies before the last one. A repeated stamp is
+    /// left out and counted.
+    pub fn push(&mut self, time_s: f64, value: f64, out: &mut Vec<f64>) -> Result<(), Error> {
+        let index = self.done.samples_in;
+        self.done.samples_in += 1;
+        match self.points.back() {
+            None => self.start_s = time_s,
+            Some(&(last, _)) if time_s == last => {
+                self.done.repeated += 1;
+                return Ok(());
+            }
+            Some(&(previous_s, _)) if time_s < previous_s => {
+                return Err(Error::TimeNotIncreasing {
+                    index,
+                    time_s,
+                    previous_s,
+                });
+            }
+            Some(&(last, _)) => self.note_step(time_s - last),
+        }
+        self.points.push_back((time_s, value));
+        // Values up to the middle of the eight points have all their neighbours.
+        while self.points.len() >= POINTS && self.grid_time() < self.points[POINTS / 2].0 {
+            self.emit(out);
+        }
+        while self.points.len() > POINTS && self.grid_time() >= self.points[POINTS / 2].0 {
+            self.points.pop_front();
+        }
+        while self.points.len() >= POINTS && self.grid_time() < self.points[POINTS / 2].0 {
+            self.emit(out);
+        }
+        Ok(())
+    }
+
+    /// Gives out the rest up to the last stamp.
+    pub fn finish(mut self, out: &mut Vec<f64>) -> Resampled {
+        if let Some(&(last, _)) = self.points.back() {
+            while self.grid_time() <= last + 1e-6 * self.step_s {
+                self.emit(out);
+            }
+        }
+        self.done
+    }
+
+    fn grid_time(&self) -> f64 {
+        self.start_s + self.next as f64 * self.step_s
+    }
+
+    fn note_step(&mut self, step_s: f64) {
+        self.done.longest_step_s = self.done.longest_step_s.max(step_s);
+        if step_s > LONGEST_STEP * self.step_s {
+            self.done.gaps += 1;
+        } else {
+            let jitter = (step_s / self.step_s - 1.0).abs();
+            self.done.largest_jitter = self.done.largest_jitter.max(jitter);
+        }
+    }
+
+    fn emit(&mut self, out: &mut Vec<f64>) {
+        let time_s = self.grid_time();
+        let after = self
+            .points
+            .iter()
+            .position(|(t, _)| *t >= time_s)
+            .unwrap_or(self.points.len() - 1)
+            .max(1)
+            .min(self.points.len() - 1);
+        let value = if self.points.len() == 1 {
+            self.points[0].1
+        } else if self.is_gap(after) {
+            self.done.bridged += 1;
+            self.line(after, time_s)
+        } else {
+            self.polynomial(after, time_s)
+        };
+        out.push(value);
+        self.next += 1;
+        self.done.samples_out += 1;
+    }
+
+    fn is_gap(&self, after: usize) -> bool {
+        self.points[after].0 - self.points[after - 1].0 > LONGEST_STEP * self.step_s
+    }
+
+    fn line(&self, after: usize, time_s: f64) -> f64 {
+        let ((t0, x0), (t1, x1)) = (self.points[after - 1], self.points[after]);
+        x0 + (x1 - x0) * (time_s - t0) / (t1 - t0)
+    }
+
+    /// Lagrange polynomial through up to four points on either side that no gap separates.
+    fn polynomial(&self, after: usize, time_s: f64) -> f64 {
+        let mut first = after - 1;
+        while first > 0 && after - first < POINTS / 2 && !self.is_gap(first) {
+            first -= 1;
+        }
+        let mut last = after;
+        while last + 1 < self.points.len()
+            && last - after + 1 < POINTS / 2
+            && !self.is_gap(last + 1)
+        {
+            last += 1;
+        }
+        let nodes: Vec<(f64, f64)> = self.points.range(first..=last).copied().collect();
+        nodes
+            .iter()
+            .enumerate()
+            .map(|(i, (ti, xi))| {
+                let weight: f64 = nodes
+                    .iter()
+                    .enumerate()
+                    .filter(|(j, _)| *j != i)
+                    .map(|(_, (tj, _))| (time_s - tj) / (ti - tj))
+                    .product();
+                xi * weight
+            })
+            .sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn resample(stamps: &[f64], signal: impl Fn(f64) -> f64, step: f64) -> (Vec<f64>, Resampled) {
+        let mut out = Vec::new();
+        let mut resampler = Resampler::new(step).unwrap();
+        for t in stamps {
+            resampler.push(*t, signal(*t), &mut out).unwrap();
+        }
+        let done = resampler.finish(&mut out);
+        (out, done)
+    }
+
+    #[test]
+    fn jittered_sine_comes_back() {
+        let stamps: Vec<f64> = (0..2000)
+            .map(|i| 1e-3 * (f64::from(i) + 0.2 * (f64::from(i) * 1.7).sin()))
+            .collect();
+        let signal = |t: f64| (std::f64::consts::TAU * 60.0 * t).sin();
+        let (out, done) = resample(&stamps, signal, 1e-3);
+        assert_eq!(done.gaps, 0);
+        assert!(done.largest_jitter > 0.2 && done.largest_jitter < 0.45);
+        for (k, x) in out.iter().enumerate() {
+            // Four points on one side only within four samples of an end.
+            let bound = if (4..out.len() - 4).contains(&k) {
+                5e-6
+            } else {
+                2e-2
+            };
+            let want = signal(stamps[0] + 1e-3 * k as f64);
+            assert!((x - want).abs() < bound, "{k}: {x} {want}");
+        }
+    }
+
+    #[test]
+    fn gaps_are_bridged_and_repeats_left_out() {
+        let stamps = [0.0, 1.0, 2.0, 2.0, 3.0, 7.0, 8.0, 9.0];
+        let (out, done) = resample(&stamps, |t| 2.0 * t, 1.0);
+        assert_eq!(out.len(), 10);
+        assert!(
+            out.iter()
+                .enumerate()
+                .all(|(k, x)| (x - 2.0 * k as f64).abs() < 1e-12)
+        );
+        assert_eq!((done.gaps, done.repeated, done.bridged), (1, 1, 4));
+        assert_eq!((done.samples_in, done.samples_out), (8, 10));
+        assert_eq!(done.longest_step_s, 4.0);
+    }
+
+    #[test]
+    fn backward_time_is_refused() {
+        let mut out = Vec::new();
+        let mut resampler = Resampler::new(1.0).unwrap();
+        resampler.push(0.0, 0.0, &mut out).unwrap();
+        resampler.push(1.0, 0.0, &mut out).unwrap();
+        let error = resampler.push(0.5, 0.0, &mut out).unwrap_err();
+        assert!(matches!(error, Error::TimeNotIncreasing { index: 2, .. }));
+    }
+
+    #[test]
+    fn one_sample_is_kept() {
+        assert_eq!(resample(&[3.0], |t| t, 1.0).0, vec![3.0]);
+    }
+}

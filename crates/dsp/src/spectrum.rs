@@ -1,0 +1,229 @@
+//! Power spectral density of a record.
+
+use num_complex::Complex64;
+use realfft::RealFftPlanner;
+
+use crate::Error;
+
+/// Power spectrum summed over Hann-windowed blocks of one length.
+///
+/// The window is applied to the transform of the plain block: multiplying by a Hann window is the
+/// same as `X'[k] = ½X[k] − ¼X[k−1] − ¼X[k+1]` (F. J. Harris, Proc. IEEE 66 (1978), 51), so a
+/// transform that is made for another purpose can be used.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PowerSum {
+    block_length: usize,
+    sum: Vec<f64>,
+    blocks: usize,
+}
+
+impl PowerSum {
+    /// An empty sum for blocks of that even length.
+    #[must_use]
+    pub fn new(block_length: usize) -> Self {
+        Self {
+            block_length,
+            sum: vec![0.0; block_length / 2 + 1],
+            blocks: 0,
+        }
+    }
+
+    /// Adds the transform (bins `0..=block_length/2`) of an unwindowed block.
+    ///
+    /// # Panics
+    /// If the number of bins does not fit the block length.
+    pub fn add_hann(&mut self, spectrum: &[Complex64]) {
+        assert_eq!(spectrum.len(), self.sum.len(), "bins of one block length");
+        let last = spectrum.len() - 1;
+        for (sum, bins) in self.sum[1..last].iter_mut().zip(spectrum.windows(3)) {
+            *sum += (bins[1] * 0.5 - (bins[0] + bins[2]) * 0.25).norm_sqr();
+        }
+        // Beyond the ends lie the conjugates of the bins inside.
+        self.sum[0] += (0.5 * spectrum[0].re - 0.5 * spectrum[1].re).powi(2);
+        self.sum[last] += (0.5 * spectrum[last].re - 0.5 * spectrum[last - 1].re).powi(2);
+        self.blocks += 1;
+    }
+
+    /// Adds another sum over blocks of the same length.
+    ///
+    /// # Panics
+    /// If the block lengths differ.
+    pub fn add(&mut self, other: &Self) {
+        assert_eq!(self.block_length, other.block_length, "one block length");
+        for (sum, more) in self.sum.iter_mut().zip(&other.sum) {
+            *sum += more;
+        }
+        self.blocks += other.blocks;
+    }
+
+    /// Empties the sum.
+    pub fn clear(&mut self) {
+        self.sum.fill(0.0);
+        self.blocks = 0;
+    }
+
+    /// One-sided density; `None` if no block was added.
+    #[must_use]
+    pub fn density(&self, sample_rate_hz: f64) -> Option<Density> {
+        if self.blocks == 0 {
+            return None;
+        }
+        // Mean square of the Hann window is 3/8; two sides are folded into one.
+        let scale = 2.0 / (sample_rate_hz * 0.375 * self.block_length as f64 * self.blocks as f64);
+        let mut values: Vec<f64> = self.sum.iter().map(|power| power * scale).collect();
+        let last = values.len() - 1;
+        values[0] *= 0.5;
+        values[last] *= 0.5;
+        Some(Density {
+            step_hz: sample_rate_hz / self.block_length as f64,
+            values,
+            blocks: self.blocks,
+        })
+    }
+}
+
+/// One-sided power spectral density, unit²/Hz, at equally spaced frequencies from zero.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Density {
+    /// Distance of the frequencies, in Hz.
+    pub step_hz: f64,
+    /// The density at `0, step_hz, 2 step_hz, …`.
+    pub values: Vec<f64>,
+    /// Blocks that were averaged.
+    pub blocks: usize,
+}
+
+impl Density {
+    /// Densities from `from_hz` up to and including `to_hz`, with their frequencies.
+    pub fn between(&self, from_hz: f64, to_hz: f64) -> impl Iterator<Item = (f64, f64)> + '_ {
+        let first = (from_hz / self.step_hz).ceil().max(0.0) as usize;
+        self.values
+            .iter()
+            .enumerate()
+            .skip(first)
+            .map(|(bin, value)| (bin as f64 * self.step_hz, *value))
+            .take_while(move |(frequency_hz, _)| *frequency_hz <= to_hz)
+    }
+}
+
+/// Density of a record by Welch's method: Hann windows, half overlapping, the mean taken off each.
+///
+/// Source: P. D. Welch, IEEE Trans. Audio Electroacoust. 15 (1967), 70.
+///
+/// # Errors
+/// [`Error::TooShort`] if the record is shorter than one block, [`Error::NotPositive`] for an odd
+/// or zero block length or rate.
+///
+/// ```
+/// use torqcomp_dsp::spectrum::welch;
+/// // A cosine of amplitude 2 has a mean square of 2, all of it near its own frequency.
+/// let x: Vec<f64> = (0..4096).map(|i| 2.0 * (0.3 * i as f64).cos()).collect();
+/// let density = welch(&x, 1000.0, 512)?;
+/// let power: f64 = density.values.iter().map(|v| v * density.step_hz).sum();
+/// assert!((power - 2.0).abs() < 1e-3);
+/// # Ok::<(), torqcomp_dsp::Error>(())
+/// ```
+pub fn welch(samples: &[f64], sample_rate_hz: f64, block_length: usize) -> Result<Density, Error> {
+    if !(sample_rate_hz > 0.0 && sample_rate_hz.is_finite()) {
+        return Err(Error::NotPositive {
+            name: "sampling rate",
+            value: sample_rate_hz,
+        });
+    }
+    if block_length < 4 || !block_length.is_multiple_of(2) {
+        return Err(Error::NotPositive {
+            name: "even block length",
+            value: block_length as f64,
+        });
+    }
+    if samples.len() < block_length {
+        return Err(Error::TooShort {
+            what: "a spectrum",
+            expected: block_length,
+            got: samples.len(),
+        });
+    }
+    let transform = RealFftPlanner::new().plan_fft_forward(block_length);
+    let mut spectrum = transform.make_output_vec();
+    let mut power = PowerSum::new(block_length);
+    for start in (0..=samples.len() - block_length).step_by(block_length / 2) {
+        let mut block = samples[start..start + block_length].to_vec();
+        let mean = block.iter().sum::<f64>() / block_length as f64;
+        block.iter_mut().for_each(|x| *x -= mean);
+        transform
+            .process(&mut block, &mut spectrum)
+            .expect("buffers were made for this length");
+        power.add_hann(&spectrum);
+    }
+    Ok(power
+        .density(sample_rate_hz)
+        .expect("the record holds at least one block"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Direct transform of the windowed block: the definition, term by term.
+    fn slow_hann_power(block: &[f64]) -> Vec<f64> {
+        let n = block.len() as f64;
+        (0..=block.len() / 2)
+            .map(|k| {
+                let sum: Complex64 = block
+                    .iter()
+                    .enumerate()
+                    .map(|(i, x)| {
+                        let turn = std::f64::consts::TAU * i as f64 / n;
+                        let window = 0.5 - 0.5 * turn.cos();
+                        Complex64::from_polar(x * window, -turn * k as f64)
+                    })
+                    .sum();
+                sum.norm_sqr()
+            })
+            .collect()
+    }
+
+    #[test]
+    fn window_in_the_frequency_domain_is_the_window_in_time() {
+        let mut block: Vec<f64> = (0..64).map(|i| ((i * i) % 17) as f64 - 3.0).collect();
+        let expected = slow_hann_power(&block);
+        let transform = RealFftPlanner::new().plan_fft_forward(64);
+        let mut spectrum = transform.make_output_vec();
+        transform.process(&mut block, &mut spectrum).unwrap();
+        let mut power = PowerSum::new(64);
+        power.add_hann(&spectrum);
+        for (got, want) in power.sum.iter().zip(&expected) {
+            assert!((got - want).abs() < 1e-9 * (1.0 + want), "{got} {want}");
+        }
+    }
+
+    #[test]
+    fn white_noise_has_a_flat_density_of_twice_variance_over_rate() {
+        let mut state = 1_u64;
+        let samples: Vec<f64> = (0..1 << 16)
+            .map(|_| {
+                // Sum of four uniform numbers of variance 1/12 each.
+                (0..4)
+                    .map(|_| {
+                        state = state
+                            .wrapping_mul(6_364_136_223_846_793_005)
+                            .wrapping_add(1_442_695_040_888_963_407);
+                        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+                    })
+                    .sum()
+            })
+            .collect();
+        let density = welch(&samples, 500.0, 256).unwrap();
+        let expected = 2.0 * (4.0 / 12.0) / 500.0;
+        for band in [(5.0, 80.0), (80.0, 160.0), (160.0, 245.0)] {
+            let (sum, count) = density
+                .between(band.0, band.1)
+                .fold((0.0, 0), |(s, n), (_, v)| (s + v, n + 1));
+            let mean = sum / f64::from(count);
+            assert!(
+                (mean / expected - 1.0).abs() < 0.03,
+                "{band:?}: {mean} {expected}"
+            );
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! Errors of numbers with units.
+
+use thiserror::Error;
+
+use super::dimension::Dimension;
+
+/// What can be wrong with a number, its unit or its uncertainty.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum QuantityError {
+    /// The text is empty.
+    #[error("the text is empty; expected {expected}, for example \"{example}\"")]
+    Empty {
+        /// Name of the kind expected.
+        expected: &'static str,
+        /// A text that would do.
+        example: &'static str,
+    },
+    /// The text does not start with a number.
+    #[error(
+        "\"{text}\" does not start with a number; write the number with a decimal point and \
+         without thousands marks, for example \"{example}\""
+    )]
+    NotANumber {
+        /// Text got.
+        text: String,
+        /// A text that would do.
+        example: &'static str,
+    },
+    /// The number, or the number in SI units, is not finite.
+    #[error("\"{text}\" is not a finite number; check the input")]
+    NotFinite {
+        /// Text got.
+        text: String,
+    },
+    /// A number stands without its unit.
+    #[error("\"{text}\" has no unit; expected {expected} with its unit, for example \"{example}\"")]
+    MissingUnit {
+        /// Text got.
+        text: String,
+        /// Name of the kind expected.
+        expected: &'static str,
+        /// A text that would do.
+        example: &'static str,
+    },
+    /// A symbol is not a known unit.
+    #[error("unknown unit \"{symbol}\" in \"{unit}\"{}", hint(*.nearest))]
+    UnknownUnit {
+        /// Symbol got.
+        symbol: String,
+        /// Unit text it stands in.
+        unit: String,
+        /// Known unit of the most similar spelling, if one is close.
+        nearest: Option<&'static str>,
+    },
+    /// The unit text does not follow the grammar.
+    #[error("the unit \"{unit}\" cannot be read: {problem}")]
+    UnitSyntax {
+        /// Unit text got.
+        unit: String,
+        /// What is wrong with it and what to write.
+        problem: &'static str,
+    },
+    /// `lb` is used where it could be a mass or a force.
+    #[error(
+        "\"lb\" in \"{unit}\" is a mass; write \"lbf\" for pound-force, or \"lbm\" if the mass is \
+         meant"
+    )]
+    AmbiguousPound {
+        /// Unit text got.
+        unit: String,
+    },
+    /// The unit does not fit the kind of quantity.
+    #[error(
+        "the unit \"{unit}\" has the dimension {got}; expected {expected} ({wanted}), for example \
+         \"{example}\""
+    )]
+    WrongDimension {
+        /// Unit text got.
+        unit: String,
+        /// Its dimension.
+        got: Dimension,
+        /// Name of the kind expected.
+        expected: &'static str,
+        /// Dimension of its SI unit.
+        wanted: Dimension,
+        /// A text that would do.
+        example: &'static str,
+    },
+    /// A temperature lies below absolute zero.
+    #[error("\"{text}\" is {kelvin} K, below absolute zero; check the number and its unit")]
+    BelowAbsoluteZero {
+        /// Text got.
+        text: String,
+        /// The temperature in kelvin.
+        kelvin: f64,
+    },
+    /// A standard uncertainty is negative.
+    #[error("a standard uncertainty must be 0 or greater, but {got} was given; drop the sign")]
+    NegativeUncertainty {
+        /// What was given: a text, or a number in SI units.
+        got: String,
+    },
+    /// The value or uncertainty of an estimate is not finite.
+    #[error("the {part} of the {kind} from {origin} is {value}; check the numbers it comes from")]
+    EstimateNotFinite {
+        /// `value` or `standard uncertainty`.
+        part: &'static str,
+        /// Name of the kind.
+        kind: &'static str,
+        /// Where the estimate comes from.
+        origin: String,
+        /// Number got, in SI units.
+        value: f64,
+    },
+}
+
+/// Tail of the message about an unknown unit.
+fn hint(nearest: Option<&'static str>) -> String {
+    match nearest {
+        Some(unit) => format!("; did you mean \"{unit}\"?"),
+        None => "; the units known are listed in the documentation of quantities".to_owned(),
+    }
+}

@@ -1,0 +1,354 @@
+//! Kinds of quantity: which units fit, and which are printed.
+
+use super::error::QuantityError;
+use super::kind_table::{PrintUnit, ROWS, Row};
+use super::unit::Unit;
+
+/// Units that results are printed in. All computation is in SI.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum UnitSystem {
+    /// SI units.
+    #[default]
+    Si,
+    /// US customary units: lbf, ft, in, slug, psi, °F.
+    Us,
+}
+
+/// A physical kind of quantity.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Kind {
+    /// Mass moment of inertia, kg m² (or N m s²/rad).
+    Inertia,
+    /// Viscous torque per angular speed, N m s/rad (or N m s).
+    AngularDamping,
+    /// Torque per angle, N m/rad.
+    AngularStiffness,
+    /// Torque, N m.
+    Torque,
+    /// Force, N.
+    Force,
+    /// Length, m.
+    Length,
+    /// Area, m².
+    Area,
+    /// Second moment of area, m⁴.
+    SecondMoment,
+    /// Pressure, stress or modulus, Pa.
+    Pressure,
+    /// Mass, kg. The one kind where `lb` is accepted.
+    Mass,
+    /// Cycles or samples per second, Hz. `rad/s` converts by 1/2π, `rpm` by 1/60.
+    Frequency,
+    /// Angle per time, rad/s. `Hz` converts by 2π, `rpm` by 2π/60.
+    AngularSpeed,
+    /// Angular speed per time, rad/s².
+    AngularAcceleration,
+    /// Angle, rad.
+    Angle,
+    /// Time, s.
+    Time,
+    /// Rate of an exponential decay, 1/s.
+    DecayRate,
+    /// Voltage, V.
+    Voltage,
+    /// Current, A.
+    Current,
+    /// Resistance, Ω.
+    Resistance,
+    /// Torque per output voltage, N m/V.
+    TorquePerVolt,
+    /// Friction force per angular speed, N s/rad (or N s).
+    ForcePerAngularSpeed,
+    /// Force per deflection, N/m.
+    LinearStiffness,
+    /// Acceleration, m/s².
+    Acceleration,
+    /// Strain, m/m. A bare number is refused, as it could mean strain or microstrain.
+    Strain,
+    /// Pure number, such as a damping ratio. May stand without a unit.
+    Ratio,
+    /// Output per input of the same kind, such as V/V. May stand without a unit.
+    Gain,
+    /// Temperature on an absolute scale, K; °C and °F convert with their zero.
+    TemperatureAbsolute,
+    /// Difference of temperatures, K; °C and °F convert by the size of the degree.
+    TemperatureDifference,
+    /// Strain per temperature difference, 1/K.
+    ThermalExpansion,
+    /// Relative change per temperature difference, 1/K.
+    TemperatureCoefficient,
+}
+
+impl Kind {
+    /// All kinds.
+    pub const ALL: [Self; 30] = [
+        Self::Inertia,
+        Self::AngularDamping,
+        Self::AngularStiffness,
+        Self::Torque,
+        Self::Force,
+        Self::Length,
+        Self::Area,
+        Self::SecondMoment,
+        Self::Pressure,
+        Self::Mass,
+        Self::Frequency,
+        Self::AngularSpeed,
+        Self::AngularAcceleration,
+        Self::Angle,
+        Self::Time,
+        Self::DecayRate,
+        Self::Voltage,
+        Self::Current,
+        Self::Resistance,
+        Self::TorquePerVolt,
+        Self::ForcePerAngularSpeed,
+        Self::LinearStiffness,
+        Self::Acceleration,
+        Self::Strain,
+        Self::Ratio,
+        Self::Gain,
+        Self::TemperatureAbsolute,
+        Self::TemperatureDifference,
+        Self::ThermalExpansion,
+        Self::TemperatureCoefficient,
+    ];
+
+    fn row(self) -> &'static Row {
+        const TABLE: &[Row] = &ROWS;
+        &TABLE[self as usize]
+    }
+
+    fn print_unit(self, system: UnitSystem) -> &'static PrintUnit {
+        match system {
+            UnitSystem::Si => &self.row().si,
+            UnitSystem::Us => &self.row().us,
+        }
+    }
+
+    /// Name for messages, such as `angular stiffness`.
+    pub fn name(self) -> &'static str {
+        self.row().name
+    }
+
+    /// A text that [`Kind::parse`] accepts, for messages.
+    pub fn example(self) -> &'static str {
+        self.row().example
+    }
+
+    /// Unit that results of this kind are printed in.
+    ///
+    /// ```
+    /// use torqcomp_model::{Kind, UnitSystem};
+    /// assert_eq!(Kind::Inertia.unit(UnitSystem::Us), "slug ft^2");
+    /// ```
+    pub fn unit(self, system: UnitSystem) -> &'static str {
+        self.print_unit(system).text
+    }
+
+    /// A value in SI units as a number in the unit of [`Kind::unit`].
+    ///
+    /// ```
+    /// use torqcomp_model::{Kind, UnitSystem};
+    /// // 300 K = 26.85 °C = 80.33 °F.
+    /// let got = Kind::TemperatureAbsolute.to(UnitSystem::Us, 300.0);
+    /// assert!((got - 80.33).abs() < 1e-9);
+    /// ```
+    pub fn to(self, system: UnitSystem, si_value: f64) -> f64 {
+        let unit = self.print_unit(system);
+        (si_value - unit.zero) / unit.factor
+    }
+
+    /// A difference or uncertainty in SI units as a number in the unit of [`Kind::unit`].
+    ///
+    /// Differs from [`Kind::to`] for an absolute temperature, where the zero of the scale drops
+    /// out of a difference.
+    ///
+    /// ```
+    /// use torqcomp_model::{Kind, UnitSystem};
+    /// // 5 K are 9 °F.
+    /// let got = Kind::TemperatureAbsolute.difference_to(UnitSystem::Us, 5.0);
+    /// assert!((got - 9.0).abs() < 1e-12);
+    /// ```
+    pub fn difference_to(self, system: UnitSystem, si_difference: f64) -> f64 {
+        si_difference / self.print_unit(system).factor
+    }
+
+    /// Reads a number with its unit and returns it in the SI unit of this kind.
+    ///
+    /// # Errors
+    /// [`QuantityError`] if the number cannot be read or is not finite, its unit is missing,
+    /// unknown or of another kind, or a temperature is below absolute zero.
+    ///
+    /// ```
+    /// use torqcomp_model::Kind;
+    /// // 12 in lbf = 1 ft lbf = 1.355817948 N m.
+    /// assert!((Kind::Torque.parse("12 in lbf")? - 1.355817948).abs() < 1e-9);
+    /// // 3700 rad/s are 3700/2π = 588.873 Hz.
+    /// assert!((Kind::Frequency.parse("3700 rad/s")? - 588.873).abs() < 1e-3);
+    /// assert!(Kind::AngularStiffness.parse("8.1e4").is_err());
+    /// # Ok::<(), torqcomp_model::QuantityError>(())
+    /// ```
+    pub fn parse(self, text: &str) -> Result<f64, QuantityError> {
+        let (number, unit) = self.split(text)?;
+        let scale = self.scale(text, unit)?;
+        let value = finite(text, number * scale.factor + scale.zero)?;
+        if self == Self::TemperatureAbsolute && value < 0.0 {
+            return Err(QuantityError::BelowAbsoluteZero {
+                text: text.to_owned(),
+                kelvin: value,
+            });
+        }
+        Ok(value)
+    }
+
+    /// Reads a standard uncertainty of a quantity of this kind, in the SI unit of this kind.
+    ///
+    /// Like [`Kind::parse`], but refuses a negative number and reads a degree as a difference.
+    ///
+    /// # Errors
+    /// As [`Kind::parse`], and [`QuantityError::NegativeUncertainty`].
+    ///
+    /// ```
+    /// use torqcomp_model::Kind;
+    /// // ± 9 °F are ± 5 K.
+    /// assert!((Kind::TemperatureAbsolute.parse_std("9 degF")? - 5.0).abs() < 1e-12);
+    /// # Ok::<(), torqcomp_model::QuantityError>(())
+    /// ```
+    pub fn parse_std(self, text: &str) -> Result<f64, QuantityError> {
+        let (number, unit) = self.split(text)?;
+        let scale = self.scale(text, unit)?;
+        if number < 0.0 {
+            return Err(QuantityError::NegativeUncertainty {
+                got: text.trim().to_owned(),
+            });
+        }
+        finite(text, number * scale.factor)
+    }
+
+    /// SI units of this kind per unit of the text, for whole columns of numbers.
+    ///
+    /// For a temperature scale this is the size of its degree.
+    ///
+    /// # Errors
+    /// [`QuantityError`] if the unit is unknown, malformed or of another kind.
+    ///
+    /// ```
+    /// use torqcomp_model::Kind;
+    /// assert_eq!(Kind::Voltage.si_factor("mV")?, 1e-3);
+    /// assert!(Kind::Voltage.si_factor("N m").is_err());
+    /// # Ok::<(), torqcomp_model::QuantityError>(())
+    /// ```
+    pub fn si_factor(self, unit: &str) -> Result<f64, QuantityError> {
+        Ok(self.scale(unit, unit.trim())?.factor)
+    }
+
+    /// Splits text into its number and its unit.
+    fn split(self, text: &str) -> Result<(f64, &str), QuantityError> {
+        let trimmed = text.trim();
+        if trimmed.is_empty() {
+            return Err(QuantityError::Empty {
+                expected: self.name(),
+                example: self.example(),
+            });
+        }
+        let bad = || QuantityError::NotANumber {
+            text: text.to_owned(),
+            example: self.example(),
+        };
+        let (number, unit) = trimmed.split_at(number_length(trimmed));
+        if names_non_finite(trimmed) {
+            return Err(QuantityError::NotFinite {
+                text: text.to_owned(),
+            });
+        }
+        let number: f64 = number.parse().map_err(|_| bad())?;
+        if unit.starts_with([',', '\'', '_', '.']) {
+            return Err(bad());
+        }
+        Ok((finite(text, number)?, unit.trim_start()))
+    }
+
+    /// Factor and zero from a unit to the SI unit of this kind.
+    fn scale(self, text: &str, unit_text: &str) -> Result<Scale, QuantityError> {
+        if unit_text.is_empty() && !matches!(self, Self::Ratio | Self::Gain) {
+            return Err(QuantityError::MissingUnit {
+                text: text.trim().to_owned(),
+                expected: self.name(),
+                example: self.example(),
+            });
+        }
+        let unit = Unit::parse(unit_text)?;
+        if unit.has_bare_pound() && self != Self::Mass {
+            return Err(QuantityError::AmbiguousPound {
+                unit: unit_text.to_owned(),
+            });
+        }
+        let accepts = self.row().accepts;
+        let Some((_, factor)) = accepts.iter().find(|(d, _)| *d == unit.dimension()) else {
+            return Err(QuantityError::WrongDimension {
+                unit: unit_text.to_owned(),
+                got: unit.dimension(),
+                expected: self.name(),
+                wanted: accepts[0].0,
+                example: self.example(),
+            });
+        };
+        let zero = if self == Self::TemperatureAbsolute {
+            unit.zero()
+        } else {
+            0.0
+        };
+        Ok(Scale {
+            factor: unit.factor() * factor,
+            zero,
+        })
+    }
+}
+
+struct Scale {
+    factor: f64,
+    zero: f64,
+}
+
+fn finite(text: &str, value: f64) -> Result<f64, QuantityError> {
+    if value.is_finite() {
+        Ok(value)
+    } else {
+        Err(QuantityError::NotFinite {
+            text: text.trim().to_owned(),
+        })
+    }
+}
+
+/// Length of the decimal number at the front: `[+-] digits [. digits] [e [+-] digits]`.
+fn number_length(text: &str) -> usize {
+    let bytes = text.as_bytes();
+    let digits_from = |start: usize| {
+        start
+            + bytes[start..]
+                .iter()
+                .take_while(|byte| byte.is_ascii_digit())
+                .count()
+    };
+    let mut end = digits_from(usize::from(text.starts_with(['+', '-'])));
+    if bytes.get(end) == Some(&b'.') {
+        end = digits_from(end + 1);
+    }
+    if matches!(bytes.get(end), Some(b'e' | b'E')) {
+        let sign = usize::from(matches!(bytes.get(end + 1), Some(b'+' | b'-')));
+        let exponent = digits_from((end + 1 + sign).min(bytes.len()));
+        // An `e` without digits belongs to the unit.
+        if exponent > end + 1 + sign {
+            end = exponent;
+        }
+    }
+    end
+}
+
+/// True for the spellings of infinity and not-a-number that float syntax knows.
+fn names_non_finite(text: &str) -> bool {
+    let first = text.split_whitespace().next().unwrap_or_default();
+    first.parse::<f64>().is_ok_and(|number| !number.is_finite())
+}

@@ -1,0 +1,177 @@
+//! Uncertainty of the inverse transfer function.
+//!
+//! First-order propagation (JCGM 100:2008, clause 5.1.2, equation 10) with analytic gradients.
+//! With N = K − Jω² + jωf and G = N/K, ln G = ln N − ln K, so
+//!
+//! ```text
+//! ∂ln G/∂J = −ω²/N     ∂ln G/∂f = jω/N     ∂ln G/∂K = 1/N − 1/K
+//! ```
+//!
+//! The real part is the relative change of the magnitude, the imaginary part the change of the
+//! phase in rad.
+
+use std::f64::consts::TAU;
+
+use num_complex::Complex64;
+
+use crate::check::non_negative;
+use crate::error::ModelError;
+use crate::response::SecondOrder;
+
+/// Standard uncertainties of the constants of a stand; `None` means none is known, and the
+/// constant then counts as exact.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ParameterStd {
+    /// Of the inertia, in kg m².
+    pub inertia_kg_m2: Option<f64>,
+    /// Of the damping, in N m s/rad.
+    pub damping_n_m_s_per_rad: Option<f64>,
+    /// Of the stiffness, in N m/rad.
+    pub stiffness_n_m_per_rad: Option<f64>,
+    /// Of the static gain (torque per volt), as a fraction of it.
+    pub static_gain_relative: Option<f64>,
+}
+
+impl ParameterStd {
+    /// Refuses negative and non-finite uncertainties.
+    fn check(&self) -> Result<(), ModelError> {
+        let named = [
+            (
+                "standard uncertainty of inertia",
+                "kg m^2",
+                self.inertia_kg_m2,
+            ),
+            (
+                "standard uncertainty of damping",
+                "N m s/rad",
+                self.damping_n_m_s_per_rad,
+            ),
+            (
+                "standard uncertainty of stiffness",
+                "N m/rad",
+                self.stiffness_n_m_per_rad,
+            ),
+            (
+                "standard uncertainty of static gain",
+                "(ratio)",
+                self.static_gain_relative,
+            ),
+        ];
+        for (name, unit, value) in named {
+            if let Some(value) = value {
+                non_negative(name, unit, value)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+/// Standard uncertainty of the inverse transfer function at one frequency.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct InverseUncertainty {
+    /// Of the magnitude, as a fraction of it.
+    pub magnitude_relative: f64,
+    /// Of the phase, in rad.
+    pub phase_rad: f64,
+}
+
+/// Gradient of ln|G| and of the phase of G with respect to J, f and K, in this order.
+///
+/// With a covariance matrix C of J, f and K (from a fit, whose estimates are correlated) the
+/// variance of ln|G| is gᵀ C g with g = `ln_magnitude`, and likewise for the phase.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct InverseGradient {
+    /// ∂ln|G|/∂J in 1/(kg m²), ∂ln|G|/∂f in rad/(N m s), ∂ln|G|/∂K in rad/(N m).
+    pub ln_magnitude: [f64; 3],
+    /// ∂φ/∂J, ∂φ/∂f and ∂φ/∂K, in rad per the same units.
+    pub phase_rad: [f64; 3],
+}
+
+impl SecondOrder {
+    /// Gradient of the inverse transfer function, see [`InverseGradient`] and the module's text.
+    ///
+    /// `frequency_hz` is ω/2π in Hz.
+    ///
+    /// # Errors
+    /// [`ModelError::UndampedResonance`] where the inverse is zero: an undamped stand exactly at
+    /// its natural frequency.
+    ///
+    /// ```
+    /// // J = 2, f = 12, K = 50 at ω = 5: N = j60, so −ω²/N = −25/(j60) = j0.416667.
+    /// let stand = torqcomp_model::SecondOrder::new(2.0, 12.0, 50.0)?;
+    /// let gradient = stand.inverse_gradient(5.0 / std::f64::consts::TAU)?;
+    /// assert!(gradient.ln_magnitude[0].abs() < 1e-12);
+    /// assert!((gradient.phase_rad[0] - 0.416667).abs() < 1e-6);
+    /// # Ok::<(), torqcomp_model::ModelError>(())
+    /// ```
+    pub fn inverse_gradient(&self, frequency_hz: f64) -> Result<InverseGradient, ModelError> {
+        let omega = TAU * frequency_hz;
+        let stiffness = self.dynamic_stiffness(frequency_hz);
+        if stiffness == Complex64::ZERO {
+            return Err(ModelError::UndampedResonance { frequency_hz });
+        }
+        let compliance = stiffness.inv();
+        let terms = [
+            -omega * omega * compliance,
+            Complex64::I * omega * compliance,
+            compliance - 1.0 / self.stiffness_n_m_per_rad(),
+        ];
+        Ok(InverseGradient {
+            ln_magnitude: terms.map(|term| term.re),
+            phase_rad: terms.map(|term| term.im),
+        })
+    }
+
+    /// Standard uncertainty of the inverse transfer function at `frequency_hz` (ω/2π in Hz).
+    ///
+    /// u²(ln|G|) = Σ (∂ln|G|/∂p)² u²(p) over p = J, f, K, plus the relative u² of the static gain;
+    /// u²(φ) = Σ (∂φ/∂p)² u²(p). J, f, K and the gain count as uncorrelated; for correlated ones
+    /// use [`SecondOrder::inverse_gradient`]. `None` if no uncertainty is known at all. Valid
+    /// while the changes are small against |G|: close to the natural frequency of a lightly
+    /// damped stand u(K)/K and u(J)/J must be well below 2ζ.
+    ///
+    /// # Errors
+    /// [`ModelError`] if an uncertainty is negative or not finite, or the inverse is zero.
+    ///
+    /// ```
+    /// use torqcomp_model::{ParameterStd, SecondOrder};
+    /// // At ω_n only f moves the magnitude: u(f)/f = 0.6/12 = 5 %.
+    /// let stand = SecondOrder::new(2.0, 12.0, 50.0)?;
+    /// let std = ParameterStd { damping_n_m_s_per_rad: Some(0.6), ..ParameterStd::default() };
+    /// let got = stand.inverse_uncertainty(5.0 / std::f64::consts::TAU, &std)?.unwrap();
+    /// assert!((got.magnitude_relative - 0.05).abs() < 1e-12);
+    /// # Ok::<(), torqcomp_model::ModelError>(())
+    /// ```
+    pub fn inverse_uncertainty(
+        &self,
+        frequency_hz: f64,
+        std: &ParameterStd,
+    ) -> Result<Option<InverseUncertainty>, ModelError> {
+        std.check()?;
+        if std.is_empty() {
+            return Ok(None);
+        }
+        let gradient = self.inverse_gradient(frequency_hz)?;
+        let parameters = [
+            std.inertia_kg_m2,
+            std.damping_n_m_s_per_rad,
+            std.stiffness_n_m_per_rad,
+        ];
+        // The static gain scales the torque and does not turn its phase.
+        let mut magnitude_relative = std.static_gain_relative.unwrap_or(0.0);
+        let mut phase_rad = 0.0_f64;
+        for (i, parameter) in parameters.into_iter().enumerate() {
+            let Some(parameter) = parameter else { continue };
+            magnitude_relative = magnitude_relative.hypot(gradient.ln_magnitude[i] * parameter);
+            phase_rad = phase_rad.hypot(gradient.phase_rad[i] * parameter);
+        }
+        Ok(Some(InverseUncertainty {
+            magnitude_relative,
+            phase_rad,
+        }))
+    }
+}
