@@ -1,2 +1,22 @@
 //! The `torqcomp` command.
-fn main() {}
+
+use std::process::ExitCode;
+
+use clap::Parser;
+use torqcomp::cli::Cli;
+use torqcomp::commands::{self, Outcome};
+
+fn main() -> ExitCode {
+    // clap ends wrong usage with code 2 itself, and help with 0.
+    match commands::run(Cli::parse()) {
+        Ok(Outcome::Done) => ExitCode::SUCCESS,
+        Ok(Outcome::WithLoss) => ExitCode::from(3),
+        Err(failure) => {
+            let code = failure.exit_code();
+            if code != 0 {
+                eprintln!("torqcomp: {failure}");
+            }
+            ExitCode::from(code)
+        }
+    }
+}

@@ -35,6 +35,12 @@ impl Windows {
         }
     }
 
+    /// Samples of the record before the oldest waiting segment.
+    #[must_use]
+    pub fn passed(&self) -> usize {
+        self.passed
+    }
+
     /// Takes the next segment of the record. Segments may have any length, also none.
     pub fn push(&mut self, segment: &[f64]) {
         self.buffer.extend_from_slice(segment);

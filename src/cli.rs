@@ -1,0 +1,383 @@
+//! The command line.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use torqcomp_model::{Kind, UnitSystem};
+
+use crate::io::csv::{Delimiter, Options, Told};
+use crate::io::digits::Digits;
+
+/// True torque from the records of a reaction-torque stand.
+///
+/// The beam and the stator of a stand ring; torqcomp divides the stand's response out of a record.
+/// Results go to standard output or -o, everything said to a person to standard error.
+///
+/// Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but data were lost (or --strict turned a
+/// warning into a failure).
+#[derive(Debug, Parser)]
+#[command(name = "torqcomp", version, arg_required_else_help = true)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub verb: Verb,
+}
+
+/// The verbs.
+#[derive(Debug, Subcommand)]
+pub enum Verb {
+    /// Turn a recorded signal into the torque that acted
+    Compensate(Compensate),
+    /// Magnitude and phase of component torques at a fundamental and its orders
+    Harmonics(Harmonics),
+    /// The inverse transfer function over frequency
+    Table(Table),
+    /// Constants that follow from the drawing, beside the measured ones
+    Predict(Predict),
+}
+
+/// Units that results are printed in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Units {
+    /// N m, N, m
+    Si,
+    /// ft lbf, lbf, in
+    Us,
+}
+
+impl From<Units> for UnitSystem {
+    fn from(units: Units) -> Self {
+        match units {
+            Units::Si => Self::Si,
+            Units::Us => Self::Us,
+        }
+    }
+}
+
+/// Formats of results.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// Comma-separated text
+    Csv,
+}
+
+/// How a record is read.
+#[derive(Debug, Args)]
+pub struct Record {
+    /// Recording to read (CSV, TSV or a recorder's text export), or - for standard input
+    #[arg(value_name = "INPUT")]
+    pub input: String,
+    /// Column with the signal: its heading, with or without the unit, or its number
+    #[arg(long, value_name = "NAME")]
+    pub channel: Option<String>,
+    /// Unit of the signal, if its heading does not say: V, mV, "N m", "ft lbf", ustrain
+    #[arg(long, value_name = "UNIT")]
+    pub unit: Option<String>,
+    /// Column with the time stamps
+    #[arg(long, value_name = "NAME")]
+    pub time_column: Option<String>,
+    /// Unit of the time stamps, if their heading does not say: s, ms, us, min
+    #[arg(long, value_name = "UNIT")]
+    pub time_unit: Option<String>,
+    /// Sampling rate, where there are no time stamps or they are wrong; with --resample, the rate
+    /// to interpolate to
+    #[arg(long, value_name = "HZ", value_parser = positive_frequency)]
+    pub rate: Option<f64>,
+    /// Interpolate where the time stamps are not uniform, instead of refusing
+    #[arg(long)]
+    pub resample: bool,
+    /// What separates the cells: , ; | tab space none
+    #[arg(long, value_name = "MARK", value_parser = delimiter)]
+    pub delimiter: Option<Delimiter>,
+    /// Decimal mark: . or ,
+    #[arg(long, value_name = "MARK", value_parser = decimal)]
+    pub decimal: Option<u8>,
+}
+
+impl Record {
+    /// The options that the table reader takes.
+    #[must_use]
+    pub fn options(&self) -> Options {
+        Options {
+            channel: self.channel.clone(),
+            unit: self.unit.clone(),
+            time_column: self.time_column.clone(),
+            time_unit: self.time_unit.clone(),
+            rate_hz: self.rate,
+            resample: self.resample,
+            told: Told {
+                delimiter: self.delimiter,
+                decimal: self.decimal,
+            },
+        }
+    }
+}
+
+/// Where a result goes.
+#[derive(Debug, Args)]
+pub struct Result {
+    /// File to write, or - for standard output
+    #[arg(short, long, value_name = "OUT")]
+    pub output: Option<String>,
+    /// Replace the output if it exists
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// Arguments of `compensate`.
+#[derive(Debug, Args)]
+pub struct Compensate {
+    /// The recording.
+    #[command(flatten)]
+    pub record: Record,
+    /// The result.
+    #[command(flatten)]
+    pub result: Result,
+    /// Stand file
+    #[arg(long, value_name = "FILE")]
+    pub stand: PathBuf,
+    /// Compensate up to this frequency [default: 2400 Hz, or less if the rate demands it]
+    #[arg(long, value_name = "HZ", value_parser = positive_frequency)]
+    pub band: Option<f64>,
+    /// Units of the result
+    #[arg(long, value_enum, default_value = "si")]
+    pub units: Units,
+    /// Format of the result
+    #[arg(long, value_enum, default_value = "csv")]
+    pub format: Format,
+    /// Significant digits of the result, 1 to 15, or "shortest" for as many as bring back every bit
+    #[arg(long, value_name = "N", default_value = "12", value_parser = digits)]
+    pub digits: Digits,
+    /// Add the recorded torque, before compensation, as a third column
+    #[arg(long)]
+    pub with_recorded: bool,
+    /// Transform the record as a whole, in memory that grows with it, instead of as a stream
+    #[arg(long)]
+    pub whole_record: bool,
+    /// Draw the recorded and the compensated torque into an SVG file
+    #[arg(long, value_name = "FILE")]
+    pub plot: Option<PathBuf>,
+    /// Part of the record to draw, in seconds of its time axis
+    #[arg(long, value_name = "FROM..TO", value_parser = range, requires = "plot")]
+    pub plot_range: Option<(f64, f64)>,
+    /// Print a report as JSON to standard output (the samples then need -o FILE)
+    #[arg(long)]
+    pub json: bool,
+    /// End with code 3 if there are warnings
+    #[arg(long)]
+    pub strict: bool,
+    /// Threads to use [default: one for each core, at most 8]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub threads: Option<u16>,
+    /// Say nothing on standard error but warnings
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// Arguments of `harmonics`.
+#[derive(Debug, Args)]
+pub struct Harmonics {
+    /// The recording.
+    #[command(flatten)]
+    pub record: Record,
+    /// The result.
+    #[command(flatten)]
+    pub result: Result,
+    /// Stand file
+    #[arg(long, value_name = "FILE")]
+    pub stand: PathBuf,
+    /// Fundamental frequency
+    #[arg(long, value_name = "HZ", value_parser = positive_frequency)]
+    pub fundamental: f64,
+    /// Orders of the fundamental: ranges and single ones, as in 1-20 or 0.5,1,2
+    #[arg(long, value_name = "LIST", default_value = "1-20", value_parser = orders)]
+    pub orders: Orders,
+    /// Find the fundamental in the data, near the one given
+    #[arg(long)]
+    pub refine: bool,
+    /// How far from the given fundamental to search, in per cent of it
+    #[arg(long, value_name = "PERCENT", default_value = "2", requires = "refine", value_parser = percent)]
+    pub refine_span: f64,
+    /// Units of the result
+    #[arg(long, value_enum, default_value = "si")]
+    pub units: Units,
+    /// Print JSON instead of a table
+    #[arg(long)]
+    pub json: bool,
+    /// End with code 3 if there are warnings
+    #[arg(long)]
+    pub strict: bool,
+}
+
+/// Arguments of `table`.
+#[derive(Debug, Args)]
+pub struct Table {
+    /// The result.
+    #[command(flatten)]
+    pub result: Result,
+    /// Stand file
+    #[arg(long, value_name = "FILE")]
+    pub stand: PathBuf,
+    /// First frequency
+    #[arg(long, value_name = "HZ", default_value = "0", value_parser = frequency)]
+    pub from: f64,
+    /// Last frequency
+    #[arg(long, value_name = "HZ", default_value = "2500", value_parser = frequency)]
+    pub to: f64,
+    /// Step of the frequency
+    #[arg(long, value_name = "HZ", default_value = "10", value_parser = positive_frequency)]
+    pub step: f64,
+    /// Add the standard uncertainties that follow from those of the stand's constants
+    #[arg(long)]
+    pub uncertainty: bool,
+    /// Print JSON instead of CSV
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `predict`.
+#[derive(Debug, Args)]
+pub struct Predict {
+    /// The result.
+    #[command(flatten)]
+    pub result: Result,
+    /// Stand file
+    #[arg(long, value_name = "FILE")]
+    pub stand: PathBuf,
+    /// Units of the result
+    #[arg(long, value_enum, default_value = "si")]
+    pub units: Units,
+    /// Print JSON instead of a table
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Orders of a fundamental, rising.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Orders(pub Vec<f64>);
+
+/// Most orders that are fitted at once.
+const MOST_ORDERS: usize = 500;
+
+/// A frequency: a number of Hz, or a number with a unit.
+fn frequency(text: &str) -> std::result::Result<f64, String> {
+    let value = match text.trim().parse::<f64>() {
+        Ok(value) => value,
+        Err(_) => Kind::Frequency.parse(text).map_err(|e| e.to_string())?,
+    };
+    if value.is_finite() && value >= 0.0 {
+        Ok(value)
+    } else {
+        Err("expected a frequency in Hz, such as 2400 or \"2.4 kHz\"".to_owned())
+    }
+}
+
+fn positive_frequency(text: &str) -> std::result::Result<f64, String> {
+    match frequency(text)? {
+        0.0 => Err("expected a frequency greater than zero".to_owned()),
+        value => Ok(value),
+    }
+}
+
+fn percent(text: &str) -> std::result::Result<f64, String> {
+    match text.trim().trim_end_matches('%').trim().parse::<f64>() {
+        Ok(value) if value > 0.0 && value < 50.0 => Ok(value),
+        _ => Err("expected per cent between 0 and 50, such as 2".to_owned()),
+    }
+}
+
+fn delimiter(text: &str) -> std::result::Result<Delimiter, String> {
+    match text {
+        "tab" | "\t" | "\\t" => Ok(Delimiter::Byte(b'\t')),
+        "space" | "spaces" | " " => Ok(Delimiter::Spaces),
+        "none" => Ok(Delimiter::None),
+        _ => match text.as_bytes() {
+            [byte] if byte.is_ascii_punctuation() && !b".+-\"".contains(byte) => {
+                Ok(Delimiter::Byte(*byte))
+            }
+            _ => Err("expected one of , ; | tab space none".to_owned()),
+        },
+    }
+}
+
+fn decimal(text: &str) -> std::result::Result<u8, String> {
+    match text {
+        "." | "point" => Ok(b'.'),
+        "," | "comma" => Ok(b','),
+        _ => Err("expected . or ,".to_owned()),
+    }
+}
+
+fn digits(text: &str) -> std::result::Result<Digits, String> {
+    match text.parse::<u32>() {
+        Ok(count @ 1..=15) => Ok(Digits::Significant(count)),
+        _ if text == "shortest" => Ok(Digits::Shortest),
+        _ => Err("expected a number from 1 to 15, or \"shortest\"".to_owned()),
+    }
+}
+
+fn range(text: &str) -> std::result::Result<(f64, f64), String> {
+    let ends = text
+        .split_once("..")
+        .and_then(|(from, to)| Some((from.trim().parse().ok()?, to.trim().parse().ok()?)));
+    match ends {
+        Some((from, to)) if from < to => Ok((from, to)),
+        _ => Err("expected two times in seconds, such as 0.1..0.15".to_owned()),
+    }
+}
+
+fn orders(text: &str) -> std::result::Result<Orders, String> {
+    let wrong = || "expected orders such as 1-20 or 0.5,1,2".to_owned();
+    let mut all = Vec::new();
+    for item in text.split(',') {
+        match item.split_once('-') {
+            Some((from, to)) => {
+                let from: u32 = from.trim().parse().map_err(|_| wrong())?;
+                let to: u32 = to.trim().parse().map_err(|_| wrong())?;
+                if from > to || to as usize > 100_000 {
+                    return Err(wrong());
+                }
+                all.extend((from..=to).map(f64::from));
+            }
+            None => all.push(item.trim().parse::<f64>().map_err(|_| wrong())?),
+        }
+    }
+    if all.iter().any(|order| !(*order > 0.0 && order.is_finite())) {
+        return Err("orders must be greater than zero; the mean is always fitted".to_owned());
+    }
+    all.sort_by(f64::total_cmp);
+    all.dedup();
+    if all.len() > MOST_ORDERS {
+        return Err(format!(
+            "{} orders are too many; at most {MOST_ORDERS}",
+            all.len()
+        ));
+    }
+    Ok(Orders(all))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_sound() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn values_are_read_as_people_write_them() {
+        assert_eq!(frequency("2400"), Ok(2400.0));
+        assert_eq!(frequency("2.4 kHz"), Ok(2400.0));
+        assert!(frequency("-1").is_err() && frequency("nan").is_err() && frequency("2 V").is_err());
+        assert_eq!(orders("1-3,0.5,2").unwrap().0, [0.5, 1.0, 2.0, 3.0]);
+        assert!(orders("3-1").is_err() && orders("0").is_err() && orders("a").is_err());
+        assert_eq!(delimiter("tab"), Ok(Delimiter::Byte(b'\t')));
+        assert!(delimiter("ab").is_err());
+        assert_eq!(range("0.1..0.2"), Ok((0.1, 0.2)));
+        assert!(range("0.2..0.1").is_err());
+        assert_eq!(digits("9"), Ok(Digits::Significant(9)));
+        assert!(digits("0").is_err() && digits("16").is_err());
+    }
+}

@@ -1,0 +1,358 @@
+//! `compensate`: a recorded signal in, the torque that acted out.
+
+mod stream;
+mod whole;
+
+use std::path::Path;
+
+use torqcomp_dsp::band::Band;
+use torqcomp_dsp::compensate::InverseFilter;
+use torqcomp_dsp::noise::NoiseGain;
+use torqcomp_dsp::resample;
+
+use super::{Outcome, conclude, relative_std};
+use crate::cli::Compensate;
+use crate::failure::Failure;
+use crate::io::csv::{Place, Summary, Table, TimeAxis, TimeSource};
+use crate::io::digits;
+use crate::io::output::Output;
+use crate::report::compensate::{Gain, Noise, RecordNoise, Report, Resampled, SCHEMA};
+use crate::report::svg::Traces;
+use crate::report::{self, Warning};
+use crate::stand::{self, Chain, Stand};
+
+/// The band unless another is asked for, as far as the rate allows: that of the thesis.
+const DEFAULT_BAND_HZ: f64 = 2400.0;
+/// Frequencies at which the report gives the gain, as fractions of the band.
+const GAIN_POINTS: usize = 9;
+/// Part of the result that may be noise before it is worth a warning.
+const NOISY_FRACTION: f64 = 0.5;
+
+/// All that is settled before the first sample is read.
+struct Plan {
+    table: Table,
+    stand: Stand,
+    chain: Chain,
+    filter: InverseFilter,
+}
+
+/// What a run found out.
+struct Run {
+    summary: Summary,
+    samples: usize,
+    start_s: f64,
+    resampled: Option<resample::Resampled>,
+    noise: Option<torqcomp_dsp::noise::RecordNoise>,
+    traces: Option<Traces>,
+}
+
+/// Runs the verb.
+pub fn run(args: &Compensate) -> Result<Outcome, Failure> {
+    let to_stdout = args.result.output.as_deref().is_none_or(|o| o == "-");
+    if args.json && to_stdout {
+        return Err(Failure::usage(
+            "--json and the samples both want standard output; give the samples a file with -o",
+        ));
+    }
+    let plan = plan(args)?;
+    let input = Path::new(&args.record.input);
+    let inputs = [input, args.stand.as_path()];
+    let mut output = Output::open(args.result.output.as_deref(), args.result.force, &inputs)?;
+    let plot = args
+        .plot
+        .as_ref()
+        .map(|path| Output::open(path.to_str(), args.result.force, &inputs))
+        .transpose()?;
+    output.write(heading(&plan.chain, args.with_recorded).as_bytes())?;
+
+    let mut report = describe(args, &plan, output.name());
+    let unit = plan.chain.applied.unit.clone();
+    let run = if args.whole_record {
+        whole::run(args, plan, &mut output)?
+    } else {
+        stream::run(args, plan, &mut output)?
+    };
+    complete(&mut report, &run);
+    output.finish()?;
+    if let (Some(mut plot), Some(traces)) = (plot, &run.traces) {
+        plot.write(traces.svg(&unit).as_bytes())?;
+        plot.finish()?;
+    }
+    if args.json {
+        crate::io::output::write_all(None, false, &report::json(&report))?;
+    }
+    if !args.quiet {
+        eprint!("{}", report.text());
+    }
+    Ok(conclude(
+        &report.warnings,
+        run.summary.lost.is_some(),
+        args.strict,
+    ))
+}
+
+fn plan(args: &Compensate) -> Result<Plan, Failure> {
+    let stand = stand::read(&args.stand)?;
+    let inverse = stand.inverse()?;
+    let place = Place::of(&args.record.input);
+    let table = Table::open(&place, &args.record.options())?;
+    let chain = stand.chain(
+        &table.channel.name,
+        table.channel.unit.as_ref(),
+        args.units.into(),
+    )?;
+    let band = match args.band {
+        Some(band_hz) => Band::new(table.time.rate_hz, band_hz),
+        None => Band::fitting(table.time.rate_hz, DEFAULT_BAND_HZ),
+    }
+    .map_err(|error| Failure::failed(error).at(&table.source))?;
+    let filter = InverseFilter::design(inverse, band)?;
+    Ok(Plan {
+        table,
+        stand,
+        chain,
+        filter,
+    })
+}
+
+/// First line of the result.
+fn heading(chain: &Chain, with_recorded: bool) -> String {
+    let applied = chain.applied.heading();
+    if with_recorded {
+        format!("time_s,{applied},recorded_{applied}\n")
+    } else {
+        format!("time_s,{applied}\n")
+    }
+}
+
+/// The report as far as it is known before the run.
+fn describe(args: &Compensate, plan: &Plan, output: &str) -> Report {
+    let Plan {
+        table,
+        stand,
+        chain,
+        filter,
+    } = plan;
+    let band = filter.band();
+    let gain = NoiseGain::of(filter, GAIN_POINTS);
+    Report {
+        schema: SCHEMA,
+        version: env!("CARGO_PKG_VERSION"),
+        input: table.source.clone(),
+        dialect: table.layout.dialect.describe(),
+        channel: table.channel.name.clone(),
+        channel_unit: table
+            .channel
+            .unit
+            .as_ref()
+            .map_or_else(String::new, |u| u.text.clone()),
+        stand: stand.file.clone(),
+        output: output.to_owned(),
+        unit: chain.applied.unit.clone(),
+        calibration: chain.described.clone(),
+        samples: 0,
+        rate_hz: table.time.rate_hz,
+        rate_from: rate_from(&table.time),
+        start_s: 0.0,
+        method: if args.whole_record {
+            "whole-record"
+        } else {
+            "stream"
+        },
+        band_hz: band.top_hz(),
+        band_end_hz: band.end_hz(),
+        edge_s: filter.half_length() as f64 / band.sample_rate_hz(),
+        resampled: None,
+        noise: Noise {
+            white_gain: gain.white,
+            largest_gain: gain.largest.0,
+            largest_gain_at_hz: gain.largest.1,
+            gain: gain
+                .curve
+                .iter()
+                .map(|&(frequency_hz, gain)| Gain {
+                    frequency_hz,
+                    gain,
+                    relative_std: relative_std(stand, chain, frequency_hz),
+                })
+                .collect(),
+            record: None,
+        },
+        warnings: Vec::new(),
+    }
+}
+
+fn rate_from(time: &TimeAxis) -> String {
+    match &time.source {
+        TimeSource::Given => "given with --rate".to_owned(),
+        TimeSource::Stamps {
+            heading, resampled, ..
+        } if *resampled => {
+            format!("from the stamps in \"{heading}\", interpolated")
+        }
+        TimeSource::Stamps { heading, .. } => {
+            format!("from the uniform stamps in \"{heading}\"")
+        }
+    }
+}
+
+/// Fills in what the run found.
+fn complete(report: &mut Report, run: &Run) {
+    report.samples = run.samples;
+    report.start_s = run.start_s;
+    report.resampled = run.resampled.as_ref().map(|r| Resampled {
+        samples_in: r.samples_in,
+        samples_out: r.samples_out,
+        repeated: r.repeated,
+        gaps: r.gaps,
+        bridged: r.bridged,
+        longest_step_s: r.longest_step_s,
+        largest_jitter: r.largest_jitter,
+    });
+    report.noise.record = run.noise.as_ref().map(|noise| RecordNoise {
+        floor_per_root_hz: noise.floor_density.sqrt(),
+        floor_band_hz: [noise.floor_from_hz, noise.floor_to_hz],
+        recorded_rms: noise.recorded_rms,
+        compensated_rms: noise.compensated_rms,
+        output_rms: noise.output_rms,
+        lost_hz: noise.lost.iter().map(|(from, to)| [*from, *to]).collect(),
+    });
+    let warnings = &mut report.warnings;
+    warnings.extend(run.summary.lost.clone());
+    warnings.extend(run.summary.warnings.clone());
+    if let Some(noise) = &run.noise {
+        warnings.extend(noise_warnings(noise, report.band_hz));
+    }
+    if let Some(resampled) = &run.resampled {
+        warnings.extend(gap_warning(resampled));
+    }
+    let reach_s = 2.0 * report.edge_s * report.rate_hz;
+    if (run.samples as f64) < reach_s {
+        report.warnings.push(Warning::new(
+            "short-record",
+            format!(
+                "the record has {} samples, and every one leans on the continuation beyond its \
+                 ends; record at least {} for a band of {} Hz",
+                run.samples,
+                reach_s as usize,
+                report::short(report.band_hz)
+            ),
+        ));
+    }
+}
+
+fn noise_warnings(noise: &torqcomp_dsp::noise::RecordNoise, band_hz: f64) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    if let Some(from_hz) = noise.lost_from_hz(band_hz) {
+        let remedy = if from_hz > 0.0 {
+            format!("--band {} keeps it out", report::rounded(from_hz, 4))
+        } else {
+            "the whole band is affected: check the channel".to_owned()
+        };
+        warnings.push(Warning::new(
+            "band-lost-in-noise",
+            format!(
+                "from {} to {} Hz the record does not rise above its noise, which the compensation \
+                 multiplies there; {remedy}",
+                report::rounded(from_hz, 4),
+                report::short(band_hz)
+            ),
+        ));
+    }
+    if noise.compensated_rms > NOISY_FRACTION * noise.output_rms {
+        warnings.push(Warning::new(
+            "mostly-noise",
+            format!(
+                "noise makes up {} of {} rms of the result; choose a lower --band",
+                report::rounded(noise.compensated_rms, 3),
+                report::rounded(noise.output_rms, 3)
+            ),
+        ));
+    }
+    warnings
+}
+
+fn gap_warning(resampled: &resample::Resampled) -> Option<Warning> {
+    (resampled.gaps > 0 || resampled.repeated > 0).then(|| {
+        Warning::new(
+            "resampled-gaps",
+            format!(
+                "{} gap(s) in the time stamps were bridged by straight lines ({} samples, the \
+                 longest {} s), {} repeated stamp(s) left out",
+                resampled.gaps,
+                resampled.bridged,
+                report::rounded(resampled.longest_step_s, 4),
+                resampled.repeated
+            ),
+        )
+    })
+}
+
+/// Writes the rows of a result: time, torque, and the recorded torque if it is wanted.
+struct Rows<'a> {
+    digits: digits::Digits,
+    /// Printed units per SI unit.
+    scale: f64,
+    times: Times<'a>,
+}
+
+/// Where the text of the time column comes from.
+enum Times<'a> {
+    /// Copied from the input.
+    Copied { text: &'a [u8], spans: &'a [u64] },
+    /// Stamps in another unit, times seconds per unit.
+    Stamps { times: &'a [f64], seconds: f64 },
+    /// A grid: start, index of the first sample, rate.
+    Grid {
+        start_s: f64,
+        first: usize,
+        rate_hz: f64,
+    },
+}
+
+impl Rows<'_> {
+    /// Appends the rows of `torque`, beside `recorded` if that is not empty.
+    fn write(&self, out: &mut Vec<u8>, torque: &[f64], recorded: &[f64]) {
+        for (i, value) in torque.iter().enumerate() {
+            match &self.times {
+                Times::Copied { text, spans } => {
+                    out.extend_from_slice(crate::io::csv::spanned(text, spans[i]));
+                }
+                Times::Stamps { times, seconds } => {
+                    digits::write(out, times[i] * seconds, digits::DEFAULT_DIGITS);
+                }
+                Times::Grid {
+                    start_s,
+                    first,
+                    rate_hz,
+                } => {
+                    let time_s = start_s + (first + i) as f64 / rate_hz;
+                    digits::write(out, time_s, digits::DEFAULT_DIGITS);
+                }
+            }
+            out.push(b',');
+            digits::write(out, value * self.scale, self.digits);
+            if let Some(value) = recorded.get(i) {
+                out.push(b',');
+                digits::write(out, value * self.scale, self.digits);
+            }
+            out.push(b'\n');
+        }
+    }
+
+    /// Time of the row `i`.
+    fn time_s(&self, i: usize) -> f64 {
+        match &self.times {
+            Times::Copied { text, spans } => {
+                let text = crate::io::csv::spanned(text, spans[i]);
+                crate::io::number::read(text, 0, b'.').map_or(f64::NAN, |(value, _)| value)
+            }
+            Times::Stamps { times, seconds } => times[i] * seconds,
+            Times::Grid {
+                start_s,
+                first,
+                rate_hz,
+            } => start_s + (first + i) as f64 / rate_hz,
+        }
+    }
+}

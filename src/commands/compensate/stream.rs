@@ -1,0 +1,297 @@
+//! The streaming way: pieces of the file go through the stages on all cores, in bounded memory.
+
+use std::collections::VecDeque;
+
+use torqcomp_dsp::compensate::{BlockConvolver, Windows};
+use torqcomp_dsp::conversion::Conversion;
+use torqcomp_dsp::noise::RecordNoise;
+use torqcomp_dsp::resample::Resampler;
+use torqcomp_dsp::spectrum::{PowerSum, welch};
+
+use super::{Plan, Rows, Run, Times};
+use crate::cli::Compensate;
+use crate::commands::unconverted;
+use crate::failure::Failure;
+use crate::io::csv::{Batch, TimeAxis, TimeSource};
+use crate::io::output::Output;
+use crate::pipeline::{self, Stages};
+use crate::report::svg::Traces;
+
+/// Threads that are worth starting: reading and writing stay serial.
+const MOST_THREADS: usize = 8;
+/// Jobs under way beside those that the threads hold.
+const SPARE_JOBS: usize = 2;
+
+/// A piece of the record on its way.
+#[derive(Default)]
+struct Job {
+    batch: Batch,
+    /// Sample that did not convert, and why.
+    unconverted: Option<(usize, String)>,
+    /// Index of the first sample of the window's middle in the record.
+    first: usize,
+    window: Vec<f64>,
+    torque: Vec<f64>,
+    text: Vec<u8>,
+    power: Option<PowerSum>,
+}
+
+/// What each sample goes through, the same on every thread.
+struct Steps<'a> {
+    recorded_factor: f64,
+    conversion: &'a Conversion,
+    half_length: usize,
+    time: &'a TimeAxis,
+    start_s: f64,
+    scale: f64,
+    args: &'a Compensate,
+}
+
+/// Runs the stages over the whole record.
+pub fn run(args: &Compensate, plan: Plan, output: &mut Output) -> Result<Run, Failure> {
+    let Plan {
+        table,
+        chain,
+        filter,
+        ..
+    } = plan;
+    let half_length = filter.half_length();
+    let rate_hz = table.time.rate_hz;
+    let time = table.time.clone();
+    let mut joiner = Joiner::new(&time, half_length);
+    let steps = Steps {
+        recorded_factor: chain.recorded_factor,
+        conversion: &chain.conversion,
+        half_length,
+        time: &time,
+        start_s: table.first_time_s(),
+        scale: 1.0 / chain.applied.factor,
+        args,
+    };
+    // Rows enough that a piece needs no more than the one after it.
+    let (mut fetch, row_plan, mut sequence) = table.into_stream(2 * half_length);
+    let first = BlockConvolver::new(&filter);
+    let mut power = PowerSum::new(first.block_length());
+    let mut traces = args.plot.as_ref().map(|_| Traces::new(args.plot_range));
+    let mut only_window = None;
+    let threads = threads(args);
+    let mut convolvers: Vec<BlockConvolver> = (1..threads).map(|_| first.another()).collect();
+    convolvers.push(first);
+
+    pipeline::run(
+        threads + SPARE_JOBS,
+        convolvers,
+        Stages {
+            read: |job: &mut Job| fetch.next(&mut job.batch),
+            prepare: |job: &mut Job| {
+                job.batch.read_rows(&row_plan, &time);
+                job.unconverted = steps.convert(&mut job.batch.rows.values);
+            },
+            join: |job: Option<Job>, ready: &mut dyn FnMut(Job)| match job {
+                Some(job) => {
+                    sequence.accept(&job.batch)?;
+                    if let Some((row, message)) = &job.unconverted {
+                        return Err(sequence.failure_at_row(&job.batch, *row, message));
+                    }
+                    joiner.push(job, ready)
+                }
+                None => {
+                    joiner.finish(ready);
+                    Ok(())
+                }
+            },
+            work: |convolver: &mut BlockConvolver, job: &mut Job| steps.work(convolver, job),
+            deliver: |job: &mut Job| {
+                output.write(&job.text)?;
+                if let Some(part) = &job.power {
+                    power.add(part);
+                }
+                if let Some(traces) = &mut traces {
+                    steps.trace(job, traces);
+                }
+                // A record that fits one window may be too short for a block.
+                only_window = (job.first == 0).then(|| std::mem::take(&mut job.window));
+                Ok(())
+            },
+        },
+    )?;
+
+    let density = power.density(rate_hz).or_else(|| {
+        let window = only_window.as_ref()?;
+        let middle = window.get(half_length..window.len() - half_length)?;
+        let block = (middle.len() / 2).next_power_of_two() / 2;
+        welch(middle, rate_hz, block).ok()
+    });
+    let in_print = |mut noise: RecordNoise| {
+        noise.floor_density *= steps.scale * steps.scale;
+        noise.recorded_rms *= steps.scale;
+        noise.compensated_rms *= steps.scale;
+        noise.output_rms *= steps.scale;
+        noise
+    };
+    Ok(Run {
+        summary: sequence.finish()?,
+        samples: joiner.samples,
+        start_s: steps.start_s,
+        resampled: joiner.resampled,
+        noise: density
+            .and_then(|density| RecordNoise::of(&filter, &density))
+            .map(in_print),
+        traces,
+    })
+}
+
+fn threads(args: &Compensate) -> usize {
+    match args.threads {
+        Some(threads) => usize::from(threads),
+        None => std::thread::available_parallelism().map_or(1, |n| n.get().min(MOST_THREADS)),
+    }
+}
+
+/// Puts the pieces together into windows, in order.
+struct Joiner {
+    windows: Windows,
+    resampler: Option<Resampler>,
+    seconds_per_unit: f64,
+    waiting: VecDeque<Job>,
+    samples: usize,
+    resampled: Option<torqcomp_dsp::resample::Resampled>,
+}
+
+impl Joiner {
+    fn new(time: &TimeAxis, half_length: usize) -> Self {
+        let resampler = time
+            .is_resampled()
+            .then(|| Resampler::new(1.0 / time.rate_hz).expect("a rate found in the stamps"));
+        let seconds_per_unit = match &time.source {
+            TimeSource::Stamps {
+                seconds_per_unit, ..
+            } => *seconds_per_unit,
+            TimeSource::Given => 1.0,
+        };
+        Self {
+            windows: Windows::new(half_length),
+            resampler,
+            seconds_per_unit,
+            waiting: VecDeque::new(),
+            samples: 0,
+            resampled: None,
+        }
+    }
+
+    fn push(&mut self, job: Job, ready: &mut dyn FnMut(Job)) -> Result<(), Failure> {
+        let rows = &job.batch.rows;
+        match &mut self.resampler {
+            None => {
+                self.windows.push(&rows.values);
+                self.samples += rows.values.len();
+            }
+            Some(resampler) => {
+                let mut grid = Vec::new();
+                for (time, value) in rows.times.iter().zip(&rows.values) {
+                    resampler.push(time * self.seconds_per_unit, *value, &mut grid)?;
+                }
+                self.windows.push(&grid);
+                self.samples += grid.len();
+            }
+        }
+        self.waiting.push_back(job);
+        self.hand_on(ready);
+        Ok(())
+    }
+
+    fn finish(&mut self, ready: &mut dyn FnMut(Job)) {
+        if let Some(resampler) = self.resampler.take() {
+            let mut grid = Vec::new();
+            self.resampled = Some(resampler.finish(&mut grid));
+            self.windows.push(&grid);
+            self.samples += grid.len();
+            self.waiting.push_back(Job::default());
+        }
+        self.windows.finish();
+        self.hand_on(ready);
+    }
+
+    fn hand_on(&mut self, ready: &mut dyn FnMut(Job)) {
+        while let Some(job) = self.waiting.front_mut() {
+            job.first = self.windows.passed();
+            if !self.windows.pop(&mut job.window) {
+                break;
+            }
+            if let Some(job) = self.waiting.pop_front() {
+                ready(job);
+            }
+        }
+    }
+}
+
+impl Steps<'_> {
+    /// Recorded units to torque at rest; the first sample that has none.
+    fn convert(&self, values: &mut [f64]) -> Option<(usize, String)> {
+        if self.recorded_factor != 1.0 {
+            values.iter_mut().for_each(|v| *v *= self.recorded_factor);
+        }
+        self.conversion.convert_slice(values).err().map(unconverted)
+    }
+
+    /// Compensates a window and writes it as text.
+    fn work(&self, convolver: &mut BlockConvolver, job: &mut Job) {
+        let length = job.window.len() - 2 * self.half_length;
+        job.torque.resize(length, 0.0);
+        let power = job
+            .power
+            .get_or_insert_with(|| PowerSum::new(convolver.block_length()));
+        power.clear();
+        convolver.convolve(&job.window, &mut job.torque, Some(power));
+        job.text.clear();
+        let rows = self.rows(&job.batch, job.first);
+        let recorded = self.recorded(&job.window);
+        let recorded = if self.args.with_recorded {
+            recorded
+        } else {
+            &[]
+        };
+        rows.write(&mut job.text, &job.torque, recorded);
+    }
+
+    fn recorded<'a>(&self, window: &'a [f64]) -> &'a [f64] {
+        &window[self.half_length..window.len() - self.half_length]
+    }
+
+    fn trace(&self, job: &Job, traces: &mut Traces) {
+        let rows = self.rows(&job.batch, job.first);
+        let recorded = self.recorded(&job.window);
+        for (i, (torque, recorded)) in job.torque.iter().zip(recorded).enumerate() {
+            traces.add(rows.time_s(i), recorded * self.scale, torque * self.scale);
+        }
+    }
+
+    fn rows<'a>(&self, batch: &'a Batch, first: usize) -> Rows<'a> {
+        let grid = Times::Grid {
+            start_s: self.start_s,
+            first,
+            rate_hz: self.time.rate_hz,
+        };
+        let times = match &self.time.source {
+            TimeSource::Given
+            | TimeSource::Stamps {
+                resampled: true, ..
+            } => grid,
+            TimeSource::Stamps { copied: true, .. } => Times::Copied {
+                text: &batch.text,
+                spans: &batch.rows.time_text,
+            },
+            TimeSource::Stamps {
+                seconds_per_unit, ..
+            } => Times::Stamps {
+                times: &batch.rows.times,
+                seconds: *seconds_per_unit,
+            },
+        };
+        Rows {
+            digits: self.args.digits,
+            scale: self.scale,
+            times,
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! The whole-record way: everything in memory, one transform.
+
+use torqcomp_dsp::compensate::whole_record;
+use torqcomp_dsp::noise::RecordNoise;
+use torqcomp_dsp::spectrum::welch;
+
+use super::{Plan, Rows, Run, Times};
+use crate::cli::Compensate;
+use crate::failure::Failure;
+use crate::io::csv::Record;
+use crate::io::output::Output;
+use crate::report::svg::Traces;
+
+/// Rows that are written at once.
+const ROWS_AT_ONCE: usize = 1 << 14;
+/// Longest block of the noise estimate.
+const LONGEST_BLOCK: usize = 1 << 12;
+
+/// Reads, compensates and writes the record.
+pub fn run(args: &Compensate, plan: Plan, output: &mut Output) -> Result<Run, Failure> {
+    let Plan {
+        table,
+        chain,
+        filter,
+        ..
+    } = plan;
+    let time = table.time.clone();
+    let record = Record::read(table, &chain)?;
+    let torque = whole_record(&filter, &record.samples)?;
+    let scale = 1.0 / chain.applied.factor;
+    let mut traces = args.plot.as_ref().map(|_| Traces::new(args.plot_range));
+    let mut text = Vec::new();
+    for (part, first) in torque.chunks(ROWS_AT_ONCE).zip((0..).step_by(ROWS_AT_ONCE)) {
+        let recorded = &record.samples[first..first + part.len()];
+        let rows = Rows {
+            digits: args.digits,
+            scale,
+            times: Times::Grid {
+                start_s: record.start_s,
+                first,
+                rate_hz: time.rate_hz,
+            },
+        };
+        text.clear();
+        rows.write(
+            &mut text,
+            part,
+            if args.with_recorded { recorded } else { &[] },
+        );
+        output.write(&text)?;
+        if let Some(traces) = &mut traces {
+            for (i, (torque, recorded)) in part.iter().zip(recorded).enumerate() {
+                traces.add(rows.time_s(i), recorded * scale, torque * scale);
+            }
+        }
+    }
+    let block = (record.samples.len() / 2).next_power_of_two() / 2;
+    let printed: Vec<f64> = record.samples.iter().map(|x| x * scale).collect();
+    let density = welch(&printed, time.rate_hz, block.min(LONGEST_BLOCK)).ok();
+    Ok(Run {
+        samples: torque.len(),
+        start_s: record.start_s,
+        resampled: record.resampled,
+        noise: density.and_then(|density| RecordNoise::of(&filter, &density)),
+        summary: record.summary,
+        traces,
+    })
+}

@@ -1,0 +1,195 @@
+//! `harmonics`: component torques at a fundamental and its orders.
+
+use num_complex::Complex64;
+use torqcomp_dsp::harmonics::{self, Fundamental, refine_fundamental};
+
+use super::{Outcome, conclude};
+use crate::cli::Harmonics;
+use crate::failure::Failure;
+use crate::io::csv::{Place, Record, Table};
+use crate::io::output::Output;
+use crate::report::harmonics::{Component, Report, SCHEMA};
+use crate::report::{self, Warning};
+use crate::stand::{self, Chain, Stand};
+
+/// Distance of the record from time zero, in its own lengths, up to which phases refer to zero.
+const FAR_FROM_ZERO: f64 = 10.0;
+
+/// Runs the verb.
+pub fn run(args: &Harmonics) -> Result<Outcome, Failure> {
+    let stand = stand::read(&args.stand)?;
+    stand.mechanics()?;
+    let table = Table::open(&Place::of(&args.record.input), &args.record.options())?;
+    let chain = stand.chain(
+        &table.channel.name,
+        table.channel.unit.as_ref(),
+        args.units.into(),
+    )?;
+    let inputs = [args.record.input.as_ref(), args.stand.as_path()];
+    let mut output = Output::open(args.result.output.as_deref(), args.result.force, &inputs)?;
+    let mut report = describe(&table, &stand, &chain);
+    let source = table.source.clone();
+    let record = Record::read(table, &chain)?;
+    let fitted = fit(args, &stand, &chain, &record, &mut report);
+    fitted.map_err(|failure| failure.at(&source))?;
+    let text = if args.json {
+        report::json(&report)
+    } else {
+        report.text()
+    };
+    output.write(text.as_bytes())?;
+    output.finish()?;
+    Ok(conclude(
+        &report.warnings,
+        record.summary.lost.is_some(),
+        args.strict,
+    ))
+}
+
+/// The report as far as it is known before the record is read.
+fn describe(table: &Table, stand: &Stand, chain: &Chain) -> Report {
+    Report {
+        schema: SCHEMA,
+        version: env!("CARGO_PKG_VERSION"),
+        input: table.source.clone(),
+        channel: table.channel.name.clone(),
+        channel_unit: table
+            .channel
+            .unit
+            .as_ref()
+            .map_or_else(String::new, |u| u.text.clone()),
+        stand: stand.file.clone(),
+        calibration: chain.described.clone(),
+        unit: chain.applied.unit.clone(),
+        samples: 0,
+        rate_hz: table.time.rate_hz,
+        duration_s: 0.0,
+        fundamental_hz: 0.0,
+        fundamental_std_hz: None,
+        phase_reference_s: 0.0,
+        mean: 0.0,
+        components: Vec::new(),
+        residual_rms: 0.0,
+        warnings: Vec::new(),
+    }
+}
+
+fn fit(
+    args: &Harmonics,
+    stand: &Stand,
+    chain: &Chain,
+    record: &Record,
+    report: &mut Report,
+) -> Result<(), Failure> {
+    let samples = &record.samples;
+    let duration_s = samples.len() as f64 / record.rate_hz;
+    report.warnings.extend(record.summary.lost.clone());
+    report.warnings.extend(record.summary.warnings.clone());
+    let orders = visible_orders(args, record.rate_hz, &mut report.warnings)?;
+    let fundamental = if args.refine {
+        let span = 0.01 * args.refine_span;
+        refine_fundamental(samples, record.rate_hz, args.fundamental, span, &orders)?
+    } else {
+        Fundamental::given(args.fundamental)
+    };
+    // Far from zero, a phase there would be an extrapolation over many periods.
+    let reference_s = if record.start_s.abs() > FAR_FROM_ZERO * duration_s {
+        record.start_s
+    } else {
+        0.0
+    };
+    let start_s = record.start_s - reference_s;
+    let found = harmonics::fit(samples, record.rate_hz, start_s, fundamental, &orders)?;
+
+    let inverse = stand.inverse()?;
+    let printed = 1.0 / chain.applied.factor;
+    report.samples = samples.len();
+    report.duration_s = duration_s;
+    report.fundamental_hz = fundamental.frequency_hz;
+    report.fundamental_std_hz = fundamental.std_hz;
+    report.phase_reference_s = reference_s;
+    report.mean = found.mean * inverse(0.0).re * printed;
+    report.residual_rms = found.residual_rms * printed;
+    report.components = found
+        .components
+        .iter()
+        .map(|c| component(c, inverse(c.frequency_hz), printed, stand, chain))
+        .collect();
+    report.warnings.extend(lost_warning(&report.components));
+    Ok(())
+}
+
+/// Orders below half the sampling rate; those above are said.
+fn visible_orders(
+    args: &Harmonics,
+    rate_hz: f64,
+    warnings: &mut Vec<Warning>,
+) -> Result<Vec<f64>, Failure> {
+    let limit = 0.5 * rate_hz / args.fundamental;
+    let (seen, unseen): (Vec<f64>, Vec<f64>) = args
+        .orders
+        .0
+        .iter()
+        .partition(|order| **order < limit * (1.0 - 1e-9));
+    if seen.is_empty() {
+        return Err(Failure::failed(format_args!(
+            "no order of {} Hz lies below half the sampling rate of {} Hz; ask for lower orders or \
+             record faster",
+            report::short(args.fundamental),
+            report::short(rate_hz)
+        )));
+    }
+    if let (Some(first), Some(last)) = (unseen.first(), unseen.last()) {
+        warnings.push(Warning::new(
+            "orders-above-nyquist",
+            format!(
+                "orders {} to {} were left out: they lie above half the sampling rate of {} Hz",
+                report::short(*first),
+                report::short(*last),
+                report::short(rate_hz)
+            ),
+        ));
+    }
+    Ok(seen)
+}
+
+fn component(
+    fitted: &harmonics::Component,
+    inverse: Complex64,
+    printed: f64,
+    stand: &Stand,
+    chain: &Chain,
+) -> Component {
+    let factor = inverse.norm();
+    let recorded = fitted.phasor.norm() * printed;
+    let torque = recorded * factor;
+    Component {
+        order: fitted.order,
+        frequency_hz: fitted.frequency_hz,
+        recorded,
+        recorded_phase_deg: fitted.phasor.arg().to_degrees(),
+        factor,
+        torque,
+        phase_deg: (fitted.phasor * inverse).arg().to_degrees(),
+        std: fitted.std_amplitude * printed * factor,
+        phase_std_deg: fitted.std_phase_rad.map(f64::to_degrees),
+        std_stand: super::relative_std(stand, chain, fitted.frequency_hz).map(|std| std * torque),
+    }
+}
+
+fn lost_warning(components: &[Component]) -> Option<Warning> {
+    let lost: Vec<String> = components
+        .iter()
+        .filter(|c| c.torque < 2.0 * c.std)
+        .map(|c| report::short(c.order))
+        .collect();
+    (!lost.is_empty()).then(|| {
+        Warning::new(
+            "components-lost-in-noise",
+            format!(
+                "orders {} do not exceed twice their own uncertainty: they may be zero",
+                lost.join(", ")
+            ),
+        )
+    })
+}

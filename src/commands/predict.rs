@@ -1,0 +1,385 @@
+//! `predict`: what follows from the drawing, beside what was measured.
+
+use torqcomp_dsp::bridge::BridgeLayout;
+use torqcomp_dsp::conversion::Conversion;
+use torqcomp_model::damping::viscous_from_friction_slope_n_m_s_per_rad;
+use torqcomp_model::inertia::total_inertia_kg_m2;
+use torqcomp_model::{Estimate, Kind, Part, SecondOrder, UnitSystem};
+
+use super::Outcome;
+use crate::cli::Predict;
+use crate::failure::Failure;
+use crate::io::output;
+use crate::report::predict::{Constant, Refinement, Report, SCHEMA, residual_percent};
+use crate::report::{self, rounded};
+use crate::stand::{self, BeamDrawing, Given, Stand};
+
+/// Part of a residual that must be left at most for an effect to explain it.
+const EXPLAINED: f64 = 0.5;
+/// Predicted over measured damping below which the drawing misses the loss altogether.
+const FAR_TOO_SMALL: f64 = 0.1;
+/// Factor between measured and predicted torque per volt from which it needs a remark.
+const LARGE_FACTOR: f64 = 1.5;
+
+/// Runs the verb.
+pub fn run(args: &Predict) -> Result<Outcome, Failure> {
+    let stand = stand::read(&args.stand)?;
+    let drawing = Drawing::of(&stand)?;
+    let constants = drawing.constants(args.units.into())?;
+    if constants.iter().all(|c| c.predicted.is_none()) {
+        return Err(Failure::failed(format_args!(
+            "{}: nothing follows from a drawing that is not there; add [beam], [[parts]], \
+             [friction], or [gage] and [bridge]",
+            stand.file
+        )));
+    }
+    let report = Report {
+        schema: SCHEMA,
+        version: env!("CARGO_PKG_VERSION"),
+        stand: stand.file.clone(),
+        constants,
+    };
+    let text = if args.json {
+        report::json(&report)
+    } else {
+        report.text()
+    };
+    output::write_all(args.result.output.as_deref(), args.result.force, &text)?;
+    Ok(Outcome::Done)
+}
+
+/// Constants that follow from the drawing, in SI units, and the measured ones.
+struct Drawing<'a> {
+    stand: &'a Stand,
+    /// Stiffness of the slender beam, then with each effect added.
+    stiffness: Option<Stiffness>,
+    inertia: Option<f64>,
+    damping: Option<f64>,
+    measured: Measured,
+}
+
+/// The measured constants.
+#[derive(Default)]
+struct Measured {
+    inertia: Option<Estimate>,
+    damping: Option<Estimate>,
+    stiffness: Option<Estimate>,
+    natural_frequency: Option<Estimate>,
+    damping_ratio: Option<Estimate>,
+}
+
+struct Stiffness {
+    slender: f64,
+    refined: Vec<(&'static str, f64)>,
+}
+
+impl<'a> Drawing<'a> {
+    fn of(stand: &'a Stand) -> Result<Self, Failure> {
+        let wrong = |error: &dyn std::fmt::Display| {
+            Failure::failed(format_args!("{}: {error}", stand.file))
+        };
+        let parts: Vec<Part> = stand.parts.iter().map(|p| p.part).collect();
+        let inertia = if parts.is_empty() {
+            None
+        } else {
+            Some(total_inertia_kg_m2(&parts).map_err(|e| wrong(&e))?)
+        };
+        let damping = match &stand.friction {
+            None => None,
+            Some(f) => {
+                let slope = f.force_change.value() / f.speed_change.value();
+                let found = viscous_from_friction_slope_n_m_s_per_rad(slope, f.radius.value());
+                Some(found.map_err(|e| wrong(&e))?)
+            }
+        };
+        Ok(Self {
+            stiffness: stand
+                .beam
+                .as_ref()
+                .map(Stiffness::of)
+                .transpose()
+                .map_err(|e| wrong(&e))?,
+            inertia,
+            damping,
+            measured: Measured::of(stand)?,
+            stand,
+        })
+    }
+
+    fn constants(&self, units: UnitSystem) -> Result<Vec<Constant>, Failure> {
+        let measured = &self.measured;
+        let slender = self.stiffness.as_ref().map(|s| s.slender);
+        let mut stiffness = constant(
+            "stiffness",
+            Kind::AngularStiffness,
+            slender,
+            &measured.stiffness,
+            units,
+        );
+        stiffness.by = "slender beam (Euler-Bernoulli) in a rigid clamp";
+        stiffness.predicted_std = self.std_of_stiffness(units);
+        self.refine(&mut stiffness, |k| {
+            Some(Kind::AngularStiffness.to(units, k))
+        });
+
+        let mut inertia = constant(
+            "inertia",
+            Kind::Inertia,
+            self.inertia,
+            &measured.inertia,
+            units,
+        );
+        inertia.by = "sum of the parts";
+
+        let mut damping = constant(
+            "damping",
+            Kind::AngularDamping,
+            self.damping,
+            &measured.damping,
+            units,
+        );
+        damping.by = "slope of friction over speed, times radius";
+        damping.note = damping_note(&damping);
+
+        let frequency = |k: f64| {
+            let stand = SecondOrder::new(self.inertia?, 0.0, k).ok()?;
+            Some(stand.natural_frequency_hz())
+        };
+        let predicted = slender.and_then(frequency);
+        let mut natural = constant(
+            "natural_frequency",
+            Kind::Frequency,
+            predicted,
+            &measured.natural_frequency,
+            units,
+        );
+        natural.by = "stiffness and inertia above";
+        self.refine(&mut natural, frequency);
+
+        let ratio = || {
+            let stand = SecondOrder::new(self.inertia?, self.damping?, slender?).ok()?;
+            Some(stand.damping_ratio())
+        };
+        let mut damping_ratio = constant(
+            "damping_ratio",
+            Kind::Ratio,
+            ratio(),
+            &measured.damping_ratio,
+            units,
+        );
+        damping_ratio.by = "stiffness, inertia and damping above";
+        Ok(vec![
+            stiffness,
+            inertia,
+            damping,
+            natural,
+            damping_ratio,
+            self.torque_per_volt(units)?,
+        ])
+    }
+
+    fn std_of_stiffness(&self, units: UnitSystem) -> Option<f64> {
+        let relative = self.stand.beam.as_ref()?.relative_std?;
+        let slender = self.stiffness.as_ref()?.slender;
+        Some(Kind::AngularStiffness.difference_to(units, relative * slender))
+    }
+
+    /// Adds what each effect of the drawing makes of a constant that follows from the stiffness.
+    fn refine(&self, constant: &mut Constant, by_stiffness: impl Fn(f64) -> Option<f64>) {
+        let refined = self.stiffness.as_ref().map_or(&[][..], |s| &s.refined);
+        for (effect, stiffness) in refined {
+            let Some(predicted) = by_stiffness(*stiffness) else {
+                continue;
+            };
+            constant.refinements.push(Refinement {
+                effect,
+                predicted,
+                residual_percent: residual_percent(Some(predicted), constant.measured),
+            });
+        }
+        let (Some(before), Some(last)) = (constant.residual_percent, constant.refinements.last())
+        else {
+            return;
+        };
+        let Some(after) = last.residual_percent else {
+            return;
+        };
+        if after.abs() <= EXPLAINED * before.abs() {
+            let effects: Vec<&str> = constant.refinements.iter().map(|r| r.effect).collect();
+            constant.explained_by = Some(format!(
+                "{} (residual {after:+.1} %)",
+                effects.join(" and ")
+            ));
+        }
+    }
+
+    fn torque_per_volt(&self, units: UnitSystem) -> Result<Constant, Failure> {
+        let stand = self.stand;
+        let given = stand.gage.is_some() && stand.bridge.is_some();
+        let placed = stand
+            .beam
+            .as_ref()
+            .is_some_and(|b| b.gage_position.is_some());
+        let mut note = None;
+        let mut predicted = None;
+        if given && placed {
+            let bridge = stand.bridge()?;
+            let torque_per_strain = stand.torque_per_strain()?;
+            let loading = bridge.loading_factor();
+            let layout = bridge.layout();
+            let gain = stand.recorder.recorder.gain();
+            let conversion = Conversion::bridge(bridge, gain, 0.0, torque_per_strain)
+                .map_err(Failure::failed)?;
+            predicted = Some(conversion.small_signal_gain());
+            note = self.torque_per_volt_note(predicted, layout, loading);
+        }
+        let mut made = constant(
+            "torque_per_volt",
+            Kind::TorquePerVolt,
+            predicted,
+            &stand.torque_per_volt,
+            units,
+        );
+        made.by = "strain at the gage, gage factor and bridge";
+        made.note = note;
+        Ok(made)
+    }
+
+    /// What can contribute to a large factor, none of which the record can tell from the others.
+    fn torque_per_volt_note(
+        &self,
+        predicted: Option<f64>,
+        layout: BridgeLayout,
+        loading: f64,
+    ) -> Option<String> {
+        let factor = self.stand.torque_per_volt.as_ref()?.value() / predicted?;
+        if factor.abs() < LARGE_FACTOR {
+            return None;
+        }
+        let mut causes = Vec::new();
+        if !matches!(layout, BridgeLayout::Quarter) {
+            let times = layout.bridge_factor();
+            causes.push(format!(
+                "a quarter bridge instead of the one given ({} times)",
+                rounded(times, 3)
+            ));
+        }
+        if self.stand.recorder.input_resistance_ohm.is_none() {
+            causes.push("a recorder whose input resistance loads the bridge".to_owned());
+        } else {
+            causes.push(format!(
+                "more load on the bridge than the {} times counted",
+                rounded(1.0 / loading, 4)
+            ));
+        }
+        causes.push("an end of the beam that is held against turning".to_owned());
+        Some(format!(
+            "measured is {} times predicted; {} can each contribute, and the constants alone cannot \
+             tell which",
+            rounded(factor, 3),
+            causes.join(", ")
+        ))
+    }
+}
+
+impl Stiffness {
+    fn of(beam: &BeamDrawing) -> Result<Self, torqcomp_model::ModelError> {
+        let radius = beam.radius.value();
+        let slender = beam.slender.angular_stiffness_n_m_per_rad(radius)?;
+        let parts = beam.full.compliance();
+        let mut total = parts.bending_m_per_n;
+        let mut refined = Vec::new();
+        for (effect, more) in [
+            ("shear of the beam", parts.shear_m_per_n),
+            (
+                "the smaller section of its thread",
+                parts.reduced_sections_m_per_n,
+            ),
+            ("turning of its clamp", parts.clamp_m_per_n),
+        ] {
+            if more > 0.0 {
+                total += more;
+                refined.push((effect, radius * radius / total));
+            }
+        }
+        Ok(Self { slender, refined })
+    }
+}
+
+impl Measured {
+    fn of(stand: &Stand) -> Result<Self, Failure> {
+        let Some(mechanics) = &stand.mechanics else {
+            return Ok(Self::default());
+        };
+        match &mechanics.given {
+            Given::Constants {
+                inertia,
+                damping,
+                stiffness,
+            } => {
+                let inputs = [inertia, damping, stiffness];
+                let derived = |kind, f: fn(&SecondOrder) -> f64| {
+                    Estimate::derive(kind, "inertia, damping and stiffness", &inputs, |x| {
+                        SecondOrder::new(x[0], x[1], x[2]).map_or(f64::NAN, |stand| f(&stand))
+                    })
+                    .map_err(|error| Failure::failed(format_args!("{}: {error}", stand.file)))
+                };
+                Ok(Self {
+                    inertia: Some(inertia.clone()),
+                    damping: Some(damping.clone()),
+                    stiffness: Some(stiffness.clone()),
+                    natural_frequency: Some(derived(
+                        Kind::Frequency,
+                        SecondOrder::natural_frequency_hz,
+                    )?),
+                    damping_ratio: Some(derived(Kind::Ratio, SecondOrder::damping_ratio)?),
+                })
+            }
+            Given::Modal {
+                natural_frequency,
+                damping_ratio,
+                ..
+            } => Ok(Self {
+                natural_frequency: Some(natural_frequency.clone()),
+                damping_ratio: Some(damping_ratio.clone()),
+                ..Self::default()
+            }),
+        }
+    }
+}
+
+fn constant(
+    name: &'static str,
+    kind: Kind,
+    predicted: Option<f64>,
+    measured: &Option<Estimate>,
+    units: UnitSystem,
+) -> Constant {
+    let predicted = predicted.map(|value| kind.to(units, value));
+    let value = measured.as_ref().map(|m| kind.to(units, m.value()));
+    let std = measured.as_ref().and_then(Estimate::std_uncertainty);
+    Constant {
+        name,
+        unit: kind.unit(units).to_owned(),
+        predicted,
+        predicted_std: None,
+        measured: value,
+        measured_std: std.map(|std| kind.difference_to(units, std)),
+        residual_percent: residual_percent(predicted, value),
+        explained_by: None,
+        by: "",
+        refinements: Vec::new(),
+        note: None,
+    }
+}
+
+fn damping_note(damping: &Constant) -> Option<String> {
+    let ratio = damping.predicted? / damping.measured?;
+    (ratio < FAR_TOO_SMALL).then(|| {
+        format!(
+            "friction over speed gives {} of the measured damping; the rest is lost in the beam and \
+             its joints, which the drawing does not describe",
+            rounded(ratio, 2)
+        )
+    })
+}

@@ -1,0 +1,116 @@
+//! `table`: the inverse transfer function over frequency, Appendix D of the thesis for any stand.
+
+use std::fmt::Write;
+
+use serde::Serialize;
+
+use super::Outcome;
+use crate::cli;
+use crate::failure::Failure;
+use crate::io::output;
+use crate::report::{self, rounded};
+use crate::stand::{self, Mechanics, Stand};
+
+/// Most rows of a table.
+const MOST_ROWS: f64 = 1e7;
+/// Significant digits of the table.
+const DIGITS: u32 = 10;
+
+/// JSON document.
+#[derive(Debug, Serialize)]
+struct Report {
+    schema: &'static str,
+    version: &'static str,
+    stand: String,
+    rows: Vec<Row>,
+}
+
+/// Torque that acted over the torque recorded, at one frequency.
+#[derive(Debug, Serialize)]
+struct Row {
+    frequency_hz: f64,
+    magnitude: f64,
+    phase_deg: f64,
+    /// Relative standard uncertainty of the magnitude; `null` if unknown.
+    magnitude_relative_std: Option<f64>,
+    phase_std_deg: Option<f64>,
+}
+
+/// Runs the verb.
+pub fn run(args: &cli::Table) -> Result<Outcome, Failure> {
+    let stand = stand::read(&args.stand)?;
+    let mechanics = stand.mechanics()?;
+    if args.to < args.from {
+        return Err(Failure::usage(format_args!(
+            "--to {} lies below --from {}",
+            args.to, args.from
+        )));
+    }
+    let steps = ((args.to - args.from) / args.step * (1.0 + 1e-12)).floor();
+    if steps >= MOST_ROWS {
+        return Err(Failure::usage(format_args!(
+            "a table of {steps} rows is too long; choose a larger --step"
+        )));
+    }
+    let rows: Vec<Row> = (0..=steps as u64)
+        .map(|i| row(&stand, mechanics, args.from + i as f64 * args.step))
+        .collect();
+    let text = if args.json {
+        report::json(&Report {
+            schema: "torqcomp.table/1",
+            version: env!("CARGO_PKG_VERSION"),
+            stand: stand.file.clone(),
+            rows,
+        })
+    } else {
+        csv(&rows, args.uncertainty)
+    };
+    output::write_all(args.result.output.as_deref(), args.result.force, &text)?;
+    Ok(Outcome::Done)
+}
+
+fn row(stand: &Stand, mechanics: &Mechanics, frequency_hz: f64) -> Row {
+    let inverse = mechanics.response.inverse(frequency_hz);
+    let recorder = &stand.recorder.recorder;
+    let std = mechanics
+        .response
+        .inverse_uncertainty(frequency_hz, &mechanics.std)
+        .ok()
+        .flatten();
+    Row {
+        frequency_hz,
+        magnitude: inverse.norm() / recorder.response(frequency_hz).norm(),
+        phase_deg: (inverse.arg() - recorder.phase_rad(frequency_hz)).to_degrees(),
+        magnitude_relative_std: std.as_ref().map(|s| s.magnitude_relative),
+        phase_std_deg: std.as_ref().map(|s| s.phase_rad.to_degrees()),
+    }
+}
+
+fn csv(rows: &[Row], uncertainty: bool) -> String {
+    let mut text = "frequency_hz,magnitude,phase_deg".to_owned();
+    if uncertainty {
+        text.push_str(",magnitude_relative_std,phase_std_deg");
+    }
+    text.push('\n');
+    for row in rows {
+        let _ = write!(
+            text,
+            "{},{},{}",
+            rounded(row.frequency_hz, DIGITS),
+            rounded(row.magnitude, DIGITS),
+            rounded(row.phase_deg, DIGITS)
+        );
+        if uncertainty {
+            // An unknown uncertainty is an empty cell, never 0.
+            let cell = |std: Option<f64>| std.map_or_else(String::new, |s| rounded(s, 4));
+            let _ = write!(
+                text,
+                ",{},{}",
+                cell(row.magnitude_relative_std),
+                cell(row.phase_std_deg)
+            );
+        }
+        text.push('\n');
+    }
+    text
+}

@@ -1,0 +1,408 @@
+//! Text tables as recorders write them.
+
+mod chunks;
+mod layout;
+mod names;
+mod record;
+mod scan;
+mod stream;
+mod time;
+
+use std::io::Read;
+use std::path::PathBuf;
+
+use torqcomp_model::Dimension;
+
+use crate::failure::{Failure, did_you_mean};
+
+pub use layout::{Delimiter, Dialect, Layout, Told};
+pub use names::{Column, NamedUnit};
+pub use record::Record;
+pub use scan::{RowPlan, Rows, spanned};
+pub use stream::{Batch, Fetch, Sequence, Summary};
+pub use time::{TimeAxis, TimeSource};
+
+/// Bytes of a file that its layout is told from.
+const HEAD: usize = 1 << 16;
+/// The same if the table begins only after that much.
+const LONG_HEAD: usize = 1 << 20;
+
+/// What the command line says about a table.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// Channel to read.
+    pub channel: Option<String>,
+    /// Its unit, if the file does not say or is wrong.
+    pub unit: Option<String>,
+    /// Column of the time stamps.
+    pub time_column: Option<String>,
+    /// Unit of the time stamps.
+    pub time_unit: Option<String>,
+    /// Sampling rate; the time column is not used then, unless for resampling.
+    pub rate_hz: Option<f64>,
+    /// Whether irregular stamps are brought onto a grid.
+    pub resample: bool,
+    /// How the file is written.
+    pub told: Told,
+}
+
+/// Where bytes come from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Place {
+    /// Standard input.
+    Stdin,
+    /// A file.
+    File(PathBuf),
+}
+
+impl Place {
+    /// `-` is standard input.
+    #[must_use]
+    pub fn of(text: &str) -> Self {
+        if text == "-" {
+            Self::Stdin
+        } else {
+            Self::File(PathBuf::from(text))
+        }
+    }
+
+    /// Name for people.
+    #[must_use]
+    pub fn name(&self) -> String {
+        match self {
+            Self::Stdin => "standard input".to_owned(),
+            Self::File(path) => path.display().to_string(),
+        }
+    }
+
+    /// Opens it for reading.
+    ///
+    /// # Errors
+    /// If it cannot be opened.
+    pub fn open(&self) -> Result<Box<dyn Read + Send>, Failure> {
+        match self {
+            Self::Stdin => Ok(Box::new(std::io::stdin())),
+            Self::File(path) => {
+                let file = std::fs::File::open(path).map_err(|e| Failure::reading(path, &e))?;
+                if file.metadata().is_ok_and(|m| m.is_dir()) {
+                    let error = std::io::ErrorKind::IsADirectory.into();
+                    return Err(Failure::reading(path, &error));
+                }
+                Ok(Box::new(file))
+            }
+        }
+    }
+}
+
+/// A table that is open for reading, one channel of it chosen.
+pub struct Table {
+    /// Name of the file, for people.
+    pub source: String,
+    /// How it is laid out.
+    pub layout: Layout,
+    /// The channel that is read.
+    pub channel: Column,
+    /// How its samples lie in time.
+    pub time: TimeAxis,
+    plan: RowPlan,
+    head: Vec<u8>,
+    input: Box<dyn Read + Send>,
+    /// Mean length of a row in the head, in bytes.
+    row_bytes: usize,
+    /// Fewest characters of a value in the head.
+    shortest_value: usize,
+    /// First time stamp as written.
+    first_stamp: Option<f64>,
+}
+
+impl Table {
+    /// Time of the first sample: its stamp, or 0 where a rate was given.
+    #[must_use]
+    pub fn first_time_s(&self) -> f64 {
+        match (&self.time.source, self.first_stamp) {
+            (
+                TimeSource::Stamps {
+                    seconds_per_unit, ..
+                },
+                Some(stamp),
+            ) => stamp * seconds_per_unit,
+            _ => 0.0,
+        }
+    }
+
+    /// Opens a file, finds its table, its channel and its time axis.
+    ///
+    /// # Errors
+    /// If the file cannot be read, holds no table, or leaves open what is to be read.
+    pub fn open(place: &Place, options: &Options) -> Result<Self, Failure> {
+        let name = place.name();
+        let mut input = place.open()?;
+        Self::read(&name, &mut input, options)
+            .map(|parts| parts.with(name.clone(), input))
+            .map_err(|failure| failure.at(&name))
+    }
+
+    fn read(name: &str, input: &mut dyn Read, options: &Options) -> Result<Parts, Failure> {
+        let (head, layout) = find_layout(name, input, &options.told)?;
+        let time_place = time_column(&layout.columns, options)?;
+        let value_place = channel(&layout.columns, time_place, options)?;
+        let mut channel = layout.columns[value_place].clone();
+        if let Some(text) = &options.unit {
+            let unit = torqcomp_model::Unit::parse(text)
+                .map_err(|error| Failure::usage(format_args!("--unit {text}: {error}")))?;
+            channel.unit = Some(NamedUnit {
+                text: text.clone(),
+                unit,
+            });
+        }
+        let plan = RowPlan {
+            dialect: layout.dialect,
+            time: time_place,
+            value: value_place,
+        };
+        let sample = Sample::of(&head, &layout, &plan);
+        let time = TimeAxis::find(&layout, time_place, &sample.rows, options)?;
+        // Stamps that are not used need not be read, nor be right.
+        let plan = RowPlan {
+            time: plan.time.filter(|_| time.uses_stamps()),
+            ..plan
+        };
+        Ok(Parts {
+            layout,
+            channel,
+            time,
+            plan,
+            head,
+            sample,
+        })
+    }
+
+    /// Splits the table into the parts that run side by side: reading pieces of at least
+    /// `rows` rows, and looking at the rows in order.
+    #[must_use]
+    pub fn into_stream(self, rows: usize) -> (Fetch, RowPlan, Sequence) {
+        let sequence = Sequence::new(&self);
+        let offset = self.layout.data_offset;
+        let fetch = Fetch::new(
+            self.source,
+            self.head[offset..].to_vec(),
+            self.input,
+            rows * self.row_bytes,
+        );
+        (fetch, self.plan, sequence)
+    }
+}
+
+struct Parts {
+    layout: Layout,
+    channel: Column,
+    time: TimeAxis,
+    plan: RowPlan,
+    head: Vec<u8>,
+    sample: Sample,
+}
+
+impl Parts {
+    fn with(self, source: String, input: Box<dyn Read + Send>) -> Table {
+        Table {
+            source,
+            layout: self.layout,
+            channel: self.channel,
+            time: self.time,
+            plan: self.plan,
+            head: self.head,
+            input,
+            row_bytes: self.sample.row_bytes,
+            shortest_value: self.sample.shortest_value,
+            first_stamp: self.sample.rows.times.first().copied(),
+        }
+    }
+}
+
+/// The rows in the head of a file, before the file is read in full.
+struct Sample {
+    rows: Rows,
+    row_bytes: usize,
+    shortest_value: usize,
+}
+
+impl Sample {
+    fn of(head: &[u8], layout: &Layout, plan: &RowPlan) -> Self {
+        let data = &head[layout.data_offset..];
+        // The last line may be cut by the end of the head.
+        let end = memchr::memrchr(b'\n', data).map_or(data.len(), |place| place + 1);
+        let mut rows = Rows::default();
+        rows.read(&data[..end], plan);
+        let shortest_value = String::from_utf8_lossy(&data[..end])
+            .lines()
+            .filter_map(|line| layout.dialect.cells(line).get(plan.value).map(String::len))
+            .filter(|length| *length > 0)
+            .min()
+            .unwrap_or(0);
+        Self {
+            row_bytes: end / rows.values.len().max(1) + 1,
+            rows,
+            shortest_value,
+        }
+    }
+}
+
+fn find_layout(
+    name: &str,
+    input: &mut dyn Read,
+    told: &Told,
+) -> Result<(Vec<u8>, Layout), Failure> {
+    let reading = |error| Failure::failed(format_args!("{name}: cannot be read: {error}"));
+    let mut head = chunks::head(input, HEAD).map_err(reading)?;
+    refuse_other_formats(&head)?;
+    let complete = head.len() < HEAD;
+    let found = layout::find(&head, complete, told);
+    if found.is_ok() || complete {
+        return found.map(|layout| (head, layout));
+    }
+    let more = chunks::head(input, LONG_HEAD - HEAD).map_err(reading)?;
+    head.extend(more);
+    layout::find(&head, head.len() < LONG_HEAD, told).map(|layout| (head, layout))
+}
+
+/// Names the formats that are often handed over in place of text.
+fn refuse_other_formats(head: &[u8]) -> Result<(), Failure> {
+    let known: [(&[u8], &str); 6] = [
+        (
+            b"\x89MCAP",
+            "an MCAP recording; only text tables are read so far",
+        ),
+        (b"\xFF\xFE", "UTF-16 text; save it as UTF-8"),
+        (b"\xFE\xFF", "UTF-16 text; save it as UTF-8"),
+        (
+            b"PK\x03\x04",
+            "a zip archive or a spreadsheet; export the sheet as CSV",
+        ),
+        (
+            b"\x1F\x8B",
+            "compressed with gzip; pipe it: gunzip -c FILE | torqcomp … -",
+        ),
+        (
+            b"\x28\xB5\x2F\xFD",
+            "compressed with zstd; pipe it: zstdcat FILE | torqcomp … -",
+        ),
+    ];
+    match known.iter().find(|(magic, _)| head.starts_with(magic)) {
+        Some((_, what)) => Err(Failure::failed(format_args!("the file is {what}"))),
+        None if head.contains(&0) => Err(Failure::failed(
+            "the file is binary; expected a text table (CSV, TSV or a recorder's export)",
+        )),
+        None => Ok(()),
+    }
+}
+
+/// Place of a column by its heading, its name without the unit, or its number from 1.
+fn find_column(columns: &[Column], wanted: &str, flag: &str) -> Result<usize, Failure> {
+    let matching = |is: &dyn Fn(&Column) -> bool| -> Vec<usize> {
+        (0..columns.len()).filter(|i| is(&columns[*i])).collect()
+    };
+    let ways: [Vec<usize>; 3] = [
+        matching(&|c| c.heading == wanted),
+        matching(&|c| c.is_called(wanted)),
+        matching(&|c| {
+            c.heading.eq_ignore_ascii_case(wanted) || c.name.eq_ignore_ascii_case(wanted)
+        }),
+    ];
+    match ways
+        .iter()
+        .find(|found| !found.is_empty())
+        .map(Vec::as_slice)
+    {
+        Some([place]) => return Ok(*place),
+        Some(places) => {
+            return Err(Failure::failed(format_args!(
+                "{} columns are called \"{wanted}\"; give the number of the one you mean, {flag} {}",
+                places.len(),
+                list(places.iter().map(|p| (p + 1).to_string()))
+            )));
+        }
+        None => {}
+    }
+    if let Ok(number) = wanted.parse::<usize>()
+        && (1..=columns.len()).contains(&number)
+    {
+        return Ok(number - 1);
+    }
+    let headings = columns.iter().map(|c| c.heading.as_str());
+    Err(Failure::failed(format_args!(
+        "there is no column \"{wanted}\"{}. The columns are {}",
+        did_you_mean(wanted, headings.clone()),
+        list(headings.map(|h| format!("\"{h}\"")))
+    )))
+}
+
+/// `a, b or c`.
+fn list(items: impl IntoIterator<Item = String>) -> String {
+    let items: Vec<String> = items.into_iter().collect();
+    match items.as_slice() {
+        [] => "none".to_owned(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} or {last}", first.join(", ")),
+    }
+}
+
+/// Place of the time column, if there is one.
+fn time_column(columns: &[Column], options: &Options) -> Result<Option<usize>, Failure> {
+    if let Some(wanted) = &options.time_column {
+        return find_column(columns, wanted, "--time-column").map(Some);
+    }
+    let candidates: Vec<usize> = (0..columns.len())
+        .filter(|i| columns[*i].is_time())
+        .collect();
+    let named: Vec<usize> = candidates
+        .iter()
+        .copied()
+        .filter(|i| columns[*i].is_named_time())
+        .collect();
+    match (named.as_slice(), candidates.as_slice()) {
+        ([one], _) | ([], [one]) => Ok(Some(*one)),
+        (_, []) => Ok(None),
+        (_, several) if options.rate_hz.is_some() && !options.resample => {
+            Ok(several.first().copied())
+        }
+        (_, several) => Err(Failure::failed(format_args!(
+            "{} columns could be the time axis; choose one with --time-column {}",
+            several.len(),
+            list(
+                several
+                    .iter()
+                    .map(|i| format!("\"{}\"", columns[*i].heading))
+            )
+        ))),
+    }
+}
+
+/// Place of the channel: the one that is asked for, or the only one.
+fn channel(columns: &[Column], time: Option<usize>, options: &Options) -> Result<usize, Failure> {
+    if let Some(wanted) = &options.channel {
+        return find_column(columns, wanted, "--channel");
+    }
+    let signals: Vec<usize> = (0..columns.len())
+        .filter(|i| Some(*i) != time && !columns[*i].is_time())
+        .collect();
+    match signals.as_slice() {
+        [one] => Ok(*one),
+        [] => Err(Failure::failed(
+            "there is no column besides the time; expected one with the signal",
+        )),
+        several => Err(Failure::failed(format_args!(
+            "{} columns could be the signal; choose one with --channel {}",
+            several.len(),
+            list(
+                several
+                    .iter()
+                    .map(|i| format!("\"{}\"", columns[*i].heading))
+            )
+        ))),
+    }
+}
+
+/// Whether a unit measures time.
+fn is_time(dimension: Dimension) -> bool {
+    dimension == Dimension::new([0, 0, 1, 0, 0, 0])
+}

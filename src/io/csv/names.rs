@@ -1,0 +1,291 @@
+//! What a column's heading says: its name and its unit.
+
+use torqcomp_model::{Dimension, Unit};
+
+/// A column of a table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Column {
+    /// Heading as it stands in the file, or `column N` if there is none.
+    pub heading: String,
+    /// The heading without its unit.
+    pub name: String,
+    /// The unit, if the file gives one.
+    pub unit: Option<NamedUnit>,
+}
+
+/// A unit and how the file writes it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NamedUnit {
+    /// As written.
+    pub text: String,
+    /// What it means.
+    pub unit: Unit,
+}
+
+/// Units that a heading may end in after an underscore, as written there and as understood. Only
+/// these: `motor_in` is not a motor in inches.
+const SUFFIXES: [(&str, &str); 52] = [
+    ("s", "s"),
+    ("sec", "s"),
+    ("ms", "ms"),
+    ("us", "us"),
+    ("ns", "ns"),
+    ("V", "V"),
+    ("v", "V"),
+    ("mV", "mV"),
+    ("mv", "mV"),
+    ("uV", "uV"),
+    ("kV", "kV"),
+    ("volt", "V"),
+    ("volts", "V"),
+    ("A", "A"),
+    ("mA", "mA"),
+    ("N", "N"),
+    ("n", "N"),
+    ("kN", "kN"),
+    ("mN", "mN"),
+    ("lbf", "lbf"),
+    ("LBF", "lbf"),
+    ("Nm", "N m"),
+    ("nm", "N m"),
+    ("N_m", "N m"),
+    ("n_m", "N m"),
+    ("NM", "N m"),
+    ("mNm", "mN m"),
+    ("mN_m", "mN m"),
+    ("kNm", "kN m"),
+    ("kN_m", "kN m"),
+    ("ft_lbf", "ft lbf"),
+    ("in_lbf", "in lbf"),
+    ("lbf_ft", "ft lbf"),
+    ("lbf_in", "in lbf"),
+    ("m", "m"),
+    ("mm", "mm"),
+    ("um", "um"),
+    ("m_s2", "m/s^2"),
+    ("m_s", "m/s"),
+    ("Hz", "Hz"),
+    ("kHz", "kHz"),
+    ("hz", "Hz"),
+    ("rpm", "rpm"),
+    ("rad", "rad"),
+    ("deg", "deg"),
+    ("rad_s", "rad/s"),
+    ("degC", "degC"),
+    ("degF", "degF"),
+    ("K", "K"),
+    ("strain", "strain"),
+    ("ustrain", "ustrain"),
+    ("percent", "%"),
+];
+
+/// Headings that stand for time, in lower case.
+const TIME_NAMES: [&str; 10] = [
+    "t",
+    "time",
+    "zeit",
+    "timestamp",
+    "time stamp",
+    "elapsed time",
+    "elapsed",
+    "seconds",
+    "secs",
+    "rel_time",
+];
+
+impl NamedUnit {
+    /// Reads a unit as recorders write it; words in brackets after it are left out
+    /// (`Voltage (unscaled)` names no unit).
+    #[must_use]
+    pub fn parse(text: &str) -> Option<Self> {
+        let text = text.trim();
+        let text = match inside_brackets(text) {
+            Some(("", inside)) => inside,
+            _ => text,
+        };
+        // A bare number is no unit, although "1" stands for a ratio.
+        if text.is_empty() || text.chars().all(|c| c.is_ascii_digit() || c == '.') {
+            return None;
+        }
+        Unit::parse(text).ok().map(|unit| Self {
+            text: text.to_owned(),
+            unit,
+        })
+    }
+
+    /// Whether it is a unit of time.
+    #[must_use]
+    pub fn is_time(&self) -> bool {
+        self.unit.dimension() == Dimension::new([0, 0, 1, 0, 0, 0])
+    }
+}
+
+impl Column {
+    /// Reads a heading; `units_row` is the cell below it, if the table has a row of units.
+    #[must_use]
+    pub fn read(heading: &str, units_row: Option<&str>) -> Self {
+        let heading = heading.trim();
+        let (name, unit) = split(heading);
+        let below = units_row.and_then(NamedUnit::parse);
+        Self {
+            heading: heading.to_owned(),
+            name: if unit.is_some() { name } else { heading }.to_owned(),
+            unit: unit.or(below),
+        }
+    }
+
+    /// The column at a place (from 0) of a table without headings.
+    #[must_use]
+    pub fn unnamed(place: usize) -> Self {
+        let name = format!("column {}", place + 1);
+        Self {
+            heading: name.clone(),
+            name,
+            unit: None,
+        }
+    }
+
+    /// Whether the column holds time, by its name or its unit.
+    #[must_use]
+    pub fn is_time(&self) -> bool {
+        match &self.unit {
+            Some(unit) => unit.is_time(),
+            None => self.is_named_time(),
+        }
+    }
+
+    /// Whether the column's name stands for time.
+    #[must_use]
+    pub fn is_named_time(&self) -> bool {
+        TIME_NAMES.contains(&self.name.to_lowercase().as_str())
+    }
+
+    /// Whether `wanted` names this column: by its heading or by its name without the unit.
+    #[must_use]
+    pub fn is_called(&self, wanted: &str) -> bool {
+        self.heading == wanted || self.name == wanted
+    }
+}
+
+/// Name and unit of a heading: `Force (N)`, `Torque [N m]`, `U / mV`, `bridge_V`.
+fn split(heading: &str) -> (&str, Option<NamedUnit>) {
+    if let Some((name, inside)) = inside_brackets(heading)
+        && let Some(unit) = NamedUnit::parse(inside)
+    {
+        return (name, Some(unit));
+    }
+    if let Some((name, unit)) = heading.split_once(" / ")
+        && let Some(unit) = NamedUnit::parse(unit)
+    {
+        return (name.trim(), Some(unit));
+    }
+    for (suffix, meaning) in SUFFIXES {
+        let name = heading
+            .strip_suffix(suffix)
+            .and_then(|n| n.strip_suffix('_'));
+        // The longest suffix wins: `torque_N_m` does not end in metres.
+        let longer = SUFFIXES.iter().any(|(other, _)| {
+            other.len() > suffix.len()
+                && other.ends_with(suffix)
+                && heading
+                    .strip_suffix(other)
+                    .is_some_and(|n| n.ends_with('_'))
+        });
+        if let Some(name) = name
+            && !name.is_empty()
+            && !longer
+        {
+            let unit = Unit::parse(meaning).ok().map(|unit| NamedUnit {
+                text: meaning.to_owned(),
+                unit,
+            });
+            return (name, unit);
+        }
+    }
+    (heading, None)
+}
+
+/// Text before and inside a bracket at the end of a heading.
+fn inside_brackets(heading: &str) -> Option<(&str, &str)> {
+    [('(', ')'), ('[', ']'), ('{', '}'), ('<', '>')]
+        .into_iter()
+        .find_map(|(open, close)| {
+            let body = heading.trim_end().strip_suffix(close)?;
+            // The matching bracket: units may hold brackets themselves.
+            let mut depth = 1;
+            for (place, c) in body.char_indices().rev() {
+                depth += i32::from(c == close) - i32::from(c == open);
+                if depth == 0 {
+                    return Some((body[..place].trim(), body[place + 1..].trim()));
+                }
+            }
+            None
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(heading: &str) -> (String, Option<String>) {
+        let column = Column::read(heading, None);
+        (column.name, column.unit.map(|u| u.text))
+    }
+
+    #[test]
+    fn headings_as_recorders_write_them() {
+        for (heading, name, unit) in [
+            ("bridge_V", "bridge", Some("V")),
+            ("Torque [N m]", "Torque", Some("N m")),
+            ("Force (N)", "Force", Some("N")),
+            ("Time(s)", "Time", Some("s")),
+            ("time_s", "time", Some("s")),
+            ("torque_n_m", "torque", Some("N m")),
+            ("torque_ft_lbf", "torque", Some("ft lbf")),
+            ("v1_in_V", "v1_in", Some("V")),
+            ("U / mV", "U", Some("mV")),
+            ("strain [µm/m]", "strain", Some("µm/m")),
+            ("motor_in", "motor_in", None),
+            ("hit_1", "hit_1", None),
+            ("Low G Accel", "Low G Accel", None),
+            (
+                "163.05 NAIO-03 ch1 torq.(P:00A305h)",
+                "163.05 NAIO-03 ch1 torq.(P:00A305h)",
+                None,
+            ),
+            ("Voltage (unscaled)", "Voltage (unscaled)", None),
+        ] {
+            assert_eq!(
+                read(heading),
+                (name.to_owned(), unit.map(str::to_owned)),
+                "{heading}"
+            );
+        }
+    }
+
+    #[test]
+    fn every_suffix_is_a_unit() {
+        for (suffix, meaning) in SUFFIXES {
+            assert!(Unit::parse(meaning).is_ok(), "{suffix}");
+        }
+    }
+
+    #[test]
+    fn units_row_fills_in() {
+        let column = Column::read("Force", Some(" (kN) "));
+        assert_eq!(column.unit.unwrap().text, "kN");
+        let column = Column::read("SG_300_a", Some("Voltage (unscaled)"));
+        assert_eq!(column.unit, None);
+    }
+
+    #[test]
+    fn time_is_told_by_name_or_unit() {
+        for heading in ["time_s", "Time", "t", "Zeit [ms]", "X (s)", "Time [s]"] {
+            assert!(Column::read(heading, None).is_time(), "{heading}");
+        }
+        for heading in ["temperature", "tension_N", "time_V"] {
+            assert!(!Column::read(heading, None).is_time(), "{heading}");
+        }
+        assert!(Column::read("Time", Some("Sec")).is_time());
+    }
+}

@@ -1,0 +1,360 @@
+//! Rows of numbers out of bytes: the quick way for plain rows, the careful way for the rest.
+
+use super::layout::{Delimiter, Dialect, is_not_a_number, is_skipped};
+use crate::io::number;
+
+/// Which cells of a row are wanted and how they are written.
+#[derive(Debug, Clone, Copy)]
+pub struct RowPlan {
+    /// How the file is written.
+    pub dialect: Dialect,
+    /// Place of the time stamps, from 0.
+    pub time: Option<usize>,
+    /// Place of the channel, from 0.
+    pub value: usize,
+}
+
+/// Rows of one piece of a file.
+#[derive(Debug, Default)]
+pub struct Rows {
+    /// Time stamps as written (in the file's unit); empty without a time column.
+    pub times: Vec<f64>,
+    /// Where the text of each time stamp stands: offset in the upper, length in the lower half.
+    pub time_text: Vec<u64>,
+    /// The channel's values as written.
+    pub values: Vec<f64>,
+    /// Lines seen, rows and others.
+    pub lines: usize,
+    /// The row that could not be read, if any; nothing after it was looked at.
+    pub problem: Option<Problem>,
+}
+
+/// A row that could not be read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Problem {
+    /// Line within the piece, from 0.
+    pub line: usize,
+    /// Byte within the piece at which the line starts.
+    pub offset: usize,
+    /// Place of the cell, from 0.
+    pub cell: usize,
+    /// What is wrong.
+    pub what: Defect,
+}
+
+/// What is wrong with a cell.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Defect {
+    /// The row ends before it.
+    Missing,
+    /// It is empty.
+    Empty,
+    /// It says that there is no number.
+    NonFinite(String),
+    /// It is no number.
+    NotANumber(String),
+}
+
+impl Rows {
+    /// Empties the rows, keeping their memory.
+    pub fn clear(&mut self) {
+        self.times.clear();
+        self.time_text.clear();
+        self.values.clear();
+        self.lines = 0;
+        self.problem = None;
+    }
+
+    /// Reads all lines of a piece. Every line ends with a line feed but perhaps the last.
+    pub fn read(&mut self, text: &[u8], plan: &RowPlan) {
+        self.clear();
+        let mut at = 0;
+        while at < text.len() {
+            match plan.quick_row(text, at) {
+                Some(row) => {
+                    if plan.time.is_some() {
+                        self.times.push(row.time);
+                        self.time_text.push(row.time_text);
+                    }
+                    self.values.push(row.value);
+                    at = row.end;
+                }
+                None => {
+                    let end = line_end(text, at);
+                    if let Err((cell, what)) = self.careful_row(&text[at..end], at, plan) {
+                        self.problem = Some(Problem {
+                            line: self.lines,
+                            offset: at,
+                            cell,
+                            what,
+                        });
+                        return;
+                    }
+                    at = end;
+                }
+            }
+            self.lines += 1;
+        }
+    }
+
+    /// Reads a line that is not a plain row of numbers: quoted, padded, a comment, or wrong.
+    #[cold]
+    fn careful_row(
+        &mut self,
+        line: &[u8],
+        at: usize,
+        plan: &RowPlan,
+    ) -> Result<(), (usize, Defect)> {
+        let text = String::from_utf8_lossy(line);
+        if is_skipped(&text) {
+            return Ok(());
+        }
+        let cells = plan.dialect.cells(&text);
+        let time = plan
+            .time
+            .map(|place| read_cell(&cells, place, plan.dialect.decimal))
+            .transpose()?;
+        let value = read_cell(&cells, plan.value, plan.dialect.decimal)?;
+        if let (Some(time), Some(place)) = (time, plan.time) {
+            // The text is copied to the output only from where it stands unquoted.
+            let span = text
+                .find(cells[place].as_str())
+                .map_or(0, |offset| span(at + offset, cells[place].len()));
+            self.times.push(time);
+            self.time_text.push(span);
+        }
+        self.values.push(value);
+        Ok(())
+    }
+}
+
+fn read_cell(cells: &[String], place: usize, decimal: u8) -> Result<f64, (usize, Defect)> {
+    let defect = match cells.get(place).map(String::as_str) {
+        None => Defect::Missing,
+        Some("") => Defect::Empty,
+        Some(cell) => match number::cell(cell, decimal) {
+            Some(value) => return Ok(value),
+            None if is_not_a_number(cell) => Defect::NonFinite(cell.to_owned()),
+            None => Defect::NotANumber(cell.to_owned()),
+        },
+    };
+    Err((place, defect))
+}
+
+/// Offset and length of a text in one number.
+#[inline]
+fn span(offset: usize, length: usize) -> u64 {
+    (offset as u64) << 32 | length as u64
+}
+
+/// Text of a span, as made by [`Rows::read`] from the same bytes.
+#[inline]
+#[must_use]
+pub fn spanned(text: &[u8], span: u64) -> &[u8] {
+    let offset = (span >> 32) as usize;
+    &text[offset..offset + (span & 0xFFFF_FFFF) as usize]
+}
+
+/// Position after the line feed that ends the line at `at`.
+#[inline]
+fn line_end(text: &[u8], at: usize) -> usize {
+    memchr::memchr(b'\n', &text[at..]).map_or(text.len(), |place| at + place + 1)
+}
+
+struct QuickRow {
+    time: f64,
+    time_text: u64,
+    value: f64,
+    end: usize,
+}
+
+impl RowPlan {
+    /// A row of plain numbers; `None` if the careful way has to look at it.
+    #[inline]
+    fn quick_row(&self, text: &[u8], start: usize) -> Option<QuickRow> {
+        let separator = match self.dialect.delimiter {
+            Delimiter::Byte(byte) => byte,
+            // No number holds a line feed: a single column has no separator.
+            Delimiter::None => b'\n',
+            Delimiter::Spaces => return None,
+        };
+        let last = self.time.map_or(self.value, |time| time.max(self.value));
+        let mut row = QuickRow {
+            time: 0.0,
+            time_text: 0,
+            value: 0.0,
+            end: 0,
+        };
+        let mut at = start;
+        for place in 0..=last {
+            if place > 0 {
+                if text.get(at) != Some(&separator) {
+                    return None;
+                }
+                at += 1;
+            }
+            let is_time = self.time == Some(place);
+            if !is_time && place != self.value {
+                at = skip_cell(text, at, separator)?;
+                continue;
+            }
+            while text.get(at) == Some(&b' ') {
+                at += 1;
+            }
+            let (number, end) = number::read(text, at, self.dialect.decimal)?;
+            if is_time {
+                row.time = number;
+                row.time_text = span(at, end - at);
+            }
+            if place == self.value {
+                row.value = number;
+            }
+            at = end;
+        }
+        row.end = end_of_row(text, at, separator)?;
+        Some(row)
+    }
+}
+
+/// Position of the separator after an unwanted cell, on the same line and outside quotes.
+#[inline]
+fn skip_cell(text: &[u8], at: usize, separator: u8) -> Option<usize> {
+    let place = at + memchr::memchr3(separator, b'\n', b'"', &text[at..])?;
+    (text[place] == separator).then_some(place)
+}
+
+/// Position of the next line, if the cell ends where a number ended.
+#[inline]
+fn end_of_row(text: &[u8], at: usize, separator: u8) -> Option<usize> {
+    match text.get(at) {
+        Some(b'\n') => Some(at + 1),
+        Some(b'\r') if text.get(at + 1) == Some(&b'\n') => Some(at + 2),
+        Some(byte) if *byte == separator => Some(line_end(text, at)),
+        None => Some(at),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const COMMA: Dialect = Dialect {
+        delimiter: Delimiter::Byte(b','),
+        decimal: b'.',
+    };
+
+    fn read(text: &str, plan: RowPlan) -> Rows {
+        let mut rows = Rows::default();
+        rows.read(text.as_bytes(), &plan);
+        rows
+    }
+
+    fn plan(time: Option<usize>, value: usize) -> RowPlan {
+        RowPlan {
+            dialect: COMMA,
+            time,
+            value,
+        }
+    }
+
+    #[test]
+    fn plain_rows() {
+        let text = "0.0,1.5\n0.1,-2e-3\r\n0.2,3";
+        let rows = read(text, plan(Some(0), 1));
+        assert_eq!(rows.values, [1.5, -2e-3, 3.0]);
+        assert_eq!(rows.times, [0.0, 0.1, 0.2]);
+        assert_eq!(rows.lines, 3);
+        let texts: Vec<&[u8]> = rows
+            .time_text
+            .iter()
+            .map(|s| spanned(text.as_bytes(), *s))
+            .collect();
+        assert_eq!(texts, [b"0.0", b"0.1", b"0.2"]);
+    }
+
+    #[test]
+    fn columns_in_any_order_with_others_between() {
+        let rows = read("7,x y,1.0,9,0.5\n8,\"a,b\",2.0,9,0.6\n", plan(Some(4), 2));
+        assert_eq!(rows.values, [1.0, 2.0]);
+        assert_eq!(rows.times, [0.5, 0.6]);
+        assert_eq!(rows.problem, None);
+    }
+
+    #[test]
+    fn padding_quotes_comments_and_blank_lines() {
+        let text = " 0 ,  1.5 ,\n\n# remark\n\"1\",\"2.5\"\n,,\n2,3.5\n";
+        let rows = read(text, plan(Some(0), 1));
+        assert_eq!(rows.values, [1.5, 2.5, 3.5]);
+        assert_eq!(rows.lines, 6);
+        assert_eq!(spanned(text.as_bytes(), rows.time_text[1]), b"1");
+    }
+
+    #[test]
+    fn other_separators() {
+        let tab = Dialect {
+            delimiter: Delimiter::Byte(b'\t'),
+            decimal: b',',
+        };
+        let rows = read(
+            "0,5\t-1,25\n",
+            RowPlan {
+                dialect: tab,
+                time: Some(0),
+                value: 1,
+            },
+        );
+        assert_eq!((rows.times[0], rows.values[0]), (0.5, -1.25));
+        let spaces = Dialect {
+            delimiter: Delimiter::Spaces,
+            decimal: b'.',
+        };
+        let rows = read(
+            "  0.5   1.25\n 1 2\n",
+            RowPlan {
+                dialect: spaces,
+                time: Some(0),
+                value: 1,
+            },
+        );
+        assert_eq!(rows.values, [1.25, 2.0]);
+        let none = Dialect {
+            delimiter: Delimiter::None,
+            decimal: b'.',
+        };
+        let rows = read(
+            "1\n2\n",
+            RowPlan {
+                dialect: none,
+                time: None,
+                value: 0,
+            },
+        );
+        assert_eq!(rows.values, [1.0, 2.0]);
+    }
+
+    #[test]
+    fn defects_are_named() {
+        for (text, line, cell, what) in [
+            ("0,1\n1\n", 1, 1, Defect::Missing),
+            ("0,1\n1,\n", 1, 1, Defect::Empty),
+            ("0,NaN\n", 0, 1, Defect::NonFinite("NaN".to_owned())),
+            ("0,-1.#IND\n", 0, 1, Defect::NonFinite("-1.#IND".to_owned())),
+            (
+                "0,1\n\n1,2\n2,abc\n",
+                3,
+                1,
+                Defect::NotANumber("abc".to_owned()),
+            ),
+            ("0,1.5V\n", 0, 1, Defect::NotANumber("1.5V".to_owned())),
+            ("x,1\n", 0, 0, Defect::NotANumber("x".to_owned())),
+        ] {
+            let problem = read(text, plan(Some(0), 1)).problem.expect(text);
+            assert_eq!(
+                (problem.line, problem.cell, problem.what),
+                (line, cell, what),
+                "{text}"
+            );
+        }
+    }
+}

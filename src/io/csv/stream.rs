@@ -1,0 +1,323 @@
+//! A table read piece by piece, and what is wrong with it, in order.
+
+use std::io::Read;
+
+use super::Table;
+use super::chunks::{Chunks, Piece};
+use super::scan::{Defect, Problem, RowPlan, Rows};
+use super::time::{Break, TimeAxis, TimeSource};
+use crate::failure::Failure;
+use crate::report::Warning;
+
+/// Bytes of a piece: large enough to be quick, small enough to stay in cache.
+const PIECE: usize = 1 << 19;
+/// Difference of the mean rate from that of the first rows that is worth a warning.
+const RATE_DRIFT: f64 = 1e-4;
+
+/// A piece of a file and the rows in it.
+#[derive(Debug, Default)]
+pub struct Batch {
+    /// The bytes.
+    pub text: Vec<u8>,
+    /// What they say.
+    pub rows: Rows,
+    /// Whether the last line has no line feed.
+    unended: bool,
+    /// First irregular time stamp within the piece.
+    time_break: Option<Break>,
+}
+
+impl Batch {
+    /// Reads the rows and checks their stamps. Needs no other batch.
+    pub fn read_rows(&mut self, plan: &RowPlan, time: &TimeAxis) {
+        self.rows.read(&self.text, plan);
+        self.time_break = time.first_break(None, &self.rows.times);
+    }
+}
+
+/// Gets pieces of a file.
+pub struct Fetch {
+    source: String,
+    chunks: Chunks,
+}
+
+impl Fetch {
+    pub(super) fn new(
+        source: String,
+        head: Vec<u8>,
+        input: Box<dyn Read + Send>,
+        bytes: usize,
+    ) -> Self {
+        Self {
+            source,
+            chunks: Chunks::new(head, input, bytes.max(PIECE)),
+        }
+    }
+
+    /// Fills a batch with the next piece; `false` at the end.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn next(&mut self, batch: &mut Batch) -> Result<bool, Failure> {
+        let piece = self.chunks.next(&mut batch.text).map_err(|error| {
+            Failure::failed(format_args!("{}: cannot be read: {error}", self.source))
+        })?;
+        batch.unended = piece == Piece::Unended;
+        Ok(piece != Piece::End)
+    }
+}
+
+/// Looks at the batches in order: what one alone cannot know.
+#[derive(Debug)]
+pub struct Sequence {
+    source: String,
+    columns: Vec<String>,
+    plan: RowPlan,
+    time: TimeAxis,
+    shortest_value: usize,
+    /// Lines before the next batch.
+    lines: usize,
+    samples: usize,
+    first_stamp: Option<f64>,
+    last_stamp: Option<f64>,
+    lost: Option<Warning>,
+    warnings: Vec<Warning>,
+}
+
+/// What a whole table held.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Summary {
+    /// Rows read.
+    pub samples: usize,
+    /// First and last stamp, in seconds; `None` without stamps.
+    pub span_s: Option<(f64, f64)>,
+    /// What was lost, if anything.
+    pub lost: Option<Warning>,
+    /// What else should be known.
+    pub warnings: Vec<Warning>,
+}
+
+impl Sequence {
+    pub(super) fn new(table: &Table) -> Self {
+        Self {
+            source: table.source.clone(),
+            columns: table
+                .layout
+                .columns
+                .iter()
+                .map(|c| c.heading.clone())
+                .collect(),
+            plan: table.plan,
+            time: table.time.clone(),
+            shortest_value: table.shortest_value,
+            lines: table.layout.data_line - 1,
+            samples: 0,
+            first_stamp: None,
+            last_stamp: None,
+            lost: None,
+            warnings: Vec::new(),
+        }
+    }
+
+    /// Rows accepted so far.
+    #[must_use]
+    pub fn samples(&self) -> usize {
+        self.samples
+    }
+
+    /// Takes the next batch.
+    ///
+    /// # Errors
+    /// The first row that cannot be read, and the first stamp that is not uniform, with its line.
+    pub fn accept(&mut self, batch: &Batch) -> Result<(), Failure> {
+        let rows = &batch.rows;
+        if let Some(found) = self.time_break(batch) {
+            let line = self.lines + line_of_row(&batch.text, &self.plan, found.row) + 1;
+            return Err(self.at(line, self.time.explain(&found)));
+        }
+        if let Some(problem) = &rows.problem {
+            self.bad_row(batch, problem)?;
+        } else if batch.unended {
+            self.look_at_unended_line(batch);
+        }
+        self.lines += rows.lines;
+        self.samples += rows.values.len();
+        self.first_stamp = self.first_stamp.or(rows.times.first().copied());
+        self.last_stamp = rows.times.last().copied().or(self.last_stamp);
+        Ok(())
+    }
+
+    /// Ends the table.
+    ///
+    /// # Errors
+    /// If it held fewer than two samples.
+    pub fn finish(mut self) -> Result<Summary, Failure> {
+        if self.samples < 2 {
+            return Err(Failure::failed(format_args!(
+                "{}: {} row(s) of numbers; a record has at least two",
+                self.source, self.samples
+            )));
+        }
+        let stamps = self.first_stamp.zip(self.last_stamp);
+        let span_s = match (&self.time.source, stamps) {
+            (
+                TimeSource::Stamps {
+                    seconds_per_unit, ..
+                },
+                Some((first, last)),
+            ) => Some((first * seconds_per_unit, last * seconds_per_unit)),
+            _ => None,
+        };
+        if let Some(span) = span_s
+            && !self.time.is_resampled()
+        {
+            self.look_at_drift(span);
+        }
+        Ok(Summary {
+            samples: self.samples,
+            span_s,
+            lost: self.lost,
+            warnings: self.warnings,
+        })
+    }
+
+    /// A failure at a row of the batch that was accepted last.
+    #[must_use]
+    pub fn failure_at_row(&self, batch: &Batch, row: usize, message: &str) -> Failure {
+        let before = self.lines - batch.rows.lines;
+        self.at(
+            before + line_of_row(&batch.text, &self.plan, row) + 1,
+            message,
+        )
+    }
+
+    fn at(&self, line: usize, message: impl std::fmt::Display) -> Failure {
+        Failure::failed(format_args!("{}, line {line}: {message}", self.source))
+    }
+
+    fn time_break(&self, batch: &Batch) -> Option<Break> {
+        let first = batch.rows.times.get(..1)?;
+        self.time
+            .first_break(self.last_stamp, first)
+            .or(batch.time_break)
+    }
+
+    /// A row that cannot be read is an error, unless the file was cut there.
+    fn bad_row(&mut self, batch: &Batch, problem: &Problem) -> Result<(), Failure> {
+        let line = self.lines + problem.line + 1;
+        let text = String::from_utf8_lossy(&batch.text[problem.offset..]);
+        let is_last = batch.unended && !text.contains('\n');
+        if is_last {
+            self.lines += 1;
+            self.lost = Some(Warning::new(
+                "truncated-last-line",
+                format!(
+                    "{}, line {line}: the file ends in the middle of this line (\"{}\"); it was \
+                     left out, everything before it was used",
+                    self.source,
+                    shorten(&text)
+                ),
+            ));
+            return Ok(());
+        }
+        Err(self.at(
+            line,
+            self.describe(problem, text.lines().next().unwrap_or("")),
+        ))
+    }
+
+    fn describe(&self, problem: &Problem, line: &str) -> String {
+        let column = problem.cell + 1;
+        let name = self.columns.get(problem.cell).map_or("", String::as_str);
+        match &problem.what {
+            Defect::Missing => format!(
+                "column {column} (\"{name}\") is missing: the line \"{}\" has too few cells; \
+                 complete or remove it",
+                shorten(line)
+            ),
+            Defect::Empty => format!(
+                "column {column} (\"{name}\") is empty; fill in the value or remove the line, and \
+                 use --resample to bridge the gap"
+            ),
+            Defect::NonFinite(text) => format!(
+                "column {column} (\"{name}\") reads \"{text}\", which is not a finite number; \
+                 remove the line, and use --resample to bridge the gap"
+            ),
+            Defect::NotANumber(text) => format!(
+                "column {column} (\"{name}\") reads \"{}\", expected a number{}; correct or remove \
+                 the line",
+                shorten(text),
+                other_mark(text, self.plan.dialect.decimal)
+            ),
+        }
+    }
+
+    /// A last line without a line feed may have been cut within its last number.
+    fn look_at_unended_line(&mut self, batch: &Batch) {
+        let start = memchr::memrchr(b'\n', &batch.text).map_or(0, |place| place + 1);
+        let text = String::from_utf8_lossy(&batch.text[start..]);
+        let cells = self.plan.dialect.cells(&text);
+        let is_last = cells.len() == self.plan.value + 1;
+        let length = cells.get(self.plan.value).map_or(0, String::len);
+        if is_last && length > 0 && length < self.shortest_value {
+            self.warnings.push(Warning::new(
+                "unended-last-line",
+                format!(
+                    "{}: the last line has no line end and its value \"{}\" is shorter than usual; \
+                     if the file was cut there, do not trust the last sample",
+                    self.source, cells[self.plan.value]
+                ),
+            ));
+        }
+    }
+
+    fn look_at_drift(&mut self, (first_s, last_s): (f64, f64)) {
+        let mean_hz = (self.samples - 1) as f64 / (last_s - first_s);
+        let drift = mean_hz / self.time.rate_hz - 1.0;
+        if drift.abs() > RATE_DRIFT {
+            self.warnings.push(Warning::new(
+                "rate-drift",
+                format!(
+                    "{}: the first rows are {} Hz apart, the whole record {} Hz on average; the \
+                     rate of the first rows was used",
+                    self.source,
+                    crate::io::digits::text(self.time.rate_hz, 7),
+                    crate::io::digits::text(mean_hz, 7)
+                ),
+            ));
+        }
+    }
+}
+
+/// Line, from 0, that a row of a piece stands on.
+fn line_of_row(text: &[u8], plan: &RowPlan, row: usize) -> usize {
+    let mut before = 0;
+    let mut rows = Rows::default();
+    for (line, bytes) in text.split_inclusive(|byte| *byte == b'\n').enumerate() {
+        rows.read(bytes, plan);
+        before += rows.values.len();
+        if before > row {
+            return line;
+        }
+    }
+    0
+}
+
+fn shorten(text: &str) -> String {
+    let text = text.trim();
+    if text.chars().count() <= 60 {
+        text.to_owned()
+    } else {
+        text.chars().take(57).chain("...".chars()).collect()
+    }
+}
+
+/// A hint if the number would do with the other decimal mark.
+fn other_mark(text: &str, decimal: u8) -> &'static str {
+    let other = if decimal == b'.' { b',' } else { b'.' };
+    match crate::io::number::cell(text, other) {
+        Some(_) if decimal == b'.' => " with a decimal point (see --decimal)",
+        Some(_) => " with a decimal comma (see --decimal)",
+        None => "",
+    }
+}

@@ -1,0 +1,333 @@
+//! The time axis of a table: stamps or a rate, and whether the stamps are uniform.
+
+use torqcomp_model::Unit;
+
+use super::layout::Layout;
+use super::scan::Rows;
+use super::{Options, is_time};
+use crate::failure::Failure;
+use crate::io::digits;
+
+/// Largest deviation of a step from the uniform one, as a fraction of it.
+const TOLERANCE: f64 = 0.01;
+
+/// How the samples of a table lie in time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TimeAxis {
+    /// Where it comes from.
+    pub source: TimeSource,
+    /// Samples a second.
+    pub rate_hz: f64,
+}
+
+/// Where a time axis comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum TimeSource {
+    /// From a column of stamps.
+    Stamps {
+        /// Heading of the column.
+        heading: String,
+        /// Unit of the stamps as written.
+        unit: String,
+        /// Seconds per unit of the stamps.
+        seconds_per_unit: f64,
+        /// Uniform step, in the stamps' unit.
+        step: f64,
+        /// Whether the stamps need not be uniform, because they are resampled.
+        resampled: bool,
+        /// Whether the text of a stamp is a number of seconds as the output writes it.
+        copied: bool,
+    },
+    /// From a rate that the user gave; the first sample is at time 0.
+    Given,
+}
+
+/// Where and how stamps stop being uniform.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Break {
+    /// Index of the stamp that ends the irregular step, within its piece.
+    pub row: usize,
+    /// The stamp before it.
+    pub before: f64,
+    /// The stamp itself.
+    pub after: f64,
+}
+
+impl TimeAxis {
+    /// Finds the time axis out of the first rows and what the user said.
+    ///
+    /// # Errors
+    /// If there is neither a column of stamps in a known unit nor a rate, or the stamps of the
+    /// first rows do not rise.
+    pub fn find(
+        layout: &Layout,
+        column: Option<usize>,
+        rows: &Rows,
+        options: &Options,
+    ) -> Result<Self, Failure> {
+        if let Some(rate_hz) = options.rate_hz
+            && !(options.resample && column.is_some())
+        {
+            return Ok(Self {
+                source: TimeSource::Given,
+                rate_hz,
+            });
+        }
+        let Some(place) = column else {
+            return Err(Failure::failed(no_time(layout)));
+        };
+        let column = &layout.columns[place];
+        let (unit_text, unit) = unit(column, options)?;
+        let typical = typical_step(&rows.times)
+            .ok_or_else(|| Failure::failed(no_step(&column.heading, &rows.times)))?;
+        let seconds_per_unit = unit.factor();
+        let step = options
+            .rate_hz
+            .map_or(typical, |rate| 1.0 / rate / seconds_per_unit);
+        Ok(Self {
+            source: TimeSource::Stamps {
+                heading: column.heading.clone(),
+                unit: unit_text,
+                seconds_per_unit,
+                step,
+                resampled: options.resample,
+                copied: seconds_per_unit == 1.0 && layout.dialect.decimal == b'.',
+            },
+            rate_hz: 1.0 / (step * seconds_per_unit),
+        })
+    }
+
+    /// Whether stamps are read.
+    #[must_use]
+    pub fn uses_stamps(&self) -> bool {
+        matches!(self.source, TimeSource::Stamps { .. })
+    }
+
+    /// Whether stamps are brought onto a grid.
+    #[must_use]
+    pub fn is_resampled(&self) -> bool {
+        matches!(
+            self.source,
+            TimeSource::Stamps {
+                resampled: true,
+                ..
+            }
+        )
+    }
+
+    /// First stamp that does not follow the one before it by the uniform step. `last` is the stamp
+    /// before the first of them. Of stamps that are resampled, the first that runs backwards.
+    #[must_use]
+    pub fn first_break(&self, last: Option<f64>, times: &[f64]) -> Option<Break> {
+        let TimeSource::Stamps {
+            step, resampled, ..
+        } = &self.source
+        else {
+            return None;
+        };
+        let (&first, &end) = (times.first()?, times.last()?);
+        // A stamp cannot be more exact than its own last bit.
+        let rounding = 2.0 * f64::EPSILON * first.abs().max(end.abs());
+        let (low, high) = if *resampled {
+            (0.0, f64::INFINITY)
+        } else {
+            (
+                step * (1.0 - TOLERANCE) - rounding,
+                step * (1.0 + TOLERANCE) + rounding,
+            )
+        };
+        let good = |before: f64, after: f64| (low..=high).contains(&(after - before));
+        if let Some(before) = last
+            && !good(before, first)
+        {
+            return Some(Break {
+                row: 0,
+                before,
+                after: first,
+            });
+        }
+        let row = times.windows(2).position(|pair| !good(pair[0], pair[1]))? + 1;
+        Some(Break {
+            row,
+            before: times[row - 1],
+            after: times[row],
+        })
+    }
+
+    /// Says what is wrong at a break and what to do.
+    #[must_use]
+    pub fn explain(&self, found: &Break) -> String {
+        let TimeSource::Stamps { unit, step, .. } = &self.source else {
+            return String::new();
+        };
+        let (before, after) = (
+            digits::text(found.before, 12),
+            digits::text(found.after, 12),
+        );
+        if found.after < found.before {
+            return format!(
+                "time runs backwards, from {before} {unit} to {after} {unit}: the clock was set \
+                 back or two recordings were joined; split the file there"
+            );
+        }
+        let what = if found.after == found.before {
+            format!("the time stamp {after} {unit} repeats the one before it")
+        } else {
+            let length = (found.after - found.before) / step;
+            format!(
+                "the time stamps are not uniform: the step from {before} {unit} to {after} {unit} \
+                 is {} times the usual one of {} {unit}",
+                digits::text(length, 4),
+                digits::text(*step, 6)
+            )
+        };
+        format!("{what}; use --resample to interpolate, or --rate HZ if the stamps are wrong")
+    }
+}
+
+/// The unit of a column of stamps: from the user, or from the heading.
+fn unit(column: &super::Column, options: &Options) -> Result<(String, Unit), Failure> {
+    let (text, unit) = match (&options.time_unit, &column.unit) {
+        (Some(text), _) => {
+            let unit = Unit::parse(text)
+                .map_err(|error| Failure::usage(format_args!("--time-unit {text}: {error}")))?;
+            (text.clone(), unit)
+        }
+        (None, Some(named)) => (named.text.clone(), named.unit),
+        (None, None) => {
+            return Err(Failure::failed(format_args!(
+                "the time column \"{}\" does not say its unit; give it with --time-unit s (or ms, \
+                 us, min)",
+                column.heading
+            )));
+        }
+    };
+    if is_time(unit.dimension()) {
+        Ok((text, unit))
+    } else {
+        Err(Failure::failed(format_args!(
+            "the time column \"{}\" is in \"{text}\", which is no unit of time; give it with \
+             --time-unit s (or ms, us, min), or another column with --time-column",
+            column.heading
+        )))
+    }
+}
+
+fn no_time(layout: &Layout) -> String {
+    if layout.heading_line.is_none() && layout.columns.len() > 1 {
+        return "the columns have no headings, so none is known to be the time; give --rate HZ, or \
+                --time-column 1 --time-unit s if the first column is the time in seconds"
+            .to_owned();
+    }
+    "there is no time column, so the sampling rate is unknown; give it with --rate HZ, or name the \
+     column with --time-column"
+        .to_owned()
+}
+
+/// Usual step of the first stamps: the mean of those within the tolerance of their median.
+fn typical_step(times: &[f64]) -> Option<f64> {
+    let mut steps: Vec<f64> = times
+        .windows(2)
+        .map(|pair| pair[1] - pair[0])
+        .filter(|step| *step > 0.0)
+        .collect();
+    if steps.is_empty() {
+        return None;
+    }
+    steps.sort_by(f64::total_cmp);
+    let median = steps[steps.len() / 2];
+    let usual: Vec<f64> = steps
+        .into_iter()
+        .filter(|step| (step / median - 1.0).abs() <= TOLERANCE)
+        .collect();
+    Some(usual.iter().sum::<f64>() / usual.len() as f64)
+}
+
+fn no_step(heading: &str, times: &[f64]) -> String {
+    if times.len() < 2 {
+        return format!(
+            "the time column \"{heading}\" has {} stamp(s), so the sampling rate is unknown; give \
+             it with --rate HZ",
+            times.len()
+        );
+    }
+    format!(
+        "the stamps of the time column \"{heading}\" do not rise; give the rate with --rate HZ, or \
+         another column with --time-column"
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn axis(step: f64, resampled: bool) -> TimeAxis {
+        TimeAxis {
+            source: TimeSource::Stamps {
+                heading: "t".to_owned(),
+                unit: "s".to_owned(),
+                seconds_per_unit: 1.0,
+                step,
+                resampled,
+                copied: true,
+            },
+            rate_hz: 1.0 / step,
+        }
+    }
+
+    #[test]
+    fn one_per_cent_of_a_step_is_uniform_and_more_is_not() {
+        let axis = axis(0.001, false);
+        assert_eq!(
+            axis.first_break(None, &[0.0, 0.001, 0.002_009, 0.003_001]),
+            None
+        );
+        let found = axis
+            .first_break(None, &[0.0, 0.001, 0.002_011, 0.003])
+            .unwrap();
+        assert_eq!((found.row, found.after), (2, 0.002_011));
+        let found = axis.first_break(Some(-0.002), &[0.0, 0.001]).unwrap();
+        assert_eq!((found.row, found.before), (0, -0.002));
+    }
+
+    #[test]
+    fn large_stamps_are_allowed_their_rounding() {
+        let start = 1.7e9;
+        let times: Vec<f64> = (0..1000).map(|i| start + 20e-6 * f64::from(i)).collect();
+        assert_eq!(axis(20e-6, false).first_break(None, &times), None);
+    }
+
+    #[test]
+    fn resampled_stamps_may_do_anything_but_run_backwards() {
+        let axis = axis(1.0, true);
+        assert_eq!(axis.first_break(None, &[0.0, 0.5, 0.5, 7.0]), None);
+        assert_eq!(axis.first_break(None, &[0.0, 0.5, 0.4]).unwrap().row, 2);
+    }
+
+    #[test]
+    fn messages_say_what_and_what_to_do() {
+        let axis = axis(0.5, false);
+        let explain = |before, after| {
+            axis.explain(&Break {
+                row: 1,
+                before,
+                after,
+            })
+        };
+        assert!(explain(1.0, 0.5).contains("backwards, from 1 s to 0.5 s"));
+        assert!(explain(1.0, 1.0).contains("repeats"));
+        let gap = explain(1.0, 2.5);
+        assert!(
+            gap.contains("3 times") && gap.contains("--resample"),
+            "{gap}"
+        );
+    }
+
+    #[test]
+    fn usual_step_is_not_moved_by_a_gap() {
+        let mut times: Vec<f64> = (0..100).map(|i| 0.002 * f64::from(i)).collect();
+        times.push(5.0);
+        assert!((typical_step(&times).unwrap() - 0.002).abs() < 1e-12);
+        assert_eq!(typical_step(&[1.0, 1.0]), None);
+    }
+}

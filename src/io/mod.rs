@@ -1,0 +1,6 @@
+//! Files in and out.
+
+pub mod csv;
+pub mod digits;
+pub mod number;
+pub mod output;

@@ -1,0 +1,191 @@
+//! Decimal text to `f64`, exactly, for recorder logs.
+//!
+//! Numbers of up to 19 digits and a power of ten up to ±22 are built from their integer mantissa
+//! (W. D. Clinger, PLDI 1990: both factors are exact, so the one operation rounds correctly);
+//! everything else goes to `fast_float2`.
+
+/// Powers of ten that an `f64` holds exactly.
+const EXACT_POWERS: [f64; 23] = [
+    1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16,
+    1e17, 1e18, 1e19, 1e20, 1e21, 1e22,
+];
+/// Largest integer up to which every integer is an `f64`.
+const EXACT_MANTISSA: u64 = 1 << 53;
+
+/// Reads a number at `text[at..]`: its value and the position after it.
+///
+/// `None` if no finite number begins there. `text` may go on with anything after it.
+#[inline]
+pub fn read(text: &[u8], at: usize, decimal: u8) -> Option<(f64, usize)> {
+    let mut place = at;
+    let negative = text.get(place) == Some(&b'-');
+    if negative || text.get(place) == Some(&b'+') {
+        place += 1;
+    }
+    let whole_start = place;
+    let (mut mantissa, whole_end) = digits(text, place, 0);
+    place = whole_end;
+    let mut count = whole_end - whole_start;
+    let mut exponent = 0_i32;
+    if text.get(place) == Some(&decimal) {
+        let fraction_start = place + 1;
+        let (more, fraction_end) = digits(text, fraction_start, mantissa);
+        mantissa = more;
+        exponent = -((fraction_end - fraction_start) as i32);
+        count += fraction_end - fraction_start;
+        place = fraction_end;
+    }
+    if count == 0 {
+        return None;
+    }
+    if matches!(text.get(place), Some(b'e' | b'E')) {
+        let (more, end) = exponent_part(text, place)?;
+        exponent = exponent.saturating_add(more);
+        place = end;
+    }
+    // 19 digits fit a u64 whatever they are.
+    if count > 19 || mantissa > EXACT_MANTISSA || exponent.unsigned_abs() > 22 {
+        return slow(&text[at..place], decimal).map(|value| (value, place));
+    }
+    let power = EXACT_POWERS[exponent.unsigned_abs() as usize];
+    let value = if exponent < 0 {
+        mantissa as f64 / power
+    } else {
+        mantissa as f64 * power
+    };
+    Some((if negative { -value } else { value }, place))
+}
+
+/// Reads the digits at `text[at..]` onto `mantissa` (wrapping: the caller counts the digits).
+#[inline]
+fn digits(text: &[u8], mut at: usize, mut mantissa: u64) -> (u64, usize) {
+    while let Some(eight) = text.get(at..at + 8) {
+        let chunk = u64::from_le_bytes(eight.try_into().expect("eight bytes"));
+        if !all_digits(chunk) {
+            break;
+        }
+        mantissa = mantissa
+            .wrapping_mul(100_000_000)
+            .wrapping_add(eight_digits(chunk));
+        at += 8;
+    }
+    while let Some(digit) = text.get(at).map(|byte| byte.wrapping_sub(b'0'))
+        && digit < 10
+    {
+        mantissa = mantissa.wrapping_mul(10).wrapping_add(u64::from(digit));
+        at += 1;
+    }
+    (mantissa, at)
+}
+
+/// Whether all eight bytes are ASCII digits: high nibble 3, and still 3 after adding 6.
+#[inline]
+fn all_digits(chunk: u64) -> bool {
+    const HIGH: u64 = 0xF0F0_F0F0_F0F0_F0F0;
+    const THREES: u64 = 0x3030_3030_3030_3030;
+    (chunk & HIGH) == THREES && (chunk.wrapping_add(0x0606_0606_0606_0606) & HIGH) == THREES
+}
+
+/// Value of eight ASCII digits, the first in the lowest byte: pairs, then fours, then eight.
+#[inline]
+fn eight_digits(chunk: u64) -> u64 {
+    let chunk = chunk & 0x0F0F_0F0F_0F0F_0F0F;
+    let pairs = (chunk.wrapping_mul(10).wrapping_add(chunk >> 8)) & 0x00FF_00FF_00FF_00FF;
+    let fours = (pairs.wrapping_mul(100).wrapping_add(pairs >> 16)) & 0x0000_FFFF_0000_FFFF;
+    fours.wrapping_mul(10_000).wrapping_add(fours >> 32) & 0xFFFF_FFFF
+}
+
+fn exponent_part(text: &[u8], at: usize) -> Option<(i32, usize)> {
+    let mut place = at + 1;
+    let negative = text.get(place) == Some(&b'-');
+    if negative || text.get(place) == Some(&b'+') {
+        place += 1;
+    }
+    let start = place;
+    let mut value = 0_i32;
+    while let Some(digit) = text.get(place).map(|byte| byte.wrapping_sub(b'0'))
+        && digit < 10
+    {
+        value = value.saturating_mul(10).saturating_add(i32::from(digit));
+        place += 1;
+    }
+    (place > start).then_some((if negative { -value } else { value }, place))
+}
+
+#[cold]
+fn slow(text: &[u8], decimal: u8) -> Option<f64> {
+    let value: f64 = if decimal == b'.' {
+        fast_float2::parse(text).ok()?
+    } else {
+        let text: Vec<u8> = text
+            .iter()
+            .map(|byte| if *byte == decimal { b'.' } else { *byte })
+            .collect();
+        fast_float2::parse(&text).ok()?
+    };
+    value.is_finite().then_some(value)
+}
+
+/// Reads a whole cell, spaces around it allowed.
+pub fn cell(text: &str, decimal: u8) -> Option<f64> {
+    let text = text.trim().as_bytes();
+    read(text, 0, decimal)
+        .filter(|(_, end)| *end == text.len())
+        .map(|(value, _)| value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn usual_cells() {
+        let value = |text: &str| cell(text, b'.');
+        assert_eq!(value("0.00005"), Some(5e-5));
+        assert_eq!(
+            value("-1.234567890123456789"),
+            Some(-1.234_567_890_123_456_7)
+        );
+        assert_eq!(value(" +7. "), Some(7.0));
+        assert_eq!(value(".5"), Some(0.5));
+        assert_eq!(value("1e5"), Some(1e5));
+        assert_eq!(value("2.5E-308"), Some(2.5e-308));
+        assert_eq!(
+            value("123456789012345678901234"),
+            Some(123_456_789_012_345_678_901_234.0)
+        );
+        assert_eq!(cell("-0,25", b','), Some(-0.25));
+        assert_eq!(
+            cell("1,23456789012345678901e3", b','),
+            Some(1234.567_890_123_456_8)
+        );
+        for text in [
+            "", "-", ".", "1e", "e5", "abc", "1.2.3", "nan", "inf", "1e999", "0x10", "1 2",
+        ] {
+            assert_eq!(value(text), None, "{text:?}");
+        }
+    }
+
+    #[test]
+    fn reading_stops_after_the_number() {
+        assert_eq!(read(b"x1.5;2", 1, b'.'), Some((1.5, 4)));
+        assert_eq!(read(b"12345678901,", 0, b'.'), Some((12_345_678_901.0, 11)));
+    }
+
+    proptest! {
+        #[test]
+        fn agrees_with_the_standard_library(value in any::<f64>(), digits in 0_usize..20) {
+            prop_assume!(value.is_finite());
+            for text in [format!("{value}"), format!("{value:e}"), format!("{value:.digits$e}")] {
+                prop_assert_eq!(cell(&text, b'.'), text.parse().ok(), "{}", text);
+            }
+        }
+
+        #[test]
+        fn agrees_on_short_decimals(whole in 0_u32..100_000, part in 0_u64..10_000_000_000, minus: bool) {
+            let text = format!("{}{whole}.{part}", if minus { "-" } else { "" });
+            prop_assert_eq!(cell(&text, b'.'), text.parse().ok());
+        }
+    }
+}

@@ -1,0 +1,154 @@
+//! Outputs that appear whole or not at all.
+
+use std::fs::File;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use tempfile::NamedTempFile;
+
+use crate::failure::Failure;
+
+/// An output: standard output, a device, or a file that takes its name when it is complete.
+pub struct Output {
+    name: String,
+    kind: Kind,
+}
+
+enum Kind {
+    Stdout(io::Stdout),
+    /// A pipe or device that exists: nothing to rename.
+    Device(File),
+    File {
+        part: NamedTempFile,
+        path: PathBuf,
+    },
+}
+
+impl Output {
+    /// Opens an output. `inputs` are files that it must not replace.
+    ///
+    /// # Errors
+    /// If the output is one of the inputs, exists without `force`, or its folder cannot be written.
+    pub fn open(place: Option<&str>, force: bool, inputs: &[&Path]) -> Result<Self, Failure> {
+        let Some(text) = place.filter(|text| *text != "-") else {
+            return Ok(Self {
+                name: "standard output".to_owned(),
+                kind: Kind::Stdout(io::stdout()),
+            });
+        };
+        let path = PathBuf::from(text);
+        let name = path.display().to_string();
+        if let Some(input) = inputs.iter().find(|input| same_file(input, &path)) {
+            return Err(Failure::usage(format_args!(
+                "the output {name} is the input {}; write to another file",
+                input.display()
+            )));
+        }
+        let kind = match std::fs::metadata(&path) {
+            Ok(meta) if meta.is_dir() => {
+                return Err(Failure::usage(format_args!(
+                    "the output {name} is a folder; name a file in it"
+                )));
+            }
+            Ok(meta) if !meta.is_file() => {
+                let file = File::options().write(true).open(&path);
+                Kind::Device(file.map_err(|e| Failure::writing(&name, &e))?)
+            }
+            Ok(_) if !force => {
+                return Err(Failure::failed(format_args!(
+                    "the output {name} exists; give --force to replace it, or another name"
+                )));
+            }
+            _ => Kind::File {
+                part: part_beside(&path).map_err(|e| folder_failure(&path, &e))?,
+                path,
+            },
+        };
+        Ok(Self { name, kind })
+    }
+
+    /// Writes bytes.
+    ///
+    /// # Errors
+    /// [`Failure::ClosedPipe`] if nobody reads any more, or a failure that names the output.
+    pub fn write(&mut self, bytes: &[u8]) -> Result<(), Failure> {
+        let result = match &mut self.kind {
+            Kind::Stdout(out) => out.write_all(bytes),
+            Kind::Device(file) => file.write_all(bytes),
+            Kind::File { part, .. } => part.as_file_mut().write_all(bytes),
+        };
+        result.map_err(|error| Failure::writing(&self.name, &error))
+    }
+
+    /// Completes the output: a file gets its name now.
+    ///
+    /// # Errors
+    /// As [`Output::write`].
+    pub fn finish(self) -> Result<(), Failure> {
+        let result = match self.kind {
+            Kind::Stdout(mut out) => out.flush(),
+            Kind::Device(mut file) => file.flush(),
+            Kind::File { part, path } => part.persist(path).map(drop).map_err(|e| e.error),
+        };
+        result.map_err(|error| Failure::writing(&self.name, &error))
+    }
+
+    /// Whether the output is standard output.
+    #[must_use]
+    pub fn is_stdout(&self) -> bool {
+        matches!(self.kind, Kind::Stdout(_))
+    }
+
+    /// Name for people.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+}
+
+/// A nameless-to-be file in the folder of the output, removed if it is not completed.
+fn part_beside(path: &Path) -> io::Result<NamedTempFile> {
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".torqcomp-").suffix(".part");
+    set_permissions(&mut builder);
+    builder.tempfile_in(folder)
+}
+
+/// The finished file gets the permissions of any other new file.
+#[cfg(unix)]
+fn set_permissions(builder: &mut tempfile::Builder<'_, '_>) {
+    use std::os::unix::fs::PermissionsExt;
+    builder.permissions(std::fs::Permissions::from_mode(0o666));
+}
+
+#[cfg(not(unix))]
+fn set_permissions(_: &mut tempfile::Builder<'_, '_>) {}
+
+fn folder_failure(path: &Path, error: &io::Error) -> Failure {
+    Failure::failed(format_args!(
+        "{}: cannot be created: {error}; check that its folder exists and can be written",
+        path.display()
+    ))
+}
+
+/// Whether two paths lead to the same file.
+fn same_file(a: &Path, b: &Path) -> bool {
+    match (a.canonicalize(), b.canonicalize()) {
+        (Ok(a), Ok(b)) => a == b,
+        _ => false,
+    }
+}
+
+/// Writes a small result in one go.
+///
+/// # Errors
+/// As [`Output::open`] and [`Output::write`].
+pub fn write_all(place: Option<&str>, force: bool, text: &str) -> Result<(), Failure> {
+    let mut output = Output::open(place, force, &[])?;
+    output.write(text.as_bytes())?;
+    output.finish()
+}

@@ -1,0 +1,9 @@
+#![doc = include_str!("../README.md")]
+
+pub mod cli;
+pub mod commands;
+pub mod failure;
+pub mod io;
+pub mod pipeline;
+pub mod report;
+pub mod stand;

@@ -1,0 +1,216 @@
+//! The report of a compensation.
+
+use std::fmt::Write;
+
+use serde::Serialize;
+
+use super::{Warning, rounded, short};
+
+/// Schema of the JSON document.
+pub const SCHEMA: &str = "torqcomp.compensate/1";
+
+/// Report of a compensation.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Report {
+    /// Schema of this document.
+    pub schema: &'static str,
+    /// Version of torqcomp.
+    pub version: &'static str,
+    /// File that was read.
+    pub input: String,
+    /// How it is written.
+    pub dialect: String,
+    /// Channel that was read.
+    pub channel: String,
+    /// Its unit in the file.
+    pub channel_unit: String,
+    /// Stand file.
+    pub stand: String,
+    /// File that was written.
+    pub output: String,
+    /// Unit of the result.
+    pub unit: String,
+    /// How the record became torque at rest.
+    pub calibration: String,
+    /// Samples written.
+    pub samples: usize,
+    /// Sampling rate.
+    pub rate_hz: f64,
+    /// Where the rate comes from.
+    pub rate_from: String,
+    /// First time of the result.
+    pub start_s: f64,
+    /// `stream` or `whole-record`.
+    pub method: &'static str,
+    /// End of the part that is compensated in full.
+    pub band_hz: f64,
+    /// Frequency from which on nothing is passed.
+    pub band_end_hz: f64,
+    /// Time from either end within which the result leans on the record's continuation.
+    pub edge_s: f64,
+    /// What was interpolated.
+    pub resampled: Option<Resampled>,
+    /// What the compensation does to noise.
+    pub noise: Noise,
+    /// What should be known.
+    pub warnings: Vec<Warning>,
+}
+
+/// What was interpolated.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Resampled {
+    /// Samples read.
+    pub samples_in: usize,
+    /// Samples on the grid.
+    pub samples_out: usize,
+    /// Samples left out because their stamp repeats the one before.
+    pub repeated: usize,
+    /// Gaps bridged by a straight line.
+    pub gaps: usize,
+    /// Grid samples within gaps.
+    pub bridged: usize,
+    /// Longest step between stamps.
+    pub longest_step_s: f64,
+    /// Largest deviation of a step, gaps aside, as a fraction of the uniform step.
+    pub largest_jitter: f64,
+}
+
+/// What a compensation does to noise.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Noise {
+    /// Rms out over rms in for white noise.
+    pub white_gain: f64,
+    /// Largest gain.
+    pub largest_gain: f64,
+    /// Frequency of the largest gain.
+    pub largest_gain_at_hz: f64,
+    /// Gain over frequency.
+    pub gain: Vec<Gain>,
+    /// Noise of this record, in the unit of the result.
+    pub record: Option<RecordNoise>,
+}
+
+/// Gain of the compensation at a frequency.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Gain {
+    /// Frequency.
+    pub frequency_hz: f64,
+    /// `|torque / recorded torque|`.
+    pub gain: f64,
+    /// Its relative standard uncertainty, from the stand's constants; `null` if unknown.
+    pub relative_std: Option<f64>,
+}
+
+/// Noise of a record.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RecordNoise {
+    /// Noise density of the record above the band, in unit/√Hz.
+    pub floor_per_root_hz: f64,
+    /// Where it was taken.
+    pub floor_band_hz: [f64; 2],
+    /// Noise within the band before compensation, rms.
+    pub recorded_rms: f64,
+    /// The same after compensation, rms.
+    pub compensated_rms: f64,
+    /// The result without its mean, rms, noise included.
+    pub output_rms: f64,
+    /// Ranges in which the record does not rise above its noise.
+    pub lost_hz: Vec<[f64; 2]>,
+}
+
+impl Report {
+    /// For people.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let mut text = String::new();
+        let mut line = |label: &str, value: String| {
+            // Writing to a String cannot fail.
+            let _ = writeln!(text, "{label:<12} {value}");
+        };
+        line("input", format!("{} ({})", self.input, self.dialect));
+        line(
+            "channel",
+            format!("{} in {}", self.channel, self.channel_unit),
+        );
+        line("calibration", self.calibration.clone());
+        line(
+            "time",
+            format!(
+                "{} samples at {} Hz ({}), from {} s",
+                self.samples,
+                rounded(self.rate_hz, 9),
+                self.rate_from,
+                short(self.start_s)
+            ),
+        );
+        if let Some(resampled) = &self.resampled {
+            line("resampled", resampled.text());
+        }
+        line(
+            "band",
+            format!(
+                "compensated to {} Hz, nothing passed from {} Hz; within {} ms of either end the \
+                 result leans on the record's continuation",
+                short(self.band_hz),
+                short(self.band_end_hz),
+                rounded(1e3 * self.edge_s, 3)
+            ),
+        );
+        line("gain", self.noise.gain_text());
+        line("noise", self.noise.record_text(&self.unit));
+        line("output", format!("{} in {}", self.output, self.unit));
+        text
+    }
+}
+
+impl Resampled {
+    fn text(&self) -> String {
+        format!(
+            "{} samples interpolated to {}; {} gap(s) bridged by straight lines ({} samples, \
+             longest step {} s), {} repeated stamp(s) left out, steps off by up to {} %",
+            self.samples_in,
+            self.samples_out,
+            self.gaps,
+            self.bridged,
+            rounded(self.longest_step_s, 4),
+            self.repeated,
+            rounded(100.0 * self.largest_jitter, 3)
+        )
+    }
+}
+
+impl Noise {
+    fn gain_text(&self) -> String {
+        let points: Vec<String> = self
+            .gain
+            .iter()
+            .map(|g| {
+                let std = g.relative_std.map_or_else(String::new, |std| {
+                    format!(" ± {} %", rounded(100.0 * std, 2))
+                });
+                format!(
+                    "{}{std} at {} Hz",
+                    rounded(g.gain, 3),
+                    short(g.frequency_hz)
+                )
+            })
+            .collect();
+        points.join(", ")
+    }
+
+    fn record_text(&self, unit: &str) -> String {
+        match &self.record {
+            None => format!(
+                "white noise grows {} times; how much this record has cannot be told (too little \
+                 room above the band)",
+                rounded(self.white_gain, 3)
+            ),
+            Some(noise) => format!(
+                "{} {unit} rms in the band become {} {unit} of {} {unit} rms in all",
+                rounded(noise.recorded_rms, 3),
+                rounded(noise.compensated_rms, 3),
+                rounded(noise.output_rms, 3)
+            ),
+        }
+    }
+}

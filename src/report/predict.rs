@@ -1,0 +1,136 @@
+//! The report of what follows from a drawing.
+
+use serde::Serialize;
+
+use super::{columns, rounded};
+
+/// Schema of the JSON document.
+pub const SCHEMA: &str = "torqcomp.predict/1";
+
+/// Report of a prediction.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Report {
+    /// Schema of this document.
+    pub schema: &'static str,
+    /// Version of torqcomp.
+    pub version: &'static str,
+    /// Stand file.
+    pub stand: String,
+    /// The constants.
+    pub constants: Vec<Constant>,
+}
+
+/// A constant from the drawing, beside the measured one.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Constant {
+    /// Name.
+    pub name: &'static str,
+    /// Unit of the values.
+    pub unit: String,
+    /// From the drawing, by the plain theory; `null` if the drawing does not give it.
+    pub predicted: Option<f64>,
+    /// Its standard uncertainty, from those of the drawing.
+    pub predicted_std: Option<f64>,
+    /// As measured; `null` if the stand file does not give it.
+    pub measured: Option<f64>,
+    /// Its standard uncertainty.
+    pub measured_std: Option<f64>,
+    /// `100 (predicted − measured) / measured`.
+    pub residual_percent: Option<f64>,
+    /// What in the model explains at least half of the residual; `null` if nothing does.
+    pub explained_by: Option<String>,
+    /// Theory by which `predicted` follows.
+    pub by: &'static str,
+    /// What adding each effect of the drawing makes of the prediction, one after the other.
+    pub refinements: Vec<Refinement>,
+    /// What else is to be said about the residual.
+    pub note: Option<String>,
+}
+
+/// The prediction with one more effect.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Refinement {
+    /// The effect.
+    pub effect: &'static str,
+    /// The prediction with it and those before it.
+    pub predicted: f64,
+    /// The residual that is left.
+    pub residual_percent: Option<f64>,
+}
+
+/// `100 (predicted − measured) / measured`.
+#[must_use]
+pub fn residual_percent(predicted: Option<f64>, measured: Option<f64>) -> Option<f64> {
+    Some(100.0 * (predicted? - measured?) / measured?).filter(|r| r.is_finite())
+}
+
+impl Report {
+    /// For people.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let mut rows = vec![
+            [
+                "constant",
+                "unit",
+                "predicted",
+                "measured",
+                "residual %",
+                "explained by",
+            ]
+            .map(str::to_owned)
+            .to_vec(),
+        ];
+        let mut notes = String::new();
+        for constant in &self.constants {
+            rows.push(constant.cells());
+            rows.extend(constant.refinements.iter().map(|r| r.cells(constant)));
+            if let Some(note) = &constant.note {
+                notes.push_str(&format!("{}: {note}\n", constant.name));
+            }
+        }
+        let table = columns(&rows);
+        if notes.is_empty() {
+            table
+        } else {
+            format!("{table}\n{notes}")
+        }
+    }
+}
+
+fn cell(value: Option<f64>, std: Option<f64>) -> String {
+    match (value, std) {
+        (None, _) => "-".to_owned(),
+        (Some(value), None) => rounded(value, 4),
+        (Some(value), Some(std)) => format!("{} ± {}", rounded(value, 4), rounded(std, 2)),
+    }
+}
+
+fn percent(value: Option<f64>) -> String {
+    value.map_or_else(|| "-".to_owned(), |v| format!("{v:+.1}"))
+}
+
+impl Constant {
+    fn cells(&self) -> Vec<String> {
+        vec![
+            self.name.to_owned(),
+            self.unit.clone(),
+            cell(self.predicted, self.predicted_std),
+            cell(self.measured, self.measured_std),
+            percent(self.residual_percent),
+            self.explained_by.clone().unwrap_or_else(|| "-".to_owned()),
+        ]
+    }
+}
+
+impl Refinement {
+    fn cells(&self, constant: &Constant) -> Vec<String> {
+        vec![
+            format!("  with {}", self.effect),
+            constant.unit.clone(),
+            cell(Some(self.predicted), None),
+            String::new(),
+            percent(self.residual_percent),
+            String::new(),
+        ]
+    }
+}

@@ -1,0 +1,172 @@
+//! The stand as the stand file describes it.
+
+mod chain;
+mod file;
+mod section;
+
+use torqcomp_dsp::bridge::{BridgeLayout, Leads, Supply};
+use torqcomp_dsp::recorder::Recorder;
+use torqcomp_model::{Estimate, ParameterStd, Part, SecondOrder};
+
+pub use chain::{Applied, Chain, applied_by_unit};
+pub use file::read;
+
+/// A stand: its mechanics, and how its record becomes torque.
+#[derive(Debug, Clone)]
+pub struct Stand {
+    /// Name of the stand.
+    pub name: String,
+    /// File it was read from.
+    pub file: String,
+    /// Inertia, damping and stiffness.
+    pub mechanics: Option<Mechanics>,
+    /// Measured torque per recorded volt.
+    pub torque_per_volt: Option<Estimate>,
+    /// The beam's drawing.
+    pub beam: Option<BeamDrawing>,
+    /// Parts that make up the inertia.
+    pub parts: Vec<NamedPart>,
+    /// Friction against speed.
+    pub friction: Option<Friction>,
+    /// The gage.
+    pub gage: Option<GageData>,
+    /// The bridge.
+    pub bridge: Option<BridgeData>,
+    /// The recorder.
+    pub recorder: RecorderData,
+}
+
+/// The stand's response, from measured constants.
+#[derive(Debug, Clone)]
+pub struct Mechanics {
+    /// The response, its static gain being 1.
+    pub response: SecondOrder,
+    /// Uncertainties of its constants.
+    pub std: ParameterStd,
+    /// How it was given.
+    pub given: Given,
+}
+
+/// How the mechanics were given.
+#[derive(Debug, Clone)]
+pub enum Given {
+    /// As inertia, damping and stiffness.
+    Constants {
+        /// Mass moment of inertia.
+        inertia: Estimate,
+        /// Viscous damping.
+        damping: Estimate,
+        /// Angular stiffness.
+        stiffness: Estimate,
+    },
+    /// As natural frequency and damping ratio.
+    Modal {
+        /// Natural frequency.
+        natural_frequency: Estimate,
+        /// Damping ratio.
+        damping_ratio: Estimate,
+        /// Record per applied quantity at rest, if it is not a torque stand.
+        static_gain: Option<StaticGain>,
+    },
+}
+
+/// Recorded quantity per applied quantity at zero frequency, in any units.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StaticGain {
+    /// The number in SI units.
+    pub value: f64,
+    /// Unit of the record, as written.
+    pub recorded_unit: String,
+    /// Unit of the applied quantity, as written.
+    pub applied_unit: String,
+}
+
+/// The beam and where the gage sits on it.
+#[derive(Debug, Clone)]
+pub struct BeamDrawing {
+    /// The beam as a slender one, of one section, in a rigid clamp.
+    pub slender: torqcomp_model::Beam,
+    /// The beam with all that the drawing gives: shear, clamp, threads.
+    pub full: torqcomp_model::Beam,
+    /// Radius at which the beam meets the stator.
+    pub radius: Estimate,
+    /// Distance of the gage from the clamp.
+    pub gage_position: Option<Estimate>,
+    /// Elastic modulus.
+    pub elastic_modulus: Estimate,
+    /// Relative standard uncertainty of the stiffness, from those of the drawing.
+    pub relative_std: Option<f64>,
+}
+
+/// A part with its name.
+#[derive(Debug, Clone)]
+pub struct NamedPart {
+    /// What it is.
+    pub name: String,
+    /// Its shape and mass.
+    pub part: Part,
+}
+
+/// A friction force that rises with speed, at a radius.
+#[derive(Debug, Clone)]
+pub struct Friction {
+    /// Rise of the friction force.
+    pub force_change: Estimate,
+    /// Rise of the speed.
+    pub speed_change: Estimate,
+    /// Radius at which the force acts.
+    pub radius: Estimate,
+}
+
+/// A strain gage.
+#[derive(Debug, Clone)]
+pub struct GageData {
+    /// The gage before it was bonded.
+    pub gage: torqcomp_dsp::gage::Gage,
+    /// Resistance after bonding, in Ω.
+    pub bonded_resistance_ohm: Option<f64>,
+    /// Temperature at which the bonded resistance was measured, in K.
+    pub bonding_temperature_k: f64,
+    /// Temperature at which the gage is used, in K.
+    pub temperature_k: f64,
+    /// Change of the unbonded resistance from bonding to use, as a fraction.
+    pub resistance_drift: f64,
+}
+
+/// A bridge.
+#[derive(Debug, Clone)]
+pub struct BridgeData {
+    /// Which arms are gages.
+    pub layout: BridgeLayout,
+    /// What drives it.
+    pub supply: Supply,
+    /// Its wires.
+    pub leads: Leads,
+}
+
+/// A recorder.
+#[derive(Debug, Clone)]
+pub struct RecorderData {
+    /// Gain, low-pass and delay.
+    pub recorder: Recorder,
+    /// Input resistance in Ω that loads the bridge.
+    pub input_resistance_ohm: Option<f64>,
+    /// Recorded volts at no load.
+    pub zero_v: f64,
+}
+
+impl Stand {
+    /// The mechanics, or what to write to have them.
+    ///
+    /// # Errors
+    /// If the stand file gives none.
+    pub fn mechanics(&self) -> Result<&Mechanics, crate::failure::Failure> {
+        self.mechanics.as_ref().ok_or_else(|| {
+            crate::failure::Failure::failed(format_args!(
+                "{}: the response of the stand is not given; add [mechanics] with inertia, damping \
+                 and stiffness, or with natural_frequency and damping_ratio",
+                self.file
+            ))
+        })
+    }
+}

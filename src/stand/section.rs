@@ -1,0 +1,308 @@
+//! Reading a section of a stand file: every key is asked for, and what was not asked for is wrong.
+
+use std::cell::RefCell;
+
+use toml_edit::{Item, TableLike};
+use torqcomp_model::{Estimate, Kind};
+
+use crate::failure::{Failure, did_you_mean};
+
+/// The text of a stand file and its name.
+pub struct SourceText<'a> {
+    /// Name of the file.
+    pub name: &'a str,
+    /// Its content.
+    pub text: &'a str,
+}
+
+impl SourceText<'_> {
+    /// A failure at a byte of the file.
+    pub fn at(&self, offset: Option<usize>, message: impl std::fmt::Display) -> Failure {
+        match offset {
+            Some(offset) => {
+                let line = self.text[..offset].matches('\n').count() + 1;
+                Failure::failed(format_args!("{}, line {line}: {message}", self.name))
+            }
+            None => Failure::failed(format_args!("{}: {message}", self.name)),
+        }
+    }
+}
+
+/// A table of a stand file.
+pub struct Section<'a> {
+    source: &'a SourceText<'a>,
+    title: String,
+    table: &'a dyn TableLike,
+    start: Option<usize>,
+    asked: RefCell<Vec<&'static str>>,
+}
+
+impl<'a> Section<'a> {
+    /// A section under a title such as `[mechanics]`.
+    pub fn new(
+        source: &'a SourceText<'a>,
+        title: impl Into<String>,
+        table: &'a dyn TableLike,
+        start: Option<usize>,
+    ) -> Self {
+        Self {
+            source,
+            title: title.into(),
+            table,
+            start,
+            asked: RefCell::default(),
+        }
+    }
+
+    fn item(&self, key: &'static str) -> Option<&'a Item> {
+        self.asked.borrow_mut().push(key);
+        self.table.get(key)
+    }
+
+    /// A failure at a key, or at the section if the key is not there.
+    pub fn fail(&self, key: &str, message: impl std::fmt::Display) -> Failure {
+        let place = self
+            .table
+            .get_key_value(key)
+            .and_then(|(key, item)| item.span().or(key.span()))
+            .map(|span| span.start)
+            .or(self.start);
+        let name = if key.is_empty() { "" } else { " " };
+        self.source
+            .at(place, format_args!("{}{name}{key}: {message}", self.title))
+    }
+
+    /// Whether a key is there.
+    pub fn has(&self, key: &str) -> bool {
+        self.table.contains_key(key)
+    }
+
+    /// A sub-table.
+    pub fn section(&self, key: &'static str) -> Result<Option<Section<'a>>, Failure> {
+        let Some(item) = self.item(key) else {
+            return Ok(None);
+        };
+        let title = match self.title.strip_suffix(']') {
+            Some(outer) => format!("{outer}.{key}]"),
+            None => format!("[{key}]"),
+        };
+        match item.as_table_like() {
+            Some(table) => {
+                let start = item.span().map(|span| span.start);
+                Ok(Some(Section::new(self.source, title, table, start)))
+            }
+            None => Err(self.fail(key, format_args!("expected a section, written {title}"))),
+        }
+    }
+
+    /// A list of tables, written `[[key]]`.
+    pub fn sections(&self, key: &'static str) -> Result<Vec<Section<'a>>, Failure> {
+        let Some(item) = self.item(key) else {
+            return Ok(Vec::new());
+        };
+        let title = format!("[[{key}]]");
+        if let Some(tables) = item.as_array_of_tables() {
+            return Ok(tables
+                .iter()
+                .map(|table| {
+                    let start = table.span().map(|span| span.start);
+                    Section::new(self.source, title.clone(), table, start)
+                })
+                .collect());
+        }
+        let inline: Option<Vec<Section<'a>>> = item.as_array().and_then(|array| {
+            array
+                .iter()
+                .map(|value| {
+                    let start = value.span().map(|span| span.start);
+                    let table: &dyn TableLike = value.as_inline_table()?;
+                    Some(Section::new(self.source, title.clone(), table, start))
+                })
+                .collect()
+        });
+        inline.ok_or_else(|| self.fail(key, format_args!("expected sections written {title}")))
+    }
+
+    /// A text.
+    pub fn text(&self, key: &'static str) -> Result<Option<&'a str>, Failure> {
+        match self.item(key) {
+            None => Ok(None),
+            Some(item) => match item.as_str() {
+                Some(text) => Ok(Some(text)),
+                None => Err(self.fail(key, "expected a text in quotes")),
+            },
+        }
+    }
+
+    /// One of several words.
+    pub fn word(&self, key: &'static str, words: &[&str]) -> Result<Option<&'a str>, Failure> {
+        match self.text(key)? {
+            Some(text) if !words.contains(&text) => Err(self.fail(
+                key,
+                format_args!(
+                    "\"{text}\" is not known; expected one of {}{}",
+                    words.join(", "),
+                    did_you_mean(text, words.iter().copied())
+                ),
+            )),
+            other => Ok(other),
+        }
+    }
+
+    /// A whole number.
+    pub fn whole(&self, key: &'static str) -> Result<Option<i64>, Failure> {
+        match self.item(key) {
+            None => Ok(None),
+            Some(item) => match item.as_integer() {
+                Some(number) => Ok(Some(number)),
+                None => Err(self.fail(key, "expected a whole number")),
+            },
+        }
+    }
+
+    /// A quantity: a text such as `"22.5 V"`, or a table of `value`, `std` and `source`.
+    pub fn quantity(&self, key: &'static str, kind: Kind) -> Result<Option<Estimate>, Failure> {
+        let Some(item) = self.item(key) else {
+            return Ok(None);
+        };
+        let Some(table) = item.as_table_like() else {
+            let text = self.quantity_text(key, item)?;
+            let value = kind.parse(&text).map_err(|error| self.fail(key, error))?;
+            return self
+                .estimate(key, kind, value, None, "stand file")
+                .map(Some);
+        };
+        let start = item.span().map(|span| span.start);
+        let inner = Section::new(self.source, format!("{} {key}", self.title), table, start);
+        let value = inner.item("value").ok_or_else(|| {
+            inner.fail("", format_args!("expected value = \"{}\"", kind.example()))
+        })?;
+        let value = kind
+            .parse(&inner.quantity_text("value", value)?)
+            .map_err(|error| inner.fail("value", error))?;
+        let std = match inner.item("std") {
+            None => None,
+            Some(item) => Some(
+                kind.parse_std(&inner.quantity_text("std", item)?)
+                    .map_err(|error| inner.fail("std", error))?,
+            ),
+        };
+        let source = inner.text("source")?.unwrap_or("stand file");
+        inner.finish()?;
+        self.estimate(key, kind, value, std, source).map(Some)
+    }
+
+    /// A quantity that must be there.
+    pub fn required(&self, key: &'static str, kind: Kind) -> Result<Estimate, Failure> {
+        self.quantity(key, kind)?
+            .ok_or_else(|| self.missing(key, kind))
+    }
+
+    /// A key that is not there; perhaps it is there misspelt.
+    fn missing(&self, key: &str, kind: Kind) -> Failure {
+        let misspelt = self
+            .table
+            .iter()
+            .map(|(other, _)| other)
+            .filter(|other| !self.asked.borrow().contains(other))
+            .find(|other| strsim::jaro_winkler(other, key) > 0.85);
+        match misspelt {
+            Some(other) => self.fail(other, format_args!("unknown key; did you mean \"{key}\"?")),
+            None => self.fail(
+                "",
+                format_args!("{key} is missing; write {key} = \"{}\"", kind.example()),
+            ),
+        }
+    }
+
+    /// A quantity that must be there and greater than zero.
+    pub fn positive(&self, key: &'static str, kind: Kind) -> Result<Estimate, Failure> {
+        let estimate = self.required(key, kind)?;
+        self.check_positive(key, &estimate)?;
+        Ok(estimate)
+    }
+
+    /// A quantity that must be greater than zero if it is there.
+    pub fn positive_if_any(
+        &self,
+        key: &'static str,
+        kind: Kind,
+    ) -> Result<Option<Estimate>, Failure> {
+        let estimate = self.quantity(key, kind)?;
+        if let Some(estimate) = &estimate {
+            self.check_positive(key, estimate)?;
+        }
+        Ok(estimate)
+    }
+
+    fn check_positive(&self, key: &str, estimate: &Estimate) -> Result<(), Failure> {
+        if estimate.value() > 0.0 {
+            return Ok(());
+        }
+        Err(self.fail(
+            key,
+            format_args!(
+                "a {} must be greater than zero, {} was given",
+                estimate.kind().name(),
+                estimate.text(torqcomp_model::UnitSystem::Si)
+            ),
+        ))
+    }
+
+    /// A quantity that must not be negative.
+    pub fn not_negative(&self, key: &'static str, kind: Kind) -> Result<Estimate, Failure> {
+        let estimate = self.required(key, kind)?;
+        if estimate.value() >= 0.0 {
+            return Ok(estimate);
+        }
+        Err(self.fail(key, format_args!("a {} must not be negative", kind.name())))
+    }
+
+    fn estimate(
+        &self,
+        key: &str,
+        kind: Kind,
+        value: f64,
+        std: Option<f64>,
+        source: &str,
+    ) -> Result<Estimate, Failure> {
+        Estimate::new(kind, value, std, source).map_err(|error| self.fail(key, error))
+    }
+
+    /// The text of a quantity; a bare number is passed on so that its kind can refuse it.
+    fn quantity_text(&self, key: &str, item: &Item) -> Result<String, Failure> {
+        if let Some(text) = item.as_str() {
+            return Ok(text.to_owned());
+        }
+        if let Some(number) = item.as_float() {
+            return Ok(number.to_string());
+        }
+        if let Some(number) = item.as_integer() {
+            return Ok(number.to_string());
+        }
+        Err(self.fail(
+            key,
+            "expected a quantity in quotes, or { value = \"…\", std = \"…\", source = \"…\" }",
+        ))
+    }
+
+    /// The raw text of a quantity whose unit tells its kind.
+    pub fn raw(&self, key: &'static str) -> Result<Option<String>, Failure> {
+        self.item(key)
+            .map(|item| self.quantity_text(key, item))
+            .transpose()
+    }
+
+    /// Refuses the keys that nobody asked for.
+    pub fn finish(&self) -> Result<(), Failure> {
+        let asked = self.asked.borrow();
+        match self.table.iter().find(|(key, _)| !asked.contains(key)) {
+            None => Ok(()),
+            Some((key, _)) => {
+                let hint = did_you_mean(key, asked.iter().copied());
+                let known = asked.join(", ");
+                Err(self.fail(key, format_args!("unknown key{hint}. Known here: {known}")))
+            }
+        }
+    }
+}
