@@ -163,3 +163,109 @@ fn lost_ranges(density: &Density, top_hz: f64, floor: f64) -> Vec<(f64, f64)> {
     }
     ranges
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use num_complex::Complex64;
+
+    use super::*;
+    use crate::band::Band;
+    use crate::compensate::whole_record;
+    use crate::spectrum::welch;
+
+    const RATE: f64 = 20_000.0;
+
+    /// A stand at 590 Hz with a damping ratio of 0.07.
+    fn filter(band_hz: f64) -> InverseFilter {
+        let inverse = |f: f64| {
+            let u = f / 590.0;
+            Complex64::new(1.0 - u * u, 0.14 * u)
+        };
+        InverseFilter::design(Arc::new(inverse), Band::new(RATE, band_hz).unwrap()).unwrap()
+    }
+
+    /// White noise of standard deviation `std`, seeded (sum of twelve uniform numbers).
+    fn white(std: f64, count: usize) -> Vec<f64> {
+        let mut state = 99_u64;
+        let mut uniform = || {
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        (0..count)
+            .map(|_| std * (0..12).map(|_| uniform()).sum::<f64>())
+            .collect()
+    }
+
+    fn rms(values: &[f64]) -> f64 {
+        (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt()
+    }
+
+    #[test]
+    fn stated_noise_is_what_noise_becomes() {
+        let filter = filter(2400.0);
+        let noise = white(0.3, 200_000);
+        let out = whole_record(&filter, &noise).unwrap();
+        // 200 000 samples in a band of a quarter of the rate fix an rms to about half a per cent.
+        let measured = rms(&out[1000..199_000]);
+        let gain = NoiseGain::of(&filter, 2);
+        assert!(
+            (gain.white * 0.3 / measured - 1.0).abs() < 0.03,
+            "{} {measured}",
+            gain.white * 0.3
+        );
+
+        // Beside a signal, the floor above the band tells the same.
+        let record: Vec<f64> = noise
+            .iter()
+            .enumerate()
+            .map(|(i, n)| n + 50.0 * (std::f64::consts::TAU * 120.0 * i as f64 / RATE).cos())
+            .collect();
+        let density = welch(&record, RATE, 4096).unwrap();
+        let stated = RecordNoise::of(&filter, &density).unwrap();
+        assert!((stated.floor_density / (2.0 * 0.09 / RATE) - 1.0).abs() < 0.05);
+        assert!(
+            (stated.compensated_rms / measured - 1.0).abs() < 0.05,
+            "{stated:?} {measured}"
+        );
+        let amplitude = 50.0 * (1.0 - (120.0_f64 / 590.0).powi(2)).hypot(0.14 * 120.0 / 590.0);
+        let expected = (0.5 * amplitude * amplitude + measured * measured).sqrt();
+        assert!(
+            (stated.output_rms / expected - 1.0).abs() < 0.01,
+            "{stated:?} {expected}"
+        );
+    }
+
+    #[test]
+    fn the_range_without_signal_is_called_lost() {
+        let filter = filter(2400.0);
+        let record = white(0.01, 200_000);
+        let density = welch(&record, RATE, 4096).unwrap();
+        let lost = RecordNoise::of(&filter, &density).unwrap();
+        assert_eq!(
+            lost.lost_from_hz(2400.0),
+            Some(0.0),
+            "nothing but noise: {:?}",
+            lost.lost
+        );
+        // A line in the lowest twenty-fourth of the band: all above it is lost.
+        let with_signal: Vec<f64> = record
+            .iter()
+            .enumerate()
+            .map(|(i, n)| n + (std::f64::consts::TAU * 50.0 * i as f64 / RATE).cos())
+            .collect();
+        let density = welch(&with_signal, RATE, 4096).unwrap();
+        let found = RecordNoise::of(&filter, &density).unwrap();
+        assert_eq!(found.lost_from_hz(2400.0), Some(100.0), "{:?}", found.lost);
+    }
+
+    #[test]
+    fn no_room_above_the_band_is_no_estimate() {
+        let filter = filter(9000.0);
+        let density = welch(&white(1.0, 20_000), RATE, 4096).unwrap();
+        assert_eq!(RecordNoise::of(&filter, &density), None);
+    }
+}

@@ -8,6 +8,8 @@ use crate::Error;
 const POINTS: usize = 8;
 /// Longest step, in grid steps, that is interpolated as a curve; anything longer is a gap.
 const LONGEST_STEP: f64 = 1.5;
+/// Distance of a stamp from the grid, in grid steps, that is nothing but rounding.
+const COINCIDENT: f64 = 1e-6;
 
 /// What a resampling did.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -118,7 +120,7 @@ impl Resampler {
     /// Gives out the rest up to the last stamp.
     pub fn finish(mut self, out: &mut Vec<f64>) -> Resampled {
         if let Some(&(last, _)) = self.points.back() {
-            while self.grid_time() <= last + 1e-6 * self.step_s {
+            while self.grid_time() <= last + COINCIDENT * self.step_s {
                 self.emit(out);
             }
         }
@@ -148,8 +150,8 @@ impl Resampler {
             .unwrap_or(self.points.len() - 1)
             .max(1)
             .min(self.points.len() - 1);
-        let value = if self.points.len() == 1 {
-            self.points[0].1
+        let value = if let Some(value) = self.stamped(after, time_s) {
+            value
         } else if self.is_gap(after) {
             self.done.bridged += 1;
             self.line(after, time_s)
@@ -159,6 +161,13 @@ impl Resampler {
         out.push(value);
         self.next += 1;
         self.done.samples_out += 1;
+    }
+
+    /// The sample whose stamp is the grid time itself, but for rounding.
+    fn stamped(&self, after: usize, time_s: f64) -> Option<f64> {
+        let first = after.saturating_sub(1);
+        let near = |point: &&(f64, f64)| (point.0 - time_s).abs() <= COINCIDENT * self.step_s;
+        self.points.range(first..=after).find(near).map(|(_, x)| *x)
     }
 
     fn is_gap(&self, after: usize) -> bool {

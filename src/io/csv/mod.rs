@@ -145,6 +145,9 @@ impl Table {
     fn read(name: &str, input: &mut dyn Read, options: &Options) -> Result<Parts, Failure> {
         let (head, layout) = find_layout(name, input, &options.told)?;
         let time_place = time_column(&layout.columns, options)?;
+        if time_place.is_none() && options.rate_hz.is_none() {
+            return Err(Failure::failed(time::missing(&layout)));
+        }
         let value_place = channel(&layout.columns, time_place, options)?;
         let mut channel = layout.columns[value_place].clone();
         if let Some(text) = &options.unit {
@@ -229,10 +232,16 @@ struct Sample {
 impl Sample {
     fn of(head: &[u8], layout: &Layout, plan: &RowPlan) -> Self {
         let data = &head[layout.data_offset..];
-        // The last line may be cut by the end of the head.
+        // The last line may be cut by the end of the head. A row that cannot be read is not
+        // counted here: it is an error when its turn comes.
         let end = memchr::memrchr(b'\n', data).map_or(data.len(), |place| place + 1);
         let mut rows = Rows::default();
-        rows.read(&data[..end], plan);
+        let mut line = Rows::default();
+        for text in data[..end].split_inclusive(|byte| *byte == b'\n') {
+            line.read(text, plan);
+            rows.times.extend_from_slice(&line.times);
+            rows.values.extend_from_slice(&line.values);
+        }
         let shortest_value = String::from_utf8_lossy(&data[..end])
             .lines()
             .filter_map(|line| layout.dialect.cells(line).get(plan.value).map(String::len))

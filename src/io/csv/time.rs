@@ -65,18 +65,17 @@ impl TimeAxis {
         rows: &Rows,
         options: &Options,
     ) -> Result<Self, Failure> {
-        if let Some(rate_hz) = options.rate_hz
-            && !(options.resample && column.is_some())
-        {
-            return Ok(Self {
-                source: TimeSource::Given,
-                rate_hz,
-            });
-        }
-        let Some(place) = column else {
-            return Err(Failure::failed(no_time(layout)));
+        let column = match (column, options.rate_hz) {
+            (Some(place), None) => &layout.columns[place],
+            (Some(place), Some(_)) if options.resample => &layout.columns[place],
+            (_, Some(rate_hz)) => {
+                return Ok(Self {
+                    source: TimeSource::Given,
+                    rate_hz,
+                });
+            }
+            (None, None) => return Err(Failure::failed(missing(layout))),
         };
-        let column = &layout.columns[place];
         let (unit_text, unit) = unit(column, options)?;
         let typical = typical_step(&rows.times)
             .ok_or_else(|| Failure::failed(no_step(&column.heading, &rows.times)))?;
@@ -93,7 +92,7 @@ impl TimeAxis {
                 resampled: options.resample,
                 copied: seconds_per_unit == 1.0 && layout.dialect.decimal == b'.',
             },
-            rate_hz: 1.0 / (step * seconds_per_unit),
+            rate_hz: without_rounding(1.0 / (step * seconds_per_unit)),
         })
     }
 
@@ -213,7 +212,9 @@ fn unit(column: &super::Column, options: &Options) -> Result<(String, Unit), Fai
     }
 }
 
-fn no_time(layout: &Layout) -> String {
+/// What to do about a table without a time axis.
+#[must_use]
+pub fn missing(layout: &Layout) -> String {
     if layout.heading_line.is_none() && layout.columns.len() > 1 {
         return "the columns have no headings, so none is known to be the time; give --rate HZ, or \
                 --time-column 1 --time-unit s if the first column is the time in seconds"
@@ -222,6 +223,16 @@ fn no_time(layout: &Layout) -> String {
     "there is no time column, so the sampling rate is unknown; give it with --rate HZ, or name the \
      column with --time-column"
         .to_owned()
+}
+
+/// A rate without the rounding of the stamps it was found from: nine digits, if they say the same.
+fn without_rounding(rate_hz: f64) -> f64 {
+    let short: f64 = digits::text(rate_hz, 9).parse().unwrap_or(rate_hz);
+    if (short / rate_hz - 1.0).abs() < 1e-10 {
+        short
+    } else {
+        rate_hz
+    }
 }
 
 /// Usual step of the first stamps: the mean of those within the tolerance of their median.
@@ -321,6 +332,14 @@ mod tests {
             gap.contains("3 times") && gap.contains("--resample"),
             "{gap}"
         );
+    }
+
+    #[test]
+    fn rates_lose_rounding_but_not_digits() {
+        assert_eq!(without_rounding(20_000.000_000_000_735), 20_000.0);
+        assert_eq!(without_rounding(20_000.001), 20_000.001);
+        assert_eq!(without_rounding(610.351_562_5), 610.351_562_5);
+        assert_eq!(without_rounding(1000.0 / 3.0), 1000.0 / 3.0);
     }
 
     #[test]

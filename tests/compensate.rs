@@ -1,0 +1,355 @@
+//! `compensate` gives back the torque that acted.
+
+use crate::util::{Folder, column, hertel_response, record, steady, table};
+
+const PARTS: [(f64, f64, f64); 5] = [
+    (0.8, 0.0, 0.0),
+    (1.0, 120.0, 0.3),
+    (0.2, 591.0, 2.0),
+    (0.1, 1500.0, -1.0),
+    (0.05, 2390.0, 0.7),
+];
+
+fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    a.iter()
+        .zip(b)
+        .map(|(x, y)| (x - y).abs())
+        .fold(0.0, f64::max)
+}
+
+#[test]
+fn the_torque_comes_back_in_both_ways_to_run_it() {
+    let rate = 20_000.0;
+    let (shown, acted) = steady(&PARTS, rate, 100_000);
+    let folder = Folder::new();
+    folder.write("in.csv", record(&shown, rate));
+    for more in [
+        &["--digits", "shortest"][..],
+        &["--digits", "shortest", "--whole-record"],
+    ] {
+        let args = [
+            &["compensate", "in.csv", "--stand", "stand.toml", "-q"][..],
+            more,
+        ]
+        .concat();
+        let ran = folder.run(&args);
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        let torque = column(&ran.stdout, "torque_n_m");
+        let inside = 400..100_000 - 400;
+        let error = largest_difference(&torque[inside.clone()], &acted[inside]);
+        assert!(error < 2e-9, "{more:?}: {error:e}");
+    }
+    // With the default digits the difference is that of the last digit.
+    let ran = folder.run(&["compensate", "in.csv", "--stand", "stand.toml", "-q"]);
+    let torque = column(&ran.stdout, "torque_n_m");
+    assert!(largest_difference(&torque[400..99_600], &acted[400..99_600]) < 2e-9);
+}
+
+#[test]
+fn stream_and_whole_record_agree() {
+    let rate = 20_000.0;
+    let mut state = 3_u64;
+    let noise: Vec<f64> = (0..70_000)
+        .map(|_| {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64
+        })
+        .collect();
+    let folder = Folder::new();
+    folder.write("in.csv", record(&noise, rate));
+    let run = |more: &[&str]| {
+        let args = [
+            &[
+                "compensate",
+                "in.csv",
+                "--stand",
+                "stand.toml",
+                "-q",
+                "--digits",
+                "shortest",
+            ][..],
+            more,
+        ]
+        .concat();
+        let ran = folder.run(&args);
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        column(&ran.stdout, "torque_n_m")
+    };
+    let (stream, whole) = (run(&[]), run(&["--whole-record"]));
+    let full_scale = whole.iter().fold(0.0_f64, |m, y| m.max(y.abs()));
+    assert!(largest_difference(&stream, &whole) < 1e-8 * full_scale);
+}
+
+#[test]
+fn units_and_headings() {
+    let (shown, _) = steady(&[(1.355_817_948_331_400_4, 0.0, 0.0)], 20_000.0, 2000);
+    let folder = Folder::new();
+    folder.write("in.csv", record(&shown, 20_000.0));
+    let si = folder
+        .run(&["compensate", "in.csv", "--stand", "stand.toml"])
+        .stdout;
+    let us = folder
+        .run(&[
+            "compensate",
+            "in.csv",
+            "--stand",
+            "stand.toml",
+            "--units",
+            "us",
+            "--with-recorded",
+        ])
+        .stdout;
+    assert_eq!(table(&si).0, ["time_s", "torque_n_m"]);
+    assert_eq!(
+        table(&us).0,
+        ["time_s", "torque_ft_lbf", "recorded_torque_ft_lbf"]
+    );
+    // A constant keeps the static gain, to the first and last sample: 1 ft lbf.
+    for row in table(&us).1 {
+        assert!(
+            (row[1] - 1.0).abs() < 1e-10 && (row[2] - 1.0).abs() < 1e-10,
+            "{row:?}"
+        );
+    }
+    assert!((table(&si).1[7][1] - 1.355_817_948_331).abs() < 1e-10);
+}
+
+#[test]
+fn torque_strain_force_and_volts_are_understood() {
+    let folder = Folder::new();
+    let stand = format!(
+        "{}[beam]\nwidth = \"0.5 in\"\ndepth = \"0.5 in\"\nlength = \"1.5 in\"\nelastic_modulus = \"30e6 psi\"\n\
+         radius = \"2.8 in\"\ngage_position = \"1 in\"\n",
+        crate::util::HERTEL
+    );
+    folder.write("stand.toml", &stand);
+    let constant = |heading: &str, value: &str, more: &[&str]| -> f64 {
+        let rows: String = (0..500)
+            .map(|i| format!("{},{value}\n", f64::from(i) * 1e-4))
+            .collect();
+        folder.write("in.csv", format!("time_s,{heading}\n{rows}"));
+        let args = [
+            &[
+                "compensate",
+                "in.csv",
+                "--stand",
+                "stand.toml",
+                "--units",
+                "us",
+                "-q",
+            ][..],
+            more,
+        ]
+        .concat();
+        let ran = folder.run(&args);
+        assert_eq!(ran.code, 0, "{heading}: {}", ran.stderr);
+        column(&ran.stdout, "torque_ft_lbf")[250]
+    };
+    assert!((constant("bridge_mV", "2", &[]) - 2.46).abs() < 1e-9);
+    assert!((constant("Torque [ft lbf]", "3", &[]) - 3.0).abs() < 1e-9);
+    // 2.8 in times 12 lbf are 2.8 ft lbf.
+    assert!((constant("Load (lbf)", "12", &[]) - 2.8).abs() < 1e-9);
+    // (27a): 3.50e6 times 12 microstrain are 42 in lbf, or 3.5 ft lbf.
+    assert!((constant("gage (ustrain)", "12", &[]) - 3.5).abs() < 1e-9);
+    assert!((constant("something", "2", &["--unit", "mV"]) - 2.46).abs() < 1e-9);
+}
+
+#[test]
+fn gage_and_bridge_stand_in_for_a_measured_constant() {
+    // A half bridge in constant voltage with a linear gage: E_o = E_s/2 GF ε (28), so that
+    // 1 mV is 2·10⁻³/(22.5·157) of strain and 3.50e6 in lbf times that is 1.98 in lbf (29).
+    let folder = Folder::new();
+    let stand = crate::util::HERTEL
+        .split("[calibration]")
+        .next()
+        .unwrap()
+        .to_owned()
+        + "[beam]\nwidth = \"0.5 in\"\ndepth = \"0.5 in\"\nlength = \"1.5 in\"\nelastic_modulus = \"30e6 psi\"\n\
+           radius = \"2.8 in\"\ngage_position = \"1 in\"\n[gage]\ngage_factor = 157\nresistance = \"5784 ohm\"\n\
+           [bridge]\nlayout = \"half\"\nexcitation = \"22.5 V\"\n";
+    folder.write("stand.toml", stand);
+    let rows: String = (0..500)
+        .map(|i| format!("{},1\n", f64::from(i) * 1e-4))
+        .collect();
+    folder.write("in.csv", format!("time_s,bridge_mV\n{rows}"));
+    let ran = folder.run(&[
+        "compensate",
+        "in.csv",
+        "--stand",
+        "stand.toml",
+        "--units",
+        "us",
+        "-q",
+    ]);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    let torque = column(&ran.stdout, "torque_ft_lbf")[100];
+    assert!(
+        (torque - 7.0e3 / (22.5 * 157.0) / 12.0).abs() < 1e-6,
+        "{torque}"
+    );
+}
+
+#[test]
+fn a_stand_in_other_units_is_compensated_in_them() {
+    let folder = Folder::new();
+    folder.write(
+        "stand.toml",
+        "schema = \"torqcomp.stand/1\"\n[mechanics]\nnatural_frequency = \"590 Hz\"\ndamping_ratio = 0.07\nstatic_gain = \"2 V/V\"\n",
+    );
+    let rows: String = (0..4000)
+        .map(|i| {
+            // 300 Hz of 1 V in: 2 V out times the response.
+            let u: f64 = 300.0 / 590.0;
+            let (re, im) = (1.0 - u * u, 2.0 * 0.07 * u);
+            let turn = std::f64::consts::TAU * 300.0 * f64::from(i) / 20_000.0 - im.atan2(re);
+            format!(
+                "{},{}\n",
+                f64::from(i) / 20_000.0,
+                2.0 / re.hypot(im) * turn.cos()
+            )
+        })
+        .collect();
+    folder.write("in.csv", format!("time_s,v_out_V\n{rows}"));
+    let ran = folder.run(&["compensate", "in.csv", "--stand", "stand.toml", "-q"]);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    let applied = column(&ran.stdout, "applied_v");
+    for (i, y) in applied.iter().enumerate().skip(500).take(3000) {
+        let want = (std::f64::consts::TAU * 300.0 * i as f64 / 20_000.0).cos();
+        assert!((y - want).abs() < 1e-8, "{i}");
+    }
+    folder.write("in.csv", "time_s,force_N\n0,1\n0.1,1\n");
+    let ran = folder.run(&["compensate", "in.csv", "--stand", "stand.toml"]);
+    ran.says(1, &["static_gain", "\"V\"", "\"N\""]);
+}
+
+#[test]
+fn recorder_low_pass_and_delay_are_divided_out() {
+    let folder = Folder::new();
+    folder.write(
+        "stand.toml",
+        format!(
+            "{}[recorder]\nlow_pass = \"1 kHz\"\ndelay = \"0.5 ms\"\n",
+            crate::util::HERTEL
+        ),
+    );
+    let rate = 20_000.0;
+    let (_, acted) = steady(&PARTS, rate, 20_000);
+    let shown: Vec<f64> = (0..20_000)
+        .map(|i| {
+            let t = f64::from(i) / rate;
+            PARTS
+                .iter()
+                .map(|(a, f, phase)| {
+                    let (gain, lag) = hertel_response(*f);
+                    // An RC low-pass by hand: 1/√(1 + (f/fc)²), −atan(f/fc).
+                    let (low, turned) = (1.0 / (f / 1000.0).hypot(1.0), -(f / 1000.0).atan());
+                    let turn = std::f64::consts::TAU * f * (t - 0.5e-3) + phase + lag + turned;
+                    a * gain * low * turn.cos()
+                })
+                .sum()
+        })
+        .collect();
+    folder.write("in.csv", record(&shown, rate));
+    let ran = folder.run(&["compensate", "in.csv", "--stand", "stand.toml", "-q"]);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    let torque = column(&ran.stdout, "torque_n_m");
+    assert!(largest_difference(&torque[600..19_400], &acted[600..19_400]) < 1e-8);
+}
+
+#[test]
+fn resampling_says_what_it_did() {
+    let rate = 20_000.0;
+    let (shown, acted) = steady(&PARTS[..2], rate, 20_000);
+    let volts = 1.23e3 * 1.355_817_948_331_400_4;
+    // Five samples are missing.
+    let rows: String = (0..20_000)
+        .filter(|i| !(9000..9005).contains(i))
+        .map(|i| {
+            format!(
+                "{:.6},{:e}\n",
+                f64::from(i) / rate,
+                shown[i as usize] / volts
+            )
+        })
+        .collect();
+    let folder = Folder::new();
+    folder.write("in.csv", format!("time_s,bridge_V\n{rows}"));
+    folder
+        .run(&["compensate", "in.csv", "--stand", "stand.toml"])
+        .says(1, &["line 9002", "--resample"]);
+    let args = [
+        "compensate",
+        "in.csv",
+        "--stand",
+        "stand.toml",
+        "--resample",
+        "-o",
+        "out.csv",
+        "--json",
+    ];
+    let report = folder.json(&args);
+    assert_eq!(report["resampled"]["gaps"], 1);
+    assert_eq!(report["resampled"]["bridged"], 5);
+    assert_eq!(report["resampled"]["samples_in"], 19_995);
+    assert_eq!(report["resampled"]["samples_out"], 20_000);
+    assert_eq!(report["warnings"][0]["code"], "resampled-gaps");
+    let torque = column(&folder.read("out.csv"), "torque_n_m");
+    assert_eq!(torque.len(), 20_000);
+    assert!(largest_difference(&torque[500..8500], &acted[500..8500]) < 1e-4);
+    // Both ways to run it resample alike.
+    let whole = [&args[..5], &["-o", "whole.csv", "--whole-record"]].concat();
+    assert_eq!(folder.run(&whole).code, 0);
+    let whole = column(&folder.read("whole.csv"), "torque_n_m");
+    assert!(largest_difference(&torque, &whole) < 1e-8);
+}
+
+#[test]
+fn the_example_gives_back_the_torque_that_went_in() {
+    let example = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/hertel");
+    let path = |name: &str| example.join(name).to_str().unwrap().to_owned();
+    let folder = Folder::new();
+    let ran = folder.run(&[
+        "compensate",
+        &path("record.csv"),
+        "--stand",
+        &path("stand.toml"),
+        "--units",
+        "us",
+        "-o",
+        "torque.csv",
+        "--json",
+    ]);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    let report: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
+    let torque = column(&folder.read("torque.csv"), "torque_ft_lbf");
+    let truth = std::fs::read_to_string(path("torque_applied.csv")).unwrap();
+    let truth = column(truth.split_once('\n').unwrap().1, "torque_ft_lbf");
+    let error: Vec<f64> = torque.iter().zip(&truth).map(|(a, b)| a - b).collect();
+    let rms = (error[400..5600].iter().map(|e| e * e).sum::<f64>() / 5200.0).sqrt();
+    // What is left is the recorder's noise, as large as the report says it is.
+    let stated = report["noise"]["record"]["compensated_rms"]
+        .as_f64()
+        .unwrap();
+    assert!((rms / stated - 1.0).abs() < 0.1, "{rms} stated {stated}");
+    // As recorded, the stand's ringing is forty times that.
+    let recorded = folder.run(&[
+        "compensate",
+        &path("record.csv"),
+        "--stand",
+        &path("stand.toml"),
+        "--units",
+        "us",
+        "--with-recorded",
+    ]);
+    let recorded = column(&recorded.stdout, "recorded_torque_ft_lbf");
+    let ringing: f64 = recorded
+        .iter()
+        .zip(&truth)
+        .map(|(a, b)| (a - b).powi(2))
+        .sum::<f64>()
+        / 6000.0;
+    assert!(ringing.sqrt() > 40.0 * rms, "{}", ringing.sqrt() / rms);
+}

@@ -1,0 +1,152 @@
+//! `harmonics` against a record whose components are known.
+
+use crate::util::{Folder, hertel_response, record, steady};
+
+const PARTS: [(f64, f64, f64); 4] = [
+    (0.8, 0.0, 0.0),
+    (1.0, 59.87, 0.3),
+    (0.4, 119.74, 2.0),
+    (0.2, 598.7, -1.0),
+];
+
+fn folder() -> Folder {
+    let folder = Folder::new();
+    let (shown, _) = steady(&PARTS, 20_000.0, 30_000);
+    let mut state = 5_u64;
+    let noisy: Vec<f64> = shown
+        .iter()
+        .map(|x| {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            x + 0.01 * ((state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5)
+        })
+        .collect();
+    folder.write("in.csv", record(&noisy, 20_000.0));
+    folder
+}
+
+#[test]
+fn components_come_back_with_factor_and_uncertainty() {
+    let report = folder().json(&[
+        "harmonics",
+        "in.csv",
+        "--stand",
+        "stand.toml",
+        "--fundamental",
+        "60",
+        "--refine",
+        "--orders",
+        "1,2,10",
+        "--json",
+    ]);
+    assert_eq!(report["schema"], "torqcomp.harmonics/1");
+    let fundamental = report["fundamental_hz"].as_f64().unwrap();
+    let std = report["fundamental_std_hz"].as_f64().unwrap();
+    assert!(
+        (fundamental - 59.87).abs() < 5.0 * std && std < 1e-3,
+        "{fundamental} ± {std}"
+    );
+    assert!((report["mean"].as_f64().unwrap() - 0.8).abs() < 1e-3);
+    // Uniform noise of 0.01 has a standard deviation of 0.01/√12.
+    assert!((report["residual_rms"].as_f64().unwrap() - 0.01 / 12_f64.sqrt()).abs() < 1e-4);
+    let components = report["components"].as_array().unwrap();
+    assert_eq!(components.len(), 3);
+    for (component, (a, f, phase)) in components.iter().zip(&PARTS[1..]) {
+        let number = |key: &str| component[key].as_f64().unwrap();
+        let (gain, _) = hertel_response(*f);
+        assert!((number("factor") * gain - 1.0).abs() < 1e-4, "{component}");
+        assert!((number("recorded") * number("factor") / number("torque") - 1.0).abs() < 1e-12);
+        assert!(
+            (number("torque") - a).abs() < 5.0 * number("std") + 1e-5,
+            "{component}"
+        );
+        // √(2/N) times the noise, times the factor.
+        let expected = (2.0_f64 / 30_000.0).sqrt() * 0.01 / 12_f64.sqrt() * number("factor");
+        assert!(
+            (number("std") / expected - 1.0).abs() < 0.35,
+            "{} {expected}",
+            number("std")
+        );
+        let phase_error = number("phase_deg") - phase.to_degrees();
+        assert!(
+            phase_error.abs() < 5.0 * number("phase_std_deg") + 0.02,
+            "{component}"
+        );
+        assert!(component["std_stand"].is_null());
+    }
+}
+
+#[test]
+fn a_table_for_people() {
+    let ran = folder().run(&[
+        "harmonics",
+        "in.csv",
+        "--stand",
+        "stand.toml",
+        "--fundamental",
+        "59.87",
+        "--orders",
+        "1-9",
+        "--units",
+        "us",
+    ]);
+    ran.says(0, &["components-lost-in-noise"]);
+    assert!(
+        ran.stdout.contains("torque ft lbf") && ran.stdout.contains("± noise"),
+        "{}",
+        ran.stdout
+    );
+    assert!(
+        ran.stdout.contains("0.7375"),
+        "1 N m are 0.7376 ft lbf: {}",
+        ran.stdout
+    );
+}
+
+#[test]
+fn orders_that_cannot_be_seen_are_said() {
+    let folder = folder();
+    let ran = folder.run(&[
+        "harmonics",
+        "in.csv",
+        "--stand",
+        "stand.toml",
+        "--fundamental",
+        "4000",
+    ]);
+    ran.says(0, &["orders-above-nyquist", "orders 3 to 20"]);
+    folder
+        .run(&[
+            "harmonics",
+            "in.csv",
+            "--stand",
+            "stand.toml",
+            "--fundamental",
+            "12 kHz",
+        ])
+        .says(1, &["half the sampling rate"]);
+    folder
+        .run(&[
+            "harmonics",
+            "in.csv",
+            "--stand",
+            "stand.toml",
+            "--fundamental",
+            "0.05",
+        ])
+        .says(1, &["in.csv", "cannot be told apart", "record at least"]);
+    folder
+        .run(&[
+            "harmonics",
+            "in.csv",
+            "--stand",
+            "stand.toml",
+            "--fundamental",
+            "55",
+            "--refine",
+            "--orders",
+            "1",
+        ])
+        .says(1, &["could not be refined"]);
+}

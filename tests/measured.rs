@@ -1,0 +1,293 @@
+//! Tests on recordings made by others, read from `TORQCOMP_MEASURED` (or `../shared/measured`).
+//!
+//! They are not part of the project. Where the folder is missing, the tests are reported as ignored.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use libtest_mimic::{Arguments, Failed, Trial};
+use serde_json::Value;
+
+/// A stand for records that are torque already or come without a calibration of their own; what it
+/// says about the recordings is not of interest, what comes out of the chain is.
+const STAND: &str = "schema = \"torqcomp.stand/1\"\n[mechanics]\nnatural_frequency = \"120 Hz\"\n\
+                     damping_ratio = 0.05\n[calibration]\ntorque_per_volt = \"100 N m/V\"\n";
+
+fn main() {
+    let folder = std::env::var_os("TORQCOMP_MEASURED").map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/measured"),
+        PathBuf::from,
+    );
+    let missing = !folder.is_dir();
+    if missing {
+        eprintln!(
+            "{} is not there: the tests on measured data are skipped",
+            folder.display()
+        );
+    }
+    let test = |name: &str, run: fn(&Path) -> Result<(), Failed>| {
+        let folder = folder.clone();
+        Trial::test(name, move || run(&folder)).with_ignored_flag(missing)
+    };
+    let tests = vec![
+        test("strain_beam_bridge_volts_are_compensated", strain_beam),
+        test("torque_transducer_orders_are_found", torque_transducer),
+        test(
+            "torque_transducer_is_compensated",
+            torque_transducer_compensated,
+        ),
+        test("thrust_balance_is_refused_and_resampled", thrust_balance),
+        test("silverbox_volts_to_volts", silverbox),
+    ];
+    libtest_mimic::run(&Arguments::from_args(), tests).exit();
+}
+
+fn run(stand: &str, args: &[&str]) -> Result<(i32, String, String), Failed> {
+    let folder = tempfile::tempdir()?;
+    std::fs::write(folder.path().join("stand.toml"), stand)?;
+    let output = Command::new(env!("CARGO_BIN_EXE_torqcomp"))
+        .args(args)
+        .args(["--stand", "stand.toml"])
+        .current_dir(folder.path())
+        .output()?;
+    let text = |bytes: Vec<u8>| String::from_utf8_lossy(&bytes).into_owned();
+    Ok((
+        output.status.code().unwrap_or(-1),
+        text(output.stdout),
+        text(output.stderr),
+    ))
+}
+
+fn check(good: bool, message: impl std::fmt::Display) -> Result<(), Failed> {
+    if good {
+        Ok(())
+    } else {
+        Err(message.to_string().into())
+    }
+}
+
+fn rows(text: &str) -> Vec<Vec<f64>> {
+    text.lines()
+        .skip(1)
+        .map(|line| {
+            line.split(',')
+                .filter_map(|cell| cell.parse().ok())
+                .collect()
+        })
+        .collect()
+}
+
+/// Bridge volts under a preamble, a units row and an odd line, the time in the last column.
+fn strain_beam(folder: &Path) -> Result<(), Failed> {
+    let file = folder.join("strain_beam/set0_test0.txt");
+    let path = file.to_str().unwrap_or_default();
+    let args = [
+        "compensate",
+        path,
+        "--channel",
+        "SG_300_a",
+        "--unit",
+        "V",
+        "--band",
+        "60",
+    ];
+    let (code, out, err) = run(STAND, &args)?;
+    check(code == 0, &err)?;
+    let rows = rows(&out);
+    // Counted independently: lines that begin with a digit or a sign and have six cells.
+    let text = std::fs::read_to_string(&file)?;
+    let data: Vec<Vec<f64>> = text
+        .lines()
+        .map(|line| {
+            line.split('\t')
+                .filter_map(|c| c.trim().parse().ok())
+                .collect::<Vec<f64>>()
+        })
+        .filter(|cells| cells.len() == 6)
+        .collect();
+    check(
+        rows.len() == data.len() && rows.len() > 10_000,
+        format!("{} {}", rows.len(), data.len()),
+    )?;
+    check(
+        rows.iter().zip(&data).all(|(r, d)| r[0] == d[5]),
+        "time stamps differ",
+    )?;
+    check(err.contains("5000 Hz"), &err)?;
+    // The mean goes through with the static gain of 100 N m/V.
+    let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / data.len() as f64;
+    let (torque, volts) = (
+        mean(&mut rows.iter().map(|r| r[1])),
+        mean(&mut data.iter().map(|d| d[1])),
+    );
+    check(
+        (torque / (100.0 * volts) - 1.0).abs() < 1e-3,
+        format!("{torque} {volts}"),
+    )?;
+    let (code, out, err) = run(
+        STAND,
+        &[
+            "harmonics",
+            path,
+            "--channel",
+            "SG_300_a",
+            "--unit",
+            "V",
+            "--fundamental",
+            "60",
+            "--orders",
+            "1-3",
+        ],
+    )?;
+    check(code == 0 && out.contains("torque N m"), &err)
+}
+
+/// A heading without a unit, trailing tabs, padded cells; 60 lines a turn at 60 rpm.
+fn torque_transducer(folder: &Path) -> Result<(), Failed> {
+    let file = folder.join("torque_transducer/generating__60rpm-torque__ILC-OFF_0pc-load.txt");
+    let path = file.to_str().unwrap_or_default();
+    let (code, _, err) = run(STAND, &["harmonics", path, "--fundamental", "1"])?;
+    check(code == 1 && err.contains("--unit"), &err)?;
+    let args = [
+        "harmonics",
+        path,
+        "--unit",
+        "N m",
+        "--fundamental",
+        "1",
+        "--refine",
+        "--orders",
+        "1-200",
+        "--json",
+    ];
+    let (code, out, err) = run(STAND, &args)?;
+    check(code == 0, &err)?;
+    let report: Value = serde_json::from_str(&out)?;
+    check(
+        (report["rate_hz"].as_f64().unwrap_or(0.0) - 1000.0).abs() < 1e-6,
+        &out,
+    )?;
+    let speed = report["fundamental_hz"].as_f64().unwrap_or(0.0);
+    check(
+        (speed - 1.0).abs() < 0.01,
+        format!("one turn a second, got {speed}"),
+    )?;
+    // The line at 60 Hz, amplitude by a plain sum over whole seconds.
+    let samples: Vec<f64> = std::fs::read_to_string(&file)?
+        .lines()
+        .filter_map(|line| line.split('\t').nth(1)?.trim().parse().ok())
+        .take(20_000)
+        .collect();
+    let turn = |i: usize| std::f64::consts::TAU * 60.0 * speed * i as f64 / 1000.0;
+    let part = |f: fn(f64) -> f64| {
+        samples
+            .iter()
+            .enumerate()
+            .map(|(i, x)| x * f(turn(i)))
+            .sum::<f64>()
+            * 2.0
+            / 20_000.0
+    };
+    let plain = part(f64::cos).hypot(part(f64::sin));
+    let sixty = report["components"]
+        .as_array()
+        .and_then(|all| all.iter().find(|c| c["order"] == 60.0))
+        .ok_or("no order 60")?;
+    let recorded = sixty["recorded"].as_f64().unwrap_or(0.0);
+    check(
+        (recorded / plain - 1.0).abs() < 0.1,
+        format!("{recorded} against {plain}"),
+    )?;
+    let factor = sixty["factor"].as_f64().unwrap_or(0.0);
+    check(
+        (factor - 0.7517).abs() < 1e-3,
+        format!("1 − (60/120)² and 2·0.05·0.5: {factor}"),
+    )
+}
+
+fn torque_transducer_compensated(folder: &Path) -> Result<(), Failed> {
+    let mut files = 0;
+    for entry in std::fs::read_dir(folder.join("torque_transducer"))? {
+        let path = entry?.path();
+        let name = path.to_str().unwrap_or_default();
+        if !name.contains("-torque_") {
+            continue;
+        }
+        let (code, out, err) = run(
+            STAND,
+            &["compensate", name, "--unit", "N m", "--with-recorded"],
+        )?;
+        check(code == 0, &err)?;
+        check(err.contains("compensated to 400 Hz"), &err)?;
+        let rows = rows(&out);
+        // Counted independently: lines with two numbers.
+        let count = std::fs::read_to_string(&path)?
+            .lines()
+            .filter(|l| {
+                l.split('\t')
+                    .filter(|c| c.trim().parse::<f64>().is_ok())
+                    .count()
+                    == 2
+            })
+            .count();
+        check(
+            rows.len() == count,
+            format!("{} rows of {count}", rows.len()),
+        )?;
+        let mean = |k: usize| rows.iter().map(|r| r[k]).sum::<f64>() / count as f64;
+        check(
+            (mean(1) - mean(2)).abs() < 0.02 * mean(2).abs().max(1.0),
+            format!("{} {}", mean(1), mean(2)),
+        )?;
+        files += 1;
+    }
+    check(files == 4, format!("{files} files"))
+}
+
+/// No headings, decimal commas, holes in the time stamps.
+fn thrust_balance(folder: &Path) -> Result<(), Failed> {
+    let file = folder.join("thrust_balance/1.caldata_m4_l5_F9_725.txt");
+    let path = file.to_str().unwrap_or_default();
+    let (code, _, err) = run(STAND, &["compensate", path])?;
+    check(code == 1 && err.contains("--time-column 1"), &err)?;
+    let args = [
+        "compensate",
+        path,
+        "--time-column",
+        "1",
+        "--time-unit",
+        "s",
+        "--unit",
+        "V",
+    ];
+    let (code, _, err) = run(STAND, &args)?;
+    check(
+        code == 1 && err.contains("line 4") && err.contains("--resample"),
+        &err,
+    )?;
+    let args = [&args[..], &["--resample", "--rate", "62.5", "--band", "10"]].concat();
+    let (code, out, err) = run(STAND, &args)?;
+    check(code == 0 && err.contains("gap(s) in the time stamps"), &err)?;
+    let rows = rows(&out);
+    check(
+        rows.windows(2)
+            .all(|w| (w[1][0] - w[0][0] - 0.016).abs() < 1e-9),
+        "the grid is not uniform",
+    )
+}
+
+/// A stand in volts: the electronic mass, spring and damper.
+fn silverbox(folder: &Path) -> Result<(), Failed> {
+    let file = folder.join("silverbox/estimation.csv");
+    let stand = "schema = \"torqcomp.stand/1\"\n[mechanics]\nnatural_frequency = \"69 Hz\"\ndamping_ratio = 0.05\n\
+                 static_gain = \"1 V/V\"\n";
+    let path = file.to_str().unwrap_or_default();
+    let (code, out, err) = run(stand, &["compensate", path, "--channel", "v2_out"])?;
+    check(code == 0, &err)?;
+    check(out.starts_with("time_s,applied_v\n"), &out[..40])?;
+    let (code, _, err) = run(stand, &["compensate", path])?;
+    check(
+        code == 1 && err.contains("\"v1_in_V\" or \"v2_out_V\""),
+        &err,
+    )
+}

@@ -1,0 +1,194 @@
+//! Outputs appear whole or not at all.
+
+use std::io::Read;
+use std::process::Stdio;
+
+use crate::util::{Folder, command, record, steady};
+
+fn folder() -> Folder {
+    let folder = Folder::new();
+    let (shown, _) = steady(&[(1.0, 60.0, 0.0), (0.3, 1200.0, 1.0)], 20_000.0, 60_000);
+    folder.write("in.csv", record(&shown, 20_000.0));
+    folder
+}
+
+const COMPENSATE: [&str; 4] = ["compensate", "in.csv", "--stand", "stand.toml"];
+
+#[test]
+fn an_existing_output_is_kept_without_force() {
+    let folder = folder();
+    folder.write("out.csv", "precious\n");
+    let args = [&COMPENSATE[..], &["-o", "out.csv"]].concat();
+    folder.run(&args).says(1, &["out.csv exists", "--force"]);
+    assert_eq!(folder.read("out.csv"), "precious\n");
+    let forced = [&args[..], &["--force"]].concat();
+    assert_eq!(folder.run(&forced).code, 0);
+    assert_eq!(folder.read("out.csv").lines().count(), 60_001);
+    assert_eq!(folder.names(), ["in.csv", "out.csv", "stand.toml"]);
+}
+
+#[test]
+fn an_input_is_never_replaced() {
+    let folder = folder();
+    let before = folder.read("in.csv");
+    for output in ["in.csv", "./in.csv", "stand.toml"] {
+        let args = [&COMPENSATE[..], &["-o", output, "--force"]].concat();
+        folder.run(&args).says(2, &["is the input"]);
+    }
+    assert_eq!(folder.read("in.csv"), before);
+}
+
+#[test]
+fn a_failed_run_leaves_the_old_output() {
+    let folder = folder();
+    folder.write("out.csv", "precious\n");
+    let broken = folder.read("in.csv").replace("\n2.5,", "\n2.5,x");
+    folder.write("in.csv", broken);
+    let args = [&COMPENSATE[..], &["-o", "out.csv", "--force"]].concat();
+    folder.run(&args).says(1, &["line 50002"]);
+    assert_eq!(folder.read("out.csv"), "precious\n");
+    assert_eq!(folder.names(), ["in.csv", "out.csv", "stand.toml"]);
+}
+
+#[test]
+fn folders_that_are_not_there() {
+    let folder = folder();
+    let args = [&COMPENSATE[..], &["-o", "none/out.csv"]].concat();
+    folder
+        .run(&args)
+        .says(1, &["none/out.csv", "folder exists"]);
+    let args = [&COMPENSATE[..], &["-o", "."]].concat();
+    folder.run(&args).says(2, &["folder"]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_named() {
+    let folder = folder();
+    let args = [&COMPENSATE[..], &["-o", "/dev/full"]].concat();
+    folder.run(&args).says(1, &["/dev/full", "no space left"]);
+    for verb in [&["table", "--stand", "stand.toml"][..], &COMPENSATE[..]] {
+        let full = std::fs::File::options()
+            .write(true)
+            .open("/dev/full")
+            .expect("the device");
+        let ran = command(&folder.path(""), verb)
+            .stdout(Stdio::from(full))
+            .output()
+            .expect("the binary ends");
+        assert_eq!(ran.status.code(), Some(1), "{verb:?}");
+        assert!(String::from_utf8_lossy(&ran.stderr).contains("no space left"));
+    }
+    assert_eq!(folder.names(), ["in.csv", "stand.toml"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_reader_that_goes_away_is_no_failure() {
+    let folder = folder();
+    let mut child = command(&folder.path(""), &COMPENSATE)
+        .spawn()
+        .expect("the binary starts");
+    let mut start = [0; 100];
+    let mut pipe = child.stdout.take().expect("a pipe");
+    pipe.read_exact(&mut start).expect("the first rows");
+    drop(pipe);
+    let ran = child.wait_with_output().expect("the binary ends");
+    assert_eq!(ran.status.code(), Some(0));
+    assert!(start.starts_with(b"time_s,torque_n_m\n0,"));
+}
+
+#[test]
+fn pipes_in_and_out_give_the_same_bytes_as_files() {
+    let folder = folder();
+    let file = [&COMPENSATE[..], &["-o", "out.csv"]].concat();
+    assert_eq!(folder.run(&file).code, 0);
+    let bytes = folder.read("in.csv").into_bytes();
+    let piped = folder.pipe(
+        &["compensate", "-", "--stand", "stand.toml", "-o", "-"],
+        &bytes,
+    );
+    assert_eq!(piped.code, 0, "{}", piped.stderr);
+    assert!(piped.stdout == folder.read("out.csv"), "bytes differ");
+}
+
+#[test]
+fn threads_do_not_change_a_byte() {
+    let folder = folder();
+    let run = |threads: &str, json: &str| {
+        let args = [
+            &COMPENSATE[..],
+            &["-o", "out.csv", "--force", "--json", "--threads", threads],
+        ]
+        .concat();
+        let ran = folder.run(&args);
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        folder.write(json, &ran.stdout);
+        (folder.read("out.csv"), ran.stdout)
+    };
+    let once = run("1", "1.json");
+    for threads in ["2", "3", "8"] {
+        assert!(run(threads, "n.json") == once, "{threads} threads");
+    }
+}
+
+#[test]
+fn json_is_one_document_and_talk_goes_to_stderr() {
+    let folder = folder();
+    let args = [&COMPENSATE[..], &["-o", "out.csv", "--json"]].concat();
+    let report = folder.json(&args);
+    assert_eq!(report["schema"], "torqcomp.compensate/1");
+    assert_eq!(report["samples"], 60_000);
+    assert_eq!(report["band_hz"], 2400.0);
+    assert_eq!(report["unit"], "N m");
+    assert!(report["noise"]["largest_gain"].as_f64().unwrap() > 15.0);
+    // No uncertainty is known for this stand: null, not 0.
+    assert!(report["noise"]["gain"][3]["relative_std"].is_null());
+    let quiet = folder.run(&[&COMPENSATE[..], &["-q"]].concat());
+    assert_eq!(quiet.stderr, "");
+}
+
+#[test]
+fn strict_turns_a_warning_into_3() {
+    let folder = Folder::new();
+    // Nothing but noise above 100 Hz.
+    let mut state = 1_u64;
+    let noisy: Vec<f64> = (0..60_000)
+        .map(|i| {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            let noise = (state >> 40) as f64 / (1 << 24) as f64 - 0.5;
+            (f64::from(i) * 0.01).sin() + 0.01 * noise
+        })
+        .collect();
+    folder.write("in.csv", record(&noisy, 20_000.0));
+    let args = [&COMPENSATE[..], &["-o", "out.csv", "--force"]].concat();
+    folder.run(&args).says(0, &["band-lost-in-noise", "--band"]);
+    let strict = [&args[..], &["--strict"]].concat();
+    folder.run(&strict).says(3, &["band-lost-in-noise"]);
+    // The same record with a band that holds the signal has nothing to warn of.
+    let low = [&args[..], &["--strict", "--band", "34"]].concat();
+    assert_eq!(folder.run(&low).code, 0);
+}
+
+#[test]
+fn a_plot_is_an_svg_file() {
+    let folder = folder();
+    let args = [
+        &COMPENSATE[..],
+        &[
+            "-o",
+            "out.csv",
+            "--plot",
+            "out.svg",
+            "--plot-range",
+            "0.1..0.12",
+        ],
+    ]
+    .concat();
+    assert_eq!(folder.run(&args).code, 0);
+    let svg = folder.read("out.svg");
+    assert!(svg.starts_with("<svg ") && svg.contains("compensated") && !svg.contains("NaN"));
+    folder.run(&args).says(1, &["exists"]);
+}

@@ -1,0 +1,79 @@
+//! `table` against Appendix D of the thesis and against the response written out by hand.
+
+use crate::util::{Folder, hertel_response, table as rows_of};
+
+#[test]
+fn the_default_table_is_that_of_the_thesis() {
+    let ran = Folder::new().run(&["table", "--stand", "stand.toml"]);
+    let (head, rows) = rows_of(&ran.stdout);
+    assert_eq!(head, ["frequency_hz", "magnitude", "phase_deg"]);
+    assert_eq!(rows.len(), 251);
+    for row in &rows {
+        let (gain, lag) = hertel_response(row[0]);
+        assert!((row[1] * gain - 1.0).abs() < 1e-9, "{row:?}");
+        assert!((row[2] + lag.to_degrees()).abs() < 1e-7, "{row:?}");
+    }
+    // Printed: 590 Hz, 0.14070231, 86.94786072.
+    assert!(
+        (rows[59][1] - 0.140_702_31).abs() < 1e-6 && (rows[59][2] - 86.947_860_72).abs() < 5e-4
+    );
+}
+
+#[test]
+fn a_delay_adds_to_the_phase_without_folding() {
+    let folder = Folder::new();
+    folder.write(
+        "stand.toml",
+        format!("{}[recorder]\ndelay = \"1 ms\"\n", crate::util::HERTEL),
+    );
+    let ran = folder.run(&[
+        "table",
+        "--stand",
+        "stand.toml",
+        "--from",
+        "2000",
+        "--to",
+        "2000",
+    ]);
+    let (_, rows) = rows_of(&ran.stdout);
+    let (_, lag) = hertel_response(2000.0);
+    assert!(
+        (rows[0][2] - (720.0 - lag.to_degrees())).abs() < 1e-6,
+        "{rows:?}"
+    );
+}
+
+#[test]
+fn uncertainty_is_empty_where_it_is_unknown() {
+    let folder = Folder::new();
+    let ran = folder.run(&[
+        "table",
+        "--stand",
+        "stand.toml",
+        "--to",
+        "0",
+        "--uncertainty",
+    ]);
+    assert_eq!(ran.stdout.lines().nth(1), Some("0,1,0,,"));
+    let known = crate::util::HERTEL.replace(
+        "\"8.1e4 ft lbf/rad\"",
+        "{ value = \"8.1e4 ft lbf/rad\", std = \"810 ft lbf/rad\" }",
+    );
+    folder.write("stand.toml", known);
+    let report = folder.json(&[
+        "table",
+        "--stand",
+        "stand.toml",
+        "--from",
+        "2400",
+        "--to",
+        "2400",
+        "--json",
+    ]);
+    // Far above resonance the inverse is Jω²/K: one per cent of K is one per cent of it, a little
+    // more by the 1 that is taken off, 16.4/15.4.
+    let std = report["rows"][0]["magnitude_relative_std"]
+        .as_f64()
+        .unwrap();
+    assert!((std - 0.01 * 16.4 / 15.4).abs() < 2e-4, "{std}");
+}

@@ -1,0 +1,223 @@
+//! Text as recorders write it, all holding the same record.
+
+use crate::util::{Folder, column};
+
+/// Twelve hundred samples at 10 kHz in a form of the caller's.
+fn rows(row: impl Fn(f64, f64) -> String) -> String {
+    (0..1200)
+        .map(|i| {
+            let t = f64::from(i) * 1e-4;
+            row(t, 1e-3 * (377.0 * t).cos())
+        })
+        .collect()
+}
+
+fn comma(text: &str) -> String {
+    text.replace('.', ",")
+}
+
+/// Compensates a file and compares with the plain one.
+fn same(name: &str, content: impl AsRef<[u8]>, more: &[&str]) {
+    let folder = Folder::new();
+    folder.write(
+        "plain.csv",
+        format!(
+            "time_s,bridge_V\n{}",
+            rows(|t, v| format!("{t:.4},{v:.9}\n"))
+        ),
+    );
+    folder.write("other.txt", content);
+    let plain = folder.run(&["compensate", "plain.csv", "--stand", "stand.toml", "-q"]);
+    assert_eq!(plain.code, 0, "{}", plain.stderr);
+    let args = [
+        &["compensate", "other.txt", "--stand", "stand.toml", "-q"][..],
+        more,
+    ]
+    .concat();
+    let other = folder.run(&args);
+    assert_eq!(other.code, 0, "{name}: {}", other.stderr);
+    for heading in ["time_s", "torque_n_m"] {
+        let (a, b) = (
+            column(&plain.stdout, heading),
+            column(&other.stdout, heading),
+        );
+        assert_eq!(a.len(), b.len(), "{name}");
+        for (x, y) in a.iter().zip(&b) {
+            assert!((x - y).abs() < 1e-9, "{name}: {heading} {x} {y}");
+        }
+    }
+}
+
+#[test]
+fn separators_and_decimal_marks() {
+    same(
+        "tabs",
+        format!(
+            "time_s\tbridge_V\n{}",
+            rows(|t, v| format!("{t:.4}\t{v:.9}\n"))
+        ),
+        &[],
+    );
+    same(
+        "semicolons",
+        format!(
+            "time_s;bridge_V\n{}",
+            rows(|t, v| format!("{t:.4};{v:.9}\n"))
+        ),
+        &[],
+    );
+    same(
+        "decimal comma",
+        format!(
+            "Zeit [s];Bruecke [V]\n{}",
+            rows(|t, v| comma(&format!("{t:.4};{v:.9}\n")))
+        ),
+        &[],
+    );
+    same(
+        "tabs and decimal comma",
+        format!(
+            "time_s\tbridge_V\n{}",
+            rows(|t, v| comma(&format!("{t:.4}\t{v:.9}\n")))
+        ),
+        &[],
+    );
+    same(
+        "spaces",
+        format!(
+            "time_s bridge_V\n{}",
+            rows(|t, v| format!(" {t:8.4}  {v:12.9}\n"))
+        ),
+        &[],
+    );
+}
+
+#[test]
+fn line_ends_marks_and_remarks() {
+    let plain = rows(|t, v| format!("{t:.4},{v:.9}\n"));
+    same("BOM", format!("\u{feff}time_s,bridge_V\n{plain}"), &[]);
+    same(
+        "CR LF",
+        format!("time_s,bridge_V\n{plain}").replace('\n', "\r\n"),
+        &[],
+    );
+    same(
+        "trailing separators",
+        format!("time_s,bridge_V,\n{}", plain.replace('\n', ",\n")),
+        &[],
+    );
+    same(
+        "quotes",
+        format!(
+            "\"time_s\",\"bridge_V\"\n{}",
+            rows(|t, v| format!("\"{t:.4}\",\"{v:.9}\"\n"))
+        ),
+        &[],
+    );
+    same(
+        "comments",
+        format!(
+            "# stand 3\n# run 7\ntime_s,bridge_V\n{}",
+            plain.replace("0.0500,", "# pause\n\n0.0500,")
+        ),
+        &[],
+    );
+    same(
+        "preamble",
+        format!("Recorder 7\nRate;10 kHz\nOperator: nobody, alone\n\ntime_s,bridge_V\n{plain}"),
+        &[],
+    );
+    same("units row", format!("time,bridge\ns,V\n{plain}"), &[]);
+    same(
+        "units in brackets",
+        format!("Time (s),Bridge [V]\n{plain}"),
+        &[],
+    );
+    same(
+        "padding",
+        format!(
+            "time_s,bridge_V\n{}",
+            rows(|t, v| format!("  {t:.4} ,   {v:.9} \r\n"))
+        ),
+        &[],
+    );
+}
+
+#[test]
+fn other_units_columns_and_time_axes() {
+    same(
+        "ms and mV",
+        format!(
+            "t (ms);U / mV\n{}",
+            rows(|t, v| format!("{:.1};{:.6}\n", t * 1e3, v * 1e3))
+        ),
+        &[],
+    );
+    same(
+        "more columns",
+        format!(
+            "speed_rpm,bridge_V,note,time_s\n{}",
+            rows(|t, v| format!("1100,{v:.9},ok,{t:.4}\n")).replace("ok", "0")
+        ),
+        &["--channel", "bridge"],
+    );
+    same(
+        "no time",
+        format!("bridge_V\n{}", rows(|_, v| format!("{v:.9}\n"))),
+        &["--rate", "10 kHz"],
+    );
+    same(
+        "no headings",
+        rows(|t, v| format!("{t:.4},{v:.9}\n")),
+        &["--time-column", "1", "--time-unit", "s", "--unit", "V"],
+    );
+    same(
+        "wrong stamps",
+        format!("time_s,bridge_V\n{}", rows(|_, v| format!("7,{v:.9}\n"))),
+        &["--rate", "10000"],
+    );
+    same(
+        "column by number",
+        format!("a,b,c\n{}", rows(|t, v| format!("1,{v:.9},{t:.4}\n"))),
+        &[
+            "--time-column",
+            "c",
+            "--time-unit",
+            "s",
+            "--channel",
+            "2",
+            "--unit",
+            "V",
+        ],
+    );
+}
+
+#[test]
+fn a_comma_that_could_be_either_is_asked_for() {
+    let folder = Folder::new();
+    folder.write("in.csv", rows(|_, v| comma(&format!("{:.6}\n", v + 1.0))));
+    let ran = folder.run(&[
+        "compensate",
+        "in.csv",
+        "--stand",
+        "stand.toml",
+        "--rate",
+        "10000",
+        "--unit",
+        "V",
+    ]);
+    ran.says(1, &["--delimiter ,", "--decimal ,"]);
+    let args = [
+        "compensate",
+        "in.csv",
+        "--stand",
+        "stand.toml",
+        "--rate",
+        "10000",
+        "--unit",
+        "V",
+        "--decimal",
+        ",",
+    ];
+    assert_eq!(folder.run(&args).code, 0);
+}
