@@ -279,7 +279,7 @@ impl Stand {
     /// # Errors
     /// If the stand file gives no mechanics.
     pub fn inverse(&self) -> Result<Inverse, Failure> {
-        let response = self.mechanics()?.response.clone();
+        let response = self.mechanics()?.response;
         let recorder = self.recorder.recorder.clone();
         Ok(Arc::new(move |frequency_hz| {
             response.inverse(frequency_hz) / recorder.response(frequency_hz)

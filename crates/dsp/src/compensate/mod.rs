@@ -177,7 +177,7 @@ fn response_on_grid(
     }
     // A real signal has real values at zero and at half the rate.
     grid[0].im = 0.0;
-    if length % 2 == 0 {
+    if length.is_multiple_of(2) {
         grid[length / 2].im = 0.0;
     }
     Ok(grid)

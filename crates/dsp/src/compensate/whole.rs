@@ -104,7 +104,7 @@ mod tests {
     fn fast_lengths_are_the_smallest_smooth_ones() {
         let smooth = |mut n: usize| {
             for p in [2, 3, 5] {
-                while n % p == 0 {
+                while n.is_multiple_of(p) {
                     n /= p;
                 }
             }
