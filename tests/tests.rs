@@ -9,3 +9,4 @@ mod output;
 mod predict;
 mod table;
 mod text_tables;
+mod thesis;

@@ -190,3 +190,13 @@ pub fn record(torque_n_m: &[f64], rate_hz: f64) -> String {
     }
     text
 }
+
+/// Fails with got, want and difference unless both agree to a relative tolerance.
+#[track_caller]
+pub fn assert_close(got: f64, want: f64, relative: f64) {
+    let difference = (got - want).abs() / want.abs();
+    assert!(
+        difference <= relative,
+        "got {got:e}, want {want:e}, relative difference {difference:e}"
+    );
+}

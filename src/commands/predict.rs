@@ -377,8 +377,8 @@ fn damping_note(damping: &Constant) -> Option<String> {
     let ratio = damping.predicted? / damping.measured?;
     (ratio < FAR_TOO_SMALL).then(|| {
         format!(
-            "friction over speed gives {} of the measured damping; the rest is lost in the beam and \
-             its joints, which the drawing does not describe",
+            "friction over speed gives {} of the measured damping; the rest is lost where the drawing \
+             says nothing, most likely in the beam and its joints",
             rounded(ratio, 2)
         )
     })

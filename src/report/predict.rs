@@ -106,7 +106,12 @@ fn cell(value: Option<f64>, std: Option<f64>) -> String {
 }
 
 fn percent(value: Option<f64>) -> String {
-    value.map_or_else(|| "-".to_owned(), |v| format!("{v:+.1}"))
+    // A prediction that misses nearly all is not to be rounded to nothing.
+    match value {
+        None => "-".to_owned(),
+        Some(v) if (v.abs() - 100.0).abs() < 0.05 => format!("{v:+.4}"),
+        Some(v) => format!("{v:+.1}"),
+    }
 }
 
 impl Constant {

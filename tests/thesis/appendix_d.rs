@@ -13,7 +13,7 @@ use std::f64::consts::TAU;
 
 use torqcomp_model::SecondOrder;
 
-const TABLE: &str = include_str!("data/appendix_d.csv");
+const TABLE: &str = include_str!("../data/thesis/appendix_d.csv");
 
 /// Worst spacing of a single-precision number of the machine, relative to the number.
 const SPACING: f64 = 1.0 / 1_048_576.0;

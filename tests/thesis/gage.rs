@@ -1,6 +1,6 @@
 //! The gage, bridge and conversion against the numbers of the thesis.
 //!
-//! `data/appendix_b.csv` is the BLH strain sensitivity table of Appendix B.
+//! `tests/data/thesis/appendix_b.csv` is the BLH strain sensitivity table of Appendix B.
 //! Each check prints what the thesis prints, what follows, and the difference.
 
 use proptest::prelude::*;
@@ -10,7 +10,7 @@ use torqcomp_dsp::gage::{
     BondedGage, Gage, GageError, apparent_strain, drifted_resistance_ohm, kelvin_from_fahrenheit,
 };
 
-const TABLE: &str = include_str!("data/appendix_b.csv");
+const TABLE: &str = include_str!("../data/thesis/appendix_b.csv");
 
 /// One cell of the table.
 #[derive(Clone, Copy)]
@@ -207,7 +207,7 @@ fn temperature_corrections_move_the_zero_more_than_the_signal() {
     let strain = apparent_strain(6.5e-6 * 1.8, 10.0 / 1.8);
     let difference = compare("apparent strain, microstrain", 65.0, strain * 1e6);
     assert!(difference.abs() < 1e-9);
-    // 2 percent of R0 at 85 F, seen as strain: more than the 50 measured.
+    // 2 percent of R0 at 85 F, seen as strain: more than the 50 that (B4) assumes.
     let risen = drifted_resistance_ohm(5900.0, 0.02);
     assert!((risen - 6018.0).abs() < 1e-9);
     let seen = table_gage().strain((risen - 5900.0) / 5900.0, kelvin_from_fahrenheit(85.0));

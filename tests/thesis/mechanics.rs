@@ -4,8 +4,6 @@
 //! Every expected value was worked outside this crate with pencil arithmetic on the printed
 //! inputs in US units; the crate computes in SI.
 
-mod util;
-
 use torqcomp_model::inertia::{
     inertia_from_run_up_kg_m2, mass_from_weight_kg, total_inertia_kg_m2,
 };
@@ -515,5 +513,5 @@ fn appendix_a_diameters_are_used_as_radii() {
     .differs();
     // J and K share r², so the natural frequency cannot tell the two readings apart.
     let narrow = stand(inertia, 8.9e-5, stiffness).natural_frequency_hz();
-    util::assert_close(narrow, 615.634, 1e-5);
+    crate::util::assert_close(narrow, 615.634, 1e-5);
 }
