@@ -5,8 +5,12 @@ use std::process::ExitCode;
 use clap::Parser;
 use torqcomp::cli::Cli;
 use torqcomp::commands::{self, Outcome};
+use torqcomp::io::output;
 
 fn main() -> ExitCode {
+    if let Err(error) = output::clean_up_when_interrupted() {
+        eprintln!("torqcomp: interrupting this run may leave a temporary file behind: {error}");
+    }
     // clap ends wrong usage with code 2 itself, and help with 0.
     match commands::run(Cli::parse()) {
         Ok(Outcome::Done) => ExitCode::SUCCESS,

@@ -98,6 +98,38 @@ fn a_reader_that_goes_away_is_no_failure() {
     assert!(start.starts_with(b"time_s,torque_n_m\n0,"));
 }
 
+#[cfg(unix)]
+#[test]
+fn an_interrupted_run_leaves_nothing() {
+    let folder = folder();
+    let mut child = command(
+        &folder.path(""),
+        &["compensate", "-", "--stand", "stand.toml", "-o", "out.csv"],
+    )
+    .stdin(Stdio::piped())
+    .spawn()
+    .expect("the binary starts");
+    let mut pipe = child.stdin.take().expect("a pipe");
+    std::io::Write::write_all(&mut pipe, folder.read("in.csv").as_bytes()).expect("rows");
+    // It waits for more rows, its temporary file being open.
+    let part = || folder.names().iter().any(|name| name.ends_with(".part"));
+    for _ in 0..500 {
+        if part() {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    assert!(part(), "{:?}", folder.names());
+    let killed = std::process::Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status()
+        .expect("kill");
+    assert!(killed.success());
+    assert_eq!(child.wait().expect("the binary ends").code(), Some(130));
+    drop(pipe);
+    assert_eq!(folder.names(), ["in.csv", "stand.toml"]);
+}
+
 #[test]
 fn pipes_in_and_out_give_the_same_bytes_as_files() {
     let folder = folder();

@@ -3,8 +3,7 @@
 use torqcomp_dsp::bridge::BridgeLayout;
 use torqcomp_dsp::conversion::Conversion;
 use torqcomp_model::damping::viscous_from_friction_slope_n_m_s_per_rad;
-use torqcomp_model::inertia::total_inertia_kg_m2;
-use torqcomp_model::{Estimate, Kind, Part, SecondOrder, UnitSystem};
+use torqcomp_model::{Estimate, Kind, SecondOrder, UnitSystem};
 
 use super::Outcome;
 use crate::cli::Predict;
@@ -53,8 +52,8 @@ struct Drawing<'a> {
     stand: &'a Stand,
     /// Stiffness of the slender beam, then with each effect added.
     stiffness: Option<Stiffness>,
-    inertia: Option<f64>,
-    damping: Option<f64>,
+    inertia: Option<Estimate>,
+    damping: Option<Estimate>,
     measured: Measured,
 }
 
@@ -69,7 +68,7 @@ struct Measured {
 }
 
 struct Stiffness {
-    slender: f64,
+    slender: Estimate,
     refined: Vec<(&'static str, f64)>,
 }
 
@@ -78,27 +77,26 @@ impl<'a> Drawing<'a> {
         let wrong = |error: &dyn std::fmt::Display| {
             Failure::failed(format_args!("{}: {error}", stand.file))
         };
-        let parts: Vec<Part> = stand.parts.iter().map(|p| p.part).collect();
+        let parts: Vec<&Estimate> = stand.parts.iter().map(|p| &p.inertia).collect();
         let inertia = if parts.is_empty() {
             None
         } else {
-            Some(total_inertia_kg_m2(&parts).map_err(|e| wrong(&e))?)
+            let sum = Estimate::derive(Kind::Inertia, "drawing", &parts, |x| x.iter().sum());
+            Some(sum.map_err(|e| wrong(&e))?)
         };
         let damping = match &stand.friction {
             None => None,
             Some(f) => {
-                let slope = f.force_change.value() / f.speed_change.value();
-                let found = viscous_from_friction_slope_n_m_s_per_rad(slope, f.radius.value());
+                let inputs = [&f.force_change, &f.speed_change, &f.radius];
+                let slope = |x: &[f64]| {
+                    viscous_from_friction_slope_n_m_s_per_rad(x[0] / x[1], x[2]).unwrap_or(f64::NAN)
+                };
+                let found = Estimate::derive(Kind::AngularDamping, "drawing", &inputs, slope);
                 Some(found.map_err(|e| wrong(&e))?)
             }
         };
         Ok(Self {
-            stiffness: stand
-                .beam
-                .as_ref()
-                .map(Stiffness::of)
-                .transpose()
-                .map_err(|e| wrong(&e))?,
+            stiffness: stand.beam.as_ref().map(Stiffness::of),
             inertia,
             damping,
             measured: Measured::of(stand)?,
@@ -108,80 +106,84 @@ impl<'a> Drawing<'a> {
 
     fn constants(&self, units: UnitSystem) -> Result<Vec<Constant>, Failure> {
         let measured = &self.measured;
-        let slender = self.stiffness.as_ref().map(|s| s.slender);
+        let slender = self.stiffness.as_ref().map(|s| &s.slender);
+        let inertia = self.inertia.as_ref();
+        let damping = self.damping.as_ref();
+
         let mut stiffness = constant(
             "stiffness",
-            Kind::AngularStiffness,
             slender,
             &measured.stiffness,
+            Kind::AngularStiffness,
             units,
         );
         stiffness.by = "slender beam (Euler-Bernoulli) in a rigid clamp";
-        stiffness.predicted_std = self.std_of_stiffness(units);
         self.refine(&mut stiffness, |k| {
             Some(Kind::AngularStiffness.to(units, k))
         });
 
-        let mut inertia = constant(
-            "inertia",
-            Kind::Inertia,
-            self.inertia,
-            &measured.inertia,
-            units,
-        );
-        inertia.by = "sum of the parts";
+        let mut ring = constant("inertia", inertia, &measured.inertia, Kind::Inertia, units);
+        ring.by = "sum of the parts";
 
-        let mut damping = constant(
+        let mut loss = constant(
             "damping",
-            Kind::AngularDamping,
-            self.damping,
+            damping,
             &measured.damping,
+            Kind::AngularDamping,
             units,
         );
-        damping.by = "slope of friction over speed, times radius";
-        damping.note = damping_note(&damping);
+        loss.by = "slope of friction over speed, times radius";
+        loss.note = damping_note(&loss);
 
-        let frequency = |k: f64| {
-            let stand = SecondOrder::new(self.inertia?, 0.0, k).ok()?;
-            Some(stand.natural_frequency_hz())
+        let frequency = |x: &[f64]| {
+            SecondOrder::new(x[0], 0.0, x[1]).map_or(f64::NAN, |stand| stand.natural_frequency_hz())
         };
-        let predicted = slender.and_then(frequency);
+        let predicted = self.derive(Kind::Frequency, &[inertia, slender], frequency)?;
         let mut natural = constant(
             "natural_frequency",
-            Kind::Frequency,
-            predicted,
+            predicted.as_ref(),
             &measured.natural_frequency,
+            Kind::Frequency,
             units,
         );
         natural.by = "stiffness and inertia above";
-        self.refine(&mut natural, frequency);
+        self.refine(&mut natural, |k| Some(frequency(&[inertia?.value(), k])));
 
-        let ratio = || {
-            let stand = SecondOrder::new(self.inertia?, self.damping?, slender?).ok()?;
-            Some(stand.damping_ratio())
+        let ratio = |x: &[f64]| {
+            SecondOrder::new(x[0], x[1], x[2]).map_or(f64::NAN, |stand| stand.damping_ratio())
         };
+        let predicted = self.derive(Kind::Ratio, &[inertia, damping, slender], ratio)?;
         let mut damping_ratio = constant(
             "damping_ratio",
-            Kind::Ratio,
-            ratio(),
+            predicted.as_ref(),
             &measured.damping_ratio,
+            Kind::Ratio,
             units,
         );
         damping_ratio.by = "stiffness, inertia and damping above";
         Ok(vec![
             stiffness,
-            inertia,
-            damping,
+            ring,
+            loss,
             natural,
             damping_ratio,
             self.torque_per_volt(units)?,
         ])
     }
 
-    fn std_of_stiffness(&self, units: UnitSystem) -> Option<f64> {
-        let relative = self.stand.beam.as_ref()?.relative_std?;
-        let slender = self.stiffness.as_ref()?.slender;
-        Some(Kind::AngularStiffness.difference_to(units, relative * slender))
+    /// An estimate that follows from others, if all of them are there.
+    fn derive(
+        &self,
+        kind: Kind,
+        inputs: &[Option<&Estimate>],
+        f: impl Fn(&[f64]) -> f64,
+    ) -> Result<Option<Estimate>, Failure> {
+        let Some(inputs) = inputs.iter().copied().collect::<Option<Vec<_>>>() else {
+            return Ok(None);
+        };
+        Estimate::derive(kind, "drawing", &inputs, f)
+            .map(Some)
+            .map_err(|error| Failure::failed(format_args!("{}: {error}", self.stand.file)))
     }
 
     /// Adds what each effect of the drawing makes of a constant that follows from the stiffness.
@@ -230,14 +232,16 @@ impl<'a> Drawing<'a> {
             let gain = stand.recorder.recorder.gain();
             let conversion = Conversion::bridge(bridge, gain, 0.0, torque_per_strain)
                 .map_err(Failure::failed)?;
-            predicted = Some(conversion.small_signal_gain());
-            note = self.torque_per_volt_note(predicted, layout, loading);
+            let gain = conversion.small_signal_gain();
+            note = self.torque_per_volt_note(gain, layout, loading);
+            let made = Estimate::new(Kind::TorquePerVolt, gain, None, "drawing");
+            predicted = Some(made.map_err(Failure::failed)?);
         }
         let mut made = constant(
             "torque_per_volt",
-            Kind::TorquePerVolt,
-            predicted,
+            predicted.as_ref(),
             &stand.torque_per_volt,
+            Kind::TorquePerVolt,
             units,
         );
         made.by = "strain at the gage, gage factor and bridge";
@@ -248,11 +252,11 @@ impl<'a> Drawing<'a> {
     /// What can contribute to a large factor, none of which the record can tell from the others.
     fn torque_per_volt_note(
         &self,
-        predicted: Option<f64>,
+        predicted: f64,
         layout: BridgeLayout,
         loading: f64,
     ) -> Option<String> {
-        let factor = self.stand.torque_per_volt.as_ref()?.value() / predicted?;
+        let factor = self.stand.torque_per_volt.as_ref()?.value() / predicted;
         if factor.abs() < LARGE_FACTOR {
             return None;
         }
@@ -283,9 +287,8 @@ impl<'a> Drawing<'a> {
 }
 
 impl Stiffness {
-    fn of(beam: &BeamDrawing) -> Result<Self, torqcomp_model::ModelError> {
+    fn of(beam: &BeamDrawing) -> Self {
         let radius = beam.radius.value();
-        let slender = beam.slender.angular_stiffness_n_m_per_rad(radius)?;
         let parts = beam.full.compliance();
         let mut total = parts.bending_m_per_n;
         let mut refined = Vec::new();
@@ -302,7 +305,10 @@ impl Stiffness {
                 refined.push((effect, radius * radius / total));
             }
         }
-        Ok(Self { slender, refined })
+        Self {
+            slender: beam.slender_stiffness.clone(),
+            refined,
+        }
     }
 }
 
@@ -350,22 +356,23 @@ impl Measured {
 
 fn constant(
     name: &'static str,
-    kind: Kind,
-    predicted: Option<f64>,
+    predicted: Option<&Estimate>,
     measured: &Option<Estimate>,
+    kind: Kind,
     units: UnitSystem,
 ) -> Constant {
-    let predicted = predicted.map(|value| kind.to(units, value));
-    let value = measured.as_ref().map(|m| kind.to(units, m.value()));
-    let std = measured.as_ref().and_then(Estimate::std_uncertainty);
+    let value = |e: &Estimate| kind.to(units, e.value());
+    let std = |e: &Estimate| Some(kind.difference_to(units, e.std_uncertainty()?));
+    let (predicted_value, measured_value) = (predicted.map(value), measured.as_ref().map(value));
     Constant {
         name,
         unit: kind.unit(units).to_owned(),
-        predicted,
-        predicted_std: None,
-        measured: value,
-        measured_std: std.map(|std| kind.difference_to(units, std)),
-        residual_percent: residual_percent(predicted, value),
+        predicted: predicted_value,
+        predicted_std: predicted.and_then(std),
+        measured: measured_value,
+        measured_std: measured.as_ref().and_then(std),
+        measured_source: measured.as_ref().map(|m| m.source().to_owned()),
+        residual_percent: residual_percent(predicted_value, measured_value),
         explained_by: None,
         by: "",
         refinements: Vec::new(),

@@ -3,10 +3,30 @@
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 
 use tempfile::NamedTempFile;
 
 use crate::failure::Failure;
+
+/// Files that are not complete, to be removed if the run is interrupted.
+static PARTS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+/// Exit code of an interrupted run: 128 and the number of the signal, as shells have it.
+const INTERRUPTED: i32 = 130;
+
+/// Has incomplete outputs removed when the run is interrupted or told to end.
+///
+/// # Errors
+/// If the system does not let signals be handled.
+pub fn clean_up_when_interrupted() -> Result<(), ctrlc::Error> {
+    ctrlc::set_handler(|| {
+        for part in PARTS.lock().unwrap_or_else(|e| e.into_inner()).drain(..) {
+            // It may have got its name already, or be gone.
+            let _ = std::fs::remove_file(part);
+        }
+        std::process::exit(INTERRUPTED);
+    })
+}
 
 /// An output: standard output, a device, or a file that takes its name when it is complete.
 pub struct Output {
@@ -115,7 +135,10 @@ fn part_beside(path: &Path) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".torqcomp-").suffix(".part");
     set_permissions(&mut builder);
-    builder.tempfile_in(folder)
+    let part = builder.tempfile_in(folder)?;
+    let mut parts = PARTS.lock().unwrap_or_else(|e| e.into_inner());
+    parts.push(part.path().to_owned());
+    Ok(part)
 }
 
 /// The finished file gets the permissions of any other new file.

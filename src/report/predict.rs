@@ -35,6 +35,8 @@ pub struct Constant {
     pub measured: Option<f64>,
     /// Its standard uncertainty.
     pub measured_std: Option<f64>,
+    /// Where the measured value comes from, as the stand file says.
+    pub measured_source: Option<String>,
     /// `100 (predicted − measured) / measured`.
     pub residual_percent: Option<f64>,
     /// What in the model explains at least half of the residual; `null` if nothing does.

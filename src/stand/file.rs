@@ -7,7 +7,8 @@ use torqcomp_dsp::bridge::{BridgeLayout, Leads, Supply};
 use torqcomp_dsp::gage::Gage;
 use torqcomp_dsp::recorder::{LowPass, Recorder};
 use torqcomp_model::{
-    Beam, Estimate, Kind, ParameterStd, Part, SecondOrder, Section as CrossSection, Segment, Unit,
+    Beam, Estimate, Kind, ModelError, ParameterStd, Part, SecondOrder, Section as CrossSection,
+    Segment, Unit,
 };
 
 use super::section::{Section, SourceText};
@@ -235,42 +236,65 @@ fn calibration(section: &Section) -> Result<Estimate, Failure> {
     Ok(constant)
 }
 
-fn cross_section(section: &Section) -> Result<CrossSection, Failure> {
-    let length = |key| section.positive(key, Kind::Length).map(|e| e.value());
-    let words = ["rectangle", "circle", "tube"];
-    let shape = section.word("section", &words)?.unwrap_or("rectangle");
-    let made = match shape {
-        "circle" => CrossSection::circle(length("diameter")?),
-        "tube" => CrossSection::tube(length("outer_diameter")?, length("inner_diameter")?),
-        _ => CrossSection::rectangle(length("width")?, length("depth")?),
-    };
-    let made = made.map_err(|error| section.fail("section", error))?;
-    match section.positive_if_any("shear_coefficient", Kind::Ratio)? {
-        None => Ok(made),
-        Some(coefficient) => made
-            .with_shear_coefficient(coefficient.value())
-            .map_err(|error| section.fail("shear_coefficient", error)),
+/// The shape of a beam's section and the lengths that it is made of.
+struct Shape {
+    word: &'static str,
+    sizes: Vec<Estimate>,
+    shear_coefficient: Option<f64>,
+}
+
+impl Shape {
+    fn read(section: &Section) -> Result<Self, Failure> {
+        let words = ["rectangle", "circle", "tube"];
+        let (word, keys): (_, &[_]) = match section.word("section", &words)? {
+            Some("circle") => ("circle", &["diameter"]),
+            Some("tube") => ("tube", &["outer_diameter", "inner_diameter"]),
+            _ => ("rectangle", &["width", "depth"]),
+        };
+        let sizes: Result<_, _> = keys
+            .iter()
+            .map(|key| section.positive(key, Kind::Length))
+            .collect();
+        let coefficient = section.positive_if_any("shear_coefficient", Kind::Ratio)?;
+        Ok(Self {
+            word,
+            sizes: sizes?,
+            shear_coefficient: coefficient.map(|e| e.value()),
+        })
+    }
+
+    /// The section with those sizes in m.
+    fn of(&self, sizes: &[f64]) -> Result<CrossSection, ModelError> {
+        let made = match self.word {
+            "circle" => CrossSection::circle(sizes[0]),
+            "tube" => CrossSection::tube(sizes[0], sizes[1]),
+            _ => CrossSection::rectangle(sizes[0], sizes[1]),
+        }?;
+        match self.shear_coefficient {
+            Some(coefficient) => made.with_shear_coefficient(coefficient),
+            None => Ok(made),
+        }
     }
 }
 
 fn beam(section: &Section) -> Result<BeamDrawing, Failure> {
     let wrong = |error| section.fail("", error);
-    let whole = cross_section(section)?;
+    let shape = Shape::read(section)?;
     let length = section.positive("length", Kind::Length)?;
-    let elastic_modulus = section.positive("elastic_modulus", Kind::Pressure)?;
+    let modulus = section.positive("elastic_modulus", Kind::Pressure)?;
     let radius = section.positive("radius", Kind::Length)?;
     let gage_position = section.quantity("gage_position", Kind::Length)?;
     let shear_modulus = section.positive_if_any("shear_modulus", Kind::Pressure)?;
     let clamp = section.positive_if_any("clamp_stiffness", Kind::AngularStiffness)?;
+    let sizes: Vec<f64> = shape.sizes.iter().map(Estimate::value).collect();
+    let whole = shape.of(&sizes).map_err(wrong)?;
     let segments = match section.section("thread")? {
         Some(thread) => threaded(&thread, length.value(), whole)?,
         None => vec![Segment::new(length.value(), whole).map_err(wrong)?],
     };
     section.finish()?;
 
-    let plain = vec![Segment::new(length.value(), whole).map_err(wrong)?];
-    let slender = Beam::new(plain, elastic_modulus.value()).map_err(wrong)?;
-    let mut full = Beam::new(segments, elastic_modulus.value()).map_err(wrong)?;
+    let mut full = Beam::new(segments, modulus.value()).map_err(wrong)?;
     if let Some(shear) = shear_modulus {
         full = full.with_shear_modulus(shear.value()).map_err(wrong)?;
     }
@@ -288,28 +312,43 @@ fn beam(section: &Section) -> Result<BeamDrawing, Failure> {
             ),
         ));
     }
-    let relative_std = relative_std_of_stiffness(&elastic_modulus, &radius, &length);
     Ok(BeamDrawing {
-        slender,
+        slender_stiffness: slender_stiffness(section, &shape, &length, &modulus, &radius)?,
         full,
         radius,
         gage_position,
-        elastic_modulus,
-        relative_std,
     })
 }
 
-/// `K = 3 r² E I / L³`: relative uncertainty of E, twice that of r, three times that of L.
-fn relative_std_of_stiffness(
+/// Stiffness of the beam as a slender one, uncertainties of the drawing carried through.
+fn slender_stiffness(
+    section: &Section,
+    shape: &Shape,
+    length: &Estimate,
     modulus: &Estimate,
     radius: &Estimate,
-    length: &Estimate,
-) -> Option<f64> {
-    let parts: Vec<f64> = [(modulus, 1.0), (radius, 2.0), (length, 3.0)]
-        .into_iter()
-        .filter_map(|(e, power)| e.std_uncertainty().map(|std| power * std / e.value()))
-        .collect();
-    (!parts.is_empty()).then(|| parts.iter().map(|p| p * p).sum::<f64>().sqrt())
+) -> Result<Estimate, Failure> {
+    let mut inputs = vec![length, modulus, radius];
+    inputs.extend(&shape.sizes);
+    let stiffness = |x: &[f64]| {
+        let segment = Segment::new(x[0], shape.of(&x[3..])?)?;
+        Beam::new(vec![segment], x[1])?.angular_stiffness_n_m_per_rad(x[2])
+    };
+    derived(section, Kind::AngularStiffness, &inputs, stiffness)
+}
+
+/// An estimate that follows from others.
+fn derived(
+    section: &Section,
+    kind: Kind,
+    inputs: &[&Estimate],
+    f: impl Fn(&[f64]) -> Result<f64, ModelError>,
+) -> Result<Estimate, Failure> {
+    let values: Vec<f64> = inputs.iter().map(|e| e.value()).collect();
+    // The model says what is wrong with the inputs themselves.
+    f(&values).map_err(|error| section.fail("", error))?;
+    Estimate::derive(kind, "drawing", inputs, |x| f(x).unwrap_or(f64::NAN))
+        .map_err(|error| section.fail("", error))
 }
 
 /// A thread: a piece of the beam with a circular section of the root diameter.
@@ -341,31 +380,46 @@ fn part(section: &Section) -> Result<NamedPart, Failure> {
         ));
     };
     let name = section.text("name")?.unwrap_or(kind).to_owned();
-    let mass_kg = section.positive("mass", Kind::Mass)?.value();
-    let length = |key| section.positive(key, Kind::Length).map(|e| e.value());
-    let part = match kind {
+    let mass = section.positive("mass", Kind::Mass)?;
+    let keys: &[_] = match kind {
+        "hollow-cylinder" => &["inner_radius", "outer_radius"],
+        _ => &["radius"],
+    };
+    let radii: Result<Vec<Estimate>, _> = keys
+        .iter()
+        .map(|key| section.positive(key, Kind::Length))
+        .collect();
+    let radii = radii?;
+    section.finish()?;
+    let mut inputs = vec![&mass];
+    inputs.extend(&radii);
+    let inertia = derived(section, Kind::Inertia, &inputs, |x| {
+        shaped(kind, x).inertia_kg_m2()
+    })?;
+    Ok(NamedPart { name, inertia })
+}
+
+/// A part out of its mass in kg and its radii in m.
+fn shaped(kind: &str, x: &[f64]) -> Part {
+    match kind {
         "thin-ring" => Part::ThinRing {
-            mass_kg,
-            radius_m: length("radius")?,
+            mass_kg: x[0],
+            radius_m: x[1],
         },
         "disc" => Part::Disc {
-            mass_kg,
-            radius_m: length("radius")?,
+            mass_kg: x[0],
+            radius_m: x[1],
         },
         "hollow-cylinder" => Part::HollowCylinder {
-            mass_kg,
-            inner_radius_m: length("inner_radius")?,
-            outer_radius_m: length("outer_radius")?,
+            mass_kg: x[0],
+            inner_radius_m: x[1],
+            outer_radius_m: x[2],
         },
         _ => Part::PointMass {
-            mass_kg,
-            radius_m: length("radius")?,
+            mass_kg: x[0],
+            radius_m: x[1],
         },
-    };
-    section.finish()?;
-    part.inertia_kg_m2()
-        .map_err(|error| section.fail("", error))?;
-    Ok(NamedPart { name, part })
+    }
 }
 
 fn friction(section: &Section) -> Result<Friction, Failure> {

@@ -6,7 +6,7 @@ mod section;
 
 use torqcomp_dsp::bridge::{BridgeLayout, Leads, Supply};
 use torqcomp_dsp::recorder::Recorder;
-use torqcomp_model::{Estimate, ParameterStd, Part, SecondOrder};
+use torqcomp_model::{Estimate, ParameterStd, SecondOrder};
 
 pub use chain::{Applied, Chain, applied_by_unit};
 pub use file::read;
@@ -84,18 +84,14 @@ pub struct StaticGain {
 /// The beam and where the gage sits on it.
 #[derive(Debug, Clone)]
 pub struct BeamDrawing {
-    /// The beam as a slender one, of one section, in a rigid clamp.
-    pub slender: torqcomp_model::Beam,
+    /// Angular stiffness as a slender beam, of one section, in a rigid clamp.
+    pub slender_stiffness: Estimate,
     /// The beam with all that the drawing gives: shear, clamp, threads.
     pub full: torqcomp_model::Beam,
     /// Radius at which the beam meets the stator.
     pub radius: Estimate,
     /// Distance of the gage from the clamp.
     pub gage_position: Option<Estimate>,
-    /// Elastic modulus.
-    pub elastic_modulus: Estimate,
-    /// Relative standard uncertainty of the stiffness, from those of the drawing.
-    pub relative_std: Option<f64>,
 }
 
 /// A part with its name.
@@ -103,8 +99,8 @@ pub struct BeamDrawing {
 pub struct NamedPart {
     /// What it is.
     pub name: String,
-    /// Its shape and mass.
-    pub part: Part,
+    /// Its mass moment of inertia about the shaft.
+    pub inertia: Estimate,
 }
 
 /// A friction force that rises with speed, at a radius.
