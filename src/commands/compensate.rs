@@ -313,6 +313,7 @@ enum Times<'a> {
 impl Rows<'_> {
     /// Appends the rows of `torque`, beside `recorded` if that is not empty.
     fn write(&self, out: &mut Vec<u8>, torque: &[f64], recorded: &[f64]) {
+        let mut text = [0; digits::ROOM];
         for (i, value) in torque.iter().enumerate() {
             match &self.times {
                 Times::Copied { text, spans } => {
@@ -321,22 +322,19 @@ impl Rows<'_> {
                 Times::Stamps { times, seconds } => {
                     digits::write(out, times[i] * seconds, digits::DEFAULT_DIGITS);
                 }
-                Times::Grid {
-                    start_s,
-                    first,
-                    rate_hz,
-                } => {
-                    let time_s = start_s + (first + i) as f64 / rate_hz;
-                    digits::write(out, time_s, digits::DEFAULT_DIGITS);
+                Times::Grid { .. } => {
+                    digits::write(out, self.time_s(i), digits::DEFAULT_DIGITS);
                 }
             }
             out.push(b',');
-            digits::write(out, value * self.scale, self.digits);
+            let mut length = digits::put(&mut text, value * self.scale, self.digits);
             if let Some(value) = recorded.get(i) {
-                out.push(b',');
-                digits::write(out, value * self.scale, self.digits);
+                text[length] = b',';
+                out.extend_from_slice(&text[..=length]);
+                length = digits::put(&mut text, value * self.scale, self.digits);
             }
-            out.push(b'\n');
+            text[length] = b'\n';
+            out.extend_from_slice(&text[..=length]);
         }
     }
 

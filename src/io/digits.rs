@@ -32,47 +32,63 @@ const SCALE_START: i32 = -21;
 const LARGEST_PLAIN: i32 = 15;
 const SMALLEST_PLAIN: i32 = -5;
 
+/// Room that one number may need: 17 digits, sign, point, leading zeros or exponent, and the slack
+/// that copies of a fixed length run over.
+pub const ROOM: usize = 48;
+
 /// Appends a finite number.
 ///
 /// With [`Digits::Significant`] the last digit is rounded to within 0.51 of a unit: one product of
 /// two correctly rounded factors stands between the value and its digits.
 #[inline]
 pub fn write(out: &mut Vec<u8>, value: f64, digits: Digits) {
+    let mut text = [0; ROOM];
+    let length = put(&mut text, value, digits);
+    out.extend_from_slice(&text[..length]);
+}
+
+/// Puts a finite number at the start of `text` and tells its length; what stands after it is left
+/// over.
+#[inline]
+pub fn put(text: &mut [u8; ROOM], value: f64, digits: Digits) -> usize {
     match digits {
-        Digits::Significant(count) => write_significant(out, value, count),
-        Digits::Shortest => out.extend_from_slice(zmij::Buffer::new().format(value).as_bytes()),
+        Digits::Significant(count) => put_significant(text, value, count),
+        Digits::Shortest => put_text(text, zmij::Buffer::new().format(value)),
     }
 }
 
-#[inline]
-fn write_significant(out: &mut Vec<u8>, value: f64, count: u32) {
-    if value == 0.0 {
-        out.push(b'0');
-        return;
-    }
-    let magnitude = value.abs();
-    let Some((mantissa, exponent)) = decompose(magnitude, count as i32) else {
-        return write_rare(out, value, count);
-    };
-    // The text is put together in a fixed buffer: sign, zeros or digits, point, digits.
-    let mut text = [b'0'; 48];
-    let mut length = 0;
-    if value < 0.0 {
-        text[0] = b'-';
-        length = 1;
-    }
-    let mut digits = [b'0'; 16];
-    sixteen_digits(mantissa, &mut digits);
-    let digits = &digits[16 - count as usize..];
-    let significant = count as usize - trailing_zeros(digits);
-    let digits = &digits[..significant];
-    if (SMALLEST_PLAIN..LARGEST_PLAIN).contains(&exponent) {
-        length = place_plain(&mut text, length, digits, exponent);
-    } else {
-        length = place_scientific(&mut text, length, digits, exponent);
-    }
-    out.extend_from_slice(&text[..length]);
+fn put_text(text: &mut [u8; ROOM], number: &str) -> usize {
+    text[..number.len()].copy_from_slice(number.as_bytes());
+    number.len()
 }
+
+#[inline]
+fn put_significant(text: &mut [u8; ROOM], value: f64, count: u32) -> usize {
+    if value == 0.0 {
+        text[0] = b'0';
+        return 1;
+    }
+    let Some((mantissa, exponent)) = decompose(value.abs(), count as i32) else {
+        return put_text(text, &rare(value, count));
+    };
+    // A sign is overwritten where there is none.
+    text[0] = b'-';
+    let start = usize::from(value < 0.0);
+    // Sixteen bytes of text in one number, the first digit in the lowest byte; zeros come in after
+    // the last.
+    let unused = 8 * (16 - count);
+    let digits = sixteen_digits(mantissa) >> unused | ASCII_ZEROS << (128 - unused);
+    let zeros_at_end = (digits ^ ASCII_ZEROS).leading_zeros() / 8;
+    let significant = 16 - zeros_at_end as usize;
+    if (SMALLEST_PLAIN..LARGEST_PLAIN).contains(&exponent) {
+        put_plain(text, start, digits, significant, exponent)
+    } else {
+        put_scientific(text, start, digits, significant, exponent)
+    }
+}
+
+/// Sixteen times the byte of the digit 0.
+const ASCII_ZEROS: u128 = 0x3030_3030_3030_3030_3030_3030_3030_3030;
 
 /// Integer of `count` digits and decimal exponent with `value ≈ d.ddd × 10^exponent`.
 #[inline]
@@ -100,13 +116,12 @@ fn scale(power: i32) -> f64 {
     SCALES[(power - SCALE_START) as usize]
 }
 
-/// Writes a number below 10^16 with leading zeros.
+/// Sixteen ASCII digits of a number below 10^16, the first in the lowest byte.
 #[inline]
-fn sixteen_digits(value: u64, out: &mut [u8; 16]) {
+fn sixteen_digits(value: u64) -> u128 {
     let high = eight_digits(value / 100_000_000);
     let low = eight_digits(value % 100_000_000);
-    out[..8].copy_from_slice(&high.to_le_bytes());
-    out[8..].copy_from_slice(&low.to_le_bytes());
+    u128::from(high) | u128::from(low) << 64
 }
 
 /// Eight ASCII digits of a number below 10^8, the first in the lowest byte: fours, pairs, digits,
@@ -122,53 +137,50 @@ fn eight_digits(value: u64) -> u64 {
     digits | 0x3030_3030_3030_3030
 }
 
+/// `0.00ddd`, `dd.ddd` or `dddd`. Bytes after the length told are left over.
 #[inline]
-fn trailing_zeros(digits: &[u8]) -> usize {
-    let zeros = digits.iter().rev().take_while(|d| **d == b'0').count();
-    zeros.min(digits.len() - 1)
-}
-
-#[inline]
-fn place_plain(text: &mut [u8; 48], start: usize, digits: &[u8], exponent: i32) -> usize {
+fn put_plain(
+    text: &mut [u8; ROOM],
+    start: usize,
+    digits: u128,
+    significant: usize,
+    exponent: i32,
+) -> usize {
     if exponent < 0 {
-        // "0." and zeros are there already but for the point.
         let first = start + 1 + exponent.unsigned_abs() as usize;
-        text[start + 1] = b'.';
-        text[first..first + digits.len()].copy_from_slice(digits);
-        return first + digits.len();
+        text[start..start + 8].copy_from_slice(b"0.000000");
+        text[first..first + 16].copy_from_slice(&digits.to_le_bytes());
+        return first + significant;
     }
     let whole = exponent as usize + 1;
-    if digits.len() <= whole {
-        text[start..start + digits.len()].copy_from_slice(digits);
+    if significant <= whole {
+        text[start..start + 16].copy_from_slice(&digits.to_le_bytes());
         return start + whole;
     }
-    text[start..start + whole].copy_from_slice(&digits[..whole]);
-    text[start + whole] = b'.';
-    let end = start + digits.len() + 1;
-    text[start + whole + 1..end].copy_from_slice(&digits[whole..]);
-    end
+    // At most 15 digits and the point: 16 bytes.
+    let before = digits & ((1 << (8 * whole)) - 1);
+    let after = digits >> (8 * whole) << (8 * whole + 8);
+    let with_point = before | u128::from(b'.') << (8 * whole) | after;
+    text[start..start + 16].copy_from_slice(&with_point.to_le_bytes());
+    start + significant + 1
 }
 
-fn place_scientific(text: &mut [u8; 48], start: usize, digits: &[u8], exponent: i32) -> usize {
-    let mut end = place_plain(text, start, digits, 0);
-    text[end] = b'e';
-    end += 1;
-    if exponent < 0 {
-        text[end] = b'-';
-        end += 1;
-    }
-    let magnitude = exponent.unsigned_abs() as u8;
-    if magnitude >= 10 {
-        text[end] = b'0' + magnitude / 10;
-        end += 1;
-    }
-    text[end] = b'0' + magnitude % 10;
-    end + 1
+fn put_scientific(
+    text: &mut [u8; ROOM],
+    start: usize,
+    digits: u128,
+    significant: usize,
+    exponent: i32,
+) -> usize {
+    let end = put_plain(text, start, digits, significant, 0);
+    let exponent = format!("e{exponent}");
+    text[end..end + exponent.len()].copy_from_slice(exponent.as_bytes());
+    end + exponent.len()
 }
 
 /// Numbers far outside a recorder's range.
 #[cold]
-fn write_rare(out: &mut Vec<u8>, value: f64, count: u32) {
+fn rare(value: f64, count: u32) -> String {
     let text = format!("{value:.*e}", count as usize - 1);
     let (digits, exponent) = text.split_once('e').unwrap_or((&text, "0"));
     let digits = if digits.contains('.') {
@@ -176,9 +188,7 @@ fn write_rare(out: &mut Vec<u8>, value: f64, count: u32) {
     } else {
         digits
     };
-    out.extend_from_slice(digits.as_bytes());
-    out.push(b'e');
-    out.extend_from_slice(exponent.as_bytes());
+    format!("{digits}e{exponent}")
 }
 
 /// Text of a finite number with that many significant digits.

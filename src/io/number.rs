@@ -57,17 +57,28 @@ pub fn read(text: &[u8], at: usize, decimal: u8) -> Option<(f64, usize)> {
 }
 
 /// Reads the digits at `text[at..]` onto `mantissa` (wrapping: the caller counts the digits).
+///
+/// Eight bytes are looked at together, so that the time does not depend on where the digits end.
 #[inline]
 fn digits(text: &[u8], mut at: usize, mut mantissa: u64) -> (u64, usize) {
     while let Some(eight) = text.get(at..at + 8) {
-        let chunk = u64::from_le_bytes(eight.try_into().expect("eight bytes"));
-        if !all_digits(chunk) {
-            break;
+        // ASCII digits become 0 to 9; adding 0x76 sets the high bit of anything larger. A carry only
+        // reaches bytes after the first that is no digit.
+        let chunk = u64::from_le_bytes(eight.try_into().expect("eight bytes")) ^ ASCII_ZEROS;
+        let no_digit = (chunk.wrapping_add(0x7676_7676_7676_7676) | chunk) & 0x8080_8080_8080_8080;
+        let count = no_digit.trailing_zeros() as usize / 8;
+        if count == 0 {
+            return (mantissa, at);
         }
+        // The bytes after the digits go out at the top, zeros come in before them.
+        let value = eight_digits(chunk << (64 - 8 * count));
         mantissa = mantissa
-            .wrapping_mul(100_000_000)
-            .wrapping_add(eight_digits(chunk));
-        at += 8;
+            .wrapping_mul(WHOLE_POWERS[count])
+            .wrapping_add(value);
+        at += count;
+        if count < 8 {
+            return (mantissa, at);
+        }
     }
     while let Some(digit) = text.get(at).map(|byte| byte.wrapping_sub(b'0'))
         && digit < 10
@@ -78,18 +89,24 @@ fn digits(text: &[u8], mut at: usize, mut mantissa: u64) -> (u64, usize) {
     (mantissa, at)
 }
 
-/// Whether all eight bytes are ASCII digits: high nibble 3, and still 3 after adding 6.
-#[inline]
-fn all_digits(chunk: u64) -> bool {
-    const HIGH: u64 = 0xF0F0_F0F0_F0F0_F0F0;
-    const THREES: u64 = 0x3030_3030_3030_3030;
-    (chunk & HIGH) == THREES && (chunk.wrapping_add(0x0606_0606_0606_0606) & HIGH) == THREES
-}
+/// Eight times the byte of the digit 0.
+const ASCII_ZEROS: u64 = 0x3030_3030_3030_3030;
+/// Powers of ten up to that of eight digits.
+const WHOLE_POWERS: [u64; 9] = [
+    1,
+    10,
+    100,
+    1000,
+    10_000,
+    100_000,
+    1_000_000,
+    10_000_000,
+    100_000_000,
+];
 
-/// Value of eight ASCII digits, the first in the lowest byte: pairs, then fours, then eight.
+/// Value of eight digits of a byte each, the first in the lowest: pairs, then fours, then eight.
 #[inline]
 fn eight_digits(chunk: u64) -> u64 {
-    let chunk = chunk & 0x0F0F_0F0F_0F0F_0F0F;
     let pairs = (chunk.wrapping_mul(10).wrapping_add(chunk >> 8)) & 0x00FF_00FF_00FF_00FF;
     let fours = (pairs.wrapping_mul(100).wrapping_add(pairs >> 16)) & 0x0000_FFFF_0000_FFFF;
     fours.wrapping_mul(10_000).wrapping_add(fours >> 32) & 0xFFFF_FFFF
