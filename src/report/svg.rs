@@ -129,7 +129,8 @@ impl Traces {
             .iter()
             .map(|bin| bin.recorded.join(bin.compensated))
             .fold(first.recorded, Span::join);
-        let value = Axis::around(values.0, values.1);
+        let room = 0.04 * (values.1 - values.0);
+        let value = Axis::around(values.0 - room, values.1 + room);
         frame(&mut svg, &time, &value, unit);
         for (class, span) in [
             ("recorded", (|b: &Bin| b.recorded) as fn(&Bin) -> Span),
