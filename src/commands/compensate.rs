@@ -16,7 +16,7 @@ use crate::failure::Failure;
 use crate::io::csv::{Place, Summary, Table, TimeAxis, TimeSource};
 use crate::io::digits;
 use crate::io::output::Output;
-use crate::report::compensate::{Gain, Noise, RecordNoise, Report, Resampled, SCHEMA};
+use crate::report::compensate::{Gain, Noise, RecordNoise, Report, SCHEMA};
 use crate::report::svg::Traces;
 use crate::report::{self, Warning};
 use crate::stand::{self, Chain, Stand};
@@ -200,15 +200,7 @@ fn rate_from(time: &TimeAxis) -> String {
 fn complete(report: &mut Report, run: &Run) {
     report.samples = run.samples;
     report.start_s = run.start_s;
-    report.resampled = run.resampled.as_ref().map(|r| Resampled {
-        samples_in: r.samples_in,
-        samples_out: r.samples_out,
-        repeated: r.repeated,
-        gaps: r.gaps,
-        bridged: r.bridged,
-        longest_step_s: r.longest_step_s,
-        largest_jitter: r.largest_jitter,
-    });
+    report.resampled.clone_from(&run.resampled);
     report.noise.record = run.noise.as_ref().map(|noise| RecordNoise {
         floor_per_root_hz: noise.floor_density.sqrt(),
         floor_band_hz: [noise.floor_from_hz, noise.floor_to_hz],

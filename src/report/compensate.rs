@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use serde::Serialize;
+use torqcomp_dsp::resample::Resampled;
 
 use super::{Warning, rounded, short};
 
@@ -54,25 +55,6 @@ pub struct Report {
     pub noise: Noise,
     /// What should be known.
     pub warnings: Vec<Warning>,
-}
-
-/// What was interpolated.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Resampled {
-    /// Samples read.
-    pub samples_in: usize,
-    /// Samples on the grid.
-    pub samples_out: usize,
-    /// Samples left out because their stamp repeats the one before.
-    pub repeated: usize,
-    /// Gaps bridged by a straight line.
-    pub gaps: usize,
-    /// Grid samples within gaps.
-    pub bridged: usize,
-    /// Longest step between stamps.
-    pub longest_step_s: f64,
-    /// Largest deviation of a step, gaps aside, as a fraction of the uniform step.
-    pub largest_jitter: f64,
 }
 
 /// What a compensation does to noise.
@@ -144,7 +126,7 @@ impl Report {
             ),
         );
         if let Some(resampled) = &self.resampled {
-            line("resampled", resampled.text());
+            line("resampled", resampled_text(resampled));
         }
         line(
             "band",
@@ -163,20 +145,18 @@ impl Report {
     }
 }
 
-impl Resampled {
-    fn text(&self) -> String {
-        format!(
-            "{} samples interpolated to {}; {} gap(s) bridged by straight lines ({} samples, \
-             longest step {} s), {} repeated stamp(s) left out, steps off by up to {} %",
-            self.samples_in,
-            self.samples_out,
-            self.gaps,
-            self.bridged,
-            rounded(self.longest_step_s, 4),
-            self.repeated,
-            rounded(100.0 * self.largest_jitter, 3)
-        )
-    }
+fn resampled_text(resampled: &Resampled) -> String {
+    format!(
+        "{} samples interpolated to {}; {} gap(s) bridged by straight lines ({} samples, longest \
+         step {} s), {} repeated stamp(s) left out, steps off by up to {} %",
+        resampled.samples_in,
+        resampled.samples_out,
+        resampled.gaps,
+        resampled.bridged,
+        rounded(resampled.longest_step_s, 4),
+        resampled.repeated,
+        rounded(100.0 * resampled.largest_jitter, 3)
+    )
 }
 
 impl Noise {

@@ -1,7 +1,9 @@
 //! The stand as the stand file describes it.
 
 mod chain;
+mod drawing;
 mod file;
+mod measuring;
 mod section;
 
 use torqcomp_dsp::bridge::{BridgeLayout, Leads, Supply};

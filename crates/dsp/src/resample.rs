@@ -2,6 +2,8 @@
 
 use std::collections::VecDeque;
 
+use serde::Serialize;
+
 use crate::Error;
 
 /// Points that a value is interpolated from where the stamps are close enough.
@@ -12,7 +14,7 @@ const LONGEST_STEP: f64 = 1.5;
 const COINCIDENT: f64 = 1e-6;
 
 /// What a resampling did.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Resampled {
     /// Samples taken in.
     pub samples_in: usize,
