@@ -256,7 +256,7 @@ mod tests {
                 .enumerate()
                 .all(|(k, x)| (x - 2.0 * k as f64).abs() < 1e-12)
         );
-        assert_eq!((done.gaps, done.repeated, done.bridged), (1, 1, 4));
+        assert_eq!((done.gaps, done.repeated, done.bridged), (1, 1, 3));
         assert_eq!((done.samples_in, done.samples_out), (8, 10));
         assert_eq!(done.longest_step_s, 4.0);
     }
