@@ -43,6 +43,8 @@ struct State<J, E> {
     read_all: bool,
     joined_all: bool,
     error: Option<E>,
+    /// A stage has panicked: nobody is to wait for its job.
+    panicked: bool,
 }
 
 enum Task<J> {
@@ -88,6 +90,7 @@ where
         read_all: false,
         joined_all: false,
         error: None,
+        panicked: false,
     });
     let changed = Condvar::new();
     let read = Mutex::new(stages.read);
@@ -96,6 +99,7 @@ where
     let (prepare, work) = (&stages.prepare, &stages.work);
 
     let worker = |mut own: S| {
+        let _release = ReleaseOthers(&state, &changed);
         loop {
             let task = {
                 let mut guard = lock(&state);
@@ -188,6 +192,18 @@ where
     }
 }
 
+/// Lets the other threads leave when the thread that holds it panics.
+struct ReleaseOthers<'a, J, E>(&'a Mutex<State<J, E>>, &'a Condvar);
+
+impl<J, E> Drop for ReleaseOthers<'_, J, E> {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            lock(self.0).panicked = true;
+            self.1.notify_all();
+        }
+    }
+}
+
 /// A panicking stage is passed on by the scope; the lock itself is not at fault.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex
@@ -198,7 +214,10 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 impl<J: Default, E> State<J, E> {
     /// The task nearest to the end of the line; `None` if there is nothing to do right now.
     fn take(&mut self) -> Option<Task<J>> {
-        if self.error.is_some() || (self.joined_all && self.next_deliver == self.next_ready) {
+        if self.panicked
+            || self.error.is_some()
+            || (self.joined_all && self.next_deliver == self.next_ready)
+        {
             return Some(Task::Leave);
         }
         let task = self.pick()?;
@@ -314,6 +333,33 @@ mod tests {
     #[test]
     fn nothing_to_read_is_fine() {
         assert_eq!(squares(0, 2, 1, None), (vec![], None));
+    }
+
+    #[test]
+    fn a_panic_does_not_leave_the_others_waiting() {
+        for threads in [1, 3] {
+            let result = std::panic::catch_unwind(|| {
+                let mut count = 0;
+                run::<Job, (), (), _, _, _, _, _>(
+                    3,
+                    vec![(); threads],
+                    Stages {
+                        read: |_: &mut Job| {
+                            count += 1;
+                            Ok(count < 100)
+                        },
+                        prepare: |_: &mut Job| {},
+                        join: |job: Option<Job>, ready: &mut dyn FnMut(Job)| {
+                            job.into_iter().for_each(ready);
+                            Ok(())
+                        },
+                        work: |_: &mut (), _: &mut Job| panic!("a fault in a stage"),
+                        deliver: |_: &mut Job| Ok(()),
+                    },
+                )
+            });
+            assert!(result.is_err());
+        }
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Text tables as recorders write them.
 
 mod chunks;
+mod columns;
 mod layout;
 mod names;
 mod record;
@@ -13,7 +14,7 @@ use std::path::PathBuf;
 
 use torqcomp_model::Dimension;
 
-use crate::failure::{Failure, did_you_mean};
+use crate::failure::Failure;
 
 pub use layout::{Delimiter, Dialect, Layout, Told};
 pub use names::{Column, NamedUnit};
@@ -144,11 +145,11 @@ impl Table {
 
     fn read(name: &str, input: &mut dyn Read, options: &Options) -> Result<Parts, Failure> {
         let (head, layout) = find_layout(name, input, &options.told)?;
-        let time_place = time_column(&layout.columns, options)?;
+        let time_place = columns::time_column(&layout.columns, options)?;
         if time_place.is_none() && options.rate_hz.is_none() {
             return Err(Failure::failed(time::missing(&layout)));
         }
-        let value_place = channel(&layout.columns, time_place, options)?;
+        let value_place = columns::channel(&layout.columns, time_place, options)?;
         let mut channel = layout.columns[value_place].clone();
         if let Some(text) = &options.unit {
             let unit = torqcomp_model::Unit::parse(text)
@@ -302,112 +303,6 @@ fn refuse_other_formats(head: &[u8]) -> Result<(), Failure> {
             "the file is binary; expected a text table (CSV, TSV or a recorder's export)",
         )),
         None => Ok(()),
-    }
-}
-
-/// Place of a column by its heading, its name without the unit, or its number from 1.
-fn find_column(columns: &[Column], wanted: &str, flag: &str) -> Result<usize, Failure> {
-    let matching = |is: &dyn Fn(&Column) -> bool| -> Vec<usize> {
-        (0..columns.len()).filter(|i| is(&columns[*i])).collect()
-    };
-    let ways: [Vec<usize>; 3] = [
-        matching(&|c| c.heading == wanted),
-        matching(&|c| c.is_called(wanted)),
-        matching(&|c| {
-            c.heading.eq_ignore_ascii_case(wanted) || c.name.eq_ignore_ascii_case(wanted)
-        }),
-    ];
-    match ways
-        .iter()
-        .find(|found| !found.is_empty())
-        .map(Vec::as_slice)
-    {
-        Some([place]) => return Ok(*place),
-        Some(places) => {
-            return Err(Failure::failed(format_args!(
-                "{} columns are called \"{wanted}\"; give the number of the one you mean, {flag} {}",
-                places.len(),
-                list(places.iter().map(|p| (p + 1).to_string()))
-            )));
-        }
-        None => {}
-    }
-    if let Ok(number) = wanted.parse::<usize>()
-        && (1..=columns.len()).contains(&number)
-    {
-        return Ok(number - 1);
-    }
-    let headings = columns.iter().map(|c| c.heading.as_str());
-    Err(Failure::failed(format_args!(
-        "there is no column \"{wanted}\"{}. The columns are {}",
-        did_you_mean(wanted, headings.clone()),
-        list(headings.map(|h| format!("\"{h}\"")))
-    )))
-}
-
-/// `a, b or c`.
-fn list(items: impl IntoIterator<Item = String>) -> String {
-    let items: Vec<String> = items.into_iter().collect();
-    match items.as_slice() {
-        [] => "none".to_owned(),
-        [one] => one.clone(),
-        [first @ .., last] => format!("{} or {last}", first.join(", ")),
-    }
-}
-
-/// Place of the time column, if there is one.
-fn time_column(columns: &[Column], options: &Options) -> Result<Option<usize>, Failure> {
-    if let Some(wanted) = &options.time_column {
-        return find_column(columns, wanted, "--time-column").map(Some);
-    }
-    let candidates: Vec<usize> = (0..columns.len())
-        .filter(|i| columns[*i].is_time())
-        .collect();
-    let named: Vec<usize> = candidates
-        .iter()
-        .copied()
-        .filter(|i| columns[*i].is_named_time())
-        .collect();
-    match (named.as_slice(), candidates.as_slice()) {
-        ([one], _) | ([], [one]) => Ok(Some(*one)),
-        (_, []) => Ok(None),
-        (_, several) if options.rate_hz.is_some() && !options.resample => {
-            Ok(several.first().copied())
-        }
-        (_, several) => Err(Failure::failed(format_args!(
-            "{} columns could be the time axis; choose one with --time-column {}",
-            several.len(),
-            list(
-                several
-                    .iter()
-                    .map(|i| format!("\"{}\"", columns[*i].heading))
-            )
-        ))),
-    }
-}
-
-/// Place of the channel: the one that is asked for, or the only one.
-fn channel(columns: &[Column], time: Option<usize>, options: &Options) -> Result<usize, Failure> {
-    if let Some(wanted) = &options.channel {
-        return find_column(columns, wanted, "--channel");
-    }
-    let signals: Vec<usize> = (0..columns.len())
-        .filter(|i| Some(*i) != time && !columns[*i].is_time())
-        .collect();
-    match signals.as_slice() {
-        [one] => Ok(*one),
-        [] => Err(Failure::failed(
-            "there is no column besides the time; expected one with the signal",
-        )),
-        several => Err(Failure::failed(format_args!(
-            "{} columns could be the signal; choose one with --channel {}",
-            several.len(),
-            list(
-                several
-                    .iter()
-                    .map(|i| format!("\"{}\"", columns[*i].heading))
-            )
-        ))),
     }
 }
 
