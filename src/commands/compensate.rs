@@ -16,6 +16,7 @@ use crate::failure::Failure;
 use crate::io::csv::{Place, Summary, Table, TimeAxis, TimeSource};
 use crate::io::digits;
 use crate::io::output::Output;
+use crate::io::text::Text;
 use crate::report::compensate::{Gain, Noise, RecordNoise, Report, SCHEMA};
 use crate::report::svg::Traces;
 use crate::report::{self, Warning};
@@ -304,29 +305,25 @@ enum Times<'a> {
 
 impl Rows<'_> {
     /// Appends the rows of `torque`, beside `recorded` if that is not empty.
-    fn write(&self, out: &mut Vec<u8>, torque: &[f64], recorded: &[f64]) {
-        let mut text = [0; digits::ROOM];
+    fn write(&self, out: &mut Text, torque: &[f64], recorded: &[f64]) {
         for (i, value) in torque.iter().enumerate() {
             match &self.times {
                 Times::Copied { text, spans } => {
-                    out.extend_from_slice(crate::io::csv::spanned(text, spans[i]));
+                    let (offset, length) = crate::io::csv::place_of(spans[i]);
+                    out.copy(text, offset, length);
                 }
                 Times::Stamps { times, seconds } => {
-                    digits::write(out, times[i] * seconds, digits::DEFAULT_DIGITS);
+                    out.number(times[i] * seconds, digits::DEFAULT_DIGITS);
                 }
-                Times::Grid { .. } => {
-                    digits::write(out, self.time_s(i), digits::DEFAULT_DIGITS);
-                }
+                Times::Grid { .. } => out.number(self.time_s(i), digits::DEFAULT_DIGITS),
             }
-            out.push(b',');
-            let mut length = digits::put(&mut text, value * self.scale, self.digits);
+            out.byte(b',');
+            out.number(value * self.scale, self.digits);
             if let Some(value) = recorded.get(i) {
-                text[length] = b',';
-                out.extend_from_slice(&text[..=length]);
-                length = digits::put(&mut text, value * self.scale, self.digits);
+                out.byte(b',');
+                out.number(value * self.scale, self.digits);
             }
-            text[length] = b'\n';
-            out.extend_from_slice(&text[..=length]);
+            out.byte(b'\n');
         }
     }
 
@@ -334,8 +331,8 @@ impl Rows<'_> {
     fn time_s(&self, i: usize) -> f64 {
         match &self.times {
             Times::Copied { text, spans } => {
-                let text = crate::io::csv::spanned(text, spans[i]);
-                crate::io::number::read(text, 0, b'.').map_or(f64::NAN, |(value, _)| value)
+                let (offset, _) = crate::io::csv::place_of(spans[i]);
+                crate::io::number::read(text, offset, b'.').map_or(f64::NAN, |(value, _)| value)
             }
             Times::Stamps { times, seconds } => times[i] * seconds,
             Times::Grid {

@@ -74,10 +74,8 @@ fn put_significant(text: &mut [u8; ROOM], value: f64, count: u32) -> usize {
     // A sign is overwritten where there is none.
     text[0] = b'-';
     let start = usize::from(value < 0.0);
-    // Sixteen bytes of text in one number, the first digit in the lowest byte; zeros come in after
-    // the last.
-    let unused = 8 * (16 - count);
-    let digits = sixteen_digits(mantissa) >> unused | ASCII_ZEROS << (128 - unused);
+    // Sixteen bytes of text in one number, the first digit in the lowest byte, zeros after the last.
+    let digits = sixteen_digits(mantissa * WHOLE_POWERS[16 - count as usize]);
     let zeros_at_end = (digits ^ ASCII_ZEROS).leading_zeros() / 8;
     let significant = 16 - zeros_at_end as usize;
     if (SMALLEST_PLAIN..LARGEST_PLAIN).contains(&exponent) {
@@ -87,6 +85,16 @@ fn put_significant(text: &mut [u8; ROOM], value: f64, count: u32) -> usize {
     }
 }
 
+/// Powers of ten that fill up a number to sixteen digits.
+const WHOLE_POWERS: [u64; 16] = {
+    let mut powers = [1; 16];
+    let mut i = 1;
+    while i < 16 {
+        powers[i] = 10 * powers[i - 1];
+        i += 1;
+    }
+    powers
+};
 /// Sixteen times the byte of the digit 0.
 const ASCII_ZEROS: u128 = 0x3030_3030_3030_3030_3030_3030_3030_3030;
 
@@ -153,15 +161,13 @@ fn put_plain(
         return first + significant;
     }
     let whole = exponent as usize + 1;
+    text[start..start + 16].copy_from_slice(&digits.to_le_bytes());
     if significant <= whole {
-        text[start..start + 16].copy_from_slice(&digits.to_le_bytes());
         return start + whole;
     }
-    // At most 15 digits and the point: 16 bytes.
-    let before = digits & ((1 << (8 * whole)) - 1);
-    let after = digits >> (8 * whole) << (8 * whole + 8);
-    let with_point = before | u128::from(b'.') << (8 * whole) | after;
-    text[start..start + 16].copy_from_slice(&with_point.to_le_bytes());
+    let after = digits >> (8 * whole);
+    text[start + whole] = b'.';
+    text[start + whole + 1..start + whole + 17].copy_from_slice(&after.to_le_bytes());
     start + significant + 1
 }
 

@@ -4,3 +4,4 @@ pub mod csv;
 pub mod digits;
 pub mod number;
 pub mod output;
+pub mod text;

@@ -15,7 +15,7 @@ const EXACT_MANTISSA: u64 = 1 << 53;
 /// Reads a number at `text[at..]`: its value and the position after it.
 ///
 /// `None` if no finite number begins there. `text` may go on with anything after it.
-#[inline]
+#[inline(always)]
 pub fn read(text: &[u8], at: usize, decimal: u8) -> Option<(f64, usize)> {
     let mut place = at;
     let negative = text.get(place) == Some(&b'-');
@@ -59,7 +59,7 @@ pub fn read(text: &[u8], at: usize, decimal: u8) -> Option<(f64, usize)> {
 /// Reads the digits at `text[at..]` onto `mantissa` (wrapping: the caller counts the digits).
 ///
 /// Eight bytes are looked at together, so that the time does not depend on where the digits end.
-#[inline]
+#[inline(always)]
 fn digits(text: &[u8], mut at: usize, mut mantissa: u64) -> (u64, usize) {
     while let Some(eight) = text.get(at..at + 8) {
         // ASCII digits become 0 to 9; adding 0x76 sets the high bit of anything larger. A carry only

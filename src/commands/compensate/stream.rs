@@ -14,6 +14,7 @@ use crate::commands::unconverted;
 use crate::failure::Failure;
 use crate::io::csv::{Batch, TimeAxis, TimeSource};
 use crate::io::output::Output;
+use crate::io::text::Text;
 use crate::pipeline::{self, Stages};
 use crate::report::svg::Traces;
 
@@ -32,7 +33,7 @@ struct Job {
     first: usize,
     window: Vec<f64>,
     torque: Vec<f64>,
-    text: Vec<u8>,
+    text: Text,
     power: Option<PowerSum>,
 }
 
@@ -102,7 +103,7 @@ pub fn run(args: &Compensate, plan: Plan, output: &mut Output) -> Result<Run, Fa
             },
             work: |convolver: &mut BlockConvolver, job: &mut Job| steps.work(convolver, job),
             deliver: |job: &mut Job| {
-                output.write(&job.text)?;
+                output.write(job.text.as_bytes())?;
                 if let Some(part) = &job.power {
                     power.add(part);
                 }

@@ -9,6 +9,7 @@ use crate::cli::Compensate;
 use crate::failure::Failure;
 use crate::io::csv::Record;
 use crate::io::output::Output;
+use crate::io::text::Text;
 use crate::report::svg::Traces;
 
 /// Rows that are written at once.
@@ -29,7 +30,7 @@ pub fn run(args: &Compensate, plan: Plan, output: &mut Output) -> Result<Run, Fa
     let torque = whole_record(&filter, &record.samples)?;
     let scale = 1.0 / chain.applied.factor;
     let mut traces = args.plot.as_ref().map(|_| Traces::new(args.plot_range));
-    let mut text = Vec::new();
+    let mut text = Text::default();
     for (part, first) in torque.chunks(ROWS_AT_ONCE).zip((0..).step_by(ROWS_AT_ONCE)) {
         let recorded = &record.samples[first..first + part.len()];
         let rows = Rows {
@@ -47,7 +48,7 @@ pub fn run(args: &Compensate, plan: Plan, output: &mut Output) -> Result<Run, Fa
             part,
             if args.with_recorded { recorded } else { &[] },
         );
-        output.write(&text)?;
+        output.write(text.as_bytes())?;
         if let Some(traces) = &mut traces {
             for (i, (torque, recorded)) in part.iter().zip(recorded).enumerate() {
                 traces.add(rows.time_s(i), recorded * scale, torque * scale);

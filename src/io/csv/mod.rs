@@ -19,7 +19,7 @@ use crate::failure::Failure;
 pub use layout::{Delimiter, Dialect, Layout, Told};
 pub use names::{Column, NamedUnit};
 pub use record::Record;
-pub use scan::{RowPlan, Rows, spanned};
+pub use scan::{RowPlan, Rows, place_of};
 pub use stream::{Batch, Fetch, Sequence, Summary};
 pub use time::{TimeAxis, TimeSource};
 

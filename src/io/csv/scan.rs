@@ -147,12 +147,11 @@ fn span(offset: usize, length: usize) -> u64 {
     (offset as u64) << 32 | length as u64
 }
 
-/// Text of a span, as made by [`Rows::read`] from the same bytes.
+/// Offset and length of a span, as made by [`Rows::read`].
 #[inline]
 #[must_use]
-pub fn spanned(text: &[u8], span: u64) -> &[u8] {
-    let offset = (span >> 32) as usize;
-    &text[offset..offset + (span & 0xFFFF_FFFF) as usize]
+pub fn place_of(span: u64) -> (usize, usize) {
+    ((span >> 32) as usize, (span & 0xFFFF_FFFF) as usize)
 }
 
 /// Position after the line feed that ends the line at `at`.
@@ -170,7 +169,7 @@ struct QuickRow {
 
 impl RowPlan {
     /// A row of plain numbers; `None` if the careful way has to look at it.
-    #[inline]
+    #[inline(always)]
     fn quick_row(&self, text: &[u8], start: usize) -> Option<QuickRow> {
         let separator = match self.dialect.delimiter {
             Delimiter::Byte(byte) => byte,
@@ -178,42 +177,49 @@ impl RowPlan {
             Delimiter::None => b'\n',
             Delimiter::Spaces => return None,
         };
-        let last = self.time.map_or(self.value, |time| time.max(self.value));
-        let mut row = QuickRow {
-            time: 0.0,
-            time_text: 0,
-            value: 0.0,
-            end: 0,
+        let time = self.time.unwrap_or(self.value);
+        let a = self.number(text, start, time.min(self.value), separator)?;
+        let b = match time.abs_diff(self.value) {
+            0 => a,
+            cells if text.get(a.end) == Some(&separator) => {
+                self.number(text, a.end + 1, cells - 1, separator)?
+            }
+            _ => return None,
         };
-        let mut at = start;
-        for place in 0..=last {
-            if place > 0 {
-                if text.get(at) != Some(&separator) {
-                    return None;
-                }
-                at += 1;
-            }
-            let is_time = self.time == Some(place);
-            if !is_time && place != self.value {
-                at = skip_cell(text, at, separator)?;
-                continue;
-            }
-            while text.get(at) == Some(&b' ') {
-                at += 1;
-            }
-            let (number, end) = number::read(text, at, self.dialect.decimal)?;
-            if is_time {
-                row.time = number;
-                row.time_text = span(at, end - at);
-            }
-            if place == self.value {
-                row.value = number;
-            }
-            at = end;
-        }
-        row.end = end_of_row(text, at, separator)?;
-        Some(row)
+        let end = end_of_row(text, b.end, separator)?;
+        let (time, value) = if time < self.value { (a, b) } else { (b, a) };
+        Some(QuickRow {
+            time: time.value,
+            time_text: span(time.start, time.end - time.start),
+            value: value.value,
+            end,
+        })
     }
+
+    /// The number after so many cells that are not wanted.
+    #[inline(always)]
+    fn number(&self, text: &[u8], mut at: usize, skip: usize, separator: u8) -> Option<Number> {
+        for _ in 0..skip {
+            at = skip_cell(text, at, separator)? + 1;
+        }
+        while text.get(at) == Some(&b' ') {
+            at += 1;
+        }
+        let (value, end) = number::read(text, at, self.dialect.decimal)?;
+        Some(Number {
+            value,
+            start: at,
+            end,
+        })
+    }
+}
+
+/// A number and where it stands.
+#[derive(Clone, Copy)]
+struct Number {
+    value: f64,
+    start: usize,
+    end: usize,
 }
 
 /// Position of the separator after an unwanted cell, on the same line and outside quotes.
@@ -250,6 +256,11 @@ mod tests {
         rows
     }
 
+    fn spanned(text: &str, span: u64) -> &[u8] {
+        let (offset, length) = place_of(span);
+        &text.as_bytes()[offset..offset + length]
+    }
+
     fn plan(time: Option<usize>, value: usize) -> RowPlan {
         RowPlan {
             dialect: COMMA,
@@ -265,11 +276,7 @@ mod tests {
         assert_eq!(rows.values, [1.5, -2e-3, 3.0]);
         assert_eq!(rows.times, [0.0, 0.1, 0.2]);
         assert_eq!(rows.lines, 3);
-        let texts: Vec<&[u8]> = rows
-            .time_text
-            .iter()
-            .map(|s| spanned(text.as_bytes(), *s))
-            .collect();
+        let texts: Vec<&[u8]> = rows.time_text.iter().map(|s| spanned(text, *s)).collect();
         assert_eq!(texts, [b"0.0", b"0.1", b"0.2"]);
     }
 
@@ -287,7 +294,7 @@ mod tests {
         let rows = read(text, plan(Some(0), 1));
         assert_eq!(rows.values, [1.5, 2.5, 3.5]);
         assert_eq!(rows.lines, 6);
-        assert_eq!(spanned(text.as_bytes(), rows.time_text[1]), b"1");
+        assert_eq!(spanned(text, rows.time_text[1]), b"1");
     }
 
     #[test]

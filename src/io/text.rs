@@ -1,0 +1,109 @@
+//! Text that is put together from many short pieces.
+
+use super::digits::{self, Digits};
+
+/// Longest piece that is copied with a fixed length.
+const SHORT: usize = 32;
+/// Room that is kept free at the end.
+const ROOM: usize = digits::ROOM;
+
+/// A growing text. Pieces are copied with a fixed length, which is quicker than the right one; what
+/// that puts after their end is overwritten by the next piece.
+#[derive(Debug, Default)]
+pub struct Text {
+    bytes: Vec<u8>,
+    length: usize,
+}
+
+impl Text {
+    /// Empties the text, keeping its memory.
+    pub fn clear(&mut self) {
+        self.length = 0;
+    }
+
+    /// The text.
+    #[must_use]
+    pub fn as_bytes(&self) -> &[u8] {
+        &self.bytes[..self.length]
+    }
+
+    /// Appends a byte.
+    #[inline]
+    pub fn byte(&mut self, byte: u8) {
+        self.room()[0] = byte;
+        self.length += 1;
+    }
+
+    /// Appends a finite number.
+    #[inline]
+    pub fn number(&mut self, value: f64, digits: Digits) {
+        self.length += digits::put(self.room(), value, digits);
+    }
+
+    /// Appends `source[offset..offset + length]`.
+    ///
+    /// # Panics
+    /// If the source is shorter than that.
+    #[inline]
+    pub fn copy(&mut self, source: &[u8], offset: usize, length: usize) {
+        match source.get(offset..offset + SHORT) {
+            Some(piece) if length <= SHORT => self.room()[..SHORT].copy_from_slice(piece),
+            _ => self.copy_long(&source[offset..offset + length]),
+        }
+        self.length += length;
+    }
+
+    #[cold]
+    fn copy_long(&mut self, piece: &[u8]) {
+        let end = self.length + piece.len();
+        if self.bytes.len() < end {
+            self.bytes.resize(end, 0);
+        }
+        self.bytes[self.length..end].copy_from_slice(piece);
+    }
+
+    #[inline]
+    fn room(&mut self) -> &mut [u8; ROOM] {
+        if self.bytes.len() < self.length + ROOM {
+            self.grow();
+        }
+        (&mut self.bytes[self.length..self.length + ROOM])
+            .try_into()
+            .expect("a slice of that length")
+    }
+
+    #[cold]
+    fn grow(&mut self) {
+        let more = (self.bytes.len() / 2).max(4 * ROOM);
+        self.bytes.resize(self.length + more, 0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn pieces_stand_one_after_the_other(
+            pieces in prop::collection::vec((0_usize..200, 0_usize..60, any::<u8>(), -1e6..1e6_f64), 0..60),
+        ) {
+            let source: Vec<u8> = (0..260_u32).map(|i| b'a' + (i % 26) as u8).collect();
+            let (mut text, mut plain) = (Text::default(), Vec::new());
+            for round in 0..2 {
+                text.clear();
+                plain.clear();
+                for (offset, length, byte, value) in &pieces {
+                    text.copy(&source, *offset, *length);
+                    plain.extend_from_slice(&source[*offset..offset + length]);
+                    text.byte(*byte);
+                    plain.push(*byte);
+                    text.number(value * f64::from(round), Digits::Significant(9));
+                    digits::write(&mut plain, value * f64::from(round), Digits::Significant(9));
+                }
+                prop_assert_eq!(text.as_bytes(), plain.as_slice());
+            }
+        }
+    }
+}
