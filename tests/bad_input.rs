@@ -191,6 +191,85 @@ fn cells() {
 }
 
 #[test]
+fn bad_rows_near_the_start_are_errors_and_not_passed_over() {
+    let rows: Vec<String> = good().lines().map(str::to_owned).collect();
+    for line in [2, 3, 4, 21, 2001] {
+        for (cell, says) in [
+            ("0.0,abc", "abc"),
+            ("0.0", "too few cells"),
+            ("0.0,", "empty"),
+        ] {
+            let text: String = rows
+                .iter()
+                .enumerate()
+                .map(|(i, row)| format!("{}\n", if i + 1 == line { cell } else { row }))
+                .collect();
+            refused(text.as_bytes(), &[], 1, &[&format!("line {line}"), says]);
+        }
+    }
+}
+
+#[test]
+fn missing_samples_are_not_skipped_without_stamps() {
+    let rows = |odd: &str| -> Vec<u8> {
+        (0..100_000)
+            .map(|i| {
+                if i == 70_000 {
+                    format!("{odd}\n")
+                } else {
+                    format!("{i},0.5\n")
+                }
+            })
+            .collect::<String>()
+            .into_bytes()
+    };
+    let args = ["--rate", "1000", "--channel", "2", "--unit", "V"];
+    refused(&rows(","), &args, 1, &["line 70001", "empty"]);
+    refused(&rows(""), &args, 1, &["line 70001", "empty"]);
+    // A remark is no lost sample, nor is an empty line at the end.
+    let folder = Folder::new();
+    folder.write("in.csv", [rows("# pause"), b"\n\n".to_vec()].concat());
+    let ran = folder.run(
+        &[
+            &["compensate", "in.csv", "--stand", "stand.toml", "-q"][..],
+            &args,
+        ]
+        .concat(),
+    );
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert_eq!(ran.stdout.lines().count(), 100_000);
+}
+
+#[test]
+fn bytes_that_are_no_utf_8_do_no_harm() {
+    let mut text = b"note,time_s,bridge_V\n".to_vec();
+    for i in 0..3000 {
+        let note: &[u8] = if i % 7 == 3 { b"\"\xB0\xB0\xB0\"" } else { b"" };
+        text.extend_from_slice(note);
+        text.extend_from_slice(format!(",{:.3},{}\n", f64::from(i) * 1e-3, i % 2).as_bytes());
+    }
+    let folder = Folder::new();
+    folder.write("in.csv", text);
+    let ran = folder.run(&[
+        "compensate",
+        "in.csv",
+        "--stand",
+        "stand.toml",
+        "--channel",
+        "bridge",
+        "-q",
+    ]);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    let times = crate::util::column(&ran.stdout, "time_s");
+    assert!(
+        times
+            .iter()
+            .enumerate()
+            .all(|(i, t)| (t - 1e-3 * i as f64).abs() < 1e-9)
+    );
+}
+
+#[test]
 fn time() {
     let step = |from: usize, shift: f64| -> Vec<u8> {
         let mut text = "time_s,bridge_V\n".to_owned();
@@ -380,6 +459,26 @@ fn a_record_cut_in_its_last_line_is_used_up_to_there() {
         ran.says(3, &["truncated-last-line", "line 3001", "left out"]);
         assert_eq!(folder.read("out.csv").lines().count(), 3000);
     }
+    // The same where the time is the last column and the cut goes through it.
+    let swapped: String = (0..3000)
+        .map(|i| format!("0.5,{:.5}\n", f64::from(i) * 5e-5))
+        .collect();
+    folder.write(
+        "in.csv",
+        format!("bridge_V,time_s\n{}", &swapped[..swapped.len() - 4]),
+    );
+    let args = [
+        "compensate",
+        "in.csv",
+        "--stand",
+        "stand.toml",
+        "-o",
+        "out.csv",
+        "--force",
+    ];
+    folder
+        .run(&args)
+        .says(3, &["truncated-last-line", "line 3001"]);
     // A last line that is whole but for its line feed is a good line.
     folder.write("in.csv", whole.trim_end());
     let ran = folder.run(&[

@@ -193,6 +193,43 @@ fn other_units_columns_and_time_axes() {
 }
 
 #[test]
+fn texts_beside_the_numbers() {
+    same(
+        "status",
+        format!(
+            "time_s,bridge_V,status\n{}",
+            rows(|t, v| format!("{t:.4},{v:.9},OK\n"))
+        ),
+        &["--channel", "bridge"],
+    );
+    same(
+        "more headings than cells",
+        format!(
+            "time_s;bridge_V;Comment\n{}",
+            rows(|t, v| format!("{t:.4};{v:.9}\n"))
+        ),
+        &[],
+    );
+    same(
+        "BOM and no headings",
+        format!("\u{feff}{}", rows(|t, v| format!("{t:.4},{v:.9}\n"))),
+        &["--time-column", "1", "--time-unit", "s", "--unit", "V"],
+    );
+    same(
+        "quoted decimal commas",
+        format!(
+            "\"time_s\",\"bridge_V\"\n{}",
+            rows(|t, v| format!(
+                "\"{}\",\"{}\"\n",
+                comma(&format!("{t:.4}")),
+                comma(&format!("{v:.9}"))
+            ))
+        ),
+        &[],
+    );
+}
+
+#[test]
 fn a_comma_that_could_be_either_is_asked_for() {
     let folder = Folder::new();
     folder.write("in.csv", rows(|_, v| comma(&format!("{:.6}\n", v + 1.0))));

@@ -89,8 +89,8 @@ pub fn run(args: &Compensate, plan: Plan, output: &mut Output) -> Result<Run, Fa
                 job.unconverted = steps.convert(&mut job.batch.rows.values);
             },
             join: |job: Option<Job>, ready: &mut dyn FnMut(Job)| match job {
-                Some(job) => {
-                    sequence.accept(&job.batch)?;
+                Some(mut job) => {
+                    sequence.accept(&mut job.batch)?;
                     if let Some((row, message)) = &job.unconverted {
                         return Err(sequence.failure_at_row(&job.batch, *row, message));
                     }

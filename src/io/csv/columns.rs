@@ -75,12 +75,18 @@ pub(super) fn time_column(columns: &[Column], options: &Options) -> Result<Optio
         (_, several) => Err(Failure::failed(format_args!(
             "{} columns could be the time axis; choose one with --time-column {}",
             several.len(),
-            list(
-                several
-                    .iter()
-                    .map(|i| format!("\"{}\"", columns[*i].heading))
-            )
+            list(several.iter().map(|i| label(columns, *i)))
         ))),
+    }
+}
+
+/// A heading in quotes, or its number where several columns have it.
+fn label(columns: &[Column], place: usize) -> String {
+    let heading = &columns[place].heading;
+    if columns.iter().filter(|c| c.heading == *heading).count() > 1 {
+        format!("{} (\"{heading}\")", place + 1)
+    } else {
+        format!("\"{heading}\"")
     }
 }
 
@@ -104,11 +110,7 @@ pub(super) fn channel(
         several => Err(Failure::failed(format_args!(
             "{} columns could be the signal; choose one with --channel {}",
             several.len(),
-            list(
-                several
-                    .iter()
-                    .map(|i| format!("\"{}\"", columns[*i].heading))
-            )
+            list(several.iter().map(|i| label(columns, *i)))
         ))),
     }
 }

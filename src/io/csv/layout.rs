@@ -4,13 +4,17 @@
 //! Where two ways explain the same lines differently, the file cannot be told for sure and the
 //! user is asked.
 
+use std::collections::BTreeMap;
+
 use super::names::{Column, NamedUnit};
 use crate::failure::Failure;
 use crate::io::number;
 
 /// Most lines above the data that are looked at for headings and units.
 const LINES_FOR_HEADINGS: usize = 6;
-/// Fewest rows in a row that make a table, unless the file holds fewer.
+/// UTF-8 byte order mark.
+const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
+/// Fewest rows that make a table, unless the file holds fewer.
 const FEWEST_ROWS: usize = 2;
 
 /// How cells are separated.
@@ -122,9 +126,34 @@ pub fn is_skipped(line: &str) -> bool {
 /// If there is no table of numbers, or more than one way to read it.
 pub fn find(head: &[u8], complete: bool, told: &Told) -> Result<Layout, Failure> {
     let lines = Lines::of(head, complete);
+    let dialects = candidates(told, head.contains(&b'"'));
+    // Columns of text beside the numbers are looked for only if there is no table without.
+    let mut best = best_tables(&lines, &dialects, numeric_width);
+    if best.is_empty() {
+        best = best_tables(&lines, &dialects, partly_numeric_width);
+    }
+    let (dialect, table) = choose(&lines, &best, head)?;
+    let heading = headings(&lines, dialect, &table);
+    let first = first_row(&lines, dialect, &table, heading.line);
+    let mark = if first == 0 { byte_order_mark(head) } else { 0 };
+    Ok(Layout {
+        dialect,
+        columns: heading.columns,
+        heading_line: heading.line.map(|line| line + 1),
+        data_line: first + 1,
+        data_offset: lines.0[first].0 + mark,
+    })
+}
+
+/// The tables with the most rows, by dialect.
+fn best_tables(
+    lines: &Lines,
+    dialects: &[Dialect],
+    width: fn(&str, Dialect) -> Option<usize>,
+) -> Vec<(Dialect, Table)> {
     let mut best: Vec<(Dialect, Table)> = Vec::new();
-    for dialect in candidates(told) {
-        let Some(table) = Table::find(&lines, dialect) else {
+    for &dialect in dialects {
+        let Some(table) = Table::find(lines, dialect, width) else {
             continue;
         };
         match best.first().map(|(_, other)| other.rows) {
@@ -133,19 +162,42 @@ pub fn find(head: &[u8], complete: bool, told: &Told) -> Result<Layout, Failure>
             _ => best = vec![(dialect, table)],
         }
     }
-    let (dialect, table) = choose(&lines, &best)?;
-    let (heading_line, columns) = headings(&lines, dialect, &table);
-    Ok(Layout {
-        dialect,
-        columns,
-        heading_line,
-        data_line: table.first + 1,
-        data_offset: lines.0[table.first].0,
-    })
+    best
 }
 
-/// Dialects in the order of preference between equals.
-fn candidates(told: &Told) -> Vec<Dialect> {
+/// The first row of the table. A row that is wrong stands between the headings and the first good
+/// row: it belongs to the table, so that it is found wrong and not passed over.
+fn first_row(lines: &Lines, dialect: Dialect, table: &Table, heading: Option<usize>) -> usize {
+    let from = heading.map_or(0, |line| line + 1);
+    (from..table.first)
+        .rev()
+        .take_while(|index| {
+            let line = &lines.0[*index].1;
+            let cells = dialect.cells(line);
+            let numbers = cells
+                .iter()
+                .filter(|cell| number::cell(cell, dialect.decimal).is_some())
+                .count();
+            // Without headings, only a row of nothing but numbers.
+            is_skipped(line)
+                || numbers > 0 && (heading.is_some() || numeric_width(line, dialect).is_some())
+        })
+        .filter(|index| !is_skipped(&lines.0[*index].1))
+        .last()
+        .unwrap_or(table.first)
+}
+
+/// Length of a UTF-8 byte order mark at the start of a file.
+fn byte_order_mark(head: &[u8]) -> usize {
+    if head.starts_with(BYTE_ORDER_MARK) {
+        BYTE_ORDER_MARK.len()
+    } else {
+        0
+    }
+}
+
+/// Dialects in the order of preference between equals. A decimal comma between commas needs quotes.
+fn candidates(told: &Told, quoted: bool) -> Vec<Dialect> {
     let delimiters = match told.delimiter {
         Some(delimiter) => vec![delimiter],
         None => vec![
@@ -164,7 +216,7 @@ fn candidates(told: &Told) -> Vec<Dialect> {
     let mut all = Vec::new();
     for delimiter in delimiters {
         for &decimal in &decimals {
-            if delimiter != Delimiter::Byte(decimal) {
+            if delimiter != Delimiter::Byte(decimal) || quoted {
                 all.push(Dialect { delimiter, decimal });
             }
         }
@@ -192,52 +244,58 @@ impl Lines {
 
 /// UTF-8, or else the Latin-1 of older recorders, in which any byte is a character.
 fn decode(bytes: &[u8]) -> String {
-    let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
+    let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
     match std::str::from_utf8(bytes) {
         Ok(text) => text.to_owned(),
         Err(_) => bytes.iter().map(|byte| char::from(*byte)).collect(),
     }
 }
 
-/// A run of rows with the same number of numeric cells.
+/// Rows of numbers, most of them of one width.
 #[derive(Debug, Clone, PartialEq)]
 struct Table {
     /// Index of the first line.
     first: usize,
-    /// Number of rows.
+    /// Number of rows of the usual width.
     rows: usize,
-    /// Cells of a row, empty ones at its end left out.
+    /// Cells of the widest row, empty ones at its end left out.
     width: usize,
 }
 
 impl Table {
-    /// The longest run under a dialect.
-    fn find(lines: &Lines, dialect: Dialect) -> Option<Self> {
-        let mut best: Option<Self> = None;
-        let mut current: Option<Self> = None;
-        for (index, (_, line)) in lines.0.iter().enumerate() {
-            if is_skipped(line) {
-                continue;
-            }
-            match (numeric_width(line, dialect), &mut current) {
-                (Some(width), Some(table)) if table.width == width => table.rows += 1,
-                (Some(width), _) => {
-                    current = Some(Self {
-                        first: index,
-                        rows: 1,
-                        width,
-                    });
+    /// The rows under a dialect: from the first one that is as wide as most are. Rows that end
+    /// earlier, or that are wrong, may stand among them.
+    fn find(
+        lines: &Lines,
+        dialect: Dialect,
+        width_of: fn(&str, Dialect) -> Option<usize>,
+    ) -> Option<Self> {
+        let widths: Vec<Option<usize>> = lines
+            .0
+            .iter()
+            .map(|(_, line)| {
+                if is_skipped(line) {
+                    None
+                } else {
+                    width_of(line, dialect)
                 }
-                (None, _) => current = None,
-            }
-            if let Some(table) = &current
-                && best.as_ref().is_none_or(|b| table.rows > b.rows)
-            {
-                best.clone_from(&current);
-            }
+            })
+            .collect();
+        let mut counts: BTreeMap<usize, usize> = BTreeMap::new();
+        for width in widths.iter().flatten() {
+            *counts.entry(*width).or_default() += 1;
         }
+        // Between equals the wider.
+        let (&usual, &rows) = counts
+            .iter()
+            .max_by_key(|(width, count)| (**count, **width))?;
         let several = lines.0.len() > FEWEST_ROWS;
-        best.filter(|table| table.rows >= FEWEST_ROWS || !several)
+        if rows < FEWEST_ROWS && several {
+            return None;
+        }
+        let first = widths.iter().position(|w| w.is_some_and(|w| w >= usual))?;
+        let width = widths[first..].iter().flatten().copied().max()?;
+        Some(Self { first, rows, width })
     }
 }
 
@@ -256,6 +314,18 @@ fn numeric_width(line: &str, dialect: Dialect) -> Option<usize> {
     (good && numbers > 0).then_some(width)
 }
 
+/// Number of cells of a row that may hold texts beside its numbers.
+fn partly_numeric_width(line: &str, dialect: Dialect) -> Option<usize> {
+    let cells = dialect.cells(line);
+    let width = cells.iter().rposition(|cell| !cell.is_empty())? + 1;
+    let numbers = cells[..width]
+        .iter()
+        .filter(|cell| number::cell(cell, dialect.decimal).is_some())
+        .count();
+    // At least as many numbers as texts: a remark with one number in it is no row.
+    (width > 1 && 2 * numbers >= width).then_some(width)
+}
+
 /// Whether a cell says that there is no number: NaN, infinity and their Windows spellings.
 #[must_use]
 pub fn is_not_a_number(cell: &str) -> bool {
@@ -266,9 +336,13 @@ pub fn is_not_a_number(cell: &str) -> bool {
     )
 }
 
-fn choose(lines: &Lines, best: &[(Dialect, Table)]) -> Result<(Dialect, Table), Failure> {
+fn choose(
+    lines: &Lines,
+    best: &[(Dialect, Table)],
+    head: &[u8],
+) -> Result<(Dialect, Table), Failure> {
     let Some((dialect, table)) = best.first() else {
-        return Err(Failure::failed(no_table(lines)));
+        return Err(Failure::failed(no_table(lines, head)));
     };
     let comma = Delimiter::Byte(b',');
     let as_separator = best.iter().find(|(d, _)| d.delimiter == comma);
@@ -279,8 +353,8 @@ fn choose(lines: &Lines, best: &[(Dialect, Table)]) -> Result<(Dialect, Table), 
         return Ok((*dialect, table.clone()));
     };
     // `0,5` is one number or two; headings with as many cells settle it.
-    let (heading_line, _) = headings(lines, separator.0, &separator.1);
-    if heading_line.is_some() && separator.1.width > 1 {
+    let heading = headings(lines, separator.0, &separator.1);
+    if heading.line.is_some() && separator.1.width > 1 {
         return Ok(separator.clone());
     }
     let (_, line) = &lines.0[table.first];
@@ -296,9 +370,16 @@ fn uses_comma(lines: &Lines, table: &Table) -> bool {
     lines.0[table.first].1.contains(',')
 }
 
-fn no_table(lines: &Lines) -> String {
-    if lines.0.iter().all(|(_, line)| line.trim().is_empty()) {
+fn no_table(lines: &Lines, head: &[u8]) -> String {
+    if head.iter().all(u8::is_ascii_whitespace) {
         return "the file is empty; expected rows of numbers".to_owned();
+    }
+    if !head.contains(&b'\n') && head.contains(&b'\r') {
+        return "the lines end with CR alone; change them to LF: tr '\\r' '\\n' < FILE".to_owned();
+    }
+    if lines.0.is_empty() {
+        return "the first line does not end within a megabyte; expected rows of numbers"
+            .to_owned();
     }
     let first = lines
         .0
@@ -313,8 +394,13 @@ fn no_table(lines: &Lines) -> String {
     )
 }
 
-/// Line of the headings and the columns they name.
-fn headings(lines: &Lines, dialect: Dialect, table: &Table) -> (Option<usize>, Vec<Column>) {
+/// The headings of a table: their line, from 0, and the columns they name.
+struct Headings {
+    line: Option<usize>,
+    columns: Vec<Column>,
+}
+
+fn headings(lines: &Lines, dialect: Dialect, table: &Table) -> Headings {
     let from = table.first.saturating_sub(LINES_FOR_HEADINGS);
     let rows: Vec<(usize, Vec<String>)> = (from..table.first)
         .map(|index| (index, dialect.cells(uncommented(&lines.0[index].1))))
@@ -325,14 +411,17 @@ fn headings(lines: &Lines, dialect: Dialect, table: &Table) -> (Option<usize>, V
             .iter()
             .filter(|c| NamedUnit::parse(c).is_some())
             .count();
-        units > 0
-            && cells
-                .iter()
-                .any(|cell| cells.iter().filter(|c| *c == cell).count() > 1)
+        let repeats = |cell| cells.iter().filter(|c| *c == cell).count() > 1;
+        units > 0 && cells.iter().any(repeats)
             || units == cells.iter().filter(|c| !c.is_empty()).count()
     };
     let (heading, units) = match rows.as_slice() {
-        [] => return (None, (0..table.width).map(Column::unnamed).collect()),
+        [] => {
+            return Headings {
+                line: None,
+                columns: (0..table.width).map(Column::unnamed).collect(),
+            };
+        }
         [.., above, below] if is_units(&below.1) => (above, Some(&below.1)),
         [.., last] => (last, None),
     };
@@ -344,7 +433,10 @@ fn headings(lines: &Lines, dialect: Dialect, table: &Table) -> (Option<usize>, V
             _ => Column::unnamed(place),
         })
         .collect();
-    (Some(heading.0 + 1), columns)
+    Headings {
+        line: Some(heading.0),
+        columns,
+    }
 }
 
 /// Headings may stand in a comment: `# time_s,bridge_V`.
@@ -354,7 +446,8 @@ fn uncommented(line: &str) -> &str {
         .trim_start()
 }
 
-/// Whether cells can be headings: one for each column (all but empty ones at the end), no number.
+/// Whether cells can be headings: at least one for each column (one may be empty), no number. There
+/// may be more, such as that of a column of comments which no row fills.
 fn is_heading(cells: &[String], width: usize, dialect: Dialect) -> bool {
     let filled = cells
         .iter()
@@ -364,7 +457,7 @@ fn is_heading(cells: &[String], width: usize, dialect: Dialect) -> bool {
     let fits = if width == 1 {
         filled == 1 && cells[0].split_whitespace().count() <= 4
     } else {
-        filled == width && cells[..width].iter().filter(|c| !c.is_empty()).count() + 1 >= width
+        filled >= width && cells[..width].iter().filter(|c| !c.is_empty()).count() + 1 >= width
     };
     fits && cells[..filled]
         .iter()

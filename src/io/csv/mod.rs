@@ -164,7 +164,7 @@ impl Table {
             time: time_place,
             value: value_place,
         };
-        let sample = Sample::of(&head, &layout, &plan);
+        let sample = Sample::of(&head, head.len() < HEAD, &layout, &plan);
         let time = TimeAxis::find(&layout, time_place, &sample.rows, options)?;
         // Stamps that are not used need not be read, nor be right.
         let plan = RowPlan {
@@ -231,11 +231,12 @@ struct Sample {
 }
 
 impl Sample {
-    fn of(head: &[u8], layout: &Layout, plan: &RowPlan) -> Self {
+    fn of(head: &[u8], complete: bool, layout: &Layout, plan: &RowPlan) -> Self {
         let data = &head[layout.data_offset..];
         // The last line may be cut by the end of the head. A row that cannot be read is not
         // counted here: it is an error when its turn comes.
-        let end = memchr::memrchr(b'\n', data).map_or(data.len(), |place| place + 1);
+        let last = memchr::memrchr(b'\n', data).map_or(data.len(), |place| place + 1);
+        let end = if complete { data.len() } else { last };
         let mut rows = Rows::default();
         let mut line = Rows::default();
         for text in data[..end].split_inclusive(|byte| *byte == b'\n') {
@@ -299,11 +300,16 @@ fn refuse_other_formats(head: &[u8]) -> Result<(), Failure> {
     ];
     match known.iter().find(|(magic, _)| head.starts_with(magic)) {
         Some((_, what)) => Err(Failure::failed(format_args!("the file is {what}"))),
-        None if head.contains(&0) => Err(Failure::failed(
+        None if is_binary(head) => Err(Failure::failed(
             "the file is binary; expected a text table (CSV, TSV or a recorder's export)",
         )),
         None => Ok(()),
     }
+}
+
+/// Whether there are more zero bytes than a fault in a text would leave.
+fn is_binary(head: &[u8]) -> bool {
+    head.iter().filter(|byte| **byte == 0).count() > head.len() / 100
 }
 
 /// Whether a unit measures time.

@@ -22,61 +22,40 @@ pub struct NamedUnit {
     pub unit: Unit,
 }
 
-/// Units that a heading may end in after an underscore, as written there and as understood. Only
-/// these: `motor_in` is not a motor in inches.
-const SUFFIXES: [(&str, &str); 52] = [
-    ("s", "s"),
-    ("sec", "s"),
-    ("ms", "ms"),
-    ("us", "us"),
-    ("ns", "ns"),
-    ("V", "V"),
-    ("v", "V"),
-    ("mV", "mV"),
-    ("mv", "mV"),
-    ("uV", "uV"),
-    ("kV", "kV"),
-    ("volt", "V"),
-    ("volts", "V"),
-    ("A", "A"),
-    ("mA", "mA"),
-    ("N", "N"),
-    ("n", "N"),
-    ("kN", "kN"),
-    ("mN", "mN"),
-    ("lbf", "lbf"),
-    ("LBF", "lbf"),
-    ("Nm", "N m"),
-    ("nm", "N m"),
-    ("N_m", "N m"),
-    ("n_m", "N m"),
-    ("NM", "N m"),
-    ("mNm", "mN m"),
-    ("mN_m", "mN m"),
-    ("kNm", "kN m"),
-    ("kN_m", "kN m"),
-    ("ft_lbf", "ft lbf"),
-    ("in_lbf", "in lbf"),
-    ("lbf_ft", "ft lbf"),
-    ("lbf_in", "in lbf"),
-    ("m", "m"),
-    ("mm", "mm"),
-    ("um", "um"),
-    ("m_s2", "m/s^2"),
-    ("m_s", "m/s"),
-    ("Hz", "Hz"),
-    ("kHz", "kHz"),
-    ("hz", "Hz"),
-    ("rpm", "rpm"),
-    ("rad", "rad"),
-    ("deg", "deg"),
-    ("rad_s", "rad/s"),
-    ("degC", "degC"),
-    ("degF", "degF"),
-    ("K", "K"),
-    ("strain", "strain"),
-    ("ustrain", "ustrain"),
-    ("percent", "%"),
+/// Units that a heading may end in after an underscore: as understood, and other ways to write them.
+/// Only these: `motor_in` is not a motor in inches, `position_nm` not a torque.
+const SUFFIXES: [&[&str]; 31] = [
+    &["s", "sec"],
+    &["ms"],
+    &["us"],
+    &["ns"],
+    &["V", "volt", "volts"],
+    &["mV"],
+    &["uV"],
+    &["kV"],
+    &["mA"],
+    &["N"],
+    &["kN"],
+    &["mN"],
+    &["lbf"],
+    &["N m", "Nm", "N_m", "n_m"],
+    &["mN m", "mNm", "mN_m"],
+    &["kN m", "kNm", "kN_m"],
+    &["ft lbf", "ft_lbf", "lbf_ft"],
+    &["in lbf", "in_lbf", "lbf_in"],
+    &["mm"],
+    &["um"],
+    &["m/s^2", "m_s2"],
+    &["m/s", "m_s"],
+    &["Hz"],
+    &["kHz"],
+    &["rpm"],
+    &["rad"],
+    &["rad/s", "rad_s"],
+    &["deg"],
+    &["degC"],
+    &["degF"],
+    &["ustrain"],
 ];
 
 /// Headings that stand for time, in lower case.
@@ -179,28 +158,20 @@ fn split(heading: &str) -> (&str, Option<NamedUnit>) {
     {
         return (name.trim(), Some(unit));
     }
-    for (suffix, meaning) in SUFFIXES {
-        let name = heading
-            .strip_suffix(suffix)
-            .and_then(|n| n.strip_suffix('_'));
-        // The longest suffix wins: `torque_N_m` does not end in metres.
-        let longer = SUFFIXES.iter().any(|(other, _)| {
-            other.len() > suffix.len()
-                && other.ends_with(suffix)
-                && heading
-                    .strip_suffix(other)
-                    .is_some_and(|n| n.ends_with('_'))
-        });
-        if let Some(name) = name
-            && !name.is_empty()
-            && !longer
-        {
-            let unit = Unit::parse(meaning).ok().map(|unit| NamedUnit {
-                text: meaning.to_owned(),
-                unit,
-            });
-            return (name, unit);
-        }
+    // The longest suffix wins: `accel_m_s` does not end in seconds.
+    let ending = SUFFIXES
+        .iter()
+        .flat_map(|ways| ways.iter().map(|way| (*way, ways[0])))
+        .filter_map(|(way, meaning)| {
+            let name = heading.strip_suffix(way)?.strip_suffix('_')?;
+            (!name.is_empty()).then_some((way.len(), name, meaning))
+        })
+        .max_by_key(|(length, ..)| *length);
+    if let Some((_, name, meaning)) = ending
+        && let Ok(unit) = Unit::parse(meaning)
+    {
+        let text = meaning.to_owned();
+        return (name, Some(NamedUnit { text, unit }));
     }
     (heading, None)
 }
@@ -246,6 +217,9 @@ mod tests {
             ("U / mV", "U", Some("mV")),
             ("strain [µm/m]", "strain", Some("µm/m")),
             ("motor_in", "motor_in", None),
+            ("position_nm", "position_nm", None),
+            ("phase_A", "phase_A", None),
+            ("accel_m_s2", "accel", Some("m/s^2")),
             ("hit_1", "hit_1", None),
             ("Low G Accel", "Low G Accel", None),
             (
@@ -265,8 +239,8 @@ mod tests {
 
     #[test]
     fn every_suffix_is_a_unit() {
-        for (suffix, meaning) in SUFFIXES {
-            assert!(Unit::parse(meaning).is_ok(), "{suffix}");
+        for ways in SUFFIXES {
+            assert!(Unit::parse(ways[0]).is_ok(), "{}", ways[0]);
         }
     }
 

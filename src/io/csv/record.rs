@@ -35,7 +35,7 @@ impl Record {
         let mut batch = Batch::default();
         while fetch.next(&mut batch)? {
             batch.read_rows(&plan, &time);
-            sequence.accept(&batch)?;
+            sequence.accept(&mut batch)?;
             let values = &mut batch.rows.values;
             values.iter_mut().for_each(|v| *v *= chain.recorded_factor);
             if let Err(error) = chain.conversion.convert_slice(values) {

@@ -25,6 +25,9 @@ pub struct Rows {
     pub values: Vec<f64>,
     /// Lines seen, rows and others.
     pub lines: usize,
+    /// First of the empty lines that no row follows yet; counted only without stamps, where an empty
+    /// line may be a lost sample.
+    pub empty_at: Option<usize>,
     /// The row that could not be read, if any; nothing after it was looked at.
     pub problem: Option<Problem>,
 }
@@ -55,6 +58,19 @@ pub enum Defect {
     NotANumber(String),
 }
 
+impl Problem {
+    /// An empty line among rows that have no stamps to tell whether a sample is missing.
+    #[must_use]
+    pub fn empty_line(line: usize, plan: &RowPlan) -> Self {
+        Self {
+            line,
+            offset: 0,
+            cell: plan.value,
+            what: Defect::Empty,
+        }
+    }
+}
+
 impl Rows {
     /// Empties the rows, keeping their memory.
     pub fn clear(&mut self) {
@@ -62,6 +78,7 @@ impl Rows {
         self.time_text.clear();
         self.values.clear();
         self.lines = 0;
+        self.empty_at = None;
         self.problem = None;
     }
 
@@ -91,7 +108,14 @@ impl Rows {
                         return;
                     }
                     at = end;
+                    self.lines += 1;
+                    continue;
                 }
+            }
+            if let Some(line) = self.empty_at {
+                self.values.pop();
+                self.problem = Some(Problem::empty_line(line, plan));
+                return;
             }
             self.lines += 1;
         }
@@ -107,6 +131,10 @@ impl Rows {
     ) -> Result<(), (usize, Defect)> {
         let text = String::from_utf8_lossy(line);
         if is_skipped(&text) {
+            let is_comment = text.trim_start().starts_with(['#', '%', '!', '/']);
+            if plan.time.is_none() && !is_comment {
+                self.empty_at = self.empty_at.or(Some(self.lines));
+            }
             return Ok(());
         }
         let cells = plan.dialect.cells(&text);
@@ -117,9 +145,10 @@ impl Rows {
         let value = read_cell(&cells, plan.value, plan.dialect.decimal)?;
         if let (Some(time), Some(place)) = (time, plan.time) {
             // The text is copied to the output only from where it stands unquoted.
-            let span = text
-                .find(cells[place].as_str())
-                .map_or(0, |offset| span(at + offset, cells[place].len()));
+            // The same text elsewhere in the line does as well.
+            let cell = cells[place].as_bytes();
+            let span =
+                memchr::memmem::find(line, cell).map_or(0, |offset| span(at + offset, cell.len()));
             self.times.push(time);
             self.time_text.push(span);
         }

@@ -80,6 +80,8 @@ pub struct Sequence {
     samples: usize,
     first_stamp: Option<f64>,
     last_stamp: Option<f64>,
+    /// An empty line at the end of the batches so far, without stamps.
+    empty_line: Option<usize>,
     lost: Option<Warning>,
     warnings: Vec<Warning>,
 }
@@ -114,6 +116,7 @@ impl Sequence {
             samples: 0,
             first_stamp: None,
             last_stamp: None,
+            empty_line: None,
             lost: None,
             warnings: Vec::new(),
         }
@@ -129,11 +132,30 @@ impl Sequence {
     ///
     /// # Errors
     /// The first row that cannot be read, and the first stamp that is not uniform, with its line.
-    pub fn accept(&mut self, batch: &Batch) -> Result<(), Failure> {
-        let rows = &batch.rows;
+    pub fn accept(&mut self, batch: &mut Batch) -> Result<(), Failure> {
         if let Some(found) = self.time_break(batch) {
             let line = self.lines + line_of_row(&batch.text, &self.plan, found.row) + 1;
-            return Err(self.at(line, self.time.explain(&found)));
+            let is_last = found.row + 1 == batch.rows.times.len();
+            if !(batch.unended && is_last && batch.rows.problem.is_none()) {
+                return Err(self.at(line, self.time.explain(&found)));
+            }
+            // The file was cut within this stamp.
+            batch.rows.times.pop();
+            batch.rows.time_text.pop();
+            batch.rows.values.pop();
+            let start = memchr::memrchr(b'\n', &batch.text).map_or(0, |place| place + 1);
+            let text = String::from_utf8_lossy(&batch.text[start..]).into_owned();
+            self.lose_last_line(line, &text);
+        }
+        let rows = &batch.rows;
+        if let Some(line) = self.empty_line
+            && !rows.values.is_empty()
+        {
+            let problem = Problem::empty_line(0, &self.plan);
+            return Err(self.at(line, self.describe(&problem, "")));
+        }
+        if let Some(line) = rows.empty_at {
+            self.empty_line = self.empty_line.or(Some(self.lines + line + 1));
         }
         if let Some(problem) = &rows.problem {
             self.bad_row(batch, problem)?;
@@ -209,21 +231,25 @@ impl Sequence {
         let is_last = batch.unended && !text.contains('\n');
         if is_last {
             self.lines += 1;
-            self.lost = Some(Warning::new(
-                "truncated-last-line",
-                format!(
-                    "{}, line {line}: the file ends in the middle of this line (\"{}\"); it was \
-                     left out, everything before it was used",
-                    self.source,
-                    shorten(&text)
-                ),
-            ));
+            self.lose_last_line(line, &text);
             return Ok(());
         }
         Err(self.at(
             line,
             self.describe(problem, text.lines().next().unwrap_or("")),
         ))
+    }
+
+    fn lose_last_line(&mut self, line: usize, text: &str) {
+        self.lost = Some(Warning::new(
+            "truncated-last-line",
+            format!(
+                "{}, line {line}: the file ends in the middle of this line (\"{}\"); it was left \
+                 out, everything before it was used",
+                self.source,
+                shorten(text)
+            ),
+        ));
     }
 
     fn describe(&self, problem: &Problem, line: &str) -> String {
