@@ -5,8 +5,8 @@
 //! serial   parallel    serial   parallel serial
 //! ```
 //!
-//! The serial stages see the jobs in order, so the outcome (and the first error) is the same with
-//! any number of threads. Every thread takes whatever job is nearest to the end. Jobs are reused,
+//! The serial stages see the jobs in order, so what is delivered, and the first error that `join`
+//! finds, are the same with any number of threads. Every thread takes whatever job is nearest to the end. Jobs are reused,
 //! so their buffers are allocated once, and their number bounds the memory.
 
 use std::collections::{BTreeMap, VecDeque};

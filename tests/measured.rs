@@ -218,7 +218,7 @@ fn torque_transducer_compensated(folder: &Path) -> Result<(), Failed> {
             &["compensate", name, "--unit", "N m", "--with-recorded"],
         )?;
         check(code == 0, &err)?;
-        check(err.contains("compensated to 400 Hz"), &err)?;
+        check(err.contains("compensated to 350 Hz"), &err)?;
         let rows = rows(&out);
         // Counted independently: lines with two numbers.
         let count = std::fs::read_to_string(&path)?

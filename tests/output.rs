@@ -33,9 +33,52 @@ fn an_input_is_never_replaced() {
     let before = folder.read("in.csv");
     for output in ["in.csv", "./in.csv", "stand.toml"] {
         let args = [&COMPENSATE[..], &["-o", output, "--force"]].concat();
-        folder.run(&args).says(2, &["is the input"]);
+        folder.run(&args).says(2, &["write to another file"]);
     }
     assert_eq!(folder.read("in.csv"), before);
+    for verb in ["table", "predict"] {
+        let args = [verb, "--stand", "stand.toml", "-o", "stand.toml", "--force"];
+        assert_ne!(folder.run(&args).code, 0);
+        assert_eq!(folder.read("stand.toml"), crate::util::HERTEL);
+    }
+    let both = [&COMPENSATE[..], &["-o", "a.csv", "--plot", "./a.csv"]].concat();
+    folder.run(&both).says(2, &["write to another file"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn links_and_permissions_are_kept() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = folder();
+    folder.write("real.csv", "old\n");
+    std::fs::set_permissions(folder.path("real.csv"), PermissionsExt::from_mode(0o600)).unwrap();
+    std::os::unix::fs::symlink("real.csv", folder.path("link.csv")).unwrap();
+    let args = [&COMPENSATE[..], &["-o", "link.csv", "--force"]].concat();
+    assert_eq!(folder.run(&args).code, 0);
+    assert!(folder.path("link.csv").is_symlink());
+    assert_eq!(folder.read("real.csv").lines().count(), 60_001);
+    let mode = std::fs::metadata(folder.path("real.csv"))
+        .unwrap()
+        .permissions()
+        .mode();
+    assert_eq!(mode & 0o777, 0o600);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn talk_that_nobody_can_hear_is_no_failure() {
+    let folder = folder();
+    let full = std::fs::File::options()
+        .write(true)
+        .open("/dev/full")
+        .expect("the device");
+    let args = [&COMPENSATE[..], &["-o", "out.csv"]].concat();
+    let ran = command(&folder.path(""), &args)
+        .stderr(Stdio::from(full))
+        .output()
+        .expect("it ends");
+    assert_eq!(ran.status.code(), Some(0));
+    assert_eq!(folder.read("out.csv").lines().count(), 60_001);
 }
 
 #[test]
@@ -56,7 +99,7 @@ fn folders_that_are_not_there() {
     let args = [&COMPENSATE[..], &["-o", "none/out.csv"]].concat();
     folder
         .run(&args)
-        .says(1, &["none/out.csv", "folder exists"]);
+        .says(1, &["none/out.csv", "folder none does not exist"]);
     let args = [&COMPENSATE[..], &["-o", "."]].concat();
     folder.run(&args).says(2, &["folder"]);
 }

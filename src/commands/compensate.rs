@@ -14,7 +14,7 @@ use super::{Outcome, conclude, relative_std};
 use crate::cli::Compensate;
 use crate::failure::Failure;
 use crate::io::csv::{Place, Summary, Table, TimeAxis, TimeSource};
-use crate::io::digits;
+use crate::io::digits::{self, Digits};
 use crate::io::output::Output;
 use crate::io::text::Text;
 use crate::report::compensate::{Gain, Noise, RecordNoise, Report, SCHEMA};
@@ -61,8 +61,8 @@ pub fn run(args: &Compensate) -> Result<Outcome, Failure> {
     let mut output = Output::open(args.result.output.as_deref(), args.result.force, &inputs)?;
     let plot = args
         .plot
-        .as_ref()
-        .map(|path| Output::open(path.to_str(), args.result.force, &inputs))
+        .as_deref()
+        .map(|path| open_plot(path, args, &inputs))
         .transpose()?;
     output.write(heading(&plan.chain, args.with_recorded).as_bytes())?;
 
@@ -74,22 +74,34 @@ pub fn run(args: &Compensate) -> Result<Outcome, Failure> {
         stream::run(args, plan, &mut output)?
     };
     complete(&mut report, &run);
-    output.finish()?;
-    if let (Some(mut plot), Some(traces)) = (plot, &run.traces) {
+    // Whatever can fail comes before the first file takes its name.
+    let mut plot = plot;
+    if let (Some(plot), Some(traces)) = (&mut plot, &run.traces) {
         plot.write(traces.svg(&unit).as_bytes())?;
-        plot.finish()?;
     }
     if args.json {
-        crate::io::output::write_all(None, false, &report::json(&report))?;
+        crate::io::output::write_all(None, false, &[], &report::json(&report))?;
     }
+    output.finish()?;
+    plot.map_or(Ok(()), Output::finish)?;
     if !args.quiet {
-        eprint!("{}", report.text());
+        report::say(&report.text());
     }
     Ok(conclude(
         &report.warnings,
         run.summary.lost.is_some(),
         args.strict,
     ))
+}
+
+fn open_plot(path: &Path, args: &Compensate, inputs: &[&Path]) -> Result<Output, Failure> {
+    let text = path
+        .to_str()
+        .filter(|text| *text != "-")
+        .ok_or_else(|| Failure::usage("--plot needs the name of a file, in UTF-8"))?;
+    let mut taken = inputs.to_vec();
+    taken.extend(args.result.output.as_deref().map(Path::new));
+    Output::open(Some(text), args.result.force, &taken)
 }
 
 fn plan(args: &Compensate) -> Result<Plan, Failure> {
@@ -252,7 +264,7 @@ fn noise_warnings(noise: &torqcomp_dsp::noise::RecordNoise, band_hz: f64) -> Vec
             ),
         ));
     }
-    if noise.compensated_rms > NOISY_FRACTION * noise.output_rms {
+    if noise.output_rms > 0.0 && noise.compensated_rms > NOISY_FRACTION * noise.output_rms {
         warnings.push(Warning::new(
             "mostly-noise",
             format!(
@@ -283,9 +295,10 @@ fn gap_warning(resampled: &resample::Resampled) -> Option<Warning> {
 
 /// Writes the rows of a result: time, torque, and the recorded torque if it is wanted.
 struct Rows<'a> {
-    digits: digits::Digits,
+    digits: Digits,
     /// Printed units per SI unit.
     scale: f64,
+    rate_hz: f64,
     times: Times<'a>,
 }
 
@@ -296,16 +309,27 @@ enum Times<'a> {
     /// Stamps in another unit, times seconds per unit.
     Stamps { times: &'a [f64], seconds: f64 },
     /// A grid: start, index of the first sample, rate.
-    Grid {
-        start_s: f64,
-        first: usize,
-        rate_hz: f64,
-    },
+    Grid { start_s: f64, first: usize },
 }
 
 impl Rows<'_> {
+    /// Digits that tell a thousandth of a step at the time of the last row. Epoch stamps need more
+    /// than a record that begins at zero.
+    fn time_digits(&self, rows: usize) -> Digits {
+        let (Some(last), rate_hz) = (rows.checked_sub(1), self.rate_hz) else {
+            return digits::DEFAULT_DIGITS;
+        };
+        let steps = (self.time_s(last).abs() * rate_hz).max(1.0);
+        match steps.log10() as u32 + 5 {
+            ..=12 => digits::DEFAULT_DIGITS,
+            count @ 13..=15 => Digits::Significant(count),
+            _ => Digits::Shortest,
+        }
+    }
+
     /// Appends the rows of `torque`, beside `recorded` if that is not empty.
     fn write(&self, out: &mut Text, torque: &[f64], recorded: &[f64]) {
+        let time_digits = self.time_digits(torque.len());
         for (i, value) in torque.iter().enumerate() {
             match &self.times {
                 Times::Copied { text, spans } => {
@@ -313,9 +337,9 @@ impl Rows<'_> {
                     out.copy(text, offset, length);
                 }
                 Times::Stamps { times, seconds } => {
-                    out.number(times[i] * seconds, digits::DEFAULT_DIGITS);
+                    out.number(times[i] * seconds, time_digits);
                 }
-                Times::Grid { .. } => out.number(self.time_s(i), digits::DEFAULT_DIGITS),
+                Times::Grid { .. } => out.number(self.time_s(i), time_digits),
             }
             out.byte(b',');
             out.number(value * self.scale, self.digits);
@@ -335,11 +359,7 @@ impl Rows<'_> {
                 crate::io::number::read(text, offset, b'.').map_or(f64::NAN, |(value, _)| value)
             }
             Times::Stamps { times, seconds } => times[i] * seconds,
-            Times::Grid {
-                start_s,
-                first,
-                rate_hz,
-            } => start_s + (first + i) as f64 / rate_hz,
+            Times::Grid { start_s, first } => start_s + (first + i) as f64 / self.rate_hz,
         }
     }
 }

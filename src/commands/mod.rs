@@ -9,7 +9,7 @@ use torqcomp_dsp::conversion::ConversionError;
 
 use crate::cli::{Cli, Verb};
 use crate::failure::Failure;
-use crate::report::Warning;
+use crate::report::{self, Warning};
 use crate::stand::{Chain, Stand};
 
 /// How a command ended well.
@@ -37,7 +37,10 @@ pub fn run(cli: Cli) -> Result<Outcome, Failure> {
 /// Says the warnings and what was lost, and tells how the command ended.
 fn conclude(warnings: &[Warning], lost: bool, strict: bool) -> Outcome {
     for warning in warnings {
-        eprintln!("torqcomp: warning [{}]: {}", warning.code, warning.message);
+        report::say(&format!(
+            "torqcomp: warning [{}]: {}\n",
+            warning.code, warning.message
+        ));
     }
     if lost || (strict && !warnings.is_empty()) {
         Outcome::WithLoss
@@ -55,10 +58,29 @@ fn relative_std(stand: &Stand, chain: &Chain, frequency_hz: f64) -> Option<f64> 
     found.ok().flatten().map(|u| u.magnitude_relative)
 }
 
-/// Index and reason of the sample that could not be converted.
-pub(crate) fn unconverted(error: ConversionError) -> (usize, String) {
-    match error {
-        ConversionError::Sample { index, source } => (index, source.to_string()),
-        other => (0, other.to_string()),
+/// Largest magnitude that is taken for a measurement: squares and sums of it stay finite.
+const LARGEST: f64 = 1e100;
+
+/// Brings recorded values to the applied quantity at rest, in SI units; index and reason of the
+/// first that cannot be.
+pub(crate) fn convert(chain: &Chain, values: &mut [f64]) -> Result<(), (usize, String)> {
+    if chain.recorded_factor != 1.0 {
+        values.iter_mut().for_each(|v| *v *= chain.recorded_factor);
+    }
+    match chain.conversion.convert_slice(values) {
+        Ok(()) => {}
+        Err(ConversionError::Sample { index, source }) => return Err((index, source.to_string())),
+        Err(other) => return Err((0, other.to_string())),
+    }
+    // `!` so that what is no number is found as well.
+    match values.iter().position(|v| !(v.abs() < LARGEST)) {
+        Some(index) => Err((
+            index,
+            format!(
+                "the value becomes {:e}, which no recorder measures; correct or remove the line",
+                values[index]
+            ),
+        )),
+        None => Ok(()),
     }
 }

@@ -43,7 +43,12 @@ pub fn run(args: &Predict) -> Result<Outcome, Failure> {
     } else {
         report.text()
     };
-    output::write_all(args.result.output.as_deref(), args.result.force, &text)?;
+    output::write_all(
+        args.result.output.as_deref(),
+        args.result.force,
+        &[args.stand.as_path()],
+        &text,
+    )?;
     Ok(Outcome::Done)
 }
 

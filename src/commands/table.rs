@@ -65,7 +65,12 @@ pub fn run(args: &cli::Table) -> Result<Outcome, Failure> {
     } else {
         csv(&rows, args.uncertainty)
     };
-    output::write_all(args.result.output.as_deref(), args.result.force, &text)?;
+    output::write_all(
+        args.result.output.as_deref(),
+        args.result.force,
+        &[args.stand.as_path()],
+        &text,
+    )?;
     Ok(Outcome::Done)
 }
 

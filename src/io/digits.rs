@@ -38,8 +38,8 @@ pub const ROOM: usize = 48;
 
 /// Appends a finite number.
 ///
-/// With [`Digits::Significant`] the last digit is rounded to within 0.51 of a unit: one product of
-/// two correctly rounded factors stands between the value and its digits.
+/// With [`Digits::Significant`] one product of two correctly rounded factors stands between the value
+/// and its digits: the last of 12 is rounded to within 0.501 of a unit, that of 15 to within 0.8.
 #[inline]
 pub fn write(out: &mut Vec<u8>, value: f64, digits: Digits) {
     let mut text = [0; ROOM];
@@ -252,8 +252,10 @@ mod tests {
             let value = if minus { -1.0 } else { 1.0 } * mantissa * 10_f64.powi(exponent);
             let back: f64 = text(value, count).parse().unwrap();
             let unit = 10_f64.powi(value.abs().log10().floor() as i32 + 1 - count as i32);
-            // The comparison itself is good to a few units of the f64.
-            prop_assert!((back - value).abs() <= 0.51 * unit + 4.0 * f64::EPSILON * value.abs());
+            // Rounding of the product and of its factor: 1.5 ε of at most ten units of the first digit.
+            let product = 1.5 * f64::EPSILON * 10_f64.powi(count as i32);
+            // The comparison itself is good to a unit of the f64.
+            prop_assert!((back - value).abs() <= (0.5 + product) * unit + f64::EPSILON * value.abs());
         }
 
         #[test]

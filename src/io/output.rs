@@ -41,48 +41,59 @@ enum Kind {
     File {
         part: NamedTempFile,
         path: PathBuf,
+        /// Whether a file that came in the meantime may be replaced.
+        force: bool,
     },
 }
 
 impl Output {
-    /// Opens an output. `inputs` are files that it must not replace.
+    /// Opens an output. `taken` are the files that it must not replace: the inputs and the other
+    /// outputs.
     ///
     /// # Errors
-    /// If the output is one of the inputs, exists without `force`, or its folder cannot be written.
-    pub fn open(place: Option<&str>, force: bool, inputs: &[&Path]) -> Result<Self, Failure> {
+    /// If the output is one of them, exists without `force`, or its folder cannot be written.
+    pub fn open(place: Option<&str>, force: bool, taken: &[&Path]) -> Result<Self, Failure> {
         let Some(text) = place.filter(|text| *text != "-") else {
             return Ok(Self {
                 name: "standard output".to_owned(),
                 kind: Kind::Stdout(io::stdout()),
             });
         };
-        let path = PathBuf::from(text);
-        let name = path.display().to_string();
-        if let Some(input) = inputs.iter().find(|input| same_file(input, &path)) {
+        let name = text.to_owned();
+        let path = Path::new(text);
+        if let Some(other) = taken.iter().find(|other| same_file(other, path)) {
             return Err(Failure::usage(format_args!(
-                "the output {name} is the input {}; write to another file",
-                input.display()
+                "the output {name} is {} as well; write to another file",
+                other.display()
             )));
         }
-        let kind = match std::fs::metadata(&path) {
+        // A link is followed, so that it stays one; also one that leads nowhere counts as existing.
+        let exists = std::fs::symlink_metadata(path).is_ok();
+        let kind = match std::fs::metadata(path) {
             Ok(meta) if meta.is_dir() => {
                 return Err(Failure::usage(format_args!(
                     "the output {name} is a folder; name a file in it"
                 )));
             }
             Ok(meta) if !meta.is_file() => {
-                let file = File::options().write(true).open(&path);
+                let file = File::options().write(true).open(path);
                 Kind::Device(file.map_err(|e| Failure::writing(&name, &e))?)
             }
-            Ok(_) if !force => {
+            _ if exists && !force => {
                 return Err(Failure::failed(format_args!(
                     "the output {name} exists; give --force to replace it, or another name"
                 )));
             }
-            _ => Kind::File {
-                part: part_beside(&path).map_err(|e| folder_failure(&path, &e))?,
-                path,
-            },
+            found => {
+                let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+                let part = part_beside(&path).map_err(|e| folder_failure(&path, &e))?;
+                if let Ok(meta) = found {
+                    // What is replaced hands on its permissions.
+                    let kept = part.as_file().set_permissions(meta.permissions());
+                    kept.map_err(|e| Failure::writing(&name, &e))?;
+                }
+                Kind::File { part, path, force }
+            }
         };
         Ok(Self { name, kind })
     }
@@ -108,7 +119,14 @@ impl Output {
         let result = match self.kind {
             Kind::Stdout(mut out) => out.flush(),
             Kind::Device(mut file) => file.flush(),
-            Kind::File { part, path } => part.persist(path).map(drop).map_err(|e| e.error),
+            Kind::File { part, path, force } => {
+                let done = if force {
+                    part.persist(path)
+                } else {
+                    part.persist_noclobber(path)
+                };
+                done.map(drop).map_err(|e| e.error)
+            }
         };
         result.map_err(|error| Failure::writing(&self.name, &error))
     }
@@ -128,14 +146,10 @@ impl Output {
 
 /// A nameless-to-be file in the folder of the output, removed if it is not completed.
 fn part_beside(path: &Path) -> io::Result<NamedTempFile> {
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
     let mut builder = tempfile::Builder::new();
     builder.prefix(".torqcomp-").suffix(".part");
     set_permissions(&mut builder);
-    let part = builder.tempfile_in(folder)?;
+    let part = builder.tempfile_in(folder_of(path))?;
     let mut parts = PARTS.lock().unwrap_or_else(|e| e.into_inner());
     parts.push(part.path().to_owned());
     Ok(part)
@@ -152,16 +166,37 @@ fn set_permissions(builder: &mut tempfile::Builder<'_, '_>) {
 fn set_permissions(_: &mut tempfile::Builder<'_, '_>) {}
 
 fn folder_failure(path: &Path, error: &io::Error) -> Failure {
-    Failure::failed(format_args!(
-        "{}: cannot be created: {error}; check that its folder exists and can be written",
-        path.display()
-    ))
+    let folder = folder_of(path);
+    if folder.is_dir() {
+        Failure::failed(format_args!(
+            "{}: cannot be created: {}; check the permissions of its folder",
+            path.display(),
+            error.kind()
+        ))
+    } else {
+        Failure::failed(format_args!(
+            "{}: the folder {} does not exist; make it first",
+            path.display(),
+            folder.display()
+        ))
+    }
+}
+
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
 }
 
 /// Whether two paths lead to the same file.
 fn same_file(a: &Path, b: &Path) -> bool {
     match (a.canonicalize(), b.canonicalize()) {
         (Ok(a), Ok(b)) => a == b,
+        // Outputs that are not there yet.
+        (Err(_), Err(_)) => {
+            a == b || folder_of(a) == folder_of(b) && a.file_name() == b.file_name()
+        }
         _ => false,
     }
 }
@@ -170,8 +205,13 @@ fn same_file(a: &Path, b: &Path) -> bool {
 ///
 /// # Errors
 /// As [`Output::open`] and [`Output::write`].
-pub fn write_all(place: Option<&str>, force: bool, text: &str) -> Result<(), Failure> {
-    let mut output = Output::open(place, force, &[])?;
+pub fn write_all(
+    place: Option<&str>,
+    force: bool,
+    taken: &[&Path],
+    text: &str,
+) -> Result<(), Failure> {
+    let mut output = Output::open(place, force, taken)?;
     output.write(text.as_bytes())?;
     output.finish()
 }

@@ -40,6 +40,12 @@ pub fn json(report: &impl Serialize) -> String {
     text
 }
 
+/// Says something to a person on standard error. Nobody may be there to read it: that is no failure.
+pub fn say(text: &str) {
+    use std::io::Write;
+    let _ = std::io::stderr().lock().write_all(text.as_bytes());
+}
+
 /// A number for people: six significant digits.
 #[must_use]
 pub fn short(value: f64) -> String {

@@ -170,9 +170,16 @@ impl Stand {
                 named.text, self.file, gain.recorded_unit
             )));
         }
+        // A zero is given in volts: it belongs to a record in volts.
+        let zero = if named.unit.dimension() == VOLTAGE {
+            self.recorder.zero_v
+        } else {
+            0.0
+        };
+        let slope = 1.0 / gain.value;
         Ok(Chain {
             recorded_factor: named.unit.factor(),
-            conversion: Conversion::linear(1.0 / gain.value, 0.0).map_err(Failure::failed)?,
+            conversion: Conversion::linear(slope, -slope * zero).map_err(Failure::failed)?,
             applied: applied_by_unit(&gain.applied_unit, units)?,
             described: "static gain of the stand file".to_owned(),
             relative_std: None,
@@ -185,7 +192,9 @@ impl Stand {
         units: UnitSystem,
     ) -> Result<(Conversion, String, Option<f64>), Failure> {
         if let Some(constant) = &self.torque_per_volt {
-            let conversion = Conversion::linear(constant.value(), 0.0).map_err(Failure::failed)?;
+            let offset = -constant.value() * self.recorder.zero_v;
+            let conversion =
+                Conversion::linear(constant.value(), offset).map_err(Failure::failed)?;
             let std = constant
                 .std_uncertainty()
                 .map(|std| std / constant.value().abs());

@@ -130,7 +130,10 @@ pub(super) fn recorder(section: Option<&Section>) -> Result<RecorderData, Failur
             .positive_if_any(key, kind)
             .map(|e| e.map(|e| e.value()))
     };
-    let gain = optional("gain", Kind::Gain)?.unwrap_or(1.0);
+    // An amplifier may invert.
+    let gain = section
+        .quantity("gain", Kind::Gain)?
+        .map_or(1.0, |gain| gain.value());
     let cutoff = optional("low_pass", Kind::Frequency)?;
     let order = section.whole("low_pass_order")?;
     if order.is_some() && cutoff.is_none() {

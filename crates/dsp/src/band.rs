@@ -15,7 +15,8 @@ const EDGE_FRACTION: f64 = 0.2;
 /// Highest band as a fraction of half the sampling rate: above it the edge is too steep to build.
 const HIGHEST_FRACTION: f64 = 0.96;
 /// Band that is taken when the stated default does not fit under half the rate.
-const FALLBACK_FRACTION: f64 = 0.8;
+/// Its edge then leaves room below half the rate to see the recorder's noise.
+const FALLBACK_FRACTION: f64 = 0.7;
 /// Nodes of the table that the edge is interpolated from.
 const EDGE_NODES: usize = 1024;
 
@@ -75,7 +76,7 @@ impl Band {
         })
     }
 
-    /// The wanted band if the rate carries it with its full edge, or else 0.8 of half the rate.
+    /// The wanted band if the rate carries it with its full edge, or else 0.7 of half the rate.
     ///
     /// # Errors
     /// As [`Band::new`].
@@ -83,7 +84,7 @@ impl Band {
     /// ```
     /// use torqcomp_dsp::band::Band;
     /// assert_eq!(Band::fitting(20_000.0, 2400.0)?.top_hz(), 2400.0);
-    /// assert_eq!(Band::fitting(1000.0, 2400.0)?.top_hz(), 400.0);
+    /// assert_eq!(Band::fitting(1000.0, 2400.0)?.top_hz(), 350.0);
     /// # Ok::<(), torqcomp_dsp::Error>(())
     /// ```
     pub fn fitting(sample_rate_hz: f64, wanted_hz: f64) -> Result<Self, Error> {

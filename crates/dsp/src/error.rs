@@ -112,6 +112,19 @@ pub enum Error {
         /// What went wrong.
         why: &'static str,
     },
+    /// A gap in the time stamps is too long to be bridged.
+    #[error(
+        "a gap of {gap_s} s, {steps} steps long, ends at {time_s} s: more would be invented than \
+         measured; split the record there"
+    )]
+    GapTooLong {
+        /// Stamp after the gap.
+        time_s: f64,
+        /// Length of the gap.
+        gap_s: f64,
+        /// The same in steps of the grid.
+        steps: f64,
+    },
     /// Time stamps that do not increase cannot be resampled.
     #[error(
         "time stamp {index} ({time_s} s) does not lie after the one before it ({previous_s} s)"

@@ -92,7 +92,7 @@ impl RecordNoise {
         let nyquist_hz = 0.5 * band.sample_rate_hz();
         // A window's leakage keeps clear of the edge, a recorder's own filter of the far end.
         let from_hz = band.end_hz() + 4.0 * density.step_hz;
-        let to_hz = 0.9 * nyquist_hz;
+        let to_hz = 0.98 * nyquist_hz;
         let mut above: Vec<f64> = density.between(from_hz, to_hz).map(|(_, v)| v).collect();
         if above.len() < FEWEST_FLOOR_BINS {
             return None;

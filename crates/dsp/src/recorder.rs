@@ -25,7 +25,8 @@ impl Recorder {
     /// A recorder with a gain (output volts per input volt), a low-pass and a delay.
     ///
     /// # Errors
-    /// [`Error::NotPositive`] for a gain or cutoff that is not positive, an order of 0 or above
+    /// [`Error::NotPositive`] for a gain of zero (an amplifier may invert), a cutoff that is not
+    /// positive, an order of 0 or above
     /// 16, or a delay that is not finite.
     pub fn new(gain: f64, low_pass: Option<LowPass>, delay_s: f64) -> Result<Self, Error> {
         let check = |name, value: f64, good: bool| {
@@ -35,7 +36,7 @@ impl Recorder {
                 Err(Error::NotPositive { name, value })
             }
         };
-        check("recorder gain", gain, gain > 0.0)?;
+        check("recorder gain", gain.abs(), gain != 0.0)?;
         check("recorder delay", delay_s, delay_s >= 0.0)?;
         if let Some(filter) = low_pass {
             check("low-pass cutoff", filter.cutoff_hz, filter.cutoff_hz > 0.0)?;

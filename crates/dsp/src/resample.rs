@@ -10,6 +10,10 @@ use crate::Error;
 const POINTS: usize = 8;
 /// Longest step, in grid steps, that is interpolated as a curve; anything longer is a gap.
 const LONGEST_STEP: f64 = 1.5;
+/// Longest gap that is bridged, in grid steps.
+const LONGEST_GAP: f64 = 10_000.0;
+/// Grid samples for each recorded one, and in any case, beyond which nothing is bridged any more.
+const MOST_PER_SAMPLE: usize = 10;
 /// Distance of a stamp from the grid, in grid steps, that is nothing but rounding.
 const COINCIDENT: f64 = 1e-6;
 
@@ -85,8 +89,9 @@ impl Resampler {
     /// Takes a stamped sample; finished grid values are appended to `out`.
     ///
     /// # Errors
-    /// [`Error::TimeNotIncreasing`] if the stamp lies before the last one. A repeated stamp is
-    /// left out and counted.
+    /// [`Error::TimeNotIncreasing`] if the stamp lies before the last one, [`Error::GapTooLong`] if
+    /// it follows a gap of more than 10 000 steps, or if by then the grid holds ten times as many
+    /// samples as were recorded. A repeated stamp is left out and counted.
     pub fn push(&mut self, time_s: f64, value: f64, out: &mut Vec<f64>) -> Result<(), Error> {
         let index = self.done.samples_in;
         self.done.samples_in += 1;
@@ -103,7 +108,7 @@ impl Resampler {
                     previous_s,
                 });
             }
-            Some(&(last, _)) => self.note_step(time_s - last),
+            Some(&(last, _)) => self.note_step(last, time_s)?,
         }
         self.points.push_back((time_s, value));
         // Values up to the middle of the eight points have all their neighbours.
@@ -133,7 +138,18 @@ impl Resampler {
         self.start_s + self.next as f64 * self.step_s
     }
 
-    fn note_step(&mut self, step_s: f64) {
+    fn note_step(&mut self, last: f64, time_s: f64) -> Result<(), Error> {
+        let step_s = time_s - last;
+        let steps = step_s / self.step_s;
+        let sparse = (time_s - self.start_s) / self.step_s
+            > LONGEST_GAP + (MOST_PER_SAMPLE * self.done.samples_in) as f64;
+        if steps > LONGEST_GAP || sparse {
+            return Err(Error::GapTooLong {
+                time_s,
+                gap_s: step_s,
+                steps,
+            });
+        }
         self.done.longest_step_s = self.done.longest_step_s.max(step_s);
         if step_s > LONGEST_STEP * self.step_s {
             self.done.gaps += 1;
@@ -141,6 +157,7 @@ impl Resampler {
             let jitter = (step_s / self.step_s - 1.0).abs();
             self.done.largest_jitter = self.done.largest_jitter.max(jitter);
         }
+        Ok(())
     }
 
     fn emit(&mut self, out: &mut Vec<f64>) {
@@ -259,6 +276,24 @@ mod tests {
         assert_eq!((done.gaps, done.repeated, done.bridged), (1, 1, 3));
         assert_eq!((done.samples_in, done.samples_out), (8, 10));
         assert_eq!(done.longest_step_s, 4.0);
+    }
+
+    #[test]
+    fn clock_jumps_are_not_bridged() {
+        let mut out = Vec::new();
+        let mut resampler = Resampler::new(1e-3).unwrap();
+        resampler.push(0.0, 0.0, &mut out).unwrap();
+        let refused = resampler.push(1e6, 0.0, &mut out);
+        assert!(
+            matches!(refused, Err(Error::GapTooLong { .. })),
+            "{refused:?}"
+        );
+        // Nor are many gaps that each would do.
+        let mut resampler = Resampler::new(1e-3).unwrap();
+        let refused =
+            (0..1000).find_map(|i| resampler.push(5.0 * f64::from(i), 0.0, &mut out).err());
+        assert!(matches!(refused, Some(Error::GapTooLong { .. })));
+        assert!(out.len() < 30_000);
     }
 
     #[test]

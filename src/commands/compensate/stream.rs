@@ -3,14 +3,13 @@
 use std::collections::VecDeque;
 
 use torqcomp_dsp::compensate::{BlockConvolver, Windows};
-use torqcomp_dsp::conversion::Conversion;
 use torqcomp_dsp::noise::RecordNoise;
 use torqcomp_dsp::resample::Resampler;
 use torqcomp_dsp::spectrum::{PowerSum, welch};
 
 use super::{Plan, Rows, Run, Times};
 use crate::cli::Compensate;
-use crate::commands::unconverted;
+use crate::commands::convert;
 use crate::failure::Failure;
 use crate::io::csv::{Batch, TimeAxis, TimeSource};
 use crate::io::output::Output;
@@ -39,8 +38,6 @@ struct Job {
 
 /// What each sample goes through, the same on every thread.
 struct Steps<'a> {
-    recorded_factor: f64,
-    conversion: &'a Conversion,
     half_length: usize,
     time: &'a TimeAxis,
     start_s: f64,
@@ -61,8 +58,6 @@ pub fn run(args: &Compensate, plan: Plan, output: &mut Output) -> Result<Run, Fa
     let time = table.time.clone();
     let mut joiner = Joiner::new(&time, half_length);
     let steps = Steps {
-        recorded_factor: chain.recorded_factor,
-        conversion: &chain.conversion,
         half_length,
         time: &time,
         start_s: table.first_time_s(),
@@ -86,7 +81,7 @@ pub fn run(args: &Compensate, plan: Plan, output: &mut Output) -> Result<Run, Fa
             read: |job: &mut Job| fetch.next(&mut job.batch),
             prepare: |job: &mut Job| {
                 job.batch.read_rows(&row_plan, &time);
-                job.unconverted = steps.convert(&mut job.batch.rows.values);
+                job.unconverted = convert(&chain, &mut job.batch.rows.values).err();
             },
             join: |job: Option<Job>, ready: &mut dyn FnMut(Job)| match job {
                 Some(mut job) => {
@@ -227,14 +222,6 @@ impl Joiner {
 }
 
 impl Steps<'_> {
-    /// Recorded units to torque at rest; the first sample that has none.
-    fn convert(&self, values: &mut [f64]) -> Option<(usize, String)> {
-        if self.recorded_factor != 1.0 {
-            values.iter_mut().for_each(|v| *v *= self.recorded_factor);
-        }
-        self.conversion.convert_slice(values).err().map(unconverted)
-    }
-
     /// Compensates a window and writes it as text.
     fn work(&self, convolver: &mut BlockConvolver, job: &mut Job) {
         let length = job.window.len() - 2 * self.half_length;
@@ -271,7 +258,6 @@ impl Steps<'_> {
         let grid = Times::Grid {
             start_s: self.start_s,
             first,
-            rate_hz: self.time.rate_hz,
         };
         let times = match &self.time.source {
             TimeSource::Given
@@ -292,6 +278,7 @@ impl Steps<'_> {
         Rows {
             digits: self.args.digits,
             scale: self.scale,
+            rate_hz: self.time.rate_hz,
             times,
         }
     }

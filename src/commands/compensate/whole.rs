@@ -36,10 +36,10 @@ pub fn run(args: &Compensate, plan: Plan, output: &mut Output) -> Result<Run, Fa
         let rows = Rows {
             digits: args.digits,
             scale,
+            rate_hz: time.rate_hz,
             times: Times::Grid {
                 start_s: record.start_s,
                 first,
-                rate_hz: time.rate_hz,
             },
         };
         text.clear();

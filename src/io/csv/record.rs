@@ -36,10 +36,7 @@ impl Record {
         while fetch.next(&mut batch)? {
             batch.read_rows(&plan, &time);
             sequence.accept(&mut batch)?;
-            let values = &mut batch.rows.values;
-            values.iter_mut().for_each(|v| *v *= chain.recorded_factor);
-            if let Err(error) = chain.conversion.convert_slice(values) {
-                let (row, message) = crate::commands::unconverted(error);
+            if let Err((row, message)) = crate::commands::convert(chain, &mut batch.rows.values) {
                 return Err(sequence.failure_at_row(&batch, row, &message));
             }
             samples.extend_from_slice(&batch.rows.values);

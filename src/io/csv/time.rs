@@ -11,6 +11,9 @@ use crate::io::digits;
 /// Largest deviation of a step from the uniform one, as a fraction of it.
 const TOLERANCE: f64 = 0.01;
 
+/// Rates, over the recorded one, that stamps may be brought to.
+const RESAMPLED_RATES: (f64, f64) = (0.9, 1.4);
+
 /// How the samples of a table lie in time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TimeAxis {
@@ -80,9 +83,14 @@ impl TimeAxis {
         let typical = typical_step(&rows.times)
             .ok_or_else(|| Failure::failed(no_step(&column.heading, &rows.times)))?;
         let seconds_per_unit = unit.factor();
-        let step = options
-            .rate_hz
-            .map_or(typical, |rate| 1.0 / rate / seconds_per_unit);
+        let recorded_hz = 1.0 / (typical * seconds_per_unit);
+        let step = match options.rate_hz {
+            None => typical,
+            Some(rate_hz) => {
+                check_resampled(rate_hz, recorded_hz)?;
+                1.0 / rate_hz / seconds_per_unit
+            }
+        };
         Ok(Self {
             source: TimeSource::Stamps {
                 heading: column.heading.clone(),
@@ -223,6 +231,20 @@ pub fn missing(layout: &Layout) -> String {
     "there is no time column, so the sampling rate is unknown; give it with --rate HZ, or name the \
      column with --time-column"
         .to_owned()
+}
+
+/// Refuses to bring stamps to a rate far from the recorded one.
+fn check_resampled(rate_hz: f64, recorded_hz: f64) -> Result<(), Failure> {
+    let (low, high) = RESAMPLED_RATES;
+    if (low * recorded_hz..=high * recorded_hz).contains(&rate_hz) {
+        return Ok(());
+    }
+    Err(Failure::failed(format_args!(
+        "the stamps come at {} Hz; --resample with --rate {} would fold high frequencies down or \
+         invent samples. Resample near the recorded rate, and limit the band with --band",
+        digits::text(recorded_hz, 6),
+        digits::text(rate_hz, 6)
+    )))
 }
 
 /// A rate without the rounding of the stamps it was found from: nine digits, if they say the same.
