@@ -17,7 +17,7 @@ use crate::io::csv::{Place, Summary, Table, TimeAxis, TimeSource};
 use crate::io::digits::{self, Digits};
 use crate::io::output::Output;
 use crate::io::text::Text;
-use crate::report::compensate::{Gain, Noise, RecordNoise, Report, SCHEMA};
+use crate::report::compensate::{Ends, Gain, Noise, RecordNoise, Report, SCHEMA};
 use crate::report::svg::Traces;
 use crate::report::{self, Warning};
 use crate::stand::{self, Chain, Stand};
@@ -26,6 +26,10 @@ use crate::stand::{self, Chain, Stand};
 const DEFAULT_BAND_HZ: f64 = 2400.0;
 /// Frequencies at which the report gives the gain, as fractions of the band.
 const GAIN_POINTS: usize = 9;
+/// Gain from which a record of unknown noise is worth a warning.
+const LARGE_GAIN: f64 = 10.0;
+/// Rms above the band over that within it, from which it is worth a warning.
+const ABOVE_BAND: f64 = 0.1;
 /// Part of the result that may be noise before it is worth a warning.
 const NOISY_FRACTION: f64 = 0.5;
 
@@ -42,9 +46,67 @@ struct Run {
     summary: Summary,
     samples: usize,
     start_s: f64,
+    extent: Ends,
     resampled: Option<resample::Resampled>,
     noise: Option<torqcomp_dsp::noise::RecordNoise>,
     traces: Option<Traces>,
+}
+
+/// Sums and ends of a result.
+#[derive(Debug, Clone, Copy, Default)]
+struct Extent {
+    count: f64,
+    sum: f64,
+    square: f64,
+    smallest: f64,
+    largest: f64,
+}
+
+impl Extent {
+    fn of(values: &[f64]) -> Self {
+        let Some(&first) = values.first() else {
+            return Self::default();
+        };
+        let mut extent = Self {
+            count: values.len() as f64,
+            smallest: first,
+            largest: first,
+            ..Self::default()
+        };
+        for value in values {
+            extent.sum += value;
+            extent.square += value * value;
+            extent.smallest = extent.smallest.min(*value);
+            extent.largest = extent.largest.max(*value);
+        }
+        extent
+    }
+
+    fn join(&mut self, other: &Self) {
+        if other.count == 0.0 {
+            return;
+        }
+        if self.count == 0.0 {
+            *self = *other;
+            return;
+        }
+        self.count += other.count;
+        self.sum += other.sum;
+        self.square += other.square;
+        self.smallest = self.smallest.min(other.smallest);
+        self.largest = self.largest.max(other.largest);
+    }
+
+    /// In printed units.
+    fn scaled(self, scale: f64) -> Ends {
+        let mean = self.sum / self.count;
+        Ends {
+            mean: mean * scale,
+            rms: (self.square / self.count - mean * mean).max(0.0).sqrt() * scale.abs(),
+            smallest: self.smallest * scale,
+            largest: self.largest * scale,
+        }
+    }
 }
 
 /// Runs the verb.
@@ -176,6 +238,7 @@ fn describe(args: &Compensate, plan: &Plan, output: &str) -> Report {
         band_end_hz: band.end_hz(),
         edge_s: filter.half_length() as f64 / band.sample_rate_hz(),
         resampled: None,
+        result: Ends::default(),
         noise: Noise {
             white_gain: gain.white,
             largest_gain: gain.largest.0,
@@ -212,6 +275,7 @@ fn rate_from(time: &TimeAxis) -> String {
 /// Fills in what the run found.
 fn complete(report: &mut Report, run: &Run) {
     report.samples = run.samples;
+    report.result = run.extent.clone();
     report.start_s = run.start_s;
     report.resampled.clone_from(&run.resampled);
     report.noise.record = run.noise.as_ref().map(|noise| RecordNoise {
@@ -219,18 +283,29 @@ fn complete(report: &mut Report, run: &Run) {
         floor_band_hz: [noise.floor_from_hz, noise.floor_to_hz],
         recorded_rms: noise.recorded_rms,
         compensated_rms: noise.compensated_rms,
-        output_rms: noise.output_rms,
+        in_band_rms: noise.in_band_rms,
+        above_band_rms: noise.above_band_rms,
         lost_hz: noise.lost.iter().map(|(from, to)| [*from, *to]).collect(),
     });
-    let warnings = &mut report.warnings;
+    let mut warnings = Vec::new();
     warnings.extend(run.summary.lost.clone());
     warnings.extend(run.summary.warnings.clone());
     if let Some(noise) = &run.noise {
-        warnings.extend(noise_warnings(noise, report.band_hz));
+        warnings.extend(noise_warnings(noise, report));
+    } else if report.noise.largest_gain > LARGE_GAIN {
+        warnings.push(Warning::new(
+            "noise-unknown",
+            format!(
+                "the record is multiplied by up to {} and how much noise it has cannot be told; \
+                 choose a lower --band if the result looks noisy",
+                report::rounded(report.noise.largest_gain, 3)
+            ),
+        ));
     }
-    if let Some(resampled) = &run.resampled {
-        warnings.extend(gap_warning(resampled));
-    }
+    report.warnings.extend(warnings);
+    report
+        .warnings
+        .extend(run.resampled.as_ref().and_then(gap_warning));
     let reach_s = 2.0 * report.edge_s * report.rate_hz;
     if (run.samples as f64) < reach_s {
         report.warnings.push(Warning::new(
@@ -246,8 +321,21 @@ fn complete(report: &mut Report, run: &Run) {
     }
 }
 
-fn noise_warnings(noise: &torqcomp_dsp::noise::RecordNoise, band_hz: f64) -> Vec<Warning> {
+fn noise_warnings(noise: &torqcomp_dsp::noise::RecordNoise, report: &Report) -> Vec<Warning> {
+    let (band_hz, unit, rms) = (report.band_hz, &report.unit, report.result.rms);
     let mut warnings = Vec::new();
+    if noise.above_band_rms > ABOVE_BAND * noise.in_band_rms {
+        warnings.push(Warning::new(
+            "signal-above-band",
+            format!(
+                "{} {unit} rms of the record lie above the band of {} Hz and are left out, {} {unit} \
+                 rms lie within it",
+                report::rounded(noise.above_band_rms, 3),
+                report::short(band_hz),
+                report::rounded(noise.in_band_rms, 3)
+            ),
+        ));
+    }
     if let Some(from_hz) = noise.lost_from_hz(band_hz) {
         let remedy = if from_hz > 0.0 {
             format!("--band {} keeps it out", report::rounded(from_hz, 4))
@@ -264,13 +352,13 @@ fn noise_warnings(noise: &torqcomp_dsp::noise::RecordNoise, band_hz: f64) -> Vec
             ),
         ));
     }
-    if noise.output_rms > 0.0 && noise.compensated_rms > NOISY_FRACTION * noise.output_rms {
+    if rms > 0.0 && noise.compensated_rms > NOISY_FRACTION * rms {
         warnings.push(Warning::new(
             "mostly-noise",
             format!(
-                "noise makes up {} of {} rms of the result; choose a lower --band",
+                "noise makes up {} of {} {unit} rms of the result; choose a lower --band",
                 report::rounded(noise.compensated_rms, 3),
-                report::rounded(noise.output_rms, 3)
+                report::rounded(rms, 3)
             ),
         ));
     }

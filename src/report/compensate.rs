@@ -49,12 +49,27 @@ pub struct Report {
     pub band_end_hz: f64,
     /// Time from either end within which the result leans on the record's continuation.
     pub edge_s: f64,
+    /// The result in figures.
+    pub result: Ends,
     /// What was interpolated.
     pub resampled: Option<Resampled>,
     /// What the compensation does to noise.
     pub noise: Noise,
     /// What should be known.
     pub warnings: Vec<Warning>,
+}
+
+/// A result in figures, in its unit.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Ends {
+    /// Mean.
+    pub mean: f64,
+    /// Root mean square about the mean.
+    pub rms: f64,
+    /// Smallest value.
+    pub smallest: f64,
+    /// Largest value.
+    pub largest: f64,
 }
 
 /// What a compensation does to noise.
@@ -94,8 +109,10 @@ pub struct RecordNoise {
     pub recorded_rms: f64,
     /// The same after compensation, rms.
     pub compensated_rms: f64,
-    /// The result without its mean, rms, noise included.
-    pub output_rms: f64,
+    /// What the record holds within the band, rms without its mean, noise included.
+    pub in_band_rms: f64,
+    /// What the record holds above the band beside its noise, rms: it is left out.
+    pub above_band_rms: f64,
     /// Ranges in which the record does not rise above its noise.
     pub lost_hz: Vec<[f64; 2]>,
 }
@@ -140,7 +157,19 @@ impl Report {
         );
         line("gain", self.noise.gain_text());
         line("noise", self.noise.record_text(&self.unit));
-        line("output", format!("{} in {}", self.output, self.unit));
+        let result = &self.result;
+        line(
+            "result",
+            format!(
+                "mean {}, {} rms about it, from {} to {} {}",
+                rounded(result.mean, 4),
+                rounded(result.rms, 4),
+                rounded(result.smallest, 4),
+                rounded(result.largest, 4),
+                self.unit
+            ),
+        );
+        line("output", self.output.clone());
         text
     }
 }
@@ -181,15 +210,14 @@ impl Noise {
     fn record_text(&self, unit: &str) -> String {
         match &self.record {
             None => format!(
-                "white noise grows {} times; how much this record has cannot be told (too little \
-                 room above the band)",
+                "white noise grows {} times; how much this record has cannot be told (too few \
+                 samples, or no noise above the band)",
                 rounded(self.white_gain, 3)
             ),
             Some(noise) => format!(
-                "{} {unit} rms in the band become {} {unit} of {} {unit} rms in all",
+                "{} {unit} rms in the band become {} {unit} rms",
                 rounded(noise.recorded_rms, 3),
-                rounded(noise.compensated_rms, 3),
-                rounded(noise.output_rms, 3)
+                rounded(noise.compensated_rms, 3)
             ),
         }
     }

@@ -43,7 +43,7 @@ pub enum Error {
     #[error(
         "the inverse filter does not die out within {samples} samples ({seconds} s): the band of \
          {band_hz} Hz is very narrow for a rate of {sample_rate_hz} Hz, or the inverse response \
-         rings; lower the record's rate or widen the band"
+         rings or grows too steeply; try another band"
     )]
     FilterTooLong {
         /// Longest length tried, in samples.

@@ -16,7 +16,7 @@ use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
 
 use crate::Error;
-use crate::spectrum::{Density, welch};
+use crate::spectrum::{Density, periodogram};
 
 mod refine;
 
@@ -24,9 +24,10 @@ pub use refine::refine_fundamental;
 
 /// Steps after which a rotating phasor is set anew, so that rounding does not add up.
 const RESET_STEPS: usize = 512;
-/// Bins on either side of a component over which the residual's density is averaged.
-const NEAR_BINS: usize = 4;
-/// Fewest residual samples that a spectrum is made of; below, the residual is taken as white.
+/// Bins of the residual's periodogram, on either side of a component, that its uncertainty is taken
+/// from. The nearest one is left out: the fit has emptied it.
+const NEAR_BINS: std::ops::RangeInclusive<usize> = 2..=12;
+/// Fewest residual samples that a periodogram is made of; below, the residual is taken as white.
 const FEWEST_FOR_SPECTRUM: usize = 256;
 /// Variance of an amplitude over that of a well-separated one, above which components are refused.
 const LARGEST_INFLATION: f64 = 1e4;
@@ -81,8 +82,9 @@ impl Fundamental {
 /// Fits the components of a uniformly sampled record.
 ///
 /// `start_s` is the time of the first sample; phases refer to time 0. The standard uncertainty of
-/// an amplitude is `√(S(f) T⁻¹)` for a residual of one-sided density `S(f)` near the component and
-/// a record of length `T`, times the inflation by components that are close together.
+/// an amplitude is `√(S(f)/T)` for a residual of one-sided density `S(f)` near the component and a
+/// record of length `T`, times the inflation by components that are close together. A residual line
+/// that is not fitted counts with what it leaks to the component.
 ///
 /// # Errors
 /// [`Error::AboveNyquist`], [`Error::NotSeparable`] if the record is too short to tell two
@@ -361,27 +363,23 @@ fn mean_square(values: &[f64]) -> f64 {
     sum_squares(values) / values.len() as f64
 }
 
-/// Density of the residual with about eight independent blocks, `None` for a short one.
+/// Density of the residual, `None` for a short one. Without a window, because the fit has none: what a
+/// strong line beside the components leaks into them shows here, too.
 fn residual_density(residual: &[f64], sample_rate_hz: f64) -> Option<Density> {
-    if residual.len() < FEWEST_FOR_SPECTRUM {
-        return None;
-    }
-    let block = (residual.len() / 8 + 1)
-        .next_power_of_two()
-        .clamp(64, 1 << 16)
-        / 2;
-    welch(residual, sample_rate_hz, block).ok()
+    (residual.len() >= FEWEST_FOR_SPECTRUM).then(|| periodogram(residual, sample_rate_hz))
 }
 
-/// Mean density over the bins next to a frequency; a line of width zero keeps clear of the
-/// constant's bins.
+/// Mean density over the bins next to a frequency, mirrored at zero.
 fn density_near(density: &Density, frequency_hz: f64) -> f64 {
     let centre = (frequency_hz / density.step_hz).round() as usize;
-    let last = density.values.len() - 2;
-    let from = centre.saturating_sub(NEAR_BINS).clamp(1, last);
-    let to = (centre + NEAR_BINS).min(last);
-    let near = &density.values[from..=to.max(from)];
-    near.iter().sum::<f64>() / near.len() as f64
+    let last = density.values.len() - 1;
+    let near: Vec<f64> = NEAR_BINS
+        .flat_map(|away| [centre + away, centre.abs_diff(away)])
+        // The constant is fitted as well.
+        .filter(|bin| (1..=last).contains(bin))
+        .map(|bin| density.values[bin])
+        .collect();
+    near.iter().sum::<f64>() / near.len().max(1) as f64
 }
 
 #[cfg(test)]

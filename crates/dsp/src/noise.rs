@@ -75,8 +75,10 @@ pub struct RecordNoise {
     pub recorded_rms: f64,
     /// The same noise after compensation, rms: `√(S₀ ∫|W H⁻¹|² df)`.
     pub compensated_rms: f64,
-    /// The whole record within the band after compensation, rms without its mean, noise included.
-    pub output_rms: f64,
+    /// What the record holds within the band, rms without its mean, noise included.
+    pub in_band_rms: f64,
+    /// What the record holds above the band beside its noise, rms.
+    pub above_band_rms: f64,
     /// Ranges within the band where the record does not rise 3 dB above the floor, in Hz.
     pub lost: Vec<(f64, f64)>,
 }
@@ -113,21 +115,25 @@ impl RecordNoise {
                 .sum::<f64>()
                 .sqrt()
         };
-        let gain_square = |f: f64| filter.response(f).norm_sqr();
+        let above_mean_square: f64 = density
+            .between(band.end_hz(), to_hz)
+            .map(|(_, v)| (v - floor_density) * density.step_hz)
+            .sum();
         Some(Self {
             floor_density,
             floor_from_hz: from_hz,
             floor_to_hz: to_hz,
             recorded_rms: power(&|f, _| floor_density * band.gain(f).powi(2)),
-            compensated_rms: power(&|f, _| floor_density * gain_square(f)),
+            compensated_rms: power(&|f, _| floor_density * filter.response(f).norm_sqr()),
             // The first bins hold the mean, widened by the window.
-            output_rms: power(&|f, v| {
+            in_band_rms: power(&|f, v| {
                 if f < 2.0 * density.step_hz {
                     0.0
                 } else {
-                    v * gain_square(f)
+                    v * band.gain(f).powi(2)
                 }
             }),
+            above_band_rms: above_mean_square.max(0.0).sqrt(),
             lost: lost_ranges(density, band.top_hz(), floor_density),
         })
     }
@@ -231,10 +237,9 @@ mod tests {
             (stated.compensated_rms / measured - 1.0).abs() < 0.05,
             "{stated:?} {measured}"
         );
-        let amplitude = 50.0 * (1.0 - (120.0_f64 / 590.0).powi(2)).hypot(0.14 * 120.0 / 590.0);
-        let expected = (0.5 * amplitude * amplitude + measured * measured).sqrt();
+        let expected = (0.5 * 50.0 * 50.0 + stated.recorded_rms.powi(2)).sqrt();
         assert!(
-            (stated.output_rms / expected - 1.0).abs() < 0.01,
+            (stated.in_band_rms / expected - 1.0).abs() < 0.01,
             "{stated:?} {expected}"
         );
     }
@@ -260,6 +265,21 @@ mod tests {
         let density = welch(&with_signal, RATE, 4096).unwrap();
         let found = RecordNoise::of(&filter, &density).unwrap();
         assert_eq!(found.lost_from_hz(2400.0), Some(100.0), "{:?}", found.lost);
+    }
+
+    #[test]
+    fn a_signal_above_the_band_is_seen() {
+        let record: Vec<f64> = white(0.1, 100_000)
+            .iter()
+            .enumerate()
+            .map(|(i, n)| n + 2.0 * (std::f64::consts::TAU * 5000.0 * i as f64 / RATE).cos())
+            .collect();
+        let density = welch(&record, RATE, 4096).unwrap();
+        let found = RecordNoise::of(&filter(2400.0), &density).unwrap();
+        assert!(
+            (found.above_band_rms / 2.0_f64.sqrt() - 1.0).abs() < 0.02,
+            "{found:?}"
+        );
     }
 
     #[test]

@@ -44,6 +44,21 @@ impl PowerSum {
         self.blocks += 1;
     }
 
+    /// Adds all half-overlapping blocks that fit into the samples, the mean taken off each.
+    pub fn add_samples(&mut self, samples: &[f64]) {
+        let length = self.block_length;
+        let transform = RealFftPlanner::new().plan_fft_forward(length);
+        let mut spectrum = transform.make_output_vec();
+        for block in samples.windows(length).step_by(length / 2) {
+            let mean = block.iter().sum::<f64>() / length as f64;
+            let mut block: Vec<f64> = block.iter().map(|x| x - mean).collect();
+            transform
+                .process(&mut block, &mut spectrum)
+                .expect("buffers were made for this length");
+            self.add_hann(&spectrum);
+        }
+    }
+
     /// Adds another sum over blocks of the same length.
     ///
     /// # Panics
@@ -106,6 +121,38 @@ impl Density {
     }
 }
 
+/// Density of a record from one transform over all of it, without a window: its periodogram.
+///
+/// Each value scatters as much as it is large; what matters is their mean over some of them.
+///
+/// ```
+/// use torqcomp_dsp::spectrum::periodogram;
+/// // Ten whole periods of amplitude 2: all of the mean square of 2 in the tenth bin.
+/// let x: Vec<f64> = (0..500).map(|i| 2.0 * (std::f64::consts::TAU * 0.02 * i as f64).cos()).collect();
+/// let density = periodogram(&x, 1000.0);
+/// assert!((density.values[10] * density.step_hz - 2.0).abs() < 1e-12);
+/// ```
+#[must_use]
+pub fn periodogram(samples: &[f64], sample_rate_hz: f64) -> Density {
+    let length = samples.len();
+    let transform = RealFftPlanner::new().plan_fft_forward(length);
+    let mut spectrum = transform.make_output_vec();
+    transform
+        .process(&mut samples.to_vec(), &mut spectrum)
+        .expect("buffers were made for this length");
+    let scale = 2.0 / (sample_rate_hz * length as f64);
+    let mut values: Vec<f64> = spectrum.iter().map(|bin| bin.norm_sqr() * scale).collect();
+    values[0] *= 0.5;
+    if length.is_multiple_of(2) {
+        values[length / 2] *= 0.5;
+    }
+    Density {
+        step_hz: sample_rate_hz / length as f64,
+        values,
+        blocks: 1,
+    }
+}
+
 /// Density of a record by Welch's method: Hann windows, half overlapping, the mean taken off each.
 ///
 /// Source: P. D. Welch, IEEE Trans. Audio Electroacoust. 15 (1967), 70.
@@ -143,18 +190,8 @@ pub fn welch(samples: &[f64], sample_rate_hz: f64, block_length: usize) -> Resul
             got: samples.len(),
         });
     }
-    let transform = RealFftPlanner::new().plan_fft_forward(block_length);
-    let mut spectrum = transform.make_output_vec();
     let mut power = PowerSum::new(block_length);
-    for start in (0..=samples.len() - block_length).step_by(block_length / 2) {
-        let mut block = samples[start..start + block_length].to_vec();
-        let mean = block.iter().sum::<f64>() / block_length as f64;
-        block.iter_mut().for_each(|x| *x -= mean);
-        transform
-            .process(&mut block, &mut spectrum)
-            .expect("buffers were made for this length");
-        power.add_hann(&spectrum);
-    }
+    power.add_samples(samples);
     Ok(power
         .density(sample_rate_hz)
         .expect("the record holds at least one block"))

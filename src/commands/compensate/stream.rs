@@ -7,7 +7,7 @@ use torqcomp_dsp::noise::RecordNoise;
 use torqcomp_dsp::resample::Resampler;
 use torqcomp_dsp::spectrum::{PowerSum, welch};
 
-use super::{Plan, Rows, Run, Times};
+use super::{Extent, Plan, Rows, Run, Times};
 use crate::cli::Compensate;
 use crate::commands::convert;
 use crate::failure::Failure;
@@ -22,6 +22,9 @@ const MOST_THREADS: usize = 8;
 /// Jobs under way beside those that the threads hold.
 const SPARE_JOBS: usize = 2;
 
+/// Longest block of the noise estimate: longer ones may not fit into a piece.
+const LONGEST_NOISE_BLOCK: usize = 1 << 13;
+
 /// A piece of the record on its way.
 #[derive(Default)]
 struct Job {
@@ -34,11 +37,13 @@ struct Job {
     torque: Vec<f64>,
     text: Text,
     power: Option<PowerSum>,
+    extent: Extent,
 }
 
 /// What each sample goes through, the same on every thread.
 struct Steps<'a> {
     half_length: usize,
+    noise_block: usize,
     time: &'a TimeAxis,
     start_s: f64,
     scale: f64,
@@ -56,9 +61,12 @@ pub fn run(args: &Compensate, plan: Plan, output: &mut Output) -> Result<Run, Fa
     let half_length = filter.half_length();
     let rate_hz = table.time.rate_hz;
     let time = table.time.clone();
+    let first = BlockConvolver::new(&filter);
+    let noise_block = first.block_length().min(LONGEST_NOISE_BLOCK);
     let mut joiner = Joiner::new(&time, half_length);
     let steps = Steps {
         half_length,
+        noise_block,
         time: &time,
         start_s: table.first_time_s(),
         scale: 1.0 / chain.applied.factor,
@@ -66,10 +74,10 @@ pub fn run(args: &Compensate, plan: Plan, output: &mut Output) -> Result<Run, Fa
     };
     // Rows enough that a piece needs no more than the one after it.
     let (mut fetch, row_plan, mut sequence) = table.into_stream(2 * half_length);
-    let first = BlockConvolver::new(&filter);
-    let mut power = PowerSum::new(first.block_length());
+    let mut power = PowerSum::new(noise_block);
+    let mut extent = Extent::default();
     let mut traces = args.plot.as_ref().map(|_| Traces::new(args.plot_range));
-    let mut only_window = None;
+    let mut short = Vec::new();
     let threads = threads(args);
     let mut convolvers: Vec<BlockConvolver> = (1..threads).map(|_| first.another()).collect();
     convolvers.push(first);
@@ -105,30 +113,33 @@ pub fn run(args: &Compensate, plan: Plan, output: &mut Output) -> Result<Run, Fa
                 if let Some(traces) = &mut traces {
                     steps.trace(job, traces);
                 }
-                // A record that fits one window may be too short for a block.
-                only_window = (job.first == 0).then(|| std::mem::take(&mut job.window));
+                extent.join(&job.extent);
+                // A record may be too short for a block of the noise estimate.
+                if short.len() < noise_block {
+                    short.extend_from_slice(steps.recorded(&job.window));
+                }
                 Ok(())
             },
         },
     )?;
 
     let density = power.density(rate_hz).or_else(|| {
-        let window = only_window.as_ref()?;
-        let middle = window.get(half_length..window.len() - half_length)?;
-        let block = (middle.len() / 2).next_power_of_two() / 2;
-        welch(middle, rate_hz, block).ok()
+        let block = (short.len() / 2).next_power_of_two() / 2;
+        welch(&short, rate_hz, block).ok()
     });
     let in_print = |mut noise: RecordNoise| {
         noise.floor_density *= steps.scale * steps.scale;
         noise.recorded_rms *= steps.scale;
         noise.compensated_rms *= steps.scale;
-        noise.output_rms *= steps.scale;
+        noise.in_band_rms *= steps.scale;
+        noise.above_band_rms *= steps.scale;
         noise
     };
     Ok(Run {
         summary: sequence.finish()?,
         samples: joiner.samples,
         start_s: steps.start_s,
+        extent: extent.scaled(steps.scale),
         resampled: joiner.resampled,
         noise: density
             .and_then(|density| RecordNoise::of(&filter, &density))
@@ -228,9 +239,16 @@ impl Steps<'_> {
         job.torque.resize(length, 0.0);
         let power = job
             .power
-            .get_or_insert_with(|| PowerSum::new(convolver.block_length()));
+            .get_or_insert_with(|| PowerSum::new(self.noise_block));
         power.clear();
-        convolver.convolve(&job.window, &mut job.torque, Some(power));
+        if self.noise_block == convolver.block_length() {
+            // The forward transforms are there anyway.
+            convolver.convolve(&job.window, &mut job.torque, Some(power));
+        } else {
+            convolver.convolve(&job.window, &mut job.torque, None);
+            power.add_samples(&job.window[self.half_length..self.half_length + length]);
+        }
+        job.extent = Extent::of(&job.torque);
         job.text.clear();
         let rows = self.rows(&job.batch, job.first);
         let recorded = self.recorded(&job.window);

@@ -4,7 +4,7 @@ use torqcomp_dsp::compensate::whole_record;
 use torqcomp_dsp::noise::RecordNoise;
 use torqcomp_dsp::spectrum::welch;
 
-use super::{Plan, Rows, Run, Times};
+use super::{Extent, Plan, Rows, Run, Times};
 use crate::cli::Compensate;
 use crate::failure::Failure;
 use crate::io::csv::Record;
@@ -61,6 +61,7 @@ pub fn run(args: &Compensate, plan: Plan, output: &mut Output) -> Result<Run, Fa
     Ok(Run {
         samples: torque.len(),
         start_s: record.start_s,
+        extent: Extent::of(&torque).scaled(scale),
         resampled: record.resampled,
         noise: density.and_then(|density| RecordNoise::of(&filter, &density)),
         summary: record.summary,

@@ -39,6 +39,9 @@ pub use windows::{Stream, Windows};
 /// Part of the impulse response that may be cut off, relative to the static gain. It bounds the
 /// difference between the two ways to run a compensation, relative to the recorded full scale.
 const TAIL_TOLERANCE: f64 = 2e-10;
+/// The same relative to the largest gain: where a compensation multiplies by thousands, what is cut
+/// off is nothing beside what noise becomes.
+const TAIL_OF_LARGEST: f64 = 4e-12;
 /// Longest transform used to build a filter.
 const LONGEST_DESIGN: usize = 1 << 24;
 
@@ -100,8 +103,11 @@ impl InverseFilter {
         let start = (64.0 * band.sample_rate_hz() / edge_width).max(1024.0) as usize;
         let mut length = start.next_power_of_two();
         while length <= LONGEST_DESIGN {
-            let circular = impulse_response(&inverse, &band, length)?;
-            if let Some(half_length) = half_length(&circular, TAIL_TOLERANCE * static_gain) {
+            let grid = response_on_grid(&inverse, &band, length)?;
+            let largest = grid.iter().map(|g| g.norm()).fold(0.0, f64::max);
+            let tolerance = (TAIL_TOLERANCE * static_gain).max(TAIL_OF_LARGEST * largest);
+            let circular = impulse_response(grid, length);
+            if let Some(half_length) = half_length(&circular, tolerance) {
                 let mut taps: Vec<f64> = (0..=2 * half_length)
                     .map(|tap| circular[(length + tap - half_length) % length])
                     .collect();
@@ -184,8 +190,7 @@ fn response_on_grid(
 }
 
 /// Impulse response on a circle of `length` samples, time zero at index 0.
-fn impulse_response(inverse: &Inverse, band: &Band, length: usize) -> Result<Vec<f64>, Error> {
-    let mut spectrum = response_on_grid(inverse, band, length)?;
+fn impulse_response(mut spectrum: Vec<Complex64>, length: usize) -> Vec<f64> {
     let mut response = vec![0.0; length];
     RealFftPlanner::new()
         .plan_fft_inverse(length)
@@ -193,7 +198,7 @@ fn impulse_response(inverse: &Inverse, band: &Band, length: usize) -> Result<Vec
         .expect("lengths come from one number and the ends are real");
     let scale = 1.0 / length as f64;
     response.iter_mut().for_each(|tap| *tap *= scale);
-    Ok(response)
+    response
 }
 
 /// Half-length beyond which at most `tolerance` is left on the circle; `None` if that is not

@@ -123,6 +123,25 @@ fn stated_uncertainty_is_the_spread() {
 }
 
 #[test]
+fn a_strong_line_that_is_not_fitted_counts() {
+    // What 3 at 588 Hz leaks to 1 at 60 Hz within 0.3 s is far more than the noise.
+    let mut square = 0.0;
+    let mut stated = 0.0;
+    for run in 0..40 {
+        let phase = 0.7 * f64::from(run);
+        let parts = [(1.0, 60.0, 0.2), (1.0, 120.0, 1.0), (3.0, 588.3, phase)];
+        let mut noise = Normal(50 + run as u64);
+        let mut x = waves(20_000.0, 0.0, 6010, &parts);
+        x.iter_mut().for_each(|v| *v += 0.001 * noise.next());
+        let h = fit(&x, 20_000.0, 0.0, Fundamental::given(60.0), &[1.0, 2.0]).unwrap();
+        square += (h.components[0].phasor - Complex64::from_polar(1.0, 0.2)).norm_sqr() / 2.0;
+        stated += h.components[0].std_amplitude.powi(2);
+    }
+    let ratio = (square / stated).sqrt();
+    assert!((0.3..1.6).contains(&ratio), "{ratio}");
+}
+
+#[test]
 fn fundamental_is_found_over_many_periods() {
     let parts = [(0.2, 59.87, 0.0), (1.0, 119.74, 1.0), (0.4, 598.7, -0.5)];
     let mut noise = Normal(11);
