@@ -100,6 +100,6 @@ pub fn did_you_mean<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str>) -
         .filter(|(similarity, _)| *similarity > 0.7)
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map_or_else(String::new, |(_, name)| {
-            format!("; did you mean \"{name}\"?")
+            format!(" (did you mean \"{name}\"?)")
         })
 }

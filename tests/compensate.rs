@@ -260,6 +260,131 @@ fn recorder_low_pass_and_delay_are_divided_out() {
 }
 
 #[test]
+fn the_zero_of_the_recorder_counts_on_every_way_to_torque() {
+    let folder = Folder::new();
+    let rows: String = (0..500)
+        .map(|i| format!("{},2.6\n", f64::from(i) * 1e-4))
+        .collect();
+    folder.write("in.csv", format!("time_s,bridge_V\n{rows}"));
+    let modal = "schema = \"torqcomp.stand/1\"\n[mechanics]\nnatural_frequency = \"590 Hz\"\ndamping_ratio = 0.07\n";
+    for (stand, heading, expected) in [
+        (
+            "[calibration]\ntorque_per_volt = \"100 N m/V\"\n",
+            "torque_n_m",
+            10.0,
+        ),
+        ("static_gain = \"2 V/N\"\n", "force_n", 0.05),
+    ] {
+        folder.write(
+            "stand.toml",
+            format!("{modal}{stand}[recorder]\nzero = \"2.5 V\"\n"),
+        );
+        let ran = folder.run(&["compensate", "in.csv", "--stand", "stand.toml", "-q"]);
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        assert!(
+            (column(&ran.stdout, heading)[250] - expected).abs() < 1e-9,
+            "{stand}"
+        );
+    }
+}
+
+#[test]
+fn clock_stamps_keep_their_resolution() {
+    // Milliseconds since 1970, where a copy of the text will not do.
+    let folder = Folder::new();
+    let stamp = |i: u32| 1.7e12 + 0.5 * f64::from(i);
+    let rows: String = (0..2000)
+        .map(|i| format!("{:.1},0.001\n", stamp(i)))
+        .collect();
+    folder.write("in.csv", format!("time_ms,bridge_V\n{rows}"));
+    for more in [&[][..], &["--resample"], &["--whole-record"]] {
+        let args = [
+            &["compensate", "in.csv", "--stand", "stand.toml", "-q"][..],
+            more,
+        ]
+        .concat();
+        let ran = folder.run(&args);
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        let times = column(&ran.stdout, "time_s");
+        let steps = times.windows(2).map(|w| w[1] - w[0]);
+        assert!(
+            steps.into_iter().all(|s| (s - 0.5e-3).abs() < 1e-6),
+            "{more:?}"
+        );
+    }
+}
+
+#[test]
+fn what_the_command_line_overrides_is_said() {
+    let (shown, _) = steady(&PARTS[..2], 20_000.0, 3000);
+    let folder = Folder::new();
+    folder.write("in.csv", record(&shown, 20_000.0));
+    let run = |more: &[&str]| {
+        folder.run(&[&["compensate", "in.csv", "--stand", "stand.toml"][..], more].concat())
+    };
+    run(&["--unit", "mV"]).says(0, &["unit-overrides-heading", "says V"]);
+    run(&["--rate", "10000"]).says(0, &["rate-overrides-stamps", "20000 Hz"]);
+    run(&["--resample", "--rate", "1000"]).says(1, &["20000 Hz", "fold"]);
+    assert!(
+        !run(&["--unit", "V", "--rate", "20000"])
+            .stderr
+            .contains("overrides")
+    );
+}
+
+#[test]
+fn a_signal_above_the_band_and_an_unknown_noise_are_said() {
+    let (shown, _) = steady(&[(1.0, 100.0, 0.0), (1.0, 600.0, 0.0)], 20_000.0, 40_000);
+    let folder = Folder::new();
+    folder.write("in.csv", record(&shown, 20_000.0));
+    let ran = folder.run(&[
+        "compensate",
+        "in.csv",
+        "--stand",
+        "stand.toml",
+        "--band",
+        "300",
+    ]);
+    ran.says(0, &["signal-above-band", "300 Hz"]);
+    let ran = folder.run(&[
+        "compensate",
+        "in.csv",
+        "--stand",
+        "stand.toml",
+        "--band",
+        "9600",
+    ]);
+    ran.says(0, &["noise-unknown", "--band"]);
+}
+
+#[test]
+fn values_that_no_recorder_measures_are_refused() {
+    let folder = Folder::new();
+    let rows: String = (0..500)
+        .map(|i| format!("{},1e305\n", f64::from(i) * 1e-4))
+        .collect();
+    folder.write("in.csv", format!("time_s,bridge_V\n{rows}"));
+    for more in [&[][..], &["--whole-record"]] {
+        let args = [
+            &[
+                "compensate",
+                "in.csv",
+                "--stand",
+                "stand.toml",
+                "-o",
+                "out.csv",
+            ][..],
+            more,
+        ]
+        .concat();
+        folder
+            .run(&args)
+            .says(1, &["line 2", "no recorder measures"]);
+    }
+    assert_eq!(folder.names(), ["in.csv", "stand.toml"]);
+}
+
+#[test]
 fn resampling_says_what_it_did() {
     let rate = 20_000.0;
     let (shown, acted) = steady(&PARTS[..2], rate, 20_000);
@@ -299,6 +424,7 @@ fn resampling_says_what_it_did() {
     let torque = column(&folder.read("out.csv"), "torque_n_m");
     assert_eq!(torque.len(), 20_000);
     assert!(largest_difference(&torque[500..8500], &acted[500..8500]) < 1e-4);
+    assert_eq!(report["resampled"]["repeated"], 0);
     // Both ways to run it resample alike.
     let whole = [&args[..5], &["-o", "whole.csv", "--whole-record"]].concat();
     assert_eq!(folder.run(&whole).code, 0);

@@ -10,7 +10,7 @@ use torqcomp_dsp::compensate::InverseFilter;
 use torqcomp_dsp::noise::NoiseGain;
 use torqcomp_dsp::resample;
 
-use super::{Outcome, conclude, relative_std};
+use super::{Outcome, conclude, uncertainty};
 use crate::cli::Compensate;
 use crate::failure::Failure;
 use crate::io::csv::{Place, Summary, Table, TimeAxis, TimeSource};
@@ -249,7 +249,8 @@ fn describe(args: &Compensate, plan: &Plan, output: &str) -> Report {
                 .map(|&(frequency_hz, gain)| Gain {
                     frequency_hz,
                     gain,
-                    relative_std: relative_std(stand, chain, frequency_hz),
+                    relative_std: uncertainty(stand, chain, frequency_hz)
+                        .map(|u| u.magnitude_relative),
                 })
                 .collect(),
             record: None,
@@ -303,6 +304,17 @@ fn complete(report: &mut Report, run: &Run) {
         ));
     }
     report.warnings.extend(warnings);
+    if run.traces.as_ref().is_some_and(Traces::is_empty) {
+        let end_s = run.start_s + (run.samples - 1) as f64 / report.rate_hz;
+        report.warnings.push(Warning::new(
+            "empty-plot",
+            format!(
+                "no sample lies within --plot-range; the record runs from {} to {} s",
+                report::short(run.start_s),
+                report::short(end_s)
+            ),
+        ));
+    }
     report
         .warnings
         .extend(run.resampled.as_ref().and_then(gap_warning));

@@ -163,6 +163,7 @@ fn component(
     let factor = inverse.norm();
     let recorded = fitted.phasor.norm() * printed;
     let torque = recorded * factor;
+    let of_stand = super::uncertainty(stand, chain, fitted.frequency_hz);
     Component {
         order: fitted.order,
         frequency_hz: fitted.frequency_hz,
@@ -173,7 +174,8 @@ fn component(
         phase_deg: (fitted.phasor * inverse).arg().to_degrees(),
         std: fitted.std_amplitude * printed * factor,
         phase_std_deg: fitted.std_phase_rad.map(f64::to_degrees),
-        std_stand: super::relative_std(stand, chain, fitted.frequency_hz).map(|std| std * torque),
+        std_stand: of_stand.as_ref().map(|u| u.magnitude_relative * torque),
+        phase_std_stand_deg: of_stand.as_ref().map(|u| u.phase_rad.to_degrees()),
     }
 }
 

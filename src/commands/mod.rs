@@ -6,6 +6,7 @@ mod predict;
 mod table;
 
 use torqcomp_dsp::conversion::ConversionError;
+use torqcomp_model::InverseUncertainty;
 
 use crate::cli::{Cli, Verb};
 use crate::failure::Failure;
@@ -49,13 +50,14 @@ fn conclude(warnings: &[Warning], lost: bool, strict: bool) -> Outcome {
     }
 }
 
-/// Relative standard uncertainty of the compensated torque that the stand's constants bring.
-fn relative_std(stand: &Stand, chain: &Chain, frequency_hz: f64) -> Option<f64> {
+/// Standard uncertainty of the compensated torque that the stand's constants bring, its calibration
+/// included.
+fn uncertainty(stand: &Stand, chain: &Chain, frequency_hz: f64) -> Option<InverseUncertainty> {
     let mechanics = stand.mechanics.as_ref()?;
     let mut std = mechanics.std;
     std.static_gain_relative = chain.relative_std;
     let found = mechanics.response.inverse_uncertainty(frequency_hz, &std);
-    found.ok().flatten().map(|u| u.magnitude_relative)
+    found.ok().flatten()
 }
 
 /// Largest magnitude that is taken for a measurement: squares and sums of it stay finite.

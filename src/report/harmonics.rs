@@ -73,6 +73,8 @@ pub struct Component {
     pub phase_std_deg: Option<f64>,
     /// Standard uncertainty of `torque` from the stand's constants; `null` if they have none.
     pub std_stand: Option<f64>,
+    /// Standard uncertainty of `phase_deg` from the stand's constants; `null` if they have none.
+    pub phase_std_stand_deg: Option<f64>,
 }
 
 impl Report {
@@ -84,19 +86,20 @@ impl Report {
             .map_or_else(String::new, |std| format!(" ± {}", rounded(std, 2)));
         let mut text = format!(
             "{}, {} in {}: {} samples at {} Hz, {} s\n\
-             fundamental {}{std} Hz, mean {} {}, residual {} {} rms, phases at {} s\n\n",
+             torque = mean + sum of A cos(2 pi f t + phase), A being the peak, t = 0 at {} s\n\
+             fundamental {}{std} Hz, mean {} {}, residual {} {} rms\n\n",
             self.input,
             self.channel,
             self.channel_unit,
             self.samples,
             short(self.rate_hz),
             rounded(self.duration_s, 5),
+            short(self.phase_reference_s),
             rounded(self.fundamental_hz, 9),
             rounded(self.mean, 5),
             self.unit,
             rounded(self.residual_rms, 3),
-            self.unit,
-            short(self.phase_reference_s)
+            self.unit
         );
         let with_stand = self.components.iter().any(|c| c.std_stand.is_some());
         let unit = &self.unit;
@@ -110,7 +113,10 @@ impl Report {
         if with_stand {
             head.push("± stand".to_owned());
         }
-        head.extend(["phase deg".to_owned(), "± deg".to_owned()]);
+        head.extend(["phase deg".to_owned(), "± noise".to_owned()]);
+        if with_stand {
+            head.push("± stand".to_owned());
+        }
         let mut rows = vec![head];
         rows.extend(self.components.iter().map(|c| c.cells(with_stand)));
         let _ = write!(text, "{}", columns(&rows));
@@ -136,6 +142,10 @@ impl Component {
             self.phase_std_deg
                 .map_or_else(|| "lost".to_owned(), |s| rounded(s, 2)),
         );
+        if with_stand {
+            let std = self.phase_std_stand_deg;
+            cells.push(std.map_or_else(String::new, |s| rounded(s, 2)));
+        }
         cells
     }
 }

@@ -111,6 +111,12 @@ impl Traces {
         }
     }
 
+    /// Whether no sample lay within the range.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.bins.is_empty()
+    }
+
     /// The picture.
     #[must_use]
     pub fn svg(&self, unit: &str) -> String {

@@ -276,8 +276,8 @@ impl Stand {
             Some(beam) => Ok(beam.radius.value()),
             None => Err(Failure::failed(format_args!(
                 "the channel \"{channel}\" is a force in \"{unit}\", and {} does not say at which \
-                 radius it acts; add [beam] radius, or static_gain = \"1 N/N\" to [mechanics] to \
-                 compensate the force itself",
+                 radius it acts; add [beam] with its radius, or, to compensate the force itself, \
+                 give [mechanics] as natural_frequency and damping_ratio with static_gain = \"1 N/N\"",
                 self.file
             ))),
         }

@@ -32,7 +32,12 @@ pub fn parse(name: &str, text: &str) -> Result<Stand, Failure> {
     let source = SourceText { name, text };
     let document = Document::parse(text).map_err(|error| {
         let message = error.message().replace('\n', ", ");
-        source.at(error.span().map(|span| span.start), message)
+        let hint = if text.contains(SCHEMA) {
+            ""
+        } else {
+            "; this does not look like a stand file, which begins with schema = \"torqcomp.stand/1\""
+        };
+        source.at(error.span().map(|span| span.start), format_args!("{message}{hint}"))
     })?;
     let top = Section::new(&source, "", document.as_table(), Some(0));
     match top.text("schema")? {

@@ -67,9 +67,11 @@ impl<'a> Section<'a> {
             .and_then(|(key, item)| item.span().or(key.span()))
             .map(|span| span.start)
             .or(self.start);
-        let name = if key.is_empty() { "" } else { " " };
-        self.source
-            .at(place, format_args!("{}{name}{key}: {message}", self.title))
+        let name = [self.title.as_str(), key].join(" ");
+        match name.trim() {
+            "" => self.source.at(place, message),
+            name => self.source.at(place, format_args!("{name}: {message}")),
+        }
     }
 
     /// Whether a key is there.
@@ -242,9 +244,9 @@ impl<'a> Section<'a> {
         Err(self.fail(
             key,
             format_args!(
-                "a {} must be greater than zero, {} was given",
+                "expected a {} greater than zero, as in \"{}\"",
                 estimate.kind().name(),
-                estimate.text(torqcomp_model::UnitSystem::Si)
+                estimate.kind().example()
             ),
         ))
     }
@@ -255,7 +257,10 @@ impl<'a> Section<'a> {
         if estimate.value() >= 0.0 {
             return Ok(estimate);
         }
-        Err(self.fail(key, format_args!("a {} must not be negative", kind.name())))
+        Err(self.fail(
+            key,
+            format_args!("expected a {} of zero or more", kind.name()),
+        ))
     }
 
     fn estimate(

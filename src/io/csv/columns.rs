@@ -37,9 +37,9 @@ fn find_column(columns: &[Column], wanted: &str, flag: &str) -> Result<usize, Fa
     }
     let headings = columns.iter().map(|c| c.heading.as_str());
     Err(Failure::failed(format_args!(
-        "there is no column \"{wanted}\"{}. The columns are {}",
+        "there is no column \"{wanted}\"{}; the columns are {}",
         did_you_mean(wanted, headings.clone()),
-        list(headings.map(|h| format!("\"{h}\"")))
+        list((0..columns.len()).map(|i| label(columns, i)))
     )))
 }
 

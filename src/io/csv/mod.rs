@@ -15,6 +15,7 @@ use std::path::PathBuf;
 use torqcomp_model::Dimension;
 
 use crate::failure::Failure;
+use crate::report::Warning;
 
 pub use layout::{Delimiter, Dialect, Layout, Told};
 pub use names::{Column, NamedUnit};
@@ -112,6 +113,8 @@ pub struct Table {
     row_bytes: usize,
     /// Fewest characters of a value in the head.
     shortest_value: usize,
+    /// What the command line says otherwise than the file.
+    warnings: Vec<Warning>,
     /// First time stamp as written.
     first_stamp: Option<f64>,
 }
@@ -151,9 +154,19 @@ impl Table {
         }
         let value_place = columns::channel(&layout.columns, time_place, options)?;
         let mut channel = layout.columns[value_place].clone();
+        let mut warnings = Vec::new();
         if let Some(text) = &options.unit {
             let unit = torqcomp_model::Unit::parse(text)
                 .map_err(|error| Failure::usage(format_args!("--unit {text}: {error}")))?;
+            if let Some(named) = channel.unit.as_ref().filter(|named| named.unit != unit) {
+                warnings.push(Warning::new(
+                    "unit-overrides-heading",
+                    format!(
+                        "\"{}\" says {}, --unit says {text}; {text} was taken",
+                        channel.heading, named.text
+                    ),
+                ));
+            }
             channel.unit = Some(NamedUnit {
                 text: text.clone(),
                 unit,
@@ -166,6 +179,7 @@ impl Table {
         };
         let sample = Sample::of(&head, head.len() < HEAD, &layout, &plan);
         let time = TimeAxis::find(&layout, time_place, &sample.rows, options)?;
+        warnings.extend(time::overridden(&layout, time_place, &sample.rows, options));
         // Stamps that are not used need not be read, nor be right.
         let plan = RowPlan {
             time: plan.time.filter(|_| time.uses_stamps()),
@@ -178,6 +192,7 @@ impl Table {
             plan,
             head,
             sample,
+            warnings,
         })
     }
 
@@ -204,6 +219,7 @@ struct Parts {
     plan: RowPlan,
     head: Vec<u8>,
     sample: Sample,
+    warnings: Vec<Warning>,
 }
 
 impl Parts {
@@ -218,6 +234,7 @@ impl Parts {
             input,
             row_bytes: self.sample.row_bytes,
             shortest_value: self.sample.shortest_value,
+            warnings: self.warnings,
             first_stamp: self.sample.rows.times.first().copied(),
         }
     }

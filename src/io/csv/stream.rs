@@ -118,7 +118,7 @@ impl Sequence {
             last_stamp: None,
             empty_line: None,
             lost: None,
-            warnings: Vec::new(),
+            warnings: table.warnings.clone(),
         }
     }
 

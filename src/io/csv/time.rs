@@ -7,6 +7,7 @@ use super::scan::Rows;
 use super::{Options, is_time};
 use crate::failure::Failure;
 use crate::io::digits;
+use crate::report::Warning;
 
 /// Largest deviation of a step from the uniform one, as a fraction of it.
 const TOLERANCE: f64 = 0.01;
@@ -231,6 +232,32 @@ pub fn missing(layout: &Layout) -> String {
     "there is no time column, so the sampling rate is unknown; give it with --rate HZ, or name the \
      column with --time-column"
         .to_owned()
+}
+
+/// A warning if a rate that was given is not that of the stamps.
+pub fn overridden(
+    layout: &Layout,
+    column: Option<usize>,
+    rows: &Rows,
+    options: &Options,
+) -> Option<Warning> {
+    let rate_hz = options.rate_hz.filter(|_| !options.resample)?;
+    let column = &layout.columns[column?];
+    let unit = unit(column, options).ok()?.1;
+    let stamped_hz = 1.0 / (typical_step(&rows.times)? * unit.factor());
+    if (rate_hz / stamped_hz - 1.0).abs() <= TOLERANCE {
+        return None;
+    }
+    Some(Warning::new(
+        "rate-overrides-stamps",
+        format!(
+            "the stamps in \"{}\" come at {} Hz, --rate says {} Hz; {} Hz was taken",
+            column.heading,
+            digits::text(stamped_hz, 7),
+            digits::text(rate_hz, 7),
+            digits::text(rate_hz, 7)
+        ),
+    ))
 }
 
 /// Refuses to bring stamps to a rate far from the recorded one.
