@@ -74,8 +74,7 @@ pub(crate) fn convert(chain: &Chain, values: &mut [f64]) -> Result<(), (usize, S
         Err(ConversionError::Sample { index, source }) => return Err((index, source.to_string())),
         Err(other) => return Err((0, other.to_string())),
     }
-    // `!` so that what is no number is found as well.
-    match values.iter().position(|v| !(v.abs() < LARGEST)) {
+    match values.iter().position(|v| v.is_nan() || v.abs() > LARGEST) {
         Some(index) => Err((
             index,
             format!(
