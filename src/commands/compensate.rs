@@ -14,7 +14,7 @@ use super::{Outcome, conclude, uncertainty};
 use crate::cli::Compensate;
 use crate::failure::Failure;
 use crate::io::csv::{Place, Summary, Table, TimeAxis, TimeSource};
-use crate::io::digits::{self, Digits};
+use crate::io::digits::{self, Decimal, Digits};
 use crate::io::output::Output;
 use crate::io::text::Text;
 use crate::report::compensate::{Ends, Gain, Noise, RecordNoise, Report, SCHEMA};
@@ -26,6 +26,8 @@ use crate::stand::{self, Chain, Stand};
 const DEFAULT_BAND_HZ: f64 = 2400.0;
 /// Frequencies at which the report gives the gain, as fractions of the band.
 const GAIN_POINTS: usize = 9;
+/// Rows whose numbers are taken apart together.
+const ROWS_TOGETHER: usize = 8;
 /// Gain from which a record of unknown noise is worth a warning.
 const LARGE_GAIN: f64 = 10.0;
 /// Rms above the band over that within it, from which it is worth a warning.
@@ -430,25 +432,50 @@ impl Rows<'_> {
     /// Appends the rows of `torque`, beside `recorded` if that is not empty.
     fn write(&self, out: &mut Text, torque: &[f64], recorded: &[f64]) {
         let time_digits = self.time_digits(torque.len());
-        for (i, value) in torque.iter().enumerate() {
-            match &self.times {
-                Times::Copied { text, spans } => {
-                    let (offset, length) = crate::io::csv::place_of(spans[i]);
-                    out.copy(text, offset, length);
-                }
-                Times::Stamps { times, seconds } => {
-                    out.number(times[i] * seconds, time_digits);
-                }
-                Times::Grid { .. } => out.number(self.time_s(i), time_digits),
+        let Digits::Significant(count) = self.digits else {
+            for (i, value) in torque.iter().enumerate() {
+                self.write_time(out, i, time_digits);
+                out.number(value * self.scale, self.digits);
+                self.end_row(out, recorded.get(i));
             }
+            return;
+        };
+        for (values, first) in torque
+            .chunks(ROWS_TOGETHER)
+            .zip((0..).step_by(ROWS_TOGETHER))
+        {
+            let mut decimals = [Decimal::of(0.0, count); ROWS_TOGETHER];
+            for (decimal, value) in decimals.iter_mut().zip(values) {
+                *decimal = Decimal::of(value * self.scale, count);
+            }
+            for (decimal, i) in decimals[..values.len()].iter().zip(first..) {
+                self.write_time(out, i, time_digits);
+                out.decimal(decimal);
+                self.end_row(out, recorded.get(i));
+            }
+        }
+    }
+
+    #[inline]
+    fn write_time(&self, out: &mut Text, i: usize, digits: Digits) {
+        match &self.times {
+            Times::Copied { text, spans } => {
+                let (offset, length) = crate::io::csv::place_of(spans[i]);
+                out.copy(text, offset, length);
+            }
+            Times::Stamps { times, seconds } => out.number(times[i] * seconds, digits),
+            Times::Grid { .. } => out.number(self.time_s(i), digits),
+        }
+        out.byte(b',');
+    }
+
+    #[inline]
+    fn end_row(&self, out: &mut Text, recorded: Option<&f64>) {
+        if let Some(value) = recorded {
             out.byte(b',');
             out.number(value * self.scale, self.digits);
-            if let Some(value) = recorded.get(i) {
-                out.byte(b',');
-                out.number(value * self.scale, self.digits);
-            }
-            out.byte(b'\n');
         }
+        out.byte(b'\n');
     }
 
     /// Time of the row `i`.

@@ -52,7 +52,7 @@ pub fn write(out: &mut Vec<u8>, value: f64, digits: Digits) {
 #[inline]
 pub fn put(text: &mut [u8; ROOM], value: f64, digits: Digits) -> usize {
     match digits {
-        Digits::Significant(count) => put_significant(text, value, count),
+        Digits::Significant(count) => Decimal::of(value, count).put(text),
         Digits::Shortest => put_text(text, zmij::Buffer::new().format(value)),
     }
 }
@@ -62,26 +62,54 @@ fn put_text(text: &mut [u8; ROOM], number: &str) -> usize {
     number.len()
 }
 
-#[inline]
-fn put_significant(text: &mut [u8; ROOM], value: f64, count: u32) -> usize {
-    if value == 0.0 {
-        text[0] = b'0';
-        return 1;
+/// A number taken apart into its digits, before it becomes text.
+///
+/// Several are best taken apart one after the other and put into text after that: the steps of one
+/// wait for each other, those of several do not.
+#[derive(Debug, Clone, Copy)]
+pub struct Decimal {
+    value: f64,
+    /// Sixteen ASCII digits, the first in the lowest byte, zeros after the last that is wanted.
+    digits: u128,
+    /// Decimal exponent of the first digit; `RARE` for a value that is written in another way.
+    exponent: i32,
+    count: u32,
+}
+
+/// Exponent of a number far outside a recorder's range, and of zero.
+const RARE: i32 = i32::MAX;
+
+impl Decimal {
+    /// Takes a finite number apart, to that many significant digits (1 to 15).
+    #[inline]
+    #[must_use]
+    pub fn of(value: f64, count: u32) -> Self {
+        let (mantissa, exponent) = decompose(value.abs(), count).unwrap_or((0, RARE));
+        Self {
+            value,
+            digits: sixteen_digits(mantissa * WHOLE_POWERS[16 - count as usize]),
+            exponent,
+            count,
+        }
     }
-    let Some((mantissa, exponent)) = decompose(value.abs(), count as i32) else {
-        return put_text(text, &rare(value, count));
-    };
-    // A sign is overwritten where there is none.
-    text[0] = b'-';
-    let start = usize::from(value < 0.0);
-    // Sixteen bytes of text in one number, the first digit in the lowest byte, zeros after the last.
-    let digits = sixteen_digits(mantissa * WHOLE_POWERS[16 - count as usize]);
-    let zeros_at_end = (digits ^ ASCII_ZEROS).leading_zeros() / 8;
-    let significant = 16 - zeros_at_end as usize;
-    if (SMALLEST_PLAIN..LARGEST_PLAIN).contains(&exponent) {
-        put_plain(text, start, digits, significant, exponent)
-    } else {
-        put_scientific(text, start, digits, significant, exponent)
+
+    /// Puts it at the start of `text` and tells its length.
+    #[inline]
+    pub fn put(&self, text: &mut [u8; ROOM]) -> usize {
+        // A sign is overwritten where there is none.
+        text[0] = b'-';
+        let start = usize::from(self.value < 0.0);
+        let zeros_at_end = (self.digits ^ ASCII_ZEROS).leading_zeros() / 8;
+        let significant = 16 - zeros_at_end as usize;
+        if (SMALLEST_PLAIN..LARGEST_PLAIN).contains(&self.exponent) {
+            put_plain(text, start, self.digits, significant, self.exponent)
+        } else if self.exponent != RARE {
+            put_scientific(text, start, self.digits, significant, self.exponent)
+        } else if self.value == 0.0 {
+            put_text(text, "0")
+        } else {
+            put_text(text, &rare(self.value, self.count))
+        }
     }
 }
 
@@ -100,18 +128,17 @@ const ASCII_ZEROS: u128 = 0x3030_3030_3030_3030_3030_3030_3030_3030;
 
 /// Integer of `count` digits and decimal exponent with `value ≈ d.ddd × 10^exponent`.
 #[inline]
-fn decompose(magnitude: f64, count: i32) -> Option<(u64, i32)> {
+fn decompose(magnitude: f64, count: u32) -> Option<(u64, i32)> {
     // log10(2) times the binary exponent is at most one too low.
     let binary = ((magnitude.to_bits() >> 52) & 0x7FF) as i32 - 1023;
     let mut exponent = (binary * 1233) >> 12;
     if !(SMALLEST_EXPONENT..LARGEST_EXPONENT).contains(&exponent) {
         return None;
     }
-    if magnitude >= scale(exponent + 1) {
-        exponent += 1;
-    }
-    let limit = scale(count) as u64;
-    let mut mantissa = (magnitude * scale(count - 1 - exponent) + 0.5) as u64;
+    exponent += i32::from(magnitude >= scale(exponent + 1));
+    let limit = WHOLE_POWERS[count as usize];
+    let scaled = magnitude * scale(count as i32 - 1 - exponent);
+    let mut mantissa = (scaled + 0.5) as i64 as u64;
     if mantissa >= limit {
         mantissa /= 10;
         exponent += 1;

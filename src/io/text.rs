@@ -1,6 +1,6 @@
 //! Text that is put together from many short pieces.
 
-use super::digits::{self, Digits};
+use super::digits::{self, Decimal, Digits};
 
 /// Longest piece that is copied with a fixed length.
 const SHORT: usize = 32;
@@ -38,6 +38,12 @@ impl Text {
     #[inline]
     pub fn number(&mut self, value: f64, digits: Digits) {
         self.length += digits::put(self.room(), value, digits);
+    }
+
+    /// Appends a number that was taken apart.
+    #[inline]
+    pub fn decimal(&mut self, decimal: &Decimal) {
+        self.length += decimal.put(self.room());
     }
 
     /// Appends `source[offset..offset + length]`.
