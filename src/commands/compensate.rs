@@ -440,6 +440,23 @@ impl Rows<'_> {
             }
             return;
         };
+        if count == digits::DEFAULT_COUNT {
+            // The same code, with the number of digits known while it is compiled.
+            self.write_rows(out, torque, recorded, digits::DEFAULT_COUNT, time_digits);
+        } else {
+            self.write_rows(out, torque, recorded, count, time_digits);
+        }
+    }
+
+    #[inline(always)]
+    fn write_rows(
+        &self,
+        out: &mut Text,
+        torque: &[f64],
+        recorded: &[f64],
+        count: u32,
+        time_digits: Digits,
+    ) {
         for (values, first) in torque
             .chunks(ROWS_TOGETHER)
             .zip((0..).step_by(ROWS_TOGETHER))

@@ -4,7 +4,10 @@
 ///
 /// A rounding of 5·10⁻¹² relative is far below any recorder's resolution, and below the 10⁻⁹ to
 /// which a compensation is exact.
-pub const DEFAULT_DIGITS: Digits = Digits::Significant(12);
+pub const DEFAULT_COUNT: u32 = 12;
+
+/// The same as a choice of digits.
+pub const DEFAULT_DIGITS: Digits = Digits::Significant(DEFAULT_COUNT);
 
 /// How many digits are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -81,7 +84,7 @@ const RARE: i32 = i32::MAX;
 
 impl Decimal {
     /// Takes a finite number apart, to that many significant digits (1 to 15).
-    #[inline]
+    #[inline(always)]
     #[must_use]
     pub fn of(value: f64, count: u32) -> Self {
         let (mantissa, exponent) = decompose(value.abs(), count).unwrap_or((0, RARE));
@@ -127,7 +130,7 @@ const WHOLE_POWERS: [u64; 16] = {
 const ASCII_ZEROS: u128 = 0x3030_3030_3030_3030_3030_3030_3030_3030;
 
 /// Integer of `count` digits and decimal exponent with `value ≈ d.ddd × 10^exponent`.
-#[inline]
+#[inline(always)]
 fn decompose(magnitude: f64, count: u32) -> Option<(u64, i32)> {
     // log10(2) times the binary exponent is at most one too low.
     let binary = ((magnitude.to_bits() >> 52) & 0x7FF) as i32 - 1023;

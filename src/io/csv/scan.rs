@@ -86,39 +86,52 @@ impl Rows {
     pub fn read(&mut self, text: &[u8], plan: &RowPlan) {
         self.clear();
         let mut at = 0;
-        while at < text.len() {
-            match plan.quick_row(text, at) {
-                Some(row) => {
-                    if plan.time.is_some() {
-                        self.times.push(row.time);
-                        self.time_text.push(row.time_text);
-                    }
-                    self.values.push(row.value);
-                    at = row.end;
-                }
-                None => {
-                    let end = line_end(text, at);
-                    if let Err((cell, what)) = self.careful_row(&text[at..end], at, plan) {
-                        self.problem = Some(Problem {
-                            line: self.lines,
-                            offset: at,
-                            cell,
-                            what,
-                        });
-                        return;
-                    }
-                    at = end;
-                    self.lines += 1;
-                    continue;
-                }
-            }
-            if let Some(line) = self.empty_at {
-                self.values.pop();
-                self.problem = Some(Problem::empty_line(line, plan));
+        // The ends of lines are looked up on their own, so that a row need not wait until the one
+        // before it is read.
+        for line_feed in memchr::memchr_iter(b'\n', text) {
+            if !self.read_line(text, at, line_feed + 1, plan) {
                 return;
             }
-            self.lines += 1;
+            at = line_feed + 1;
         }
+        if at < text.len() {
+            self.read_line(text, at, text.len(), plan);
+        }
+    }
+
+    /// Reads the line `text[at..end]`; `false` if it is wrong.
+    #[inline(always)]
+    fn read_line(&mut self, text: &[u8], at: usize, end: usize, plan: &RowPlan) -> bool {
+        let before = self.values.len();
+        match plan.quick_row(text, at) {
+            Some(row) if row.end == end => {
+                if plan.time.is_some() {
+                    self.times.push(row.time);
+                    self.time_text.push(row.time_text);
+                }
+                self.values.push(row.value);
+            }
+            _ => {
+                if let Err((cell, what)) = self.careful_row(&text[at..end], at, plan) {
+                    self.problem = Some(Problem {
+                        line: self.lines,
+                        offset: at,
+                        cell,
+                        what,
+                    });
+                    return false;
+                }
+            }
+        }
+        if let Some(line) = self.empty_at
+            && self.values.len() > before
+        {
+            self.values.pop();
+            self.problem = Some(Problem::empty_line(line, plan));
+            return false;
+        }
+        self.lines += 1;
+        true
     }
 
     /// Reads a line that is not a plain row of numbers: quoted, padded, a comment, or wrong.

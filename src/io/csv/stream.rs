@@ -10,7 +10,7 @@ use crate::failure::Failure;
 use crate::report::Warning;
 
 /// Bytes of a piece: large enough to be quick, small enough to stay in cache.
-const PIECE: usize = 1 << 19;
+const PIECE: usize = 1 << 17;
 /// Difference of the mean rate from that of the first rows that is worth a warning.
 const RATE_DRIFT: f64 = 1e-4;
 
