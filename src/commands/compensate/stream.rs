@@ -7,7 +7,8 @@ use torqcomp_dsp::noise::RecordNoise;
 use torqcomp_dsp::resample::Resampler;
 use torqcomp_dsp::spectrum::{PowerSum, welch};
 
-use super::{Extent, Plan, Rows, Run, Times};
+use super::rows::{Rows, Times};
+use super::{Extent, Plan, Run};
 use crate::cli::Compensate;
 use crate::commands::convert;
 use crate::failure::Failure;

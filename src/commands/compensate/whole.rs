@@ -4,7 +4,8 @@ use torqcomp_dsp::compensate::whole_record;
 use torqcomp_dsp::noise::RecordNoise;
 use torqcomp_dsp::spectrum::welch;
 
-use super::{Extent, Plan, Rows, Run, Times};
+use super::rows::{Rows, Times};
+use super::{Extent, Plan, Run};
 use crate::cli::Compensate;
 use crate::failure::Failure;
 use crate::io::csv::Record;

@@ -1,0 +1,120 @@
+//! The rows of a result as text.
+
+use crate::io::digits::{self, Decimal, Digits};
+use crate::io::text::Text;
+
+/// Rows whose numbers are taken apart together.
+const ROWS_TOGETHER: usize = 8;
+
+/// Writes the rows of a result: time, torque, and the recorded torque if it is wanted.
+pub(super) struct Rows<'a> {
+    pub(super) digits: Digits,
+    /// Printed units per SI unit.
+    pub(super) scale: f64,
+    pub(super) rate_hz: f64,
+    pub(super) times: Times<'a>,
+}
+
+/// Where the text of the time column comes from.
+pub(super) enum Times<'a> {
+    /// Copied from the input.
+    Copied { text: &'a [u8], spans: &'a [u64] },
+    /// Stamps in another unit, times seconds per unit.
+    Stamps { times: &'a [f64], seconds: f64 },
+    /// A grid: start, index of the first sample, rate.
+    Grid { start_s: f64, first: usize },
+}
+
+impl Rows<'_> {
+    /// Digits that tell a thousandth of a step at the time of the last row. Epoch stamps need more
+    /// than a record that begins at zero.
+    fn time_digits(&self, rows: usize) -> Digits {
+        let (Some(last), rate_hz) = (rows.checked_sub(1), self.rate_hz) else {
+            return digits::DEFAULT_DIGITS;
+        };
+        let steps = (self.time_s(last).abs() * rate_hz).max(1.0);
+        match steps.log10() as u32 + 5 {
+            ..=12 => digits::DEFAULT_DIGITS,
+            count @ 13..=15 => Digits::Significant(count),
+            _ => Digits::Shortest,
+        }
+    }
+
+    /// Appends the rows of `torque`, beside `recorded` if that is not empty.
+    pub(super) fn write(&self, out: &mut Text, torque: &[f64], recorded: &[f64]) {
+        let time_digits = self.time_digits(torque.len());
+        let Digits::Significant(count) = self.digits else {
+            for (i, value) in torque.iter().enumerate() {
+                self.write_time(out, i, time_digits);
+                out.number(value * self.scale, self.digits);
+                self.end_row(out, recorded.get(i));
+            }
+            return;
+        };
+        if count == digits::DEFAULT_COUNT {
+            // The same code, with the number of digits known while it is compiled.
+            self.write_rows(out, torque, recorded, digits::DEFAULT_COUNT, time_digits);
+        } else {
+            self.write_rows(out, torque, recorded, count, time_digits);
+        }
+    }
+
+    #[inline(always)]
+    fn write_rows(
+        &self,
+        out: &mut Text,
+        torque: &[f64],
+        recorded: &[f64],
+        count: u32,
+        time_digits: Digits,
+    ) {
+        for (values, first) in torque
+            .chunks(ROWS_TOGETHER)
+            .zip((0..).step_by(ROWS_TOGETHER))
+        {
+            let mut decimals = [Decimal::of(0.0, count); ROWS_TOGETHER];
+            for (decimal, value) in decimals.iter_mut().zip(values) {
+                *decimal = Decimal::of(value * self.scale, count);
+            }
+            for (decimal, i) in decimals[..values.len()].iter().zip(first..) {
+                self.write_time(out, i, time_digits);
+                out.decimal(decimal);
+                self.end_row(out, recorded.get(i));
+            }
+        }
+    }
+
+    #[inline]
+    fn write_time(&self, out: &mut Text, i: usize, digits: Digits) {
+        match &self.times {
+            Times::Copied { text, spans } => {
+                let (offset, length) = crate::io::csv::place_of(spans[i]);
+                out.copy(text, offset, length);
+            }
+            Times::Stamps { times, seconds } => out.number(times[i] * seconds, digits),
+            Times::Grid { .. } => out.number(self.time_s(i), digits),
+        }
+        out.byte(b',');
+    }
+
+    #[inline]
+    fn end_row(&self, out: &mut Text, recorded: Option<&f64>) {
+        if let Some(value) = recorded {
+            out.byte(b',');
+            out.number(value * self.scale, self.digits);
+        }
+        out.byte(b'\n');
+    }
+
+    /// Time of the row `i`.
+    pub(super) fn time_s(&self, i: usize) -> f64 {
+        match &self.times {
+            Times::Copied { text, spans } => {
+                let (offset, _) = crate::io::csv::place_of(spans[i]);
+                crate::io::number::read(text, offset, b'.').map_or(f64::NAN, |(value, _)| value)
+            }
+            Times::Stamps { times, seconds } => times[i] * seconds,
+            Times::Grid { start_s, first } => start_s + (first + i) as f64 / self.rate_hz,
+        }
+    }
+}
