@@ -23,13 +23,13 @@ pub fn read(text: &[u8], at: usize, decimal: u8) -> Option<(f64, usize)> {
         place += 1;
     }
     let whole_start = place;
-    let (mut mantissa, whole_end) = digits(text, place, 0);
+    let (mut mantissa, whole_end) = few_digits(text, place, 0);
     place = whole_end;
     let mut count = whole_end - whole_start;
     let mut exponent = 0_i32;
     if text.get(place) == Some(&decimal) {
         let fraction_start = place + 1;
-        let (more, fraction_end) = digits(text, fraction_start, mantissa);
+        let (more, fraction_end) = many_digits(text, fraction_start, mantissa);
         mantissa = more;
         exponent = -((fraction_end - fraction_start) as i32);
         count += fraction_end - fraction_start;
@@ -56,30 +56,27 @@ pub fn read(text: &[u8], at: usize, decimal: u8) -> Option<(f64, usize)> {
     Some((if negative { -value } else { value }, place))
 }
 
-/// Reads the digits at `text[at..]` onto `mantissa` (wrapping: the caller counts the digits).
-///
-/// Eight bytes are looked at together, so that the time does not depend on where the digits end.
+/// Reads the digits at `text[at..]` onto `mantissa` (wrapping: the caller counts the digits): eight at
+/// a time while there are as many, then one by one. Short runs are quickest one by one.
 #[inline(always)]
-fn digits(text: &[u8], mut at: usize, mut mantissa: u64) -> (u64, usize) {
+fn many_digits(text: &[u8], mut at: usize, mut mantissa: u64) -> (u64, usize) {
     while let Some(eight) = text.get(at..at + 8) {
-        // ASCII digits become 0 to 9; adding 0x76 sets the high bit of anything larger. A carry only
-        // reaches bytes after the first that is no digit.
+        // ASCII digits become 0 to 9; adding 0x76 sets the high bit of anything larger.
         let chunk = u64::from_le_bytes(eight.try_into().expect("eight bytes")) ^ ASCII_ZEROS;
-        let no_digit = (chunk.wrapping_add(0x7676_7676_7676_7676) | chunk) & 0x8080_8080_8080_8080;
-        let count = no_digit.trailing_zeros() as usize / 8;
-        if count == 0 {
-            return (mantissa, at);
+        if (chunk.wrapping_add(0x7676_7676_7676_7676) | chunk) & 0x8080_8080_8080_8080 != 0 {
+            break;
         }
-        // The bytes after the digits go out at the top, zeros come in before them.
-        let value = eight_digits(chunk << (64 - 8 * count));
         mantissa = mantissa
-            .wrapping_mul(WHOLE_POWERS[count])
-            .wrapping_add(value);
-        at += count;
-        if count < 8 {
-            return (mantissa, at);
-        }
+            .wrapping_mul(100_000_000)
+            .wrapping_add(eight_digits(chunk));
+        at += 8;
     }
+    few_digits(text, at, mantissa)
+}
+
+/// The same, one by one.
+#[inline(always)]
+fn few_digits(text: &[u8], mut at: usize, mut mantissa: u64) -> (u64, usize) {
     while let Some(digit) = text.get(at).map(|byte| byte.wrapping_sub(b'0'))
         && digit < 10
     {
@@ -91,18 +88,6 @@ fn digits(text: &[u8], mut at: usize, mut mantissa: u64) -> (u64, usize) {
 
 /// Eight times the byte of the digit 0.
 const ASCII_ZEROS: u64 = 0x3030_3030_3030_3030;
-/// Powers of ten up to that of eight digits.
-const WHOLE_POWERS: [u64; 9] = [
-    1,
-    10,
-    100,
-    1000,
-    10_000,
-    100_000,
-    1_000_000,
-    10_000_000,
-    100_000_000,
-];
 
 /// Value of eight digits of a byte each, the first in the lowest: pairs, then fours, then eight.
 #[inline]
