@@ -9,6 +9,11 @@ const EXACT_POWERS: [f64; 23] = [
     1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16,
     1e17, 1e18, 1e19, 1e20, 1e21, 1e22,
 ];
+/// Their reciprocals, correctly rounded.
+const INVERSE_POWERS: [f64; 23] = [
+    1e0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13, 1e-14,
+    1e-15, 1e-16, 1e-17, 1e-18, 1e-19, 1e-20, 1e-21, 1e-22,
+];
 /// Largest integer up to which every integer is an `f64`.
 const EXACT_MANTISSA: u64 = 1 << 53;
 
@@ -17,6 +22,18 @@ const EXACT_MANTISSA: u64 = 1 << 53;
 /// `None` if no finite number begins there. `text` may go on with anything after it.
 #[inline(always)]
 pub fn read(text: &[u8], at: usize, decimal: u8) -> Option<(f64, usize)> {
+    read_as::<true>(text, at, decimal)
+}
+
+/// The same to within one unit of the last bit: it multiplies where [`read`] has to wait for a
+/// division. For time stamps, which are compared with a tolerance and copied as text.
+#[inline(always)]
+pub fn read_nearly(text: &[u8], at: usize, decimal: u8) -> Option<(f64, usize)> {
+    read_as::<false>(text, at, decimal)
+}
+
+#[inline(always)]
+fn read_as<const EXACT: bool>(text: &[u8], at: usize, decimal: u8) -> Option<(f64, usize)> {
     let mut place = at;
     let negative = text.get(place) == Some(&b'-');
     if negative || text.get(place) == Some(&b'+') {
@@ -48,7 +65,9 @@ pub fn read(text: &[u8], at: usize, decimal: u8) -> Option<(f64, usize)> {
         return slow(&text[at..place], decimal).map(|value| (value, place));
     }
     let power = EXACT_POWERS[exponent.unsigned_abs() as usize];
-    let value = if exponent < 0 {
+    let value = if exponent < 0 && !EXACT {
+        mantissa as f64 * INVERSE_POWERS[exponent.unsigned_abs() as usize]
+    } else if exponent < 0 {
         mantissa as f64 / power
     } else {
         mantissa as f64 * power
@@ -97,6 +116,7 @@ fn eight_digits(chunk: u64) -> u64 {
     fours.wrapping_mul(10_000).wrapping_add(fours >> 32) & 0xFFFF_FFFF
 }
 
+#[inline]
 fn exponent_part(text: &[u8], at: usize) -> Option<(i32, usize)> {
     let mut place = at + 1;
     let negative = text.get(place) == Some(&b'-');
@@ -108,7 +128,12 @@ fn exponent_part(text: &[u8], at: usize) -> Option<(i32, usize)> {
     while let Some(digit) = text.get(place).map(|byte| byte.wrapping_sub(b'0'))
         && digit < 10
     {
-        value = value.saturating_mul(10).saturating_add(i32::from(digit));
+        // Far beyond any f64 the digits no longer matter.
+        value = if value < 100_000 {
+            10 * value + i32::from(digit)
+        } else {
+            value
+        };
         place += 1;
     }
     (place > start).then_some((if negative { -value } else { value }, place))
@@ -176,6 +201,15 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn nearly_is_within_one_unit_of_the_last_bit(whole in 0_u32..2_000_000_000, part in 0_u64..1_000_000) {
+            let text = format!("{whole}.{part:06},x");
+            let (exact, end) = read(text.as_bytes(), 0, b'.').unwrap();
+            let (near, same_end) = read_nearly(text.as_bytes(), 0, b'.').unwrap();
+            prop_assert_eq!(end, same_end);
+            prop_assert!((near.to_bits() as i64 - exact.to_bits() as i64).abs() <= 1);
+        }
+
         #[test]
         fn agrees_with_the_standard_library(value in any::<f64>(), digits in 0_usize..20) {
             prop_assume!(value.is_finite());

@@ -220,16 +220,18 @@ impl RowPlan {
             Delimiter::Spaces => return None,
         };
         let time = self.time.unwrap_or(self.value);
-        let a = self.number(text, start, time.min(self.value), separator)?;
+        // A stamp is copied and compared, a value is computed with.
+        let time_first = time < self.value;
+        let a = self.number(text, start, time.min(self.value), separator, time_first)?;
         let b = match time.abs_diff(self.value) {
             0 => a,
             cells if text.get(a.end) == Some(&separator) => {
-                self.number(text, a.end + 1, cells - 1, separator)?
+                self.number(text, a.end + 1, cells - 1, separator, !time_first)?
             }
             _ => return None,
         };
         let end = end_of_row(text, b.end, separator)?;
-        let (time, value) = if time < self.value { (a, b) } else { (b, a) };
+        let (time, value) = if time_first { (a, b) } else { (b, a) };
         Some(QuickRow {
             time: time.value,
             time_text: span(time.start, time.end - time.start),
@@ -240,14 +242,25 @@ impl RowPlan {
 
     /// The number after so many cells that are not wanted.
     #[inline(always)]
-    fn number(&self, text: &[u8], mut at: usize, skip: usize, separator: u8) -> Option<Number> {
+    fn number(
+        &self,
+        text: &[u8],
+        mut at: usize,
+        skip: usize,
+        separator: u8,
+        is_time: bool,
+    ) -> Option<Number> {
         for _ in 0..skip {
             at = skip_cell(text, at, separator)? + 1;
         }
         while text.get(at) == Some(&b' ') {
             at += 1;
         }
-        let (value, end) = number::read(text, at, self.dialect.decimal)?;
+        let (value, end) = if is_time {
+            number::read_nearly(text, at, self.dialect.decimal)?
+        } else {
+            number::read(text, at, self.dialect.decimal)?
+        };
         Some(Number {
             value,
             start: at,
