@@ -131,12 +131,6 @@ impl Output {
         result.map_err(|error| Failure::writing(&self.name, &error))
     }
 
-    /// Whether the output is standard output.
-    #[must_use]
-    pub fn is_stdout(&self) -> bool {
-        matches!(self.kind, Kind::Stdout(_))
-    }
-
     /// Name for people.
     #[must_use]
     pub fn name(&self) -> &str {

@@ -12,8 +12,6 @@ mod time;
 use std::io::Read;
 use std::path::PathBuf;
 
-use torqcomp_model::Dimension;
-
 use crate::failure::Failure;
 use crate::report::Warning;
 
@@ -327,9 +325,4 @@ fn refuse_other_formats(head: &[u8]) -> Result<(), Failure> {
 /// Whether there are more zero bytes than a fault in a text would leave.
 fn is_binary(head: &[u8]) -> bool {
     head.iter().filter(|byte| **byte == 0).count() > head.len() / 100
-}
-
-/// Whether a unit measures time.
-fn is_time(dimension: Dimension) -> bool {
-    dimension == Dimension::new([0, 0, 1, 0, 0, 0])
 }

@@ -122,12 +122,6 @@ impl Sequence {
         }
     }
 
-    /// Rows accepted so far.
-    #[must_use]
-    pub fn samples(&self) -> usize {
-        self.samples
-    }
-
     /// Takes the next batch.
     ///
     /// # Errors

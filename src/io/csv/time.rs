@@ -4,7 +4,7 @@ use torqcomp_model::Unit;
 
 use super::layout::Layout;
 use super::scan::Rows;
-use super::{Options, is_time};
+use super::{NamedUnit, Options};
 use crate::failure::Failure;
 use crate::io::digits;
 use crate::report::Warning;
@@ -80,7 +80,7 @@ impl TimeAxis {
             }
             (None, None) => return Err(Failure::failed(missing(layout))),
         };
-        let (unit_text, unit) = unit(column, options)?;
+        let NamedUnit { text, unit } = unit(column, options)?;
         let typical = typical_step(&rows.times)
             .ok_or_else(|| Failure::failed(no_step(&column.heading, &rows.times)))?;
         let seconds_per_unit = unit.factor();
@@ -95,7 +95,7 @@ impl TimeAxis {
         Ok(Self {
             source: TimeSource::Stamps {
                 heading: column.heading.clone(),
-                unit: unit_text,
+                unit: text,
                 seconds_per_unit,
                 step,
                 resampled: options.resample,
@@ -194,14 +194,14 @@ impl TimeAxis {
 }
 
 /// The unit of a column of stamps: from the user, or from the heading.
-fn unit(column: &super::Column, options: &Options) -> Result<(String, Unit), Failure> {
-    let (text, unit) = match (&options.time_unit, &column.unit) {
-        (Some(text), _) => {
-            let unit = Unit::parse(text)
-                .map_err(|error| Failure::usage(format_args!("--time-unit {text}: {error}")))?;
-            (text.clone(), unit)
-        }
-        (None, Some(named)) => (named.text.clone(), named.unit),
+fn unit(column: &super::Column, options: &Options) -> Result<NamedUnit, Failure> {
+    let named = match (&options.time_unit, &column.unit) {
+        (Some(text), _) => NamedUnit {
+            text: text.clone(),
+            unit: Unit::parse(text)
+                .map_err(|error| Failure::usage(format_args!("--time-unit {text}: {error}")))?,
+        },
+        (None, Some(named)) => named.clone(),
         (None, None) => {
             return Err(Failure::failed(format_args!(
                 "the time column \"{}\" does not say its unit; give it with --time-unit s (or ms, \
@@ -210,13 +210,13 @@ fn unit(column: &super::Column, options: &Options) -> Result<(String, Unit), Fai
             )));
         }
     };
-    if is_time(unit.dimension()) {
-        Ok((text, unit))
+    if named.is_time() {
+        Ok(named)
     } else {
         Err(Failure::failed(format_args!(
-            "the time column \"{}\" is in \"{text}\", which is no unit of time; give it with \
+            "the time column \"{}\" is in \"{}\", which is no unit of time; give it with \
              --time-unit s (or ms, us, min), or another column with --time-column",
-            column.heading
+            column.heading, named.text
         )))
     }
 }
@@ -243,7 +243,7 @@ pub fn overridden(
 ) -> Option<Warning> {
     let rate_hz = options.rate_hz.filter(|_| !options.resample)?;
     let column = &layout.columns[column?];
-    let unit = unit(column, options).ok()?.1;
+    let unit = unit(column, options).ok()?.unit;
     let stamped_hz = 1.0 / (typical_step(&rows.times)? * unit.factor());
     if (rate_hz / stamped_hz - 1.0).abs() <= TOLERANCE {
         return None;
