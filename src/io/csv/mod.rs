@@ -2,6 +2,7 @@
 
 mod chunks;
 mod columns;
+mod habit;
 mod layout;
 mod names;
 mod record;
