@@ -41,9 +41,42 @@ impl Text {
     }
 
     /// Appends a number that was taken apart.
-    #[inline]
+    #[inline(always)]
     pub fn decimal(&mut self, decimal: &Decimal) {
         self.length += decimal.put(self.room());
+    }
+
+    /// Appends `source[offset..offset + length]`, a comma, a number and a line feed.
+    ///
+    /// # Panics
+    /// If the source is shorter than that.
+    #[inline(always)]
+    pub fn row(&mut self, source: &[u8], offset: usize, length: usize, decimal: &Decimal) {
+        let Some(piece) = source
+            .get(offset..offset + SHORT)
+            .filter(|_| length < SHORT)
+        else {
+            self.long_row(source, offset, length, decimal);
+            return;
+        };
+        if self.bytes.len() < self.length + SHORT + ROOM {
+            self.grow();
+        }
+        let row = &mut self.bytes[self.length..self.length + SHORT + ROOM];
+        row[..SHORT].copy_from_slice(piece);
+        row[length] = b',';
+        let number = &mut row[length + 1..length + 1 + ROOM];
+        let end = length + 1 + decimal.put(number.try_into().expect("a slice of that length"));
+        row[end] = b'\n';
+        self.length += end + 1;
+    }
+
+    #[cold]
+    fn long_row(&mut self, source: &[u8], offset: usize, length: usize, decimal: &Decimal) {
+        self.copy(source, offset, length);
+        self.byte(b',');
+        self.decimal(decimal);
+        self.byte(b'\n');
     }
 
     /// Appends `source[offset..offset + length]`.

@@ -76,7 +76,15 @@ impl Rows<'_> {
             for (decimal, value) in decimals.iter_mut().zip(values) {
                 *decimal = Decimal::of(value * self.scale, count);
             }
-            for (decimal, i) in decimals[..values.len()].iter().zip(first..) {
+            let decimals = &decimals[..values.len()];
+            if let (Times::Copied { text, spans }, true) = (&self.times, recorded.is_empty()) {
+                for (decimal, span) in decimals.iter().zip(&spans[first..]) {
+                    let (offset, length) = crate::io::csv::place_of(*span);
+                    out.row(text, offset, length, decimal);
+                }
+                continue;
+            }
+            for (decimal, i) in decimals.iter().zip(first..) {
                 self.write_time(out, i, time_digits);
                 out.decimal(decimal);
                 self.end_row(out, recorded.get(i));
