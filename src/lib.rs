@@ -6,4 +6,5 @@ pub mod failure;
 pub mod io;
 pub mod pipeline;
 pub mod report;
+pub mod signal;
 pub mod stand;

@@ -40,6 +40,16 @@ impl Text {
         self.length += digits::put(self.room(), value, digits);
     }
 
+    /// Appends a number of nanoseconds as seconds, every digit of it.
+    pub fn seconds(&mut self, nanoseconds: i64) {
+        const PER_SECOND: u64 = 1_000_000_000;
+        let magnitude = nanoseconds.unsigned_abs();
+        let sign = if nanoseconds < 0 { "-" } else { "" };
+        let (whole, part) = (magnitude / PER_SECOND, magnitude % PER_SECOND);
+        let text = format!("{sign}{whole}.{part:09}");
+        self.copy(text.as_bytes(), 0, text.len());
+    }
+
     /// Appends a number that was taken apart.
     #[inline(always)]
     pub fn decimal(&mut self, decimal: &Decimal) {
@@ -122,6 +132,17 @@ impl Text {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    #[test]
+    fn nanoseconds_keep_every_digit() {
+        let mut text = Text::default();
+        for nanoseconds in [0, 1_700_000_000_123_456_789, -1_500_000_000] {
+            text.seconds(nanoseconds);
+            text.byte(b' ');
+        }
+        let expected = "0.000000000 1700000000.123456789 -1.500000000 ";
+        assert_eq!(text.as_bytes(), expected.as_bytes());
+    }
 
     proptest! {
         #[test]

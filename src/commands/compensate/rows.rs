@@ -21,6 +21,8 @@ pub(super) enum Times<'a> {
     Copied { text: &'a [u8], spans: &'a [u64] },
     /// Stamps in another unit, times seconds per unit.
     Stamps { times: &'a [f64], seconds: f64 },
+    /// Nanoseconds from an origin, in nanoseconds.
+    Nanoseconds { times: &'a [f64], origin: i64 },
     /// A grid: start, index of the first sample, rate.
     Grid { start_s: f64, first: usize },
 }
@@ -100,6 +102,7 @@ impl Rows<'_> {
                 out.copy(text, offset, length);
             }
             Times::Stamps { times, seconds } => out.number(times[i] * seconds, digits),
+            Times::Nanoseconds { times, origin } => out.seconds(origin + times[i] as i64),
             Times::Grid { .. } => out.number(self.time_s(i), digits),
         }
         out.byte(b',');
@@ -122,6 +125,7 @@ impl Rows<'_> {
                 crate::io::number::read(text, offset, b'.').map_or(f64::NAN, |(value, _)| value)
             }
             Times::Stamps { times, seconds } => times[i] * seconds,
+            Times::Nanoseconds { times, origin } => (*origin as f64 + times[i]) * 1e-9,
             Times::Grid { start_s, first } => start_s + (first + i) as f64 / self.rate_hz,
         }
     }

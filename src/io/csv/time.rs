@@ -41,6 +41,15 @@ pub enum TimeSource {
         resampled: bool,
         /// Whether the text of a stamp is a number of seconds as the output writes it.
         copied: bool,
+        /// Nanoseconds at which the stamps are zero.
+        origin_ns: i64,
+    },
+    /// From a rate that the head of the file gives.
+    Header {
+        /// The words that gave it.
+        words: String,
+        /// Time of the first sample.
+        start_s: f64,
     },
     /// From a rate that the user gave; the first sample is at time 0.
     Given,
@@ -100,6 +109,7 @@ impl TimeAxis {
                 step,
                 resampled: options.resample,
                 copied: seconds_per_unit == 1.0 && layout.dialect.decimal == b'.',
+                origin_ns: 0,
             },
             rate_hz: without_rounding(1.0 / (step * seconds_per_unit)),
         })
@@ -330,6 +340,7 @@ mod tests {
                 step,
                 resampled,
                 copied: true,
+                origin_ns: 0,
             },
             rate_hz: 1.0 / step,
         }
