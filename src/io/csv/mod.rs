@@ -15,9 +15,11 @@ use crate::failure::Failure;
 use crate::report::Warning;
 
 pub use chunks::{Chunks, Piece};
-pub use layout::{Delimiter, Dialect, Layout, Told};
+pub(crate) use columns::{list, time_column};
+pub use layout::{Delimiter, Dialect, Layout, Told, is_skipped};
 pub use names::{Column, NamedUnit};
 pub use scan::{Defect, Problem, RowPlan, Rows, place_of};
+pub(crate) use time::without_rounding;
 pub use time::{Break, TimeAxis, TimeSource};
 
 /// Bytes of a file that its layout is told from.
@@ -260,8 +262,14 @@ fn find_layout(
     layout::find(&head, head.len() < LONG_HEAD, told).map(|layout| (head, layout))
 }
 
+/// The layout of a text that is in memory as a whole.
+pub(crate) fn find_layout_of(text: &[u8], told: &Told) -> Result<Layout, Failure> {
+    let head = &text[..text.len().min(LONG_HEAD)];
+    layout::find(head, head.len() == text.len(), told)
+}
+
 /// Names the formats that are often handed over in place of text.
-fn refuse_other_formats(head: &[u8]) -> Result<(), Failure> {
+pub(crate) fn refuse_other_formats(head: &[u8]) -> Result<(), Failure> {
     let known: [(&[u8], &str); 6] = [
         (
             b"\x89MCAP",
