@@ -3,6 +3,7 @@
 mod feed;
 mod open;
 mod record;
+mod recorded;
 mod sequence;
 
 use crate::io::csv::{Column, RowPlan, TimeAxis, TimeSource};

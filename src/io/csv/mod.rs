@@ -20,7 +20,7 @@ pub use layout::{Delimiter, Dialect, Layout, Told, is_skipped};
 pub use names::{Column, NamedUnit};
 pub use scan::{Defect, Problem, RowPlan, Rows, place_of};
 pub(crate) use time::without_rounding;
-pub use time::{Break, TimeAxis, TimeSource};
+pub use time::{Break, Stamps, TimeAxis, TimeSource};
 
 /// Bytes of a file that its layout is told from.
 const HEAD: usize = 1 << 16;

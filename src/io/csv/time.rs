@@ -55,6 +55,21 @@ pub enum TimeSource {
     Given,
 }
 
+/// What is known of stamps before their step.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stamps {
+    /// Heading of their column, or what they are.
+    pub heading: String,
+    /// Their unit as written.
+    pub unit: String,
+    /// Seconds per unit.
+    pub seconds_per_unit: f64,
+    /// Whether the text of a stamp is a number of seconds as the output writes it.
+    pub copied: bool,
+    /// Nanoseconds at which they are zero.
+    pub origin_ns: i64,
+}
+
 /// Where and how stamps stop being uniform.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Break {
@@ -90,26 +105,40 @@ impl TimeAxis {
             (None, None) => return Err(Failure::failed(missing(layout))),
         };
         let NamedUnit { text, unit } = unit(column, options)?;
-        let typical = typical_step(&rows.times)
-            .ok_or_else(|| Failure::failed(no_step(&column.heading, &rows.times)))?;
-        let seconds_per_unit = unit.factor();
-        let recorded_hz = 1.0 / (typical * seconds_per_unit);
+        let stamps = Stamps {
+            heading: column.heading.clone(),
+            unit: text,
+            seconds_per_unit: unit.factor(),
+            copied: unit.factor() == 1.0 && layout.dialect.decimal == b'.',
+            origin_ns: 0,
+        };
+        Self::of_stamps(stamps, &rows.times, options)
+    }
+
+    /// The time axis of stamps, told from the first of them.
+    ///
+    /// # Errors
+    /// If they do not rise, or are to be resampled to a rate far from theirs.
+    pub fn of_stamps(stamps: Stamps, first: &[f64], options: &Options) -> Result<Self, Failure> {
+        let typical =
+            typical_step(first).ok_or_else(|| Failure::failed(no_step(&stamps.heading, first)))?;
+        let seconds_per_unit = stamps.seconds_per_unit;
         let step = match options.rate_hz {
             None => typical,
             Some(rate_hz) => {
-                check_resampled(rate_hz, recorded_hz)?;
+                check_resampled(rate_hz, 1.0 / (typical * seconds_per_unit))?;
                 1.0 / rate_hz / seconds_per_unit
             }
         };
         Ok(Self {
             source: TimeSource::Stamps {
-                heading: column.heading.clone(),
-                unit: text,
+                heading: stamps.heading,
+                unit: stamps.unit,
                 seconds_per_unit,
                 step,
                 resampled: options.resample,
-                copied: seconds_per_unit == 1.0 && layout.dialect.decimal == b'.',
-                origin_ns: 0,
+                copied: stamps.copied,
+                origin_ns: stamps.origin_ns,
             },
             rate_hz: without_rounding(1.0 / (step * seconds_per_unit)),
         })
