@@ -168,25 +168,32 @@ fn scale(power: i32) -> f64 {
 }
 
 /// Sixteen ASCII digits of a number below 10^16, the first in the lowest byte.
-#[inline]
+#[inline(always)]
 fn sixteen_digits(value: u64) -> u128 {
-    let high = eight_digits(value / 100_000_000);
-    let low = eight_digits(value % 100_000_000);
-    u128::from(high) | u128::from(low) << 64
+    let (high, low) = (value / 100_000_000, value % 100_000_000);
+    u128::from(eight_digits(high)) | u128::from(eight_digits(low)) << 64
 }
 
-/// Eight ASCII digits of a number below 10^8, the first in the lowest byte: fours, pairs, digits,
-/// each split for all parts at once by multiplying with a rounded reciprocal.
-#[inline]
+/// Eight ASCII digits of a number below 10^8, the first in the lowest byte.
+#[inline(always)]
 fn eight_digits(value: u64) -> u64 {
     let high = value / 10_000;
-    let fours = high | ((value - high * 10_000) << 32);
-    let hundreds = ((fours * 10_486) >> 20) & 0x0000_007F_0000_007F;
-    let pairs = hundreds | ((fours - hundreds * 100) << 16);
-    let tens = ((pairs * 103) >> 10) & 0x000F_000F_000F_000F;
-    let digits = tens | ((pairs - tens * 10) << 8);
-    digits | 0x3030_3030_3030_3030
+    let low = value - high * 10_000;
+    u64::from(FOUR_DIGITS[high as usize]) | u64::from(FOUR_DIGITS[low as usize]) << 32
 }
+
+/// Four ASCII digits of every number below 10^4, the first in the lowest byte.
+static FOUR_DIGITS: [u32; 10_000] = {
+    let mut table = [0; 10_000];
+    let mut value = 0;
+    while value < 10_000 {
+        let n = value as u32;
+        table[value] =
+            0x3030_3030 | n / 1000 | n / 100 % 10 << 8 | n / 10 % 10 << 16 | n % 10 << 24;
+        value += 1;
+    }
+    table
+};
 
 /// `0.00ddd`, `dd.ddd` or `dddd`. Bytes after the length told are left over.
 ///

@@ -39,7 +39,7 @@ struct Job {
     torque: Vec<f64>,
     text: Text,
     power: Option<PowerSum>,
-    extent: Extent,
+    extent: Option<Extent>,
 }
 
 /// What each sample goes through, the same on every thread.
@@ -77,7 +77,7 @@ pub fn run(args: &Compensate, plan: Plan, output: &mut Output) -> Result<Run, Fa
     // Rows enough that a piece needs no more than the one after it.
     let (mut fetch, row_plan, mut sequence) = signal.into_stream(2 * half_length);
     let mut power = PowerSum::new(noise_block);
-    let mut extent = Extent::default();
+    let mut extent = Extent::NONE;
     let mut traces = args.plot.as_ref().map(|_| Traces::new(args.plot_range));
     let mut short = Vec::new();
     let threads = threads(args);
@@ -115,7 +115,9 @@ pub fn run(args: &Compensate, plan: Plan, output: &mut Output) -> Result<Run, Fa
                 if let Some(traces) = &mut traces {
                     steps.trace(job, traces);
                 }
-                extent.join(&job.extent);
+                if let Some(part) = &job.extent {
+                    extent.join(part);
+                }
                 // A record may be too short for a block of the noise estimate.
                 if short.len() < noise_block {
                     short.extend_from_slice(steps.recorded(&job.window));
@@ -250,7 +252,7 @@ impl Steps<'_> {
             convolver.convolve(&job.window, &mut job.torque, None);
             power.add_samples(&job.window[self.half_length..self.half_length + length]);
         }
-        job.extent = Extent::of(&job.torque);
+        job.extent = Some(Extent::of(&job.torque));
         job.text.clear();
         let rows = self.rows(&job.batch, job.first);
         let recorded = self.recorded(&job.window);

@@ -193,7 +193,7 @@ impl TimeAxis {
                 after: first,
             });
         }
-        let row = times.windows(2).position(|pair| !good(pair[0], pair[1]))? + 1;
+        let row = first_step(times, &good)? + 1;
         Some(Break {
             row,
             before: times[row - 1],
@@ -230,6 +230,19 @@ impl TimeAxis {
         };
         format!("{what}; use --resample to interpolate, or --rate HZ if the stamps are wrong")
     }
+}
+
+/// Index of the first step that is not good. Looks at many at once, since there rarely is one.
+fn first_step(times: &[f64], good: &impl Fn(f64, f64) -> bool) -> Option<usize> {
+    const TOGETHER: usize = 64;
+    let steps = times.len().saturating_sub(1);
+    let is_good = |i: usize| good(times[i], times[i + 1]);
+    let start = (0..steps).step_by(TOGETHER).find(|&start| {
+        let part = &times[start..(start + TOGETHER + 1).min(times.len())];
+        let pairs = part.iter().zip(&part[1..]);
+        !pairs.fold(true, |all, (a, b)| all & good(*a, *b))
+    })?;
+    (start..steps).find(|i| !is_good(*i))
 }
 
 /// The unit of a column of stamps: from the user, or from the heading.
