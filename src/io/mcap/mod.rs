@@ -33,9 +33,11 @@ pub mod summary;
 mod testing;
 pub mod time;
 pub mod units;
+pub mod writer;
 
 pub use inventory::Inventory;
 pub use selection::Selection;
 pub use source::{Options, Source};
 pub use summary::Summary;
 pub use time::TimeChoice;
+pub use writer::Writer;

@@ -72,6 +72,7 @@ pub struct Source {
     clock: Clock,
     tally: Tally,
     is_at_end: bool,
+    log_offset_ns: i64,
 }
 
 /// A message kept for later.
@@ -146,6 +147,7 @@ impl Source {
             clock: Clock::default(),
             tally: Tally::default(),
             is_at_end: false,
+            log_offset_ns: 0,
         };
         source.look_ahead()?;
         source.choose_time(options.time)?;
@@ -162,6 +164,13 @@ impl Source {
     #[must_use]
     pub fn chosen(&self) -> &Chosen {
         &self.chosen
+    }
+
+    /// The chosen time of the first message minus its log time, in ns: what a time must be
+    /// lessened by to lie among the log times of the file.
+    #[must_use]
+    pub fn log_offset_ns(&self) -> i64 {
+        self.log_offset_ns
     }
 
     /// Gives the next samples in the order of their times, in ns since the clock's zero; false
@@ -333,6 +342,17 @@ impl Source {
                 (TimeChoice::Log, why.to_owned())
             }
         };
+        self.log_offset_ns = self.first.front().map_or(0, |message| {
+            let log_ns = i64::try_from(message.log_time_ns).ok();
+            let time_ns = match choice {
+                TimeChoice::Log => log_ns,
+                TimeChoice::Publish => i64::try_from(message.publish_time_ns).ok(),
+                TimeChoice::Header => stamps.first().copied().flatten(),
+            };
+            time_ns
+                .zip(log_ns)
+                .map_or(0, |(time, log)| time.saturating_sub(log))
+        });
         self.chosen.time = TimeUsed {
             choice,
             field: field.filter(|_| choice == TimeChoice::Header),

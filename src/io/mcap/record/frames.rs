@@ -167,10 +167,7 @@ impl Frames {
     pub fn new(name: String, mut input: Input) -> Result<Self, Failure> {
         let there = input.want(MAGIC.len()).map_err(|e| failed(&name, &e))?;
         if input.window()[..there] != *MAGIC {
-            return Err(Failure::failed(format_args!(
-                "{name}: not an MCAP file: it does not begin with the bytes 89 4d 43 41 50 30 0d \
-                 0a; record with a recorder that writes MCAP, or convert the file first"
-            )));
+            return Err(not_mcap(&name));
         }
         input.used(MAGIC.len());
         Ok(Self {
@@ -428,6 +425,15 @@ fn record_head(bytes: &[u8]) -> Option<(u8, u64)> {
     let (head, _) = bytes.split_first_chunk::<RECORD_HEAD>()?;
     let [op, length @ ..] = head;
     Some((*op, u64::from_le_bytes(*length)))
+}
+
+/// The failure of a file that is something else.
+#[must_use]
+pub fn not_mcap(name: &str) -> Failure {
+    Failure::failed(format_args!(
+        "{name}: not an MCAP file: it does not begin with the bytes 89 4d 43 41 50 30 0d 0a; \
+         record with a recorder that writes MCAP, or convert the file first"
+    ))
 }
 
 fn failed(name: &str, error: &std::io::Error) -> Failure {
