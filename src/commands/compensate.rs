@@ -1,6 +1,6 @@
 //! `compensate`: a recorded signal in, the torque that acted out.
 
-mod rows;
+mod sink;
 mod stream;
 mod whole;
 
@@ -11,10 +11,11 @@ use torqcomp_dsp::compensate::InverseFilter;
 use torqcomp_dsp::noise::NoiseGain;
 use torqcomp_dsp::resample;
 
+use self::sink::Sink;
 use super::{Outcome, conclude, uncertainty};
 use crate::cli::Compensate;
 use crate::failure::Failure;
-use crate::io::csv::{Place, TimeAxis, TimeSource};
+use crate::io::csv::Place;
 use crate::io::output::Output;
 use crate::report::compensate::{Ends, Gain, Noise, RecordNoise, Report, SCHEMA};
 use crate::report::svg::Traces;
@@ -130,20 +131,20 @@ pub fn run(args: &Compensate) -> Result<Outcome, Failure> {
     let plan = plan(args)?;
     let input = Path::new(&args.record.input);
     let inputs = [input, args.stand.as_path()];
-    let mut output = Output::open(args.result.output.as_deref(), args.result.force, &inputs)?;
+    let output = Output::open(args.result.output.as_deref(), args.result.force, &inputs)?;
     let plot = args
         .plot
         .as_deref()
         .map(|path| open_plot(path, args, &inputs))
         .transpose()?;
-    output.write(heading(&plan.chain, args.with_recorded).as_bytes())?;
-
     let mut report = describe(args, &plan, output.name());
+    let mut sink = Sink::open(args, &plan, output)?;
+    report.output_signal = sink.describe();
     let unit = plan.chain.applied.unit.clone();
     let run = if args.whole_record {
-        whole::run(args, plan, &mut output)?
+        whole::run(args, plan, &mut sink)?
     } else {
-        stream::run(args, plan, &mut output)?
+        stream::run(args, plan, &mut sink)?
     };
     complete(&mut report, &run);
     // Whatever can fail comes before the first file takes its name.
@@ -154,7 +155,7 @@ pub fn run(args: &Compensate) -> Result<Outcome, Failure> {
     if args.json {
         crate::io::output::write_all(None, false, &[], &report::json(&report))?;
     }
-    output.finish()?;
+    sink.finish(args, &report)?;
     plot.map_or(Ok(()), Output::finish)?;
     if !args.quiet {
         report::say(&report.text());
@@ -233,11 +234,12 @@ fn describe(args: &Compensate, plan: &Plan, output: &str) -> Report {
             .map_or_else(String::new, |u| u.text.clone()),
         stand: stand.file.clone(),
         output: output.to_owned(),
+        output_signal: None,
         unit: chain.applied.unit.clone(),
         calibration: chain.described.clone(),
         samples: 0,
         rate_hz: signal.time.rate_hz,
-        rate_from: rate_from(&signal.time),
+        rate_from: signal.time.rate_from(),
         start_s: 0.0,
         method: if args.whole_record {
             "whole-record"
@@ -266,21 +268,6 @@ fn describe(args: &Compensate, plan: &Plan, output: &str) -> Report {
             record: None,
         },
         warnings: Vec::new(),
-    }
-}
-
-fn rate_from(time: &TimeAxis) -> String {
-    match &time.source {
-        TimeSource::Given => "given with --rate".to_owned(),
-        TimeSource::Header { words, .. } => format!("from the head of the file: {words}"),
-        TimeSource::Stamps {
-            heading, resampled, ..
-        } if *resampled => {
-            format!("from the stamps in \"{heading}\", interpolated")
-        }
-        TimeSource::Stamps { heading, .. } => {
-            format!("from the uniform stamps in \"{heading}\"")
-        }
     }
 }
 

@@ -30,7 +30,7 @@ pub fn run(args: &Harmonics) -> Result<Outcome, Failure> {
     let mut output = Output::open(args.result.output.as_deref(), args.result.force, &inputs)?;
     let mut report = describe(&signal, &stand, &chain);
     let source = signal.source.clone();
-    let record = Record::read(signal, &chain)?;
+    let record = Record::read(signal, |values| super::convert(&chain, values))?;
     let fitted = fit(args, &stand, &chain, &record, &mut report);
     fitted.map_err(|failure| failure.at(&source))?;
     let text = if args.json {

@@ -1,8 +1,10 @@
 //! One file for each verb.
 
 mod compensate;
+mod extract;
 mod harmonics;
 mod predict;
+mod rows;
 mod table;
 
 use torqcomp_dsp::conversion::ConversionError;
@@ -29,6 +31,7 @@ pub enum Outcome {
 pub fn run(cli: Cli) -> Result<Outcome, Failure> {
     match cli.verb {
         Verb::Compensate(args) => compensate::run(&args),
+        Verb::Extract(args) => extract::run(&args),
         Verb::Harmonics(args) => harmonics::run(&args),
         Verb::Table(args) => table::run(&args),
         Verb::Predict(args) => predict::run(&args),

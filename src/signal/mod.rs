@@ -1,15 +1,20 @@
 //! One channel of a recording, open for reading piece by piece, whatever the format of the file.
 
 mod feed;
+mod messages;
 mod open;
+mod options;
 mod record;
 mod recorded;
 mod sequence;
 
 use crate::io::csv::{Column, RowPlan, TimeAxis, TimeSource};
+use crate::io::mcap::TimeChoice;
+use crate::io::mcap::decode::Encoding;
 use crate::report::Warning;
 
 pub use feed::{Batch, Fetch, RowSource};
+pub use options::{MessageOptions, Options};
 pub use record::Record;
 pub use sequence::{Sequence, Summary, TextRows};
 
@@ -23,11 +28,28 @@ pub struct Signal {
     pub channel: Column,
     /// How its samples lie in time.
     pub time: TimeAxis,
+    /// Of messages, what a copy of their file needs to know.
+    pub origin: Option<Origin>,
     /// First time stamp as written.
     first_stamp: Option<f64>,
     /// What is known to be odd before reading.
     warnings: Vec<Warning>,
     feed: Feed,
+}
+
+/// Where messages come from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Origin {
+    /// Their topic.
+    pub topic: String,
+    /// Their encoding, if it is known.
+    pub encoding: Option<Encoding>,
+    /// Time of the first sample, in ns.
+    pub first_ns: i64,
+    /// What a sample's time is ahead of the file's log times, in ns.
+    pub log_offset_ns: i64,
+    /// The time that was asked for.
+    pub time: Option<TimeChoice>,
 }
 
 /// Where the samples come from.

@@ -1,9 +1,14 @@
 //! Opening a channel of a file of any format.
 
+use std::io::Read;
+
 use super::sequence::TextRows;
-use super::{Feed, Signal};
+use super::{Feed, Options, Signal};
 use crate::failure::Failure;
-use crate::io::csv::{Options, Place, Table};
+use crate::io::csv::{Place, Table};
+use crate::io::mcap::record::frames::Frames;
+use crate::io::mcap::record::input::Input;
+use crate::io::mcap::{self, Source, selection::Wanted};
 
 impl Signal {
     /// Opens a file, finds the channel and its time axis.
@@ -11,7 +16,31 @@ impl Signal {
     /// # Errors
     /// If the file cannot be read, holds no recording, or leaves open what is to be read.
     pub fn open(place: &Place, options: &Options) -> Result<Self, Failure> {
-        Table::open(place, options).map(Self::of_table)
+        let name = place.name();
+        let mut input = place.open()?;
+        let mut head = Vec::new();
+        (&mut input)
+            .take(MAGIC.len() as u64)
+            .read_to_end(&mut head)
+            .map_err(|error| Failure::failed(format_args!("{name}: cannot be read: {error}")))?;
+        let is_mcap = head == MAGIC;
+        let input = Box::new(std::io::Cursor::new(head).chain(input));
+        if is_mcap {
+            options.check_for_messages()?;
+            let wanted = match options.messages.selection.check()? {
+                Wanted::Only => mcap::inventory::only_topic(place)?,
+                wanted => wanted,
+            };
+            let frames = Frames::new(name, Input::new(input))?;
+            let reading = mcap::Options {
+                time: options.messages.time,
+                spacing: options.messages.spacing.clone(),
+            };
+            let source = Source::read(frames, &wanted, &reading)?;
+            return Self::of_messages(source, &options.table, &options.messages);
+        }
+        options.check_for_text()?;
+        Table::of(name, input, &options.table).map(Self::of_table)
     }
 
     /// The signal of a plain table.
@@ -43,6 +72,7 @@ impl Signal {
             time,
             first_stamp,
             warnings,
+            origin: None,
             feed: Feed::Text {
                 rows,
                 head,
@@ -52,3 +82,6 @@ impl Signal {
         }
     }
 }
+
+/// What an MCAP file begins with.
+const MAGIC: &[u8] = ::mcap::MAGIC;

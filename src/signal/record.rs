@@ -5,7 +5,6 @@ use torqcomp_dsp::resample::{Resampled, Resampler};
 use super::{Batch, Signal, Summary};
 use crate::failure::Failure;
 use crate::io::csv::TimeSource;
-use crate::stand::Chain;
 
 /// A uniformly sampled record, in SI units of the applied quantity, not yet compensated.
 #[derive(Debug, Clone)]
@@ -23,11 +22,15 @@ pub struct Record {
 }
 
 impl Record {
-    /// Reads a signal to its end.
+    /// Reads a signal to its end; `convert` brings its samples to the units wanted, or says which
+    /// cannot be.
     ///
     /// # Errors
     /// The first row that cannot be read or converted, with its line.
-    pub fn read(signal: Signal, chain: &Chain) -> Result<Self, Failure> {
+    pub fn read(
+        signal: Signal,
+        convert: impl Fn(&mut [f64]) -> Result<(), (usize, String)>,
+    ) -> Result<Self, Failure> {
         let time = signal.time.clone();
         let start_s = signal.first_time_s();
         let (mut fetch, plan, mut sequence) = signal.into_stream(0);
@@ -37,7 +40,7 @@ impl Record {
         while fetch.next(&mut batch)? {
             batch.read_rows(plan.as_ref(), &time);
             sequence.accept(&mut batch)?;
-            if let Err((row, message)) = crate::commands::convert(chain, &mut batch.rows.values) {
+            if let Err((row, message)) = convert(&mut batch.rows.values) {
                 return Err(sequence.failure_at_row(&batch, row, &message));
             }
             samples.extend_from_slice(&batch.rows.values);

@@ -43,6 +43,7 @@ impl Signal {
                 unit: selection.unit.clone(),
             },
             time,
+            origin: None,
             warnings: recording.warnings.clone(),
             feed: Feed::Rows(Box::new(Memory {
                 samples: channel.samples.clone(),

@@ -7,13 +7,13 @@ use torqcomp_dsp::noise::RecordNoise;
 use torqcomp_dsp::resample::Resampler;
 use torqcomp_dsp::spectrum::{PowerSum, welch};
 
-use super::rows::{Rows, Times};
+use super::sink::Sink;
 use super::{Extent, Plan, Run};
 use crate::cli::Compensate;
 use crate::commands::convert;
+use crate::commands::rows::{Rows, Times};
 use crate::failure::Failure;
 use crate::io::csv::{TimeAxis, TimeSource};
-use crate::io::output::Output;
 use crate::io::text::Text;
 use crate::pipeline::{self, Stages};
 use crate::report::svg::Traces;
@@ -49,11 +49,13 @@ struct Steps<'a> {
     time: &'a TimeAxis,
     start_s: f64,
     scale: f64,
+    /// Whether the result is text.
+    is_text: bool,
     args: &'a Compensate,
 }
 
 /// Runs the stages over the whole record.
-pub fn run(args: &Compensate, plan: Plan, output: &mut Output) -> Result<Run, Failure> {
+pub fn run(args: &Compensate, plan: Plan, sink: &mut Sink) -> Result<Run, Failure> {
     let Plan {
         signal,
         chain,
@@ -72,6 +74,7 @@ pub fn run(args: &Compensate, plan: Plan, output: &mut Output) -> Result<Run, Fa
         time: &time,
         start_s: signal.first_time_s(),
         scale: 1.0 / chain.applied.factor,
+        is_text: sink.is_text(),
         args,
     };
     // Rows enough that a piece needs no more than the one after it.
@@ -108,7 +111,8 @@ pub fn run(args: &Compensate, plan: Plan, output: &mut Output) -> Result<Run, Fa
             },
             work: |convolver: &mut BlockConvolver, job: &mut Job| steps.work(convolver, job),
             deliver: |job: &mut Job| {
-                output.write(job.text.as_bytes())?;
+                let rows = steps.rows(&job.batch, job.first);
+                sink.take(job.text.as_bytes(), &rows, &job.torque)?;
                 if let Some(part) = &job.power {
                     power.add(part);
                 }
@@ -254,6 +258,9 @@ impl Steps<'_> {
         }
         job.extent = Some(Extent::of(&job.torque));
         job.text.clear();
+        if !self.is_text {
+            return;
+        }
         let rows = self.rows(&job.batch, job.first);
         let recorded = self.recorded(&job.window);
         let recorded = if self.args.with_recorded {
@@ -277,33 +284,7 @@ impl Steps<'_> {
     }
 
     fn rows<'a>(&self, batch: &'a Batch, first: usize) -> Rows<'a> {
-        let grid = Times::Grid {
-            start_s: self.start_s,
-            first,
-        };
-        let times = match &self.time.source {
-            TimeSource::Given
-            | TimeSource::Header { .. }
-            | TimeSource::Stamps {
-                resampled: true, ..
-            } => grid,
-            TimeSource::Stamps { copied: true, .. } => Times::Copied {
-                text: &batch.text,
-                spans: &batch.rows.time_text,
-            },
-            TimeSource::Stamps {
-                seconds_per_unit,
-                origin_ns,
-                ..
-            } if *origin_ns == 0 => Times::Stamps {
-                times: &batch.rows.times,
-                seconds: *seconds_per_unit,
-            },
-            TimeSource::Stamps { origin_ns, .. } => Times::Nanoseconds {
-                times: &batch.rows.times,
-                origin: *origin_ns,
-            },
-        };
+        let times = Times::of(batch, self.time, self.start_s, first);
         Rows {
             digits: self.args.digits,
             scale: self.scale,

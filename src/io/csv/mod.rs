@@ -118,16 +118,19 @@ pub struct Table {
 }
 
 impl Table {
-    /// Opens a file, finds its table, its channel and its time axis.
+    /// Finds the table in a text, its channel and its time axis.
     ///
     /// # Errors
-    /// If the file cannot be read, holds no table, or leaves open what is to be read.
-    pub fn open(place: &Place, options: &Options) -> Result<Self, Failure> {
-        let name = place.name();
-        let mut input = place.open()?;
-        Self::read(&name, &mut input, options)
-            .map(|parts| parts.with(name.clone(), input))
-            .map_err(|failure| failure.at(&name))
+    /// If the text cannot be read, holds no table, or leaves open what is to be read.
+    pub fn of(
+        name: String,
+        mut input: Box<dyn Read + Send>,
+        options: &Options,
+    ) -> Result<Self, Failure> {
+        match Self::read(&name, &mut input, options) {
+            Ok(parts) => Ok(parts.with(name, input)),
+            Err(failure) => Err(failure.at(&name)),
+        }
     }
 
     fn read(name: &str, input: &mut dyn Read, options: &Options) -> Result<Parts, Failure> {
@@ -270,11 +273,7 @@ pub(crate) fn find_layout_of(text: &[u8], told: &Told) -> Result<Layout, Failure
 
 /// Names the formats that are often handed over in place of text.
 pub(crate) fn refuse_other_formats(head: &[u8]) -> Result<(), Failure> {
-    let known: [(&[u8], &str); 6] = [
-        (
-            b"\x89MCAP",
-            "an MCAP recording; only text tables are read so far",
-        ),
+    let known: [(&[u8], &str); 5] = [
         (b"\xFF\xFE", "UTF-16 text; save it as UTF-8"),
         (b"\xFE\xFF", "UTF-16 text; save it as UTF-8"),
         (

@@ -144,6 +144,23 @@ impl TimeAxis {
         })
     }
 
+    /// Where the rate comes from, for people.
+    #[must_use]
+    pub fn rate_from(&self) -> String {
+        match &self.source {
+            TimeSource::Given => "given with --rate".to_owned(),
+            TimeSource::Header { words, .. } => format!("from the head of the file: {words}"),
+            TimeSource::Stamps {
+                heading, resampled, ..
+            } if *resampled => {
+                format!("from the stamps in \"{heading}\", interpolated")
+            }
+            TimeSource::Stamps { heading, .. } => {
+                format!("from the uniform stamps in \"{heading}\"")
+            }
+        }
+    }
+
     /// Whether stamps are read.
     #[must_use]
     pub fn uses_stamps(&self) -> bool {

@@ -106,6 +106,20 @@ pub enum Encoding {
     Json,
 }
 
+impl Encoding {
+    /// Reads the name that channels give.
+    #[must_use]
+    pub fn of(name: &str) -> Option<Self> {
+        match name {
+            "cdr" => Some(Self::Cdr),
+            "ros1" => Some(Self::Ros1),
+            "protobuf" => Some(Self::Protobuf),
+            "json" => Some(Self::Json),
+            _ => None,
+        }
+    }
+}
+
 /// Takes wanted numbers out of messages.
 pub enum Decoder {
     /// CDR and ROS 1.

@@ -1,7 +1,9 @@
 //! The rows of a result as text.
 
+use crate::io::csv::{TimeAxis, TimeSource};
 use crate::io::digits::{self, Decimal, Digits};
 use crate::io::text::Text;
+use crate::signal::Batch;
 
 /// Rows whose numbers are taken apart together.
 const ROWS_TOGETHER: usize = 8;
@@ -25,6 +27,34 @@ pub(super) enum Times<'a> {
     Nanoseconds { times: &'a [f64], origin: i64 },
     /// A grid: start, index of the first sample, rate.
     Grid { start_s: f64, first: usize },
+}
+
+impl<'a> Times<'a> {
+    /// The times of a batch whose first sample is the `first` of the record.
+    pub(super) fn of(batch: &'a Batch, time: &TimeAxis, start_s: f64, first: usize) -> Self {
+        let times = &batch.rows.times;
+        match &time.source {
+            TimeSource::Given
+            | TimeSource::Header { .. }
+            | TimeSource::Stamps {
+                resampled: true, ..
+            } => Self::Grid { start_s, first },
+            TimeSource::Stamps { copied: true, .. } => Self::Copied {
+                text: &batch.text,
+                spans: &batch.rows.time_text,
+            },
+            TimeSource::Stamps { origin_ns, .. } if *origin_ns != 0 => Self::Nanoseconds {
+                times,
+                origin: *origin_ns,
+            },
+            TimeSource::Stamps {
+                seconds_per_unit, ..
+            } => Self::Stamps {
+                times,
+                seconds: *seconds_per_unit,
+            },
+        }
+    }
 }
 
 impl Rows<'_> {
@@ -115,6 +145,17 @@ impl Rows<'_> {
             out.number(value * self.scale, self.digits);
         }
         out.byte(b'\n');
+    }
+
+    /// Time of the row `i` in ns; a grid begins at `start_ns`.
+    pub(super) fn time_ns(&self, i: usize, start_ns: i64) -> i64 {
+        match &self.times {
+            Times::Nanoseconds { times, origin } => origin + times[i] as i64,
+            Times::Grid { first, .. } => {
+                start_ns + (1e9 * (first + i) as f64 / self.rate_hz).round() as i64
+            }
+            _ => (1e9 * self.time_s(i)).round() as i64,
+        }
     }
 
     /// Time of the row `i`.
