@@ -117,7 +117,7 @@ impl<W: Write> Copier<'_, W> {
         match op {
             op::DATA_END | op::FOOTER => Ok(false),
             op::ATTACHMENT => self.attachment(at, length),
-            _ if length > chunk::LARGEST => {
+            _ if length > chunk::LARGEST && op != op::CHUNK => {
                 self.losses.push(Loss::TooLong { at, op, length });
                 Ok(false)
             }
@@ -126,10 +126,12 @@ impl<W: Write> Copier<'_, W> {
     }
 
     fn whole(&mut self, at: u64, op: u8, length: u64) -> Result<bool, Failure> {
-        let whole = RECORD_HEAD + usize::try_from(length).unwrap_or(usize::MAX);
+        let whole = RECORD_HEAD + length.min(chunk::LARGEST) as usize;
         let there = self.want(whole)?;
         if op == op::CHUNK {
-            return self.chunk(at, there, whole);
+            // A recorder that was stopped leaves its last chunk without a length.
+            let is_whole = there == whole && length <= chunk::LARGEST;
+            return self.chunk(at, there, is_whole);
         }
         if there < whole {
             return Ok(self.truncated(at, "within a record"));
@@ -159,16 +161,16 @@ impl<W: Write> Copier<'_, W> {
         self.pass(whole as u64).map(|_| true)
     }
 
-    fn chunk(&mut self, at: u64, there: usize, whole: usize) -> Result<bool, Failure> {
+    fn chunk(&mut self, at: u64, there: usize, is_whole: bool) -> Result<bool, Failure> {
         let body = &self.input.window()[RECORD_HEAD.min(there)..there];
         let Some((head, packed)) = ChunkHead::read(body) else {
-            if there < whole {
+            if !is_whole {
                 return Ok(self.truncated(at, "within a chunk"));
             }
-            return Ok(self.leave_out(at, whole, ChunkError::Head, None));
+            return Ok(self.leave_out(at, there, ChunkError::Head, None));
         };
         let span_ns = Some((head.start_ns, head.end_ns));
-        if there < whole {
+        if !is_whole {
             let _ = chunk::unpack_part(&head, packed, &mut self.records);
             self.salvage(&head.compression)?;
             return Ok(self.truncated(at, "within a chunk"));
@@ -182,7 +184,7 @@ impl<W: Write> Copier<'_, W> {
             }),
         };
         if let Err(why) = unpacked {
-            return Ok(self.leave_out(at, whole, why, span_ns));
+            return Ok(self.leave_out(at, there, why, span_ns));
         }
         self.is_chunk_copied = true;
         let index = &mut self.index;
@@ -190,13 +192,13 @@ impl<W: Write> Copier<'_, W> {
         self.index.chunks.push(ChunkEntry {
             span_ns: (head.start_ns, head.end_ns),
             offset: self.sink.offset(),
-            length: whole as u64,
+            length: there as u64,
             compression: head.compression,
             packed: head.packed_size,
             unpacked: head.size,
             ..ChunkEntry::default()
         });
-        self.pass(whole as u64).map(|_| true)
+        self.pass(there as u64).map(|_| true)
     }
 
     fn leave_out(
