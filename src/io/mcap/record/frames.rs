@@ -228,7 +228,7 @@ impl Frames {
     ///
     /// # Errors
     /// If the file cannot be read. Damage to its content is no error: see [`Self::losses`].
-    pub fn next(&mut self) -> Result<Option<Frame>, Failure> {
+    pub fn advance(&mut self) -> Result<Option<Frame>, Failure> {
         loop {
             if let Some(frame) = self.next_in_chunk() {
                 return Ok(Some(frame));

@@ -29,8 +29,8 @@ const PIECE: usize = 1 << 18;
 pub struct Copied {
     /// What is in it.
     pub index: Index,
-    /// Compression of most of its chunks, by their number.
-    pub compression: String,
+    /// Compression of most of its chunks, by their number; none if it has messages, but no chunks.
+    pub compression: Option<&'static str>,
     /// What could not be copied.
     pub losses: Vec<Loss>,
 }
@@ -63,19 +63,17 @@ pub fn copy<W: Write>(
     })
 }
 
-fn usual_compression(index: &Index) -> String {
-    ["zstd", "lz4", ""]
-        .into_iter()
-        .rev()
-        .max_by_key(|name| {
-            let same = index
-                .chunks
-                .iter()
-                .filter(|chunk| chunk.compression == *name);
-            same.count()
-        })
-        .unwrap_or("")
-        .to_owned()
+fn usual_compression(index: &Index) -> Option<&'static str> {
+    if index.chunks.is_empty() && !index.messages.is_empty() {
+        return None;
+    }
+    ["zstd", "lz4", ""].into_iter().rev().max_by_key(|name| {
+        let same = index
+            .chunks
+            .iter()
+            .filter(|chunk| chunk.compression == *name);
+        same.count()
+    })
 }
 
 struct Copier<'a, W: Write> {
@@ -216,7 +214,7 @@ impl<W: Write> Copier<'_, W> {
 
     /// Writes the whole records of a chunk that is cut off as a chunk.
     fn salvage(&mut self, compression: &str) -> Result<(), Failure> {
-        let mut chunk = Chunk::new(compression);
+        let mut chunk = Chunk::new(Some(compression));
         let index = &mut self.index;
         each(&self.records, |op, body| {
             note(index, op, body);
