@@ -74,7 +74,7 @@ pub(crate) fn convert(chain: &Chain, values: &mut [f64]) -> Result<(), (usize, S
         Err(ConversionError::Sample { index, source }) => return Err((index, source.to_string())),
         Err(other) => return Err((0, other.to_string())),
     }
-    match values.iter().position(|v| v.is_nan() || v.abs() > LARGEST) {
+    match first_impossible(values) {
         Some(index) => Err((
             index,
             format!(
@@ -84,4 +84,14 @@ pub(crate) fn convert(chain: &Chain, values: &mut [f64]) -> Result<(), (usize, S
         )),
         None => Ok(()),
     }
+}
+
+/// Index of the first value that is no measurement. Looks at many at once, since there is none.
+fn first_impossible(values: &[f64]) -> Option<usize> {
+    const TOGETHER: usize = 64;
+    let is_possible = |v: &f64| v.abs() <= LARGEST;
+    let all = |part: &[f64]| part.iter().fold(true, |all, v| all & is_possible(v));
+    let part = values.chunks(TOGETHER).position(|part| !all(part))?;
+    let start = part * TOGETHER;
+    Some(start + values[start..].iter().position(|v| !is_possible(v))?)
 }

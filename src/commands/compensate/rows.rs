@@ -21,6 +21,8 @@ pub(super) enum Times<'a> {
     Copied { text: &'a [u8], spans: &'a [u64] },
     /// Stamps in another unit, times seconds per unit.
     Stamps { times: &'a [f64], seconds: f64 },
+    /// Nanoseconds from an origin, in nanoseconds.
+    Nanoseconds { times: &'a [f64], origin: i64 },
     /// A grid: start, index of the first sample, rate.
     Grid { start_s: f64, first: usize },
 }
@@ -76,7 +78,15 @@ impl Rows<'_> {
             for (decimal, value) in decimals.iter_mut().zip(values) {
                 *decimal = Decimal::of(value * self.scale, count);
             }
-            for (decimal, i) in decimals[..values.len()].iter().zip(first..) {
+            let decimals = &decimals[..values.len()];
+            if let (Times::Copied { text, spans }, true) = (&self.times, recorded.is_empty()) {
+                for (decimal, span) in decimals.iter().zip(&spans[first..]) {
+                    let (offset, length) = crate::io::csv::place_of(*span);
+                    out.row(text, offset, length, decimal);
+                }
+                continue;
+            }
+            for (decimal, i) in decimals.iter().zip(first..) {
                 self.write_time(out, i, time_digits);
                 out.decimal(decimal);
                 self.end_row(out, recorded.get(i));
@@ -92,6 +102,7 @@ impl Rows<'_> {
                 out.copy(text, offset, length);
             }
             Times::Stamps { times, seconds } => out.number(times[i] * seconds, digits),
+            Times::Nanoseconds { times, origin } => out.seconds(origin + times[i] as i64),
             Times::Grid { .. } => out.number(self.time_s(i), digits),
         }
         out.byte(b',');
@@ -114,6 +125,7 @@ impl Rows<'_> {
                 crate::io::number::read(text, offset, b'.').map_or(f64::NAN, |(value, _)| value)
             }
             Times::Stamps { times, seconds } => times[i] * seconds,
+            Times::Nanoseconds { times, origin } => (*origin as f64 + times[i]) * 1e-9,
             Times::Grid { start_s, first } => start_s + (first + i) as f64 / self.rate_hz,
         }
     }

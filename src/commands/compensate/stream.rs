@@ -12,11 +12,12 @@ use super::{Extent, Plan, Run};
 use crate::cli::Compensate;
 use crate::commands::convert;
 use crate::failure::Failure;
-use crate::io::csv::{Batch, TimeAxis, TimeSource};
+use crate::io::csv::{TimeAxis, TimeSource};
 use crate::io::output::Output;
 use crate::io::text::Text;
 use crate::pipeline::{self, Stages};
 use crate::report::svg::Traces;
+use crate::signal::Batch;
 
 /// Threads that are worth starting: reading and writing stay serial.
 const MOST_THREADS: usize = 8;
@@ -38,7 +39,7 @@ struct Job {
     torque: Vec<f64>,
     text: Text,
     power: Option<PowerSum>,
-    extent: Extent,
+    extent: Option<Extent>,
 }
 
 /// What each sample goes through, the same on every thread.
@@ -54,14 +55,14 @@ struct Steps<'a> {
 /// Runs the stages over the whole record.
 pub fn run(args: &Compensate, plan: Plan, output: &mut Output) -> Result<Run, Failure> {
     let Plan {
-        table,
+        signal,
         chain,
         filter,
         ..
     } = plan;
     let half_length = filter.half_length();
-    let rate_hz = table.time.rate_hz;
-    let time = table.time.clone();
+    let rate_hz = signal.time.rate_hz;
+    let time = signal.time.clone();
     let first = BlockConvolver::new(&filter);
     let noise_block = first.block_length().min(LONGEST_NOISE_BLOCK);
     let mut joiner = Joiner::new(&time, half_length);
@@ -69,14 +70,14 @@ pub fn run(args: &Compensate, plan: Plan, output: &mut Output) -> Result<Run, Fa
         half_length,
         noise_block,
         time: &time,
-        start_s: table.first_time_s(),
+        start_s: signal.first_time_s(),
         scale: 1.0 / chain.applied.factor,
         args,
     };
     // Rows enough that a piece needs no more than the one after it.
-    let (mut fetch, row_plan, mut sequence) = table.into_stream(2 * half_length);
+    let (mut fetch, row_plan, mut sequence) = signal.into_stream(2 * half_length);
     let mut power = PowerSum::new(noise_block);
-    let mut extent = Extent::default();
+    let mut extent = Extent::NONE;
     let mut traces = args.plot.as_ref().map(|_| Traces::new(args.plot_range));
     let mut short = Vec::new();
     let threads = threads(args);
@@ -89,7 +90,7 @@ pub fn run(args: &Compensate, plan: Plan, output: &mut Output) -> Result<Run, Fa
         Stages {
             read: |job: &mut Job| fetch.next(&mut job.batch),
             prepare: |job: &mut Job| {
-                job.batch.read_rows(&row_plan, &time);
+                job.batch.read_rows(row_plan.as_ref(), &time);
                 job.unconverted = convert(&chain, &mut job.batch.rows.values).err();
             },
             join: |job: Option<Job>, ready: &mut dyn FnMut(Job)| match job {
@@ -114,7 +115,9 @@ pub fn run(args: &Compensate, plan: Plan, output: &mut Output) -> Result<Run, Fa
                 if let Some(traces) = &mut traces {
                     steps.trace(job, traces);
                 }
-                extent.join(&job.extent);
+                if let Some(part) = &job.extent {
+                    extent.join(part);
+                }
                 // A record may be too short for a block of the noise estimate.
                 if short.len() < noise_block {
                     short.extend_from_slice(steps.recorded(&job.window));
@@ -137,7 +140,7 @@ pub fn run(args: &Compensate, plan: Plan, output: &mut Output) -> Result<Run, Fa
         noise
     };
     Ok(Run {
-        summary: sequence.finish()?,
+        summary: sequence.finish(&mut fetch)?,
         samples: joiner.samples,
         start_s: steps.start_s,
         extent: extent.scaled(steps.scale),
@@ -175,7 +178,7 @@ impl Joiner {
             TimeSource::Stamps {
                 seconds_per_unit, ..
             } => *seconds_per_unit,
-            TimeSource::Given => 1.0,
+            TimeSource::Given | TimeSource::Header { .. } => 1.0,
         };
         Self {
             windows: Windows::new(half_length),
@@ -249,7 +252,7 @@ impl Steps<'_> {
             convolver.convolve(&job.window, &mut job.torque, None);
             power.add_samples(&job.window[self.half_length..self.half_length + length]);
         }
-        job.extent = Extent::of(&job.torque);
+        job.extent = Some(Extent::of(&job.torque));
         job.text.clear();
         let rows = self.rows(&job.batch, job.first);
         let recorded = self.recorded(&job.window);
@@ -280,6 +283,7 @@ impl Steps<'_> {
         };
         let times = match &self.time.source {
             TimeSource::Given
+            | TimeSource::Header { .. }
             | TimeSource::Stamps {
                 resampled: true, ..
             } => grid,
@@ -288,10 +292,16 @@ impl Steps<'_> {
                 spans: &batch.rows.time_text,
             },
             TimeSource::Stamps {
-                seconds_per_unit, ..
-            } => Times::Stamps {
+                seconds_per_unit,
+                origin_ns,
+                ..
+            } if *origin_ns == 0 => Times::Stamps {
                 times: &batch.rows.times,
                 seconds: *seconds_per_unit,
+            },
+            TimeSource::Stamps { origin_ns, .. } => Times::Nanoseconds {
+                times: &batch.rows.times,
+                origin: *origin_ns,
             },
         };
         Rows {

@@ -8,10 +8,10 @@ use super::rows::{Rows, Times};
 use super::{Extent, Plan, Run};
 use crate::cli::Compensate;
 use crate::failure::Failure;
-use crate::io::csv::Record;
 use crate::io::output::Output;
 use crate::io::text::Text;
 use crate::report::svg::Traces;
+use crate::signal::Record;
 
 /// Rows that are written at once.
 const ROWS_AT_ONCE: usize = 1 << 14;
@@ -21,13 +21,13 @@ const LONGEST_BLOCK: usize = 1 << 12;
 /// Reads, compensates and writes the record.
 pub fn run(args: &Compensate, plan: Plan, output: &mut Output) -> Result<Run, Failure> {
     let Plan {
-        table,
+        signal,
         chain,
         filter,
         ..
     } = plan;
-    let time = table.time.clone();
-    let record = Record::read(table, &chain)?;
+    let time = signal.time.clone();
+    let record = Record::read(signal, &chain)?;
     let torque = whole_record(&filter, &record.samples)?;
     let scale = 1.0 / chain.applied.factor;
     let mut traces = args.plot.as_ref().map(|_| Traces::new(args.plot_range));

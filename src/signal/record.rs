@@ -2,8 +2,9 @@
 
 use torqcomp_dsp::resample::{Resampled, Resampler};
 
-use super::{Batch, Summary, Table, TimeSource};
+use super::{Batch, Signal, Summary};
 use crate::failure::Failure;
+use crate::io::csv::TimeSource;
 use crate::stand::Chain;
 
 /// A uniformly sampled record, in SI units of the applied quantity, not yet compensated.
@@ -22,19 +23,19 @@ pub struct Record {
 }
 
 impl Record {
-    /// Reads a table to its end.
+    /// Reads a signal to its end.
     ///
     /// # Errors
     /// The first row that cannot be read or converted, with its line.
-    pub fn read(table: Table, chain: &Chain) -> Result<Self, Failure> {
-        let time = table.time.clone();
-        let start_s = table.first_time_s();
-        let (mut fetch, plan, mut sequence) = table.into_stream(0);
+    pub fn read(signal: Signal, chain: &Chain) -> Result<Self, Failure> {
+        let time = signal.time.clone();
+        let start_s = signal.first_time_s();
+        let (mut fetch, plan, mut sequence) = signal.into_stream(0);
         let mut samples = Vec::new();
         let mut times = Vec::new();
         let mut batch = Batch::default();
         while fetch.next(&mut batch)? {
-            batch.read_rows(&plan, &time);
+            batch.read_rows(plan.as_ref(), &time);
             sequence.accept(&mut batch)?;
             if let Err((row, message)) = crate::commands::convert(chain, &mut batch.rows.values) {
                 return Err(sequence.failure_at_row(&batch, row, &message));
@@ -63,7 +64,7 @@ impl Record {
             samples,
             start_s,
             rate_hz: time.rate_hz,
-            summary: sequence.finish()?,
+            summary: sequence.finish(&mut fetch)?,
             resampled,
         })
     }
