@@ -67,9 +67,8 @@ fn recording(compression: Option<Compression>) -> Vec<u8> {
     let mut writer = Writer::with_options(Cursor::new(Vec::new()), options).expect("in memory");
     let name = "sensor_msgs/msg/JointState";
     let schema = writer.add_schema(name, "ros2msg", SCHEMA.as_bytes());
-    let channel = schema.and_then(|id| {
-        writer.add_channel(id, "/joint_states", "cdr", &Default::default())
-    });
+    let channel =
+        schema.and_then(|id| writer.add_channel(id, "/joint_states", "cdr", &Default::default()));
     let channel_id = channel.expect("the first channel");
     for place in 0..MESSAGES {
         let log_time = 1_700_000_000_000_000_000 + place * 1_000_000;
