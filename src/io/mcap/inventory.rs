@@ -154,7 +154,7 @@ impl Inventory {
     /// If it cannot be read.
     pub fn read(mut frames: Frames) -> Result<Self, Failure> {
         let mut scan = Scan::default();
-        while let Some(frame) = frames.next()? {
+        while let Some(frame) = frames.advance()? {
             scan.note(frame.op, frames.body(&frame));
         }
         Ok(scan.finish(&frames))

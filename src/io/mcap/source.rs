@@ -221,7 +221,7 @@ impl Source {
             self.take(copied.log_time_ns, copied.publish_time_ns, &copied.data);
             return Ok(true);
         }
-        while let Some(frame) = self.frames.next()? {
+        while let Some(frame) = self.frames.advance()? {
             if frame.op != op::MESSAGE {
                 self.channels.note(frame.op, self.frames.body(&frame));
                 continue;
@@ -287,7 +287,7 @@ impl Source {
     /// Copies the first messages, to choose the time by them.
     fn look_ahead(&mut self) -> Result<(), Failure> {
         while self.first.len() < FIRST {
-            let Some(frame) = self.frames.next()? else {
+            let Some(frame) = self.frames.advance()? else {
                 break;
             };
             let body = self.frames.body(&frame);
@@ -378,7 +378,7 @@ fn first_message(
     channels: &mut Channels,
     wanted: &Wanted,
 ) -> Result<(std::sync::Arc<Channel>, Copied), Failure> {
-    while let Some(frame) = frames.next()? {
+    while let Some(frame) = frames.advance()? {
         let body = frames.body(&frame);
         if frame.op != op::MESSAGE {
             channels.note(frame.op, body);

@@ -93,7 +93,7 @@ fn a_damaged_chunk_is_left_out_and_the_others_are_used() {
     for compression in [None, Some(Compression::Zstd)] {
         let mut bytes = numbers(options(compression), 1000);
         let (mut some, mut chunks) = (frames(&bytes), Vec::new());
-        while let Some(frame) = some.next().unwrap() {
+        while let Some(frame) = some.advance().unwrap() {
             if frame.is_in_chunk && chunks.last() != Some(&frame.offset) {
                 chunks.push(frame.offset);
             }

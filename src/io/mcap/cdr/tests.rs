@@ -42,7 +42,7 @@ impl Book {
     }
 
     fn number<const N: usize>(&mut self, little: [u8; N]) -> &mut Self {
-        while (self.bytes.len() - 4) % N.min(self.largest) != 0 {
+        while !(self.bytes.len() - 4).is_multiple_of(N.min(self.largest)) {
             self.bytes.push(0xaa);
         }
         let mut bytes = little;

@@ -83,7 +83,7 @@ fn step<'a>(
 fn inner<'a>(message: &'a [u8], number: u32) -> Result<Option<Cow<'a, [u8]>>, Damage> {
     let mut whole: Option<Cow<[u8]>> = None;
     let mut fields = Fields::new(message);
-    while let Some((found, content)) = fields.next()? {
+    while let Some((found, content)) = fields.field()? {
         if let (true, Content::Bytes(bytes)) = (found == number, content) {
             match &mut whole {
                 None => whole = Some(Cow::Borrowed(bytes)),
@@ -110,7 +110,7 @@ fn single(
         Kind::Number(kind) => {
             let mut last = wire.absent.map(|value| (value, value as i64));
             let mut fields = Fields::new(message);
-            while let Some((found, content)) = fields.next()? {
+            while let Some((found, content)) = fields.field()? {
                 if found == wire.number
                     && let Some(both) = wire::number(*kind, &wire, content)
                 {
@@ -150,7 +150,7 @@ impl Collect<'_> {
                     let list = &mut *self.list;
                     list.clear();
                     let mut fields = Fields::new(message);
-                    while let Some((found, content)) = fields.next()? {
+                    while let Some((found, content)) = fields.field()? {
                         if found == wire.number {
                             wire::numbers(*kind, &wire, content, &mut |value| list.push(value))?;
                         }
@@ -180,7 +180,7 @@ impl Collect<'_> {
     ) -> Result<(), Damage> {
         let mut items = Vec::new();
         let mut fields = Fields::new(message);
-        while let Some((found, content)) = fields.next()? {
+        while let Some((found, content)) = fields.field()? {
             if let (true, Content::Bytes(bytes)) = (found == number, content) {
                 items.push(bytes);
             }
@@ -237,7 +237,7 @@ impl Search<'_> {
         let behind = rest.get(1..).unwrap_or(&[]);
         let mut fields = Fields::new(message);
         let mut text = None;
-        while let Some((found, content)) = fields.next()? {
+        while let Some((found, content)) = fields.field()? {
             let (true, Content::Bytes(bytes)) = (found == wire.number, content) else {
                 continue;
             };

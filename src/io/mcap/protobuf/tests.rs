@@ -105,6 +105,6 @@ fn what_is_not_set_is_zero_only_where_the_language_says_so() {
 #[test]
 fn a_cut_message_is_damage() {
     let bytes = message();
-    assert_eq!(read("z", &bytes[..bytes.len() - 1]).is_err(), true);
+    assert!(read("z", &bytes[..bytes.len() - 1]).is_err());
     assert!(read("z", &bytes[..20]).is_err());
 }

@@ -38,7 +38,7 @@ impl<'a> Fields<'a> {
     ///
     /// # Errors
     /// [`Damage`] if the bytes are no fields.
-    pub fn next(&mut self) -> Result<Option<(u32, Content<'a>)>, Damage> {
+    pub fn field(&mut self) -> Result<Option<(u32, Content<'a>)>, Damage> {
         if self.rest.is_empty() {
             return Ok(None);
         }
@@ -218,7 +218,7 @@ mod tests {
         let bytes = b"\x08\x96\x01\x12\x03abc\x1b\x20\x01\x1c\x2d\x01\0\0\0\x31\x02\0\0\0\0\0\0\0";
         let mut fields = Fields::new(bytes);
         let mut found = Vec::new();
-        while let Some(field) = fields.next().unwrap() {
+        while let Some(field) = fields.field().unwrap() {
             found.push(field);
         }
         assert_eq!(
@@ -263,9 +263,9 @@ mod tests {
             b"\x0b\x14",
             b"\x0b",
         ] {
-            assert!(Fields::new(bytes).next().is_err(), "{bytes:?}");
+            assert!(Fields::new(bytes).field().is_err(), "{bytes:?}");
         }
         let endless = [0x80_u8; 20];
-        assert!(Fields::new(&endless).next().is_err());
+        assert!(Fields::new(&endless).field().is_err());
     }
 }

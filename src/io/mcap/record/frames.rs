@@ -228,7 +228,7 @@ impl Frames {
     ///
     /// # Errors
     /// If the file cannot be read. Damage to its content is no error: see [`Self::losses`].
-    pub fn next(&mut self) -> Result<Option<Frame>, Failure> {
+    pub fn advance(&mut self) -> Result<Option<Frame>, Failure> {
         loop {
             if let Some(frame) = self.next_in_chunk() {
                 return Ok(Some(frame));
@@ -286,7 +286,8 @@ impl Frames {
         if op == op::ATTACHMENT {
             return self.attachment(offset, length);
         }
-        if length > LONGEST {
+        // A recorder that was stopped leaves its last chunk without a length.
+        if length > LONGEST && op != op::CHUNK {
             self.ended = true;
             self.lose(Loss::TooLong {
                 at: offset,
@@ -295,12 +296,13 @@ impl Frames {
             });
             return Ok(None);
         }
-        self.record(offset, op, length as usize)
+        self.record(offset, op, length)
     }
 
-    fn record(&mut self, offset: u64, op: u8, length: usize) -> Result<Option<Frame>, Failure> {
+    fn record(&mut self, offset: u64, op: u8, told: u64) -> Result<Option<Frame>, Failure> {
+        let length = told.min(LONGEST) as usize;
         let there = self.want(RECORD_HEAD + length)?;
-        let is_whole = there == RECORD_HEAD + length;
+        let is_whole = there == RECORD_HEAD + length && told <= LONGEST;
         self.held = there;
         match op {
             op::CHUNK => self.unpack(offset, is_whole),

@@ -6,7 +6,7 @@ use super::*;
 fn ops(bytes: &[u8]) -> (Vec<u8>, Frames) {
     let mut frames = frames(bytes);
     let mut ops = Vec::new();
-    while let Some(frame) = frames.next().unwrap() {
+    while let Some(frame) = frames.advance().unwrap() {
         ops.push(frame.op);
     }
     (ops, frames)
@@ -64,7 +64,7 @@ fn an_attachment_is_told_by_its_front() {
     let bytes = file(None);
     let mut frames = frames(&bytes);
     let mut seen = None;
-    while let Some(frame) = frames.next().unwrap() {
+    while let Some(frame) = frames.advance().unwrap() {
         if frame.op == op::ATTACHMENT {
             assert!(frame.is_front && !frame.is_in_chunk);
             let (head, _) = super::super::AttachmentHead::read(frames.body(&frame)).unwrap();

@@ -274,11 +274,8 @@ impl<'a> Parser<'a, '_> {
             while level > 0 {
                 let token = self.token()?;
                 match token.text {
-                    _ if token.is_quoted => {
-                        if name == "unit" {
-                            unit = Some(token.text.to_owned());
-                        }
-                    }
+                    text if token.is_quoted && name == "unit" => unit = Some(text.to_owned()),
+                    _ if token.is_quoted => {}
                     "(" => level += 1,
                     ")" => level -= 1,
                     _ => {}

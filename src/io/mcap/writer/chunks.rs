@@ -14,18 +14,20 @@ const FULL: usize = 1 << 20;
 /// A chunk under construction.
 #[derive(Debug)]
 pub struct Chunk {
-    compression: String,
+    /// None for records that stand in the file by themselves.
+    compression: Option<String>,
     records: Body,
     /// For each channel the log time and the place of its messages.
     places: BTreeMap<u16, Vec<(u64, u64)>>,
 }
 
 impl Chunk {
-    /// An empty chunk: `zstd`, `lz4` or nothing.
+    /// An empty chunk: `zstd`, `lz4` or empty for no compression; none for no chunk at all: an
+    /// index of chunks would hide messages outside of chunks, so a file has either.
     #[must_use]
-    pub fn new(compression: &str) -> Self {
+    pub fn new(compression: Option<&str>) -> Self {
         Self {
-            compression: compression.to_owned(),
+            compression: compression.map(str::to_owned),
             records: Body::default(),
             places: BTreeMap::new(),
         }
@@ -58,7 +60,13 @@ impl Chunk {
         if self.records.0.is_empty() {
             return Ok(());
         }
-        let packed = pack(&self.compression, &self.records.0)?;
+        let Some(compression) = &self.compression else {
+            sink.write(&self.records.0)?;
+            self.records.0.clear();
+            self.places.clear();
+            return Ok(());
+        };
+        let packed = pack(compression, &self.records.0)?;
         let logs = || self.places.values().flatten().map(|(log, _)| *log);
         let span_ns = (logs().min().unwrap_or(0), logs().max().unwrap_or(0));
         let mut front = Body::default();
@@ -67,7 +75,7 @@ impl Chunk {
             .u64(span_ns.1)
             .u64(self.records.0.len() as u64)
             .u32(crc32fast::hash(&self.records.0))
-            .bytes(self.compression.as_bytes())
+            .bytes(compression.as_bytes())
             .u64(packed.len() as u64);
         let offset = sink.offset();
         let length = (front.0.len() + packed.len()) as u64;
@@ -79,7 +87,7 @@ impl Chunk {
             span_ns,
             offset,
             length: sink.offset() - offset,
-            compression: self.compression.clone(),
+            compression: compression.clone(),
             packed: packed.len() as u64,
             unpacked: self.records.0.len() as u64,
             ..ChunkEntry::default()

@@ -29,8 +29,8 @@ const PIECE: usize = 1 << 18;
 pub struct Copied {
     /// What is in it.
     pub index: Index,
-    /// Compression of most of its chunks, by their number.
-    pub compression: String,
+    /// Compression of most of its chunks, by their number; none if it has messages, but no chunks.
+    pub compression: Option<&'static str>,
     /// What could not be copied.
     pub losses: Vec<Loss>,
 }
@@ -63,19 +63,17 @@ pub fn copy<W: Write>(
     })
 }
 
-fn usual_compression(index: &Index) -> String {
-    ["zstd", "lz4", ""]
-        .into_iter()
-        .rev()
-        .max_by_key(|name| {
-            let same = index
-                .chunks
-                .iter()
-                .filter(|chunk| chunk.compression == *name);
-            same.count()
-        })
-        .unwrap_or("")
-        .to_owned()
+fn usual_compression(index: &Index) -> Option<&'static str> {
+    if index.chunks.is_empty() && !index.messages.is_empty() {
+        return None;
+    }
+    ["zstd", "lz4", ""].into_iter().rev().max_by_key(|name| {
+        let same = index
+            .chunks
+            .iter()
+            .filter(|chunk| chunk.compression == *name);
+        same.count()
+    })
 }
 
 struct Copier<'a, W: Write> {
@@ -117,7 +115,7 @@ impl<W: Write> Copier<'_, W> {
         match op {
             op::DATA_END | op::FOOTER => Ok(false),
             op::ATTACHMENT => self.attachment(at, length),
-            _ if length > chunk::LARGEST => {
+            _ if length > chunk::LARGEST && op != op::CHUNK => {
                 self.losses.push(Loss::TooLong { at, op, length });
                 Ok(false)
             }
@@ -126,10 +124,12 @@ impl<W: Write> Copier<'_, W> {
     }
 
     fn whole(&mut self, at: u64, op: u8, length: u64) -> Result<bool, Failure> {
-        let whole = RECORD_HEAD + usize::try_from(length).unwrap_or(usize::MAX);
+        let whole = RECORD_HEAD + length.min(chunk::LARGEST) as usize;
         let there = self.want(whole)?;
         if op == op::CHUNK {
-            return self.chunk(at, there, whole);
+            // A recorder that was stopped leaves its last chunk without a length.
+            let is_whole = there == whole && length <= chunk::LARGEST;
+            return self.chunk(at, there, is_whole);
         }
         if there < whole {
             return Ok(self.truncated(at, "within a record"));
@@ -159,16 +159,16 @@ impl<W: Write> Copier<'_, W> {
         self.pass(whole as u64).map(|_| true)
     }
 
-    fn chunk(&mut self, at: u64, there: usize, whole: usize) -> Result<bool, Failure> {
+    fn chunk(&mut self, at: u64, there: usize, is_whole: bool) -> Result<bool, Failure> {
         let body = &self.input.window()[RECORD_HEAD.min(there)..there];
         let Some((head, packed)) = ChunkHead::read(body) else {
-            if there < whole {
+            if !is_whole {
                 return Ok(self.truncated(at, "within a chunk"));
             }
-            return Ok(self.leave_out(at, whole, ChunkError::Head, None));
+            return Ok(self.leave_out(at, there, ChunkError::Head, None));
         };
         let span_ns = Some((head.start_ns, head.end_ns));
-        if there < whole {
+        if !is_whole {
             let _ = chunk::unpack_part(&head, packed, &mut self.records);
             self.salvage(&head.compression)?;
             return Ok(self.truncated(at, "within a chunk"));
@@ -182,7 +182,7 @@ impl<W: Write> Copier<'_, W> {
             }),
         };
         if let Err(why) = unpacked {
-            return Ok(self.leave_out(at, whole, why, span_ns));
+            return Ok(self.leave_out(at, there, why, span_ns));
         }
         self.is_chunk_copied = true;
         let index = &mut self.index;
@@ -190,13 +190,13 @@ impl<W: Write> Copier<'_, W> {
         self.index.chunks.push(ChunkEntry {
             span_ns: (head.start_ns, head.end_ns),
             offset: self.sink.offset(),
-            length: whole as u64,
+            length: there as u64,
             compression: head.compression,
             packed: head.packed_size,
             unpacked: head.size,
             ..ChunkEntry::default()
         });
-        self.pass(whole as u64).map(|_| true)
+        self.pass(there as u64).map(|_| true)
     }
 
     fn leave_out(
@@ -214,7 +214,7 @@ impl<W: Write> Copier<'_, W> {
 
     /// Writes the whole records of a chunk that is cut off as a chunk.
     fn salvage(&mut self, compression: &str) -> Result<(), Failure> {
-        let mut chunk = Chunk::new(compression);
+        let mut chunk = Chunk::new(Some(compression));
         let index = &mut self.index;
         each(&self.records, |op, body| {
             note(index, op, body);

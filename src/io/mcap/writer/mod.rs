@@ -2,8 +2,8 @@
 //!
 //! The data of the input are copied byte for byte: every schema, channel, message, attachment,
 //! metadata record and record of unknown kind, chunks as they are compressed. Behind them come
-//! chunks with the added channel, in the compression that most chunks of the input have, and a
-//! metadata record `torqcomp`; then the summary of everything. So the added messages are behind
+//! chunks with the added channel, in the compression that most chunks of the input have (or its
+//! messages by themselves, if those of the input are), and a metadata record `torqcomp`; then the summary of everything. So the added messages are behind
 //! the others in the file, and readers put them in order of time by the index. A chunk that is
 //! damaged is left out; what is whole of a chunk that is cut off becomes a chunk of its own.
 
@@ -76,7 +76,7 @@ impl<W: Write> Writer<W> {
             )));
         }
         let torque = Torque::new(added.encoding, &added.name);
-        let mut chunk = Chunk::new(&copied.compression);
+        let mut chunk = Chunk::new(copied.compression);
         let channel_id = declare(&mut index, &mut chunk, &torque, &added.topic)
             .ok_or_else(|| Failure::failed("the file has no number left for another channel"))?;
         Ok(Self {

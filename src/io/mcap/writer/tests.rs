@@ -193,6 +193,15 @@ fn checksums_of_data_and_summary_are_right() {
 }
 
 #[test]
+fn a_file_without_chunks_stays_without() {
+    let (after, _) = copy(&original(options(None).use_chunks(false)), Encoding::Cdr);
+    let summary = Summary::read(&after).unwrap().unwrap();
+    assert!(summary.chunk_indexes.is_empty());
+    assert_eq!(summary.stats.unwrap().message_count, 22_000);
+    assert_eq!(MessageStream::new(&after).unwrap().count(), 22_000);
+}
+
+#[test]
 fn every_encoding_can_be_read_back() {
     let before = original(options(None));
     for (encoding, field) in [
