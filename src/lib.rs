@@ -5,5 +5,6 @@ pub mod commands;
 pub mod failure;
 pub mod io;
 pub mod pipeline;
+pub mod recording;
 pub mod report;
 pub mod stand;

@@ -44,7 +44,7 @@ fn find_column(columns: &[Column], wanted: &str, flag: &str) -> Result<usize, Fa
 }
 
 /// `a, b or c`.
-fn list(items: impl IntoIterator<Item = String>) -> String {
+pub(crate) fn list(items: impl IntoIterator<Item = String>) -> String {
     let items: Vec<String> = items.into_iter().collect();
     match items.as_slice() {
         [] => "none".to_owned(),
@@ -54,7 +54,7 @@ fn list(items: impl IntoIterator<Item = String>) -> String {
 }
 
 /// Place of the time column, if there is one.
-pub(super) fn time_column(columns: &[Column], options: &Options) -> Result<Option<usize>, Failure> {
+pub(crate) fn time_column(columns: &[Column], options: &Options) -> Result<Option<usize>, Failure> {
     if let Some(wanted) = &options.time_column {
         return find_column(columns, wanted, "--time-column").map(Some);
     }

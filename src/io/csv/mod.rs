@@ -15,11 +15,13 @@ use std::path::PathBuf;
 use crate::failure::Failure;
 use crate::report::Warning;
 
-pub use layout::{Delimiter, Dialect, Layout, Told};
+pub(crate) use columns::{list, time_column};
+pub use layout::{Delimiter, Dialect, Layout, Told, is_skipped};
 pub use names::{Column, NamedUnit};
 pub use record::Record;
 pub use scan::{RowPlan, Rows, place_of};
 pub use stream::{Batch, Fetch, Sequence, Summary};
+pub(crate) use time::without_rounding;
 pub use time::{TimeAxis, TimeSource};
 
 /// Bytes of a file that its layout is told from.
@@ -291,8 +293,14 @@ fn find_layout(
     layout::find(&head, head.len() < LONG_HEAD, told).map(|layout| (head, layout))
 }
 
+/// The layout of a text that is in memory as a whole.
+pub(crate) fn find_layout_of(text: &[u8], told: &Told) -> Result<Layout, Failure> {
+    let head = &text[..text.len().min(LONG_HEAD)];
+    layout::find(head, head.len() == text.len(), told)
+}
+
 /// Names the formats that are often handed over in place of text.
-fn refuse_other_formats(head: &[u8]) -> Result<(), Failure> {
+pub(crate) fn refuse_other_formats(head: &[u8]) -> Result<(), Failure> {
     let known: [(&[u8], &str); 6] = [
         (
             b"\x89MCAP",

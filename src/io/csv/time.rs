@@ -275,7 +275,7 @@ fn check_resampled(rate_hz: f64, recorded_hz: f64) -> Result<(), Failure> {
 }
 
 /// A rate without the rounding of the stamps it was found from: nine digits, if they say the same.
-fn without_rounding(rate_hz: f64) -> f64 {
+pub(crate) fn without_rounding(rate_hz: f64) -> f64 {
     let short: f64 = digits::text(rate_hz, 9).parse().unwrap_or(rate_hz);
     if (short / rate_hz - 1.0).abs() < 1e-10 {
         short

@@ -1,0 +1,111 @@
+//! How the samples of a channel lie in time.
+
+use std::sync::Arc;
+
+/// Largest deviation of a step from the usual one, as a fraction of it, in a record that has a rate.
+const USUAL: f64 = 0.25;
+
+/// The time axis of a channel.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Axis {
+    /// Samples a second; `None` if the file says nothing of it, or if its stamps have no usual step.
+    pub rate_hz: Option<f64>,
+    /// Where the rate comes from.
+    pub rate_from: RateFrom,
+    /// Time of the first sample on the file's own axis, in seconds.
+    pub start_s: Option<f64>,
+    /// Date and time of the first sample, as written.
+    pub start_text: Option<String>,
+    /// Time of each sample in seconds, as read.
+    pub stamps_s: Option<Arc<Vec<f64>>>,
+    /// Rate that the head of the file gives, in Hz, used or not.
+    pub header_rate_hz: Option<f64>,
+    /// What was taken for granted about the axis and should be confirmed before results rest on it:
+    /// `the column "Time" gives no unit; seconds were assumed`.
+    pub assumed: Option<String>,
+}
+
+/// Where a rate comes from.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub enum RateFrom {
+    /// There is none.
+    #[default]
+    None,
+    /// From the user.
+    Given,
+    /// From the head of the file; the words that gave it.
+    Header(String),
+    /// From the stamps in a column; its heading.
+    Stamps(String),
+}
+
+impl RateFrom {
+    /// For people and for JSON: `none`, `given`, `header: Delta_X`, `stamps: Time [s]`.
+    #[must_use]
+    pub fn describe(&self) -> String {
+        match self {
+            Self::None => "none".to_owned(),
+            Self::Given => "given".to_owned(),
+            Self::Header(words) => format!("header: {words}"),
+            Self::Stamps(heading) => format!("stamps: {heading}"),
+        }
+    }
+}
+
+/// Usual step of time stamps, in their unit: the mean of the steps within 25 % of their median.
+/// `None` if fewer than half of the steps are so close, or fewer than two stamps rise.
+///
+/// ```
+/// use torqcomp::recording::typical_step;
+/// // Three steps of 2 and a gap of 6.
+/// assert_eq!(typical_step(&[0.0, 2.0, 4.0, 10.0, 12.0]), Some(2.0));
+/// assert_eq!(typical_step(&[0.0, 1.0, 10.0, 100.0, 1000.0]), None);
+/// ```
+#[must_use]
+pub fn typical_step(stamps: &[f64]) -> Option<f64> {
+    let mut steps: Vec<f64> = stamps
+        .windows(2)
+        .map(|pair| pair[1] - pair[0])
+        .filter(|step| *step > 0.0)
+        .collect();
+    if steps.is_empty() {
+        return None;
+    }
+    let middle = steps.len() / 2;
+    let (_, median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
+    let median = *median;
+    let usual = |step: &f64| (step / median - 1.0).abs() <= USUAL;
+    let (sum, count) = stamps
+        .windows(2)
+        .map(|pair| pair[1] - pair[0])
+        .filter(usual)
+        .fold((0.0, 0_usize), |(sum, count), step| (sum + step, count + 1));
+    (2 * count >= steps.len()).then(|| sum / count as f64)
+}
+
+impl Axis {
+    /// An axis of stamps in seconds.
+    #[must_use]
+    pub fn of_stamps(heading: &str, stamps_s: Arc<Vec<f64>>) -> Self {
+        let step = typical_step(&stamps_s);
+        Self {
+            rate_hz: step.map(|step| crate::io::csv::without_rounding(1.0 / step)),
+            rate_from: step.map_or(RateFrom::None, |_| RateFrom::Stamps(heading.to_owned())),
+            start_s: stamps_s.first().copied().filter(|t| t.is_finite()),
+            stamps_s: Some(stamps_s),
+            ..Self::default()
+        }
+    }
+
+    /// An axis of a rate out of the head of a file; `words` gave it.
+    #[must_use]
+    pub fn of_header(words: &str, rate_hz: f64, start_s: Option<f64>) -> Self {
+        Self {
+            rate_hz: Some(rate_hz),
+            rate_from: RateFrom::Header(words.to_owned()),
+            start_s,
+            header_rate_hz: Some(rate_hz),
+            ..Self::default()
+        }
+    }
+}

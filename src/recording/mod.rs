@@ -1,0 +1,108 @@
+//! What a recorder stored: its channels, each with its own samples, unit and time axis.
+//!
+//! Whatever the format and dialect of a file, this is what comes out of it. Nothing is repaired:
+//! samples and stamps are as read, cells that hold no number are `NaN` and listed with their lines.
+
+mod axis;
+mod select;
+pub mod text;
+
+use crate::failure::Failure;
+use crate::io::csv::{NamedUnit, Options, Place};
+use crate::report::Warning;
+
+pub use axis::{Axis, RateFrom, typical_step};
+pub use select::Selection;
+
+/// A file's content.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recording {
+    /// Name of the file, for people.
+    pub source: String,
+    /// `csv` for any text, `mcap`.
+    pub format: &'static str,
+    /// How it is written, for people: `LabVIEW LVM, tab-separated, decimal point, 3 segments`.
+    pub dialect: String,
+    /// What the head of the file says besides, as pairs of key and value.
+    pub details: Vec<(String, String)>,
+    /// All channels, in the order of the file; of several segments, those of the first one first.
+    pub channels: Vec<Channel>,
+    /// The segments, if the file has more than one.
+    pub segments: Vec<Segment>,
+    /// What a user should know about how it was read.
+    pub warnings: Vec<Warning>,
+    /// What was announced or begun, but is not there.
+    pub lost: Option<Warning>,
+}
+
+/// A part of a file that was recorded on its own: after a trigger, or after a pause.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Segment {
+    /// Its name, for people: `segment 2`.
+    pub name: String,
+    /// Its start after that of the first segment, in seconds, if the file says.
+    pub start_s: Option<f64>,
+    /// Its date and time as written.
+    pub start_text: Option<String>,
+}
+
+/// One channel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Channel {
+    /// Its name, without the unit.
+    pub name: String,
+    /// Its heading as written, or `column N`.
+    pub heading: String,
+    /// Its unit, if it is known to torqcomp.
+    pub unit: Option<NamedUnit>,
+    /// Its unit as written, known or not.
+    pub unit_text: Option<String>,
+    /// Samples as written; `NaN` where there was no number.
+    pub samples: Vec<f64>,
+    /// The cells that held no number, in order.
+    pub holes: Vec<Hole>,
+    /// How its samples lie in time.
+    pub axis: Axis,
+    /// The segment it belongs to, from 0, if there are several.
+    pub segment: Option<usize>,
+}
+
+/// A cell among the samples that holds no number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Hole {
+    /// Its place among the samples, from 0.
+    pub index: usize,
+    /// Its line in the file, from 1 (0 where there are no lines).
+    pub line: usize,
+    /// What stands there.
+    pub what: HoleKind,
+}
+
+/// What stands in place of a number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum HoleKind {
+    /// The row ends before the cell.
+    Missing,
+    /// Nothing.
+    Empty,
+    /// NaN, infinity, overflow.
+    NonFinite,
+    /// A text.
+    Text,
+}
+
+/// Reads a recording of any format and dialect as a whole into memory: the text, and eight bytes for
+/// each number in it.
+///
+/// # Errors
+/// If the file cannot be read, is no recording, or leaves open how it is to be read.
+pub fn read(place: &Place, options: &Options) -> Result<Recording, Failure> {
+    use std::io::Read;
+    let name = place.name();
+    let mut bytes = Vec::new();
+    place
+        .open()?
+        .read_to_end(&mut bytes)
+        .map_err(|error| Failure::failed(format_args!("{name}: cannot be read: {error}")))?;
+    text::read(&name, bytes, options).map_err(|failure| failure.at(&name))
+}
