@@ -267,6 +267,24 @@ impl Sources<'_> {
             .iter()
             .filter(|entry| entry.topic() == Some(keys::Topic::Start))
             .find_map(|entry| keys::seconds(entry, None, self.decimal))
+            .or_else(|| self.start_of_position())
+    }
+
+    /// Start as Rohde & Schwarz write it: position of the trigger, less the part of the record before
+    /// the reference point.
+    fn start_of_position(&self) -> Option<f64> {
+        let value = |key: &str| {
+            let entry = self
+                .entries
+                .iter()
+                .find(|e| e.key.eq_ignore_ascii_case(key))?;
+            keys::quantity(entry.value()?, self.decimal)
+        };
+        let (position, _) = value("Horizontal Position")?;
+        let (reference, unit) = value("Reference Point")?;
+        let (length, _) = value("Record Length")?;
+        let (_, hz) = self.header_rate(None)?;
+        (unit == "%").then(|| position - reference / 100.0 * length / hz)
     }
 
     /// Stamps of a group in seconds: of the ways the file writes them, the first that has a step.
@@ -381,19 +399,34 @@ impl Sources<'_> {
                 return Ok(None);
             }
         }
-        if let Some(unit) = self.default_time_unit.and_then(units::read) {
-            return Ok(Some((unit.unit.factor(), None)));
+        let first = match self.columns[place].first_ticks {
+            Some(ticks) => ticks as f64,
+            None => values.first().copied().unwrap_or(0.0).abs(),
+        };
+        if let Some(seconds) = epoch_unit(first) {
+            return Ok(Some((seconds, None)));
         }
-        let (factor, words) = match values.first().copied().unwrap_or(0.0).abs() {
-            // Seconds since 1970 and parts of them, between 2001 and 2286; 100 ns since 1601.
-            v if (1e12..1e13).contains(&v) => (1e-3, "milliseconds since 1970"),
-            v if (1e15..1e16).contains(&v) => (1e-6, "microseconds since 1970"),
-            v if (1e18..1e19).contains(&v) => (1e-9, "nanoseconds since 1970"),
-            v if (1e17..2e17).contains(&v) => (1e-7, "units of 100 ns since 1601"),
-            _ => (1.0, "seconds"),
+        let (factor, words) = match first {
+            _ => match self.default_time_unit.and_then(units::read) {
+                Some(unit) => return Ok(Some((unit.unit.factor(), None))),
+                None => (1.0, "seconds"),
+            },
         };
         let assumed = format!("\"{}\" gives no unit: {words} were assumed", field.heading);
         Ok(Some((factor, Some(assumed))))
+    }
+}
+
+/// Seconds per unit of a time since 1970 (between 2001 and 2286), or since 1601 in units of 100 ns, by
+/// its size alone.
+fn epoch_unit(first: f64) -> Option<f64> {
+    match first {
+        v if (1e9..1e10).contains(&v) => Some(1.0),
+        v if (1e12..1e13).contains(&v) => Some(1e-3),
+        v if (1e15..1e16).contains(&v) => Some(1e-6),
+        v if (1e18..9e18).contains(&v) => Some(1e-9),
+        v if (1e17..2e17).contains(&v) => Some(1e-7),
+        _ => None,
     }
 }
 

@@ -31,6 +31,15 @@ impl Cell {
         if let Some(value) = number::cell(text, decimal) {
             return Self::Number(value);
         }
+        // + 0.123, as Graphtec writes it.
+        if let Some(rest) = text
+            .strip_prefix(['+', '-'])
+            .filter(|rest| rest.starts_with(' '))
+            && let Some(value) =
+                number::cell(rest, decimal).filter(|value| !value.is_sign_negative())
+        {
+            return Self::Number(if text.starts_with('-') { -value } else { value });
+        }
         if let Some(value) = grouped(text, decimal) {
             return Self::Grouped(value);
         }

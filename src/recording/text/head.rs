@@ -7,7 +7,7 @@ use crate::failure::Failure;
 use crate::io::csv::{Delimiter, Dialect, Told, dialects, is_skipped};
 
 /// Bytes that a table is looked for in, and more if there is none.
-const HEADS: [usize; 3] = [1 << 16, 1 << 20, 1 << 23];
+const HEADS: [usize; 4] = [1 << 15, 1 << 17, 1 << 20, 1 << 23];
 /// Part of the lines from the first row on that must be rows.
 const MOSTLY: f64 = 0.8;
 /// Most columns of text, as a part of all, in a table that is a recording.
@@ -142,7 +142,16 @@ pub fn find(
 /// See [`find`].
 pub fn find_in(head: &Head, told: &Told) -> Result<Table, Failure> {
     let quoted = head.lines.iter().any(|line| line.text.contains('"'));
-    let all = dialects(told, quoted);
+    let occurs = |byte: u8| {
+        head.lines
+            .iter()
+            .any(|line| line.text.as_bytes().contains(&byte))
+    };
+    let mut all = dialects(told, quoted);
+    all.retain(|dialect| match dialect.delimiter {
+        Delimiter::Byte(byte) => told.delimiter.is_some() || occurs(byte),
+        Delimiter::Spaces | Delimiter::None => true,
+    });
     let strict: Vec<Found> = all
         .iter()
         .filter_map(|dialect| Found::of(head, *dialect, strict_row))

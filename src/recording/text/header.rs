@@ -38,6 +38,14 @@ pub struct Header {
     pub names: Option<String>,
 }
 
+/// A unit, of time as well where a maker writes seconds as S.
+fn unit_of(name: &str, unit: &str) -> Option<NamedUnit> {
+    match unit.trim() {
+        "S" if units::is_time_name(name) || units::is_axis_name(name) => units::read("s"),
+        unit => units::read(unit),
+    }
+}
+
 impl Field {
     /// A column without a heading, its place counted from 0.
     #[must_use]
@@ -61,7 +69,7 @@ impl Field {
             unit: own,
             unit_text,
         } = units::heading(heading);
-        let below = unit.and_then(units::read);
+        let below = unit.and_then(|unit| unit_of(&name, unit));
         let below_text = unit.and_then(units::as_written);
         Self {
             heading: heading.to_owned(),
@@ -70,6 +78,18 @@ impl Field {
                 .or(below.as_ref().map(|u| u.text.clone()))
                 .or(below_text),
             unit: own.or(below),
+            is_label: false,
+        }
+    }
+
+    /// A column whose heading is its name alone.
+    #[must_use]
+    pub fn with_unit(name: &str, unit: Option<&str>) -> Self {
+        Self {
+            heading: name.to_owned(),
+            name: name.to_owned(),
+            unit: unit.and_then(|unit| unit_of(name, unit)),
+            unit_text: unit.and_then(units::as_written),
             is_label: false,
         }
     }
@@ -183,7 +203,9 @@ fn uncommented(text: &str) -> &str {
 
 /// Whether a cell labels the row of names.
 fn is_name_label(cell: &str) -> bool {
-    const LABELS: [&str; 18] = [
+    const LABELS: [&str; 20] = [
+        "channeltitle",
+        "channel title",
         "name",
         "names",
         "channel name",
@@ -229,13 +251,33 @@ fn labelled(rows: &[Row], used: &[bool]) -> Option<(Vec<Field>, usize)> {
         .filter(|row| row.cells.len() + 1 >= used.len())
         .collect();
     let about = |topic: Topic| {
+        let key = |row: &&&Row| row.cells[0].trim_end_matches([':', '=']).trim().to_owned();
         others
             .iter()
-            .find(|row| keys::topic(&row.cells[0]) == Some(topic))
+            .find(|row| keys::topic(&key(row)) == Some(topic))
     };
     let units = about(Topic::Unit);
-    if units.is_none() && about(Topic::Interval).is_none() && about(Topic::Rate).is_none() {
+    // Without a row that says more, the label must stand above several columns.
+    let is_alone = others.is_empty()
+        || units.is_none() && about(Topic::Interval).is_none() && about(Topic::Rate).is_none();
+    if is_alone && names.cells[1..].iter().all(|cell| *cell != names.cells[0]) {
         return None;
+    }
+    // Where the rows of data have no cell under the labels, the names begin one cell later.
+    let filled = names.cells.iter().filter(|cell| !cell.is_empty()).count();
+    if filled == used.len() + 1 && names.cells.len() >= filled && used.iter().all(|used| *used) {
+        let fields = (0..used.len())
+            .map(|place| {
+                let unit = units
+                    .and_then(|row| row.cells.get(place + 1))
+                    .map(String::as_str);
+                match unit {
+                    Some(unit) => Field::with_unit(&names.cells[place + 1], Some(unit)),
+                    None => Field::new(&names.cells[place + 1], None),
+                }
+            })
+            .collect();
+        return Some((fields, names.line));
     }
     let is_label = |place: usize| {
         let repeats = |row: &Row| row.cells.get(place) == row.cells.first();
@@ -255,7 +297,8 @@ fn labelled(rows: &[Row], used: &[bool]) -> Option<(Vec<Field>, usize)> {
                 .and_then(|row| row.cells.get(place))
                 .map(String::as_str);
             match names.cells.get(place) {
-                Some(name) if !name.is_empty() => Field::new(name, unit),
+                Some(name) if !name.is_empty() && units.is_some() => Field::with_unit(name, unit),
+                Some(name) if !name.is_empty() => Field::new(name, None),
                 _ => Field::unnamed(place),
             }
         })
@@ -288,10 +331,10 @@ fn positional(rows: &[Row], table: &Table, used: &[bool]) -> Positional {
     }
     let (names, units, remarks) = match fitting.as_slice() {
         [] => return unnamed(),
-        [below, above, ..] if is_units(&below.cells) => (*above, Some(*below), None),
         [below, above, ..] if is_mixed(&below.cells, &above.cells) => {
             (*above, Some(*below), Some(*below))
         }
+        [below, above, ..] if is_units(&below.cells) => (*above, Some(*below), None),
         [only, ..] if is_units(&only.cells) => (*only, Some(*only), None),
         [names, ..] => (*names, None, None),
     };
@@ -417,7 +460,15 @@ fn is_mixed(below: &[String], above: &[String]) -> bool {
     let (Some(unit), Some(name)) = (below.first(), above.first()) else {
         return false;
     };
-    units::read(unit).is_some_and(|unit| units::is_time(&unit)) && units::is_time_name(name)
+    units::read(unit).is_some_and(|unit| units::is_time(&unit))
+        && units::is_time_name(name)
+        && below.len() > 1
+        && below[1..]
+            .iter()
+            .all(|cell| units::read(cell).is_none() && !units::is_bracketed(cell))
+        && below[1..]
+            .iter()
+            .any(|cell| units::as_written(cell).is_some_and(|c| c.len() > 3))
 }
 
 /// Rows under the units that say how values were formed: `Avg`, `Smp`.
@@ -451,7 +502,11 @@ fn upper_names<'a>(names: &Row, fitting: &[&'a Row<'a>], used: &[bool]) -> Optio
         .iter()
         .copied()
         .filter(|row| row.line < names.line)
-        .find(|row| is_distinct(&cells(row)))
+        .find(|row| {
+            let cells = cells(row);
+            let is_text = |cell: &String| Cell::read(cell, b'.') == Cell::Text;
+            is_distinct(&cells) && cells.iter().all(is_text)
+        })
 }
 
 /// Names out of a line such as `Source,CH1`, where no line above the table has them.

@@ -18,7 +18,7 @@ mod units;
 
 use super::{Recording, Segment};
 use crate::failure::Failure;
-use crate::io::csv::{Dialect, Options};
+use crate::io::csv::{self, Dialect, Options};
 use crate::report::Warning;
 
 pub use clock::Clock;
@@ -69,6 +69,63 @@ pub fn read(source: &str, bytes: Vec<u8>, options: &Options) -> Result<Recording
         .collect();
     recording.warnings.extend(holes);
     Ok(recording)
+}
+
+/// Whether the quick reader of plain tables ([`crate::io::csv::Table`]) sees in a file what this one
+/// sees: by its encoding and line ends, no maker's reader is needed, and both find the same table with
+/// the same headings, units and at most one column of time, which holds numbers. `head` are the first
+/// bytes of the file, `complete` says that there are no more.
+#[must_use]
+pub fn is_plain(head: &[u8], complete: bool, options: &Options) -> bool {
+    let Ok(text) = decode::decode(head.to_vec()) else {
+        return false;
+    };
+    // Only a mark at the start is taken away from a plain table.
+    let mark = if head.starts_with(b"\xEF\xBB\xBF") {
+        3
+    } else {
+        0
+    };
+    if text.bytes != head[mark..] || !text.oddities.is_empty() {
+        return false;
+    }
+    let lines = Head::of(&text.bytes, 0, 1, FOR_MAKER);
+    let is_special =
+        |maker: &makers::Maker| maker.read.is_some() || maker.hints != Hints::default();
+    if makers::recognise(&lines).is_some_and(is_special) {
+        return false;
+    }
+    let Ok(layout) = csv::find_layout_in(head, complete, &options.told) else {
+        return false;
+    };
+    let Ok((head, table)) = head::find(&text.bytes, 0, 1, &options.told) else {
+        return false;
+    };
+    let wanted = table::wanted(&head, &table);
+    let used: Vec<bool> = wanted.iter().map(Option::is_some).collect();
+    let header = header::read(&head, &table, &used);
+    let same_columns = layout.columns.len() == header.fields.len()
+        && layout
+            .columns
+            .iter()
+            .zip(&header.fields)
+            .all(|(column, field)| {
+                column.heading == field.heading
+                    && column.name == field.name
+                    && column.unit == field.unit
+            });
+    let times = header
+        .fields
+        .iter()
+        .filter(|field| field.is_named_time())
+        .count();
+    same_columns
+        && layout.dialect == table.dialect
+        && layout.data_line == head.number(table::first_row(&head, &table, &header))
+        && wanted
+            .iter()
+            .all(|kind| *kind == Some(rows::Wanted::Numbers))
+        && times <= 1
 }
 
 /// A table, or several below each other under the same headings.
@@ -148,3 +205,6 @@ fn details(entries: &[Entry]) -> Vec<(String, String)> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests;

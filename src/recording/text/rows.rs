@@ -13,6 +13,8 @@ pub enum Wanted {
     Numbers,
     /// Dates and times of day, as seconds after the first of them.
     Clock,
+    /// Integers too long for an `f64`, as differences to the first of them.
+    Ticks,
     /// Nothing: it holds texts.
     Nothing,
 }
@@ -26,6 +28,8 @@ pub struct Column {
     pub holes: Vec<Hole>,
     /// The first date or time, as nanoseconds and as written.
     pub first_clock: Option<(Clock, String)>,
+    /// The first of integers that differences were taken to.
+    pub first_ticks: Option<i64>,
     /// Nanoseconds of the last one, with the midnights that were passed.
     last_clock: i64,
 }
@@ -182,6 +186,11 @@ impl Rows {
             _ if length == 0 => Some((None, next)),
             Wanted::Nothing => Some((None, next)),
             Wanted::Numbers => None,
+            Wanted::Ticks => {
+                let text = std::str::from_utf8(&line[at..end]).ok()?;
+                let ticks = text.trim().parse().ok()?;
+                Some((Some(self.columns[place].ticks(ticks)), next))
+            }
             Wanted::Clock => {
                 let text = std::str::from_utf8(&line[at..end]).ok()?;
                 let clock = Clock::parse(text)?;
@@ -241,6 +250,10 @@ impl Rows {
             (Wanted::Nothing, _) | (_, Cell::Empty) => return,
             (Wanted::Numbers, Cell::Number(value) | Cell::Grouped(value)) => Ok(value),
             (Wanted::Clock, Cell::Clock(clock)) => Ok(column.seconds(clock, text)),
+            (Wanted::Ticks, Cell::Number(_)) => match text.parse() {
+                Ok(ticks) => Ok(column.ticks(ticks)),
+                Err(_) => Err(HoleKind::Text),
+            },
             (_, Cell::NonFinite) => Err(HoleKind::NonFinite),
             _ => Err(HoleKind::Text),
         };
@@ -276,7 +289,7 @@ fn is_row(cells: &[Cell], wanted: &[Wanted]) -> bool {
         .iter()
         .zip(wanted)
         .filter(|(cell, wanted)| match wanted {
-            Wanted::Numbers => cell.is_number() || **cell == Cell::NonFinite,
+            Wanted::Numbers | Wanted::Ticks => cell.is_number() || **cell == Cell::NonFinite,
             Wanted::Clock => matches!(cell, Cell::Clock(_)),
             Wanted::Nothing => false,
         })
@@ -305,6 +318,12 @@ impl Column {
             });
             self.values.push(f64::NAN);
         }
+    }
+
+    /// The difference of an integer to the first one.
+    fn ticks(&mut self, ticks: i64) -> f64 {
+        let first = *self.first_ticks.get_or_insert(ticks);
+        ticks.wrapping_sub(first) as f64
     }
 
     /// Seconds of a date or time after the first one. Without a date, a step back by more than half a

@@ -67,6 +67,14 @@ pub fn read(text: &str) -> Option<NamedUnit> {
     if let Some(unit) = NamedUnit::parse(text) {
         return Some(unit);
     }
+    // V (Voltage)
+    if let Some((symbol, _)) = text
+        .strip_suffix(')')
+        .and_then(|text| text.split_once(" ("))
+        && let Some(unit) = NamedUnit::parse(symbol)
+    {
+        return Some(unit);
+    }
     let lower = text.to_lowercase();
     // NM, Nm and N.m are torque; nm is a length.
     let synonym = SYNONYMS
@@ -154,7 +162,50 @@ pub fn heading(text: &str) -> Heading {
         let name = if is_time(&unit) { "time" } else { text };
         return Heading::new(name.to_owned(), Some(unit), None);
     }
-    Heading::new(text.to_owned(), None, None)
+    let name = match text.split_once(' ') {
+        // "U_k" U_k
+        Some((first, second)) if first == second => first,
+        _ => text,
+    };
+    Heading::new(name.to_owned(), time_word(text), None)
+}
+
+/// The unit of time that is part of a name of time: `millis`, `Time ms`, `elapsed seconds`.
+fn time_word(text: &str) -> Option<NamedUnit> {
+    const WORDS: [(&str, &str); 24] = [
+        ("ms", "ms"),
+        ("msec", "ms"),
+        ("millis", "ms"),
+        ("millisecond", "ms"),
+        ("milliseconds", "ms"),
+        ("millisekunden", "ms"),
+        ("us", "us"),
+        ("usec", "us"),
+        ("micros", "us"),
+        ("microsecond", "us"),
+        ("microseconds", "us"),
+        ("mikrosekunden", "us"),
+        ("ns", "ns"),
+        ("nsec", "ns"),
+        ("nanoseconds", "ns"),
+        ("sec", "s"),
+        ("secs", "s"),
+        ("second", "s"),
+        ("seconds", "s"),
+        ("sekunden", "s"),
+        ("sekunde", "s"),
+        ("minutes", "min"),
+        ("minuten", "min"),
+        ("hours", "h"),
+    ];
+    let lower = text.to_lowercase();
+    let last = lower.rsplit(|c: char| !c.is_alphanumeric()).next()?;
+    let (_, unit) = WORDS.iter().find(|(word, _)| *word == last)?;
+    let meaning = Unit::parse(unit).ok().filter(|_| is_time_name(text))?;
+    Some(NamedUnit {
+        text: (*unit).to_owned(),
+        unit: meaning,
+    })
 }
 
 impl Heading {
@@ -176,7 +227,13 @@ fn bracket(text: &str) -> Option<(String, &str)> {
                 continue;
             };
             let inside = text[start + 1..start + length].trim();
-            let looks_like_unit = open == '[' && inside.parse::<f64>().is_err()
+            let is_at_end = start + length + 1 == text.len();
+            let odd = |c: char| matches!(c, '{' | '}' | '(' | '!' | '?' | '$' | ',' | ';' | ':');
+            let looks_like_unit = open == '['
+                && is_at_end
+                && inside.parse::<f64>().is_err()
+                && inside.chars().count() <= 16
+                && !inside.contains(odd)
                 || read(inside).is_some()
                 || inside.len() <= 8 && inside.contains(['/', '%', '°', '²', '^', 'µ']);
             if looks_like_unit && !inside.is_empty() {
@@ -205,7 +262,20 @@ pub fn is_time(unit: &NamedUnit) -> bool {
 /// Whether a name stands for time, or for the axis that is time in a recorder's export.
 #[must_use]
 pub fn is_time_name(name: &str) -> bool {
-    const WORDS: [&str; 30] = [
+    const WORDS: [&str; 43] = [
+        "ms",
+        "msec",
+        "millisecond",
+        "milliseconds",
+        "millisekunden",
+        "us",
+        "usec",
+        "microsecond",
+        "microseconds",
+        "mikrosekunden",
+        "nanoseconds",
+        "subsec",
+        "sec",
         "t",
         "time",
         "times",
@@ -246,7 +316,9 @@ pub fn is_time_name(name: &str) -> bool {
         let stem = word
             .trim_start_matches('%')
             .trim_end_matches(|c: char| c.is_ascii_digit());
-        WORDS.contains(&stem)
+        let is_compound = (stem.ends_with("zeit") || stem.ends_with("time"))
+            && !["lifetime", "risetime", "deadtime", "totzeit", "overtime"].contains(&stem);
+        WORDS.contains(&stem) || is_compound
     };
     match words.as_slice() {
         [] => false,
