@@ -119,7 +119,15 @@ pub fn is_plain(head: &[u8], complete: bool, options: &Options) -> bool {
         .iter()
         .filter(|field| field.is_named_time())
         .count();
+    let has_marks = head.lines[table.first..].iter().any(|line| {
+        let cells = table.dialect.cells(&line.text);
+        let read = |cell: &String| cell::Cell::read(cell, table.dialect.decimal);
+        cells
+            .iter()
+            .any(|cell| matches!(read(cell), cell::Cell::Grouped(_)))
+    });
     same_columns
+        && !has_marks
         && layout.dialect == table.dialect
         && layout.data_line == head.number(table::first_row(&head, &table, &header))
         && wanted

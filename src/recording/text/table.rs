@@ -135,7 +135,7 @@ pub fn wanted(head: &Head, table: &Table) -> Vec<Option<Wanted>> {
             match Cell::read(cell, table.dialect.decimal) {
                 Cell::Number(_) | Cell::Grouped(_) | Cell::NonFinite => {
                     count.numbers += 1;
-                    let is_long = cell.len() > 15 && cell.parse::<i64>().is_ok();
+                    let is_long = cell.len() > 12 && cell.parse::<i64>().is_ok();
                     count.ticks += usize::from(is_long);
                 }
                 Cell::Clock(_) => count.clocks += 1,
@@ -182,7 +182,7 @@ pub fn first_row(head: &Head, table: &Table, header: &Header) -> usize {
                 .collect();
             let numbers = read.iter().filter(|cell| cell.is_number()).count();
             numbers > 0
-                && read.len() == table.width
+                && read.len() >= table.width
                 && !cells[0].is_empty()
                 && read[0] != Cell::Text
         })
