@@ -126,7 +126,7 @@ pub fn is_skipped(line: &str) -> bool {
 /// If there is no table of numbers, or more than one way to read it.
 pub fn find(head: &[u8], complete: bool, told: &Told) -> Result<Layout, Failure> {
     let lines = Lines::of(head, complete);
-    let dialects = candidates(told, head.contains(&b'"'));
+    let dialects = dialects(told, head.contains(&b'"'));
     // Columns of text beside the numbers are looked for only if there is no table without.
     let mut best = best_tables(&lines, &dialects, numeric_width);
     if best.is_empty() {
@@ -197,7 +197,7 @@ fn byte_order_mark(head: &[u8]) -> usize {
 }
 
 /// Dialects in the order of preference between equals. A decimal comma between commas needs quotes.
-fn candidates(told: &Told, quoted: bool) -> Vec<Dialect> {
+pub fn dialects(told: &Told, quoted: bool) -> Vec<Dialect> {
     let delimiters = match told.delimiter {
         Some(delimiter) => vec![delimiter],
         None => vec![

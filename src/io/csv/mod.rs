@@ -17,6 +17,7 @@ use crate::report::Warning;
 pub use chunks::{Chunks, Piece};
 pub(crate) use columns::{list, time_column};
 pub use layout::{Delimiter, Dialect, Layout, Told, is_skipped};
+pub(crate) use layout::{dialects, find as find_layout_in, is_not_a_number};
 pub use names::{Column, NamedUnit};
 pub use scan::{Defect, Problem, RowPlan, Rows, place_of};
 pub(crate) use time::without_rounding;
@@ -263,12 +264,6 @@ fn find_layout(
     let more = chunks::head(input, LONG_HEAD - HEAD).map_err(reading)?;
     head.extend(more);
     layout::find(&head, head.len() < LONG_HEAD, told).map(|layout| (head, layout))
-}
-
-/// The layout of a text that is in memory as a whole.
-pub(crate) fn find_layout_of(text: &[u8], told: &Told) -> Result<Layout, Failure> {
-    let head = &text[..text.len().min(LONG_HEAD)];
-    layout::find(head, head.len() == text.len(), told)
 }
 
 /// Names the formats that are often handed over in place of text.

@@ -1,13 +1,36 @@
 //! Recordings in text: decoding the bytes, telling the dialect, reading every column.
+//!
+//! [`decode`] brings the bytes to lines; [`makers`] knows who writes how; [`head`] finds the table and
+//! [`header`] reads what stands above it, with the help of [`keys`] and [`units`]; [`rows`] reads the
+//! numbers and [`axes`] finds the time.
 
+mod axes;
+mod cell;
+mod clock;
 mod decode;
+mod head;
+mod header;
+mod keys;
+mod makers;
+mod rows;
+mod table;
+mod units;
 
-use std::sync::Arc;
-
-use super::{Axis, Channel, Hole, HoleKind, Recording};
+use super::{Recording, Segment};
 use crate::failure::Failure;
-use crate::io::csv::{self, Options};
-use crate::io::number;
+use crate::io::csv::{self, Dialect, Options};
+use crate::report::Warning;
+
+pub use clock::Clock;
+use decode::Text;
+use head::Head;
+use keys::Entry;
+use table::Hints;
+
+/// Bytes that a maker is told from.
+const FOR_MAKER: usize = 1 << 14;
+/// Most details that are kept.
+const DETAILS: usize = 100;
 
 /// Reads a text file of any dialect; `source` is its name for people.
 ///
@@ -15,67 +38,181 @@ use crate::io::number;
 /// If it is no recording, or leaves open how it is to be read.
 pub fn read(source: &str, bytes: Vec<u8>, options: &Options) -> Result<Recording, Failure> {
     let text = decode::decode(bytes)?;
-    let layout = csv::find_layout_of(&text.bytes, &options.told)?;
-    let mut columns: Vec<Vec<f64>> = vec![Vec::new(); layout.columns.len()];
-    let mut holes: Vec<Vec<Hole>> = vec![Vec::new(); layout.columns.len()];
-    let data = &text.bytes[layout.data_offset..];
-    for (row, line) in data.split(|byte| *byte == b'\n').enumerate() {
-        let line_text = String::from_utf8_lossy(line);
-        if csv::is_skipped(&line_text) {
-            continue;
-        }
-        let cells = layout.dialect.cells(&line_text);
-        for (place, column) in columns.iter_mut().enumerate() {
-            let cell = cells.get(place).map(String::as_str);
-            let value = cell.and_then(|cell| number::cell(cell, layout.dialect.decimal));
-            if value.is_none() {
-                holes[place].push(Hole {
-                    index: column.len(),
-                    line: layout.data_line + row,
-                    what: match cell {
-                        None => HoleKind::Missing,
-                        Some("") => HoleKind::Empty,
-                        Some(_) => HoleKind::Text,
-                    },
-                });
-            }
-            column.push(value.unwrap_or(f64::NAN));
-        }
+    let head = Head::of(&text.bytes, 0, 1, FOR_MAKER);
+    let maker = makers::recognise(&head);
+    let mut recording = match maker.and_then(|maker| maker.read) {
+        Some(read) => read(&text, options)?,
+        None => general(
+            &text,
+            maker.map_or(Hints::default(), |maker| maker.hints),
+            options,
+        )?,
+    };
+    if recording.channels.is_empty() {
+        return Err(Failure::failed(
+            "there is no column besides the time; expected one with the signal",
+        ));
     }
-    let time = csv::time_column(&layout.columns, options)?;
-    let axis = time.map_or_else(Axis::default, |place| {
-        let factor = layout.columns[place]
-            .unit
-            .as_ref()
-            .map_or(1.0, |u| u.unit.factor());
-        let stamps = columns[place].iter().map(|t| t * factor).collect();
-        Axis::of_stamps(&layout.columns[place].heading, Arc::new(stamps))
-    });
-    let channels = layout
-        .columns
+    source.clone_into(&mut recording.source);
+    let mut words: Vec<String> = maker.iter().map(|maker| maker.name.to_owned()).collect();
+    words.extend(text.oddities.iter().map(|word| (*word).to_owned()));
+    words.push(recording.dialect);
+    if recording.segments.len() > 1 {
+        words.push(format!("{} segments", recording.segments.len()));
+    }
+    recording.dialect = words.join(", ");
+    recording.warnings.splice(0..0, text.warnings);
+    let holes: Vec<Warning> = recording
+        .channels
         .iter()
-        .zip(columns.into_iter().zip(holes))
-        .enumerate()
-        .filter(|(place, _)| Some(*place) != time)
-        .map(|(_, (column, (samples, holes)))| Channel {
-            name: column.name.clone(),
-            heading: column.heading.clone(),
-            unit: column.unit.clone(),
-            unit_text: column.unit.as_ref().map(|u| u.text.clone()),
-            samples,
-            holes,
-            axis: axis.clone(),
-            segment: None,
-        })
+        .filter_map(table::holes_warning)
         .collect();
-    Ok(Recording {
-        source: source.to_owned(),
-        format: "csv",
-        dialect: layout.dialect.describe(),
-        details: Vec::new(),
-        channels,
-        segments: Vec::new(),
-        warnings: text.warnings,
-        lost: None,
-    })
+    recording.warnings.extend(holes);
+    Ok(recording)
 }
+
+/// Whether the quick reader of plain tables ([`crate::io::csv::Table`]) sees in a file what this one
+/// sees: by its encoding and line ends, no maker's reader is needed, and both find the same table with
+/// the same headings, units and at most one column of time, which holds numbers. `head` are the first
+/// bytes of the file, `complete` says that there are no more.
+#[must_use]
+pub fn is_plain(head: &[u8], complete: bool, options: &Options) -> bool {
+    let Ok(text) = decode::decode(head.to_vec()) else {
+        return false;
+    };
+    // Only a mark at the start is taken away from a plain table.
+    let mark = if head.starts_with(b"\xEF\xBB\xBF") {
+        3
+    } else {
+        0
+    };
+    if text.bytes != head[mark..] || !text.oddities.is_empty() {
+        return false;
+    }
+    let lines = Head::of(&text.bytes, 0, 1, FOR_MAKER);
+    let is_special =
+        |maker: &makers::Maker| maker.read.is_some() || maker.hints != Hints::default();
+    if makers::recognise(&lines).is_some_and(is_special) {
+        return false;
+    }
+    let Ok(layout) = csv::find_layout_in(head, complete, &options.told) else {
+        return false;
+    };
+    let Ok((head, table)) = head::find(&text.bytes, 0, 1, &options.told) else {
+        return false;
+    };
+    let wanted = table::wanted(&head, &table);
+    let used: Vec<bool> = wanted.iter().map(Option::is_some).collect();
+    let header = header::read(&head, &table, &used);
+    let same_columns = layout.columns.len() == header.fields.len()
+        && layout
+            .columns
+            .iter()
+            .zip(&header.fields)
+            .all(|(column, field)| {
+                column.heading == field.heading
+                    && column.name == field.name
+                    && column.unit == field.unit
+            });
+    let times = header
+        .fields
+        .iter()
+        .filter(|field| field.is_named_time())
+        .count();
+    let has_marks = head.lines[table.first..].iter().any(|line| {
+        let cells = table.dialect.cells(&line.text);
+        let read = |cell: &String| cell::Cell::read(cell, table.dialect.decimal);
+        cells
+            .iter()
+            .any(|cell| matches!(read(cell), cell::Cell::Grouped(_)))
+    });
+    same_columns
+        && !has_marks
+        && layout.dialect == table.dialect
+        && layout.data_line == head.number(table::first_row(&head, &table, &header))
+        && wanted
+            .iter()
+            .all(|kind| *kind == Some(rows::Wanted::Numbers))
+        && times <= 1
+}
+
+/// A table, or several below each other under the same headings.
+fn general(text: &Text, hints: Hints, options: &Options) -> Result<Recording, Failure> {
+    let mut parts = Vec::new();
+    let (mut from, mut number) = (0, 1);
+    while from < text.bytes.len() {
+        let part = match table::read(&text.bytes, from, number, hints, options, &|_| false) {
+            Ok(part) => part,
+            // What follows the last table need not be one.
+            Err(_) if !parts.is_empty() => break,
+            Err(failure) => return Err(failure),
+        };
+        (from, number) = (part.end, part.next_line);
+        parts.push(part);
+    }
+    Ok(recording_of(parts))
+}
+
+/// Puts tables together as the segments of a recording.
+fn recording_of(parts: Vec<table::Part>) -> Recording {
+    let several = parts.len() > 1;
+    let mut recording = empty();
+    for (place, part) in parts.into_iter().enumerate() {
+        if place == 0 {
+            recording.dialect = describe(part.dialect);
+            recording.details = details(&part.entries);
+        }
+        if several {
+            recording.segments.push(Segment {
+                name: format!("segment {}", place + 1),
+                start_s: None,
+                start_text: keys::date_text(&part.entries),
+            });
+        }
+        for mut channel in part.channels {
+            channel.segment = several.then_some(place);
+            recording.channels.push(channel);
+        }
+        recording.warnings.extend(part.warnings);
+        recording.lost = recording.lost.or(part.lost);
+    }
+    recording
+}
+
+fn empty() -> Recording {
+    Recording {
+        source: String::new(),
+        format: "csv",
+        dialect: String::new(),
+        details: Vec::new(),
+        channels: Vec::new(),
+        segments: Vec::new(),
+        warnings: Vec::new(),
+        lost: None,
+    }
+}
+
+fn describe(dialect: Dialect) -> String {
+    dialect.describe()
+}
+
+/// Keys and values for people.
+fn details(entries: &[Entry]) -> Vec<(String, String)> {
+    entries
+        .iter()
+        .filter(|entry| entry.value().is_some())
+        .take(DETAILS)
+        .map(|entry| {
+            let values: Vec<&str> = entry
+                .values
+                .iter()
+                .map(String::as_str)
+                .filter(|v| !v.is_empty())
+                .collect();
+            (entry.key.clone(), values.join(", "))
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,170 @@
+//! What a cell holds: a number (perhaps with a thousands mark), a date or time, a text, nothing.
+
+use super::clock::Clock;
+use crate::io::csv::is_not_a_number;
+use crate::io::number;
+
+/// What a cell holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Cell {
+    /// A number.
+    Number(f64),
+    /// A number with marks between its thousands.
+    Grouped(f64),
+    /// A date, a time of day, or both.
+    Clock(Clock),
+    /// NaN, infinity and the like.
+    NonFinite,
+    /// Nothing.
+    Empty,
+    /// Anything else.
+    Text,
+}
+
+impl Cell {
+    /// Reads a cell; quotes and spaces around it have been taken off.
+    #[must_use]
+    pub fn read(text: &str, decimal: u8) -> Self {
+        if text.is_empty() {
+            return Self::Empty;
+        }
+        if let Some(value) = number::cell(text, decimal) {
+            return Self::Number(value);
+        }
+        // + 0.123, as Graphtec writes it.
+        if let Some(rest) = text
+            .strip_prefix(['+', '-'])
+            .filter(|rest| rest.starts_with(' '))
+            && let Some(value) =
+                number::cell(rest, decimal).filter(|value| !value.is_sign_negative())
+        {
+            return Self::Number(if text.starts_with('-') { -value } else { value });
+        }
+        if let Some(value) = grouped(text, decimal) {
+            return Self::Grouped(value);
+        }
+        if is_non_finite(text) {
+            return Self::NonFinite;
+        }
+        Clock::parse(text).map_or(Self::Text, Self::Clock)
+    }
+
+    /// Whether it can stand in a row of data.
+    #[must_use]
+    pub fn is_datum(self) -> bool {
+        !matches!(self, Self::Text | Self::Empty)
+    }
+
+    /// Whether it is a finite number.
+    #[must_use]
+    pub fn is_number(self) -> bool {
+        matches!(self, Self::Number(_) | Self::Grouped(_))
+    }
+}
+
+/// Ways to say that there is no number, besides those of floating point: over range, no value.
+fn is_non_finite(text: &str) -> bool {
+    const WORDS: [&str; 16] = [
+        "∞",
+        "-∞",
+        "+∞",
+        "n/a",
+        "#n/a",
+        "na",
+        "null",
+        "none",
+        "overflow",
+        "ovrflw",
+        "ovld",
+        "over",
+        "---",
+        "--",
+        "****",
+        "unendlich",
+    ];
+    is_not_a_number(text)
+        || text.to_ascii_lowercase().starts_with("-1.#")
+        || text.to_ascii_lowercase().starts_with("1.#")
+        || WORDS.contains(&text.to_lowercase().as_str())
+        || exceeds(text)
+}
+
+/// A number too large for an `f64`, such as 1e999.
+fn exceeds(text: &str) -> bool {
+    text.as_bytes()
+        .iter()
+        .all(|b| b.is_ascii_digit() || b"+-.,eE".contains(b))
+        && text
+            .replace(',', ".")
+            .parse::<f64>()
+            .is_ok_and(f64::is_infinite)
+}
+
+/// A number whose thousands are marked: `1,234.5`, `1.234,5`, `1'234`, `1 234`. The first group does
+/// not begin with a zero and has up to three digits, the others have three, all marks are the same.
+fn grouped(text: &str, decimal: u8) -> Option<f64> {
+    let body = text.trim_start_matches(['+', '-']);
+    let end = body
+        .find(|c: char| c == char::from(decimal) || c == 'e' || c == 'E')
+        .unwrap_or(body.len());
+    let whole = &body[..end];
+    let mark = whole.chars().find(|c| !c.is_ascii_digit())?;
+    let is_mark = match mark {
+        '.' | ',' => mark != char::from(decimal),
+        '\'' | '’' | ' ' | '\u{a0}' | '\u{202f}' => true,
+        _ => false,
+    };
+    let mut groups = whole.split(mark);
+    let first = groups.next()?;
+    let digits = |group: &str| group.bytes().all(|b| b.is_ascii_digit());
+    let good = is_mark
+        && (1..=3).contains(&first.len())
+        && digits(first)
+        && !first.starts_with('0')
+        && groups.all(|group| group.len() == 3 && digits(group));
+    if !good {
+        return None;
+    }
+    let plain: String = text.chars().filter(|c| *c != mark).collect();
+    number::cell(&plain, decimal)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thousands() {
+        for (text, decimal, value) in [
+            ("1,234.5", b'.', 1234.5),
+            ("-12,345,678", b'.', -12_345_678.0),
+            ("1.234,5", b',', 1234.5),
+            ("1'234.25", b'.', 1234.25),
+            ("1 234,5", b',', 1234.5),
+            ("1\u{a0}234", b'.', 1234.0),
+        ] {
+            assert_eq!(Cell::read(text, decimal), Cell::Grouped(value), "{text}");
+        }
+        for text in [
+            "0,981",
+            "12,34",
+            "1,2345",
+            "1,234,56",
+            "1,234.567,8",
+            "a,123",
+        ] {
+            assert_eq!(Cell::read(text, b'.'), Cell::Text, "{text}");
+        }
+    }
+
+    #[test]
+    fn other_cells() {
+        assert_eq!(Cell::read("1.5", b'.'), Cell::Number(1.5));
+        assert_eq!(Cell::read("", b'.'), Cell::Empty);
+        for text in ["NaN", "-∞", "-1.#IND", "1e999", "N/A"] {
+            assert_eq!(Cell::read(text, b'.'), Cell::NonFinite, "{text}");
+        }
+        assert!(matches!(Cell::read("12:00:01", b'.'), Cell::Clock(_)));
+        assert_eq!(Cell::read("LOST COMMUNICATION", b'.'), Cell::Text);
+    }
+}

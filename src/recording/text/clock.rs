@@ -1,0 +1,288 @@
+//! Dates and times of day as recorders write them: `12:34:56.789`, `2026-03-26T14:34:31Z`,
+//! `26.03.2026 14:34:31,5`, `3/26/2026 2:34:31 PM`, `26-Mar-2026`.
+//!
+//! Only differences are used, so a time zone is passed over and the order of day and month between
+//! slashes matters only where both are at most 12 (then the month is taken to be first).
+
+/// Nanoseconds of a second.
+const SECOND: i64 = 1_000_000_000;
+/// Nanoseconds of a day.
+pub const DAY: i64 = 86_400 * SECOND;
+
+/// A date, a time of day, or both.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Clock {
+    /// Days since 1970-01-01.
+    pub day: Option<i32>,
+    /// Nanoseconds since midnight.
+    pub nanoseconds: Option<i64>,
+}
+
+const MONTHS: [&str; 12] = [
+    "jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec",
+];
+/// Months that German shortens otherwise.
+const GERMAN_MONTHS: [(&str, u32); 4] = [("mär", 3), ("mrz", 3), ("mai", 5), ("okt", 10)];
+const GERMAN_DECEMBER: &str = "dez";
+
+impl Clock {
+    /// Reads a cell that holds nothing else.
+    ///
+    /// ```
+    /// use torqcomp::recording::text::Clock;
+    /// let clock = Clock::parse("1970-01-02 00:00:01.5").unwrap();
+    /// assert_eq!((clock.day, clock.nanoseconds), (Some(1), Some(1_500_000_000)));
+    /// assert_eq!(Clock::parse("1.5"), None);
+    /// ```
+    #[must_use]
+    pub fn parse(text: &str) -> Option<Self> {
+        let text = text.trim();
+        // The shortest is 1:02:03, the longest has a date, 19 decimals and a zone.
+        if !(6..=60).contains(&text.len()) || !text.contains([':', '-', '.', '/']) {
+            return None;
+        }
+        if let Some(nanoseconds) = time_of_day(text) {
+            return Some(Self {
+                day: None,
+                nanoseconds: Some(nanoseconds),
+            });
+        }
+        if let Some(day) = date(text) {
+            return Some(Self {
+                day: Some(day),
+                nanoseconds: None,
+            });
+        }
+        text.char_indices()
+            .filter(|(_, c)| matches!(c, ' ' | 'T' | '_' | ',' | ';'))
+            .find_map(|(place, c)| {
+                let day = date(text[..place].trim())?;
+                let rest = text[place + c.len_utf8()..].trim();
+                Some(Self {
+                    day: Some(day),
+                    nanoseconds: Some(time_of_day(rest)?),
+                })
+            })
+    }
+
+    /// Nanoseconds since 1970, or since midnight without a date.
+    #[must_use]
+    pub fn total(self) -> i64 {
+        i64::from(self.day.unwrap_or(0)) * DAY + self.nanoseconds.unwrap_or(0)
+    }
+}
+
+/// `h:mm:ss`, with decimals after `.`, `,` or `:`, with AM or PM, with a zone; `mm:ss.f`.
+fn time_of_day(text: &str) -> Option<i64> {
+    let lower = text.to_ascii_lowercase();
+    let (body, half) = match lower.strip_suffix("pm").or(lower.strip_suffix("p.m.")) {
+        Some(body) => (body.trim_end(), Some(12)),
+        None => match lower.strip_suffix("am").or(lower.strip_suffix("a.m.")) {
+            Some(body) => (body.trim_end(), Some(0)),
+            None => (without_zone(&lower), None),
+        },
+    };
+    let (first, rest) = body.split_once(':')?;
+    let first: i64 = digits(first, 1..=2)?;
+    let (second, rest) = match rest.split_once(':') {
+        Some((second, rest)) => (second, Some(rest)),
+        None => (rest, None),
+    };
+    let (hours, minutes, seconds) = match rest {
+        Some(rest) => (first, digits(second, 2..=2)?, rest),
+        // Minutes and seconds only if there are decimals: 12:34 may be either.
+        None if second.contains(['.', ',']) => (0, first, second),
+        None => return None,
+    };
+    let (whole, decimals) = match seconds.find(['.', ',', ':']) {
+        Some(place) => (&seconds[..place], &seconds[place + 1..]),
+        None => (seconds, ""),
+    };
+    let whole = digits(whole, 1..=2)?;
+    let hours = match half {
+        Some(half) if (1..=12).contains(&hours) => hours % 12 + half,
+        Some(_) => return None,
+        None => hours,
+    };
+    // A counter may run beyond a day; minutes and seconds do not run beyond 60.
+    if minutes >= 60 || whole > 60 {
+        return None;
+    }
+    Some(((hours * 60 + minutes) * 60 + whole) * SECOND + fraction(decimals)?)
+}
+
+/// Without `Z`, `+02:00`, `-0500` or ` UTC` at the end.
+fn without_zone(text: &str) -> &str {
+    let text = text.trim_end_matches("utc").trim_end_matches("gmt");
+    let text = text.trim_end().trim_end_matches('z');
+    match text.rfind(['+', '-']) {
+        Some(place) if text.len() - place >= 3 && place >= 5 => text[..place].trim_end(),
+        _ => text,
+    }
+}
+
+fn fraction(decimals: &str) -> Option<i64> {
+    if !decimals.bytes().all(|b| b.is_ascii_digit()) {
+        return None;
+    }
+    let nine: String = decimals
+        .chars()
+        .chain("000000000".chars())
+        .take(9)
+        .collect();
+    nine.parse().ok()
+}
+
+fn digits(text: &str, count: std::ops::RangeInclusive<usize>) -> Option<i64> {
+    (count.contains(&text.len()) && text.bytes().all(|b| b.is_ascii_digit()))
+        .then(|| text.parse().ok())?
+}
+
+/// Days since 1970 of a date alone.
+fn date(text: &str) -> Option<i32> {
+    // Montag, 2. Mai 2022
+    let text = match text.split_once(", ") {
+        Some((weekday, rest)) if weekday.chars().all(char::is_alphabetic) => rest,
+        _ => text,
+    };
+    // 2. Mai 2022, but 2.5.2022 and 2. 5. 2022 as well.
+    let spaced = text.replace(". ", " ");
+    let text = spaced.as_str();
+    let mark = text.chars().find(|c| matches!(c, '-' | '/' | '.' | ' '))?;
+    let mut parts = text.split(mark).map(str::trim).filter(|p| !p.is_empty());
+    let (a, b, c) = (parts.next()?, parts.next()?, parts.next()?);
+    if parts.next().is_some() {
+        return None;
+    }
+    let number = |text: &str| digits(text.trim_end_matches('.'), 1..=2).map(|n| n as u32);
+    let (year, month, day) = if a.len() == 4 {
+        (digits(a, 4..=4)?, month(b)?, number(c)?)
+    } else {
+        let year = match c.len() {
+            4 => digits(c, 4..=4)?,
+            2 => 2000 + digits(c, 2..=2)?,
+            _ => return None,
+        };
+        match (mark, number(a), number(b)) {
+            ('/', Some(a), Some(b)) if a <= 12 => (year, a, b),
+            (_, Some(day), _) => (year, month(b)?, day),
+            (_, None, Some(day)) => (year, month(a)?, day),
+            _ => return None,
+        }
+    };
+    days(i32::try_from(year).ok()?, month, day)
+}
+
+fn month(text: &str) -> Option<u32> {
+    if let Some(number) = digits(text, 1..=2) {
+        return Some(number as u32);
+    }
+    let start: String = text.to_lowercase().chars().take(3).collect();
+    if start == GERMAN_DECEMBER {
+        return Some(12);
+    }
+    let german = GERMAN_MONTHS.iter().find(|(name, _)| *name == start);
+    german.map(|(_, number)| *number).or_else(|| {
+        let place = MONTHS.iter().position(|name| *name == start)?;
+        Some(place as u32 + 1)
+    })
+}
+
+/// Days from 1970-01-01 to a day of the Gregorian calendar: 365 for each year, one more for each leap
+/// year before it, and the days of the months before.
+fn days(year: i32, month: u32, day: u32) -> Option<i32> {
+    const BEFORE: [i32; 12] = [0, 31, 59, 90, 120, 151, 181, 212, 243, 273, 304, 334];
+    if !(1..=12).contains(&month) || !(1..=31).contains(&day) || !(1900..=2200).contains(&year) {
+        return None;
+    }
+    let is_leap = year % 4 == 0 && (year % 100 != 0 || year % 400 == 0);
+    let leap_years = |year: i32| year / 4 - year / 100 + year / 400;
+    let years = (year - 1970) * 365 + leap_years(year - 1) - leap_years(1969);
+    let leap_day = i32::from(is_leap && month > 2);
+    Some(years + BEFORE[month as usize - 1] + leap_day + day as i32 - 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn seconds(text: &str) -> f64 {
+        Clock::parse(text).expect(text).total() as f64 * 1e-9
+    }
+
+    #[test]
+    fn times_of_day() {
+        for (text, value) in [
+            ("12:34:56.789", 45_296.789),
+            ("1:02:03", 3723.0),
+            ("12:34:56,789", 45_296.789),
+            ("12:34:56:789", 45_296.789),
+            ("2:34:31 PM", 52_471.0),
+            ("12:00:00 AM", 0.0),
+            ("09:51:40.7271890640258789063", 35_500.727_189_064),
+            ("05:12.5", 312.5),
+            ("14:34:31Z", 52_471.0),
+            ("14:34:31.25+02:00", 52_471.25),
+        ] {
+            assert!((seconds(text) - value).abs() < 1e-9, "{text}");
+        }
+    }
+
+    #[test]
+    fn dates() {
+        // 2022-05-02 is 19 114 days after 1970-01-01 (52 years of 365 days, 13 leap days, 121 days).
+        for text in [
+            "2022-05-02",
+            "2022/05/02",
+            "02.05.2022",
+            "2.5.22",
+            "5/2/2022",
+            "02-May-2022",
+            "2. Mai 2022",
+            "May 2 2022",
+            "Montag, 2. Mai 2022",
+        ] {
+            assert_eq!(Clock::parse(text).expect(text).day, Some(19_114), "{text}");
+        }
+        assert_eq!(Clock::parse("26/3/2026").unwrap().day, Some(20_538));
+        assert_eq!(Clock::parse("2000-03-01").unwrap().day, Some(11_017));
+    }
+
+    #[test]
+    fn dates_with_times() {
+        for text in [
+            "2022-05-02 15:56:24.376",
+            "2022-05-02T15:56:24.376Z",
+            "02.05.2022 15:56:24,376",
+            "5/2/2022 3:56:24.376 PM",
+            "2022/05/02, 15:56:24.376",
+            "02-May-2022 15:56:24.376",
+        ] {
+            let clock = Clock::parse(text).expect(text);
+            assert_eq!(clock.day, Some(19_114), "{text}");
+            assert_eq!(clock.nanoseconds, Some(57_384_376_000_000), "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_clock() {
+        for text in [
+            "1.5",
+            "-1.25e-3",
+            "192.168.178.20",
+            "1-2-3",
+            "abc:de",
+            "12:34",
+            "99.99.2020",
+            "1.2.3",
+            "",
+            "::::::",
+            "12:61:00",
+            "V2.5.1999x",
+            "0.00.0",
+            "191179-001",
+        ] {
+            assert_eq!(Clock::parse(text), None, "{text}");
+        }
+    }
+}

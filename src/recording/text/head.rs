@@ -1,0 +1,403 @@
+//! The first lines of a text, and where its table of numbers is in them.
+
+use std::collections::BTreeMap;
+
+use super::cell::Cell;
+use crate::failure::Failure;
+use crate::io::csv::{Delimiter, Dialect, Told, dialects, is_skipped};
+
+/// Bytes that a table is looked for in, and more if there is none.
+const HEADS: [usize; 4] = [1 << 15, 1 << 17, 1 << 20, 1 << 23];
+/// Part of the lines from the first row on that must be rows.
+const MOSTLY: f64 = 0.8;
+/// Most columns of text, as a part of all, in a table that is a recording.
+const TEXTS: f64 = 0.34;
+
+/// Lines that a maker is told from.
+const FOR_NAMES: usize = 120;
+
+/// A line: where it begins, and its text.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Line {
+    /// Its first byte.
+    pub offset: usize,
+    /// Its text, without its end.
+    pub text: String,
+}
+
+/// The first lines of a text, or of a part of it.
+#[derive(Debug, Clone)]
+pub struct Head {
+    /// The lines.
+    pub lines: Vec<Line>,
+    /// Number of the first of them in the file, from 1.
+    pub first_number: usize,
+    /// Whether that is all there is.
+    pub complete: bool,
+}
+
+/// Where a table is and how it is written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Table {
+    /// How it is written.
+    pub dialect: Dialect,
+    /// Place of its first row among the lines of the head.
+    pub first: usize,
+    /// Columns of its widest row.
+    pub width: usize,
+    /// Whether rows hold texts beside their numbers.
+    pub has_texts: bool,
+}
+
+/// UTF-8, or else the Latin-1 of older recorders, in which any byte is a character.
+#[must_use]
+pub fn decode(bytes: &[u8]) -> String {
+    match std::str::from_utf8(bytes) {
+        Ok(text) => text.to_owned(),
+        Err(_) => bytes.iter().map(|byte| char::from(*byte)).collect(),
+    }
+}
+
+/// Whether a text begins so, in any case.
+#[must_use]
+pub fn starts(text: &str, with: &str) -> bool {
+    text.get(..with.len())
+        .is_some_and(|start| start.eq_ignore_ascii_case(with))
+}
+
+impl Head {
+    /// The lines within so many bytes from an offset; `number` is that of the first line.
+    #[must_use]
+    pub fn of(text: &[u8], from: usize, number: usize, bytes: usize) -> Self {
+        let end = from.saturating_add(bytes).min(text.len());
+        let complete = end == text.len();
+        let mut lines = Vec::new();
+        let mut offset = from;
+        for piece in text[from..end].split_inclusive(|byte| *byte == b'\n') {
+            // A line that goes on after the head says nothing for sure.
+            if complete || piece.ends_with(b"\n") {
+                let text = decode(piece);
+                lines.push(Line {
+                    offset,
+                    text: text.trim_end_matches(['\r', '\n']).to_owned(),
+                });
+            }
+            offset += piece.len();
+        }
+        Self {
+            lines,
+            first_number: number,
+            complete,
+        }
+    }
+
+    /// Whether a line begins so, in any case.
+    #[must_use]
+    pub fn starts(&self, line: usize, with: &str) -> bool {
+        self.lines
+            .get(line)
+            .is_some_and(|line| starts(&line.text, with))
+    }
+
+    /// Whether one of the first lines is so.
+    #[must_use]
+    pub fn any(&self, is: impl Fn(&str) -> bool) -> bool {
+        self.lines.iter().take(FOR_NAMES).any(|line| is(&line.text))
+    }
+
+    /// Number of a line in the file.
+    #[must_use]
+    pub fn number(&self, line: usize) -> usize {
+        self.first_number + line
+    }
+}
+
+/// Finds the table in what follows an offset.
+///
+/// # Errors
+/// If there is none, or more than one way to read it.
+pub fn find(
+    text: &[u8],
+    from: usize,
+    number: usize,
+    told: &Told,
+) -> Result<(Head, Table), Failure> {
+    let mut failure = None;
+    for bytes in HEADS {
+        let head = Head::of(text, from, number, bytes);
+        match find_in(&head, told) {
+            Ok(table) => return Ok((head, table)),
+            Err(error) => failure = Some(error),
+        }
+        if head.complete {
+            break;
+        }
+    }
+    Err(failure.unwrap_or_else(|| Failure::failed("the file is empty; expected rows of numbers")))
+}
+
+/// The table in a head.
+///
+/// # Errors
+/// See [`find`].
+pub fn find_in(head: &Head, told: &Told) -> Result<Table, Failure> {
+    let quoted = head.lines.iter().any(|line| line.text.contains('"'));
+    let occurs = |byte: u8| {
+        head.lines
+            .iter()
+            .any(|line| line.text.as_bytes().contains(&byte))
+    };
+    let mut all = dialects(told, quoted);
+    all.retain(|dialect| match dialect.delimiter {
+        Delimiter::Byte(byte) => told.delimiter.is_some() || occurs(byte),
+        Delimiter::Spaces | Delimiter::None => true,
+    });
+    let strict: Vec<Found> = all
+        .iter()
+        .filter_map(|dialect| Found::of(head, *dialect, strict_row))
+        .collect();
+    if let Some(best) = best(&strict) {
+        return Ok(unambiguous(head, &strict, best)?.table.clone());
+    }
+    let lenient: Vec<Found> = all
+        .iter()
+        .filter_map(|dialect| Found::of(head, *dialect, lenient_row))
+        .collect();
+    let Some(best) = best(&lenient) else {
+        return Err(Failure::failed(no_table(head)));
+    };
+    refuse_listing(head, &best.table)?;
+    Ok(best.table.clone())
+}
+
+/// What a line is as a row.
+#[derive(Debug, Clone, Copy)]
+struct Shape {
+    /// Cells, empty ones at the end left out.
+    width: usize,
+    /// Numbers with marks between thousands.
+    grouped: usize,
+}
+
+/// A row without texts.
+fn strict_row(line: &str, dialect: Dialect) -> Option<Shape> {
+    shape(line, dialect, |numbers, texts, _| numbers > 0 && texts == 0)
+}
+
+/// A row that may hold as many texts as numbers and times.
+fn lenient_row(line: &str, dialect: Dialect) -> Option<Shape> {
+    shape(line, dialect, |numbers, texts, data| {
+        numbers > 0 && data + texts > 1 && data >= texts
+    })
+}
+
+fn shape(line: &str, dialect: Dialect, good: fn(usize, usize, usize) -> bool) -> Option<Shape> {
+    // Quick refusal of prose: no digit, no row.
+    if !line.bytes().any(|byte| byte.is_ascii_digit()) {
+        return None;
+    }
+    let (mut numbers, mut texts, mut data, mut grouped, mut width) = (0, 0, 0, 0, 0);
+    for (place, text) in dialect.cells(line).iter().enumerate() {
+        let cell = Cell::read(text, dialect.decimal);
+        numbers += usize::from(cell.is_number());
+        texts += usize::from(cell == Cell::Text);
+        data += usize::from(cell.is_datum());
+        grouped += usize::from(matches!(cell, Cell::Grouped(_)));
+        if cell != Cell::Empty {
+            width = place + 1;
+        }
+    }
+    good(numbers, texts, data).then_some(Shape { width, grouped })
+}
+
+/// A table under one dialect, and how much it explains.
+struct Found {
+    table: Table,
+    rows: usize,
+    grouped: usize,
+}
+
+impl Found {
+    fn of(head: &Head, dialect: Dialect, row: fn(&str, Dialect) -> Option<Shape>) -> Option<Self> {
+        let shapes: Vec<(usize, Option<Shape>)> = head
+            .lines
+            .iter()
+            .enumerate()
+            .filter(|(_, line)| !is_skipped(&line.text))
+            .map(|(place, line)| (place, row(&line.text, dialect)))
+            .collect();
+        let from = first_row(&shapes)?;
+        let rows: Vec<Shape> = shapes[from..].iter().filter_map(|(_, s)| *s).collect();
+        // One row is a table only where there is nothing else.
+        if rows.len() < 2 && shapes.len() > 2 {
+            return None;
+        }
+        Some(Self {
+            table: Table {
+                dialect,
+                first: shapes[from].0,
+                width: rows.iter().map(|shape| shape.width).max()?,
+                has_texts: false,
+            },
+            rows: rows.len(),
+            grouped: rows.iter().map(|shape| shape.grouped).sum(),
+        })
+    }
+}
+
+/// Place of the first row: the first from which on most lines are rows. A line of another width
+/// than the rows after it is none of them.
+fn first_row(shapes: &[(usize, Option<Shape>)]) -> Option<usize> {
+    let mut rows_after = vec![0_usize; shapes.len() + 1];
+    for place in (0..shapes.len()).rev() {
+        rows_after[place] = rows_after[place + 1] + usize::from(shapes[place].1.is_some());
+    }
+    let usual = usual_width(shapes)?;
+    let is_first = |place: &usize| {
+        let Some(shape) = shapes[*place].1 else {
+            return false;
+        };
+        let mostly = rows_after[*place] as f64 >= MOSTLY * (shapes.len() - place) as f64;
+        let next = shapes.get(place + 1).and_then(|(_, shape)| *shape);
+        // A line of numbers below a key of its own, with text after it, is no row.
+        let is_alone = place + 1 < shapes.len() && next.is_none();
+        let fits = shape.width == usual || next.is_none_or(|next| next.width == shape.width);
+        mostly && fits && !is_alone
+    };
+    (0..shapes.len()).find(is_first)
+}
+
+fn usual_width(shapes: &[(usize, Option<Shape>)]) -> Option<usize> {
+    let mut counts: BTreeMap<usize, usize> = BTreeMap::new();
+    for (_, shape) in shapes {
+        if let Some(shape) = shape {
+            *counts.entry(shape.width).or_default() += 1;
+        }
+    }
+    let most = counts
+        .iter()
+        .max_by_key(|(width, count)| (**count, **width));
+    most.map(|(width, _)| *width)
+}
+
+/// The dialect with the most rows; between equals the one that needs fewer thousands marks, then the
+/// first.
+fn best(found: &[Found]) -> Option<&Found> {
+    found.iter().reduce(|best, other| {
+        let better =
+            other.rows > best.rows || other.rows == best.rows && other.grouped < best.grouped;
+        if better { other } else { best }
+    })
+}
+
+/// The best way to read, unless a comma can be read in two ways that explain all rows: then headings
+/// settle it, or the user is asked.
+fn unambiguous<'a>(head: &Head, found: &'a [Found], best: &'a Found) -> Result<&'a Found, Failure> {
+    let equal = |other: &&Found| other.rows == best.rows && other.table != best.table;
+    let comma = Delimiter::Byte(b',');
+    let (line, text) = {
+        let line = best.table.first;
+        (head.number(line), head.lines[line].text.trim())
+    };
+    if !text.contains(',') {
+        return Ok(best);
+    }
+    let shown: String = text.chars().take(60).collect();
+    // 0,5 between cells or as a decimal mark; headings with as many cells settle it.
+    let separator = found
+        .iter()
+        .find(|f| f.table.dialect.delimiter == comma && f.rows == best.rows);
+    let decimal = found.iter().find(|f| {
+        f.table.dialect.decimal == b',' && f.table.dialect.delimiter != comma && f.rows == best.rows
+    });
+    if let (Some(separator), Some(_)) = (separator, decimal) {
+        if separator.table.width > 1 && has_heading(head, &separator.table) {
+            return Ok(separator);
+        }
+        return Err(Failure::failed(format_args!(
+            "line {line}: \"{shown}\" can be read with the comma between cells or as a decimal \
+             mark; say which with --delimiter , or --decimal ,"
+        )));
+    }
+    // 1,234 with a decimal comma or with a mark between thousands.
+    let dialect = best.table.dialect;
+    let thousands = found.iter().filter(equal).any(|f| {
+        f.table.dialect.delimiter == dialect.delimiter
+            && f.table.dialect.decimal != dialect.decimal
+            && f.grouped > 0
+    });
+    if dialect.decimal == b',' && thousands {
+        return Err(Failure::failed(format_args!(
+            "line {line}: the comma in \"{shown}\" can be a decimal mark or stand between \
+             thousands; say which with --decimal , or --decimal ."
+        )));
+    }
+    Ok(best)
+}
+
+/// Whether a line above the table splits into as many texts as the table has columns.
+fn has_heading(head: &Head, table: &Table) -> bool {
+    head.lines[..table.first].iter().rev().take(6).any(|line| {
+        let text = line.text.trim_start().trim_start_matches(['#', '%']);
+        let cells = table.dialect.cells(text);
+        cells.len() >= table.width
+            && cells[..table.width]
+                .iter()
+                .all(|cell| Cell::read(cell, table.dialect.decimal) == Cell::Text)
+    })
+}
+
+/// Refuses a list of settings or results: most of its columns hold texts.
+fn refuse_listing(head: &Head, table: &Table) -> Result<(), Failure> {
+    let rows: Vec<Vec<Cell>> = head.lines[table.first..]
+        .iter()
+        .filter(|line| !is_skipped(&line.text))
+        .take(200)
+        .map(|line| {
+            let cells = table.dialect.cells(&line.text);
+            cells
+                .iter()
+                .map(|c| Cell::read(c, table.dialect.decimal))
+                .collect()
+        })
+        .collect();
+    let texts = (0..table.width)
+        .filter(|place| {
+            let cells = rows.iter().filter_map(|row| row.get(*place));
+            let (mut texts, mut data) = (0, 0);
+            for cell in cells {
+                texts += usize::from(*cell == Cell::Text);
+                data += usize::from(cell.is_datum());
+            }
+            texts > data
+        })
+        .count();
+    // One or two columns of remarks may stand beside a single signal.
+    if texts > 2 && texts as f64 > TEXTS * table.width as f64 {
+        return Err(Failure::failed(format_args!(
+            "the file is a list of settings or results, not a recording: {texts} of the {} columns \
+             from line {} on hold texts; expected rows of numbers, one row for each moment",
+            table.width,
+            head.number(table.first)
+        )));
+    }
+    Ok(())
+}
+
+fn no_table(head: &Head) -> String {
+    let first = head.lines.iter().find(|line| !line.text.trim().is_empty());
+    let Some(first) = first else {
+        return if head.complete {
+            "the file is empty; expected rows of numbers".to_owned()
+        } else {
+            "the first line does not end within eight megabytes; expected rows of numbers"
+                .to_owned()
+        };
+    };
+    let shown: String = first.text.trim().chars().take(60).collect();
+    format!(
+        "no table of numbers found (the first line reads \"{shown}\"); expected at least two rows \
+         of numbers, with or without headings above. Say how the cells are separated with \
+         --delimiter and --decimal if they are unusual"
+    )
+}

@@ -1,0 +1,311 @@
+//! LabVIEW measurement files (`.lvm`): a header for the file, then segments, each with a header of
+//! its own that says rate, start and unit of each channel. National Instruments, "Specification for
+//! the LabVIEW Measurement File".
+
+use std::sync::Arc;
+
+use super::{Maker, channel};
+use crate::failure::Failure;
+use crate::io::csv::{Delimiter, Dialect, Options, without_rounding};
+use crate::io::number;
+use crate::recording::text::decode::Text;
+use crate::recording::text::header::Field;
+use crate::recording::text::rows::{self, Column, Wanted};
+use crate::recording::text::table::Hints;
+use crate::recording::text::{describe, empty};
+use crate::recording::{Axis, Channel, RateFrom, Recording, Segment};
+use crate::report::Warning;
+
+const END: &str = "***End_of_Header***";
+
+/// The rule.
+pub const ALL: &[Maker] = &[Maker {
+    name: "LabVIEW LVM",
+    is: |head| head.starts(0, "LabVIEW Measurement"),
+    hints: Hints {
+        time_unit: Some("s"),
+        unit: None,
+    },
+    read: Some(read),
+}];
+
+/// Where the times of the samples stand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Stamps {
+    No,
+    One,
+    Multi,
+}
+
+/// What the header of the file says.
+struct File {
+    dialect: Dialect,
+    stamps: Stamps,
+    details: Vec<(String, String)>,
+}
+
+/// What the header of a segment says, a value for each channel.
+#[derive(Default)]
+struct Header {
+    channels: usize,
+    samples: Vec<String>,
+    dates: Vec<String>,
+    times: Vec<String>,
+    units: Vec<String>,
+    dimensions: Vec<String>,
+    starts: Vec<String>,
+    steps: Vec<String>,
+}
+
+fn read(text: &Text, options: &Options) -> Result<Recording, Failure> {
+    let mut lines = Cursor {
+        text: &text.bytes,
+        at: 0,
+        number: 1,
+    };
+    let file = file_header(&mut lines, options);
+    let mut recording = empty();
+    recording.dialect = describe(file.dialect);
+    recording.details.clone_from(&file.details);
+    while lines.skip_to("Channels") {
+        let place = recording.segments.len();
+        let header = segment_header(&mut lines, file.dialect);
+        let names = lines.next().unwrap_or_default();
+        let mut segment = Segment {
+            name: format!("segment {}", place + 1),
+            start_s: None,
+            start_text: joined(&header.dates, &header.times, 0),
+        };
+        let channels =
+            segment_channels(&mut lines, &file, &header, &names, options, &mut recording);
+        segment.start_s = channels.first().and_then(|channel| channel.axis.start_s);
+        recording.channels.extend(channels);
+        recording.segments.push(segment);
+    }
+    if recording.segments.len() < 2 {
+        recording.segments.clear();
+        recording
+            .channels
+            .iter_mut()
+            .for_each(|channel| channel.segment = None);
+    }
+    if recording.channels.is_empty() {
+        return Err(Failure::failed(
+            "the LabVIEW file ends before its first sample; expected a segment with channels",
+        ));
+    }
+    Ok(recording)
+}
+
+/// Lines of a text, one after the other.
+struct Cursor<'a> {
+    text: &'a [u8],
+    at: usize,
+    number: usize,
+}
+
+impl Cursor<'_> {
+    fn next(&mut self) -> Option<String> {
+        if self.at >= self.text.len() {
+            return None;
+        }
+        let end =
+            memchr::memchr(b'\n', &self.text[self.at..]).map_or(self.text.len(), |p| self.at + p);
+        let line = crate::recording::text::head::decode(&self.text[self.at..end]);
+        self.at = end + 1;
+        self.number += 1;
+        Some(line.trim_end_matches('\r').to_owned())
+    }
+
+    /// Goes to the next line that begins so; it is the next to be read.
+    fn skip_to(&mut self, start: &str) -> bool {
+        loop {
+            let (at, number) = (self.at, self.number);
+            match self.next() {
+                Some(line) if line.starts_with(start) => {
+                    (self.at, self.number) = (at, number);
+                    return true;
+                }
+                Some(_) => {}
+                None => return false,
+            }
+        }
+    }
+}
+
+fn file_header(lines: &mut Cursor, options: &Options) -> File {
+    let mut separator = b'\t';
+    let mut decimal = b'.';
+    let mut stamps = Stamps::No;
+    let mut details = Vec::new();
+    while let Some(line) = lines.next() {
+        if line.starts_with(END) {
+            break;
+        }
+        let Some((key, value)) = line.split_once(['\t', ',', ';']) else {
+            continue;
+        };
+        let value = value.trim_end_matches(['\t', ';']);
+        match key {
+            "Separator" if value.starts_with("Comma") => separator = b',',
+            "Separator" if value.starts_with("Semicolon") => separator = b';',
+            "Decimal_Separator" if value.starts_with(',') => decimal = b',',
+            "X_Columns" if value.starts_with("One") => stamps = Stamps::One,
+            "X_Columns" if value.starts_with("Multi") => stamps = Stamps::Multi,
+            _ => {}
+        }
+        let value = value.trim_end_matches(',').trim();
+        if !value.is_empty() {
+            details.push((key.to_owned(), value.to_owned()));
+        }
+    }
+    let dialect = Dialect {
+        delimiter: options.told.delimiter.unwrap_or(Delimiter::Byte(separator)),
+        decimal: options.told.decimal.unwrap_or(decimal),
+    };
+    File {
+        dialect,
+        stamps,
+        details,
+    }
+}
+
+fn segment_header(lines: &mut Cursor, dialect: Dialect) -> Header {
+    let mut header = Header::default();
+    while let Some(line) = lines.next() {
+        if line.starts_with(END) {
+            break;
+        }
+        let mut cells = dialect.cells(&line).into_iter();
+        let key = cells.next().unwrap_or_default();
+        // With a column of times for each channel, the values stand above the channels alone.
+        let values: Vec<String> = cells.filter(|cell| !cell.is_empty()).collect();
+        match key.as_str() {
+            "Channels" => {
+                header.channels = values.first().and_then(|v| v.parse().ok()).unwrap_or(0);
+            }
+            "Samples" => header.samples = values,
+            "Date" => header.dates = values,
+            "Time" => header.times = values,
+            "Y_Unit_Label" => header.units = values,
+            "X_Dimension" => header.dimensions = values,
+            "X0" => header.starts = values,
+            "Delta_X" => header.steps = values,
+            _ => {}
+        }
+    }
+    header
+}
+
+/// Date and time of a channel.
+fn joined(dates: &[String], times: &[String], place: usize) -> Option<String> {
+    match (dates.get(place), times.get(place)) {
+        (Some(date), Some(time)) => Some(format!("{date} {time}")),
+        (date, time) => date.or(time).cloned(),
+    }
+}
+
+fn segment_channels(
+    lines: &mut Cursor,
+    file: &File,
+    header: &Header,
+    names: &str,
+    options: &Options,
+    recording: &mut Recording,
+) -> Vec<Channel> {
+    let names = file.dialect.cells(names);
+    // Names may go beyond the channels that the header counts, but for the comments.
+    let named = names
+        .iter()
+        .skip(1)
+        .filter(|name| !name.is_empty() && *name != "Comment")
+        .count();
+    let count = match file.stamps {
+        Stamps::Multi if named > 1 => header.channels.max(1).min(named),
+        _ => header.channels.max(1).min(named.max(1)),
+    };
+    // A remark stands in the column after the last channel.
+    let mut wanted = match file.stamps {
+        Stamps::Multi => vec![Wanted::Numbers; 2 * count],
+        Stamps::No | Stamps::One => vec![Wanted::Numbers; 1 + count],
+    };
+    wanted.push(Wanted::Nothing);
+    let is_next = |line: &str| line.starts_with("Channels") || line.starts_with("***");
+    let read = rows::read(
+        lines.text,
+        lines.at,
+        lines.number,
+        file.dialect,
+        &wanted,
+        &is_next,
+    );
+    lines.at = read.end;
+    lines.number += read.lines;
+    let segment = recording.segments.len();
+    let mut channels = Vec::new();
+    for place in 0..count {
+        let (time, value) = match file.stamps {
+            Stamps::Multi => (2 * place, 2 * place + 1),
+            Stamps::No | Stamps::One => (0, 1 + place),
+        };
+        let heading = names.get(value).filter(|name| !name.is_empty());
+        let unit = header.units.get(place).map(String::as_str);
+        let field = heading.map_or_else(
+            || Field::new(&format!("channel {}", place + 1), unit),
+            |h| Field::new(h, unit),
+        );
+        let axis = axis(file, header, place, &read.columns[time], options);
+        let column = read.columns[value].clone();
+        if let Some(missing) = missing(header, place, &field, &column) {
+            recording.lost = recording.lost.take().or(Some(missing));
+        }
+        channels.push(channel(&field, column, axis, Some(segment)));
+    }
+    channels
+}
+
+fn axis(file: &File, header: &Header, place: usize, times: &Column, options: &Options) -> Axis {
+    let number = |values: &[String]| {
+        // Where one value stands for all channels, it is the first.
+        let text = values.get(place).or(values.first())?;
+        number::cell(text, file.dialect.decimal)
+    };
+    let start_s = number(&header.starts);
+    let header_hz = number(&header.steps)
+        .filter(|step| *step > 0.0)
+        .map(|step| without_rounding(1.0 / step));
+    let is_time = header
+        .dimensions
+        .get(place)
+        .is_none_or(|dimension| dimension.starts_with("Time"));
+    let mut axis = if file.stamps != Stamps::No || !times.values.is_empty() {
+        Axis::of_stamps("X_Value", Arc::new(times.values.clone()))
+    } else if is_time {
+        header_hz.map_or_else(Axis::default, |hz| Axis::of_header("Delta_X", hz, start_s))
+    } else {
+        Axis::default()
+    };
+    axis.header_rate_hz = header_hz.filter(|_| is_time);
+    axis.start_text = joined(&header.dates, &header.times, place)
+        .or_else(|| joined(&header.dates, &header.times, 0));
+    if let Some(rate_hz) = options.rate_hz {
+        axis.rate_hz = Some(rate_hz);
+        axis.rate_from = RateFrom::Given;
+    }
+    axis
+}
+
+/// A warning if the header announces more samples than there are.
+fn missing(header: &Header, place: usize, field: &Field, column: &Column) -> Option<Warning> {
+    let said: usize = header.samples.get(place)?.parse().ok()?;
+    (said > column.values.len()).then(|| {
+        Warning::new(
+            "samples-missing",
+            format!(
+                "channel \"{}\": the header announces {said} samples, but there are {}",
+                field.name,
+                column.values.len()
+            ),
+        )
+    })
+}

@@ -1,0 +1,473 @@
+//! Units and headings as recorders write them, in English and German.
+
+use torqcomp_model::{Dimension, Unit};
+
+use crate::io::csv::NamedUnit;
+
+/// Other ways to write a unit, in lower case, and how torqcomp writes it.
+const SYNONYMS: [(&str, &str); 44] = [
+    ("sekunde", "s"),
+    ("sekunden", "s"),
+    ("sek", "s"),
+    ("sek.", "s"),
+    ("secs", "s"),
+    ("sec.", "s"),
+    ("millisekunden", "ms"),
+    ("msek", "ms"),
+    ("msecs", "ms"),
+    ("millis", "ms"),
+    ("mikrosekunden", "us"),
+    ("micros", "us"),
+    ("minuten", "min"),
+    ("mins", "min"),
+    ("stunden", "h"),
+    ("std", "h"),
+    ("hours", "h"),
+    ("vdc", "V"),
+    ("vac", "V"),
+    ("vrms", "V"),
+    ("vpp", "V"),
+    ("adc", "A"),
+    ("aac", "A"),
+    ("arms", "A"),
+    ("ampere", "A"),
+    ("grad", "deg"),
+    ("grd", "deg"),
+    ("°", "deg"),
+    ("grad c", "degC"),
+    ("deg c", "degC"),
+    ("deg. c", "degC"),
+    ("deg f", "degF"),
+    ("u/min", "rpm"),
+    ("upm", "rpm"),
+    ("1/min", "rpm"),
+    ("min-1", "rpm"),
+    ("min^-1", "rpm"),
+    ("r/min", "rpm"),
+    ("rev/min", "rpm"),
+    ("nm", "N m"),
+    ("n.m", "N m"),
+    ("n-m", "N m"),
+    ("ustr", "ustrain"),
+    ("µe", "ustrain"),
+];
+
+/// Words in the place of a unit that say there is none.
+const NO_UNITS: [&str; 12] = [
+    "", "-", "--", "none", "(none)", "n/a", "without", "no unit", "keine", "ohne", "ts", "rn",
+];
+
+/// Reads a unit, in brackets or not.
+#[must_use]
+pub fn read(text: &str) -> Option<NamedUnit> {
+    let text = unbracketed(text);
+    if NO_UNITS.contains(&text.to_lowercase().as_str()) || text.chars().count() > 24 {
+        return None;
+    }
+    if let Some(unit) = NamedUnit::parse(text) {
+        return Some(unit);
+    }
+    // V (Voltage)
+    if let Some((symbol, _)) = text
+        .strip_suffix(')')
+        .and_then(|text| text.split_once(" ("))
+        && let Some(unit) = NamedUnit::parse(symbol)
+    {
+        return Some(unit);
+    }
+    let lower = text.to_lowercase();
+    // NM, Nm and N.m are torque; nm is a length.
+    let synonym = SYNONYMS
+        .iter()
+        .find(|(word, _)| *word == lower && (*word != "nm" || text.starts_with('N')))?;
+    Some(NamedUnit {
+        text: text.to_owned(),
+        unit: Unit::parse(synonym.1).ok()?,
+    })
+}
+
+/// A unit as written, if the cell names one at all.
+#[must_use]
+pub fn as_written(text: &str) -> Option<String> {
+    let text = unbracketed(text);
+    let is_none = NO_UNITS.contains(&text.to_lowercase().as_str());
+    (!is_none && text.chars().count() <= 40).then(|| text.to_owned())
+}
+
+/// Without the brackets around the whole.
+fn unbracketed(text: &str) -> &str {
+    let text = text.trim().trim_matches('"').trim();
+    for (open, close) in [('(', ')'), ('[', ']'), ('{', '}'), ('<', '>')] {
+        if let Some(inside) = text.strip_prefix(open).and_then(|t| t.strip_suffix(close)) {
+            return inside.trim();
+        }
+    }
+    text
+}
+
+/// Whether a text stands in brackets as a whole.
+#[must_use]
+pub fn is_bracketed(text: &str) -> bool {
+    let text = text.trim();
+    text.len() > 2 && unbracketed(text).len() < text.len() && !text.starts_with('"')
+}
+
+/// What a heading says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Heading {
+    /// The name without the unit.
+    pub name: String,
+    /// The unit, if it is known.
+    pub unit: Option<NamedUnit>,
+    /// The unit as written.
+    pub unit_text: Option<String>,
+}
+
+/// Reads a heading: what [`crate::io::csv::Column::read`] knows, and `C1 in V`, `U/V`, `Kraft, N`,
+/// a unit in brackets before other words, units in square brackets that are not known.
+#[must_use]
+pub fn heading(text: &str) -> Heading {
+    let text = text.trim().trim_matches('"').trim();
+    let column = crate::io::csv::Column::read(text, None);
+    if let Some(unit) = column.unit {
+        return Heading::new(column.name, Some(unit), None);
+    }
+    if let Some((name, inside)) = bracket(text) {
+        let known = read(inside);
+        let unknown = as_written(inside).filter(|_| known.is_none());
+        if known.is_some() || unknown.is_some() {
+            return Heading::new(name, known, unknown);
+        }
+        return Heading::new(name, None, None);
+    }
+    // CH1V, as Rigol writes it.
+    if let Some((name, unit)) = text.split_at_checked(text.len().saturating_sub(1))
+        && matches!(unit, "V" | "A")
+        && name
+            .strip_prefix("CH")
+            .is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
+    {
+        return Heading::new(name.to_owned(), read(unit), None);
+    }
+    for mark in [" in ", " / ", "/", ", "] {
+        if let Some((name, unit)) = text.rsplit_once(mark)
+            && read(text).is_none()
+            && !name.trim().is_empty()
+            && let Some(unit) = read(unit)
+        {
+            return Heading::new(name.trim().to_owned(), Some(unit), None);
+        }
+    }
+    if let Some(unit) = text.strip_prefix("in ").and_then(read) {
+        let name = if is_time(&unit) { "time" } else { text };
+        return Heading::new(name.to_owned(), Some(unit), None);
+    }
+    let name = match text.split_once(' ') {
+        // "U_k" U_k
+        Some((first, second)) if first == second => first,
+        _ => text,
+    };
+    Heading::new(name.to_owned(), time_word(text), None)
+}
+
+/// The unit of time that is part of a name of time: `millis`, `Time ms`, `elapsed seconds`.
+fn time_word(text: &str) -> Option<NamedUnit> {
+    const WORDS: [(&str, &str); 24] = [
+        ("ms", "ms"),
+        ("msec", "ms"),
+        ("millis", "ms"),
+        ("millisecond", "ms"),
+        ("milliseconds", "ms"),
+        ("millisekunden", "ms"),
+        ("us", "us"),
+        ("usec", "us"),
+        ("micros", "us"),
+        ("microsecond", "us"),
+        ("microseconds", "us"),
+        ("mikrosekunden", "us"),
+        ("ns", "ns"),
+        ("nsec", "ns"),
+        ("nanoseconds", "ns"),
+        ("sec", "s"),
+        ("secs", "s"),
+        ("second", "s"),
+        ("seconds", "s"),
+        ("sekunden", "s"),
+        ("sekunde", "s"),
+        ("minutes", "min"),
+        ("minuten", "min"),
+        ("hours", "h"),
+    ];
+    let lower = text.to_lowercase();
+    let last = lower.rsplit(|c: char| !c.is_alphanumeric()).next()?;
+    let (_, unit) = WORDS.iter().find(|(word, _)| *word == last)?;
+    let meaning = Unit::parse(unit).ok().filter(|_| is_time_name(text))?;
+    Some(NamedUnit {
+        text: (*unit).to_owned(),
+        unit: meaning,
+    })
+}
+
+impl Heading {
+    fn new(name: String, unit: Option<NamedUnit>, unknown: Option<String>) -> Self {
+        Self {
+            name,
+            unit_text: unit.as_ref().map(|unit| unit.text.clone()).or(unknown),
+            unit,
+        }
+    }
+}
+
+/// The heading without a bracket in it that holds a unit, and what the bracket holds. Square brackets
+/// hold units, round ones only those that are known or that are no words.
+fn bracket(text: &str) -> Option<(String, &str)> {
+    for (open, close) in [('[', ']'), ('(', ')')] {
+        for (start, _) in text.match_indices(open) {
+            let Some(length) = text[start..].find(close) else {
+                continue;
+            };
+            let inside = text[start + 1..start + length].trim();
+            let is_at_end = start + length + 1 == text.len();
+            let odd = |c: char| matches!(c, '{' | '}' | '(' | '!' | '?' | '$' | ',' | ';' | ':');
+            let looks_like_unit = open == '['
+                && is_at_end
+                && inside.parse::<f64>().is_err()
+                && inside.chars().count() <= 16
+                && !inside.contains(odd)
+                || read(inside).is_some()
+                || inside.len() <= 8 && inside.contains(['/', '%', '°', '²', '^', 'µ']);
+            if looks_like_unit && !inside.is_empty() {
+                let rest = [text[..start].trim(), text[start + length + 1..].trim()];
+                let name = rest.join(" ").trim().to_owned();
+                return Some((
+                    if name.is_empty() {
+                        text.to_owned()
+                    } else {
+                        name
+                    },
+                    inside,
+                ));
+            }
+        }
+    }
+    None
+}
+
+/// Whether it is a unit of time.
+#[must_use]
+pub fn is_time(unit: &NamedUnit) -> bool {
+    unit.unit.dimension() == Dimension::new([0, 0, 1, 0, 0, 0])
+}
+
+/// Whether a name stands for time, or for the axis that is time in a recorder's export.
+#[must_use]
+pub fn is_time_name(name: &str) -> bool {
+    const WORDS: [&str; 43] = [
+        "ms",
+        "msec",
+        "millisecond",
+        "milliseconds",
+        "millisekunden",
+        "us",
+        "usec",
+        "microsecond",
+        "microseconds",
+        "mikrosekunden",
+        "nanoseconds",
+        "subsec",
+        "sec",
+        "t",
+        "time",
+        "times",
+        "zeit",
+        "uhrzeit",
+        "zeitstempel",
+        "messzeit",
+        "timestamp",
+        "datum",
+        "date",
+        "datetime",
+        "elapsed",
+        "seconds",
+        "secs",
+        "second",
+        "sekunden",
+        "sekunde",
+        "millis",
+        "micros",
+        "tijd",
+        "temps",
+        "tiempo",
+        "tempo",
+        "reltime",
+        "abstime",
+        "systemtime",
+        "epoch",
+        "utc",
+        "clock",
+        "laufzeit",
+    ];
+    let lower = name.to_lowercase();
+    let words: Vec<&str> = lower
+        .split(|c: char| !c.is_alphanumeric() && c != '%')
+        .filter(|word| !word.is_empty())
+        .collect();
+    let is = |word: &str| {
+        let stem = word
+            .trim_start_matches('%')
+            .trim_end_matches(|c: char| c.is_ascii_digit());
+        let is_compound = (stem.ends_with("zeit") || stem.ends_with("time"))
+            && !["lifetime", "risetime", "deadtime", "totzeit", "overtime"].contains(&stem);
+        WORDS.contains(&stem) || is_compound
+    };
+    match words.as_slice() {
+        [] => false,
+        [one] => is(one),
+        // "elapsed time", "rel_time", "time stamp", "Date/Time", "Time 1 - default sample rate".
+        [first, .., last] => {
+            let first_is = is(first) && *first != "t" && *first != "second";
+            let qualified = [
+                "rel",
+                "abs",
+                "elapsed",
+                "relative",
+                "absolute",
+                "test",
+                "sample",
+                "run",
+                "latest",
+                "total",
+                "local",
+                "system",
+                "ros",
+                "log",
+                "measurement",
+                "x",
+            ];
+            first_is && !["constant", "delay", "konstante"].contains(last)
+                || qualified.contains(first) && is(last)
+        }
+    }
+}
+
+/// Whether a name stands for the horizontal axis, which is time unless the file says otherwise.
+#[must_use]
+pub fn is_axis_name(name: &str) -> bool {
+    const NAMES: [&str; 12] = [
+        "x", "x-axis", "x_axis", "xaxis", "x axis", "x-achse", "x_value", "x value", "x values",
+        "x-value", "x-wert", "abscissa",
+    ];
+    NAMES.contains(&name.trim().to_lowercase().as_str())
+}
+
+/// Whether a name stands for a number that counts samples.
+#[must_use]
+pub fn is_index_name(name: &str) -> bool {
+    const NAMES: [&str; 34] = [
+        "x",
+        "#",
+        "n",
+        "i",
+        "nr",
+        "nr.",
+        "no",
+        "no.",
+        "index",
+        "idx",
+        "sample",
+        "samples",
+        "scan",
+        "sequence",
+        "seq",
+        "point",
+        "points",
+        "record",
+        "row",
+        "count",
+        "counter",
+        "messpunkt",
+        "messwert",
+        "punkt",
+        "zeile",
+        "lfd. nr.",
+        "sample number",
+        "sample no.",
+        "sample no",
+        "sample #",
+        "sample nr.",
+        "sample index",
+        "number",
+        "datapoint",
+    ];
+    let name = name.trim().trim_matches('"').to_lowercase();
+    NAMES.contains(&name.as_str())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn told(text: &str) -> (String, Option<String>, bool) {
+        let heading = heading(text);
+        (heading.name, heading.unit_text, heading.unit.is_some())
+    }
+
+    #[test]
+    fn headings() {
+        for (text, name, unit, known) in [
+            ("C1 in V", "C1", Some("V"), true),
+            ("in s", "time", Some("s"), true),
+            ("U/V", "U", Some("V"), true),
+            ("\"Zeit\" t / s", "\"Zeit\" t", Some("s"), true),
+            ("Kraft, N", "Kraft", Some("N"), true),
+            ("Time (s) Run #1", "Time Run #1", Some("s"), true),
+            ("Flow [l/min]", "Flow", Some("l/min"), false),
+            ("Force (Trigger)", "Force (Trigger)", None, false),
+            ("ch1 torq.(P:00A305h)", "ch1 torq.(P:00A305h)", None, false),
+            ("Drehzahl [U/min]", "Drehzahl", Some("U/min"), true),
+            ("time_s", "time", Some("s"), true),
+            ("m/s", "m/s", None, false),
+        ] {
+            let want = (name.to_owned(), unit.map(str::to_owned), known);
+            assert_eq!(told(text), want, "{text}");
+        }
+    }
+
+    #[test]
+    fn every_synonym_leads_to_a_unit() {
+        for (_, unit) in SYNONYMS {
+            assert!(Unit::parse(unit).is_ok(), "{unit}");
+        }
+    }
+
+    #[test]
+    fn names_of_time() {
+        for name in [
+            "t",
+            "Time",
+            "Zeit",
+            "Elapsed Time",
+            "Time Stamp",
+            "Zeit  1 - Standardmessrate",
+            "TIMESTAMP",
+            "Date/Time",
+            "Time1",
+            "rel_time",
+            "%time",
+            "Uhrzeit",
+            "Time 1",
+        ] {
+            assert!(is_time_name(name), "{name}");
+        }
+        for name in [
+            "temperature",
+            "Torque",
+            "Timer setting",
+            "t_ambient",
+            "Time constant",
+            "X",
+        ] {
+            assert!(!is_time_name(name), "{name}");
+        }
+    }
+}
