@@ -2,6 +2,7 @@
 
 mod compensate;
 mod harmonics;
+mod inspect;
 mod predict;
 mod table;
 
@@ -30,6 +31,7 @@ pub fn run(cli: Cli) -> Result<Outcome, Failure> {
     match cli.verb {
         Verb::Compensate(args) => compensate::run(&args),
         Verb::Harmonics(args) => harmonics::run(&args),
+        Verb::Inspect(args) => inspect::run(&args),
         Verb::Table(args) => table::run(&args),
         Verb::Predict(args) => predict::run(&args),
     }

@@ -1,0 +1,136 @@
+//! Channels that are the same, or multiples of each other, within a file and across files.
+
+use torqcomp_dsp::quality::copies::{Portrait, Relation, relation};
+
+use super::{label, unit_of, with_unit};
+use crate::recording::{Channel, Recording};
+use crate::report::{Warning, rounded};
+
+/// A channel among those that are compared.
+struct Seen<'a> {
+    channel: &'a Channel,
+    portrait: Portrait<'a>,
+}
+
+/// A channel that others follow from.
+struct Family<'a> {
+    first: Seen<'a>,
+    others: Vec<(&'a Channel, Relation)>,
+}
+
+/// The warnings about channels of one file that follow from each other.
+#[must_use]
+pub fn within(recording: &Recording) -> Vec<Warning> {
+    let mut families: Vec<Family> = Vec::new();
+    for channel in &recording.channels {
+        let Some(portrait) = Portrait::of(&channel.samples) else {
+            continue;
+        };
+        let found = families.iter_mut().find_map(|family| {
+            let relation = relation(&family.first.portrait, &portrait)?;
+            Some((family, relation))
+        });
+        match found {
+            Some((family, relation)) => family.others.push((channel, relation)),
+            None => families.push(Family {
+                first: Seen { channel, portrait },
+                others: Vec::new(),
+            }),
+        }
+    }
+    families.iter().flat_map(Family::warnings).collect()
+}
+
+impl Family<'_> {
+    fn warnings(&self) -> Vec<Warning> {
+        let first = &label(self.first.channel);
+        let names = |identical: bool| -> Vec<String> {
+            self.others
+                .iter()
+                .filter(|(_, relation)| relation.identical == identical)
+                .map(|(channel, relation)| {
+                    let name = label(channel);
+                    if identical {
+                        format!("\"{name}\"")
+                    } else {
+                        format!("\"{name}\" = {}", follows(first, channel, relation))
+                    }
+                })
+                .collect()
+        };
+        let (same, scaled) = (names(true), names(false));
+        let mut found = Vec::new();
+        if !same.is_empty() {
+            found.push(Warning::new(
+                "channel-copy",
+                format!(
+                    "{} holds the same samples as \"{first}\": one signal stored twice",
+                    same.join(", ")
+                ),
+            ));
+        }
+        if !scaled.is_empty() {
+            found.push(Warning::new(
+                "channel-multiple",
+                format!(
+                    "{}, within its resolution: one signal in two scales",
+                    scaled.join("; ")
+                ),
+            ));
+        }
+        found
+    }
+}
+
+/// `2.5 × "a" + 1 V`.
+fn follows(first: &str, channel: &Channel, relation: &Relation) -> String {
+    let text = format!("{} x \"{first}\"", rounded(relation.factor, 6));
+    let extent = channel.samples.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    if relation.offset.abs() < 1e-6 * extent {
+        return text;
+    }
+    let sign = if relation.offset < 0.0 { '-' } else { '+' };
+    let offset = with_unit(relation.offset.abs(), unit_of(channel), 6);
+    format!("{text} {sign} {offset}")
+}
+
+/// The warnings about channels of different files that hold the same samples.
+#[must_use]
+pub fn across(recordings: &[&Recording]) -> Vec<Warning> {
+    let portraits: Vec<Vec<Seen>> = recordings.iter().map(|r| seen(r)).collect();
+    let mut found = Vec::new();
+    for (i, first) in portraits.iter().enumerate() {
+        for (j, second) in portraits.iter().enumerate().skip(i + 1) {
+            let pairs = first
+                .iter()
+                .flat_map(|a| second.iter().map(move |b| (a, b)));
+            for (a, b) in pairs {
+                let Some(relation) = relation(&a.portrait, &b.portrait) else {
+                    continue;
+                };
+                let (name, other) = (&label(a.channel), &label(b.channel));
+                let (file, second) = (&recordings[i].source, &recordings[j].source);
+                let (code, what) = if relation.identical {
+                    ("channel-copy", format!("the same samples as \"{name}\""))
+                } else {
+                    ("channel-multiple", follows(name, b.channel, &relation))
+                };
+                found.push(Warning::new(
+                    code,
+                    format!("\"{other}\" of {second} is {what} of {file}"),
+                ));
+            }
+        }
+    }
+    found
+}
+
+fn seen(recording: &Recording) -> Vec<Seen<'_>> {
+    let channels = recording.channels.iter();
+    channels
+        .filter_map(|channel| {
+            let portrait = Portrait::of(&channel.samples)?;
+            Some(Seen { channel, portrait })
+        })
+        .collect()
+}
