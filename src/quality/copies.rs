@@ -2,12 +2,13 @@
 
 use torqcomp_dsp::quality::copies::{Portrait, Relation, relation};
 
-use super::{label, unit_of, with_unit};
+use super::{labels, unit_of, with_unit};
 use crate::recording::{Channel, Recording};
 use crate::report::{Warning, rounded};
 
 /// A channel among those that are compared.
 struct Seen<'a> {
+    label: String,
     channel: &'a Channel,
     portrait: Portrait<'a>,
 }
@@ -15,25 +16,22 @@ struct Seen<'a> {
 /// A channel that others follow from.
 struct Family<'a> {
     first: Seen<'a>,
-    others: Vec<(&'a Channel, Relation)>,
+    others: Vec<(Seen<'a>, Relation)>,
 }
 
 /// The warnings about channels of one file that follow from each other.
 #[must_use]
 pub fn within(recording: &Recording) -> Vec<Warning> {
     let mut families: Vec<Family> = Vec::new();
-    for channel in &recording.channels {
-        let Some(portrait) = Portrait::of(&channel.samples) else {
-            continue;
-        };
+    for channel in seen(recording) {
         let found = families.iter_mut().find_map(|family| {
-            let relation = relation(&family.first.portrait, &portrait)?;
+            let relation = relation(&family.first.portrait, &channel.portrait)?;
             Some((family, relation))
         });
         match found {
             Some((family, relation)) => family.others.push((channel, relation)),
             None => families.push(Family {
-                first: Seen { channel, portrait },
+                first: channel,
                 others: Vec::new(),
             }),
         }
@@ -43,17 +41,17 @@ pub fn within(recording: &Recording) -> Vec<Warning> {
 
 impl Family<'_> {
     fn warnings(&self) -> Vec<Warning> {
-        let first = &label(self.first.channel);
+        let first = &self.first.label;
         let names = |identical: bool| -> Vec<String> {
             self.others
                 .iter()
                 .filter(|(_, relation)| relation.identical == identical)
-                .map(|(channel, relation)| {
-                    let name = label(channel);
+                .map(|(other, relation)| {
+                    let name = &other.label;
                     if identical {
                         format!("\"{name}\"")
                     } else {
-                        format!("\"{name}\" = {}", follows(first, channel, relation))
+                        format!("\"{name}\" = {}", follows(first, other.channel, relation))
                     }
                 })
                 .collect()
@@ -108,7 +106,7 @@ pub fn across(recordings: &[&Recording]) -> Vec<Warning> {
                 let Some(relation) = relation(&a.portrait, &b.portrait) else {
                     continue;
                 };
-                let (name, other) = (&label(a.channel), &label(b.channel));
+                let (name, other) = (&a.label, &b.label);
                 let (file, second) = (&recordings[i].source, &recordings[j].source);
                 let (code, what) = if relation.identical {
                     ("channel-copy", format!("the same samples as \"{name}\""))
@@ -125,12 +123,18 @@ pub fn across(recordings: &[&Recording]) -> Vec<Warning> {
     found
 }
 
+/// The channels that say enough to be compared.
 fn seen(recording: &Recording) -> Vec<Seen<'_>> {
-    let channels = recording.channels.iter();
+    let labels = labels(&recording.channels);
+    let channels = recording.channels.iter().zip(labels);
     channels
-        .filter_map(|channel| {
+        .filter_map(|(channel, label)| {
             let portrait = Portrait::of(&channel.samples)?;
-            Some(Seen { channel, portrait })
+            Some(Seen {
+                label,
+                channel,
+                portrait,
+            })
         })
         .collect()
 }

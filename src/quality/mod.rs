@@ -7,6 +7,8 @@ pub mod copies;
 pub mod samples;
 pub mod time;
 
+use std::collections::HashMap;
+
 use crate::recording::{Axis, Channel};
 use crate::report::Warning;
 
@@ -29,7 +31,7 @@ pub use time::TimeFindings;
 pub fn warnings(name: &str, unit: &str, samples: &[f64], axis: &Axis) -> Vec<Warning> {
     let mut found = TimeFindings::of(axis).warnings(&format!("\"{name}\""), axis);
     let findings = Findings::of(samples, axis.rate_hz);
-    found.extend(findings.warnings(name, unit, axis));
+    found.extend(findings.warnings(name, unit, axis, &[]));
     found.extend(findings.constant.map(|value| constant(&[(name, value)])));
     found.extend(findings.coarse().map(|q| coarse(&[(name, unit, q)])));
     found
@@ -120,11 +122,24 @@ pub fn unit_of(channel: &Channel) -> &str {
     channel.unit_text.as_deref().or(known).unwrap_or("")
 }
 
-/// Name of a channel, with its segment if there are several.
+/// Names of channels, told apart: with the segment, or the number of the channel where several of one
+/// segment have the same name.
 #[must_use]
-pub fn label(channel: &Channel) -> String {
-    match channel.segment {
-        Some(segment) => format!("{} (segment {})", channel.name, segment + 1),
-        None => channel.name.clone(),
+pub fn labels(channels: &[Channel]) -> Vec<String> {
+    let key = |channel: &Channel| (channel.name.clone(), channel.segment);
+    let mut counts: HashMap<(String, Option<usize>), usize> = HashMap::new();
+    for channel in channels {
+        *counts.entry(key(channel)).or_default() += 1;
     }
+    let label = |(i, channel): (usize, &Channel)| {
+        let mut label = channel.name.clone();
+        if let Some(segment) = channel.segment {
+            label.push_str(&format!(" (segment {})", segment + 1));
+        }
+        if counts[&key(channel)] > 1 {
+            label.push_str(&format!(" (channel {})", i + 1));
+        }
+        label
+    };
+    channels.iter().enumerate().map(label).collect()
 }

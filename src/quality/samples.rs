@@ -9,7 +9,7 @@ use torqcomp_dsp::quality::stuck::{constant, standstills};
 use torqcomp_dsp::quality::{Run, range};
 
 use super::{place, with_unit};
-use crate::recording::Axis;
+use crate::recording::{Axis, Hole, HoleKind};
 use crate::report::{Warning, rounded, short};
 
 /// Levels in the range below which a resolution is coarse: 8 bits.
@@ -17,9 +17,14 @@ const COARSE: f64 = 256.0;
 /// Levels up to which a channel is a state, not a measurement.
 const STATES: usize = 4;
 
+/// Samples below which nothing is said of their resolution: a table of a few readings.
+const FEWEST: usize = 100;
+
 /// What the samples of a channel show.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Findings {
+    /// Number of samples.
+    pub samples: usize,
     /// Smallest and largest finite sample.
     pub range: Option<(f64, f64)>,
     /// Mean of the finite samples.
@@ -53,6 +58,7 @@ impl Findings {
         let mut standstills = standstills(samples);
         standstills.retain(|run| !at_rail(run));
         Self {
+            samples: samples.len(),
             range: range(samples),
             mean,
             std,
@@ -70,15 +76,19 @@ impl Findings {
     #[must_use]
     pub fn coarse(&self) -> Option<Quantisation> {
         self.quantisation
-            .filter(|q| q.levels < COARSE && q.seen > STATES)
+            .filter(|q| q.levels < COARSE && q.seen > STATES && self.samples >= FEWEST)
     }
 
     /// The warnings about the channel alone, but for those that are said of several channels at once
-    /// ([`super::constant`], [`super::coarse`]).
+    /// ([`super::constant`], [`super::coarse`]). `holes` are the cells that held no number, as far as
+    /// they are known.
     #[must_use]
-    pub fn warnings(&self, name: &str, unit: &str, axis: &Axis) -> Vec<Warning> {
+    pub fn warnings(&self, name: &str, unit: &str, axis: &Axis, holes: &[Hole]) -> Vec<Warning> {
         let mut found = Vec::new();
-        found.extend(self.non_finite.map(|f| non_finite_cells(name, &f, axis)));
+        found.extend(
+            self.non_finite
+                .map(|f| non_finite_cells(name, &f, axis, holes)),
+        );
         for (rail, end) in self
             .clipping
             .iter()
@@ -105,12 +115,32 @@ fn mean_and_std(samples: &[f64]) -> Option<(f64, f64)> {
     (count > 0.0).then(|| (mean, (square / count).sqrt()))
 }
 
-fn non_finite_cells(name: &str, found: &NonFinite, axis: &Axis) -> Warning {
+fn non_finite_cells(name: &str, found: &NonFinite, axis: &Axis, holes: &[Hole]) -> Warning {
+    let kinds = [
+        (HoleKind::Empty, "empty"),
+        (HoleKind::Missing, "beyond the end of their line"),
+        (HoleKind::NonFinite, "NaN or infinite"),
+        (HoleKind::Text, "text"),
+    ];
+    let counts: Vec<String> = kinds
+        .iter()
+        .map(|(kind, word)| (holes.iter().filter(|hole| hole.what == *kind).count(), word))
+        .filter(|(count, _)| *count > 0)
+        .map(|(count, word)| format!("{count} {word}"))
+        .collect();
+    let counts = match counts.as_slice() {
+        [] => String::new(),
+        some => format!(" ({})", some.join(", ")),
+    };
+    let line = match holes.first() {
+        Some(hole) if hole.line > 0 => format!(", line {}", hole.line),
+        _ => String::new(),
+    };
     Warning::new(
         "non-finite",
         format!(
-            "\"{name}\": {} sample(s) are missing or no finite numbers, the first at {}, at most {} \
-             in a row; remove or repair them before processing",
+            "\"{name}\": {} sample(s) are missing or no finite numbers{counts}, the first at \
+             {}{line}, at most {} in a row; remove or repair them before processing",
             found.count,
             place(axis, found.first),
             found.longest
@@ -141,7 +171,7 @@ fn stuck(name: &str, unit: &str, runs: &[Run], axis: &Axis) -> Option<Warning> {
         "stuck-channel",
         format!(
             "\"{name}\" stands still {} time(s), for {samples} samples in all; the longest is at {} \
-             from {} on, {} samples: a cable, a transmitter or the recorder dropped out",
+             from {} on, {} samples: at rest, or a cable, a transmitter or the recorder dropped out",
             runs.len(),
             with_unit(longest.value, unit, 6),
             place(axis, longest.start),
@@ -183,7 +213,7 @@ fn hum(name: &str, unit: &str, found: &Mains) -> Warning {
         .collect();
     let doubt = match found.shaft_hz {
         Some(shaft_hz) => format!(
-            "; there is a line at {} Hz too, so all may be orders of a shaft",
+            "; there is a line at {} Hz too, a simple fraction of it, so all may be orders of a shaft",
             rounded(shaft_hz, 4)
         ),
         None => "; a machine that turns in step with the mains makes such lines as well".to_owned(),
@@ -191,7 +221,8 @@ fn hum(name: &str, unit: &str, found: &Mains) -> Warning {
     Warning::new(
         "mains-lines",
         format!(
-            "\"{name}\" has mains lines ({} Hz): {} (peak; told apart from others to {} Hz){doubt}",
+            "\"{name}\" has lines at multiples of {} Hz, as mains hum makes them: {} (peak; others \
+             closer than {} Hz are not told apart){doubt}",
             short(found.nominal_hz),
             lines.join(", "),
             rounded(found.resolution_hz, 2)

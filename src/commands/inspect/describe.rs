@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use torqcomp_dsp::quality::clipping::Clipping;
 
-use crate::quality::{self, Findings, TimeFindings, copies, label, unit_of};
+use crate::quality::{self, Findings, TimeFindings, copies, labels, unit_of};
 use crate::recording::{Axis, Channel, Recording};
 use crate::report::Warning;
 use crate::report::inspect::{self, Detail, File, Gap, MainsLine, Said, Segment};
@@ -19,6 +19,7 @@ pub fn file(recording: &Recording) -> File {
         .map(|(axis, _)| TimeFindings::of(axis))
         .collect();
     let findings = examine(channels);
+    let labels = labels(channels);
 
     let mut warnings: Vec<Said> = recording
         .lost
@@ -27,12 +28,12 @@ pub fn file(recording: &Recording) -> File {
         .map(|warning| said(warning.clone(), Vec::new()))
         .collect();
     for ((axis, members), found) in axes.iter().zip(&times) {
-        let names: Vec<String> = members.iter().map(|i| label(&channels[*i])).collect();
+        let names: Vec<String> = members.iter().map(|i| labels[*i].clone()).collect();
         let all = members.len() == channels.len();
         let found = found.warnings(&whose(&names, all), axis);
         warnings.extend(found.into_iter().map(|w| said(w, names.clone())));
     }
-    warnings.extend(of_channels(channels, &findings));
+    warnings.extend(of_channels(channels, &labels, &findings));
     let copies = copies::within(recording);
     warnings.extend(copies.into_iter().map(|w| said(w, Vec::new())));
 
@@ -145,32 +146,71 @@ fn examine(channels: &[Channel]) -> Vec<Findings> {
     all.into_iter().map(|(_, found)| found).collect()
 }
 
+/// Channels with the same fault from which on it is said once for all of them.
+const MANY: usize = 4;
+
 /// What is wrong with the samples; what many channels have in common is said once.
-fn of_channels(channels: &[Channel], findings: &[Findings]) -> Vec<Said> {
+fn of_channels(channels: &[Channel], labels: &[String], findings: &[Findings]) -> Vec<Said> {
     let mut all = Vec::new();
-    let mut constant: Vec<(String, f64)> = Vec::new();
+    let mut constant = Vec::new();
     let mut coarse = Vec::new();
-    for (channel, found) in channels.iter().zip(findings) {
-        let (name, unit) = (label(channel), unit_of(channel));
-        let warnings = found.warnings(&name, unit, &channel.axis);
+    for ((channel, name), found) in channels.iter().zip(labels).zip(findings) {
+        let unit = unit_of(channel);
+        let warnings = found.warnings(name, unit, &channel.axis, &channel.holes);
         all.extend(warnings.into_iter().map(|w| said(w, vec![name.clone()])));
-        constant.extend(found.constant.map(|value| (name.clone(), value)));
-        coarse.extend(found.coarse().map(|q| (name, unit, q)));
+        constant.extend(found.constant.map(|value| (name.as_str(), value)));
+        coarse.extend(found.coarse().map(|q| (name.as_str(), unit, q)));
     }
+    let mut all = gathered(all);
     if !constant.is_empty() {
-        let list: Vec<(&str, f64)> = constant.iter().map(|(n, v)| (n.as_str(), *v)).collect();
-        let names = constant.iter().map(|(name, _)| name.clone()).collect();
-        all.push(said(quality::constant(&list), names));
+        let names = constant.iter().map(|(name, _)| (*name).to_owned());
+        all.push(said(quality::constant(&constant), names.collect()));
     }
     if !coarse.is_empty() {
-        let list: Vec<_> = coarse
-            .iter()
-            .map(|(n, u, q)| (n.as_str(), *u, *q))
-            .collect();
-        let names = coarse.iter().map(|(name, ..)| name.clone()).collect();
-        all.push(said(quality::coarse(&list), names));
+        let names = coarse.iter().map(|(name, ..)| (*name).to_owned());
+        all.push(said(quality::coarse(&coarse), names.collect()));
     }
     all
+}
+
+/// Puts warnings of one code about many channels together.
+fn gathered(warnings: Vec<Said>) -> Vec<Said> {
+    let mut out: Vec<Said> = Vec::new();
+    for warning in &warnings {
+        let alike: Vec<&Said> = warnings.iter().filter(|w| w.code == warning.code).collect();
+        if alike.len() < MANY {
+            out.push(warning.clone());
+        } else if out.iter().all(|said| said.code != warning.code) {
+            let mut channels: Vec<String> = alike.iter().flat_map(|w| w.channels.clone()).collect();
+            channels.dedup();
+            out.push(Said {
+                code: warning.code,
+                message: format!(
+                    "{} channels, {}; the first: {}",
+                    channels.len(),
+                    listed(&channels),
+                    warning.message
+                ),
+                channels,
+            });
+        }
+    }
+    out
+}
+
+/// Some names, for people.
+fn listed(names: &[String]) -> String {
+    const MOST: usize = 6;
+    let quoted: Vec<String> = names
+        .iter()
+        .take(MOST)
+        .map(|n| format!("\"{n}\""))
+        .collect();
+    if names.len() > MOST {
+        format!("{} and {} more", quoted.join(", "), names.len() - MOST)
+    } else {
+        quoted.join(", ")
+    }
 }
 
 fn describe(channel: &Channel, found: &Findings, time: Option<&TimeFindings>) -> inspect::Channel {
@@ -199,7 +239,9 @@ fn describe(channel: &Channel, found: &Findings, time: Option<&TimeFindings>) ->
 fn duration_s(channel: &Channel) -> Option<f64> {
     let axis = &channel.axis;
     if let Some(stamps) = &axis.stamps_s {
-        return stamps.first().zip(stamps.last()).map(|(a, b)| b - a);
+        let mut finite = stamps.iter().filter(|t| t.is_finite());
+        let first = finite.next()?;
+        return Some(finite.next_back().unwrap_or(first) - first);
     }
     let steps = channel.samples.len().checked_sub(1)?;
     axis.rate_hz.map(|rate_hz| steps as f64 / rate_hz)

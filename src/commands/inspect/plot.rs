@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::failure::Failure;
 use crate::io::output::Output;
-use crate::quality::{label, unit_of};
+use crate::quality::{labels, unit_of};
 use crate::recording::{Channel, Recording};
 use crate::report::inspect::{self, Entry, Report};
 use crate::report::panels::{self, Panel, Times};
@@ -34,9 +34,13 @@ pub fn svg(recordings: &[&Recording], report: &Report) -> String {
         .zip(found)
         .flat_map(|(recording, found)| {
             let channels = recording.channels.iter().zip(&found.channels);
-            channels.map(move |(channel, found)| {
-                let file = several.then_some(recording.source.as_str());
-                panel(channel, found, file)
+            let named = channels.zip(labels(&recording.channels));
+            named.map(move |((channel, found), label)| {
+                let name = match several {
+                    true => format!("{}: {label}", recording.source),
+                    false => label,
+                };
+                panel(channel, found, name)
             })
         })
         .collect();
@@ -47,7 +51,7 @@ pub fn svg(recordings: &[&Recording], report: &Report) -> String {
     panels::svg(&title, &panels)
 }
 
-fn panel<'a>(channel: &'a Channel, found: &inspect::Channel, file: Option<&str>) -> Panel<'a> {
+fn panel<'a>(channel: &'a Channel, found: &inspect::Channel, name: String) -> Panel<'a> {
     let axis = &channel.axis;
     let times = match (&axis.stamps_s, axis.rate_hz) {
         (Some(stamps), _) => Times::Stamps(stamps),
@@ -57,9 +61,8 @@ fn panel<'a>(channel: &'a Channel, found: &inspect::Channel, file: Option<&str>)
         },
         (None, None) => Times::Numbers,
     };
-    let name = label(channel);
     Panel {
-        name: file.map_or(name.clone(), |file| format!("{file}: {name}")),
+        name,
         unit: unit_of(channel).to_owned(),
         samples: &channel.samples,
         times,

@@ -66,7 +66,8 @@ impl Clipping {
 /// same value three times in a row with a chance below `(step/σ)²` for each sample. A signal whose
 /// samples lie at its two extremes for more than 85 % switches between them and is not judged. What
 /// remains possible is a plateau that a signal really has, entered with a kink: the limit of a
-/// command looks the same as that of an amplifier.
+/// command looks the same as that of an amplifier. Zero is such a plateau of everything that rests, so
+/// that an extreme of exactly 0 is never called clipped.
 ///
 /// ```
 /// use torqcomp_dsp::quality::clipping::clipping;
@@ -89,7 +90,7 @@ pub fn clipping(samples: &[f64]) -> Option<Clipping> {
     let shortest = SHORTEST.max(LONGER * usual + 1);
     let at = |extreme: f64| -> Vec<Run> {
         runs(samples)
-            .filter(|r| r.value == extreme && r.length >= shortest)
+            .filter(|r| r.value == extreme && extreme != 0.0 && r.length >= shortest)
             .collect()
     };
     let (lows, highs) = (at(low), at(high));
@@ -237,6 +238,9 @@ mod tests {
             .map(|i| if i % 100 < 50 { 1.0 } else { 0.0 })
             .collect();
         assert_eq!(clipping(&square), None);
+        // A drive that starts from rest with a kink.
+        let start: Vec<f64> = (0..900).map(|i| f64::from((i - 300).max(0))).collect();
+        assert_eq!(clipping(&start), None);
         let held: Vec<f64> = noise(2, 2000).iter().flat_map(|x| [*x; 5]).collect();
         assert_eq!(clipping(&held), None);
     }

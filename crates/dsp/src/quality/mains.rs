@@ -23,8 +23,9 @@ const BESIDE: usize = 14;
 const PROMINENCE: f64 = 6.0;
 /// Amplitude of the strongest line, over the rms of the record without its mean, that is worth saying.
 const SMALLEST: f64 = 1e-3;
-/// Parts of a mains frequency at which a shaft that turns in step with it has lines as well.
-const SHAFT_PARTS: [f64; 4] = [0.25, 0.5, 1.0 / 3.0, 2.0 / 3.0];
+/// Largest denominator of the fractions of a mains frequency at which a shaft that makes a line there
+/// is expected to make others.
+const LARGEST_DENOMINATOR: usize = 6;
 
 /// Lines of the mains in a record.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,8 +36,8 @@ pub struct Mains {
     pub lines: Vec<Line>,
     /// Distance of the spectrum's frequencies: lines closer together are one.
     pub resolution_hz: f64,
-    /// A line at a quarter, a half or a third of the mains frequency, if there is one: then all of
-    /// them may be orders of a shaft.
+    /// A line at a simple fraction of the mains frequency (denominator up to 6), if there is one: then
+    /// all of them may be orders of a shaft.
     pub shaft_hz: Option<f64>,
 }
 
@@ -98,10 +99,7 @@ pub fn mains(samples: &[f64], rate_hz: f64) -> Option<Mains> {
         // Multiples of 300 Hz belong to both: the fundamental decides, then the number of lines.
         let weight = lines.len() as f64 + if lines[0].order == 1 { 100.0 } else { 0.0 };
         if best.as_ref().is_none_or(|(other, _)| weight > *other) {
-            let shaft_hz = SHAFT_PARTS
-                .into_iter()
-                .find_map(|part| peak(&density, part * nominal_hz))
-                .map(|bin| bin as f64 * density.step_hz);
+            let shaft_hz = shaft(&density, nominal_hz);
             let found = Mains {
                 nominal_hz,
                 lines,
@@ -112,6 +110,16 @@ pub fn mains(samples: &[f64], rate_hz: f64) -> Option<Mains> {
         }
     }
     best.map(|(_, found)| found)
+}
+
+/// The lowest line at `p/q` of a mains frequency below twice of it, `q` from 2 to 6.
+fn shaft(density: &Density, nominal_hz: f64) -> Option<f64> {
+    let fractions = (2..=LARGEST_DENOMINATOR).flat_map(|q| (1..2 * q).map(move |p| (p, q)));
+    fractions
+        .filter(|(p, q)| p % q != 0)
+        .filter_map(|(p, q)| peak(density, nominal_hz * p as f64 / q as f64))
+        .min()
+        .map(|bin| bin as f64 * density.step_hz)
 }
 
 /// Density and variance of the record, from blocks spread over it.

@@ -11,6 +11,8 @@ const LIVELY: f64 = 0.5;
 const FEWEST: usize = 50;
 /// Chance, over the whole record, of a standstill by accident.
 const CHANCE: f64 = 1e-6;
+/// Usual step, over the smallest, of a channel that moves by many steps of its resolution.
+const FINE: f64 = 4.0;
 /// Step into or out of a standstill, over the usual one, from which it is abrupt.
 const ABRUPT: f64 = 0.5;
 
@@ -32,7 +34,8 @@ pub fn constant(samples: &[f64]) -> Option<f64> {
 ///
 /// In `n` samples that repeat the one before with probability `p` (counted outside runs of 20 and
 /// more), a run of `L` happens by chance `n pᴸ⁻¹` times. A run is a standstill if that is below
-/// 10⁻⁶, `L ≥ 20`, the channel is lively (`p < ½`), and the run begins or ends abruptly: with a step
+/// 10⁻⁶, `L ≥ 20`, the channel is lively (`p < ½`, and the median of its steps other than zero is at
+/// least four times the smallest: a slow signal repeats values wherever it is slowest), and the run begins or ends abruptly: with a step
 /// of at least half the median one. A drive that comes to rest slows down first, so that it is not
 /// reported; of real standstills in noise, one in fourteen is missed for that.
 ///
@@ -60,7 +63,10 @@ pub fn standstills(samples: &[f64]) -> Vec<Run> {
         return Vec::new();
     }
     let chance = (repeated as f64 + 1.0) / (count as f64 + 1.0);
-    let usual = usual_step(samples);
+    let (usual, smallest) = usual_and_smallest_step(samples);
+    if usual < FINE * smallest {
+        return Vec::new();
+    }
     candidates
         .into_iter()
         .filter(|r| samples.len() as f64 * chance.powi(r.length as i32 - 1) < CHANCE)
@@ -68,15 +74,16 @@ pub fn standstills(samples: &[f64]) -> Vec<Run> {
         .collect()
 }
 
-/// Median of the steps that are not zero.
-fn usual_step(samples: &[f64]) -> f64 {
+/// Median and smallest of the steps that are not zero.
+fn usual_and_smallest_step(samples: &[f64]) -> (f64, f64) {
     let mut steps: Vec<f64> = super::excerpts(samples)
         .iter()
         .flat_map(|part| part.windows(2))
         .map(|pair| (pair[1] - pair[0]).abs())
         .filter(|step| *step > 0.0)
         .collect();
-    median(&mut steps).unwrap_or(0.0)
+    let smallest = steps.iter().copied().fold(f64::INFINITY, f64::min);
+    (median(&mut steps).unwrap_or(0.0), smallest)
 }
 
 fn is_abrupt(samples: &[f64], run: &Run, least: f64) -> bool {
@@ -104,6 +111,12 @@ mod tests {
         assert!((399..=402).contains(&found[0].length), "{found:?}");
         // A slow signal in coarse steps repeats values all the time.
         assert_eq!(standstills(&rounded(&sine(1.0, 5000.0, 20_000), 0.01)), []);
+        // A temperature in steps of its resolution, with a plateau.
+        let slow: Vec<f64> = (0..2000)
+            .map(|i| (0.3 * f64::from(i) + 60.0 * (f64::from(i) / 150.0).sin()).round())
+            .collect();
+        assert!(runs(&slow).any(|r| r.length > 12));
+        assert_eq!(standstills(&slow), []);
         // A counter that moves now and then.
         let counter: Vec<f64> = (0..5000).map(|i| f64::from(i / 100)).collect();
         assert_eq!(standstills(&counter), []);
