@@ -19,9 +19,10 @@ struct Family<'a> {
     others: Vec<(Seen<'a>, Relation)>,
 }
 
-/// The warnings about channels of one file that follow from each other.
+/// The warnings about channels of one file that follow from each other, each with the names of all of
+/// them.
 #[must_use]
-pub fn within(recording: &Recording) -> Vec<Warning> {
+pub fn within(recording: &Recording) -> Vec<(Warning, Vec<String>)> {
     let mut families: Vec<Family> = Vec::new();
     for channel in seen(recording) {
         let found = families.iter_mut().find_map(|family| {
@@ -40,41 +41,39 @@ pub fn within(recording: &Recording) -> Vec<Warning> {
 }
 
 impl Family<'_> {
-    fn warnings(&self) -> Vec<Warning> {
+    fn warnings(&self) -> Vec<(Warning, Vec<String>)> {
         let first = &self.first.label;
-        let names = |identical: bool| -> Vec<String> {
-            self.others
-                .iter()
-                .filter(|(_, relation)| relation.identical == identical)
-                .map(|(other, relation)| {
-                    let name = &other.label;
-                    if identical {
-                        format!("\"{name}\"")
-                    } else {
-                        format!("\"{name}\" = {}", follows(first, other.channel, relation))
-                    }
-                })
-                .collect()
+        let (same, scaled): (Vec<_>, Vec<_>) = self
+            .others
+            .iter()
+            .partition(|(_, relation)| relation.identical);
+        let names = |others: &[&(Seen, Relation)]| -> Vec<String> {
+            let others = others.iter().map(|(seen, _)| seen.label.clone());
+            std::iter::once(first.clone()).chain(others).collect()
         };
-        let (same, scaled) = (names(true), names(false));
         let mut found = Vec::new();
         if !same.is_empty() {
-            found.push(Warning::new(
-                "channel-copy",
-                format!(
-                    "{} holds the same samples as \"{first}\": one signal stored twice",
-                    same.join(", ")
-                ),
-            ));
+            let quoted: Vec<String> = same
+                .iter()
+                .map(|(s, _)| format!("\"{}\"", s.label))
+                .collect();
+            let hold = if same.len() == 1 { "holds" } else { "hold" };
+            let message = format!(
+                "{} {hold} the same samples as \"{first}\": one signal stored several times",
+                quoted.join(", ")
+            );
+            found.push((Warning::new("channel-copy", message), names(&same)));
         }
         if !scaled.is_empty() {
-            found.push(Warning::new(
-                "channel-multiple",
-                format!(
-                    "{}, within its resolution: one signal in two scales",
-                    scaled.join("; ")
-                ),
-            ));
+            let equations = scaled.iter().map(|(seen, relation)| {
+                let right = follows(first, seen.channel, relation);
+                format!("\"{}\" = {right}", seen.label)
+            });
+            let message = format!(
+                "{}, within its resolution: one signal in several scales",
+                equations.collect::<Vec<_>>().join("; ")
+            );
+            found.push((Warning::new("channel-multiple", message), names(&scaled)));
         }
         found
     }

@@ -6,7 +6,7 @@ use torqcomp_dsp::quality::mains::{Mains, mains};
 use torqcomp_dsp::quality::quantisation::{Quantisation, quantisation};
 use torqcomp_dsp::quality::repeats::{Repeats, repeats};
 use torqcomp_dsp::quality::stuck::{constant, standstills};
-use torqcomp_dsp::quality::{Run, range};
+use torqcomp_dsp::quality::{Run, is_straight, range};
 
 use super::{place, with_unit};
 use crate::recording::{Axis, Hole, HoleKind};
@@ -33,6 +33,8 @@ pub struct Findings {
     pub std: Option<f64>,
     /// Samples that are no finite numbers.
     pub non_finite: Option<NonFinite>,
+    /// Whether it is a straight line: a counter, a time axis.
+    pub is_straight: bool,
     /// The value of a channel that has only one.
     pub constant: Option<f64>,
     /// Where it is clipped.
@@ -63,6 +65,7 @@ impl Findings {
             mean,
             std,
             non_finite: non_finite(samples),
+            is_straight: is_straight(samples),
             constant: constant(samples),
             clipping,
             standstills,
@@ -76,7 +79,8 @@ impl Findings {
     #[must_use]
     pub fn coarse(&self) -> Option<Quantisation> {
         self.quantisation
-            .filter(|q| q.levels < COARSE && q.seen > STATES && self.samples >= FEWEST)
+            .filter(|q| q.levels < COARSE && q.seen > STATES)
+            .filter(|_| self.samples >= FEWEST && !self.is_straight)
     }
 
     /// The warnings about the channel alone, but for those that are said of several channels at once

@@ -1,10 +1,11 @@
 //! The time axis of a channel: what its stamps show.
 
+use torqcomp_dsp::quality::is_straight;
 use torqcomp_dsp::quality::rate::{Contradiction, contradiction};
 use torqcomp_dsp::quality::rounding::{Rounded, rounded};
 use torqcomp_dsp::quality::steps::{Event, Events, Steps, rounded_steps, steps};
 
-use crate::recording::Axis;
+use crate::recording::{Axis, Channel};
 use crate::report::{Warning, rounded as number};
 
 /// Largest deviation of a step, as a part of it, in an axis that counts as uniform.
@@ -55,10 +56,7 @@ impl TimeFindings {
     pub fn warnings(&self, whose: &str, axis: &Axis) -> Vec<Warning> {
         let mut found: Vec<Warning> = missing(whose, axis).into_iter().collect();
         if let Some(assumed) = &axis.assumed {
-            found.push(Warning::new(
-                "time-axis-assumed",
-                format!("{whose}: {assumed}"),
-            ));
+            found.push(Warning::new("time-assumed", format!("{whose}: {assumed}")));
         }
         found.extend(self.contradiction.map(|c| contradicted(whose, &c)));
         let Some(steps) = &self.steps else {
@@ -72,6 +70,10 @@ impl TimeFindings {
         }
         found.extend(backwards(whose, steps));
         found.extend(repeated(whose, steps));
+        if axis.rate_hz.is_none() {
+            // Without a usual step, every step would be a gap.
+            return found;
+        }
         found.extend(jumps(whose, steps));
         found.extend(gaps(whose, steps));
         found.extend(match &self.rounded {
@@ -80,6 +82,28 @@ impl TimeFindings {
         });
         found
     }
+}
+
+/// A warning about a channel that is a time axis itself (in a unit of time, rising along a straight
+/// line), if the rate that the head of the file gives for it is another one.
+#[must_use]
+pub fn stamps_in_channel(name: &str, channel: &Channel) -> Option<Warning> {
+    let stated_hz = channel.axis.header_rate_hz?;
+    let unit = channel.unit.as_ref().filter(|unit| unit.is_time())?;
+    if channel.axis.stamps_s.is_some() || !is_straight(&channel.samples) {
+        return None;
+    }
+    let step_s = steps(&channel.samples)?.typical_s * unit.unit.factor();
+    let found = contradiction(stated_hz, 1.0 / step_s, channel.samples.len())?;
+    Some(Warning::new(
+        "rate-contradicts-stamps",
+        format!(
+            "\"{name}\" rises like a time axis of {} Hz, the head of the file says {} Hz for it; find \
+             out which is right, and give it with --rate, or the column with --time-column",
+            number(found.stamped_hz, 6),
+            number(found.stated_hz, 6)
+        ),
+    ))
 }
 
 fn missing(whose: &str, axis: &Axis) -> Option<Warning> {

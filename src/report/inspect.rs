@@ -6,6 +6,11 @@ use super::{columns, rounded, short};
 
 /// Schema of the JSON document.
 pub const SCHEMA: &str = "torqcomp.inspect/1";
+/// Lines of the head that are shown, and characters of each.
+const MOST_DETAILS: usize = 12;
+const LINE_WIDTH: usize = 100;
+/// Characters of a unit that the table shows.
+const UNIT_WIDTH: usize = 24;
 /// Characters of a name that the table shows.
 const NAME_WIDTH: usize = 44;
 
@@ -273,12 +278,11 @@ fn said(warnings: &[Said], none: &str) -> String {
 
 /// Lines of at most 100 characters, the first indented by two, the others by six.
 fn wrapped(text: &str) -> String {
-    const WIDTH: usize = 100;
     let mut out = String::from(" ");
     let mut column = 1;
     for word in text.split(' ') {
         let length = word.chars().count();
-        if column + 1 + length > WIDTH && column > 6 {
+        if column + 1 + length > LINE_WIDTH && column > 6 {
             out.push_str("\n     ");
             column = 5;
         }
@@ -293,8 +297,16 @@ fn wrapped(text: &str) -> String {
 impl File {
     fn text(&self) -> String {
         let mut text = format!("{}\n{}: {}\n", self.file, self.format, self.dialect);
-        for detail in &self.details {
-            text.push_str(&format!("  {}: {}\n", detail.key, detail.value));
+        for detail in self.details.iter().take(MOST_DETAILS) {
+            let line = format!("  {}: {}", detail.key, detail.value);
+            text.push_str(&shortened(&line, LINE_WIDTH));
+            text.push('\n');
+        }
+        if self.details.len() > MOST_DETAILS {
+            let more = self.details.len() - MOST_DETAILS;
+            text.push_str(&format!(
+                "  … and {more} more in the head (--json has all)\n"
+            ));
         }
         for segment in &self.segments {
             let start = segment
@@ -349,6 +361,16 @@ impl File {
     }
 }
 
+/// The beginning of a text that is too long.
+fn shortened(text: &str, most: usize) -> String {
+    if text.chars().count() <= most {
+        return text.to_owned();
+    }
+    let mut short: String = text.chars().take(most - 1).collect();
+    short.push('…');
+    short
+}
+
 /// `1-3, 5`.
 fn ranges(numbers: &[usize]) -> String {
     let mut parts: Vec<(usize, usize)> = Vec::new();
@@ -374,13 +396,9 @@ impl Channel {
         if let Some(segment) = self.segment {
             name.push_str(&format!(" (segment {segment})"));
         }
-        if name.chars().count() > NAME_WIDTH {
-            name = name.chars().take(NAME_WIDTH - 1).collect();
-            name.push('…');
-        }
         vec![
-            format!("{number:>2}  {name}"),
-            self.unit.clone().unwrap_or_else(|| "not given".to_owned()),
+            format!("{number:>2}  {}", shortened(&name, NAME_WIDTH)),
+            shortened(self.unit.as_deref().unwrap_or("not given"), UNIT_WIDTH),
             self.samples.to_string(),
             self.rate_hz
                 .map_or_else(|| "unknown".to_owned(), |rate_hz| rounded(rate_hz, 7)),

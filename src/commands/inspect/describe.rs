@@ -30,12 +30,14 @@ pub fn file(recording: &Recording) -> File {
     for ((axis, members), found) in axes.iter().zip(&times) {
         let names: Vec<String> = members.iter().map(|i| labels[*i].clone()).collect();
         let all = members.len() == channels.len();
-        let found = found.warnings(&whose(&names, all), axis);
+        let mut found = found.warnings(&whose(&names, all), axis);
+        // The reader may have said it already.
+        found.retain(|w| recording.warnings.iter().all(|said| said.code != w.code));
         warnings.extend(found.into_iter().map(|w| said(w, names.clone())));
     }
     warnings.extend(of_channels(channels, &labels, &findings));
     let copies = copies::within(recording);
-    warnings.extend(copies.into_iter().map(|w| said(w, Vec::new())));
+    warnings.extend(copies.into_iter().map(|(w, names)| said(w, names)));
 
     let time_of = |i: usize| axes.iter().position(|(_, members)| members.contains(&i));
     let described = channels.iter().zip(&findings).enumerate();
@@ -99,7 +101,7 @@ fn distinct_axes(channels: &[Channel]) -> Vec<(&Axis, Vec<usize>)> {
 
 fn is_same(a: &Axis, b: &Axis) -> bool {
     let stamps = match (&a.stamps_s, &b.stamps_s) {
-        (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+        (Some(a), Some(b)) => Arc::ptr_eq(a, b) || a == b,
         (None, None) => true,
         _ => false,
     };
@@ -157,7 +159,9 @@ fn of_channels(channels: &[Channel], labels: &[String], findings: &[Findings]) -
     for ((channel, name), found) in channels.iter().zip(labels).zip(findings) {
         let unit = unit_of(channel);
         let warnings = found.warnings(name, unit, &channel.axis, &channel.holes);
-        all.extend(warnings.into_iter().map(|w| said(w, vec![name.clone()])));
+        let of_time = quality::time::stamps_in_channel(name, channel);
+        let warnings = of_time.into_iter().chain(warnings);
+        all.extend(warnings.map(|w| said(w, vec![name.clone()])));
         constant.extend(found.constant.map(|value| (name.as_str(), value)));
         coarse.extend(found.coarse().map(|q| (name.as_str(), unit, q)));
     }

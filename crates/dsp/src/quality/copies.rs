@@ -1,7 +1,7 @@
 //! Channels that are copies or multiples of each other.
 
 use super::quantisation::quantisation;
-use super::{range, runs};
+use super::{is_straight, range, runs};
 
 /// Largest difference from a multiple, as a part of the range, whatever the resolution.
 const FINE: f64 = 1e-5;
@@ -9,8 +9,6 @@ const FINE: f64 = 1e-5;
 const FEWEST_CHANGES: usize = 10;
 /// Resolution steps within the range, for the same reason.
 const FEWEST_LEVELS: f64 = 8.0;
-/// Distance from a straight line, as a part of the range, within which a channel is one.
-const STRAIGHT: f64 = 1e-3;
 /// Samples that a pair is tried on before it is looked at as a whole.
 const PROBES: usize = 64;
 /// Most significant digits of a text that counts as rounded by them.
@@ -60,7 +58,7 @@ impl<'a> Portrait<'a> {
             ends: (place(low), place(high)),
             step: quantisation(samples).map_or(0.0, |q| q.step),
             digits: significant_digits(samples),
-            is_straight: is_straight(samples, STRAIGHT * (high - low)),
+            is_straight: is_straight(samples),
         })
     }
 
@@ -147,14 +145,6 @@ fn fit(x: &[f64], y: &[f64]) -> Relation {
         offset: mean_y - factor * mean_x,
         identical: false,
     }
-}
-
-/// Whether all samples lie near the line through the first and the last.
-fn is_straight(samples: &[f64], near: f64) -> bool {
-    let (first, last) = (samples[0], samples[samples.len() - 1]);
-    let slope = (last - first) / (samples.len() - 1) as f64;
-    let mut samples = samples.iter().enumerate();
-    samples.all(|(i, x)| (x - first - slope * i as f64).abs() <= near)
 }
 
 /// Significant digits that some of the values need, if these are few.

@@ -50,6 +50,28 @@ pub fn range(samples: &[f64]) -> Option<(f64, f64)> {
     (low <= high).then_some((low, high))
 }
 
+/// Distance from a straight line, as a part of the range, within which a channel is one.
+const STRAIGHT: f64 = 1e-3;
+
+/// Whether all samples lie within a thousandth of the range of the line through the first and the
+/// last: a counter, a time axis, a constant. Not if one of them is no number.
+///
+/// ```
+/// use torqcomp_dsp::quality::is_straight;
+/// assert!(is_straight(&[1.0, 3.0, 5.0, 7.0]));
+/// assert!(!is_straight(&[1.0, 3.0, 4.0, 7.0]));
+/// ```
+#[must_use]
+pub fn is_straight(samples: &[f64]) -> bool {
+    let (Some((low, high)), [first, .., last]) = (range(samples), samples) else {
+        return false;
+    };
+    let near = STRAIGHT * (high - low);
+    let slope = (last - first) / (samples.len() - 1) as f64;
+    let mut samples = samples.iter().enumerate();
+    samples.all(|(i, x)| (x - first - slope * i as f64).abs() <= near)
+}
+
 /// Blocks that are looked at in a long record, and samples of each.
 const BLOCKS: usize = 32;
 const BLOCK_LENGTH: usize = 4096;
