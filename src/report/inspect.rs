@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::{columns, rounded, short};
+use crate::io::mcap::Inventory;
 
 /// Schema of the JSON document.
 pub const SCHEMA: &str = "torqcomp.inspect/1";
@@ -57,6 +58,9 @@ pub struct File {
     pub warnings: Vec<Said>,
     /// Whether something that was announced or begun is not there.
     pub data_lost: bool,
+    /// Everything in an MCAP file: topics, encodings, attachments, metadata, chunks.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mcap: Option<Inventory>,
 }
 
 /// A pair of key and value out of a file's head.
@@ -154,17 +158,17 @@ pub struct Channel {
     /// Samples that every value is held for, if it is one number.
     pub hold: Option<usize>,
     /// Samples at a value where the signal is cut off.
-    pub clipped: usize,
+    pub clipped: Option<usize>,
     /// Lowest value, if the signal is cut off there.
     pub clipped_low: Option<f64>,
     /// Highest value, if the signal is cut off there.
     pub clipped_high: Option<f64>,
     /// Samples in which the channel stands still.
-    pub stuck: usize,
+    pub stuck: Option<usize>,
     /// Whether all samples are the same.
-    pub constant: bool,
+    pub constant: Option<bool>,
     /// Samples that are missing or no finite numbers.
-    pub non_finite: usize,
+    pub non_finite: Option<usize>,
     /// Step of the values; `null` if it is too fine to be seen.
     pub resolution: Option<f64>,
     /// Bits that the range takes in steps of `resolution`.

@@ -5,13 +5,15 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use torqcomp_dsp::quality::clipping::Clipping;
 
+use super::content::Content;
 use crate::quality::{self, Findings, TimeFindings, copies, labels, unit_of};
 use crate::recording::{Axis, Channel, Recording};
 use crate::report::Warning;
 use crate::report::inspect::{self, Detail, File, Gap, MainsLine, Said, Segment};
 
-/// Describes a recording.
-pub fn file(recording: &Recording) -> File {
+/// Describes the content of a file.
+pub fn file(content: &Content) -> File {
+    let recording = &content.recording;
     let channels = &recording.channels;
     let axes = distinct_axes(channels);
     let times: Vec<TimeFindings> = axes
@@ -52,9 +54,12 @@ pub fn file(recording: &Recording) -> File {
                 let time = time_of(i).map(|place| &times[place]);
                 describe(channel, found, time)
             })
+            .chain(content.listed.iter().cloned())
             .collect(),
         warnings,
-        data_lost: recording.lost.is_some(),
+        data_lost: recording.lost.is_some()
+            || content.inventory.as_ref().is_some_and(|i| i.is_lossy),
+        mcap: content.inventory.clone(),
     }
 }
 
@@ -289,12 +294,12 @@ fn with_samples(channel: inspect::Channel, found: &Findings) -> inspect::Channel
         },
         repeated_unexplained: found.repeats.and_then(|r| r.unexplained),
         hold: found.repeats.and_then(|r| r.hold),
-        clipped: found.clipping.map_or(0, |c| c.samples()),
+        clipped: Some(found.clipping.map_or(0, |c| c.samples())),
         clipped_low: rail(|c| c.low.map(|r| r.value)),
         clipped_high: rail(|c| c.high.map(|r| r.value)),
-        stuck: found.standstills.iter().map(|run| run.length).sum(),
-        constant: found.constant.is_some(),
-        non_finite: found.non_finite.map_or(0, |f| f.count),
+        stuck: Some(found.standstills.iter().map(|run| run.length).sum()),
+        constant: Some(found.constant.is_some()),
+        non_finite: Some(found.non_finite.map_or(0, |f| f.count)),
         resolution: found.quantisation.map(|q| q.step),
         resolution_bits: found.quantisation.map(|q| q.bits),
         mains: lines

@@ -2,11 +2,13 @@
 
 mod content;
 mod describe;
+mod messages;
 mod plot;
 mod same;
 
 use std::path::{Path, PathBuf};
 
+use self::content::Content;
 use super::Outcome;
 use crate::cli::Inspect;
 use crate::failure::Failure;
@@ -30,7 +32,7 @@ pub fn run(args: &Inspect) -> Result<Outcome, Failure> {
         .map(|path| plot::open(path, args.result.force, &taken))
         .transpose()?;
 
-    let read: Vec<Result<Recording, Failure>> = args
+    let read: Vec<Result<Content, Failure>> = args
         .files
         .iter()
         .map(|file| content::read(&Place::of(file), &args.options()))
@@ -55,9 +57,9 @@ fn check(args: &Inspect) -> Result<(), Failure> {
     Ok(())
 }
 
-fn entry((read, file): (&Result<Recording, Failure>, &String)) -> Entry {
+fn entry((read, file): (&Result<Content, Failure>, &String)) -> Entry {
     match read {
-        Ok(recording) => Entry::Read(Box::new(describe::file(recording))),
+        Ok(content) => Entry::Read(Box::new(describe::file(content))),
         Err(failure) => Entry::Failed {
             file: file.clone(),
             error: failure.to_string(),
@@ -66,11 +68,11 @@ fn entry((read, file): (&Result<Recording, Failure>, &String)) -> Entry {
 }
 
 /// What comparing the files shows. Files that are the same need no comparison of their channels.
-fn between(files: &[String], read: &[Result<Recording, Failure>]) -> Vec<Said> {
+fn between(files: &[String], read: &[Result<Content, Failure>]) -> Vec<Said> {
     let (mut found, firsts) = same::files(files);
     let recordings: Vec<&Recording> = firsts
         .iter()
-        .filter_map(|i| read[*i].as_ref().ok())
+        .filter_map(|i| read[*i].as_ref().ok().map(|content| &content.recording))
         .collect();
     found.extend(copies::across(&recordings));
     found
@@ -83,7 +85,7 @@ fn between(files: &[String], read: &[Result<Recording, Failure>]) -> Vec<Said> {
 fn finish(
     args: &Inspect,
     report: &Report,
-    read: &[Result<Recording, Failure>],
+    read: &[Result<Content, Failure>],
     mut output: Output,
     plot: Option<Output>,
 ) -> Result<Outcome, Failure> {
@@ -95,7 +97,8 @@ fn finish(
     output.write(text.as_bytes())?;
     output.finish()?;
     if let Some(mut plot) = plot {
-        let recordings: Vec<&Recording> = read.iter().flatten().collect();
+        let contents = read.iter().flatten();
+        let recordings: Vec<&Recording> = contents.map(|content| &content.recording).collect();
         plot.write(plot::svg(&recordings, report).as_bytes())?;
         plot.finish()?;
     }
