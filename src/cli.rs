@@ -38,6 +38,8 @@ pub enum Verb {
     Predict(Predict),
     /// One channel of a recording as plain rows of time and value
     Extract(Extract),
+    /// What recordings hold, and what is wrong with them
+    Inspect(Inspect),
 }
 
 /// Units that results are printed in.
@@ -305,6 +307,58 @@ pub struct Predict {
     /// Print JSON instead of a table
     #[arg(long)]
     pub json: bool,
+}
+
+/// Arguments of `inspect`.
+#[derive(Debug, Args)]
+pub struct Inspect {
+    /// Recordings to look at, or - for standard input; several are also compared with each other
+    #[arg(value_name = "FILE", required = true)]
+    pub files: Vec<String>,
+    /// The result.
+    #[command(flatten)]
+    pub result: Result,
+    /// Column with the time stamps
+    #[arg(long, value_name = "NAME")]
+    pub time_column: Option<String>,
+    /// Unit of the time stamps, if their heading does not say: s, ms, us, min
+    #[arg(long, value_name = "UNIT")]
+    pub time_unit: Option<String>,
+    /// Sampling rate, where there are no time stamps or they are wrong
+    #[arg(long, value_name = "HZ", value_parser = positive_frequency)]
+    pub rate: Option<f64>,
+    /// What separates the cells: , ; | tab space none
+    #[arg(long, value_name = "MARK", value_parser = delimiter)]
+    pub delimiter: Option<Delimiter>,
+    /// Decimal mark: . or ,
+    #[arg(long, value_name = "MARK", value_parser = decimal)]
+    pub decimal: Option<u8>,
+    /// Draw the channels into an SVG file
+    #[arg(long, value_name = "FILE")]
+    pub plot: Option<PathBuf>,
+    /// Print JSON instead of a table
+    #[arg(long)]
+    pub json: bool,
+    /// End with code 3 if there are warnings
+    #[arg(long)]
+    pub strict: bool,
+}
+
+impl Inspect {
+    /// The options that the readers take.
+    #[must_use]
+    pub fn options(&self) -> Options {
+        Options {
+            time_column: self.time_column.clone(),
+            time_unit: self.time_unit.clone(),
+            rate_hz: self.rate,
+            told: Told {
+                delimiter: self.delimiter,
+                decimal: self.decimal,
+            },
+            ..Options::default()
+        }
+    }
 }
 
 /// Orders of a fundamental, rising.

@@ -5,6 +5,7 @@ pub mod commands;
 pub mod failure;
 pub mod io;
 pub mod pipeline;
+pub mod quality;
 pub mod recording;
 pub mod report;
 pub mod signal;

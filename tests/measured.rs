@@ -2,6 +2,9 @@
 //!
 //! They are not part of the project. Where the folder is missing, the tests are reported as ignored.
 
+#[path = "measured/inspect.rs"]
+mod inspect;
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -28,11 +31,11 @@ fn main() {
             folder.display()
         );
     }
-    let test = |name: &str, run: fn(&Path) -> Result<(), Failed>| {
+    let test = |name: &str, run: fn(&Path) -> Result<(), Failed>| -> Trial {
         let folder = folder.clone();
         Trial::test(name, move || run(&folder)).with_ignored_flag(missing)
     };
-    let tests = vec![
+    let mut tests = vec![
         test("strain_beam_bridge_volts_are_compensated", strain_beam),
         test("torque_transducer_orders_are_found", torque_transducer),
         test(
@@ -46,6 +49,7 @@ fn main() {
         test("settings_are_no_recording", recordings::settings),
         test("assumptions_are_said", recordings::assumptions),
     ];
+    tests.extend(inspect::TESTS.map(|(name, run)| test(name, run)));
     libtest_mimic::run(&Arguments::from_args(), tests).exit();
 }
 

@@ -3,6 +3,7 @@
 mod compensate;
 mod extract;
 mod harmonics;
+mod inspect;
 mod predict;
 mod rows;
 mod table;
@@ -33,6 +34,7 @@ pub fn run(cli: Cli) -> Result<Outcome, Failure> {
         Verb::Compensate(args) => compensate::run(&args),
         Verb::Extract(args) => extract::run(&args),
         Verb::Harmonics(args) => harmonics::run(&args),
+        Verb::Inspect(args) => inspect::run(&args),
         Verb::Table(args) => table::run(&args),
         Verb::Predict(args) => predict::run(&args),
     }

@@ -2,6 +2,8 @@
 
 pub mod compensate;
 pub mod harmonics;
+pub mod inspect;
+pub mod panels;
 pub mod predict;
 pub mod svg;
 

@@ -24,6 +24,7 @@ mod error;
 pub mod gage;
 pub mod harmonics;
 pub mod noise;
+pub mod quality;
 pub mod recorder;
 pub mod resample;
 pub mod spectrum;
