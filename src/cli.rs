@@ -347,8 +347,8 @@ pub struct Inspect {
 impl Inspect {
     /// The options that the readers take.
     #[must_use]
-    pub fn options(&self) -> Options {
-        Options {
+    pub fn options(&self) -> csv::Options {
+        csv::Options {
             time_column: self.time_column.clone(),
             time_unit: self.time_unit.clone(),
             rate_hz: self.rate,
@@ -356,7 +356,7 @@ impl Inspect {
                 delimiter: self.delimiter,
                 decimal: self.decimal,
             },
-            ..Options::default()
+            ..csv::Options::default()
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Opening a channel of a file of any format.
 
-use std::io::Read;
+use std::io::{Cursor, Read};
 
 use super::sequence::TextRows;
 use super::{Feed, Options, Signal};
@@ -9,6 +9,10 @@ use crate::io::csv::{Place, Table};
 use crate::io::mcap::record::frames::Frames;
 use crate::io::mcap::record::input::Input;
 use crate::io::mcap::{self, Source, selection::Wanted};
+use crate::recording;
+
+/// Bytes that the format of a file is told from.
+const HEAD: u64 = 1 << 16;
 
 impl Signal {
     /// Opens a file, finds the channel and its time axis.
@@ -18,29 +22,42 @@ impl Signal {
     pub fn open(place: &Place, options: &Options) -> Result<Self, Failure> {
         let name = place.name();
         let mut input = place.open()?;
+        let unreadable =
+            |error| Failure::failed(format_args!("{}: cannot be read: {error}", place.name()));
         let mut head = Vec::new();
-        (&mut input)
-            .take(MAGIC.len() as u64)
-            .read_to_end(&mut head)
-            .map_err(|error| Failure::failed(format_args!("{name}: cannot be read: {error}")))?;
-        let is_mcap = head == MAGIC;
-        let input = Box::new(std::io::Cursor::new(head).chain(input));
-        if is_mcap {
+        let start = (&mut input).take(HEAD).read_to_end(&mut head);
+        let complete = start.map_err(unreadable)? < HEAD as usize;
+        if head.starts_with(::mcap::MAGIC) {
             options.check_for_messages()?;
-            let wanted = match options.messages.selection.check()? {
-                Wanted::Only => mcap::inventory::only_topic(place)?,
-                wanted => wanted,
-            };
-            let frames = Frames::new(name, Input::new(input))?;
-            let reading = mcap::Options {
-                time: options.messages.time,
-                spacing: options.messages.spacing.clone(),
-            };
-            let source = Source::read(frames, &wanted, &reading)?;
-            return Self::of_messages(source, &options.table, &options.messages);
+            return Self::open_messages(place, Box::new(Cursor::new(head).chain(input)), options);
         }
         options.check_for_text()?;
-        Table::of(name, input, &options.table).map(Self::of_table)
+        let table = &options.table;
+        if complete && head.is_empty() || recording::text::is_plain(&head, complete, table) {
+            let input = Box::new(Cursor::new(head).chain(input));
+            return Table::of(name, input, table).map(Self::of_table);
+        }
+        input.read_to_end(&mut head).map_err(unreadable)?;
+        let recording = recording::text::read(&name, head, table).map_err(|f| f.at(&name))?;
+        Self::of_recording(recording, table)
+    }
+
+    fn open_messages(
+        place: &Place,
+        input: Box<dyn Read + Send>,
+        options: &Options,
+    ) -> Result<Self, Failure> {
+        let wanted = match options.messages.selection.check()? {
+            Wanted::Only => mcap::inventory::only_topic(place)?,
+            wanted => wanted,
+        };
+        let frames = Frames::new(place.name(), Input::new(input))?;
+        let reading = mcap::Options {
+            time: options.messages.time,
+            spacing: options.messages.spacing.clone(),
+        };
+        let source = Source::read(frames, &wanted, &reading)?;
+        Self::of_messages(source, &options.table, &options.messages)
     }
 
     /// The signal of a plain table.
@@ -82,6 +99,3 @@ impl Signal {
         }
     }
 }
-
-/// What an MCAP file begins with.
-const MAGIC: &[u8] = ::mcap::MAGIC;
