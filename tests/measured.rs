@@ -2,6 +2,9 @@
 //!
 //! They are not part of the project. Where the folder is missing, the tests are reported as ignored.
 
+#[path = "measured/mcap_files.rs"]
+mod mcap_files;
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -38,6 +41,11 @@ fn main() {
         ),
         test("thrust_balance_is_refused_and_resampled", thrust_balance),
         test("silverbox_volts_to_volts", silverbox),
+        test("mcap_of_ros2_is_read", mcap_files::ros2_bag),
+        test("mcap_of_ros1_is_read", mcap_files::ros1_file),
+        test("mcap_with_an_open_chunk_is_told", mcap_files::open_chunk),
+        test("mcap_is_copied_with_a_channel_more", mcap_files::copied),
+        test("mcap_times_are_chosen", mcap_files::times),
     ];
     libtest_mimic::run(&Arguments::from_args(), tests).exit();
 }
