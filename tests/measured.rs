@@ -4,6 +4,8 @@
 
 #[path = "measured/inspect.rs"]
 mod inspect;
+#[path = "measured/mcap_files.rs"]
+mod mcap_files;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -48,6 +50,11 @@ fn main() {
         test("recordings_have_segments", recordings::segments),
         test("settings_are_no_recording", recordings::settings),
         test("assumptions_are_said", recordings::assumptions),
+        test("mcap_of_ros2_is_read", mcap_files::ros2_bag),
+        test("mcap_of_ros1_is_read", mcap_files::ros1_file),
+        test("mcap_with_an_open_chunk_is_told", mcap_files::open_chunk),
+        test("mcap_is_copied_with_a_channel_more", mcap_files::copied),
+        test("mcap_times_are_chosen", mcap_files::times),
     ];
     tests.extend(inspect::TESTS.map(|(name, run)| test(name, run)));
     libtest_mimic::run(&Arguments::from_args(), tests).exit();
