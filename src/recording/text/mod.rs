@@ -29,6 +29,8 @@ use table::Hints;
 
 /// Bytes that a maker is told from.
 const FOR_MAKER: usize = 1 << 14;
+/// Fewest numbers in a text of one line that are the samples of one channel.
+const ONE_LINE: usize = 32;
 /// Most details that are kept.
 const DETAILS: usize = 100;
 
@@ -140,6 +142,10 @@ pub fn is_plain(head: &[u8], complete: bool, options: &Options) -> bool {
 fn general(text: &Text, hints: Hints, options: &Options) -> Result<Recording, Failure> {
     let mut parts = Vec::new();
     let (mut from, mut number) = (0, 1);
+    if let Some(column) = one_line(&text.bytes, options) {
+        let part = table::read(&column, 0, 1, hints, options, &|_| false)?;
+        return Ok(recording_of(vec![part]));
+    }
     while from < text.bytes.len() {
         let part = match table::read(&text.bytes, from, number, hints, options, &|_| false) {
             Ok(part) => part,
@@ -151,6 +157,29 @@ fn general(text: &Text, hints: Hints, options: &Options) -> Result<Recording, Fa
         parts.push(part);
     }
     Ok(recording_of(parts))
+}
+
+/// The numbers of a text that is one line of them, each in a line of its own: some oscilloscopes write
+/// the samples so.
+fn one_line(text: &[u8], options: &Options) -> Option<Vec<u8>> {
+    let line = text.trim_ascii();
+    if line.contains(&b'\n') || options.told.delimiter.is_some() {
+        return None;
+    }
+    let mark = *[b'\t', b';', b',', b' ']
+        .iter()
+        .find(|mark| line.contains(mark))?;
+    let decimal = options.told.decimal.unwrap_or(b'.');
+    let cells = line.split(|byte| *byte == mark);
+    let numbers = cells.clone().filter(|cell| !cell.is_empty()).all(|cell| {
+        std::str::from_utf8(cell).is_ok_and(|cell| crate::io::number::cell(cell, decimal).is_some())
+    });
+    let is_long = cells.count() >= ONE_LINE;
+    (numbers && is_long).then(|| {
+        line.iter()
+            .map(|byte| if *byte == mark { b'\n' } else { *byte })
+            .collect()
+    })
 }
 
 /// Puts tables together as the segments of a recording.
