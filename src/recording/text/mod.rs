@@ -31,6 +31,8 @@ use table::Hints;
 const FOR_MAKER: usize = 1 << 14;
 /// Fewest numbers in a text of one line that are the samples of one channel.
 const ONE_LINE: usize = 32;
+/// Most tables below each other.
+const MOST_TABLES: usize = 1000;
 /// Most details that are kept.
 const DETAILS: usize = 100;
 
@@ -146,15 +148,25 @@ fn general(text: &Text, hints: Hints, options: &Options) -> Result<Recording, Fa
         let part = table::read(&column, 0, 1, hints, options, &|_| false)?;
         return Ok(recording_of(vec![part]));
     }
-    while from < text.bytes.len() {
+    loop {
         let part = match table::read(&text.bytes, from, number, hints, options, &|_| false) {
             Ok(part) => part,
             // What follows the last table need not be one.
             Err(_) if !parts.is_empty() => break,
             Err(failure) => return Err(failure),
         };
+        let is_last = part.end >= text.bytes.len() || part.end <= from;
         (from, number) = (part.end, part.next_line);
         parts.push(part);
+        if is_last {
+            break;
+        }
+        if parts.len() > MOST_TABLES {
+            return Err(Failure::failed(format_args!(
+                "line {number}: there are more than {MOST_TABLES} tables below each other; split the \
+                 file"
+            )));
+        }
     }
     Ok(recording_of(parts))
 }

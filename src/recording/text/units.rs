@@ -127,7 +127,9 @@ pub struct Heading {
 /// a unit in brackets before other words, units in square brackets that are not known.
 #[must_use]
 pub fn heading(text: &str) -> Heading {
-    let text = text.trim().trim_matches('"').trim();
+    // "Zeit" t / s
+    let unquoted = text.replace('"', "");
+    let text = unquoted.trim();
     let column = crate::io::csv::Column::read(text, None);
     if let Some(unit) = column.unit {
         return Heading::new(column.name, Some(unit), None);
@@ -419,7 +421,7 @@ mod tests {
             ("C1 in V", "C1", Some("V"), true),
             ("in s", "time", Some("s"), true),
             ("U/V", "U", Some("V"), true),
-            ("\"Zeit\" t / s", "\"Zeit\" t", Some("s"), true),
+            ("\"Zeit\" t / s", "Zeit t", Some("s"), true),
             ("Kraft, N", "Kraft", Some("N"), true),
             ("Time (s) Run #1", "Time Run #1", Some("s"), true),
             ("Flow [l/min]", "Flow", Some("l/min"), false),

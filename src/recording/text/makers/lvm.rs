@@ -77,7 +77,7 @@ fn read(text: &Text, options: &Options) -> Result<Recording, Failure> {
             start_text: joined(&header.dates, &header.times, 0),
         };
         let channels =
-            segment_channels(&mut lines, &file, &header, &names, options, &mut recording);
+            segment_channels(&mut lines, &file, &header, &names, options, &mut recording)?;
         segment.start_s = channels.first().and_then(|channel| channel.axis.start_s);
         recording.channels.extend(channels);
         recording.segments.push(segment);
@@ -233,7 +233,7 @@ fn segment_channels(
     names: &str,
     options: &Options,
     recording: &mut Recording,
-) -> Vec<Channel> {
+) -> Result<Vec<Channel>, Failure> {
     let names = file.dialect.cells(names);
     // Names may go beyond the channels that the header counts, but for the comments.
     let named = names
@@ -259,7 +259,7 @@ fn segment_channels(
         file.dialect,
         &wanted,
         &is_next,
-    );
+    )?;
     lines.at = read.end;
     lines.number += read.lines;
     let segment = recording.segments.len();
@@ -282,7 +282,7 @@ fn segment_channels(
         }
         channels.push(channel(&field, column, axis, Some(segment)));
     }
-    channels
+    Ok(channels)
 }
 
 fn axis(file: &File, header: &Header, place: usize, times: &Column, options: &Options) -> Axis {
