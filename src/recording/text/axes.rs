@@ -418,14 +418,11 @@ impl Sources<'_> {
         if let Some(seconds) = epoch_unit(first) {
             return Ok(Some((seconds, None)));
         }
-        let (factor, words) = match first {
-            _ => match self.default_time_unit.and_then(units::read) {
-                Some(unit) => return Ok(Some((unit.unit.factor(), None))),
-                None => (1.0, "seconds"),
-            },
-        };
-        let assumed = format!("\"{}\" gives no unit: {words} were assumed", field.heading);
-        Ok(Some((factor, Some(assumed))))
+        if let Some(unit) = self.default_time_unit.and_then(units::read) {
+            return Ok(Some((unit.unit.factor(), None)));
+        }
+        let assumed = format!("\"{}\" gives no unit: seconds were assumed", field.heading);
+        Ok(Some((1.0, Some(assumed))))
     }
 }
 

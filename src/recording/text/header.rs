@@ -382,7 +382,7 @@ fn positional(rows: &[Row], table: &Table, used: &[bool]) -> Positional {
             (*above, Some(*below), Some(*below))
         }
         [below, above, ..] if is_units(&below.cells) => (*above, Some(*below), None),
-        [only, ..] if is_units(&only.cells) => (*only, Some(*only), None),
+        [only, ..] if is_nothing_but_units(&only.cells) => (*only, Some(*only), None),
         [names, ..] => (*names, None, None),
     };
     let mut lines = vec![names.line];
@@ -473,7 +473,9 @@ fn is_key_block(fitting: &[&Row], used: &[bool]) -> bool {
     });
     let (key, values) = (&nearest.cells[0], &nearest.cells[1..]);
     let is_known = keys::topic(key).is_some() && values.iter().all(|v| units::read(v).is_none());
-    two && !is_time && !is_units(&nearest.cells) && (fitting.len() > 2 || is_known)
+    // An empty line parts headings from keys.
+    let in_block = fitting.len() > 2 && fitting[1].line + 1 == nearest.line;
+    two && !is_time && !is_units(&nearest.cells) && (in_block || is_known)
 }
 
 /// Whether cells are units: all of them, or some where others repeat, or most are in brackets.
@@ -499,6 +501,12 @@ fn is_units(cells: &[String]) -> bool {
         .iter()
         .any(|cell| filled.iter().filter(|c| c == &cell).count() > 1);
     known > 0 && (repeats || 2 * like > filled.len()) || bracketed > 0 && bracketed == filled.len()
+}
+
+/// Whether a lone line above the data names its columns by their units: `s,V`.
+fn is_nothing_but_units(cells: &[String]) -> bool {
+    let mut filled = cells.iter().filter(|cell| !cell.is_empty()).peekable();
+    filled.peek().is_some() && filled.all(|cell| NamedUnit::parse(cell).is_some())
 }
 
 /// Whether the first cell is a unit of time under the name of time, and the others are remarks:

@@ -29,6 +29,10 @@ use table::Hints;
 
 /// Bytes that a maker is told from.
 const FOR_MAKER: usize = 1 << 14;
+/// Fewest numbers in a text of one line that are the samples of one channel.
+const ONE_LINE: usize = 32;
+/// Most tables below each other.
+const MOST_TABLES: usize = 1000;
 /// Most details that are kept.
 const DETAILS: usize = 100;
 
@@ -140,17 +144,54 @@ pub fn is_plain(head: &[u8], complete: bool, options: &Options) -> bool {
 fn general(text: &Text, hints: Hints, options: &Options) -> Result<Recording, Failure> {
     let mut parts = Vec::new();
     let (mut from, mut number) = (0, 1);
-    while from < text.bytes.len() {
+    if let Some(column) = one_line(&text.bytes, options) {
+        let part = table::read(&column, 0, 1, hints, options, &|_| false)?;
+        return Ok(recording_of(vec![part]));
+    }
+    loop {
         let part = match table::read(&text.bytes, from, number, hints, options, &|_| false) {
             Ok(part) => part,
             // What follows the last table need not be one.
             Err(_) if !parts.is_empty() => break,
             Err(failure) => return Err(failure),
         };
+        let is_last = part.end >= text.bytes.len() || part.end <= from;
         (from, number) = (part.end, part.next_line);
         parts.push(part);
+        if is_last {
+            break;
+        }
+        if parts.len() > MOST_TABLES {
+            return Err(Failure::failed(format_args!(
+                "line {number}: there are more than {MOST_TABLES} tables below each other; split the \
+                 file"
+            )));
+        }
     }
     Ok(recording_of(parts))
+}
+
+/// The numbers of a text that is one line of them, each in a line of its own: some oscilloscopes write
+/// the samples so.
+fn one_line(text: &[u8], options: &Options) -> Option<Vec<u8>> {
+    let line = text.trim_ascii();
+    if line.contains(&b'\n') || options.told.delimiter.is_some() {
+        return None;
+    }
+    let mark = *[b'\t', b';', b',', b' ']
+        .iter()
+        .find(|mark| line.contains(mark))?;
+    let decimal = options.told.decimal.unwrap_or(b'.');
+    let cells = line.split(|byte| *byte == mark);
+    let numbers = cells.clone().filter(|cell| !cell.is_empty()).all(|cell| {
+        std::str::from_utf8(cell).is_ok_and(|cell| crate::io::number::cell(cell, decimal).is_some())
+    });
+    let is_long = cells.count() >= ONE_LINE;
+    (numbers && is_long).then(|| {
+        line.iter()
+            .map(|byte| if *byte == mark { b'\n' } else { *byte })
+            .collect()
+    })
 }
 
 /// Puts tables together as the segments of a recording.

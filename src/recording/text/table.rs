@@ -82,7 +82,7 @@ pub fn read_at(
     let is_next = |line: &str| stop(line) || names.as_deref() == Some(line);
     let offset = head.lines[first].offset;
     let number = head.number(first);
-    let mut rows = rows::read(text, offset, number, table.dialect, &wanted, &is_next);
+    let mut rows = rows::read(text, offset, number, table.dialect, &wanted, &is_next)?;
     let lost = drop_cut_row(text, table.dialect, &mut rows);
     if let Some(unit) = hints.unit {
         default_units(&mut header, unit);
