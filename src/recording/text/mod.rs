@@ -19,7 +19,6 @@ mod units;
 use super::{Recording, Segment};
 use crate::failure::Failure;
 use crate::io::csv::{self, Dialect, Options};
-use crate::report::Warning;
 
 pub use clock::Clock;
 use decode::Text;
@@ -66,12 +65,6 @@ pub fn read(source: &str, bytes: Vec<u8>, options: &Options) -> Result<Recording
     }
     recording.dialect = words.join(", ");
     recording.warnings.splice(0..0, text.warnings);
-    let holes: Vec<Warning> = recording
-        .channels
-        .iter()
-        .filter_map(table::holes_warning)
-        .collect();
-    recording.warnings.extend(holes);
     Ok(recording)
 }
 
@@ -130,14 +123,26 @@ pub fn is_plain(head: &[u8], complete: bool, options: &Options) -> bool {
             .iter()
             .any(|cell| matches!(read(cell), cell::Cell::Grouped(_)))
     });
+    let first_row = head.number(table::first_row(&head, &table, &header));
     same_columns
         && !has_marks
         && layout.dialect == table.dialect
-        && layout.data_line == head.number(table::first_row(&head, &table, &header))
+        && (layout.data_line == first_row || begins_with_number(&layout, &text.bytes))
         && wanted
             .iter()
             .all(|kind| *kind == Some(rows::Wanted::Numbers))
         && times <= 1
+}
+
+/// Whether the first row that the quick reader sees begins as a row does: with something wrong behind
+/// that, it refuses the row, while this reader would begin after it.
+fn begins_with_number(layout: &csv::Layout, text: &[u8]) -> bool {
+    let line = text.split(|byte| *byte == b'\n').nth(layout.data_line - 1);
+    let line = head::decode(line.unwrap_or(&[]));
+    let cells = layout.dialect.cells(&line);
+    cells
+        .first()
+        .is_some_and(|cell| crate::io::number::cell(cell, layout.dialect.decimal).is_some())
 }
 
 /// A table, or several below each other under the same headings.

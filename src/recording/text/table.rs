@@ -8,7 +8,7 @@ use super::keys::{Entry, Topic};
 use super::rows::{self, Rows, Wanted};
 use crate::failure::Failure;
 use crate::io::csv::{Dialect, Options, is_skipped};
-use crate::recording::{Channel, Hole, HoleKind};
+use crate::recording::Channel;
 use crate::report::Warning;
 
 /// Rows that tell what a column holds.
@@ -303,38 +303,4 @@ fn count_differs(entries: &[Entry], rows: usize, dialect: Dialect) -> Option<War
             ),
         )
     })
-}
-
-/// Cells that hold no number, counted by kind, as a warning for a channel.
-#[must_use]
-pub fn holes_warning(channel: &Channel) -> Option<Warning> {
-    let count = |kind: HoleKind| {
-        channel
-            .holes
-            .iter()
-            .filter(|hole| hole.what == kind)
-            .count()
-    };
-    let first: &Hole = channel.holes.first()?;
-    let kinds = [
-        (HoleKind::Empty, "empty"),
-        (HoleKind::NonFinite, "not finite"),
-        (HoleKind::Text, "text"),
-    ];
-    let what: Vec<String> = kinds
-        .iter()
-        .filter(|(kind, _)| count(*kind) > 0)
-        .map(|(kind, word)| format!("{} {word}", count(*kind)))
-        .collect();
-    Some(Warning::new(
-        "non-finite",
-        format!(
-            "channel \"{}\": {} of {} cells hold no number ({}), the first in line {}",
-            channel.name,
-            channel.holes.len(),
-            channel.samples.len(),
-            what.join(", "),
-            first.line
-        ),
-    ))
 }
