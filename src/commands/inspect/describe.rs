@@ -167,7 +167,7 @@ fn of_channels(channels: &[Channel], labels: &[String], findings: &[Findings]) -
         let of_time = quality::time::stamps_in_channel(name, channel);
         let warnings = of_time.into_iter().chain(warnings);
         all.extend(warnings.map(|w| said(w, vec![name.clone()])));
-        constant.extend(found.constant.map(|value| (name.as_str(), value)));
+        constant.extend(found.dead().map(|value| (name.as_str(), value)));
         coarse.extend(found.coarse().map(|q| (name.as_str(), unit, q)));
     }
     let mut all = gathered(all);
