@@ -74,7 +74,7 @@ fn a_good_record_has_everything_said_and_nothing_wrong() {
     assert_eq!(codes(&report), [""; 0]);
     let channel = &report["channels"][0];
     assert_eq!(channel["name"], "torque");
-    assert_eq!(channel["unit"], "n_m");
+    assert_eq!(channel["unit"], "N m");
     assert_eq!(channel["samples"], 5000);
     assert_eq!(channel["rate_hz"], 1000.0);
     assert_eq!(channel["start"], 0.0);

@@ -27,6 +27,8 @@ pub fn file(content: &Content) -> File {
         .lost
         .iter()
         .chain(&recording.warnings)
+        // What is said of each channel below need not be said of the file.
+        .filter(|warning| warning.code != "non-finite")
         .map(|warning| said(warning.clone(), Vec::new()))
         .collect();
     for ((axis, members), found) in axes.iter().zip(&times) {
