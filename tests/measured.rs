@@ -8,6 +8,9 @@ mod inspect;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+#[path = "measured/recordings.rs"]
+mod recordings;
+
 use libtest_mimic::{Arguments, Failed, Trial};
 use serde_json::Value;
 
@@ -41,6 +44,10 @@ fn main() {
         ),
         test("thrust_balance_is_refused_and_resampled", thrust_balance),
         test("silverbox_volts_to_volts", silverbox),
+        test("recordings_hold_what_was_counted", recordings::all),
+        test("recordings_have_segments", recordings::segments),
+        test("settings_are_no_recording", recordings::settings),
+        test("assumptions_are_said", recordings::assumptions),
     ];
     tests.extend(inspect::TESTS.map(|(name, run)| test(name, run)));
     libtest_mimic::run(&Arguments::from_args(), tests).exit();

@@ -4,6 +4,8 @@ use std::sync::Arc;
 
 /// Largest deviation of a step from the usual one, as a fraction of it, in a record that has a rate.
 const USUAL: f64 = 0.25;
+/// Deviations among which steps are averaged where there are gaps.
+const CLOSE: [f64; 2] = [0.01, 0.05];
 
 /// The time axis of a channel.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -52,8 +54,10 @@ impl RateFrom {
     }
 }
 
-/// Usual step of time stamps, in their unit: the mean of the steps within 25 % of their median.
-/// `None` if fewer than half of the steps are so close, or fewer than two stamps rise.
+/// Usual step of time stamps, in their unit. Where nearly all steps are within 25 % of their median it
+/// is the mean of these, which takes out the rounding of the stamps; among gaps it is the mean of
+/// those within 1 % (or 5, or 25 %) of the median, whichever is half of all.
+/// `None` if fewer than half of the steps are within 25 %, or fewer than two stamps rise.
 ///
 /// ```
 /// use torqcomp::recording::typical_step;
@@ -74,13 +78,26 @@ pub fn typical_step(stamps: &[f64]) -> Option<f64> {
     let middle = steps.len() / 2;
     let (_, median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
     let median = *median;
-    let usual = |step: &f64| (step / median - 1.0).abs() <= USUAL;
-    let (sum, count) = stamps
-        .windows(2)
-        .map(|pair| pair[1] - pair[0])
-        .filter(usual)
-        .fold((0.0, 0_usize), |(sum, count), step| (sum + step, count + 1));
-    (2 * count >= steps.len()).then(|| sum / count as f64)
+    let within = |part: f64| {
+        stamps
+            .windows(2)
+            .map(|pair| pair[1] - pair[0])
+            .filter(|step| (step / median - 1.0).abs() <= part)
+            .fold((0.0, 0_usize), |(sum, count), step| (sum + step, count + 1))
+    };
+    let (sum, count) = within(USUAL);
+    if 2 * count < steps.len() {
+        return None;
+    }
+    if 100 * count >= 99 * steps.len() {
+        return Some(sum / count as f64);
+    }
+    let (sum, count) = CLOSE
+        .into_iter()
+        .map(within)
+        .find(|(_, count)| 2 * count >= steps.len())
+        .unwrap_or((sum, count));
+    Some(sum / count as f64)
 }
 
 impl Axis {

@@ -17,7 +17,7 @@ use crate::report::Warning;
 
 pub(crate) use columns::{list, time_column};
 pub use layout::{Delimiter, Dialect, Layout, Told, is_skipped};
-pub(crate) use layout::{dialects, is_not_a_number};
+pub(crate) use layout::{dialects, find as find_layout_in, is_not_a_number};
 pub use names::{Column, NamedUnit};
 pub use record::Record;
 pub use scan::{RowPlan, Rows, place_of};

@@ -173,7 +173,41 @@ fn split(heading: &str) -> (&str, Option<NamedUnit>) {
         let text = meaning.to_owned();
         return (name, Some(NamedUnit { text, unit }));
     }
+    if let Some((name, unit)) = suffixed(heading) {
+        return (name, NamedUnit::parse(unit));
+    }
     (heading, None)
+}
+
+/// A unit of one letter after an underscore, where the name says that it is meant: `position_m` and
+/// `motor_current_A`, but not `arm_m` and `phase_A`.
+fn suffixed(text: &str) -> Option<(&str, &'static str)> {
+    const WORDS: [(&str, &str, &[&str]); 4] = [
+        (
+            "_m",
+            "m",
+            &[
+                "position",
+                "displacement",
+                "distance",
+                "length",
+                "height",
+                "stroke",
+                "weg",
+            ],
+        ),
+        ("_A", "A", &["current", "strom"]),
+        ("_K", "K", &["temperature", "temperatur"]),
+        ("_C", "degC", &["temperature", "temperatur"]),
+    ];
+    let lower = text.to_lowercase();
+    WORDS.iter().find_map(|(suffix, unit, words)| {
+        let name = text.strip_suffix(suffix)?;
+        words
+            .iter()
+            .any(|word| lower.contains(word))
+            .then_some((name, *unit))
+    })
 }
 
 /// Text before and inside a bracket at the end of a heading.
@@ -221,6 +255,9 @@ mod tests {
             ("phase_A", "phase_A", None),
             ("accel_m_s2", "accel", Some("m/s^2")),
             ("hit_1", "hit_1", None),
+            ("arm_m", "arm_m", None),
+            ("measured_position_m", "measured_position", Some("m")),
+            ("motor_current_A", "motor_current", Some("A")),
             ("Low G Accel", "Low G Accel", None),
             (
                 "163.05 NAIO-03 ch1 torq.(P:00A305h)",

@@ -267,6 +267,24 @@ impl Sources<'_> {
             .iter()
             .filter(|entry| entry.topic() == Some(keys::Topic::Start))
             .find_map(|entry| keys::seconds(entry, None, self.decimal))
+            .or_else(|| self.start_of_position())
+    }
+
+    /// Start as Rohde & Schwarz write it: position of the trigger, less the part of the record before
+    /// the reference point.
+    fn start_of_position(&self) -> Option<f64> {
+        let value = |key: &str| {
+            let entry = self
+                .entries
+                .iter()
+                .find(|e| e.key.eq_ignore_ascii_case(key))?;
+            keys::quantity(entry.value()?, self.decimal)
+        };
+        let (position, _) = value("Horizontal Position")?;
+        let (reference, unit) = value("Reference Point")?;
+        let (length, _) = value("Record Length")?;
+        let (_, hz) = self.header_rate(None)?;
+        (unit == "%").then(|| position - reference / 100.0 * length / hz)
     }
 
     /// Stamps of a group in seconds: of the ways the file writes them, the first that has a step.
@@ -280,13 +298,25 @@ impl Sources<'_> {
             };
             found.extend(stamps);
         }
-        let best = found
-            .iter()
-            .position(|stamps| typical_step(&stamps.stamps_s).is_some() && rises(&stamps.stamps_s));
+        // The finest is the one that repeats the fewest stamps.
+        let repeats = |stamps: &Stamps| {
+            stamps
+                .stamps_s
+                .windows(2)
+                .filter(|pair| pair[0] == pair[1])
+                .count()
+        };
+        let best = (0..found.len())
+            .filter(|place| typical_step(&found[*place].stamps_s).is_some())
+            .filter(|place| rises(&found[*place].stamps_s))
+            .min_by_key(|place| repeats(&found[*place]));
         if found.is_empty() {
             return Ok(None);
         }
-        Ok(Some(found.swap_remove(best.unwrap_or(0))))
+        let date = found.iter().find_map(|stamps| stamps.start_text.clone());
+        let mut best = found.swap_remove(best.unwrap_or(0));
+        best.start_text = best.start_text.or(date);
+        Ok(Some(best))
     }
 
     fn clock_stamps(
@@ -342,7 +372,7 @@ impl Sources<'_> {
                 .iter()
                 .map(|stamp| stamp * seconds_per_unit)
                 .collect(),
-            start_text: None,
+            start_text: column.first_ticks.map(|ticks| ticks.to_string()),
             assumed,
         }))
     }
@@ -381,19 +411,31 @@ impl Sources<'_> {
                 return Ok(None);
             }
         }
+        let first = match self.columns[place].first_ticks {
+            Some(ticks) => ticks as f64,
+            None => values.first().copied().unwrap_or(0.0).abs(),
+        };
+        if let Some(seconds) = epoch_unit(first) {
+            return Ok(Some((seconds, None)));
+        }
         if let Some(unit) = self.default_time_unit.and_then(units::read) {
             return Ok(Some((unit.unit.factor(), None)));
         }
-        let (factor, words) = match values.first().copied().unwrap_or(0.0).abs() {
-            // Seconds since 1970 and parts of them, between 2001 and 2286; 100 ns since 1601.
-            v if (1e12..1e13).contains(&v) => (1e-3, "milliseconds since 1970"),
-            v if (1e15..1e16).contains(&v) => (1e-6, "microseconds since 1970"),
-            v if (1e18..1e19).contains(&v) => (1e-9, "nanoseconds since 1970"),
-            v if (1e17..2e17).contains(&v) => (1e-7, "units of 100 ns since 1601"),
-            _ => (1.0, "seconds"),
-        };
-        let assumed = format!("\"{}\" gives no unit: {words} were assumed", field.heading);
-        Ok(Some((factor, Some(assumed))))
+        let assumed = format!("\"{}\" gives no unit: seconds were assumed", field.heading);
+        Ok(Some((1.0, Some(assumed))))
+    }
+}
+
+/// Seconds per unit of a time since 1970 (between 2001 and 2286), or since 1601 in units of 100 ns, by
+/// its size alone.
+fn epoch_unit(first: f64) -> Option<f64> {
+    match first {
+        v if (1e9..1e10).contains(&v) => Some(1.0),
+        v if (1e12..1e13).contains(&v) => Some(1e-3),
+        v if (1e15..1e16).contains(&v) => Some(1e-6),
+        v if (1e18..9e18).contains(&v) => Some(1e-9),
+        v if (1e17..2e17).contains(&v) => Some(1e-7),
+        _ => None,
     }
 }
 

@@ -31,6 +31,15 @@ impl Cell {
         if let Some(value) = number::cell(text, decimal) {
             return Self::Number(value);
         }
+        // + 0.123, as Graphtec writes it.
+        if let Some(rest) = text
+            .strip_prefix(['+', '-'])
+            .filter(|rest| rest.starts_with(' '))
+            && let Some(value) =
+                number::cell(rest, decimal).filter(|value| !value.is_sign_negative())
+        {
+            return Self::Number(if text.starts_with('-') { -value } else { value });
+        }
         if let Some(value) = grouped(text, decimal) {
             return Self::Grouped(value);
         }
@@ -116,8 +125,9 @@ fn grouped(text: &str, decimal: u8) -> Option<f64> {
     if !good {
         return None;
     }
-    let plain: String = text.chars().filter(|c| *c != mark).collect();
-    number::cell(&plain, decimal)
+    let sign = &text[..text.len() - body.len()];
+    let digits: String = whole.chars().filter(|c| *c != mark).collect();
+    number::cell(&format!("{sign}{digits}{}", &body[end..]), decimal)
 }
 
 #[cfg(test)]

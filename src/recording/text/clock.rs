@@ -140,6 +140,14 @@ fn digits(text: &str, count: std::ops::RangeInclusive<usize>) -> Option<i64> {
 
 /// Days since 1970 of a date alone.
 fn date(text: &str) -> Option<i32> {
+    // Montag, 2. Mai 2022
+    let text = match text.split_once(", ") {
+        Some((weekday, rest)) if weekday.chars().all(char::is_alphabetic) => rest,
+        _ => text,
+    };
+    // 2. Mai 2022, but 2.5.2022 and 2. 5. 2022 as well.
+    let spaced = text.replace(". ", " ");
+    let text = spaced.as_str();
     let mark = text.chars().find(|c| matches!(c, '-' | '/' | '.' | ' '))?;
     let mut parts = text.split(mark).map(str::trim).filter(|p| !p.is_empty());
     let (a, b, c) = (parts.next()?, parts.next()?, parts.next()?);
@@ -231,7 +239,7 @@ mod tests {
             "5/2/2022",
             "02-May-2022",
             "2. Mai 2022",
-            "May 2 2022",
+            "Montag, 2. Mai 2022",
         ] {
             assert_eq!(Clock::parse(text).expect(text).day, Some(19_114), "{text}");
         }

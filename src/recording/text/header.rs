@@ -38,6 +38,14 @@ pub struct Header {
     pub names: Option<String>,
 }
 
+/// A unit, of time as well where a maker writes seconds as S.
+fn unit_of(name: &str, unit: &str) -> Option<NamedUnit> {
+    match unit.trim() {
+        "S" if units::is_time_name(name) || units::is_axis_name(name) => units::read("s"),
+        unit => units::read(unit),
+    }
+}
+
 impl Field {
     /// A column without a heading, its place counted from 0.
     #[must_use]
@@ -61,8 +69,16 @@ impl Field {
             unit: own,
             unit_text,
         } = units::heading(heading);
-        let below = unit.and_then(units::read);
+        let below = unit.and_then(|unit| unit_of(&name, unit));
         let below_text = unit.and_then(units::as_written);
+        // Under a name with a unit below, what looks like a unit at its end may be none.
+        let is_plain = !heading.contains(['[', '(', '/']);
+        let name = match &below {
+            Some(_) if is_plain => heading.to_owned(),
+            _ => name,
+        };
+        let own = own.filter(|_| below.is_none() || !is_plain);
+        let unit_text = unit_text.filter(|_| own.is_some() || below.is_none());
         Self {
             heading: heading.to_owned(),
             name,
@@ -70,6 +86,18 @@ impl Field {
                 .or(below.as_ref().map(|u| u.text.clone()))
                 .or(below_text),
             unit: own.or(below),
+            is_label: false,
+        }
+    }
+
+    /// A column whose heading is its name alone.
+    #[must_use]
+    pub fn with_unit(name: &str, unit: Option<&str>) -> Self {
+        Self {
+            heading: name.to_owned(),
+            name: name.to_owned(),
+            unit: unit.and_then(|unit| unit_of(name, unit)),
+            unit_text: unit.and_then(units::as_written),
             is_label: false,
         }
     }
@@ -114,6 +142,12 @@ pub fn read(head: &Head, table: &Table, used: &[bool]) -> Header {
             .flat_map(|row| keys::entries(head.number(row.line), row.text, table.dialect))
             .collect()
     };
+    let keyed = entries_below_keys(head, &rows);
+    let entries = |without: &[usize]| -> Vec<Entry> {
+        let mut all = entries(without);
+        all.extend(keyed.iter().cloned());
+        all
+    };
     if let Some((fields, names)) = labelled(&rows, used) {
         return Header {
             fields,
@@ -133,6 +167,21 @@ pub fn read(head: &Head, table: &Table, used: &[bool]) -> Header {
         entries,
         names: found.names.map(|line| head.lines[line].text.clone()),
     }
+}
+
+/// Keys in a line of their own with their values in the next: `dt:` above `0.001`.
+fn entries_below_keys(head: &Head, rows: &[Row]) -> Vec<Entry> {
+    rows.windows(2)
+        .filter(|pair| pair[1].line == pair[0].line + 1)
+        .filter_map(|pair| {
+            let key = pair[0].text.trim().strip_suffix(':')?;
+            Some(Entry {
+                line: head.number(pair[0].line),
+                key: key.to_owned(),
+                values: pair[1].cells.clone(),
+            })
+        })
+        .collect()
 }
 
 /// Splits a line above the table as the table is split, or, if that does not give a cell for each
@@ -183,7 +232,9 @@ fn uncommented(text: &str) -> &str {
 
 /// Whether a cell labels the row of names.
 fn is_name_label(cell: &str) -> bool {
-    const LABELS: [&str; 18] = [
+    const LABELS: [&str; 20] = [
+        "channeltitle",
+        "channel title",
         "name",
         "names",
         "channel name",
@@ -223,19 +274,41 @@ fn labelled(rows: &[Row], used: &[bool]) -> Option<(Vec<Field>, usize)> {
         .rev()
         .filter(wide)
         .find(|row| is_name_label(&row.cells[0]))?;
+    let block = block_around(rows, names.line);
     let others: Vec<&Row> = rows
         .iter()
-        .filter(|row| row.line != names.line && row.cells.len() > 1 && !row.cells[0].is_empty())
+        .filter(|row| row.line != names.line && block.contains(&row.line))
+        .filter(|row| row.cells.len() > 1 && !row.cells[0].is_empty())
         .filter(|row| row.cells.len() + 1 >= used.len())
         .collect();
     let about = |topic: Topic| {
+        let key = |row: &&&Row| row.cells[0].trim_end_matches([':', '=']).trim().to_owned();
         others
             .iter()
-            .find(|row| keys::topic(&row.cells[0]) == Some(topic))
+            .find(|row| keys::topic(&key(row)) == Some(topic))
     };
     let units = about(Topic::Unit);
-    if units.is_none() && about(Topic::Interval).is_none() && about(Topic::Rate).is_none() {
+    // Without a row that says more, the label must stand above several columns.
+    let is_alone = others.is_empty()
+        || units.is_none() && about(Topic::Interval).is_none() && about(Topic::Rate).is_none();
+    if is_alone && names.cells[1..].iter().all(|cell| *cell != names.cells[0]) {
         return None;
+    }
+    // Where the rows of data have no cell under the labels, the names begin one cell later.
+    let filled = names.cells.iter().filter(|cell| !cell.is_empty()).count();
+    if filled == used.len() + 1 && names.cells.len() >= filled && used.iter().all(|used| *used) {
+        let fields = (0..used.len())
+            .map(|place| {
+                let unit = units
+                    .and_then(|row| row.cells.get(place + 1))
+                    .map(String::as_str);
+                match unit {
+                    Some(unit) => Field::with_unit(&names.cells[place + 1], Some(unit)),
+                    None => Field::new(&names.cells[place + 1], None),
+                }
+            })
+            .collect();
+        return Some((fields, names.line));
     }
     let is_label = |place: usize| {
         let repeats = |row: &Row| row.cells.get(place) == row.cells.first();
@@ -255,12 +328,29 @@ fn labelled(rows: &[Row], used: &[bool]) -> Option<(Vec<Field>, usize)> {
                 .and_then(|row| row.cells.get(place))
                 .map(String::as_str);
             match names.cells.get(place) {
-                Some(name) if !name.is_empty() => Field::new(name, unit),
+                Some(name) if !name.is_empty() && units.is_some() => Field::with_unit(name, unit),
+                Some(name) if !name.is_empty() => Field::new(name, None),
                 _ => Field::unnamed(place),
             }
         })
         .collect();
     Some((fields, names.line))
+}
+
+/// The lines around one that no empty line parts from it.
+fn block_around(rows: &[Row], line: usize) -> std::ops::RangeInclusive<usize> {
+    let (mut first, mut last) = (line, line);
+    for row in rows {
+        if row.line == last + 1 {
+            last = row.line;
+        }
+    }
+    for row in rows.iter().rev() {
+        if row.line + 1 == first {
+            first = row.line;
+        }
+    }
+    first..=last
 }
 
 /// Columns named by the rows nearest above the data, and which lines those are.
@@ -288,11 +378,11 @@ fn positional(rows: &[Row], table: &Table, used: &[bool]) -> Positional {
     }
     let (names, units, remarks) = match fitting.as_slice() {
         [] => return unnamed(),
-        [below, above, ..] if is_units(&below.cells) => (*above, Some(*below), None),
         [below, above, ..] if is_mixed(&below.cells, &above.cells) => {
             (*above, Some(*below), Some(*below))
         }
-        [only, ..] if is_units(&only.cells) => (*only, Some(*only), None),
+        [below, above, ..] if is_units(&below.cells) => (*above, Some(*below), None),
+        [only, ..] if is_nothing_but_units(&only.cells) => (*only, Some(*only), None),
         [names, ..] => (*names, None, None),
     };
     let mut lines = vec![names.line];
@@ -383,7 +473,9 @@ fn is_key_block(fitting: &[&Row], used: &[bool]) -> bool {
     });
     let (key, values) = (&nearest.cells[0], &nearest.cells[1..]);
     let is_known = keys::topic(key).is_some() && values.iter().all(|v| units::read(v).is_none());
-    two && !is_time && !is_units(&nearest.cells) && (fitting.len() > 2 || is_known)
+    // An empty line parts headings from keys.
+    let in_block = fitting.len() > 2 && fitting[1].line + 1 == nearest.line;
+    two && !is_time && !is_units(&nearest.cells) && (in_block || is_known)
 }
 
 /// Whether cells are units: all of them, or some where others repeat, or most are in brackets.
@@ -411,13 +503,27 @@ fn is_units(cells: &[String]) -> bool {
     known > 0 && (repeats || 2 * like > filled.len()) || bracketed > 0 && bracketed == filled.len()
 }
 
+/// Whether a lone line above the data names its columns by their units: `s,V`.
+fn is_nothing_but_units(cells: &[String]) -> bool {
+    let mut filled = cells.iter().filter(|cell| !cell.is_empty()).peekable();
+    filled.peek().is_some() && filled.all(|cell| NamedUnit::parse(cell).is_some())
+}
+
 /// Whether the first cell is a unit of time under the name of time, and the others are remarks:
 /// `ms,Servo motor speed,Torque` under `Time,Analog 1,Analog 2`.
 fn is_mixed(below: &[String], above: &[String]) -> bool {
     let (Some(unit), Some(name)) = (below.first(), above.first()) else {
         return false;
     };
-    units::read(unit).is_some_and(|unit| units::is_time(&unit)) && units::is_time_name(name)
+    units::read(unit).is_some_and(|unit| units::is_time(&unit))
+        && units::is_time_name(name)
+        && below.len() > 1
+        && below[1..]
+            .iter()
+            .all(|cell| units::read(cell).is_none() && !units::is_bracketed(cell))
+        && below[1..]
+            .iter()
+            .any(|cell| units::as_written(cell).is_some_and(|c| c.len() > 3))
 }
 
 /// Rows under the units that say how values were formed: `Avg`, `Smp`.
@@ -451,7 +557,11 @@ fn upper_names<'a>(names: &Row, fitting: &[&'a Row<'a>], used: &[bool]) -> Optio
         .iter()
         .copied()
         .filter(|row| row.line < names.line)
-        .find(|row| is_distinct(&cells(row)))
+        .find(|row| {
+            let cells = cells(row);
+            let is_text = |cell: &String| Cell::read(cell, b'.') == Cell::Text;
+            is_distinct(&cells) && cells.iter().all(is_text)
+        })
 }
 
 /// Names out of a line such as `Source,CH1`, where no line above the table has them.

@@ -38,7 +38,19 @@ pub enum Topic {
 }
 
 /// Keys that are about something exactly, in lower case without brackets.
-const EXACT: [(&str, Topic); 70] = [
+const EXACT: [(&str, Topic); 82] = [
+    ("horizontalleft", Topic::Start),
+    ("horizontalresolutionpp", Topic::Interval),
+    ("horz_units", Topic::AxisUnit),
+    ("vert_units", Topic::Unit),
+    ("signal", Topic::Name),
+    ("vertical unit(s)", Topic::Unit),
+    ("channel", Topic::Name),
+    ("channeltitle", Topic::Name),
+    ("unitname", Topic::Unit),
+    ("y-axis unit", Topic::Unit),
+    ("x-axis unit", Topic::AxisUnit),
+    ("x-axis first", Topic::Start),
     ("rate", Topic::Rate),
     ("fs", Topic::Rate),
     ("f_s", Topic::Rate),
@@ -112,7 +124,8 @@ const EXACT: [(&str, Topic); 70] = [
 ];
 
 /// Words within keys, in the order in which they are looked for.
-const WITHIN: [(&str, Topic); 72] = [
+const WITHIN: [(&str, Topic); 73] = [
+    ("axis delta", Topic::Interval),
     ("sample rate", Topic::Rate),
     ("samplerate", Topic::Rate),
     ("sample_rate", Topic::Rate),
@@ -247,6 +260,10 @@ pub fn entries(line: usize, text: &str, dialect: Dialect) -> Vec<Entry> {
         .trim()
         .trim_start_matches(['#', '%', '!', '*', ';', '/'])
         .trim();
+    // `Abtastrate = 2,5 kHz` is one value, whatever the table's mark.
+    if let Some(entry) = one_cell(line, text).filter(is_quantity) {
+        return vec![entry];
+    }
     let cells = split(text, dialect);
     // `CH1V,CH2V,t0 =-5e-05, tInc = 1e-09,`: cells of their own.
     let assignments: Vec<Entry> = cells
@@ -273,6 +290,16 @@ pub fn entries(line: usize, text: &str, dialect: Dialect) -> Vec<Entry> {
         }
         _ => one_cell(line, text).into_iter().collect(),
     }
+}
+
+/// Whether the value is a number with or without a unit, and nothing else.
+fn is_quantity(entry: &Entry) -> bool {
+    let Some(text) = entry.value() else {
+        return false;
+    };
+    let is_unit = |c: char| c.is_alphabetic() || matches!(c, '/' | '%' | ' ' | '°' | '²');
+    text.starts_with(|c: char| c.is_ascii_digit() || c == '-' || c == '+')
+        && quantity(text, b'.').is_some_and(|(_, unit)| unit.chars().all(is_unit))
 }
 
 /// `Sampling Frequency - 5000`, `Date: 1.2.2024`, `T0 = 5`.
@@ -406,6 +433,9 @@ fn hertz(value: f64, unit: &str, is_interval: bool) -> Option<f64> {
         "" if is_interval => 1.0,
         "" => return Some(value).filter(|hz| *hz > 0.0),
         "ps" => 1e-12,
+        "ns" => 1e-9,
+        "us" | "\u{b5}s" | "\u{3bc}s" => 1e-6,
+        "ms" => 1e-3,
         "s" => 1.0,
         _ => {
             let unit = units::read(unit)?;

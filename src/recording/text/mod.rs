@@ -18,7 +18,7 @@ mod units;
 
 use super::{Recording, Segment};
 use crate::failure::Failure;
-use crate::io::csv::{Dialect, Options};
+use crate::io::csv::{self, Dialect, Options};
 use crate::report::Warning;
 
 pub use clock::Clock;
@@ -29,6 +29,10 @@ use table::Hints;
 
 /// Bytes that a maker is told from.
 const FOR_MAKER: usize = 1 << 14;
+/// Fewest numbers in a text of one line that are the samples of one channel.
+const ONE_LINE: usize = 32;
+/// Most tables below each other.
+const MOST_TABLES: usize = 1000;
 /// Most details that are kept.
 const DETAILS: usize = 100;
 
@@ -71,21 +75,123 @@ pub fn read(source: &str, bytes: Vec<u8>, options: &Options) -> Result<Recording
     Ok(recording)
 }
 
+/// Whether the quick reader of plain tables ([`crate::io::csv::Table`]) sees in a file what this one
+/// sees: by its encoding and line ends, no maker's reader is needed, and both find the same table with
+/// the same headings, units and at most one column of time, which holds numbers. `head` are the first
+/// bytes of the file, `complete` says that there are no more.
+#[must_use]
+pub fn is_plain(head: &[u8], complete: bool, options: &Options) -> bool {
+    let Ok(text) = decode::decode(head.to_vec()) else {
+        return false;
+    };
+    // Only a mark at the start is taken away from a plain table.
+    let mark = if head.starts_with(b"\xEF\xBB\xBF") {
+        3
+    } else {
+        0
+    };
+    if text.bytes != head[mark..] || !text.oddities.is_empty() {
+        return false;
+    }
+    let lines = Head::of(&text.bytes, 0, 1, FOR_MAKER);
+    let is_special =
+        |maker: &makers::Maker| maker.read.is_some() || maker.hints != Hints::default();
+    if makers::recognise(&lines).is_some_and(is_special) {
+        return false;
+    }
+    let Ok(layout) = csv::find_layout_in(head, complete, &options.told) else {
+        return false;
+    };
+    let Ok((head, table)) = head::find(&text.bytes, 0, 1, &options.told) else {
+        return false;
+    };
+    let wanted = table::wanted(&head, &table);
+    let used: Vec<bool> = wanted.iter().map(Option::is_some).collect();
+    let header = header::read(&head, &table, &used);
+    let same_columns = layout.columns.len() == header.fields.len()
+        && layout
+            .columns
+            .iter()
+            .zip(&header.fields)
+            .all(|(column, field)| {
+                column.heading == field.heading
+                    && column.name == field.name
+                    && column.unit == field.unit
+            });
+    let times = header
+        .fields
+        .iter()
+        .filter(|field| field.is_named_time())
+        .count();
+    let has_marks = head.lines[table.first..].iter().any(|line| {
+        let cells = table.dialect.cells(&line.text);
+        let read = |cell: &String| cell::Cell::read(cell, table.dialect.decimal);
+        cells
+            .iter()
+            .any(|cell| matches!(read(cell), cell::Cell::Grouped(_)))
+    });
+    same_columns
+        && !has_marks
+        && layout.dialect == table.dialect
+        && layout.data_line == head.number(table::first_row(&head, &table, &header))
+        && wanted
+            .iter()
+            .all(|kind| *kind == Some(rows::Wanted::Numbers))
+        && times <= 1
+}
+
 /// A table, or several below each other under the same headings.
 fn general(text: &Text, hints: Hints, options: &Options) -> Result<Recording, Failure> {
     let mut parts = Vec::new();
     let (mut from, mut number) = (0, 1);
-    while from < text.bytes.len() {
+    if let Some(column) = one_line(&text.bytes, options) {
+        let part = table::read(&column, 0, 1, hints, options, &|_| false)?;
+        return Ok(recording_of(vec![part]));
+    }
+    loop {
         let part = match table::read(&text.bytes, from, number, hints, options, &|_| false) {
             Ok(part) => part,
             // What follows the last table need not be one.
             Err(_) if !parts.is_empty() => break,
             Err(failure) => return Err(failure),
         };
+        let is_last = part.end >= text.bytes.len() || part.end <= from;
         (from, number) = (part.end, part.next_line);
         parts.push(part);
+        if is_last {
+            break;
+        }
+        if parts.len() > MOST_TABLES {
+            return Err(Failure::failed(format_args!(
+                "line {number}: there are more than {MOST_TABLES} tables below each other; split the \
+                 file"
+            )));
+        }
     }
     Ok(recording_of(parts))
+}
+
+/// The numbers of a text that is one line of them, each in a line of its own: some oscilloscopes write
+/// the samples so.
+fn one_line(text: &[u8], options: &Options) -> Option<Vec<u8>> {
+    let line = text.trim_ascii();
+    if line.contains(&b'\n') || options.told.delimiter.is_some() {
+        return None;
+    }
+    let mark = *[b'\t', b';', b',', b' ']
+        .iter()
+        .find(|mark| line.contains(mark))?;
+    let decimal = options.told.decimal.unwrap_or(b'.');
+    let cells = line.split(|byte| *byte == mark);
+    let numbers = cells.clone().filter(|cell| !cell.is_empty()).all(|cell| {
+        std::str::from_utf8(cell).is_ok_and(|cell| crate::io::number::cell(cell, decimal).is_some())
+    });
+    let is_long = cells.count() >= ONE_LINE;
+    (numbers && is_long).then(|| {
+        line.iter()
+            .map(|byte| if *byte == mark { b'\n' } else { *byte })
+            .collect()
+    })
 }
 
 /// Puts tables together as the segments of a recording.
@@ -148,3 +254,6 @@ fn details(entries: &[Entry]) -> Vec<(String, String)> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests;

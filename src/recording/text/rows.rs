@@ -2,6 +2,7 @@
 
 use super::cell::Cell;
 use super::clock::{Clock, DAY};
+use crate::failure::Failure;
 use crate::io::csv::{Delimiter, Dialect, is_skipped};
 use crate::io::number;
 use crate::recording::{Hole, HoleKind};
@@ -13,6 +14,8 @@ pub enum Wanted {
     Numbers,
     /// Dates and times of day, as seconds after the first of them.
     Clock,
+    /// Integers too long for an `f64`, as differences to the first of them.
+    Ticks,
     /// Nothing: it holds texts.
     Nothing,
 }
@@ -26,6 +29,8 @@ pub struct Column {
     pub holes: Vec<Hole>,
     /// The first date or time, as nanoseconds and as written.
     pub first_clock: Option<(Clock, String)>,
+    /// The first of integers that differences were taken to.
+    pub first_ticks: Option<i64>,
     /// Nanoseconds of the last one, with the midnights that were passed.
     last_clock: i64,
 }
@@ -47,15 +52,25 @@ pub struct Rows {
     pub odd_count: usize,
     /// Rows with more cells than columns; the first one's line.
     pub too_wide: Option<usize>,
+    /// Empty cells that may still be filled in; they cost memory that the file need not have.
+    budget: usize,
+    /// Line at which there was no budget left.
+    too_ragged: Option<usize>,
     /// Row and line of each first row after a line that is no row.
     breaks: Vec<(usize, usize)>,
 }
 
+/// Empty cells that any file may have, besides one for each byte.
+const FREE_CELLS: usize = 1 << 20;
 /// Odd lines that are kept to be shown.
 const ODD_LINES: usize = 5;
 
 /// Reads rows from `text[from..]`, whose first line has the number `line`, until `stop` says so of a
 /// line that is no row.
+///
+/// # Errors
+/// If the rows have so different lengths that the cells between would need far more memory than the
+/// file.
 pub fn read(
     text: &[u8],
     from: usize,
@@ -63,8 +78,9 @@ pub fn read(
     dialect: Dialect,
     wanted: &[Wanted],
     stop: &dyn Fn(&str) -> bool,
-) -> Rows {
+) -> Result<Rows, Failure> {
     let mut rows = Rows {
+        budget: text.len() + FREE_CELLS,
         columns: vec![Column::default(); wanted.len()],
         end: text.len(),
         ..Rows::default()
@@ -82,7 +98,13 @@ pub fn read(
         rows.lines += 1;
         at = end + 1;
     }
-    rows
+    match rows.too_ragged {
+        None => Ok(rows),
+        Some(line) => Err(Failure::failed(format_args!(
+            "line {line} is so much longer than the rows before it that these would need more memory \
+             than the whole file; expected rows of about the same number of cells"
+        ))),
+    }
 }
 
 /// Without the carriage returns at the end.
@@ -142,6 +164,12 @@ impl Rows {
             if let Some(value) = value {
                 let column = &mut self.columns[place];
                 if column.values.len() != row {
+                    let empty = row - column.values.len();
+                    if empty > self.budget {
+                        self.too_ragged = Some(number);
+                        return false;
+                    }
+                    self.budget -= empty;
                     column.fill(row, &self.breaks);
                 }
                 column.values.push(value);
@@ -182,6 +210,11 @@ impl Rows {
             _ if length == 0 => Some((None, next)),
             Wanted::Nothing => Some((None, next)),
             Wanted::Numbers => None,
+            Wanted::Ticks => {
+                let text = std::str::from_utf8(&line[at..end]).ok()?;
+                let ticks = text.trim().parse().ok()?;
+                Some((Some(self.columns[place].ticks(ticks)), next))
+            }
             Wanted::Clock => {
                 let text = std::str::from_utf8(&line[at..end]).ok()?;
                 let clock = Clock::parse(text)?;
@@ -199,7 +232,7 @@ impl Rows {
         stop: &dyn Fn(&str) -> bool,
     ) -> bool {
         let text = super::head::decode(line);
-        if stop(&text) {
+        if stop(&text) || self.too_ragged.is_some() {
             return false;
         }
         if is_skipped(&text) && !is_all_separators(&text, plan.dialect) {
@@ -241,9 +274,19 @@ impl Rows {
             (Wanted::Nothing, _) | (_, Cell::Empty) => return,
             (Wanted::Numbers, Cell::Number(value) | Cell::Grouped(value)) => Ok(value),
             (Wanted::Clock, Cell::Clock(clock)) => Ok(column.seconds(clock, text)),
+            (Wanted::Ticks, Cell::Number(_)) => match text.parse() {
+                Ok(ticks) => Ok(column.ticks(ticks)),
+                Err(_) => Err(HoleKind::Text),
+            },
             (_, Cell::NonFinite) => Err(HoleKind::NonFinite),
             _ => Err(HoleKind::Text),
         };
+        let empty = row - column.values.len().min(row);
+        if empty > self.budget {
+            self.too_ragged = Some(line);
+            return;
+        }
+        self.budget -= empty;
         if column.values.len() < row {
             column.fill(row, &self.breaks);
         }
@@ -276,7 +319,7 @@ fn is_row(cells: &[Cell], wanted: &[Wanted]) -> bool {
         .iter()
         .zip(wanted)
         .filter(|(cell, wanted)| match wanted {
-            Wanted::Numbers => cell.is_number() || **cell == Cell::NonFinite,
+            Wanted::Numbers | Wanted::Ticks => cell.is_number() || **cell == Cell::NonFinite,
             Wanted::Clock => matches!(cell, Cell::Clock(_)),
             Wanted::Nothing => false,
         })
@@ -305,6 +348,12 @@ impl Column {
             });
             self.values.push(f64::NAN);
         }
+    }
+
+    /// The difference of an integer to the first one.
+    fn ticks(&mut self, ticks: i64) -> f64 {
+        let first = *self.first_ticks.get_or_insert(ticks);
+        ticks.wrapping_sub(first) as f64
     }
 
     /// Seconds of a date or time after the first one. Without a date, a step back by more than half a

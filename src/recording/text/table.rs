@@ -15,7 +15,7 @@ use crate::report::Warning;
 const SAMPLE: usize = 400;
 
 /// What is known beforehand of a maker's tables.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Hints {
     /// Unit of time where the files never name it.
     pub time_unit: Option<&'static str>,
@@ -82,7 +82,7 @@ pub fn read_at(
     let is_next = |line: &str| stop(line) || names.as_deref() == Some(line);
     let offset = head.lines[first].offset;
     let number = head.number(first);
-    let mut rows = rows::read(text, offset, number, table.dialect, &wanted, &is_next);
+    let mut rows = rows::read(text, offset, number, table.dialect, &wanted, &is_next)?;
     let lost = drop_cut_row(text, table.dialect, &mut rows);
     if let Some(unit) = hints.unit {
         default_units(&mut header, unit);
@@ -98,7 +98,12 @@ pub fn read_at(
     .find()?;
     let mut warnings = odd_lines(&rows);
     warnings.extend(assumptions(&axes));
-    warnings.extend(count_differs(&header.entries, rows.count, table.dialect));
+    let longest = rows.columns.iter().map(|column| column.values.len()).max();
+    warnings.extend(count_differs(
+        &header.entries,
+        longest.unwrap_or(0),
+        table.dialect,
+    ));
     Ok(Part {
         end: rows.end,
         next_line: number + rows.lines,
@@ -111,10 +116,11 @@ pub fn read_at(
 }
 
 /// What each column holds in the first rows; `None` if nothing.
-fn wanted(head: &Head, table: &Table) -> Vec<Option<Wanted>> {
+pub fn wanted(head: &Head, table: &Table) -> Vec<Option<Wanted>> {
     #[derive(Clone, Copy, Default)]
     struct Counts {
         numbers: usize,
+        ticks: usize,
         clocks: usize,
         texts: usize,
     }
@@ -127,7 +133,11 @@ fn wanted(head: &Head, table: &Table) -> Vec<Option<Wanted>> {
         let cells = table.dialect.cells(&line.text);
         for (count, cell) in counts.iter_mut().zip(&cells) {
             match Cell::read(cell, table.dialect.decimal) {
-                Cell::Number(_) | Cell::Grouped(_) | Cell::NonFinite => count.numbers += 1,
+                Cell::Number(_) | Cell::Grouped(_) | Cell::NonFinite => {
+                    count.numbers += 1;
+                    let is_long = cell.len() > 12 && cell.parse::<i64>().is_ok();
+                    count.ticks += usize::from(is_long);
+                }
                 Cell::Clock(_) => count.clocks += 1,
                 Cell::Text => count.texts += 1,
                 Cell::Empty => {}
@@ -141,9 +151,11 @@ fn wanted(head: &Head, table: &Table) -> Vec<Option<Wanted>> {
                 numbers: 0,
                 clocks: 0,
                 texts: 0,
+                ..
             } => None,
             c if c.texts > c.numbers + c.clocks => Some(Wanted::Nothing),
             c if c.clocks > c.numbers => Some(Wanted::Clock),
+            c if c.ticks == c.numbers => Some(Wanted::Ticks),
             _ => Some(Wanted::Numbers),
         })
         .collect()
@@ -151,7 +163,7 @@ fn wanted(head: &Head, table: &Table) -> Vec<Option<Wanted>> {
 
 /// The first row: a row with something wrong in it may stand between the headings and the first good
 /// one; it belongs to the table, so that what is wrong is seen.
-fn first_row(head: &Head, table: &Table, header: &Header) -> usize {
+pub fn first_row(head: &Head, table: &Table, header: &Header) -> usize {
     let Some(names) = &header.names else {
         return table.first;
     };
@@ -170,7 +182,7 @@ fn first_row(head: &Head, table: &Table, header: &Header) -> usize {
                 .collect();
             let numbers = read.iter().filter(|cell| cell.is_number()).count();
             numbers > 0
-                && read.len() == table.width
+                && read.len() >= table.width
                 && !cells[0].is_empty()
                 && read[0] != Cell::Text
         })

@@ -67,6 +67,14 @@ pub fn read(text: &str) -> Option<NamedUnit> {
     if let Some(unit) = NamedUnit::parse(text) {
         return Some(unit);
     }
+    // V (Voltage)
+    if let Some((symbol, _)) = text
+        .strip_suffix(')')
+        .and_then(|text| text.split_once(" ("))
+        && let Some(unit) = NamedUnit::parse(symbol)
+    {
+        return Some(unit);
+    }
     let lower = text.to_lowercase();
     // NM, Nm and N.m are torque; nm is a length.
     let synonym = SYNONYMS
@@ -119,13 +127,16 @@ pub struct Heading {
 /// a unit in brackets before other words, units in square brackets that are not known.
 #[must_use]
 pub fn heading(text: &str) -> Heading {
-    let text = text.trim().trim_matches('"').trim();
+    // "Zeit" t / s
+    let unquoted = text.replace('"', "");
+    let text = unquoted.trim();
     let column = crate::io::csv::Column::read(text, None);
     if let Some(unit) = column.unit {
         return Heading::new(column.name, Some(unit), None);
     }
     if let Some((name, inside)) = bracket(text) {
-        let known = read(inside);
+        let is_seconds = inside == "S" && is_time_name(&name);
+        let known = read(if is_seconds { "s" } else { inside });
         let unknown = as_written(inside).filter(|_| known.is_none());
         if known.is_some() || unknown.is_some() {
             return Heading::new(name, known, unknown);
@@ -154,13 +165,55 @@ pub fn heading(text: &str) -> Heading {
         let name = if is_time(&unit) { "time" } else { text };
         return Heading::new(name.to_owned(), Some(unit), None);
     }
-    Heading::new(text.to_owned(), None, None)
+    Heading::new(text.to_owned(), time_word(text), None)
+}
+
+/// The unit of time that is part of a name of time: `millis`, `Time ms`, `elapsed seconds`.
+fn time_word(text: &str) -> Option<NamedUnit> {
+    const WORDS: [(&str, &str); 24] = [
+        ("ms", "ms"),
+        ("msec", "ms"),
+        ("millis", "ms"),
+        ("millisecond", "ms"),
+        ("milliseconds", "ms"),
+        ("millisekunden", "ms"),
+        ("us", "us"),
+        ("usec", "us"),
+        ("micros", "us"),
+        ("microsecond", "us"),
+        ("microseconds", "us"),
+        ("mikrosekunden", "us"),
+        ("ns", "ns"),
+        ("nsec", "ns"),
+        ("nanoseconds", "ns"),
+        ("sec", "s"),
+        ("secs", "s"),
+        ("second", "s"),
+        ("seconds", "s"),
+        ("sekunden", "s"),
+        ("sekunde", "s"),
+        ("minutes", "min"),
+        ("minuten", "min"),
+        ("hours", "h"),
+    ];
+    let lower = text.to_lowercase();
+    let last = lower.rsplit(|c: char| !c.is_alphanumeric()).next()?;
+    let (_, unit) = WORDS.iter().find(|(word, _)| *word == last)?;
+    let meaning = Unit::parse(unit).ok().filter(|_| is_time_name(text))?;
+    Some(NamedUnit {
+        text: (*unit).to_owned(),
+        unit: meaning,
+    })
 }
 
 impl Heading {
     fn new(name: String, unit: Option<NamedUnit>, unknown: Option<String>) -> Self {
         Self {
-            name,
+            // "U_k" U_k
+            name: match name.split_once(' ') {
+                Some((first, second)) if first == second => first.to_owned(),
+                _ => name,
+            },
             unit_text: unit.as_ref().map(|unit| unit.text.clone()).or(unknown),
             unit,
         }
@@ -176,8 +229,15 @@ fn bracket(text: &str) -> Option<(String, &str)> {
                 continue;
             };
             let inside = text[start + 1..start + length].trim();
-            let looks_like_unit = open == '[' && inside.parse::<f64>().is_err()
+            let is_at_end = start + length + 1 == text.len();
+            let odd = |c: char| matches!(c, '{' | '}' | '(' | '!' | '?' | '$' | ',' | ';' | ':');
+            let looks_like_unit = open == '['
+                && is_at_end
+                && inside.parse::<f64>().is_err()
+                && inside.chars().count() <= 16
+                && !inside.contains(odd)
                 || read(inside).is_some()
+                || inside == "S"
                 || inside.len() <= 8 && inside.contains(['/', '%', '°', '²', '^', 'µ']);
             if looks_like_unit && !inside.is_empty() {
                 let rest = [text[..start].trim(), text[start + length + 1..].trim()];
@@ -205,7 +265,20 @@ pub fn is_time(unit: &NamedUnit) -> bool {
 /// Whether a name stands for time, or for the axis that is time in a recorder's export.
 #[must_use]
 pub fn is_time_name(name: &str) -> bool {
-    const WORDS: [&str; 30] = [
+    const WORDS: [&str; 43] = [
+        "ms",
+        "msec",
+        "millisecond",
+        "milliseconds",
+        "millisekunden",
+        "us",
+        "usec",
+        "microsecond",
+        "microseconds",
+        "mikrosekunden",
+        "nanoseconds",
+        "subsec",
+        "sec",
         "t",
         "time",
         "times",
@@ -246,7 +319,9 @@ pub fn is_time_name(name: &str) -> bool {
         let stem = word
             .trim_start_matches('%')
             .trim_end_matches(|c: char| c.is_ascii_digit());
-        WORDS.contains(&stem)
+        let is_compound = (stem.ends_with("zeit") || stem.ends_with("time"))
+            && !["lifetime", "risetime", "deadtime", "totzeit", "overtime"].contains(&stem);
+        WORDS.contains(&stem) || is_compound
     };
     match words.as_slice() {
         [] => false,
@@ -346,7 +421,7 @@ mod tests {
             ("C1 in V", "C1", Some("V"), true),
             ("in s", "time", Some("s"), true),
             ("U/V", "U", Some("V"), true),
-            ("\"Zeit\" t / s", "\"Zeit\" t", Some("s"), true),
+            ("\"Zeit\" t / s", "Zeit t", Some("s"), true),
             ("Kraft, N", "Kraft", Some("N"), true),
             ("Time (s) Run #1", "Time Run #1", Some("s"), true),
             ("Flow [l/min]", "Flow", Some("l/min"), false),
