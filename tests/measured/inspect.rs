@@ -126,7 +126,7 @@ fn gaps(folder: &Path) -> Result<(), Failed> {
         let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
         steps.sort_by(f64::total_cmp);
         let middle = steps[steps.len() / 2];
-        let near = |s: &&f64| (*s / middle - 1.0).abs() <= 0.25;
+        let near = |s: &&f64| (*s / middle - 1.0).abs() <= 0.01;
         let usual =
             steps.iter().filter(near).sum::<f64>() / steps.iter().filter(near).count() as f64;
         let counted = steps.iter().filter(|s| **s > 1.5 * usual).count();
