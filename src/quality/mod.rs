@@ -32,7 +32,7 @@ pub fn warnings(name: &str, unit: &str, samples: &[f64], axis: &Axis) -> Vec<War
     let mut found = TimeFindings::of(axis).warnings(&format!("\"{name}\""), axis);
     let findings = Findings::of(samples, axis.rate_hz);
     found.extend(findings.warnings(name, unit, axis, &[]));
-    found.extend(findings.constant.map(|value| constant(&[(name, value)])));
+    found.extend(findings.dead().map(|value| constant(&[(name, value)])));
     found.extend(findings.coarse().map(|q| coarse(&[(name, unit, q)])));
     found
 }

@@ -20,6 +20,9 @@ const STATES: usize = 4;
 /// Samples below which nothing is said of their resolution: a table of a few readings.
 const FEWEST: usize = 100;
 
+/// Samples below which a channel of one value is nothing to wonder at.
+const FEW: usize = 10;
+
 /// What the samples of a channel show.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Findings {
@@ -73,6 +76,12 @@ impl Findings {
             quantisation: quantisation(samples),
             mains: rate_hz.and_then(|rate_hz| mains(samples, rate_hz)),
         }
+    }
+
+    /// The value of a channel that has only one, if it had the chance of having others.
+    #[must_use]
+    pub fn dead(&self) -> Option<f64> {
+        self.constant.filter(|_| self.samples >= FEW)
     }
 
     /// The resolution, if it is coarse for a measurement.

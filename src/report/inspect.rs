@@ -375,6 +375,18 @@ fn shortened(text: &str, most: usize) -> String {
     short
 }
 
+/// A name, its middle left out if it is too long: both ends tell more.
+fn middle_left_out(name: &str) -> String {
+    let count = name.chars().count();
+    if count <= NAME_WIDTH {
+        return name.to_owned();
+    }
+    let half = NAME_WIDTH / 2;
+    let head: String = name.chars().take(half - 1).collect();
+    let tail: String = name.chars().skip(count - half).collect();
+    format!("{head}…{tail}")
+}
+
 /// `1-3, 5`.
 fn ranges(numbers: &[usize]) -> String {
     let mut parts: Vec<(usize, usize)> = Vec::new();
@@ -401,12 +413,20 @@ impl Channel {
             name.push_str(&format!(" (segment {segment})"));
         }
         vec![
-            format!("{number:>2}  {}", shortened(&name, NAME_WIDTH)),
+            format!("{number:>2}  {}", middle_left_out(&name)),
             shortened(self.unit.as_deref().unwrap_or("not given"), UNIT_WIDTH),
             self.samples.to_string(),
             self.rate_hz
                 .map_or_else(|| "unknown".to_owned(), |rate_hz| rounded(rate_hz, 7)),
-            value(self.start, 6),
+            // Seconds since 1970 have ten digits before the point.
+            value(
+                self.start,
+                if self.start.is_some_and(|s| s.abs() > 1e6) {
+                    13
+                } else {
+                    6
+                },
+            ),
             value(self.duration_s, 6),
             value(self.smallest, 5),
             value(self.largest, 5),

@@ -186,7 +186,7 @@ impl Axis {
 
     /// An axis with few marks, for a low picture.
     pub(super) fn coarse(low: f64, high: f64) -> Self {
-        Self::with_marks(low, high, 3.0)
+        Self::with_marks(low, high, 4.0)
     }
 
     fn with_marks(low: f64, high: f64, count: f64) -> Self {

@@ -124,10 +124,12 @@ fn gaps(folder: &Path) -> Result<(), Failed> {
     ] {
         let times = numbers(&column(&folder.join(file), '\t', 0)?);
         let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        let long = |steps: &[f64], usual: f64| steps.iter().filter(|s| **s > 1.5 * usual).count();
-        let counted = long(&steps, 0.016);
         steps.sort_by(f64::total_cmp);
         let middle = steps[steps.len() / 2];
+        let near = |s: &&f64| (*s / middle - 1.0).abs() <= 0.01;
+        let usual =
+            steps.iter().filter(near).sum::<f64>() / steps.iter().filter(near).count() as f64;
+        let counted = steps.iter().filter(|s| **s > 1.5 * usual).count();
         check((middle - 0.016).abs() < 1e-4, format!("{file}: {middle}"))?;
         let report = inspect(folder, &[file, "--time-column", "1", "--time-unit", "s"])?;
         let channel = &report["channels"][0];

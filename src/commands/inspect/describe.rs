@@ -27,6 +27,8 @@ pub fn file(content: &Content) -> File {
         .lost
         .iter()
         .chain(&recording.warnings)
+        // What is said of each channel below need not be said of the file.
+        .filter(|warning| warning.code != "non-finite")
         .map(|warning| said(warning.clone(), Vec::new()))
         .collect();
     for ((axis, members), found) in axes.iter().zip(&times) {
@@ -167,7 +169,7 @@ fn of_channels(channels: &[Channel], labels: &[String], findings: &[Findings]) -
         let of_time = quality::time::stamps_in_channel(name, channel);
         let warnings = of_time.into_iter().chain(warnings);
         all.extend(warnings.map(|w| said(w, vec![name.clone()])));
-        constant.extend(found.constant.map(|value| (name.as_str(), value)));
+        constant.extend(found.dead().map(|value| (name.as_str(), value)));
         coarse.extend(found.coarse().map(|q| (name.as_str(), unit, q)));
     }
     let mut all = gathered(all);

@@ -85,8 +85,9 @@ impl Events {
 /// Looks at the steps of time stamps in s. `None` if fewer than two stamps are finite or none lies
 /// after another.
 ///
-/// The usual step `T` is the mean of the positive steps within 25 % of their median, which no fault
-/// of fewer than half of the steps can move. With `s = 1.4826·MAD` of the steps:
+/// The usual step `T` is the mean of the steps within 25 % of the median positive step; if more than
+/// 1 % of the steps are farther away (gaps), of those within 1 % (or 5 %) of it, if these are half of
+/// all. No fault of fewer than half of the steps can move it. With `s = 1.4826·MAD` of the steps:
 /// * a step longer than `max(1.5 T, T + 6 s)` is a gap that leaves out `round(step/T) − 1` samples
 ///   (normal jitter of any size exceeds 6 s once in 10⁹ steps);
 /// * a step longer than all regular steps together is a jump of the clock, not a gap;
@@ -190,6 +191,10 @@ fn walk(stamps_s: &[f64]) -> impl Iterator<Item = (usize, f64, f64)> + '_ {
 
 /// Part of the median that a step may lie away from it and still be usual.
 const USUAL: f64 = 0.25;
+/// The same where there are gaps, the first that holds half of the steps.
+const CLOSE: [f64; 2] = [0.01, 0.05];
+/// Part of the steps that are usual where there are no gaps.
+const NEARLY_ALL: f64 = 0.99;
 /// Steps out of which medians are taken.
 const MOST_STEPS: usize = 1 << 18;
 
@@ -202,15 +207,25 @@ fn some_steps(stamps_s: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Mean of the steps within 25 % of the median positive step.
+/// Mean of the steps near the median positive step.
 fn usual(stamps_s: &[f64]) -> Option<f64> {
     let mut positive = some_steps(stamps_s);
     positive.retain(|step| *step > 0.0);
     let middle = median(&mut positive)?;
-    let (sum, count) = walk(stamps_s)
-        .map(|(_, _, step)| step)
-        .filter(|step| (step / middle - 1.0).abs() <= USUAL)
-        .fold((0.0, 0.0), |(sum, count), step| (sum + step, count + 1.0));
+    let near = |part: f64| {
+        walk(stamps_s)
+            .map(|(_, _, step)| step)
+            .filter(|step| (step / middle - 1.0).abs() <= part)
+            .fold((0.0, 0.0), |(sum, count), step| (sum + step, count + 1.0))
+    };
+    let all = walk(stamps_s).filter(|(_, _, step)| *step > 0.0).count() as f64;
+    let (sum, count) = near(USUAL);
+    let closer = || CLOSE.into_iter().map(near).find(|(_, n)| *n >= 0.5 * all);
+    let (sum, count) = if count >= NEARLY_ALL * all {
+        (sum, count)
+    } else {
+        closer().unwrap_or((sum, count))
+    };
     Some(sum / count)
 }
 
