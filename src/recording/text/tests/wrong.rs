@@ -29,7 +29,7 @@ fn what_is_no_recording_is_refused() {
 #[test]
 fn rows_of_wild_lengths_do_not_fill_the_memory() {
     let wide = "1,".repeat(8000) + "1\n";
-    let text = format!("{wide}{wide}{}{wide}", "1\n".repeat(2_000_000));
+    let text = format!("{wide}{wide}{}{wide}", "1\n".repeat(2_000));
     assert!(failure(&text).contains("longer than the rows before"));
 }
 
