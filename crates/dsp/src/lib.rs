@@ -27,5 +27,7 @@ pub mod noise;
 pub mod recorder;
 pub mod resample;
 pub mod spectrum;
+pub mod weak;
+pub mod zero_phase;
 
 pub use error::Error;
