@@ -1,5 +1,7 @@
 //! The command line.
 
+pub mod identify;
+
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -34,6 +36,8 @@ pub enum Verb {
     Table(Table),
     /// Constants that follow from the drawing, beside the measured ones
     Predict(Predict),
+    /// Constants of the stand from records, with their uncertainties
+    Identify(identify::Identify),
 }
 
 /// Units that results are printed in.

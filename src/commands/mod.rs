@@ -2,6 +2,7 @@
 
 mod compensate;
 mod harmonics;
+mod identify;
 mod predict;
 mod table;
 
@@ -32,6 +33,7 @@ pub fn run(cli: Cli) -> Result<Outcome, Failure> {
         Verb::Harmonics(args) => harmonics::run(&args),
         Verb::Table(args) => table::run(&args),
         Verb::Predict(args) => predict::run(&args),
+        Verb::Identify(args) => identify::run(&args),
     }
 }
 

@@ -2,6 +2,7 @@
 
 pub mod decay;
 pub mod runup;
+pub mod static_load;
 
 use torqcomp_model::fit::FitError;
 

@@ -2,6 +2,7 @@
 
 pub mod compensate;
 pub mod harmonics;
+pub mod identify;
 pub mod predict;
 pub mod svg;
 
