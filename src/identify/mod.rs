@@ -1,6 +1,7 @@
 //! Constants of a stand from records of it: signals from `dsp`, fits from `model`, joined here.
 
 pub mod decay;
+pub mod response;
 pub mod runup;
 pub mod static_load;
 

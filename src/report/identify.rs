@@ -39,6 +39,8 @@ pub struct Report {
     pub laws: Vec<Law>,
     /// Terms of the calibration standards (`static`).
     pub terms: Vec<Term>,
+    /// Relative error on data held out for 0, 1, 2, … modes (`response`).
+    pub held_out_errors: Vec<Option<f64>>,
     /// How it was done.
     pub method: Vec<String>,
     /// What should be known.
@@ -213,6 +215,7 @@ impl Report {
                 .collect(),
             laws: Vec::new(),
             terms: Vec::new(),
+            held_out_errors: Vec::new(),
             method: outcome.method.clone(),
             warnings: outcome.warnings.clone(),
         }

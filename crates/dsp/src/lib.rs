@@ -22,6 +22,7 @@ pub mod compensate;
 pub mod conversion;
 pub mod decimate;
 mod error;
+pub mod frf;
 pub mod gage;
 pub mod harmonics;
 pub mod noise;

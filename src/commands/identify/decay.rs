@@ -6,8 +6,8 @@ use super::{declared, deliver, quantity, read, stand_text, uniform};
 use crate::cli::identify::Decay;
 use crate::commands::Outcome;
 use crate::failure::Failure;
-use crate::identify::decay::{Evaluated, Options, Ringing, identify};
 use crate::identify::Found;
+use crate::identify::decay::{Evaluated, Options, Ringing, identify};
 use crate::report::identify::{Law, Report};
 use crate::stand::update::Entry;
 

@@ -1,6 +1,7 @@
 //! `identify`: constants of the stand from records, with uncertainties.
 
 mod decay;
+mod response;
 mod runup;
 mod static_load;
 
@@ -24,7 +25,7 @@ pub fn run(args: &Identify) -> Result<Outcome, Failure> {
         Test::Decay(args) => decay::run(args),
         Test::Runup(args) => runup::run(args),
         Test::Static(args) => static_load::run(args),
-        Test::Response(_) => Err(Failure::usage("identify response is not there yet")),
+        Test::Response(args) => response::run(args),
     }
 }
 

@@ -95,6 +95,21 @@ pub fn identify(records: &[Ringing], options: &Options) -> Result<Evaluated, Fai
              or cut the record to the decay with --range",
         ));
     }
+    for (k, pole) in fit
+        .poles
+        .iter()
+        .enumerate()
+        .filter(|(k, _)| fit.fit.at_bound[2 * k])
+    {
+        outcome.warn(
+            "at-bound",
+            format!(
+                "mode {} at {} Hz does not decay in this record: its damping is not told",
+                k + 1,
+                rounded(pole.omega_rad_per_s / TAU, 5)
+            ),
+        );
+    }
     let order = fit.by_strength(stretches.len());
     for (place, k) in order.iter().enumerate() {
         name_mode(&mut outcome, &fit, *k, place, order.len());
