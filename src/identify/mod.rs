@@ -9,6 +9,7 @@ use torqcomp_model::fit::FitError;
 
 use crate::failure::Failure;
 use crate::report::Warning;
+use crate::report::chart::Chart;
 
 /// A number that was found, with what is known of it.
 #[derive(Debug, Clone, PartialEq)]
@@ -92,6 +93,8 @@ pub struct Outcome {
     pub method: Vec<String>,
     /// What a user should know.
     pub warnings: Vec<Warning>,
+    /// Data, fit and residual, to be drawn.
+    pub charts: Vec<Chart>,
 }
 
 impl Outcome {

@@ -5,6 +5,7 @@ use torqcomp_model::fit::linear::{self, LinearFit};
 
 use super::{Found, Outcome, Quality, rms};
 use crate::failure::Failure;
+use crate::report::chart::{Chart, Series};
 
 /// One reading under a known load.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -118,6 +119,7 @@ pub fn identify(points: &[Point], options: Options, units: &Units) -> Result<Eva
         coefficients: scaled(&fit, largest),
     };
     evaluated.terms = terms(points, &steps, &evaluated.coefficients, largest);
+    draw(&mut evaluated, units);
     say(&mut evaluated.outcome, points, options);
     Ok(evaluated)
 }
@@ -192,6 +194,32 @@ fn outcome(
         points.len()
     ));
     outcome
+}
+
+/// Readings with the curve through them, and how far they are off.
+fn draw(evaluated: &mut Evaluated, units: &Units) {
+    let mut points = evaluated.points.clone();
+    points.sort_by(|a, b| a.load.total_cmp(&b.load));
+    let loads: Vec<f64> = points.iter().map(|p| p.load).collect();
+    let readings: Vec<f64> = points.iter().map(|p| p.reading).collect();
+    let value = |load: &f64| -> f64 {
+        let power = |(k, c): (usize, &f64)| c * load.powi(k as i32);
+        evaluated.coefficients.iter().enumerate().map(power).sum()
+    };
+    let curve: Vec<f64> = loads.iter().map(value).collect();
+    let left: Vec<f64> = readings.iter().zip(&curve).map(|(r, c)| r - c).collect();
+    let x = format!("load, {}", units.load);
+    let y = format!("reading, {}", units.reading);
+    let both = vec![
+        Series::dots("readings", &loads, &readings),
+        Series::line("fit", &loads, &curve),
+    ];
+    let rest = vec![Series::dots("reading less fit", &loads, &left)];
+    let charts = [
+        Chart::new("Readings and fit", &x, &y, both),
+        Chart::new("Residual", &x, &y, rest),
+    ];
+    evaluated.outcome.charts.extend(charts);
 }
 
 fn constant_name(units: &Units) -> &'static str {

@@ -5,6 +5,8 @@ use std::fmt::Write;
 use serde::Serialize;
 use torqcomp_model::{Kind, UnitSystem};
 
+use super::chart::Chart;
+use super::page::Page;
 use super::{Warning, columns, rounded, short};
 use crate::cli::Units;
 use crate::identify::{Comparison, Found, Outcome, Quality};
@@ -45,6 +47,9 @@ pub struct Report {
     pub method: Vec<String>,
     /// What should be known.
     pub warnings: Vec<Warning>,
+    /// Drawings for the page.
+    #[serde(skip)]
+    pub charts: Vec<Chart>,
 }
 
 /// A number with its standard uncertainty.
@@ -218,6 +223,7 @@ impl Report {
             held_out_errors: Vec::new(),
             method: outcome.method.clone(),
             warnings: outcome.warnings.clone(),
+            charts: outcome.charts.clone(),
         }
     }
 
@@ -245,13 +251,7 @@ impl Report {
         }
         self.say_others(&mut text);
         for pair in &self.correlations {
-            let _ = writeln!(
-                text,
-                "\n{} and {} are hard to tell apart: correlation {}",
-                pair.first,
-                pair.second,
-                rounded(pair.coefficient, 4)
-            );
+            let _ = writeln!(text, "\n{}", correlated(pair));
         }
         text
     }
@@ -266,15 +266,7 @@ impl Report {
         }
         if !self.laws.is_empty() {
             let _ = writeln!(text, "\nDamping laws, the best first:\n");
-            let head = ["law", "left, rms", "criterion"]
-                .map(str::to_owned)
-                .to_vec();
-            let row = |l: &Law| vec![l.law.to_owned(), rounded(l.rms, 4), rounded(l.criterion, 7)];
-            let rows: Vec<Vec<String>> = [head]
-                .into_iter()
-                .chain(self.laws.iter().map(row))
-                .collect();
-            text.push_str(&columns(&rows));
+            text.push_str(&columns(&self.law_rows()));
         }
         if !self.terms.is_empty() {
             let _ = writeln!(
@@ -282,32 +274,114 @@ impl Report {
                 "\nIn the terms of the standards, largest over the loads:\n"
             );
             for term in &self.terms {
-                let value = term.percent.map_or_else(
-                    || "not known".to_owned(),
-                    |p| format!("{} %", rounded(p, 3)),
-                );
+                let value = percent(term.percent);
                 let _ = writeln!(text, "{:<20} {value:>10}  {}", term.name, term.formula);
             }
         }
     }
 
-    /// A page for a browser, complete in itself; `charts` are drawings under their headings.
+    /// A page for a browser, complete in itself.
     #[must_use]
-    pub fn page(&self, charts: &[(String, String)]) -> String {
-        let _ = charts;
-        String::new()
+    pub fn page(&self) -> String {
+        let mut page = Page::new(&format!("{} test", capitalised(self.test)));
+        let rate = self
+            .rate_hz
+            .map_or_else(String::new, |r| format!(" at {} Hz", short(r)));
+        page.text(&format!(
+            "{}: {} samples{rate}",
+            self.inputs.join(", "),
+            self.samples
+        ));
+        page.heading("Constants");
+        page.table(&rows(&self.parameters));
+        if let Some(fit) = &self.fit {
+            page.text(&left(fit));
+        }
+        for warning in &self.warnings {
+            page.warning(warning.code, &warning.message);
+        }
+        if !self.charts.is_empty() {
+            page.heading("Data and fit");
+        }
+        for chart in &self.charts {
+            page.chart(chart);
+        }
+        self.page_of_others(&mut page);
+        page.heading("Method");
+        for line in &self.method {
+            page.text(line);
+        }
+        page.text(&format!("torqcomp {}", self.version));
+        page.html()
+    }
+
+    fn page_of_others(&self, page: &mut Page) {
+        for other in &self.comparisons {
+            page.heading(&format!("For comparison, {}", other.method));
+            page.table(&rows(&other.parameters));
+            if let Some(fit) = &other.fit {
+                page.text(&left(fit));
+            }
+        }
+        for pair in &self.correlations {
+            page.text(&correlated(pair));
+        }
+        if !self.laws.is_empty() {
+            page.heading("Damping laws, the best first");
+            page.table(&self.law_rows());
+        }
+        if !self.terms.is_empty() {
+            page.heading("In the terms of the standards, largest over the loads");
+            let head = ["term", "value", "formula"].map(str::to_owned).to_vec();
+            let row = |t: &Term| vec![t.name.to_owned(), percent(t.percent), t.formula.to_owned()];
+            let rows: Vec<Vec<String>> = [head]
+                .into_iter()
+                .chain(self.terms.iter().map(row))
+                .collect();
+            page.table(&rows);
+        }
+    }
+
+    fn law_rows(&self) -> Vec<Vec<String>> {
+        let head = ["law", "left, rms", "criterion"]
+            .map(str::to_owned)
+            .to_vec();
+        let row = |l: &Law| vec![l.law.to_owned(), rounded(l.rms, 4), rounded(l.criterion, 7)];
+        [head]
+            .into_iter()
+            .chain(self.laws.iter().map(row))
+            .collect()
     }
 }
 
-fn table(parameters: &[Parameter]) -> String {
+fn percent(value: Option<f64>) -> String {
+    value.map_or_else(
+        || "not known".to_owned(),
+        |p| format!("{} %", rounded(p, 3)),
+    )
+}
+
+fn correlated(pair: &Correlation) -> String {
+    format!(
+        "{} and {} are hard to tell apart: correlation {}",
+        pair.first,
+        pair.second,
+        rounded(pair.coefficient, 4)
+    )
+}
+
+fn rows(parameters: &[Parameter]) -> Vec<Vec<String>> {
     let head = ["", "value", "std", "unit", "relative"]
         .map(str::to_owned)
         .to_vec();
-    let rows: Vec<Vec<String>> = [head]
+    [head]
         .into_iter()
         .chain(parameters.iter().map(Parameter::row))
-        .collect();
-    columns(&rows)
+        .collect()
+}
+
+fn table(parameters: &[Parameter]) -> String {
+    columns(&rows(parameters))
 }
 
 fn left(fit: &Fit) -> String {

@@ -59,8 +59,7 @@ pub fn run(args: &Decay) -> Result<Outcome, Failure> {
             criterion: l.criterion,
         })
         .collect();
-    let page = || report.page(&[]);
-    deliver(&report, &page, &args.findings, &inputs, &entries)
+    deliver(&report, &args.findings, &inputs, &entries)
 }
 
 /// Reads one record; samples that are not there are left out, as the fit needs no uniform steps.

@@ -58,7 +58,6 @@ fn declared(
 /// Prints the report, writes the stand file and the page.
 fn deliver(
     report: &Report,
-    page: &dyn Fn() -> String,
     findings: &Findings,
     inputs: &[&str],
     entries: &[Entry],
@@ -88,7 +87,7 @@ fn deliver(
             .copied()
             .chain(result.output.as_deref().map(Path::new))
             .collect();
-        output::write_all(Some(place), result.force, &beside, &page())?;
+        output::write_all(Some(place), result.force, &beside, &report.page())?;
     }
     let printed = match (findings.json, result.output.as_deref()) {
         (true, _) => report::json(report),

@@ -66,8 +66,7 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
         .iter()
         .map(|e| Some(*e).filter(|e| e.is_finite()))
         .collect();
-    let page = || report.page(&[]);
-    deliver(&report, &page, &args.findings, &inputs, &entries)
+    deliver(&report, &args.findings, &inputs, &entries)
 }
 
 fn load(args: &Response, input: &str) -> Result<Loaded, Failure> {

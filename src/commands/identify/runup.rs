@@ -77,8 +77,7 @@ pub fn run(args: &Runup) -> Result<Outcome, Failure> {
             "a mass has no place in a stand file; leave -o out, or record an angle and a torque",
         ));
     }
-    let page = || report.page(&[]);
-    deliver(&report, &page, &args.findings, &[&args.input], &entries)
+    deliver(&report, &args.findings, &[&args.input], &entries)
 }
 
 /// What a unit says of the motion: its derivative, and whether it turns.

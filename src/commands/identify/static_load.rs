@@ -104,8 +104,7 @@ pub fn run(args: &Static) -> Result<Outcome, Failure> {
             percent: t.percent,
         })
         .collect();
-    let page = || report.page(&[]);
-    deliver(&report, &page, &args.findings, &[&args.input], &entries)
+    deliver(&report, &args.findings, &[&args.input], &entries)
 }
 
 fn column(

@@ -10,6 +10,7 @@ use torqcomp_dsp::{decimate, onset, peaks};
 
 use super::{Comparison, Correlated, Found, Outcome, Quality, STRONG, rms};
 use crate::failure::Failure;
+use crate::report::chart::{Chart, Series};
 use crate::report::{rounded, short};
 
 pub use laws::{Law, LawFit, envelope};
@@ -143,6 +144,7 @@ pub fn identify(records: &[Ringing], options: &Options) -> Result<Evaluated, Fai
     let laws = damping_law(&mut outcome, &fit, &stretches)?;
     amplitude_dependence(&mut outcome, &fit, &stretches, main);
     by_hand(&mut outcome, &fit, &stretches, main);
+    draw(&mut outcome, &fit, &stretches, &starts_s);
     if !fit.fit.stop.converged() {
         outcome.warn(
             "not-converged",
@@ -483,4 +485,28 @@ fn by_hand(outcome: &mut Outcome, fit: &ModesFit, stretches: &[Stretch], main: u
             quality: None,
         });
     }
+}
+
+/// The longest stretch with its fit, and what is left.
+fn draw(outcome: &mut Outcome, fit: &ModesFit, stretches: &[Stretch], starts_s: &[f64]) {
+    let Some(s) = (0..stretches.len()).max_by_key(|s| stretches[*s].values.len()) else {
+        return;
+    };
+    let times: Vec<f64> = stretches[s]
+        .times_s
+        .iter()
+        .map(|t| t + starts_s[s])
+        .collect();
+    let left: Vec<f64> = fit.residuals[s].iter().map(|r| -r).collect();
+    let both = vec![
+        Series::line("data", &times, &stretches[s].values),
+        Series::line("fit", &times, &fit.curve(stretches, s)),
+    ];
+    outcome
+        .charts
+        .push(Chart::new("Decay and fit", "time, s", "signal", both));
+    let rest = vec![Series::line("data less fit", &times, &left)];
+    outcome
+        .charts
+        .push(Chart::new("Residual", "time, s", "signal", rest));
 }

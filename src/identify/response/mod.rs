@@ -10,8 +10,9 @@ use torqcomp_dsp::frf::{self, Block, Estimator, Frf, Window};
 use super::decay::Pole;
 use super::{Comparison, Found, Outcome, Quality};
 use crate::failure::Failure;
+use crate::report::chart::{Chart, Series};
 use crate::report::{rounded, short};
-pub use modal::{Data, Modal};
+pub use modal::{Data, Effort, Modal};
 
 /// How the stand was excited.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -78,7 +79,7 @@ const MOST_MODES: usize = 24;
 /// Modes without gain after which no more are tried.
 const PATIENCE: usize = 3;
 /// Fewer modes are preferred if the error held out is no more than this much larger.
-const SLACK: f64 = 1.03;
+const SLACK: f64 = 1.05;
 
 /// Evaluates records of one stand.
 ///
@@ -91,10 +92,11 @@ pub fn identify(records: &[Driven], options: &Options) -> Result<Evaluated, Fail
     let modal = order(&set, &lines, options)?;
     let (best, held_out) = modal;
     let data = data(&set, &lines, options, &|_| true);
-    let mut fitted = data.fit(&[])?;
+    let mut fitted = data.fit(&[], Effort::Coarse)?;
     for _ in 0..best {
-        fitted = grow(&data, &fitted)?.unwrap_or(fitted);
+        fitted = grow(&data, &fitted, options)?.unwrap_or(fitted);
     }
+    fitted = data.fit(&fitted.poles, Effort::Fine)?;
     let count = fitted.poles.len();
     let spread = jackknife(&set, &lines, options, &fitted)?;
     name_modes(&mut outcome, &fitted, &spread);
@@ -143,6 +145,7 @@ pub fn identify(records: &[Driven], options: &Options) -> Result<Evaluated, Fail
     let h1 = Frf::of(set.blocks.iter(), Estimator::H1);
     raw_error(&mut outcome, &set, &lines);
     levels(&mut outcome, &set, &lines);
+    draw(&mut outcome, &h1, &lines, set.step_hz, &fitted, &held_out);
     Ok(Evaluated {
         outcome,
         frequency_hz: lines.clone().map(|k| k as f64 * set.step_hz).collect(),
@@ -463,13 +466,18 @@ fn data(set: &Set, lines: &Range<usize>, options: &Options, keep: &dyn Fn(usize)
     }
 }
 
-fn grow(data: &Data, so_far: &Modal) -> Result<Option<Modal>, Failure> {
-    let Some(pole) = data.next_pole(so_far) else {
+/// Modes closer than this part of their frequency are not looked for unless their number is given: a
+/// mode that is not quite linear leaves something beside its line.
+const APART: f64 = 0.03;
+
+fn grow(data: &Data, so_far: &Modal, options: &Options) -> Result<Option<Modal>, Failure> {
+    let apart = if options.modes.is_some() { 0.0 } else { APART };
+    let Some(pole) = data.next_pole(so_far, apart) else {
         return Ok(None);
     };
     let mut starts = so_far.poles.clone();
     starts.push(pole);
-    Ok(Some(data.fit(&starts)?))
+    Ok(Some(data.fit(&starts, Effort::Coarse)?))
 }
 
 /// Folds of the blocks: each is held out once.
@@ -507,7 +515,7 @@ fn order(set: &Set, lines: &Range<usize>, options: &Options) -> Result<(usize, V
         .collect();
     let mut models: Vec<Modal> = training
         .iter()
-        .map(|d| d.fit(&[]))
+        .map(|d| d.fit(&[], Effort::Coarse))
         .collect::<Result<_, _>>()?;
     let error = |models: &[Modal]| -> f64 {
         let each = models.iter().zip(&folds).flat_map(|(model, fold)| {
@@ -520,7 +528,7 @@ fn order(set: &Set, lines: &Range<usize>, options: &Options) -> Result<(usize, V
     let mut since = 0;
     while errors.len() <= most && (since < PATIENCE || options.modes.is_some()) {
         for (model, data) in models.iter_mut().zip(&training) {
-            if let Some(next) = grow(data, model)? {
+            if let Some(next) = grow(data, model, options)? {
                 *model = next;
             }
         }
@@ -565,7 +573,7 @@ fn jackknife(
     for g in 0..groups {
         let out = count * g / groups..count * (g + 1) / groups;
         let part = data(set, lines, options, &|i| !out.contains(&i));
-        each.push(part.fit(&fitted.poles)?.poles);
+        each.push(part.fit(&fitted.poles, Effort::Coarse)?.poles);
     }
     let spread = |pick: &dyn Fn(&Pole) -> f64, k: usize| {
         let n = groups as f64;
@@ -713,4 +721,66 @@ fn levels(outcome: &mut Outcome, set: &Set, lines: &Range<usize>) {
             );
         }
     }
+}
+
+/// Response with its bounds and the model, phase, coherence, and the error against the number of modes.
+fn draw(
+    outcome: &mut Outcome,
+    h1: &Frf,
+    lines: &Range<usize>,
+    step_hz: f64,
+    fitted: &Modal,
+    held_out: &[f64],
+) {
+    let hz: Vec<f64> = lines.clone().map(|k| k as f64 * step_hz).collect();
+    let of = |values: &[num_complex::Complex64], f: fn(&num_complex::Complex64) -> f64| {
+        values.iter().map(f).collect::<Vec<f64>>()
+    };
+    let part = &h1.response[lines.clone()];
+    let size = |c: &num_complex::Complex64| c.norm();
+    let turn = |c: &num_complex::Complex64| c.arg().to_degrees();
+    let pair = |f: fn(&num_complex::Complex64) -> f64| {
+        vec![
+            Series::line("H1", &hz, &of(part, f)),
+            Series::line("model", &hz, &of(&fitted.response, f)),
+        ]
+    };
+    let mut magnitude = Chart::new(
+        "Response",
+        "frequency, Hz",
+        "measured over applied",
+        pair(size),
+    );
+    magnitude.y_log = true;
+    // Twice the standard uncertainty to both sides.
+    magnitude.band = lines
+        .clone()
+        .filter_map(|k| {
+            let (middle, std) = (h1.response[k].norm(), 2.0 * h1.relative_std(k)?);
+            (std < 1.0).then(|| {
+                (
+                    k as f64 * step_hz,
+                    middle * (1.0 - std),
+                    middle * (1.0 + std),
+                )
+            })
+        })
+        .collect();
+    outcome.charts.push(magnitude);
+    outcome
+        .charts
+        .push(Chart::new("Phase", "frequency, Hz", "degrees", pair(turn)));
+    let coherence = vec![Series::line("coherence", &hz, &h1.coherence[lines.clone()])];
+    outcome
+        .charts
+        .push(Chart::new("Coherence", "frequency, Hz", "", coherence));
+    let counts: Vec<f64> = (0..held_out.len()).map(|n| n as f64).collect();
+    let percent: Vec<f64> = held_out.iter().map(|e| 100.0 * e).collect();
+    let error = vec![Series::dots("on data held out", &counts, &percent)];
+    outcome.charts.push(Chart::new(
+        "Error and number of modes",
+        "modes",
+        "per cent",
+        error,
+    ));
 }

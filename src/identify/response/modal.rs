@@ -11,7 +11,7 @@
 
 use nalgebra::DMatrix;
 use num_complex::Complex64;
-use torqcomp_model::fit::{Differences, Fit, FitError, Options, Parameter, linear, minimize};
+use torqcomp_model::fit::{Fit, FitError, Options, Parameter, Residuals, linear, minimize};
 
 use crate::identify::decay::Pole;
 
@@ -30,6 +30,15 @@ pub struct Data {
     pub added_rate: f64,
     /// Whether a delay is fitted.
     pub with_delay: bool,
+}
+
+/// How exactly a fit is made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Effort {
+    /// Enough to choose by.
+    Coarse,
+    /// To the end.
+    Fine,
 }
 
 /// A modal model.
@@ -53,21 +62,33 @@ impl Data {
         self.omega[self.omega.len() / 2]
     }
 
-    /// The columns at a frequency, for poles with the window's rate in them.
+    /// The columns at a frequency.
     fn columns(&self, omega: f64, poles: &[Pole], delay_s: f64, scale: f64) -> Vec<Complex64> {
-        let s = Complex64::new(0.0, omega / scale);
-        let front = s.powi(self.order) * Complex64::from_polar(1.0, -omega * delay_s);
+        let (front, s) = self.front(omega, delay_s, scale);
         let mut all = Vec::with_capacity(2 * poles.len() + 2);
         for pole in poles {
-            let p =
-                Complex64::new(-(pole.rate_per_s + self.added_rate), pole.omega_rad_per_s) / scale;
-            let (near, far) = (1.0 / (s - p), 1.0 / (s - p.conj()));
+            let (near, far) = self.fractions(s, *pole, scale);
             all.push(front * (near + far));
             all.push(front * Complex64::I * (near - far));
         }
         all.push(front);
         all.push(front / (s * s));
         all
+    }
+
+    /// What stands before the sum, and s.
+    fn front(&self, omega: f64, delay_s: f64, scale: f64) -> (Complex64, Complex64) {
+        let s = Complex64::new(0.0, omega / scale);
+        (
+            s.powi(self.order) * Complex64::from_polar(1.0, -omega * delay_s),
+            s,
+        )
+    }
+
+    /// 1/(s − p) and 1/(s − p*), with the window's rate in p.
+    fn fractions(&self, s: Complex64, pole: Pole, scale: f64) -> (Complex64, Complex64) {
+        let p = Complex64::new(-(pole.rate_per_s + self.added_rate), pole.omega_rad_per_s) / scale;
+        (1.0 / (s - p), 1.0 / (s - p.conj()))
     }
 
     /// Linear numbers for given poles, and weighted residuals, real and imaginary one after another.
@@ -97,7 +118,7 @@ impl Data {
     ///
     /// # Errors
     /// [`FitError`] if there are too few lines.
-    pub fn fit(&self, starts: &[Pole]) -> Result<Modal, FitError> {
+    pub fn fit(&self, starts: &[Pole], effort: Effort) -> Result<Modal, FitError> {
         let (low, high) = (self.omega[0], self.omega[self.omega.len() - 1]);
         let mut parameters = Vec::new();
         for (k, pole) in starts.iter().enumerate() {
@@ -112,40 +133,27 @@ impl Data {
             let delay = Parameter::new("delay", 0.0).scaled(step);
             parameters.push(delay.at_least(-8.0 * step).at_most(8.0 * step));
         }
-        let poles_of = |p: &[f64]| -> Vec<Pole> {
-            (0..starts.len())
-                .map(|k| Pole {
-                    rate_per_s: p[2 * k],
-                    omega_rad_per_s: p[2 * k + 1],
-                })
-                .collect()
-        };
-        let delay_of = |p: &[f64]| {
-            if self.with_delay {
-                p[2 * starts.len()]
-            } else {
-                0.0
-            }
+        let problem = Problem {
+            data: self,
+            modes: starts.len(),
         };
         let fit = if parameters.is_empty() {
             None
         } else {
-            let residuals = |p: &[f64], out: &mut Vec<f64>| {
-                out.extend(self.solve(&poles_of(p), delay_of(p))?.residuals);
-                Ok(())
+            let (tolerance, rounds) = match effort {
+                Effort::Coarse => (1e-4, 12),
+                Effort::Fine => (1e-10, 100),
             };
             let options = Options {
-                differences: Differences::Forward,
-                threads: 2,
-                tolerance: 1e-9,
-                most_evaluations: 60 * (parameters.len() + 2),
+                tolerance,
+                most_evaluations: 2 * rounds,
                 ..Options::default()
             };
-            Some(minimize(&residuals, &parameters, &options)?)
+            Some(minimize(&problem, &parameters, &options)?)
         };
         let (poles, delay_s) = fit.as_ref().map_or_else(
             || (Vec::new(), 0.0),
-            |f| (poles_of(&f.values), delay_of(&f.values)),
+            |f| (problem.poles(&f.values), problem.delay(&f.values)),
         );
         let solved = self.solve(&poles, delay_s)?;
         let scale = self.scale();
@@ -163,13 +171,21 @@ impl Data {
         })
     }
 
-    /// A start for one more mode: the strongest line of what is left.
+    /// A start for one more mode: the strongest line of what is left, not within `apart` (a part of the
+    /// frequency) of the modes there are.
     #[must_use]
-    pub fn next_pole(&self, so_far: &Modal) -> Option<Pole> {
+    pub fn next_pole(&self, so_far: &Modal, apart: f64) -> Option<Pole> {
         let left: Vec<f64> = (0..self.omega.len())
             .map(|i| self.weight[i] * (self.response[i] - so_far.response[i]).norm())
             .collect();
-        let best = (0..left.len()).max_by(|a, b| left[*a].total_cmp(&left[*b]))?;
+        let near = |omega: f64| {
+            so_far
+                .poles
+                .iter()
+                .any(|p| (omega / p.omega_rad_per_s - 1.0).abs() < apart)
+        };
+        let open = (0..left.len()).filter(|i| !near(self.omega[*i]));
+        let best = open.max_by(|a, b| left[*a].total_cmp(&left[*b]))?;
         let below = |i: &usize| left[*i] < std::f64::consts::FRAC_1_SQRT_2 * left[best];
         let from = (0..best).rev().find(below).unwrap_or(0);
         let to = (best + 1..left.len()).find(below).unwrap_or(left.len() - 1);
@@ -200,6 +216,106 @@ impl Data {
             }
         }
         found.map(|(_, pole)| pole)
+    }
+}
+
+/// The search for poles and delay, the linear numbers following at once.
+struct Problem<'a> {
+    data: &'a Data,
+    modes: usize,
+}
+
+impl Problem<'_> {
+    fn poles(&self, p: &[f64]) -> Vec<Pole> {
+        (0..self.modes)
+            .map(|k| Pole {
+                rate_per_s: p[2 * k],
+                omega_rad_per_s: p[2 * k + 1],
+            })
+            .collect()
+    }
+
+    fn delay(&self, p: &[f64]) -> f64 {
+        if self.data.with_delay {
+            p[2 * self.modes]
+        } else {
+            0.0
+        }
+    }
+
+    /// Derivatives of the model with the linear numbers held, by σ and ω of each mode and the delay.
+    fn slopes(&self, omega: f64, poles: &[Pole], delay_s: f64, linear: &[f64]) -> Vec<Complex64> {
+        let scale = self.data.scale();
+        let (front, s) = self.data.front(omega, delay_s, scale);
+        let mut all = Vec::with_capacity(2 * poles.len() + 1);
+        for (k, pole) in poles.iter().enumerate() {
+            let (near, far) = self.data.fractions(s, *pole, scale);
+            let residue = Complex64::new(linear[2 * k], linear[2 * k + 1]);
+            let (a, b) = (
+                residue * near * near / scale,
+                residue.conj() * far * far / scale,
+            );
+            all.push(-front * (a + b));
+            all.push(front * Complex64::I * (a - b));
+        }
+        if self.data.with_delay {
+            let columns = self.data.columns(omega, poles, delay_s, scale);
+            let model: Complex64 = columns.iter().zip(linear).map(|(c, v)| c * v).sum();
+            all.push(Complex64::new(0.0, -omega) * model);
+        }
+        all
+    }
+}
+
+impl Residuals for Problem<'_> {
+    fn residuals(&self, p: &[f64], out: &mut Vec<f64>) -> Result<(), FitError> {
+        out.extend(self.data.solve(&self.poles(p), self.delay(p))?.residuals);
+        Ok(())
+    }
+
+    fn has_jacobian(&self) -> bool {
+        true
+    }
+
+    /// The slopes with what the linear numbers can make up for taken out (L. Kaufman, BIT 15 (1975), 49).
+    fn jacobian(&self, p: &[f64], out: &mut DMatrix<f64>) -> Result<(), FitError> {
+        let (poles, delay_s) = (self.poles(p), self.delay(p));
+        let linear = self.data.solve(&poles, delay_s)?.values;
+        let lines = self.data.omega.len();
+        let scale = self.data.scale();
+        let mut design = DMatrix::zeros(2 * lines, linear.len());
+        for (i, omega) in self.data.omega.iter().enumerate() {
+            let w = self.data.weight[i];
+            let put = |to: &mut DMatrix<f64>, j: usize, value: Complex64| {
+                to[(2 * i, j)] = w * value.re;
+                to[(2 * i + 1, j)] = w * value.im;
+            };
+            for (j, value) in self
+                .data
+                .columns(*omega, &poles, delay_s, scale)
+                .into_iter()
+                .enumerate()
+            {
+                put(&mut design, j, value);
+            }
+            for (j, value) in self
+                .slopes(*omega, &poles, delay_s, &linear)
+                .into_iter()
+                .enumerate()
+            {
+                put(out, j, value);
+            }
+        }
+        for mut column in design.column_iter_mut() {
+            let size = column.norm();
+            if size > 0.0 {
+                column.unscale_mut(size);
+            }
+        }
+        let q = design.qr().q();
+        let made_up = &q * q.tr_mul(out);
+        *out -= made_up;
+        Ok(())
     }
 }
 

@@ -17,6 +17,7 @@ use torqcomp_dsp::weak::{Window, white_noise_variance};
 
 use super::{Comparison, Correlated, Found, Outcome, Quality, STRONG, rms};
 use crate::failure::Failure;
+use crate::report::chart::{Chart, Series};
 use regression::{Corrected, solve};
 
 /// What the motion channel holds.
@@ -149,6 +150,7 @@ pub fn identify(run: &Run, options: &Options) -> Result<Outcome, Failure> {
             }
         }
     }
+    draw(&mut outcome, run, half, &fitted);
     say(&mut outcome, run, &directions, options, &fitted);
     if let Some(classical) = classical::identify(run, &directions, half, split)? {
         outcome.comparisons.push(classical);
@@ -360,6 +362,35 @@ fn named(run: &Run, directions: &Directions, split: bool, fitted: &Corrected) ->
         .enumerate()
         .map(|(i, (name, unit))| Found::new(name, fitted.values[i], fitted.std(i), unit))
         .collect()
+}
+
+/// The torque and what the equation of motion makes of the motion, and the difference.
+fn draw(outcome: &mut Outcome, run: &Run, half: usize, fitted: &Corrected) {
+    let stride = (half / 2).max(1);
+    let time = |k: usize| (half + k * stride) as f64 / run.rate_hz;
+    let times: Vec<f64> = (0..fitted.right.len()).map(time).collect();
+    let model: Vec<f64> = fitted
+        .right
+        .iter()
+        .zip(&fitted.residuals)
+        .map(|(b, r)| b + r)
+        .collect();
+    let left: Vec<f64> = fitted.residuals.iter().map(|r| -r).collect();
+    let unit = run.body.effort();
+    let both = vec![
+        Series::line("measured", &times, &fitted.right),
+        Series::line("from the motion", &times, &model),
+    ];
+    outcome.charts.push(Chart::new(
+        "Torque or force, averaged",
+        "time from the start, s",
+        unit,
+        both,
+    ));
+    let rest = vec![Series::line("measured less model", &times, &left)];
+    outcome
+        .charts
+        .push(Chart::new("Residual", "time from the start, s", unit, rest));
 }
 
 /// What a user should know about this run.
