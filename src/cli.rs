@@ -1,5 +1,7 @@
 //! The command line.
 
+pub mod identify;
+
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -40,6 +42,8 @@ pub enum Verb {
     Extract(Extract),
     /// What recordings hold, and what is wrong with them
     Inspect(Inspect),
+    /// Constants of the stand from records, with their uncertainties
+    Identify(identify::Identify),
 }
 
 /// Units that results are printed in.

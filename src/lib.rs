@@ -3,6 +3,7 @@
 pub mod cli;
 pub mod commands;
 pub mod failure;
+pub mod identify;
 pub mod io;
 pub mod pipeline;
 pub mod quality;

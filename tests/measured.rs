@@ -46,6 +46,9 @@ fn main() {
         ),
         test("thrust_balance_is_refused_and_resampled", thrust_balance),
         test("silverbox_volts_to_volts", silverbox),
+        test("emps_mass_and_friction_are_found", emps),
+        test("hammer_modes_are_found", hammer),
+        test("frequencies_of_ringing_beams_are_found", ringing),
         test("recordings_hold_what_was_counted", recordings::all),
         test("recordings_have_segments", recordings::segments),
         test("settings_are_no_recording", recordings::settings),
@@ -308,4 +311,122 @@ fn silverbox(folder: &Path) -> Result<(), Failed> {
         code == 1 && err.contains("\"v1_in_V\" or \"v2_out_V\""),
         &err,
     )
+}
+
+fn number(report: &Value, name: &str) -> Result<f64, Failed> {
+    let all = report["parameters"].as_array().ok_or("no parameters")?;
+    let found = all.iter().find(|p| p["name"] == name);
+    let value = found.and_then(|p| p["value"].as_f64());
+    value.ok_or_else(|| format!("{name} is not in {all:?}").into())
+}
+
+fn identified(args: &[&str]) -> Result<Value, Failed> {
+    let (code, out, err) = run(STAND, &[&["identify"], args, &["--json"]].concat())?;
+    check(code == 0, &err)?;
+    Ok(serde_json::from_str(&out)?)
+}
+
+/// The published mass within 0.5 %, friction within 1 %, and the force at least as well.
+fn emps(folder: &Path) -> Result<(), Failed> {
+    let file = folder.join("emps/estimation.csv");
+    let path = file.to_str().unwrap_or_default();
+    let args = [
+        "runup",
+        path,
+        "--motion",
+        "measured_position_m",
+        "--motion-unit",
+        "m",
+        "--torque",
+        "control_V",
+        "--torque-factor",
+        "35.15065188 N/V",
+    ];
+    let report = identified(&args)?;
+    for (name, published, within) in [
+        ("mass", 95.11, 5e-3),
+        ("viscous_friction", 203.5, 1e-2),
+        ("dry_friction", 20.39, 1e-2),
+    ] {
+        let got = number(&report, name)?;
+        check(
+            (got / published - 1.0).abs() < within,
+            format!("{name}: {got}, published {published}"),
+        )?;
+    }
+    let relative = |r: &Value| r["fit"]["relative"].as_f64().unwrap_or(1.0);
+    check(
+        relative(&report) <= 0.0413,
+        format!("{}", relative(&report)),
+    )?;
+    let split = identified(&[&args[..], &["--by-direction"]].concat())?;
+    check(relative(&split) <= 0.032, format!("{}", relative(&split)))
+}
+
+/// The eight modes, and one hit from the two others.
+fn hammer(folder: &Path) -> Result<(), Failed> {
+    let hits = [1, 2, 3].map(|k| folder.join(format!("hammer/hit{k}.lvm")));
+    let paths = hits.each_ref().map(|p| p.to_str().unwrap_or_default());
+    let args = [
+        "--applied",
+        "Force (Trigger)",
+        "--measured",
+        "Acceleration (Trigger)",
+        "--measured-as",
+        "acceleration",
+        "--band",
+        "60..1000",
+    ];
+    let report = identified(&[&["response"], &paths[..], &args[..]].concat())?;
+    let error = number(&report, "held_out_error")?;
+    check(error <= 10.0, format!("{error} %"))?;
+    let all = report["parameters"].as_array().ok_or("no parameters")?;
+    let found: Vec<f64> = all
+        .iter()
+        .filter(|p| {
+            p["name"]
+                .as_str()
+                .is_some_and(|n| n.ends_with("natural_frequency"))
+        })
+        .filter_map(|p| p["value"].as_f64())
+        .collect();
+    for want in [99.5, 163.3, 241.9, 366.9, 446.3, 556.5, 730.7, 870.7] {
+        check(
+            found.iter().any(|f| (f - want).abs() <= 0.5),
+            format!("{want} Hz in {found:?}"),
+        )?;
+    }
+    Ok(())
+}
+
+/// 25.5 to 33.9 Hz as the support moves; 0.50 to 0.62 Hz and a damping ratio of 0.0011 to 0.0015.
+fn ringing(folder: &Path) -> Result<(), Failed> {
+    let beam = folder.join("strain_beam/set0_test0.txt");
+    for range in ["9.7..12", "5.4..6"] {
+        let args = [
+            "--channel",
+            "SG_300_a",
+            "--band",
+            "20..50",
+            "--range",
+            range,
+        ];
+        let report =
+            identified(&[&["decay", beam.to_str().unwrap_or_default()], &args[..]].concat())?;
+        let got = number(&report, "natural_frequency")?;
+        check((25.5..=33.9).contains(&got), format!("{range}: {got}"))?;
+    }
+    let args = ["--time-column", "1", "--time-unit", "s", "--modes", "1"];
+    for file in ["1.caldata_m4_l5_F9_725.txt", "data1.txt", "data15.txt"] {
+        let path = folder.join("thrust_balance").join(file);
+        let report =
+            identified(&[&["decay", path.to_str().unwrap_or_default()], &args[..]].concat())?;
+        let got = number(&report, "natural_frequency")?;
+        check((0.50..=0.62).contains(&got), format!("{file}: {got}"))?;
+        if file == "data15.txt" {
+            let ratio = number(&report, "damping_ratio")?;
+            check((0.0011..=0.0015).contains(&ratio), format!("{ratio}"))?;
+        }
+    }
+    Ok(())
 }

@@ -5,6 +5,7 @@ mod util;
 mod bad_input;
 mod compensate;
 mod harmonics;
+mod identify;
 mod inspect;
 mod output;
 mod predict;

@@ -3,6 +3,7 @@
 mod compensate;
 mod extract;
 mod harmonics;
+mod identify;
 mod inspect;
 mod predict;
 mod rows;
@@ -37,6 +38,7 @@ pub fn run(cli: Cli) -> Result<Outcome, Failure> {
         Verb::Inspect(args) => inspect::run(&args),
         Verb::Table(args) => table::run(&args),
         Verb::Predict(args) => predict::run(&args),
+        Verb::Identify(args) => identify::run(&args),
     }
 }
 

@@ -1,8 +1,11 @@
 //! What the verbs report, as plain data: one struct for each, written as text or as JSON.
 
+pub mod chart;
 pub mod compensate;
 pub mod harmonics;
+pub mod identify;
 pub mod inspect;
+pub mod page;
 pub mod panels;
 pub mod predict;
 pub mod svg;

@@ -5,6 +5,7 @@ mod drawing;
 mod file;
 mod measuring;
 mod section;
+pub mod update;
 
 use torqcomp_dsp::bridge::{BridgeLayout, Leads, Supply};
 use torqcomp_dsp::recorder::Recorder;

@@ -1,0 +1,131 @@
+//! Fewer samples of a record whose upper frequencies hold only noise.
+
+use std::f64::consts::PI;
+
+use crate::Error;
+
+/// Half-length of the low-pass in samples of the result.
+const REACH: usize = 8;
+/// Corner as a part of the new rate.
+const CORNER: f64 = 0.36;
+/// Kaiser's window for 80 dB.
+const BETA: f64 = 7.9;
+
+/// Part of the new rate up to which the response is 1 within 2·10⁻⁴.
+pub const PASS: f64 = 0.2;
+
+/// A record at a lower rate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Decimated {
+    /// Its samples.
+    pub samples: Vec<f64>,
+    /// Place of the first of them in the record.
+    pub first: usize,
+    /// Samples of the record for one of these.
+    pub factor: usize,
+}
+
+/// Low-passes a record and keeps every `factor`-th sample, only where the low-pass (a sinc under
+/// Kaiser's window, symmetrical) lies within the record.
+///
+/// A sum of exponentials stays a sum of exponentials with the same frequencies and decay rates, since
+/// every linear filter only changes their amplitudes; those below [`PASS`] times the new rate keep
+/// them.
+///
+/// # Errors
+/// [`Error::TooShort`] if not two samples would be left.
+///
+/// ```
+/// let slow: Vec<f64> = (0..1000).map(|i| (0.01 * f64::from(i)).sin()).collect();
+/// let few = torqcomp_dsp::decimate::decimate(&slow, 10)?;
+/// assert_eq!((few.first, few.samples.len()), (80, 84));
+/// assert!((few.samples[7] - (0.01_f64 * 150.0).sin()).abs() < 2e-4);
+/// # Ok::<(), torqcomp_dsp::Error>(())
+/// ```
+pub fn decimate(samples: &[f64], factor: usize) -> Result<Decimated, Error> {
+    let factor = factor.max(1);
+    if factor == 1 {
+        return Ok(Decimated {
+            samples: samples.to_vec(),
+            first: 0,
+            factor,
+        });
+    }
+    let half = REACH * factor;
+    let expected = 2 * half + 1 + factor;
+    if samples.len() < expected {
+        return Err(Error::TooShort {
+            what: "a lower rate",
+            expected,
+            got: samples.len(),
+        });
+    }
+    let taps = taps(half, CORNER / factor as f64);
+    let kept = samples
+        .windows(taps.len())
+        .step_by(factor)
+        .map(|window| window.iter().zip(&taps).map(|(x, h)| x * h).sum())
+        .collect();
+    Ok(Decimated {
+        samples: kept,
+        first: half,
+        factor,
+    })
+}
+
+/// A low-pass of 2·half + 1 taps with sum 1; the corner in cycles a sample.
+fn taps(half: usize, corner: f64) -> Vec<f64> {
+    let mut taps: Vec<f64> = (0..=2 * half)
+        .map(|i| {
+            let k = i as f64 - half as f64;
+            let x = k / (half + 1) as f64;
+            let sinc = if k == 0.0 {
+                2.0 * corner
+            } else {
+                (2.0 * PI * corner * k).sin() / (PI * k)
+            };
+            sinc * bessel_i0(BETA * (1.0 - x * x).sqrt())
+        })
+        .collect();
+    let sum: f64 = taps.iter().sum();
+    taps.iter_mut().for_each(|t| *t /= sum);
+    taps
+}
+
+/// Modified Bessel function of order 0 by its series.
+fn bessel_i0(x: f64) -> f64 {
+    let (mut term, mut sum, mut k) = (1.0, 1.0, 1.0);
+    while term > 1e-17 * sum {
+        term *= (0.5 * x / k).powi(2);
+        sum += term;
+        k += 1.0;
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn decays_keep_their_rates_and_what_is_above_is_gone() {
+        let decay = |t: f64| (-0.002 * t).exp() * (0.05 * t).cos();
+        let record: Vec<f64> = (0..4000)
+            .map(|i| decay(f64::from(i)) + (2.5 * f64::from(i)).sin())
+            .collect();
+        let few = decimate(&record, 12).unwrap();
+        for (k, value) in few.samples.iter().enumerate() {
+            let want = decay((few.first + 12 * k) as f64);
+            assert!((value - want).abs() < 4e-4, "{k}: {value} {want}");
+        }
+    }
+
+    #[test]
+    fn short_records_are_refused_and_factor_one_changes_nothing() {
+        assert!(matches!(
+            decimate(&[0.0; 100], 10),
+            Err(Error::TooShort { .. })
+        ));
+        assert_eq!(decimate(&[1.0, 2.0], 1).unwrap().samples, [1.0, 2.0]);
+    }
+}

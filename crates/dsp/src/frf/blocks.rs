@@ -1,0 +1,235 @@
+//! Cutting records into blocks, and their spectra.
+
+use num_complex::Complex64;
+use realfft::RealFftPlanner;
+
+use super::Block;
+
+/// What a block is weighted with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Window {
+    /// Nothing: whole periods, or transients that die out.
+    None,
+    /// Hann's, for noise.
+    Hann,
+    /// e^{−i/τ} over samples i, on both signals: transients that do not die out. Every decay rate
+    /// appears larger by 1/τ, exactly.
+    Exponential(f64),
+}
+
+/// Spectra of an applied and a measured block of one length.
+#[must_use]
+pub fn transform(applied: &[f64], measured: &[f64], window: Window) -> Block {
+    Block {
+        applied: spectrum(applied, window),
+        measured: spectrum(measured, window),
+    }
+}
+
+fn spectrum(samples: &[f64], window: Window) -> Vec<Complex64> {
+    let count = samples.len();
+    let mean = match window {
+        Window::Hann => samples.iter().sum::<f64>() / count.max(1) as f64,
+        _ => 0.0,
+    };
+    let weight = |i: usize| match window {
+        Window::None => 1.0,
+        Window::Hann => 0.5 - 0.5 * (std::f64::consts::TAU * i as f64 / count as f64).cos(),
+        Window::Exponential(tau) => (-(i as f64) / tau).exp(),
+    };
+    let mut weighted: Vec<f64> = samples
+        .iter()
+        .enumerate()
+        .map(|(i, v)| (v - mean) * weight(i))
+        .collect();
+    let plan = RealFftPlanner::new().plan_fft_forward(count);
+    let mut out = plan.make_output_vec();
+    plan.process(&mut weighted, &mut out)
+        .expect("buffers were made for this length");
+    out
+}
+
+/// Half-overlapping Hann-weighted segments of that length.
+#[must_use]
+pub fn segments(applied: &[f64], measured: &[f64], length: usize) -> Vec<Block> {
+    let count = applied.len().min(measured.len());
+    (0..)
+        .map(|k| k * (length / 2).max(1))
+        .take_while(|from| from + length <= count)
+        .map(|from| {
+            let range = from..from + length;
+            transform(&applied[range.clone()], &measured[range], Window::Hann)
+        })
+        .collect()
+}
+
+/// Power of noise and of distortion of a signal that is periodic but for noise.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Periodic {
+    /// Mean spectrum of a period.
+    pub mean: Block,
+    /// Power at each line of the measured mean that noise explains: the variance from period to
+    /// period over their number.
+    pub noise_power: Vec<f64>,
+    /// Lines that the applied signal excites.
+    pub excited: Vec<bool>,
+}
+
+/// Part of the strongest line from which on a line counts as excited (in amplitude).
+const EXCITED: f64 = 1e-2;
+
+/// Averages whole periods (J. Schoukens, R. Pintelon, Y. Rolain, Mastering System Identification in 100
+/// Exercises, 2012, 5.2): what changes from period to period is noise, what the mean has at lines that
+/// are not excited is distortion. `None` for fewer than two blocks.
+#[must_use]
+pub fn average_periods(periods: &[Block]) -> Option<Periodic> {
+    let count = periods.len();
+    let first = periods.first().filter(|_| count > 1)?;
+    let lines = first.applied.len();
+    let mean_of = |pick: fn(&Block) -> &Vec<Complex64>| -> Vec<Complex64> {
+        (0..lines)
+            .map(|k| periods.iter().map(|b| pick(b)[k]).sum::<Complex64>() / count as f64)
+            .collect()
+    };
+    let mean = Block {
+        applied: mean_of(|b| &b.applied),
+        measured: mean_of(|b| &b.measured),
+    };
+    let scatter = |k: usize| -> f64 {
+        periods
+            .iter()
+            .map(|b| (b.measured[k] - mean.measured[k]).norm_sqr())
+            .sum()
+    };
+    let noise_power = (0..lines)
+        .map(|k| scatter(k) / (count * (count - 1)) as f64)
+        .collect();
+    let top = mean.applied[1..]
+        .iter()
+        .fold(0.0_f64, |m, x| m.max(x.norm()));
+    let excited = mean
+        .applied
+        .iter()
+        .map(|x| x.norm() >= EXCITED * top)
+        .collect();
+    Some(Periodic {
+        mean,
+        noise_power,
+        excited,
+    })
+}
+
+/// Correlation of a signal with itself a period later that tells a period.
+const ALIKE: f64 = 0.98;
+
+/// The period of a signal in samples, if at least two fit into it.
+#[must_use]
+pub fn find_period(samples: &[f64]) -> Option<usize> {
+    let count = samples.len();
+    if count < 16 {
+        return None;
+    }
+    let mean = samples.iter().sum::<f64>() / count as f64;
+    let size = (2 * count).next_power_of_two();
+    let mut padded: Vec<f64> = samples.iter().map(|v| v - mean).collect();
+    let squares: Vec<f64> = std::iter::once(0.0)
+        .chain(padded.iter().scan(0.0, |sum, v| {
+            *sum += v * v;
+            Some(*sum)
+        }))
+        .collect();
+    padded.resize(size, 0.0);
+    let mut planner = RealFftPlanner::new();
+    let forward = planner.plan_fft_forward(size);
+    let mut bins = forward.make_output_vec();
+    forward
+        .process(&mut padded, &mut bins)
+        .expect("buffers were made for this length");
+    bins.iter_mut()
+        .for_each(|b| *b = Complex64::new(b.norm_sqr() / size as f64, 0.0));
+    let inverse = planner.plan_fft_inverse(size);
+    inverse
+        .process(&mut bins, &mut padded)
+        .expect("buffers were made for this length");
+    let alike = |lag: usize| {
+        let power = (squares[count - lag] * (squares[count] - squares[lag])).sqrt();
+        if power > 0.0 {
+            padded[lag] / power
+        } else {
+            0.0
+        }
+    };
+    // Not the slope around lag 0: first the correlation has to fall.
+    let fallen = (1..count / 2).find(|lag| alike(*lag) < 0.5)?;
+    let peak = |lag: &usize| {
+        alike(*lag) > ALIKE && alike(*lag) >= alike(lag - 1) && alike(*lag) >= alike(lag + 1)
+    };
+    (fallen..=count / 2)
+        .filter(|lag| lag + 1 < count)
+        .find(peak)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_and_distortion_are_told_apart() {
+        // Lines 3 and 5 excited, the square of the signal in the output, a little noise.
+        let wave = |i: usize| {
+            let turn = std::f64::consts::TAU * i as f64 / 64.0;
+            (3.0 * turn).cos() + (5.0 * turn).sin()
+        };
+        let applied: Vec<f64> = (0..640).map(wave).collect();
+        let measured: Vec<f64> = applied
+            .iter()
+            .enumerate()
+            .map(|(i, x)| x + 0.1 * x * x + 1e-4 * ((i * i) as f64).sin())
+            .collect();
+        assert_eq!(find_period(&applied), Some(64));
+        let periods: Vec<Block> = (0..10)
+            .map(|p| p * 64..(p + 1) * 64)
+            .map(|r| transform(&applied[r.clone()], &measured[r], Window::None))
+            .collect();
+        let found = average_periods(&periods).unwrap();
+        assert!(found.excited[3] && found.excited[5] && !found.excited[6]);
+        // 0.1·cos² has 0.05 at twice the frequency: 0.05·64/2.
+        assert!((found.mean.measured[6].norm() - 1.6).abs() < 0.01);
+        assert!(found.noise_power[6] < 1e-4);
+        assert_eq!(average_periods(&periods[..1]), None);
+    }
+
+    #[test]
+    fn noise_has_no_period() {
+        let mut state = 5_u64;
+        let noise: Vec<f64> = (0..1000)
+            .map(|_| {
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1_442_695_040_888_963_407);
+                (state >> 33) as f64 - 1e9
+            })
+            .collect();
+        assert_eq!(find_period(&noise), None);
+    }
+
+    #[test]
+    fn an_exponential_window_moves_decay_rates_by_its_own() {
+        let decay: Vec<f64> = (0..4096)
+            .map(|i| (-0.002 * f64::from(i)).exp() * (0.3 * f64::from(i)).cos())
+            .collect();
+        let pulse: Vec<f64> = (0..4096).map(|i| if i == 0 { 1.0 } else { 0.0 }).collect();
+        let block = transform(&pulse, &decay, Window::Exponential(500.0));
+        let quicker: Vec<f64> = (0..4096)
+            .map(|i| (-0.004 * f64::from(i)).exp() * (0.3 * f64::from(i)).cos())
+            .collect();
+        let plain = transform(&pulse, &quicker, Window::None);
+        assert!(
+            block
+                .measured
+                .iter()
+                .zip(&plain.measured)
+                .all(|(a, b)| (a - b).norm() < 1e-9)
+        );
+    }
+}

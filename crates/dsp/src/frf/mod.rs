@@ -1,0 +1,209 @@
+//! Frequency responses from blocks of an applied and a measured signal.
+//!
+//! Blocks are segments of noise, periods of a periodic signal, or hits. Their spectra are kept one by
+//! one, so that a response can be taken from some of them and tried on the others.
+//!
+//! Estimators and bounds: J. S. Bendat, A. G. Piersol, Random Data, 4th ed., 2010, chapters 6 and 9.
+
+mod blocks;
+mod hits;
+
+use num_complex::Complex64;
+
+pub use blocks::{Periodic, Window, average_periods, find_period, segments, transform};
+pub use hits::{Hit, HitFault, find_hits};
+
+/// Spectra of one block, at frequencies k times the step, from 0 to half the rate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Block {
+    /// Of the applied signal.
+    pub applied: Vec<Complex64>,
+    /// Of the measured signal.
+    pub measured: Vec<Complex64>,
+}
+
+/// How a response is estimated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Estimator {
+    /// S_xy/S_xx: noise in the measured signal does not bias it.
+    H1,
+    /// S_yy/S_yx: noise in the applied signal does not bias it.
+    H2,
+    /// Total least squares, noise of equal power in both: between H1 and H2.
+    Hv,
+}
+
+/// A response with its coherence.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frf {
+    /// Response at each line.
+    pub response: Vec<Complex64>,
+    /// Ordinary coherence at each line, 0 to 1; 1 throughout for a single block, which tells nothing.
+    pub coherence: Vec<f64>,
+    /// Power of the applied signal at each line.
+    pub applied_power: Vec<f64>,
+    /// Blocks that were averaged.
+    pub blocks: usize,
+}
+
+impl Frf {
+    /// The response from those blocks.
+    ///
+    /// ```
+    /// use num_complex::Complex64;
+    /// use torqcomp_dsp::frf::{Block, Estimator, Frf};
+    /// let line = |x: f64, y: f64| Block { applied: vec![Complex64::new(x, 0.0)], measured: vec![Complex64::new(y, 0.0)] };
+    /// // y = 2x without noise: all estimators agree.
+    /// let blocks = [line(1.0, 2.0), line(-3.0, -6.0)];
+    /// for estimator in [Estimator::H1, Estimator::H2, Estimator::Hv] {
+    ///     let frf = Frf::of(blocks.iter(), estimator);
+    ///     assert!((frf.response[0].re - 2.0).abs() < 1e-12 && (frf.coherence[0] - 1.0).abs() < 1e-12);
+    /// }
+    /// ```
+    #[must_use]
+    pub fn of<'a>(blocks: impl Iterator<Item = &'a Block>, estimator: Estimator) -> Self {
+        let mut sums: Vec<(f64, f64, Complex64)> = Vec::new();
+        let mut count = 0;
+        for block in blocks {
+            sums.resize(block.applied.len(), (0.0, 0.0, Complex64::ZERO));
+            for (sum, (x, y)) in sums
+                .iter_mut()
+                .zip(block.applied.iter().zip(&block.measured))
+            {
+                sum.0 += x.norm_sqr();
+                sum.1 += y.norm_sqr();
+                sum.2 += x.conj() * y;
+            }
+            count += 1;
+        }
+        let n = f64::from(count).max(1.0);
+        Self {
+            response: sums.iter().map(|s| estimate(s, estimator)).collect(),
+            coherence: sums
+                .iter()
+                .map(|(xx, yy, xy)| coherence(*xx, *yy, *xy))
+                .collect(),
+            applied_power: sums.iter().map(|(xx, ..)| xx / n).collect(),
+            blocks: count as usize,
+        }
+    }
+
+    /// Relative standard uncertainty of the magnitude, and standard uncertainty of the phase in rad, at
+    /// a line: `√((1 − γ²)/(2 n γ²))`, Bendat & Piersol (9.90), (9.91). `None` for a single block.
+    #[must_use]
+    pub fn relative_std(&self, line: usize) -> Option<f64> {
+        let coherence = self.coherence[line];
+        (self.blocks > 1 && coherence > 0.0)
+            .then(|| ((1.0 - coherence) / (2.0 * self.blocks as f64 * coherence)).sqrt())
+    }
+}
+
+fn coherence(xx: f64, yy: f64, xy: Complex64) -> f64 {
+    let size = xx * yy;
+    if size > 0.0 {
+        (xy.norm_sqr() / size).min(1.0)
+    } else {
+        0.0
+    }
+}
+
+fn estimate(&(xx, yy, xy): &(f64, f64, Complex64), estimator: Estimator) -> Complex64 {
+    match estimator {
+        _ if xx == 0.0 => Complex64::ZERO,
+        Estimator::H1 => xy / xx,
+        Estimator::H2 if xy.norm_sqr() == 0.0 => Complex64::ZERO,
+        Estimator::H2 => yy / xy.conj(),
+        Estimator::Hv => {
+            // The eigenvector of [[xx, xy*], [xy, yy]] with the larger eigenvalue, both signals brought
+            // to one power first, as their units differ.
+            let scale = (yy / xx).sqrt();
+            if scale == 0.0 || xy.norm() == 0.0 {
+                return Complex64::ZERO;
+            }
+            // With equal powers the eigenvector is (1, e^{j arg}), so that Hv is the geometric mean.
+            scale * xy / xy.norm()
+        }
+    }
+}
+
+/// Root of the power of `measured − response·applied` over that of `measured`, between two lines.
+#[must_use]
+pub fn prediction_error(
+    response: &[Complex64],
+    block: &Block,
+    lines: std::ops::Range<usize>,
+) -> f64 {
+    let (mut left, mut all) = (0.0, 0.0);
+    for (k, h) in lines.clone().zip(response) {
+        left += (block.measured[k] - h * block.applied[k]).norm_sqr();
+        all += block.measured[k].norm_sqr();
+    }
+    if all > 0.0 { (left / all).sqrt() } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn noise(state: &mut u64) -> f64 {
+        let mut sum = -6.0;
+        for _ in 0..12 {
+            *state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            sum += (*state >> 11) as f64 / (1_u64 << 53) as f64;
+        }
+        sum
+    }
+
+    /// One line, many blocks: y = 2j x + noise, x + noise recorded.
+    fn blocks(count: usize, in_x: f64, in_y: f64) -> Vec<Block> {
+        let mut state = 7;
+        let mut draw = move |size: f64| Complex64::new(noise(&mut state), noise(&mut state)) * size;
+        (0..count)
+            .map(|_| {
+                let x = draw(1.0);
+                let y = Complex64::new(0.0, 2.0) * x + draw(in_y);
+                Block {
+                    applied: vec![x + draw(in_x)],
+                    measured: vec![y],
+                }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn each_estimator_is_free_of_its_own_noise() {
+        let want = Complex64::new(0.0, 2.0);
+        let output = blocks(4000, 0.0, 1.0);
+        let h1 = Frf::of(output.iter(), Estimator::H1);
+        assert!((h1.response[0] - want).norm() < 0.06, "{}", h1.response[0]);
+        // γ² = 4/(4 + 1).
+        assert!((h1.coherence[0] - 0.8).abs() < 0.02, "{}", h1.coherence[0]);
+        assert!(Frf::of(output.iter(), Estimator::H2).response[0].norm() > 2.4);
+        let input = blocks(4000, 0.5, 0.0);
+        let h2 = Frf::of(input.iter(), Estimator::H2);
+        assert!((h2.response[0] - want).norm() < 0.06, "{}", h2.response[0]);
+        assert!(Frf::of(input.iter(), Estimator::H1).response[0].norm() < 1.7);
+        let both = blocks(4000, 0.3, 0.6);
+        let hv = Frf::of(both.iter(), Estimator::Hv);
+        assert!((hv.response[0] - want).norm() < 0.06, "{}", hv.response[0]);
+    }
+
+    #[test]
+    fn bounds_cover_what_they_say() {
+        let all = blocks(6400, 0.0, 1.0);
+        let (mut squares, mut said) = (0.0, 0.0);
+        for part in all.chunks(32) {
+            let frf = Frf::of(part.iter(), Estimator::H1);
+            squares += (frf.response[0].norm() / 2.0 - 1.0).powi(2);
+            said += frf.relative_std(0).unwrap();
+        }
+        let (spread, said) = ((squares / 200.0).sqrt(), said / 200.0);
+        assert!((spread / said - 1.0).abs() < 0.15, "{spread} {said}");
+        assert_eq!(
+            Frf::of(all[..1].iter(), Estimator::H1).relative_std(0),
+            None
+        );
+    }
+}

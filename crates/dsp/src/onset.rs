@@ -1,0 +1,132 @@
+//! Where a record is hit, and what rings after each hit.
+
+use std::ops::Range;
+
+/// Blocks that a record is looked at in.
+const BLOCKS: usize = 400;
+/// Fewest samples of a block.
+const LEAST_BLOCK: usize = 8;
+/// A hit raises the swing of a block to this many times that of the blocks before it …
+const RISE: f64 = 3.0;
+/// … and to this part of the largest swing in the record.
+const SIZE: f64 = 0.15;
+/// Blocks before a hit that it is compared with.
+const BEFORE: usize = 4;
+
+/// The stretches of free ringing: each begins at the largest swing after a hit and ends before the
+/// next hit or at the end. A record that rings from its first sample on is one stretch.
+///
+/// ```
+/// // Silence, then a decay from sample 500 on.
+/// let decay = |i: i32| if i < 500 { 0.0 } else { (-0.005 * f64::from(i - 500)).exp() * (0.3 * f64::from(i - 500)).cos() };
+/// let record: Vec<f64> = (0..2000).map(decay).collect();
+/// assert_eq!(torqcomp_dsp::onset::decays(&record), [500..2000]);
+/// ```
+#[must_use]
+pub fn decays(samples: &[f64]) -> Vec<Range<usize>> {
+    let block = (samples.len() / BLOCKS).max(LEAST_BLOCK);
+    let swings: Vec<f64> = samples.chunks(block).map(swing).collect();
+    let largest = swings.iter().fold(0.0_f64, |m, s| m.max(*s));
+    if largest == 0.0 {
+        return Vec::new();
+    }
+    let floor = {
+        let mut sorted = swings.clone();
+        sorted.sort_by(f64::total_cmp);
+        sorted[sorted.len() / 20]
+    };
+    let mut hits = Vec::new();
+    for i in 1..swings.len() {
+        let before = &swings[i.saturating_sub(BEFORE)..i];
+        let quiet = before.iter().fold(floor, |m, s| m.max(*s));
+        let recent = hits.last().is_some_and(|h| i - h <= BEFORE);
+        if swings[i] > SIZE * largest && swings[i] > RISE * quiet && !recent {
+            hits.push(i);
+        }
+    }
+    let starts: Vec<usize> = if hits.is_empty() {
+        vec![0]
+    } else {
+        hits.iter().map(|hit| hit * block).collect()
+    };
+    let ends = starts[1..]
+        .iter()
+        .map(|s| s.saturating_sub(block))
+        .chain([samples.len()]);
+    starts
+        .iter()
+        .zip(ends)
+        .map(|(start, end)| peak_after(samples, *start, end, block)..end)
+        .filter(|range| range.len() >= 4 * LEAST_BLOCK)
+        .collect()
+}
+
+/// Half the difference of the largest and the smallest value.
+fn swing(block: &[f64]) -> f64 {
+    let (low, high) = block
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
+            (l.min(*v), h.max(*v))
+        });
+    0.5 * (high - low)
+}
+
+/// The sample farthest from where the stretch settles, within the first blocks of it.
+fn peak_after(samples: &[f64], start: usize, end: usize, block: usize) -> usize {
+    let tail = &samples[start + (end - start) * 3 / 4..end];
+    let rest = tail.iter().sum::<f64>() / tail.len().max(1) as f64;
+    let near = &samples[start..end.min(start + 2 * (BEFORE + 1) * block)];
+    let far = |i: &usize| (near[*i] - rest).abs();
+    let peak = (0..near.len()).max_by(|a, b| far(a).total_cmp(&far(b)));
+    // Several samples of one size: the first.
+    let first = peak.and_then(|p| (0..=p).find(|i| far(i) >= far(&p)));
+    start + first.unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ringing(starts: &[usize], count: usize) -> Vec<f64> {
+        (0..count)
+            .map(|i| {
+                starts
+                    .iter()
+                    .filter(|s| **s <= i)
+                    .map(|s| (i - s) as f64)
+                    .map(|t| (-0.01 * t).exp() * (0.4 * t).cos())
+                    .sum()
+            })
+            .collect()
+    }
+
+    #[test]
+    fn every_hit_has_its_stretch() {
+        let record = ringing(&[300, 1700, 3100], 4500);
+        let found = decays(&record);
+        assert_eq!(found.len(), 3, "{found:?}");
+        for (range, hit) in found.iter().zip([300, 1700, 3100]) {
+            assert!(range.start.abs_diff(hit) <= 2, "{range:?} for {hit}");
+        }
+        assert!(found[0].end <= 1700 && found[2].end == 4500);
+    }
+
+    #[test]
+    fn a_record_that_rings_throughout_is_one_stretch() {
+        let record = ringing(&[0], 1000);
+        assert_eq!(decays(&record), [0..1000]);
+        assert!(decays(&[1.0; 100]).is_empty() && decays(&[]).is_empty());
+    }
+
+    #[test]
+    fn a_step_rings_about_its_new_rest() {
+        let record: Vec<f64> = ringing(&[400], 2000)
+            .iter()
+            .enumerate()
+            .map(|(i, v)| if i < 400 { 0.0 } else { 1.0 - v })
+            .collect();
+        let found = decays(&record);
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!(found[0].start.abs_diff(400) <= 10, "{found:?}");
+    }
+}

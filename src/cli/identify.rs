@@ -1,0 +1,273 @@
+//! The command line of `identify`.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand, ValueEnum};
+
+use super::{Result, Units, decimal, delimiter, positive_frequency, range};
+use crate::io::csv::{Delimiter, Options, Told};
+
+/// Arguments of `identify`.
+#[derive(Debug, Args)]
+pub struct Identify {
+    /// The test that was recorded.
+    #[command(subcommand)]
+    pub test: Test,
+}
+
+/// Tests that constants follow from.
+#[derive(Debug, Subcommand)]
+pub enum Test {
+    /// Frequencies and damping from a free decay after a step or an impulse
+    Decay(Decay),
+    /// Modes from a known input and the measured output
+    Response(Response),
+    /// Inertia and friction from the motion of the free body under a known torque
+    Runup(Runup),
+    /// Sensitivity and zero from known loads
+    Static(Static),
+}
+
+/// How tables are read, whatever their channels.
+#[derive(Debug, Args)]
+pub struct Reading {
+    /// Column with the time stamps
+    #[arg(long, value_name = "NAME")]
+    pub time_column: Option<String>,
+    /// Unit of the time stamps, if their heading does not say: s, ms, us, min
+    #[arg(long, value_name = "UNIT")]
+    pub time_unit: Option<String>,
+    /// Sampling rate, where there are no time stamps or they are wrong
+    #[arg(long, value_name = "HZ", value_parser = positive_frequency)]
+    pub rate: Option<f64>,
+    /// What separates the cells: , ; | tab space none
+    #[arg(long, value_name = "MARK", value_parser = delimiter)]
+    pub delimiter: Option<Delimiter>,
+    /// Decimal mark: . or ,
+    #[arg(long, value_name = "MARK", value_parser = decimal)]
+    pub decimal: Option<u8>,
+}
+
+impl Reading {
+    /// The options for one channel.
+    #[must_use]
+    pub fn options(&self, channel: Option<&str>, unit: Option<&str>) -> Options {
+        Options {
+            channel: channel.map(str::to_owned),
+            unit: unit.map(str::to_owned),
+            time_column: self.time_column.clone(),
+            time_unit: self.time_unit.clone(),
+            rate_hz: self.rate,
+            resample: false,
+            told: Told {
+                delimiter: self.delimiter,
+                decimal: self.decimal,
+            },
+        }
+    }
+}
+
+/// Where the findings go: the stand file of `-o` is written, or updated if it is there.
+#[derive(Debug, Args)]
+pub struct Findings {
+    /// The stand file.
+    #[command(flatten)]
+    pub result: Result,
+    /// Stand file to take declared values from [default: that of -o, if it is there]
+    #[arg(long, value_name = "FILE")]
+    pub stand: Option<PathBuf>,
+    /// Units of the printed values
+    #[arg(long, value_enum, default_value = "si")]
+    pub units: Units,
+    /// Print JSON instead of text
+    #[arg(long)]
+    pub json: bool,
+    /// Write a page with the fit, the residual and the constants
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<String>,
+    /// End with code 3 if there are warnings
+    #[arg(long)]
+    pub strict: bool,
+}
+
+/// Arguments of `identify decay`.
+#[derive(Debug, Args)]
+pub struct Decay {
+    /// Recordings of free decays of one stand, or - for standard input
+    #[arg(value_name = "INPUT", required = true)]
+    pub inputs: Vec<String>,
+    /// Column with the signal: its heading, with or without the unit, or its number
+    #[arg(long, value_name = "NAME")]
+    pub channel: Option<String>,
+    /// Number of modes [default: found from the data]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=20))]
+    pub modes: Option<u8>,
+    /// Part of the record to use, in seconds of its time axis
+    #[arg(long, value_name = "FROM..TO", value_parser = range, allow_hyphen_values = true)]
+    pub range: Option<(f64, f64)>,
+    /// Frequencies to look for modes at, in Hz
+    #[arg(long, value_name = "FROM..TO", value_parser = range)]
+    pub band: Option<(f64, f64)>,
+    /// Inertia, known otherwise: stiffness and damping then follow
+    #[arg(long, value_name = "QUANTITY", conflicts_with = "stiffness")]
+    pub inertia: Option<String>,
+    /// Stiffness, known otherwise: inertia and damping then follow
+    #[arg(long, value_name = "QUANTITY")]
+    pub stiffness: Option<String>,
+    /// How the table is read.
+    #[command(flatten)]
+    pub reading: Reading,
+    /// Where the findings go.
+    #[command(flatten)]
+    pub findings: Findings,
+}
+
+/// How a stand was excited.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Excitation {
+    /// By hits, one or several a record
+    Impact,
+    /// By noise
+    Random,
+    /// By the same signal again and again
+    Periodic,
+}
+
+/// What the measured channel is of the motion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Measured {
+    /// Displacement, angle, strain, or torque of the beam
+    Displacement,
+    /// Speed
+    Speed,
+    /// Acceleration
+    Acceleration,
+}
+
+/// Arguments of `identify response`.
+#[derive(Debug, Args)]
+pub struct Response {
+    /// Recordings of one stand
+    #[arg(value_name = "INPUT", required = true)]
+    pub inputs: Vec<String>,
+    /// Column with what acted: hammer force, exciter force, known torque
+    #[arg(long, value_name = "NAME")]
+    pub applied: String,
+    /// Column with what was measured
+    #[arg(long, value_name = "NAME")]
+    pub measured: String,
+    /// What the measured channel is [default: by its unit]
+    #[arg(long, value_enum)]
+    pub measured_as: Option<Measured>,
+    /// How the stand was excited [default: found from the data]
+    #[arg(long, value_enum)]
+    pub excitation: Option<Excitation>,
+    /// Frequencies to fit, in Hz [default: where the excitation has power]
+    #[arg(long, value_name = "FROM..TO", value_parser = range)]
+    pub band: Option<(f64, f64)>,
+    /// Number of modes [default: found on data held out]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=40))]
+    pub modes: Option<u8>,
+    /// Period of a periodic excitation, in samples [default: found from the data]
+    #[arg(long, value_name = "N")]
+    pub period: Option<usize>,
+    /// Length of a segment of random data, in samples [default: from the length of the record]
+    #[arg(long, value_name = "N")]
+    pub segment: Option<usize>,
+    /// Fit a delay of the measured channel too
+    #[arg(long)]
+    pub delay: bool,
+    /// How the table is read.
+    #[command(flatten)]
+    pub reading: Reading,
+    /// Where the findings go.
+    #[command(flatten)]
+    pub findings: Findings,
+}
+
+/// Arguments of `identify runup`.
+#[derive(Debug, Args)]
+pub struct Runup {
+    /// Recording of the run
+    #[arg(value_name = "INPUT")]
+    pub input: String,
+    /// Column with the position, speed or acceleration
+    #[arg(long, value_name = "NAME")]
+    pub motion: String,
+    /// Unit of the motion, if its heading does not say: rad, rpm, m, m/s^2
+    #[arg(long, value_name = "UNIT")]
+    pub motion_unit: Option<String>,
+    /// Column with the torque or force
+    #[arg(long, value_name = "NAME")]
+    pub torque: String,
+    /// Unit of the torque or force, if its heading does not say
+    #[arg(long, value_name = "UNIT")]
+    pub torque_unit: Option<String>,
+    /// Torque or force for one unit of its channel, such as "35.15 N/V"
+    #[arg(long, value_name = "QUANTITY", allow_hyphen_values = true)]
+    pub torque_factor: Option<String>,
+    /// Radius at which a force drives a turning body
+    #[arg(long, value_name = "QUANTITY")]
+    pub radius: Option<String>,
+    /// Let viscous friction differ by direction
+    #[arg(long)]
+    pub by_direction: bool,
+    /// Half of the averaging window, in seconds [default: found from the data]
+    #[arg(long, value_name = "S")]
+    pub window: Option<f64>,
+    /// How the table is read.
+    #[command(flatten)]
+    pub reading: Reading,
+    /// Where the findings go.
+    #[command(flatten)]
+    pub findings: Findings,
+}
+
+/// Arguments of `identify static`.
+#[derive(Debug, Args)]
+pub struct Static {
+    /// Table of loads and readings, a row each, in the order they were taken
+    #[arg(value_name = "INPUT")]
+    pub input: String,
+    /// Column with the load
+    #[arg(long, value_name = "NAME")]
+    pub load: String,
+    /// Unit of the load, if its heading does not say
+    #[arg(long, value_name = "UNIT")]
+    pub load_unit: Option<String>,
+    /// Radius at which a load given as a force acts
+    #[arg(long, value_name = "QUANTITY")]
+    pub radius: Option<String>,
+    /// Column with the reading
+    #[arg(long, value_name = "NAME")]
+    pub reading: String,
+    /// Unit of the reading, if its heading does not say
+    #[arg(long, value_name = "UNIT")]
+    pub reading_unit: Option<String>,
+    /// Column with the standard uncertainty of each reading, in the unit of the reading
+    #[arg(long, value_name = "NAME")]
+    pub std: Option<String>,
+    /// Column that numbers the series [default: a new one after each return to no load]
+    #[arg(long, value_name = "NAME")]
+    pub series: Option<String>,
+    /// Column that numbers the mounting positions
+    #[arg(long, value_name = "NAME")]
+    pub position: Option<String>,
+    /// Highest power of the load
+    #[arg(long, value_name = "1|3", default_value = "1", value_parser = degree)]
+    pub degree: usize,
+    /// How the table is read.
+    #[command(flatten)]
+    pub table: Reading,
+    /// Where the findings go.
+    #[command(flatten)]
+    pub findings: Findings,
+}
+
+fn degree(text: &str) -> std::result::Result<usize, String> {
+    match text {
+        "1" | "linear" => Ok(1),
+        "3" | "cubic" => Ok(3),
+        _ => Err("expected 1 (linear) or 3 (cubic)".to_owned()),
+    }
+}

@@ -1,0 +1,137 @@
+//! `identify response`.
+
+use torqcomp_model::Dimension;
+
+use super::{deliver, must_be_uniform, read, whole};
+use crate::cli::identify::{Excitation, Measured, Response};
+use crate::commands::Outcome;
+use crate::failure::Failure;
+use crate::identify::response::{self, Driven, Options, identify};
+use crate::io::csv::NamedUnit;
+use crate::report::identify::Report;
+use crate::stand::update::Entry;
+
+/// A record as it is evaluated.
+struct Loaded {
+    name: String,
+    rate_hz: f64,
+    applied: Vec<f64>,
+    measured: Vec<f64>,
+    unit: Option<NamedUnit>,
+}
+
+/// Runs the test.
+pub fn run(args: &Response) -> Result<Outcome, Failure> {
+    let loaded: Vec<Loaded> = args
+        .inputs
+        .iter()
+        .map(|input| load(args, input))
+        .collect::<Result<_, _>>()?;
+    let records: Vec<Driven> = loaded
+        .iter()
+        .map(|l| Driven {
+            name: &l.name,
+            rate_hz: l.rate_hz,
+            applied: &l.applied,
+            measured: &l.measured,
+        })
+        .collect();
+    let options = Options {
+        excitation: args.excitation.map(|e| match e {
+            Excitation::Impact => response::Excitation::Impact,
+            Excitation::Random => response::Excitation::Random,
+            Excitation::Periodic => response::Excitation::Periodic,
+        }),
+        band_hz: args.band,
+        modes: args.modes.map(usize::from),
+        period: args.period,
+        segment: args.segment,
+        order: order(args, loaded[0].unit.as_ref()),
+        with_delay: args.delay,
+    };
+    let mut evaluated = identify(&records, &options)?;
+    if let Some(quality) = &mut evaluated.outcome.quality {
+        quality.unit = loaded[0]
+            .unit
+            .as_ref()
+            .map_or_else(String::new, |u| u.text.clone());
+    }
+    let entries = entries(args, &evaluated.outcome)?;
+    let inputs: Vec<&str> = args.inputs.iter().map(String::as_str).collect();
+    let mut report = Report::new("response", &inputs, &evaluated.outcome, args.findings.units);
+    report.samples = loaded.iter().map(|l| l.applied.len()).sum();
+    report.rate_hz = Some(loaded[0].rate_hz);
+    report.held_out_errors = evaluated
+        .held_out
+        .iter()
+        .map(|e| Some(*e).filter(|e| e.is_finite()))
+        .collect();
+    deliver(&report, &args.findings, &inputs, &entries)
+}
+
+fn load(args: &Response, input: &str) -> Result<Loaded, Failure> {
+    let applied_options = args.reading.options(Some(&args.applied), None);
+    let recording = read(input, &applied_options)?;
+    let applied = recording.select(&applied_options)?;
+    let measured = recording.select(&args.reading.options(Some(&args.measured), None))?;
+    for channel in [&applied, &measured] {
+        whole(channel)?;
+        must_be_uniform(channel, args.reading.rate.is_some())?;
+    }
+    Ok(Loaded {
+        name: input.to_owned(),
+        rate_hz: applied.rate_hz,
+        applied: applied.samples.to_vec(),
+        measured: measured.samples.to_vec(),
+        unit: measured.unit.clone(),
+    })
+}
+
+/// Derivative of displacement that the measured channel is.
+fn order(args: &Response, unit: Option<&NamedUnit>) -> i32 {
+    match args.measured_as {
+        Some(Measured::Displacement) => 0,
+        Some(Measured::Speed) => 1,
+        Some(Measured::Acceleration) => 2,
+        None => {
+            let is = |seconds: i32| {
+                unit.is_some_and(|u| {
+                    [
+                        Dimension::new([0, 1, seconds, 0, 0, 0]),
+                        Dimension::new([0, 0, seconds, 0, 0, 1]),
+                    ]
+                    .contains(&u.unit.dimension())
+                })
+            };
+            if is(-2) { 2 } else { i32::from(is(-1)) }
+        }
+    }
+}
+
+fn entries(args: &Response, outcome: &crate::identify::Outcome) -> Result<Vec<Entry>, Failure> {
+    let pair = (
+        outcome.get("natural_frequency"),
+        outcome.get("damping_ratio"),
+    );
+    let (Some(frequency), Some(ratio)) = pair else {
+        return match args.findings.result.output {
+            Some(_) => Err(Failure::failed(
+                "a stand file holds one mode, and several were found; choose one with --band and --modes 1",
+            )),
+            None => Ok(Vec::new()),
+        };
+    };
+    let source = format!("identify response: {}", args.inputs.join(", "));
+    let entry = |key: &'static str, found: &crate::identify::Found| Entry {
+        section: "mechanics",
+        key,
+        value: found.value,
+        std: found.std,
+        unit: found.unit.clone(),
+        source: source.clone(),
+    };
+    Ok(vec![
+        entry("natural_frequency", frequency),
+        entry("damping_ratio", ratio),
+    ])
+}

@@ -1,0 +1,189 @@
+//! `identify static`.
+
+use torqcomp_model::{Dimension, Kind};
+
+use super::{deliver, quantity, read, unit_of, whole};
+use crate::cli::identify::Static;
+use crate::commands::Outcome;
+use crate::failure::Failure;
+use crate::identify::static_load::{Options, Point, Units, identify, series_of};
+use crate::io::csv::NamedUnit;
+use crate::recording::Recording;
+use crate::report::identify::{Report, Term};
+use crate::stand::update::Entry;
+
+const TORQUE: Dimension = Dimension::new([1, 2, -2, 0, 0, 0]);
+const FORCE: Dimension = Dimension::new([1, 1, -2, 0, 0, 0]);
+const VOLTAGE: Dimension = Dimension::new([1, 2, -3, -1, 0, 0]);
+
+/// Runs the test.
+pub fn run(args: &Static) -> Result<Outcome, Failure> {
+    let mut options = args.table.options(None, None);
+    // A table of loads has no time axis; a rate keeps it from being looked for.
+    options.rate_hz = options.rate_hz.or(Some(1.0));
+    let recording = read(&args.input, &options)?;
+    let (loads, load_unit) = column(
+        &recording,
+        &args.load,
+        args.load_unit.as_deref(),
+        "--load-unit",
+    )?;
+    let (readings, unit) = column(
+        &recording,
+        &args.reading,
+        args.reading_unit.as_deref(),
+        "--reading-unit",
+    )?;
+    let (load_factor, load_text) = load_of(args, &load_unit)?;
+    let (factor, text) = match unit.unit.dimension() {
+        VOLTAGE => (unit.unit.factor(), "V".to_owned()),
+        _ => (1.0, unit.text.clone()),
+    };
+    let numbers = |name: &Option<String>| -> Result<Option<Vec<usize>>, Failure> {
+        let Some(name) = name else { return Ok(None) };
+        let channel = recording.channel(Some(name))?;
+        Ok(Some(ranks(&channel.samples)))
+    };
+    let loads: Vec<f64> = loads.iter().map(|v| v * load_factor).collect();
+    let series = numbers(&args.series)?.unwrap_or_else(|| series_of(&loads));
+    let positions = numbers(&args.position)?;
+    let stds = match &args.std {
+        Some(name) => Some(recording.channel(Some(name))?.samples.clone()),
+        None => None,
+    };
+    let points: Vec<Point> = (0..loads.len())
+        .map(|i| Point {
+            load: loads[i],
+            reading: readings[i] * factor,
+            std: stds.as_ref().map(|s| s[i] * factor),
+            series: series[i],
+            position: positions.as_ref().map_or(0, |p| p[i]),
+        })
+        .collect();
+    if let Some(i) = points
+        .iter()
+        .position(|p| p.std.is_some_and(|s| s.is_nan() || s <= 0.0))
+    {
+        return Err(Failure::failed(format_args!(
+            "row {} of {}: the standard uncertainty must be greater than 0",
+            i + 1,
+            args.input
+        )));
+    }
+    let units = Units {
+        load: load_text,
+        reading: text,
+    };
+    let found = identify(
+        &points,
+        Options {
+            degree: args.degree,
+        },
+        &units,
+    )?;
+    let entries = entries(args, &found.outcome);
+    if entries.is_empty() && args.findings.result.output.is_some() {
+        return Err(Failure::failed(
+            "only a torque over a voltage has a place in a stand file; leave -o out, or give the load as a \
+             torque and the reading in volts",
+        ));
+    }
+    let mut report = Report::new(
+        "static",
+        &[&args.input],
+        &found.outcome,
+        args.findings.units,
+    );
+    report.samples = points.len();
+    report.terms = found
+        .terms
+        .iter()
+        .map(|t| Term {
+            name: t.name,
+            formula: t.formula,
+            percent: t.percent,
+        })
+        .collect();
+    deliver(&report, &args.findings, &[&args.input], &entries)
+}
+
+fn column(
+    recording: &Recording,
+    name: &str,
+    unit: Option<&str>,
+    flag: &str,
+) -> Result<(Vec<f64>, NamedUnit), Failure> {
+    let options = crate::io::csv::Options {
+        channel: Some(name.to_owned()),
+        unit: unit.map(str::to_owned),
+        rate_hz: Some(1.0),
+        ..Default::default()
+    };
+    let selection = recording.select(&options)?;
+    whole(&selection)?;
+    let unit = unit_of(&selection, flag)?;
+    Ok((selection.samples.to_vec(), unit))
+}
+
+/// SI units for one unit of the load, and what they are called.
+fn load_of(args: &Static, unit: &NamedUnit) -> Result<(f64, String), Failure> {
+    let factor = unit.unit.factor();
+    let radius = args
+        .radius
+        .as_deref()
+        .map(|text| quantity("--radius", text, Kind::Length))
+        .transpose()?;
+    match (unit.unit.dimension(), radius) {
+        (TORQUE, None) => Ok((factor, "N m".to_owned())),
+        (FORCE, Some(radius)) => Ok((factor * radius, "N m".to_owned())),
+        (FORCE, None) => Ok((factor, "N".to_owned())),
+        (_, Some(_)) => Err(Failure::usage(format_args!(
+            "--radius goes with a load that is a force; \"{}\" is in {}",
+            args.load, unit.text
+        ))),
+        (_, None) => Ok((1.0, unit.text.clone())),
+    }
+}
+
+/// Numbers the different values from 0 in the order they come.
+fn ranks(values: &[f64]) -> Vec<usize> {
+    let mut seen: Vec<f64> = Vec::new();
+    values
+        .iter()
+        .map(|v| {
+            seen.iter().position(|s| s == v).unwrap_or_else(|| {
+                seen.push(*v);
+                seen.len() - 1
+            })
+        })
+        .collect()
+}
+
+fn entries(args: &Static, outcome: &crate::identify::Outcome) -> Vec<Entry> {
+    let source = format!("identify static: {}", args.input);
+    outcome
+        .get("torque_per_volt")
+        .map(|found| Entry {
+            section: "calibration",
+            key: "torque_per_volt",
+            value: found.value,
+            std: found.std,
+            unit: found.unit.clone(),
+            source: source.clone(),
+        })
+        .into_iter()
+        .chain(
+            outcome
+                .get("torque_per_volt")
+                .and(outcome.get("zero"))
+                .map(|zero| Entry {
+                    section: "recorder",
+                    key: "zero",
+                    value: zero.value,
+                    std: zero.std,
+                    unit: "V".to_owned(),
+                    source: source.clone(),
+                }),
+        )
+        .collect()
+}

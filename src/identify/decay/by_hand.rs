@@ -1,0 +1,92 @@
+//! What one reads from a decay by hand: logarithmic decrement and half-power width.
+
+use std::f64::consts::{PI, TAU};
+
+use torqcomp_dsp::peaks;
+
+use super::modes::Stretch;
+
+/// Peaks smaller than this part of the first are left out.
+const SMALLEST: f64 = 0.05;
+
+/// Damped frequency in Hz and decay rate in 1/s from the heights of successive peaks: the slope of
+/// ln|peak| over time through all of them, by plain regression. `None` with fewer than three peaks.
+#[must_use]
+pub fn log_decrement(stretch: &Stretch, offset: f64, omega: f64) -> Option<(f64, f64)> {
+    let peaks = peaks_of(stretch, offset, PI / omega);
+    if peaks.len() < 3 {
+        return None;
+    }
+    let n = peaks.len() as f64;
+    let (mean_t, mean_y) = peaks
+        .iter()
+        .fold((0.0, 0.0), |(t, y), p| (t + p.0 / n, y + p.1.ln() / n));
+    let (top, bottom) = peaks.iter().fold((0.0, 0.0), |(a, b), p| {
+        (
+            a + (p.0 - mean_t) * (p.1.ln() - mean_y),
+            b + (p.0 - mean_t).powi(2),
+        )
+    });
+    let half_turns = n - 1.0;
+    let frequency_hz = 0.5 * half_turns / (peaks[peaks.len() - 1].0 - peaks[0].0);
+    Some((frequency_hz, -top / bottom))
+}
+
+/// Time and size of the largest value in every half cycle, a parabola through three samples each, down
+/// to a part of the first.
+fn peaks_of(stretch: &Stretch, offset: f64, half_period_s: f64) -> Vec<(f64, f64)> {
+    let values: Vec<f64> = stretch.values.iter().map(|v| v - offset).collect();
+    let times = &stretch.times_s;
+    let mut found: Vec<(f64, f64)> = Vec::new();
+    for i in 1..values.len().saturating_sub(1) {
+        let (before, here, after) = (values[i - 1].abs(), values[i].abs(), values[i + 1].abs());
+        let same_side = values[i - 1] * values[i] > 0.0 && values[i + 1] * values[i] > 0.0;
+        if !(same_side && here >= before && here > after) {
+            continue;
+        }
+        let bend = before - 2.0 * here + after;
+        let shift = if bend < 0.0 {
+            0.5 * (before - after) / bend
+        } else {
+            0.0
+        };
+        let t = times[i] + shift * 0.5 * (times[i + 1] - times[i - 1]);
+        let size = here - 0.25 * (before - after) * shift;
+        match found.last_mut() {
+            // Noise makes several peaks of one: the largest.
+            Some(last) if t - last.0 < 0.6 * half_period_s => {
+                if size > last.1 {
+                    *last = (t, size);
+                }
+            }
+            _ => found.push((t, size)),
+        }
+    }
+    let first = found.first().map_or(0.0, |p| p.1);
+    let end = found
+        .iter()
+        .position(|p| p.1 < SMALLEST * first)
+        .unwrap_or(found.len());
+    found.truncate(end);
+    found
+}
+
+/// Frequency in Hz and damping ratio from the width of the spectrum's peak at half its power,
+/// ζ = Δf/2f. Too large where the record ends before the decay does. `None` without a peak.
+#[must_use]
+pub fn half_power(stretch: &Stretch, offset: f64, omega: f64) -> Option<(f64, f64)> {
+    let length = *stretch.times_s.last()?;
+    let rate_hz = (stretch.times_s.len() - 1) as f64 / length;
+    let values: Vec<f64> = stretch.values.iter().map(|v| v - offset).collect();
+    let near = omega / TAU;
+    // Eightfold padding draws the peak finely enough.
+    let mut padded = values;
+    padded.resize(padded.len().min(1 << 17) * 8, 0.0);
+    let peak = peaks::strongest(
+        &padded,
+        rate_hz,
+        0.7 * near,
+        (1.4 * near).min(0.49 * rate_hz),
+    )?;
+    Some((peak.frequency_hz, 0.5 * peak.width_hz / peak.frequency_hz))
+}

@@ -1,0 +1,193 @@
+//! Which damping law the envelope of a single mode follows.
+//!
+//! Slowly falling amplitude of x'' + ω² x = −(damping) (A. H. Nayfeh, D. T. Mook, Nonlinear
+//! Oscillations, 1979, 3.3; averaging over a cycle):
+//!
+//! | law | A(t) |
+//! |---|---|
+//! | viscous, and structural at one frequency | `A' = −σ A` |
+//! | dry friction | `A' = −s` |
+//! | quadratic (drag) | `A' = −β A²` |
+//! | viscous and dry | `A' = −σ A − s` |
+//! | viscous and quadratic | `A' = −σ A − β A²` |
+
+use torqcomp_model::fit::{Fit, FitError, Options, Parameter, minimize};
+
+use super::modes::{Pole, Stretch};
+
+/// A law of damping.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Law {
+    /// Proportional to the speed, or lost per cycle in proportion to the square of the amplitude:
+    /// one frequency cannot tell the two apart.
+    Viscous,
+    /// Of constant size against the speed.
+    Dry,
+    /// Proportional to the square of the speed.
+    Quadratic,
+    /// The first and the second.
+    ViscousAndDry,
+    /// The first and the third.
+    ViscousAndQuadratic,
+}
+
+impl Law {
+    /// All laws, simple ones first.
+    pub const ALL: [Self; 5] = [
+        Self::Viscous,
+        Self::Dry,
+        Self::Quadratic,
+        Self::ViscousAndDry,
+        Self::ViscousAndQuadratic,
+    ];
+
+    /// Name for people and JSON.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Viscous => "viscous or structural",
+            Self::Dry => "dry friction",
+            Self::Quadratic => "quadratic",
+            Self::ViscousAndDry => "viscous and dry friction",
+            Self::ViscousAndQuadratic => "viscous and quadratic",
+        }
+    }
+
+    fn parts(self) -> (bool, bool, bool) {
+        match self {
+            Self::Viscous => (true, false, false),
+            Self::Dry => (false, true, false),
+            Self::Quadratic => (false, false, true),
+            Self::ViscousAndDry => (true, true, false),
+            Self::ViscousAndQuadratic => (true, false, true),
+        }
+    }
+}
+
+/// Amplitude at time t from a start A₀ under rates σ (1/s), s (units/s) and β (1/(unit s)).
+///
+/// With s: `A = (A₀ + s/σ) e^{−σt} − s/σ`, until it is 0; with β: `A = A₀ e^{−σt} / (1 + βA₀ (1 −
+/// e^{−σt})/σ)`; limits for σ → 0.
+///
+/// ```
+/// use torqcomp::identify::decay::envelope;
+/// // Dry friction alone: 2 − 0.5·3 = 0.5.
+/// assert_eq!(envelope(2.0, 0.0, 0.5, 0.0, 3.0), 0.5);
+/// // Drag alone: 2/(1 + 0.5·2·3) = 0.5.
+/// assert_eq!(envelope(2.0, 0.0, 0.0, 0.5, 3.0), 0.5);
+/// ```
+#[must_use]
+pub fn envelope(start: f64, sigma: f64, dry: f64, quadratic: f64, time_s: f64) -> f64 {
+    let fall = (-sigma * time_s).exp();
+    // (1 − e^{−σt})/σ, which tends to t.
+    let reach = if sigma * time_s > 1e-9 {
+        -(-sigma * time_s).exp_m1() / sigma
+    } else {
+        time_s
+    };
+    let linear = start * fall / (1.0 + quadratic * start * reach) - dry * reach;
+    linear.max(0.0)
+}
+
+/// One law fitted to the data.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LawFit {
+    /// The law.
+    pub law: Law,
+    /// σ, s, β, ω; those the law does not have are 0.
+    pub rates: [f64; 3],
+    /// Root mean square of what is left.
+    pub rms: f64,
+    /// Bayesian information criterion.
+    pub criterion: f64,
+    /// Whether every part of the law is there: none ended at zero.
+    pub complete: bool,
+}
+
+/// Fits a law to a stretch with one mode; the start comes from the viscous fit.
+///
+/// # Errors
+/// [`FitError`] if the fit cannot be made.
+pub fn fit(law: Law, stretch: &Stretch, pole: Pole, start: [f64; 4]) -> Result<LawFit, FitError> {
+    let [a, b, offset, drift] = start;
+    let amplitude = a.hypot(b).max(f64::MIN_POSITIVE);
+    let phase = (-b).atan2(a);
+    let (has_viscous, has_dry, has_quadratic) = law.parts();
+    let rate = pole.rate_per_s.max(1e-6 * pole.omega_rad_per_s);
+    let length = stretch.times_s.last().copied().unwrap_or(1.0);
+    let part = |has: bool, value: f64, scale: f64, name: &str| {
+        let parameter = Parameter::new(name, if has { value } else { 0.0 })
+            .at_least(0.0)
+            .scaled(scale);
+        if has { parameter } else { parameter.fixed() }
+    };
+    let alone = !(has_viscous && (has_dry || has_quadratic));
+    let share = if alone { 1.0 } else { 0.5 };
+    let parameters = [
+        Parameter::new("amplitude", amplitude).at_least(0.0),
+        Parameter::new("omega", pole.omega_rad_per_s),
+        Parameter::new("phase", phase).scaled(1.0),
+        Parameter::new("offset", offset).scaled(amplitude),
+        Parameter::new("drift", drift).scaled(amplitude / length),
+        part(has_viscous, share * rate, rate, "viscous"),
+        part(
+            has_dry,
+            0.5 * share * rate * amplitude,
+            rate * amplitude,
+            "dry",
+        ),
+        part(
+            has_quadratic,
+            share * rate / amplitude,
+            rate / amplitude,
+            "quadratic",
+        ),
+    ];
+    let residuals = |p: &[f64], out: &mut Vec<f64>| {
+        let pairs = stretch.times_s.iter().zip(&stretch.values);
+        out.extend(pairs.map(|(t, y)| {
+            let size = envelope(p[0], p[5], p[6], p[7], *t);
+            size * (p[1] * t + p[2]).cos() + p[3] + p[4] * t - y
+        }));
+        Ok(())
+    };
+    let options = Options {
+        tolerance: 1e-9,
+        most_evaluations: 600,
+        ..Options::default()
+    };
+    let fit = minimize(&residuals, &parameters, &options)?;
+    Ok(summed(law, &fit))
+}
+
+fn summed(law: Law, fit: &Fit) -> LawFit {
+    let n = fit.residuals.len() as f64;
+    let free = fit.values.len()
+        - [law.parts().0, law.parts().1, law.parts().2]
+            .iter()
+            .filter(|h| !**h)
+            .count();
+    LawFit {
+        law,
+        rates: [fit.values[5], fit.values[6], fit.values[7]],
+        rms: fit.rms,
+        criterion: n * fit.rms.powi(2).max(f64::MIN_POSITIVE).ln() + free as f64 * n.ln(),
+        complete: !fit.at_bound[5..8].iter().any(|b| *b),
+    }
+}
+
+/// The laws in order of what speaks for them; one whose parts vanish is left to the simpler one.
+///
+/// # Errors
+/// [`FitError`] if no law can be fitted.
+pub fn compare(stretch: &Stretch, pole: Pole, start: [f64; 4]) -> Result<Vec<LawFit>, FitError> {
+    let mut all = Vec::new();
+    for law in Law::ALL {
+        let fitted = fit(law, stretch, pole, start)?;
+        if fitted.complete {
+            all.push(fitted);
+        }
+    }
+    all.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
+    Ok(all)
+}

@@ -1,0 +1,341 @@
+//! A rational function through a frequency response: modes, residual terms and a delay.
+//!
+//! ```text
+//! H(s) = s^m [ Σ R_k/(s − p_k) + R_k*/(s − p_k*) + c_1 + c_2/s² ] e^{−sτ},   p_k = −σ_k + jω_k
+//! ```
+//!
+//! m is 0 for displacement, 1 for speed, 2 for acceleration; c_1 stands for modes above the band, c_2
+//! for those below and for free motion. Residues and c are linear; for given poles they follow at once, so
+//! that only poles and delay are searched for (G. H. Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973),
+//! 413, variable projection).
+
+use nalgebra::DMatrix;
+use num_complex::Complex64;
+use torqcomp_model::fit::{Fit, FitError, Options, Parameter, Residuals, linear, minimize};
+
+use crate::identify::decay::Pole;
+
+/// A response at lines of a band, with weights.
+#[derive(Debug, Clone)]
+pub struct Data {
+    /// Angular frequency of each line in rad/s.
+    pub omega: Vec<f64>,
+    /// Response at each line.
+    pub response: Vec<Complex64>,
+    /// Weight of each line, about 1.
+    pub weight: Vec<f64>,
+    /// m.
+    pub order: i32,
+    /// Decay rate that a window added to every mode, in 1/s.
+    pub added_rate: f64,
+    /// Whether a delay is fitted.
+    pub with_delay: bool,
+}
+
+/// How exactly a fit is made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Effort {
+    /// Enough to choose by.
+    Coarse,
+    /// To the end.
+    Fine,
+}
+
+/// A modal model.
+#[derive(Debug, Clone)]
+pub struct Modal {
+    /// Poles as they are without the window.
+    pub poles: Vec<Pole>,
+    /// τ in s.
+    pub delay_s: f64,
+    /// Linear numbers: real and imaginary part of each residue, then c₁ and c₂.
+    linear: Vec<f64>,
+    /// The fit of poles and delay.
+    pub fit: Option<Fit>,
+    /// Model at each line.
+    pub response: Vec<Complex64>,
+    scale: f64,
+}
+
+impl Data {
+    fn scale(&self) -> f64 {
+        self.omega[self.omega.len() / 2]
+    }
+
+    /// The columns at a frequency.
+    fn columns(&self, omega: f64, poles: &[Pole], delay_s: f64, scale: f64) -> Vec<Complex64> {
+        let (front, s) = self.front(omega, delay_s, scale);
+        let mut all = Vec::with_capacity(2 * poles.len() + 2);
+        for pole in poles {
+            let (near, far) = self.fractions(s, *pole, scale);
+            all.push(front * (near + far));
+            all.push(front * Complex64::I * (near - far));
+        }
+        all.push(front);
+        all.push(front / (s * s));
+        all
+    }
+
+    /// What stands before the sum, and s.
+    fn front(&self, omega: f64, delay_s: f64, scale: f64) -> (Complex64, Complex64) {
+        let s = Complex64::new(0.0, omega / scale);
+        (
+            s.powi(self.order) * Complex64::from_polar(1.0, -omega * delay_s),
+            s,
+        )
+    }
+
+    /// 1/(s − p) and 1/(s − p*), with the window's rate in p.
+    fn fractions(&self, s: Complex64, pole: Pole, scale: f64) -> (Complex64, Complex64) {
+        let p = Complex64::new(-(pole.rate_per_s + self.added_rate), pole.omega_rad_per_s) / scale;
+        (1.0 / (s - p), 1.0 / (s - p.conj()))
+    }
+
+    /// Linear numbers for given poles, and weighted residuals, real and imaginary one after another.
+    fn solve(&self, poles: &[Pole], delay_s: f64) -> Result<linear::LinearFit, FitError> {
+        let scale = self.scale();
+        let count = 2 * poles.len() + 2;
+        let lines = self.omega.len();
+        let mut design = DMatrix::zeros(2 * lines, count);
+        let mut right = vec![0.0; 2 * lines];
+        for (i, omega) in self.omega.iter().enumerate() {
+            let w = self.weight[i];
+            for (j, value) in self
+                .columns(*omega, poles, delay_s, scale)
+                .into_iter()
+                .enumerate()
+            {
+                design[(2 * i, j)] = w * value.re;
+                design[(2 * i + 1, j)] = w * value.im;
+            }
+            right[2 * i] = w * self.response[i].re;
+            right[2 * i + 1] = w * self.response[i].im;
+        }
+        linear::solve(&design, &right, None, false)
+    }
+
+    /// Fits from starts of the poles.
+    ///
+    /// # Errors
+    /// [`FitError`] if there are too few lines.
+    pub fn fit(&self, starts: &[Pole], effort: Effort) -> Result<Modal, FitError> {
+        let (low, high) = (self.omega[0], self.omega[self.omega.len() - 1]);
+        let mut parameters = Vec::new();
+        for (k, pole) in starts.iter().enumerate() {
+            let rate = pole.rate_per_s.max(1e-9 * high);
+            parameters.push(Parameter::new(format!("rate {}", k + 1), rate).at_least(0.0));
+            let omega = pole.omega_rad_per_s.clamp(0.5 * low, 1.2 * high);
+            let omega = Parameter::new(format!("omega {}", k + 1), omega);
+            parameters.push(omega.at_least(0.4 * low).at_most(1.3 * high));
+        }
+        if self.with_delay {
+            let step = std::f64::consts::PI / high;
+            let delay = Parameter::new("delay", 0.0).scaled(step);
+            parameters.push(delay.at_least(-8.0 * step).at_most(8.0 * step));
+        }
+        let problem = Problem {
+            data: self,
+            modes: starts.len(),
+        };
+        let fit = if parameters.is_empty() {
+            None
+        } else {
+            let (tolerance, rounds) = match effort {
+                Effort::Coarse => (1e-4, 12),
+                Effort::Fine => (1e-10, 100),
+            };
+            let options = Options {
+                tolerance,
+                most_evaluations: 2 * rounds,
+                ..Options::default()
+            };
+            Some(minimize(&problem, &parameters, &options)?)
+        };
+        let (poles, delay_s) = fit.as_ref().map_or_else(
+            || (Vec::new(), 0.0),
+            |f| (problem.poles(&f.values), problem.delay(&f.values)),
+        );
+        let solved = self.solve(&poles, delay_s)?;
+        let scale = self.scale();
+        let model = |omega: &f64| -> Complex64 {
+            let columns = self.columns(*omega, &poles, delay_s, scale);
+            columns.iter().zip(&solved.values).map(|(c, v)| c * v).sum()
+        };
+        Ok(Modal {
+            response: self.omega.iter().map(model).collect(),
+            poles,
+            delay_s,
+            linear: solved.values,
+            fit,
+            scale,
+        })
+    }
+
+    /// A start for one more mode: the strongest line of what is left, not within `apart` (a part of the
+    /// frequency) of the modes there are.
+    #[must_use]
+    pub fn next_pole(&self, so_far: &Modal, apart: f64) -> Option<Pole> {
+        let left: Vec<f64> = (0..self.omega.len())
+            .map(|i| self.weight[i] * (self.response[i] - so_far.response[i]).norm())
+            .collect();
+        let near = |omega: f64| {
+            so_far
+                .poles
+                .iter()
+                .any(|p| (omega / p.omega_rad_per_s - 1.0).abs() < apart)
+        };
+        let open = (0..left.len()).filter(|i| !near(self.omega[*i]));
+        let best = open.max_by(|a, b| left[*a].total_cmp(&left[*b]))?;
+        let below = |i: &usize| left[*i] < std::f64::consts::FRAC_1_SQRT_2 * left[best];
+        let from = (0..best).rev().find(below).unwrap_or(0);
+        let to = (best + 1..left.len()).find(below).unwrap_or(left.len() - 1);
+        let wide = 0.5 * (self.omega[to] - self.omega[from]);
+        let rest = Data {
+            response: self
+                .response
+                .iter()
+                .zip(&so_far.response)
+                .map(|(a, b)| a - b)
+                .collect(),
+            ..self.clone()
+        };
+        let mut found: Option<(f64, Pole)> = None;
+        for (rate, shift) in [0.1, 0.3, 0.6, 1.0, 2.0]
+            .iter()
+            .flat_map(|r| [-0.5, 0.0, 0.5].map(|s| (*r, s)))
+        {
+            let pole = Pole {
+                rate_per_s: (rate * wide - self.added_rate).max(1e-3 * wide),
+                omega_rad_per_s: self.omega[best] + shift * wide,
+            };
+            let Ok(solved) = rest.solve(&[pole], so_far.delay_s) else {
+                continue;
+            };
+            if found.is_none_or(|(least, _)| solved.sum_of_squares < least) {
+                found = Some((solved.sum_of_squares, pole));
+            }
+        }
+        found.map(|(_, pole)| pole)
+    }
+}
+
+/// The search for poles and delay, the linear numbers following at once.
+struct Problem<'a> {
+    data: &'a Data,
+    modes: usize,
+}
+
+impl Problem<'_> {
+    fn poles(&self, p: &[f64]) -> Vec<Pole> {
+        (0..self.modes)
+            .map(|k| Pole {
+                rate_per_s: p[2 * k],
+                omega_rad_per_s: p[2 * k + 1],
+            })
+            .collect()
+    }
+
+    fn delay(&self, p: &[f64]) -> f64 {
+        if self.data.with_delay {
+            p[2 * self.modes]
+        } else {
+            0.0
+        }
+    }
+
+    /// Derivatives of the model with the linear numbers held, by σ and ω of each mode and the delay.
+    fn slopes(&self, omega: f64, poles: &[Pole], delay_s: f64, linear: &[f64]) -> Vec<Complex64> {
+        let scale = self.data.scale();
+        let (front, s) = self.data.front(omega, delay_s, scale);
+        let mut all = Vec::with_capacity(2 * poles.len() + 1);
+        for (k, pole) in poles.iter().enumerate() {
+            let (near, far) = self.data.fractions(s, *pole, scale);
+            let residue = Complex64::new(linear[2 * k], linear[2 * k + 1]);
+            let (a, b) = (
+                residue * near * near / scale,
+                residue.conj() * far * far / scale,
+            );
+            all.push(-front * (a + b));
+            all.push(front * Complex64::I * (a - b));
+        }
+        if self.data.with_delay {
+            let columns = self.data.columns(omega, poles, delay_s, scale);
+            let model: Complex64 = columns.iter().zip(linear).map(|(c, v)| c * v).sum();
+            all.push(Complex64::new(0.0, -omega) * model);
+        }
+        all
+    }
+}
+
+impl Residuals for Problem<'_> {
+    fn residuals(&self, p: &[f64], out: &mut Vec<f64>) -> Result<(), FitError> {
+        out.extend(self.data.solve(&self.poles(p), self.delay(p))?.residuals);
+        Ok(())
+    }
+
+    fn has_jacobian(&self) -> bool {
+        true
+    }
+
+    /// The slopes with what the linear numbers can make up for taken out (L. Kaufman, BIT 15 (1975), 49).
+    fn jacobian(&self, p: &[f64], out: &mut DMatrix<f64>) -> Result<(), FitError> {
+        let (poles, delay_s) = (self.poles(p), self.delay(p));
+        let linear = self.data.solve(&poles, delay_s)?.values;
+        let lines = self.data.omega.len();
+        let scale = self.data.scale();
+        let mut design = DMatrix::zeros(2 * lines, linear.len());
+        for (i, omega) in self.data.omega.iter().enumerate() {
+            let w = self.data.weight[i];
+            let put = |to: &mut DMatrix<f64>, j: usize, value: Complex64| {
+                to[(2 * i, j)] = w * value.re;
+                to[(2 * i + 1, j)] = w * value.im;
+            };
+            for (j, value) in self
+                .data
+                .columns(*omega, &poles, delay_s, scale)
+                .into_iter()
+                .enumerate()
+            {
+                put(&mut design, j, value);
+            }
+            for (j, value) in self
+                .slopes(*omega, &poles, delay_s, &linear)
+                .into_iter()
+                .enumerate()
+            {
+                put(out, j, value);
+            }
+        }
+        for mut column in design.column_iter_mut() {
+            let size = column.norm();
+            if size > 0.0 {
+                column.unscale_mut(size);
+            }
+        }
+        let q = design.qr().q();
+        let made_up = &q * q.tr_mul(out);
+        *out -= made_up;
+        Ok(())
+    }
+}
+
+impl Modal {
+    /// Size of the residue of a mode: how strongly it takes part.
+    #[must_use]
+    pub fn strength(&self, k: usize) -> f64 {
+        self.linear[2 * k].hypot(self.linear[2 * k + 1]) / self.poles[k].rate_per_s.max(1e-12)
+    }
+
+    /// Response at rest per applied unit, from the modes and c₁; for displacement only, and without
+    /// free motion.
+    #[must_use]
+    pub fn at_rest(&self) -> f64 {
+        let one = |(k, pole): (usize, &Pole)| {
+            let p = Complex64::new(-pole.rate_per_s, pole.omega_rad_per_s) / self.scale;
+            let residue = Complex64::new(self.linear[2 * k], self.linear[2 * k + 1]);
+            2.0 * (-residue / p).re
+        };
+        let modes: f64 = self.poles.iter().enumerate().map(one).sum();
+        modes + self.linear[self.linear.len() - 2]
+    }
+}

@@ -1,0 +1,80 @@
+//! The classical way of robot identification, for comparison.
+
+use nalgebra::DMatrix;
+use torqcomp_dsp::zero_phase::low_pass;
+use torqcomp_model::fit::linear;
+
+use super::{Directions, Motion, Run, comparison, names};
+use crate::failure::Failure;
+use crate::identify::{Comparison, rms};
+
+/// Order of the low-pass, each way.
+const ORDER: u32 = 4;
+
+/// Low-pass on all channels, central differences, every n-th sample, least squares. `None` where the
+/// motion is an acceleration, which needs no differences.
+pub(super) fn identify(
+    run: &Run,
+    directions: &Directions,
+    half: usize,
+    split: bool,
+) -> Result<Option<Comparison>, Failure> {
+    if run.kind == Motion::Acceleration {
+        return Ok(None);
+    }
+    let rate = run.rate_hz;
+    let corner_hz = (rate / half as f64).min(0.2 * rate);
+    let smooth = |samples: &[f64]| low_pass(samples, rate, corner_hz, ORDER);
+    let filtered = smooth(run.motion)?;
+    let speed = match run.kind {
+        Motion::Position => differences(&filtered, rate),
+        _ => filtered,
+    };
+    let mut columns = vec![differences(&speed, rate)];
+    if split {
+        columns.push(speed.iter().map(|v| v.max(0.0)).collect());
+        columns.push(speed.iter().map(|v| v.min(0.0)).collect());
+    } else {
+        columns.push(speed.clone());
+    }
+    if directions.both() {
+        columns.push(smooth(
+            &speed.iter().map(|v| v.signum()).collect::<Vec<f64>>(),
+        )?);
+    }
+    columns.push(vec![1.0; speed.len()]);
+    let effort = smooth(run.effort)?;
+    let step = (rate / (4.0 * corner_hz)).floor().max(1.0) as usize;
+    // The ends of differences and filters are left out.
+    let edge = (2 * half).min(speed.len() / 10);
+    let rows: Vec<usize> = (edge..speed.len() - edge).step_by(step).collect();
+    let design = DMatrix::from_fn(rows.len(), columns.len(), |r, c| columns[c][rows[r]]);
+    let right: Vec<f64> = rows.iter().map(|r| effort[*r]).collect();
+    let fit = linear::solve(&design, &right, None, false)?;
+    let left = rms(&fit.residuals);
+    let method = format!(
+        "classical: Butterworth low-pass at {} Hz forwards and backwards, central differences, \
+         every {step} samples, least squares",
+        crate::report::short(corner_hz)
+    );
+    let names = names(run, directions, split);
+    let quality = (left, left / rms(&right));
+    Ok(Some(comparison(
+        method,
+        run,
+        &names,
+        &fit.values,
+        &fit.std,
+        quality,
+    )))
+}
+
+fn differences(samples: &[f64], rate_hz: f64) -> Vec<f64> {
+    let last = samples.len() - 1;
+    (0..=last)
+        .map(|i| {
+            let (from, to) = (i.saturating_sub(1), (i + 1).min(last));
+            (samples[to] - samples[from]) * rate_hz / (to - from) as f64
+        })
+        .collect()
+}
