@@ -45,6 +45,7 @@
 //! | [`response`] | transfer function and its inverse |
 //! | [`uncertainty`] | uncertainty of the inverse |
 //! | [`calibration`] | torque per volt from a static load |
+//! | [`fit`] | least squares: parameters with uncertainties from data |
 //! | [`error`] | errors of the mechanics |
 
 pub mod beam;
@@ -52,6 +53,7 @@ pub mod calibration;
 mod check;
 pub mod damping;
 pub mod error;
+pub mod fit;
 pub mod inertia;
 pub mod quantity;
 pub mod response;
