@@ -47,6 +47,7 @@
 //! | [`simulate`] | the stand's answer to an input, effects included |
 //! | [`uncertainty`] | uncertainty of the inverse |
 //! | [`calibration`] | torque per volt from a static load |
+//! | [`fit`] | least squares: parameters with uncertainties from data |
 //! | [`error`] | errors of the mechanics |
 
 pub mod beam;
@@ -55,6 +56,7 @@ mod check;
 pub mod damping;
 pub mod effects;
 pub mod error;
+pub mod fit;
 pub mod inertia;
 pub mod quantity;
 pub mod response;

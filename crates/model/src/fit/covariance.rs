@@ -1,0 +1,92 @@
+//! Uncertainty of the parameters, and the directions that the data do not determine.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::Covariance;
+
+/// Singular values below this part of the largest, after scaling of the columns, count as zero:
+/// derivatives by differences have about ten digits.
+const RANK_TOLERANCE: f64 = 1e-9;
+/// Share of a parameter in an undetermined direction from which on it is undetermined itself.
+const SHARE: f64 = 1e-3;
+
+/// A combination of parameters along which the fit does not change.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Undetermined {
+    /// Index of each parameter that takes part and its relative change along the direction.
+    pub shares: Vec<(usize, f64)>,
+}
+
+/// Covariance and undetermined directions from the triangular factor of the Jacobian.
+///
+/// `indices` are the parameters the columns belong to, out of `count`; `variance` gives
+/// that of a residual of weight 1 from the rank, `None` if unknown.
+pub(super) fn covariance(
+    r: &DMatrix<f64>,
+    indices: &[usize],
+    sizes: &[f64],
+    count: usize,
+    variance: impl Fn(usize) -> Option<f64>,
+) -> (Covariance, Vec<Undetermined>) {
+    let n = indices.len();
+    let norms: Vec<f64> = (0..n).map(|j| r.column(j).norm()).collect();
+    let scaled = DMatrix::from_fn(n, n, |i, j| {
+        if norms[j] > 0.0 {
+            r[(i, j)] / norms[j]
+        } else {
+            0.0
+        }
+    });
+    let svd = scaled.svd(false, true);
+    let v_t = svd.v_t.expect("the right side was asked for");
+    let largest = svd.singular_values.iter().fold(0.0_f64, |m, s| m.max(*s));
+    let mut inverse = DMatrix::zeros(n, n);
+    let mut undetermined = Vec::new();
+    let mut open = vec![false; n];
+    for (k, singular) in svd.singular_values.iter().enumerate() {
+        let row: DVector<f64> = v_t.row(k).transpose();
+        if *singular > RANK_TOLERANCE * largest {
+            inverse += &row * row.transpose() / (singular * singular);
+            continue;
+        }
+        (0..n)
+            .filter(|j| row[*j].abs() > SHARE)
+            .for_each(|j| open[j] = true);
+        undetermined.push(direction(&row, &norms, indices, sizes));
+    }
+    let variance = variance(n - undetermined.len());
+    let kept: Vec<usize> = (0..n).filter(|j| !open[*j] && variance.is_some()).collect();
+    let mut places = vec![None; count];
+    kept.iter()
+        .enumerate()
+        .for_each(|(place, j)| places[indices[*j]] = Some(place));
+    let variance = variance.unwrap_or(0.0);
+    let matrix = DMatrix::from_fn(kept.len(), kept.len(), |a, b| {
+        let (i, j) = (kept[a], kept[b]);
+        variance * inverse[(i, j)] / (norms[i] * norms[j])
+    });
+    (Covariance { places, matrix }, undetermined)
+}
+
+/// A null direction in relative changes of the parameters, its largest being 1.
+fn direction(row: &DVector<f64>, norms: &[f64], indices: &[usize], sizes: &[f64]) -> Undetermined {
+    let dead = norms.contains(&0.0);
+    let change: Vec<f64> = (0..indices.len())
+        .map(|j| match (dead, norms[j] > 0.0) {
+            // A column without effect is a direction of its own.
+            (true, false) => row[j],
+            (true, true) if row[j].abs() <= SHARE => 0.0,
+            _ => row[j] / (norms[j] * sizes[j]),
+        })
+        .collect();
+    let largest = change
+        .iter()
+        .fold(0.0_f64, |m, c| if c.abs() > m.abs() { *c } else { m });
+    let shares = indices
+        .iter()
+        .zip(&change)
+        .map(|(index, c)| (*index, c / largest))
+        .filter(|(_, share)| share.abs() > SHARE)
+        .collect();
+    Undetermined { shares }
+}

@@ -1,0 +1,319 @@
+//! Nonlinear least squares within bounds.
+
+use nalgebra::DMatrix;
+
+use super::covariance::covariance;
+use super::jacobian::{Derivatives, jacobian};
+use super::problem::Evaluated;
+use super::reduce::{Reduced, reduce};
+use super::step::{Room, step};
+use super::{Differences, Fit, FitError, Parameter, Residuals, StopReason};
+
+/// How a fit is made.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Options {
+    /// Derivatives where the problem gives none.
+    pub differences: Differences,
+    /// Threads for differences.
+    pub threads: usize,
+    /// Most evaluations of the residuals.
+    pub most_evaluations: usize,
+    /// Relative reduction of the sum of squares, and relative step, that count as none.
+    pub tolerance: f64,
+    /// Factors of the residuals: 1/σ makes them comparable.
+    pub weights: Option<Vec<f64>>,
+    /// Whether the weighted residuals have variance 1 by what is known of the noise. If not, the
+    /// variance is taken from the residuals.
+    pub variance_known: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            differences: Differences::Central,
+            threads: 1,
+            most_evaluations: 20_000,
+            tolerance: 1e-12,
+            weights: None,
+            variance_known: false,
+        }
+    }
+}
+
+/// Start of the damping, as a part of the scaling.
+const FIRST_DAMPING: f64 = 1e-3;
+/// Damping at which no step is left.
+const MOST_DAMPING: f64 = 1e24;
+/// Cosine of the angle between residuals and any column that counts as a right angle.
+const RIGHT_ANGLE: f64 = 1e-10;
+
+/// Finds the parameters that make the sum of the squares of the residuals least.
+///
+/// # Errors
+/// [`FitError`] if a parameter's numbers cannot be, nothing is free, there are too few residuals, or
+/// the model cannot be evaluated at the start.
+///
+/// # Examples
+/// See [the module](super).
+pub fn minimize(
+    problem: &dyn Residuals,
+    parameters: &[Parameter],
+    options: &Options,
+) -> Result<Fit, FitError> {
+    parameters.iter().try_for_each(Parameter::check)?;
+    let free: Vec<usize> = (0..parameters.len())
+        .filter(|i| !parameters[*i].fixed)
+        .collect();
+    if free.is_empty() {
+        return Err(FitError::NothingFree);
+    }
+    let mut state = State::start(problem, parameters, options, &free)?;
+    let stop = state.run()?;
+    state.finish(stop)
+}
+
+/// Where the search stands.
+struct State<'a> {
+    evaluated: Evaluated<'a>,
+    how: Derivatives<'a>,
+    options: &'a Options,
+    values: Vec<f64>,
+    residuals: Vec<f64>,
+    cost: f64,
+    reduced: Reduced,
+    scaling: Vec<f64>,
+    lambda: f64,
+    /// Factor of the next rise of the damping.
+    rise: f64,
+    evaluations: usize,
+}
+
+/// What came of a step.
+enum Progress {
+    Moved,
+    Refused,
+    Ended(StopReason),
+}
+
+impl<'a> State<'a> {
+    fn start(
+        problem: &'a dyn Residuals,
+        parameters: &'a [Parameter],
+        options: &'a Options,
+        free: &'a [usize],
+    ) -> Result<Self, FitError> {
+        let mut evaluated = Evaluated {
+            problem,
+            weights: options.weights.as_deref(),
+            expected: None,
+        };
+        let values: Vec<f64> = parameters.iter().map(|p| p.start).collect();
+        let residuals = evaluated.residuals(&values)?;
+        evaluated.expected = Some(residuals.len());
+        if residuals.len() < free.len() {
+            return Err(FitError::TooFewResiduals {
+                residuals: residuals.len(),
+                free: free.len(),
+            });
+        }
+        let how = Derivatives {
+            parameters,
+            free,
+            differences: options.differences,
+            threads: options.threads,
+        };
+        let (matrix, count) = jacobian(&evaluated, &how, &values, &residuals)?;
+        let mut state = Self {
+            reduced: reduce(&matrix, &residuals),
+            cost: sum_of_squares(&residuals),
+            scaling: vec![0.0; free.len()],
+            lambda: FIRST_DAMPING,
+            rise: 2.0,
+            evaluations: 1 + count,
+            evaluated,
+            how,
+            options,
+            values,
+            residuals,
+        };
+        state.rescale();
+        Ok(state)
+    }
+
+    /// Moré's scaling: the largest norm each column has had.
+    fn rescale(&mut self) {
+        for (j, scale) in self.scaling.iter_mut().enumerate() {
+            let norm = self.reduced.r.column(j).norm();
+            *scale = scale.max(norm);
+        }
+        // A column without effect still needs some damping to be solvable.
+        let floor = self.scaling.iter().fold(0.0_f64, |m, s| m.max(*s)) * 1e-30;
+        let parameters = self.how.parameters;
+        for (scale, index) in self.scaling.iter_mut().zip(self.how.free) {
+            if *scale <= floor {
+                *scale = 1.0 / parameters[*index].scale;
+            }
+        }
+    }
+
+    fn run(&mut self) -> Result<StopReason, FitError> {
+        loop {
+            if self.cost == 0.0 {
+                return Ok(StopReason::Exact);
+            }
+            if self.at_right_angles() {
+                return Ok(StopReason::Gradient);
+            }
+            if self.evaluations >= self.options.most_evaluations {
+                return Ok(StopReason::Evaluations);
+            }
+            match self.advance()? {
+                Progress::Ended(reason) => return Ok(reason),
+                Progress::Moved | Progress::Refused => {}
+            }
+        }
+    }
+
+    /// Whether no free direction that its bounds leave open lowers the sum of squares.
+    fn at_right_angles(&self) -> bool {
+        let gradient = self.reduced.r.tr_mul(&self.reduced.c);
+        let size = self.cost.sqrt();
+        let room = self.room();
+        (0..gradient.len()).all(|j| {
+            let held =
+                gradient[j] > 0.0 && room[j].down <= 0.0 || gradient[j] < 0.0 && room[j].up <= 0.0;
+            let norm = self.reduced.r.column(j).norm();
+            held || gradient[j].abs() <= RIGHT_ANGLE * norm * size
+        })
+    }
+
+    fn room(&self) -> Vec<Room> {
+        let one = |index: &usize| {
+            let (parameter, value) = (&self.how.parameters[*index], self.values[*index]);
+            Room {
+                down: value - parameter.lower,
+                up: parameter.upper - value,
+            }
+        };
+        self.how.free.iter().map(one).collect()
+    }
+
+    /// Tries one step.
+    fn advance(&mut self) -> Result<Progress, FitError> {
+        let room = self.room();
+        let Some(step) = step(&self.reduced, &self.scaling, self.lambda, &room) else {
+            return Ok(self.refuse());
+        };
+        let after = &self.reduced.c + &self.reduced.r * &step;
+        let predicted = self.reduced.c.norm_squared() - after.norm_squared();
+        let mut trial = self.values.clone();
+        let mut moved = 0.0_f64;
+        for (index, d) in self.how.free.iter().zip(step.iter()) {
+            let parameter = &self.how.parameters[*index];
+            trial[*index] = (trial[*index] + d).clamp(parameter.lower, parameter.upper);
+            let size = self.values[*index].abs().max(1e-3 * parameter.scale);
+            moved = moved.max((trial[*index] - self.values[*index]).abs() / size);
+        }
+        if moved == 0.0 {
+            return Ok(Progress::Ended(StopReason::NoProgress));
+        }
+        self.evaluations += 1;
+        let Ok(residuals) = self.evaluated.residuals(&trial) else {
+            return Ok(self.refuse());
+        };
+        let cost = sum_of_squares(&residuals);
+        let gain = self.cost - cost;
+        let tolerance = self.options.tolerance;
+        if gain <= 0.0 {
+            let level = gain.abs() <= tolerance * self.cost && predicted <= tolerance * self.cost;
+            return Ok(if level {
+                Progress::Ended(StopReason::Reduction)
+            } else {
+                self.refuse()
+            });
+        }
+        let small_gain = gain <= tolerance * self.cost && predicted <= tolerance * self.cost;
+        self.accept(trial, residuals, cost, gain / predicted)?;
+        Ok(match (small_gain, moved <= tolerance) {
+            (true, _) => Progress::Ended(StopReason::Reduction),
+            (_, true) => Progress::Ended(StopReason::Step),
+            _ => Progress::Moved,
+        })
+    }
+
+    /// More damping, after a step that did not help.
+    fn refuse(&mut self) -> Progress {
+        self.lambda = self.lambda.max(1e-15) * self.rise;
+        self.rise *= 2.0;
+        if self.lambda > MOST_DAMPING {
+            Progress::Ended(StopReason::NoProgress)
+        } else {
+            Progress::Refused
+        }
+    }
+
+    /// Takes a step, with less damping the better the model predicted its gain.
+    fn accept(
+        &mut self,
+        values: Vec<f64>,
+        residuals: Vec<f64>,
+        cost: f64,
+        ratio: f64,
+    ) -> Result<(), FitError> {
+        let (matrix, count) = jacobian(&self.evaluated, &self.how, &values, &residuals)?;
+        self.evaluations += count;
+        self.reduced = reduce(&matrix, &residuals);
+        self.values = values;
+        self.residuals = residuals;
+        self.cost = cost;
+        self.lambda *= (1.0 - (2.0 * ratio - 1.0).powi(3)).max(1.0 / 3.0);
+        self.rise = 2.0;
+        self.rescale();
+        Ok(())
+    }
+
+    fn finish(self, stop: StopReason) -> Result<Fit, FitError> {
+        let parameters = self.how.parameters;
+        let count = parameters.len();
+        let at_bound: Vec<bool> = parameters
+            .iter()
+            .zip(&self.values)
+            .map(|(p, v)| !p.fixed && (*v <= p.lower || *v >= p.upper))
+            .collect();
+        let inside: Vec<usize> = (0..self.how.free.len())
+            .filter(|j| !at_bound[self.how.free[*j]])
+            .collect();
+        let indices: Vec<usize> = inside.iter().map(|j| self.how.free[*j]).collect();
+        let sizes: Vec<f64> = indices
+            .iter()
+            .map(|i| self.values[*i].abs().max(1e-3 * parameters[*i].scale))
+            .collect();
+        let columns: DMatrix<f64> = self.reduced.r.select_columns(&inside);
+        let small = reduce(&columns, self.reduced.c.as_slice());
+        let freedom = |rank: usize| self.residuals.len() - rank;
+        let variance = |rank: usize| match (self.options.variance_known, freedom(rank)) {
+            (true, _) => Some(1.0),
+            (false, 0) => None,
+            (false, freedom) => Some(self.cost / freedom as f64),
+        };
+        let (covariance, undetermined) = covariance(&small.r, &indices, &sizes, count, variance);
+        let degrees_of_freedom = freedom(indices.len() - undetermined.len());
+        Ok(Fit {
+            std: (0..count).map(|i| covariance.std(i)).collect(),
+            values: self.values,
+            covariance,
+            undetermined,
+            at_bound,
+            rms: (self.cost / self.residuals.len() as f64).sqrt(),
+            sum_of_squares: self.cost,
+            degrees_of_freedom,
+            residuals: self.residuals,
+            stop,
+            evaluations: self.evaluations,
+        })
+    }
+}
+
+fn sum_of_squares(residuals: &[f64]) -> f64 {
+    residuals.iter().map(|r| r * r).sum()
+}

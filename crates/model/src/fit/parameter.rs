@@ -1,0 +1,100 @@
+//! What is looked for, and within which bounds.
+
+use super::FitError;
+
+/// A parameter of a fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parameter {
+    /// Name in reports.
+    pub name: String,
+    /// Value to start from, within the bounds.
+    pub start: f64,
+    /// Least value, or −∞.
+    pub lower: f64,
+    /// Greatest value, or +∞.
+    pub upper: f64,
+    /// Size of a change that matters, greater than 0: sets the steps of differences where the
+    /// value itself is small.
+    pub scale: f64,
+    /// Whether it keeps its start.
+    pub fixed: bool,
+}
+
+impl Parameter {
+    /// A free parameter without bounds, its scale being the size of its start (or 1).
+    ///
+    /// ```
+    /// use torqcomp_model::fit::Parameter;
+    /// let rate = Parameter::new("rate", 20.0).at_least(0.0);
+    /// assert_eq!((rate.scale, rate.lower, rate.upper), (20.0, 0.0, f64::INFINITY));
+    /// ```
+    #[must_use]
+    pub fn new(name: impl Into<String>, start: f64) -> Self {
+        let scale = start.abs();
+        Self {
+            name: name.into(),
+            start,
+            lower: f64::NEG_INFINITY,
+            upper: f64::INFINITY,
+            scale: if scale > 0.0 { scale } else { 1.0 },
+            fixed: false,
+        }
+    }
+
+    /// The same with a least value.
+    #[must_use]
+    pub fn at_least(mut self, lower: f64) -> Self {
+        self.lower = lower;
+        self
+    }
+
+    /// The same with a greatest value.
+    #[must_use]
+    pub fn at_most(mut self, upper: f64) -> Self {
+        self.upper = upper;
+        self
+    }
+
+    /// The same with another scale.
+    #[must_use]
+    pub fn scaled(mut self, scale: f64) -> Self {
+        self.scale = scale;
+        self
+    }
+
+    /// The same, kept at its start.
+    #[must_use]
+    pub fn fixed(mut self) -> Self {
+        self.fixed = true;
+        self
+    }
+
+    /// Whether all its numbers make sense together.
+    pub(super) fn check(&self) -> Result<(), FitError> {
+        let wrong = |problem: String| {
+            Err(FitError::Parameter {
+                name: self.name.clone(),
+                problem,
+            })
+        };
+        let (start, lower, upper) = (self.start, self.lower, self.upper);
+        if !start.is_finite() {
+            return wrong(format!("starts at {start}; a finite number is needed"));
+        }
+        if !(self.scale > 0.0 && self.scale.is_finite()) {
+            return wrong(format!(
+                "scale is {}; it must be greater than 0",
+                self.scale
+            ));
+        }
+        if lower.is_nan() || upper.is_nan() || lower > upper || (lower == upper && !self.fixed) {
+            return wrong(format!(
+                "its bounds are {lower} and {upper}; the lower one must be less"
+            ));
+        }
+        if start < lower || start > upper {
+            return wrong(format!("starts at {start}, outside {lower} to {upper}"));
+        }
+        Ok(())
+    }
+}

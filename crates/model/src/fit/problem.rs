@@ -1,0 +1,109 @@
+//! What is fitted: residuals as a function of parameters.
+
+use nalgebra::DMatrix;
+
+use super::FitError;
+
+/// Residuals to be made small, and if known their derivatives.
+///
+/// A closure `Fn(&[f64], &mut Vec<f64>) -> Result<(), FitError>` is one whose derivatives are taken
+/// by differences.
+pub trait Residuals: Sync {
+    /// Writes the residuals at `values` (all parameters, fixed ones too) into `out`, which is empty.
+    ///
+    /// # Errors
+    /// [`FitError::Model`] where the model cannot be evaluated: the fit then takes a smaller step.
+    fn residuals(&self, values: &[f64], out: &mut Vec<f64>) -> Result<(), FitError>;
+
+    /// Whether [`Residuals::jacobian`] is there; otherwise differences are taken.
+    fn has_jacobian(&self) -> bool {
+        false
+    }
+
+    /// Writes ∂residual/∂parameter into the matrix, which is all zero: a row each residual and a
+    /// column each parameter, fixed ones too.
+    ///
+    /// # Errors
+    /// As [`Residuals::residuals`].
+    fn jacobian(&self, values: &[f64], out: &mut DMatrix<f64>) -> Result<(), FitError> {
+        let _ = (values, out);
+        Err(FitError::Model("no derivatives are given".to_owned()))
+    }
+}
+
+impl<F> Residuals for F
+where
+    F: Fn(&[f64], &mut Vec<f64>) -> Result<(), FitError> + Sync,
+{
+    fn residuals(&self, values: &[f64], out: &mut Vec<f64>) -> Result<(), FitError> {
+        self(values, out)
+    }
+}
+
+/// Residuals and derivatives, each from a closure.
+pub struct WithJacobian<R, J> {
+    /// The residuals.
+    pub residuals: R,
+    /// Their derivatives.
+    pub jacobian: J,
+}
+
+impl<R, J> Residuals for WithJacobian<R, J>
+where
+    R: Fn(&[f64], &mut Vec<f64>) -> Result<(), FitError> + Sync,
+    J: Fn(&[f64], &mut DMatrix<f64>) -> Result<(), FitError> + Sync,
+{
+    fn residuals(&self, values: &[f64], out: &mut Vec<f64>) -> Result<(), FitError> {
+        (self.residuals)(values, out)
+    }
+
+    fn has_jacobian(&self) -> bool {
+        true
+    }
+
+    fn jacobian(&self, values: &[f64], out: &mut DMatrix<f64>) -> Result<(), FitError> {
+        (self.jacobian)(values, out)
+    }
+}
+
+/// How derivatives are taken where the problem does not give them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Differences {
+    /// (r(p + h) − r(p))/h: one evaluation a parameter, seven to eight digits.
+    Forward,
+    /// (r(p + h) − r(p − h))/2h: two evaluations a parameter, ten to eleven digits.
+    Central,
+}
+
+/// A problem with the weights of its residuals and the count of its evaluations.
+pub(super) struct Evaluated<'a> {
+    pub problem: &'a dyn Residuals,
+    /// Factors of the residuals, or none.
+    pub weights: Option<&'a [f64]>,
+    pub expected: Option<usize>,
+}
+
+impl Evaluated<'_> {
+    /// Weighted residuals, all finite.
+    pub fn residuals(&self, values: &[f64]) -> Result<Vec<f64>, FitError> {
+        let mut out = Vec::with_capacity(self.expected.unwrap_or(0));
+        self.problem.residuals(values, &mut out)?;
+        let expected = self.weights.map(<[f64]>::len).or(self.expected);
+        if let Some(expected) = expected.filter(|n| *n != out.len()) {
+            return Err(FitError::Length {
+                expected,
+                got: out.len(),
+            });
+        }
+        if let Some(weights) = self.weights {
+            out.iter_mut().zip(weights).for_each(|(r, w)| *r *= w);
+        }
+        match out.iter().position(|r| !r.is_finite()) {
+            Some(index) => Err(FitError::NotFinite {
+                index,
+                value: out[index],
+            }),
+            None => Ok(out),
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! A tall least-squares problem brought to a small one without squaring its condition number.
+
+use nalgebra::{DMatrix, DVector};
+
+/// Rows taken at once: large enough for few rounds, small enough to stay in cache.
+const BLOCK: usize = 2048;
+
+/// The problem min |A x − b| as min |R x − c|² + rest², with R square and upper triangular.
+pub(super) struct Reduced {
+    /// Upper triangular factor of A.
+    pub r: DMatrix<f64>,
+    /// The part of b that A can reach.
+    pub c: DVector<f64>,
+}
+
+/// Reduces [A | b] by orthogonal transformations, block after block of rows (Householder; Golub & Van
+/// Loan, Matrix Computations, 4th ed., 5.2 and 6.5.3 for the joining of blocks).
+pub(super) fn reduce(a: &DMatrix<f64>, b: &[f64]) -> Reduced {
+    let (rows, columns) = a.shape();
+    let width = columns + 1;
+    let mut top = DMatrix::zeros(width, width);
+    let mut from = 0;
+    while from < rows {
+        let count = BLOCK.max(width).min(rows - from);
+        let mut stacked = DMatrix::zeros(width + count, width);
+        stacked.rows_mut(0, width).copy_from(&top);
+        for j in 0..columns {
+            let source = &a.column(j);
+            let source = &source.as_slice()[from..from + count];
+            stacked.column_mut(j).as_mut_slice()[width..].copy_from_slice(source);
+        }
+        stacked.column_mut(columns).as_mut_slice()[width..].copy_from_slice(&b[from..from + count]);
+        triangularize(&mut stacked);
+        top.copy_from(&stacked.rows(0, width));
+        from += count;
+    }
+    Reduced {
+        r: top.view((0, 0), (columns, columns)).into_owned(),
+        c: top.view((0, columns), (columns, 1)).column(0).into_owned(),
+    }
+}
+
+/// Householder reflections in place; below the diagonal is zero afterwards.
+fn triangularize(matrix: &mut DMatrix<f64>) {
+    let (rows, columns) = matrix.shape();
+    let data = matrix.as_mut_slice();
+    let mut v = vec![0.0; rows];
+    for k in 0..columns.min(rows) {
+        let column = &mut data[k * rows + k..(k + 1) * rows];
+        let largest = column.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        if largest == 0.0 {
+            continue;
+        }
+        let norm = largest
+            * column
+                .iter()
+                .map(|x| (x / largest).powi(2))
+                .sum::<f64>()
+                .sqrt();
+        let head = column[0];
+        let alpha = if head > 0.0 { -norm } else { norm };
+        let v = &mut v[..rows - k];
+        // v is scaled to v₀ = 1, which keeps it free of overflow.
+        let pivot = head - alpha;
+        v[0] = 1.0;
+        v[1..]
+            .iter_mut()
+            .zip(&column[1..])
+            .for_each(|(v, x)| *v = x / pivot);
+        let beta = -pivot / alpha;
+        column.fill(0.0);
+        column[0] = alpha;
+        for j in k + 1..columns {
+            let target = &mut data[j * rows + k..(j + 1) * rows];
+            let dot: f64 = target.iter().zip(v.iter()).map(|(t, v)| t * v).sum();
+            let factor = beta * dot;
+            target
+                .iter_mut()
+                .zip(v.iter())
+                .for_each(|(t, v)| *t -= factor * v);
+        }
+    }
+}
+
+/// Solves R x = b for an upper triangular R without zeros on its diagonal.
+pub(super) fn back_substitute(r: &DMatrix<f64>, b: &DVector<f64>) -> Option<DVector<f64>> {
+    r.solve_upper_triangular(b)
+        .filter(|x| x.iter().all(|v| v.is_finite()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keeps_the_normal_equations() {
+        let rows = 5000;
+        let a = DMatrix::from_fn(rows, 3, |i, j| ((i * (j + 2)) as f64 * 0.37).sin());
+        let b: Vec<f64> = (0..rows).map(|i| (i as f64 * 0.11).cos()).collect();
+        let reduced = reduce(&a, &b);
+        let error = (reduced.r.tr_mul(&reduced.r) - a.tr_mul(&a)).norm();
+        assert!(error < 1e-9, "{error}");
+        let right = a.tr_mul(&DVector::from_vec(b));
+        let error = (reduced.r.tr_mul(&reduced.c) - right).norm();
+        assert!(error < 1e-9, "{error}");
+    }
+}
