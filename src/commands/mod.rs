@@ -1,8 +1,10 @@
 //! One file for each verb.
 
 mod compensate;
+mod diagnose;
 mod harmonics;
 mod predict;
+mod simulate;
 mod table;
 
 use torqcomp_dsp::conversion::ConversionError;
@@ -32,6 +34,8 @@ pub fn run(cli: Cli) -> Result<Outcome, Failure> {
         Verb::Harmonics(args) => harmonics::run(&args),
         Verb::Table(args) => table::run(&args),
         Verb::Predict(args) => predict::run(&args),
+        Verb::Simulate(args) => simulate::run(&args),
+        Verb::Diagnose(args) => diagnose::run(&args),
     }
 }
 

@@ -1,6 +1,7 @@
 //! What the verbs report, as plain data: one struct for each, written as text or as JSON.
 
 pub mod compensate;
+pub mod diagnose;
 pub mod harmonics;
 pub mod predict;
 pub mod svg;

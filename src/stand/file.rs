@@ -6,6 +6,7 @@ use toml_edit::Document;
 use torqcomp_model::{Estimate, Kind, ParameterStd, SecondOrder, Unit};
 
 use super::drawing::{beam, friction, part};
+use super::effects::effect;
 use super::measuring::{bridge, gage, recorder};
 use super::section::{Section, SourceText};
 use super::{Given, Mechanics, Stand, StaticGain};
@@ -74,18 +75,14 @@ pub fn parse(name: &str, text: &str) -> Result<Stand, Failure> {
     let gage = top.section("gage")?.map(|s| gage(&s)).transpose()?;
     let bridge = top.section("bridge")?.map(|s| bridge(&s)).transpose()?;
     let recorder = recorder(top.section("recorder")?.as_ref())?;
-    if let Some(effect) = top.sections("effects")?.first() {
-        let kind = effect.text("kind")?.unwrap_or("");
-        return Err(effect.fail(
-            "kind",
-            format_args!(
-                "this version cannot apply the effect \"{kind}\"; leave it out to use the plain \
-                 stand"
-            ),
-        ));
-    }
+    let effect_sections = top.sections("effects")?;
+    let measured_unit = top
+        .section("diagnosed")?
+        .map(|s| diagnosed(&s))
+        .transpose()?
+        .flatten();
     top.finish()?;
-    let stand = Stand {
+    let mut stand = Stand {
         name: stand_name,
         file: name.to_owned(),
         mechanics,
@@ -96,8 +93,14 @@ pub fn parse(name: &str, text: &str) -> Result<Stand, Failure> {
         gage,
         bridge,
         recorder,
+        effects: Vec::new(),
+        measured_unit,
     };
     one_calibration(&top, &stand)?;
+    stand.effects = effect_sections
+        .iter()
+        .map(|section| effect(section, stand.recorded_unit()))
+        .collect::<Result<_, _>>()?;
     Ok(stand)
 }
 
@@ -223,6 +226,16 @@ fn static_gain(section: &Section) -> Result<Option<StaticGain>, Failure> {
         recorded_unit: recorded.trim().to_owned(),
         applied_unit: applied.to_owned(),
     }))
+}
+
+/// What a diagnosis wrote about itself; the unit of the record is used, the rest is for people.
+fn diagnosed(section: &Section) -> Result<Option<String>, Failure> {
+    let unit = section.text("measured_unit")?.map(str::to_owned);
+    for key in ["applied_unit", "verdict", "records"] {
+        let _ = section.text(key)?;
+    }
+    section.finish()?;
+    Ok(unit)
 }
 
 fn calibration(section: &Section) -> Result<Estimate, Failure> {

@@ -2,8 +2,10 @@
 
 mod chain;
 mod drawing;
+mod effects;
 mod file;
 mod measuring;
+mod refine;
 mod section;
 
 use torqcomp_dsp::bridge::{BridgeLayout, Leads, Supply};
@@ -11,7 +13,10 @@ use torqcomp_dsp::recorder::Recorder;
 use torqcomp_model::{Estimate, ParameterStd, SecondOrder};
 
 pub use chain::{Applied, Chain, applied_by_unit};
+pub use effects::DeclaredEffect;
+pub use file::parse;
 pub use file::read;
+pub use refine::{Refined, refine, si_unit};
 
 /// A stand: its mechanics, and how its record becomes torque.
 #[derive(Debug, Clone)]
@@ -36,6 +41,10 @@ pub struct Stand {
     pub bridge: Option<BridgeData>,
     /// The recorder.
     pub recorder: RecorderData,
+    /// What the plain stand lacks.
+    pub effects: Vec<DeclaredEffect>,
+    /// Unit of the record that a diagnosis refined the stand with.
+    pub measured_unit: Option<String>,
 }
 
 /// The stand's response, from measured constants.

@@ -1,7 +1,7 @@
 //! Play between stator and beam.
 //!
-//! `gap`: within `±g` of its middle the beam is not touched, `n = −clamp(x, −g, g)`. `soft-gap`: something
-//! softer carries within the gap, `n = −r clamp(x, −g, g)`. `joint`: the beam follows the stator with play,
+//! `gap`: within `±g` of its middle the beam is not touched, `n = −clamp(x, −g, g)`. (A gap in which something
+//! softer carries is not offered: it is the same as an end stop beside the beam.) `joint`: the beam follows the stator with play,
 //! `n = w − x` with `w` dragged along at a distance of at most `g` (the play operator of M. A. Krasnoselskii, A. V.
 //! Pokrovskii, *Systems with Hysteresis* (1989)). `recorded`: the same play, in what the gage is moved by
 //! only. M. Nordin, P.-O. Gutman, *Controlling mechanical systems with backlash*, Automatica 38 (2002), 1633.
@@ -25,24 +25,7 @@ pub(super) static EFFECT: Effect = Effect {
             place: Place::Stand,
             parameters: &[GAP],
             starts: &[&[0.02], &[0.1], &[0.4]],
-            build: |p| {
-                Action::Torque(Box::new(Gap {
-                    gap: p[0],
-                    share: 1.0,
-                }))
-            },
-        },
-        Form {
-            name: "soft-gap",
-            place: Place::Stand,
-            parameters: &[GAP, Parameter::number("softening", 0.0, 1.0)],
-            starts: &[&[0.1, 0.5], &[0.5, 0.5]],
-            build: |p| {
-                Action::Torque(Box::new(Gap {
-                    gap: p[0],
-                    share: p[1],
-                }))
-            },
+            build: |p| Action::Torque(Box::new(Gap { gap: p[0] })),
         },
         Form {
             name: "joint",
@@ -75,12 +58,11 @@ pub(super) static EFFECT: Effect = Effect {
 
 struct Gap {
     gap: f64,
-    share: f64,
 }
 
 impl Torque for Gap {
     fn value(&self, _: &mut Memory, x: f64, _: f64) -> f64 {
-        -self.share * x.clamp(-self.gap, self.gap)
+        -x.clamp(-self.gap, self.gap)
     }
 }
 

@@ -25,7 +25,9 @@ pub(super) static EFFECT: Effect = Effect {
             starts: &[&[0.005]],
             build: |p| {
                 let time_s = p[0];
-                Action::Feedthrough(Box::new(move |_, omega| Complex64::new(0.0, omega * time_s)))
+                Action::Feedthrough(Box::new(move |_, omega| {
+                    Complex64::new(0.0, omega * time_s)
+                }))
             },
         },
         Form {
@@ -35,7 +37,9 @@ pub(super) static EFFECT: Effect = Effect {
             starts: &[&[0.005]],
             build: |p| {
                 let time_s = p[0];
-                Action::Factor(Box::new(move |_, omega| Complex64::new(1.0, omega * time_s)))
+                Action::Factor(Box::new(move |_, omega| {
+                    Complex64::new(1.0, omega * time_s)
+                }))
             },
         },
         Form {

@@ -16,7 +16,11 @@ pub(super) static EFFECT: Effect = Effect {
     equation: "n = F tanh(x'/v)",
     source: "C. A. Coulomb, Theorie des machines simples (1781)",
     validity: "where sliding is full",
-    mistaken_for: &["bouc-wen-hysteresis", "quadratic-damping", "structural-damping"],
+    mistaken_for: &[
+        "bouc-wen-hysteresis",
+        "quadratic-damping",
+        "structural-damping",
+    ],
     experiment: "a slow load and unload, a free decay down to rest, and the response at two levels",
     forms: &[Form {
         name: "tanh",

@@ -45,6 +45,10 @@ fn butterworth(order: u32, cutoff_hz: f64) -> Action {
         .collect();
     Action::Factor(Box::new(move |_, omega| {
         let s = Complex64::new(0.0, omega / (TAU * cutoff_hz));
-        poles.iter().map(|p| 1.0 - s / p).product::<Complex64>().inv()
+        poles
+            .iter()
+            .map(|p| 1.0 - s / p)
+            .product::<Complex64>()
+            .inv()
     }))
 }

@@ -135,7 +135,10 @@ impl Input {
         let scale = 1.0 / self.total as f64;
         let first = self.lead * substeps - 1;
         let count = (self.samples.len() - 1) * substeps + 4;
-        fine[first..first + count].iter().map(|x| x * scale).collect()
+        fine[first..first + count]
+            .iter()
+            .map(|x| x * scale)
+            .collect()
     }
 }
 

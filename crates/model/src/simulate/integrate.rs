@@ -120,7 +120,8 @@ impl Step {
 
     #[inline]
     fn advance(&self, state: State, input: &[f64]) -> State {
-        let force = |w: &[f64; 4]| w[0] * input[0] + w[1] * input[1] + w[2] * input[2] + w[3] * input[3];
+        let force =
+            |w: &[f64; 4]| w[0] * input[0] + w[1] * input[1] + w[2] * input[2] + w[3] * input[3];
         State {
             x: self.a * state.x + (self.b * state.speed + force(&self.to_x)),
             speed: self.c * state.x + (self.d * state.speed + force(&self.to_speed)),

@@ -11,4 +11,3 @@ mod model;
 pub use input::Input;
 pub use integrate::{State, substeps};
 pub use model::{Fixed, Model};
-

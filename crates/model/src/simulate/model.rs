@@ -81,6 +81,27 @@ impl Model {
         free_motion(&self.mode, rate_hz, count)
     }
 
+    /// Displacement and speed at the first sample, in the steady state of what continues the record
+    /// backwards; torques left out.
+    #[must_use]
+    pub fn state_at_start(&self, input: &Input) -> [f64; 2] {
+        let Signal::Spectrum(x) = self.respond(input) else {
+            return [0.0; 2];
+        };
+        let speed = x
+            .iter()
+            .enumerate()
+            .map(|(k, x)| x * Complex64::new(0.0, input.omega_rad_s(k)))
+            .collect();
+        [input.samples_of(x)[0], input.samples_of(speed)[0]]
+    }
+
+    /// Whether the motion has to be integrated in time.
+    #[must_use]
+    pub fn has_torques(&self) -> bool {
+        !self.torques().is_empty()
+    }
+
     fn torques(&self) -> Vec<&dyn Torque> {
         self.actions
             .iter()
@@ -92,9 +113,8 @@ impl Model {
     }
 
     fn respond(&self, input: &Input) -> Signal {
-        let line = |(k, u): (usize, &Complex64)| {
-            u * self.gain * self.mode.response(input.omega_rad_s(k))
-        };
+        let line =
+            |(k, u): (usize, &Complex64)| u * self.gain * self.mode.response(input.omega_rad_s(k));
         Signal::Spectrum(input.spectrum().iter().enumerate().map(line).collect())
     }
 
