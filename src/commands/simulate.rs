@@ -50,7 +50,11 @@ pub fn run(args: &Simulate) -> Result<Outcome, Failure> {
         text.push_str(&digits::text(time_s, 12));
         text.push(',');
         let mut cell = Vec::new();
-        digits::write(&mut cell, value / factor.measured, args.digits);
+        digits::write(
+            &mut cell,
+            (value + stand.diagnosed.offset) / factor.measured,
+            args.digits,
+        );
         text.push_str(&String::from_utf8_lossy(&cell));
         text.push('\n');
     }
@@ -101,17 +105,21 @@ fn scales(stand: &Stand, applied: Option<f64>) -> Result<(f64, Scales), Failure>
         (None, Some(gain)) => factor(&gain.applied_unit)?,
         (None, None) => 1.0,
     };
-    let measured = match (&stand.measured_unit, gain) {
+    let measured = match (&stand.diagnosed.measured_unit, gain) {
         (Some(unit), _) => factor(unit)?,
         (None, Some(gain)) => factor(&gain.recorded_unit)?,
         (None, None) => applied,
     };
     // A record in volts of a stand with a calibration is torque over that constant.
-    let volts = stand.measured_unit.as_deref().is_some_and(|unit| {
-        torqcomp_model::Kind::Voltage
-            .parse(&format!("1 {unit}"))
-            .is_ok()
-    });
+    let volts = stand
+        .diagnosed
+        .measured_unit
+        .as_deref()
+        .is_some_and(|unit| {
+            torqcomp_model::Kind::Voltage
+                .parse(&format!("1 {unit}"))
+                .is_ok()
+        });
     let per_volt = stand
         .torque_per_volt
         .as_ref()
@@ -130,6 +138,7 @@ fn model(stand: &Stand, gain: f64) -> Result<Model, Failure> {
     Ok(Model {
         mode: stand.mode()?,
         gain,
+        shift: stand.diagnosed.shift,
         recorder: Some(std::sync::Arc::new(move |frequency_hz| {
             recorder.response(frequency_hz)
         })),

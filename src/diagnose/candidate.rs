@@ -46,10 +46,10 @@ impl<'a> Base<'a> {
     pub fn of(judged: Judged<'a>, records: &Records) -> Self {
         let fitted = &judged.fitted;
         let mut slopes = Vec::new();
-        for (record, begin) in records.train.iter().zip(&fitted.starts) {
+        for (record, begin) in records.train.iter().zip(&fitted.begins) {
             let mut record = record.clone();
-            record.start = *begin;
-            let nuisance = record.nuisance(&records.reference, &[]);
+            record.begin = *begin;
+            let nuisance = record.nuisance(&records.reference, &[], None);
             let at = |values: &[f64]| {
                 let (model, _) = fitted.structure.model(values);
                 let mut residual = difference(&model, &record).ok()?;
@@ -141,10 +141,10 @@ pub fn judge<'a>(fitted: Fitted<'a>, records: &Records) -> Option<Judged<'a>> {
     let train = records
         .train
         .iter()
-        .zip(&fitted.starts)
+        .zip(&fitted.begins)
         .map(|(record, start)| {
             let mut record = record.clone();
-            record.start = *start;
+            record.begin = *start;
             fitted.residual(&record, &records.reference)
         });
     let train = train.collect::<Option<Vec<_>>>()?;
@@ -156,7 +156,7 @@ pub fn judge<'a>(fitted: Fitted<'a>, records: &Records) -> Option<Judged<'a>> {
             .position(|t| std::sync::Arc::ptr_eq(&t.input, &r.input));
         let mut record = r.clone();
         if let Some(place) = same {
-            record.start = fitted.starts[place];
+            record.begin = fitted.begins[place];
         }
         fitted.residual(&record, &records.reference)
     });
@@ -220,8 +220,8 @@ pub fn finish<'a>(first: &Fitted<'a>, records: &Records) -> Option<Fitted<'a>> {
 /// The training records with the motion at their start that a fit has found.
 fn begun(train: &[Record], fitted: &Fitted) -> Vec<Record> {
     let mut training = train.to_vec();
-    for (record, start) in training.iter_mut().zip(&fitted.starts) {
-        record.start = *start;
+    for (record, start) in training.iter_mut().zip(&fitted.begins) {
+        record.begin = *start;
     }
     training
 }
@@ -279,16 +279,16 @@ fn score(base: &Base, structure: &Structure, start: &[f64], records: &Records) -
     let each = records
         .train
         .iter()
-        .zip(&judged.fitted.starts)
+        .zip(&judged.fitted.begins)
         .zip(&judged.train)
         .zip(&base.slopes);
     for (((record, begin), before), slopes) in each {
         let mut record = record.clone();
-        record.start = *begin;
+        record.begin = *begin;
         if !lines_hz.is_empty() {
             let mut residual = before.samples.clone();
             record
-                .nuisance(&records.reference, &lines_hz)
+                .nuisance(&records.reference, &lines_hz, None)
                 .clear(&mut residual);
             fall += dot(&before.samples, &before.samples) - dot(&residual, &residual);
             continue;
@@ -296,7 +296,9 @@ fn score(base: &Base, structure: &Structure, start: &[f64], records: &Records) -
         let Ok(mut moved) = difference(&model, &record) else {
             return 0.0;
         };
-        record.nuisance(&records.reference, &[]).clear(&mut moved);
+        record
+            .nuisance(&records.reference, &[], None)
+            .clear(&mut moved);
         let mut change: Vec<f64> = before
             .samples
             .iter()

@@ -2,9 +2,9 @@
 
 use torqcomp_model::effects::Mode;
 use torqcomp_model::fit::{self, Differences, FitError, Options, Parameter};
-use torqcomp_model::simulate::{Model, State};
+use torqcomp_model::simulate::Model;
 
-use super::record::{Nuisance, Record, Taken, dot};
+use super::record::{Begin, Nuisance, Record, Taken, dot};
 use super::structure::Structure;
 
 /// A structure with fitted values.
@@ -22,8 +22,8 @@ pub struct Fitted<'a> {
     pub amplitudes: Vec<f64>,
     /// Sum of squares over the training records.
     pub train_sum: f64,
-    /// Motion at the start of each training record.
-    pub starts: Vec<State>,
+    /// How each training record begins.
+    pub begins: Vec<Begin>,
 }
 
 /// What a model leaves of a record.
@@ -35,14 +35,20 @@ pub struct Residual {
     pub taken: Taken,
     /// The model's record, over the range, without what belonged to the record.
     pub modelled: Vec<f64>,
+    /// How the record begins.
+    pub begin: Begin,
 }
 
 /// Relative reduction of the sum of squares that counts as none.
 const TOLERANCE: f64 = 1e-6;
-/// Rounds in which the start of the motion is set right.
-const START_ROUNDS: usize = 2;
+/// Rounds in which the beginning of a held-out record is set right.
+const BEGIN_ROUNDS: usize = 3;
+/// Largest displacement by a constant load, over the rms of the record.
+const LARGEST_SHIFT: f64 = 0.5;
+/// Step of the displacement by a constant load, for differences.
+const SHIFT_STEP: f64 = 1e-4;
 
-/// Fits a structure from start values.
+/// Fits a structure from start values; the records' own beginnings are refined with it.
 ///
 /// # Errors
 /// If the model cannot be evaluated at the start.
@@ -54,21 +60,13 @@ pub fn fit<'a>(
     most: usize,
 ) -> Result<Fitted<'a>, FitError> {
     let mut records = records.to_vec();
-    let mut values = start.to_vec();
-    let integrates = has_torque(&structure, start);
-    let mut found = None;
-    for round in 0..START_ROUNDS {
-        let done = minimize(&structure, &values, &records, reference, most)?;
-        values.clone_from(&done.values);
-        let moved = integrates
-            && round + 1 < START_ROUNDS
-            && correct_starts(&structure, &values, &mut records, reference);
-        found = Some(done);
-        if !moved {
-            break;
-        }
+    let mut found = minimize(&structure, start, &mut records, reference, most)?;
+    if structure.model(start).0.has_torques()
+        && correct_starts(&structure, &found.values, &mut records, reference)
+    {
+        let values = structure.own(&found.values).to_vec();
+        found = minimize(&structure, &values, &mut records, reference, most)?;
     }
-    let found = found.ok_or(FitError::NothingFree)?;
     Ok(complete(structure, found, &records, reference))
 }
 
@@ -83,8 +81,9 @@ pub fn look<'a>(
     reference: &Mode,
     most: usize,
 ) -> Result<Fitted<'a>, FitError> {
-    let found = minimize(&structure, start, records, reference, most)?;
-    Ok(complete(structure, found, records, reference))
+    let mut records = records.to_vec();
+    let found = minimize(&structure, start, &mut records, reference, most)?;
+    Ok(complete(structure, found, &records, reference))
 }
 
 fn complete<'a>(
@@ -93,67 +92,96 @@ fn complete<'a>(
     records: &[Record],
     reference: &Mode,
 ) -> Fitted<'a> {
+    let count = structure.bounds().len();
+    let mut values = found.values;
+    values.truncate(count);
     Fitted {
-        amplitudes: line_amplitudes(&structure, &found.values, records, reference),
+        amplitudes: line_amplitudes(&structure, &values, records, reference),
         structure,
-        std: found.std,
-        at_bound: found.at_bound,
+        std: found.std[..count].to_vec(),
+        at_bound: found.at_bound[..count].to_vec(),
         train_sum: found.sum_of_squares,
-        starts: records.iter().map(|r| r.start).collect(),
-        values: found.values,
+        begins: records.iter().map(|r| r.begin).collect(),
+        values,
     }
-}
-
-fn has_torque(structure: &Structure, values: &[f64]) -> bool {
-    let (model, _) = structure.model(values);
-    model.has_torques()
 }
 
 fn minimize(
     structure: &Structure,
     start: &[f64],
-    records: &[Record],
+    records: &mut [Record],
     reference: &Mode,
     most: usize,
 ) -> Result<fit::Fit, FitError> {
-    // Without lines, what belongs to a record does not depend on the parameters.
-    let fixed: Vec<Nuisance> = records.iter().map(|r| r.nuisance(reference, &[])).collect();
-    let problem = |values: &[f64], out: &mut Vec<f64>| {
-        let (model, lines_hz) = structure.model(values);
-        for (record, fixed) in records.iter().zip(&fixed) {
-            let mut residual = difference(&model, record)?;
-            if lines_hz.is_empty() {
-                fixed.clear(&mut residual);
-            } else {
-                record.nuisance(reference, &lines_hz).clear(&mut residual);
+    let size = structure.frame.rulers.rms;
+    let own = structure.bounds().len();
+    let shifted = structure.model(start).0.has_zero();
+    let parameters = parameters(structure, start, records, shifted);
+    let found = {
+        let records = &*records;
+        // Without lines, what belongs to a record does not depend on the parameters.
+        let fixed: Vec<Nuisance> = records
+            .iter()
+            .map(|r| r.nuisance(reference, &[], None))
+            .collect();
+        let problem = |values: &[f64], out: &mut Vec<f64>| {
+            let (mut model, lines_hz) = structure.model(&values[..own]);
+            for (k, (record, fixed)) in records.iter().zip(&fixed).enumerate() {
+                model.shift = values.get(own + k).map_or(record.begin.shift, |s| s * size);
+                let mut residual = difference(&model, record)?;
+                if lines_hz.is_empty() {
+                    fixed.clear(&mut residual);
+                } else {
+                    record
+                        .nuisance(reference, &lines_hz, None)
+                        .clear(&mut residual);
+                }
+                out.append(&mut residual);
             }
-            out.append(&mut residual);
-        }
-        Ok(())
+            Ok(())
+        };
+        let options = Options {
+            differences: Differences::Forward,
+            tolerance: TOLERANCE,
+            most_evaluations: most * (parameters.len() + 1),
+            ..Options::default()
+        };
+        fit::minimize(&problem, &parameters, &options)?
     };
-    let parameters: Vec<Parameter> = structure
-        .bounds()
-        .iter()
-        .zip(start)
-        .map(|(b, s)| {
-            Parameter::new("", s.clamp(b.lower, b.upper))
-                .at_least(b.lower)
-                .at_most(b.upper)
-                .scaled(s.abs().max(1e-4))
-        })
-        .collect();
-    let options = Options {
-        differences: Differences::Forward,
-        tolerance: TOLERANCE,
-        most_evaluations: most * (parameters.len() + 1),
-        ..Options::default()
-    };
-    fit::minimize(&problem, &parameters, &options)
+    for (k, record) in records.iter_mut().enumerate().filter(|_| shifted) {
+        record.begin.shift = found.values[own + k] * size;
+    }
+    Ok(found)
+}
+
+/// The structure's parameters, and the displacement by a constant load of each record where it matters.
+fn parameters(
+    structure: &Structure,
+    start: &[f64],
+    records: &[Record],
+    shifted: bool,
+) -> Vec<Parameter> {
+    let bounds = structure.bounds();
+    let own = bounds.iter().zip(start).map(|(b, s)| {
+        Parameter::new("", s.clamp(b.lower, b.upper))
+            .at_least(b.lower)
+            .at_most(b.upper)
+            .scaled(s.abs().max(1e-4))
+    });
+    let size = structure.frame.rulers.rms;
+    let shifts = records.iter().filter(|_| shifted).map(|r| {
+        let start = (r.begin.shift / size).clamp(-LARGEST_SHIFT, LARGEST_SHIFT);
+        Parameter::new("", start)
+            .at_least(-LARGEST_SHIFT)
+            .at_most(LARGEST_SHIFT)
+            .scaled(0.1)
+    });
+    own.chain(shifts).collect()
 }
 
 /// Measured less modelled over the range of a record.
 pub(super) fn difference(model: &Model, record: &Record) -> Result<Vec<f64>, FitError> {
-    let modelled = model.simulate(&record.input, record.start);
+    let modelled = model.simulate(&record.input, record.begin.start);
     let range = record.range.clone();
     let pairs = record.measured[range.clone()].iter().zip(&modelled[range]);
     let residual: Vec<f64> = pairs.map(|(y, x)| y - x).collect();
@@ -171,21 +199,21 @@ fn correct_starts(
     records: &mut [Record],
     reference: &Mode,
 ) -> bool {
-    let (model, lines_hz) = structure.model(values);
+    let (mut model, lines_hz) = structure.model(structure.own(values));
     let mut any = false;
     for record in records {
+        model.shift = record.begin.shift;
         let Ok(mut residual) = difference(&model, record) else {
             continue;
         };
         let before = dot(&residual, &residual) / residual.len() as f64;
-        let taken = record.nuisance(reference, &lines_hz).fit(&mut residual);
+        let taken = record
+            .nuisance(reference, &lines_hz, None)
+            .fit(&mut residual);
         if let Some([x, speed]) = taken.motion {
-            let moved = State {
-                x: record.start.x + x,
-                speed: record.start.speed + speed * reference.omega_rad_s,
-            };
+            record.begin.start.x += x;
+            record.begin.start.speed += speed * reference.omega_rad_s;
             any |= x.hypot(speed) > 0.05 * before.sqrt();
-            record.start = moved;
         }
     }
     any
@@ -197,13 +225,19 @@ fn line_amplitudes(
     records: &[Record],
     reference: &Mode,
 ) -> Vec<f64> {
-    let (model, lines_hz) = structure.model(values);
+    let (mut model, lines_hz) = structure.model(values);
     let mut sums = vec![0.0; lines_hz.len()];
+    if sums.is_empty() {
+        return sums;
+    }
     for record in records {
+        model.shift = record.begin.shift;
         let Ok(mut residual) = difference(&model, record) else {
             continue;
         };
-        let taken = record.nuisance(reference, &lines_hz).fit(&mut residual);
+        let taken = record
+            .nuisance(reference, &lines_hz, None)
+            .fit(&mut residual);
         for (sum, [c, s]) in sums.iter_mut().zip(&taken.lines) {
             *sum += c.hypot(*s) / records.len() as f64;
         }
@@ -212,35 +246,51 @@ fn line_amplitudes(
 }
 
 impl Fitted<'_> {
-    /// What the fitted model leaves of a record that it was not fitted to: the record's own constant, start and
+    /// What the fitted model leaves of a record that it was not fitted to: the record's own constants, start and
     /// phases are estimated, nothing else.
     #[must_use]
     pub fn residual(&self, record: &Record, reference: &Mode) -> Option<Residual> {
-        let (model, lines_hz) = self.structure.model(&self.values);
+        let (mut model, lines_hz) = self.structure.model(&self.values);
         let mut record = record.clone();
-        let rounds = if model.has_torques() { START_ROUNDS } else { 1 };
-        for round in 0..rounds {
+        let rounds = if model.has_torques() { BEGIN_ROUNDS } else { 1 };
+        let step = SHIFT_STEP * self.structure.frame.rulers.rms;
+        for round in 1..=rounds {
+            model.shift = record.begin.shift;
             let mut samples = difference(&model, &record).ok()?;
-            let modelled: Vec<f64> = record.measured[record.range.clone()]
-                .iter()
-                .zip(&samples)
-                .map(|(y, r)| y - r)
-                .collect();
-            let nuisance = record.nuisance(reference, &lines_hz);
-            let taken = nuisance.fit(&mut samples);
-            if let Some([x, speed]) = taken.motion
-                && round + 1 < rounds
-            {
-                record.start.x += x;
-                record.start.speed += speed * reference.omega_rad_s;
-                continue;
+            let column = if model.has_zero() {
+                model.shift += step;
+                let there = difference(&model, &record).ok()?;
+                Some(
+                    samples
+                        .iter()
+                        .zip(&there)
+                        .map(|(a, b)| (a - b) / step)
+                        .collect(),
+                )
+            } else {
+                None
+            };
+            let measured = &record.measured[record.range.clone()];
+            let modelled: Vec<f64> = measured.iter().zip(&samples).map(|(y, r)| y - r).collect();
+            let taken = record
+                .nuisance(reference, &lines_hz, column)
+                .fit(&mut samples);
+            if round == rounds {
+                self.restore_amplitudes(&record, &lines_hz, &taken, &mut samples);
+                let begin = record.begin;
+                return Some(Residual {
+                    samples,
+                    taken,
+                    modelled,
+                    begin,
+                });
             }
-            self.restore_amplitudes(&record, &lines_hz, &taken, &mut samples);
-            return Some(Residual {
-                samples,
-                taken,
-                modelled,
-            });
+            let limit = LARGEST_SHIFT * self.structure.frame.rulers.rms;
+            let [x, speed] = taken.motion.unwrap_or_default();
+            record.begin.start.x += x;
+            record.begin.start.speed += speed * reference.omega_rad_s;
+            record.begin.shift =
+                (record.begin.shift + taken.shift.unwrap_or(0.0)).clamp(-limit, limit);
         }
         None
     }

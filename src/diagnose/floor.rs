@@ -14,6 +14,8 @@ pub struct Floor {
 
 /// Part of the input that may differ from period to period.
 const SAME: f64 = 1e-5;
+/// Time in which the motion settles, in s.
+const SETTLED_S: f64 = 0.05;
 /// Part of the power out of band that the signal may have.
 const SIGNAL: f64 = 0.2;
 
@@ -48,40 +50,43 @@ fn pooled(squares: &[(f64, usize)]) -> f64 {
     (sum / count as f64).sqrt()
 }
 
-/// Mean square of the noise from differences of periods, and the samples compared.
+/// Mean square of the noise from differences of periods, and the samples compared: those before which the input has
+/// repeated for long enough that the motion has settled.
 fn from_periods(record: &Record) -> Option<(f64, usize)> {
     let u = &record.input.samples()[record.range.clone()];
     let y = &record.measured[record.range.clone()];
     let period = period(u)?;
-    // The motion must have settled: the last two periods are compared.
-    let count = y.len().min(3 * period) - period;
-    let tail = &y[y.len() - count - period..];
-    let sum: f64 = tail[period..]
-        .iter()
-        .zip(tail)
-        .map(|(a, b)| (a - b).powi(2))
-        .sum();
-    Some((0.5 * sum / count as f64, count))
+    let small = SAME * dot(u, u) / u.len() as f64;
+    let settled = (SETTLED_S * record.input.rate_hz()) as usize;
+    let (mut run, mut sum, mut count) = (0, 0.0, 0);
+    for i in period..u.len() {
+        run = if (u[i] - u[i - period]).powi(2) < 100.0 * small {
+            run + 1
+        } else {
+            0
+        };
+        if run > settled {
+            sum += (y[i] - y[i - period]).powi(2);
+            count += 1;
+        }
+    }
+    (count >= period).then(|| (0.5 * sum / f64::from(count as u32), count))
 }
 
-/// Length of the period of an input that repeats at least twice.
+/// Length of the period of an input that repeats over a good part of it.
 fn period(u: &[f64]) -> Option<usize> {
     let energy = dot(u, u) / u.len() as f64;
     if energy == 0.0 {
         return None;
     }
-    let apart = |lag: usize, count: usize| {
-        let sum: f64 = u[lag..]
-            .iter()
-            .zip(u)
-            .take(count)
-            .map(|(a, b)| (a - b).powi(2))
-            .sum();
-        sum / count.min(u.len() - lag) as f64
+    // A piece of the second half is looked for further on.
+    let from = u.len() / 2;
+    let piece = &u[from..(from + 256).min(u.len())];
+    let near = |lag: &usize| {
+        let there = u[from + lag..].iter().zip(piece);
+        there.map(|(a, b)| (a - b).powi(2)).sum::<f64>() < SAME * energy * piece.len() as f64
     };
-    (16..u.len() / 2).find(|lag| {
-        apart(*lag, 64) < 10.0 * SAME * energy && apart(*lag, usize::MAX) < SAME * energy
-    })
+    (64..(u.len() - from).saturating_sub(piece.len())).find(near)
 }
 
 /// Mean square of white noise with the level that the top of the spectrum has.

@@ -17,10 +17,10 @@ use crate::failure::Failure;
 
 pub use candidate::{Base, Judged, Records, judge};
 pub use dependence::{Dependence, Share, Sight};
-pub use fit::Fitted;
+pub use fit::{Fitted, Residual};
 pub use floor::Floor;
 pub use plain::Constants;
-pub use record::{Record, dot};
+pub use record::{Begin, Record, dot};
 pub use search::{Status, Tried, parallel};
 pub use spectra::{Peak, lines};
 pub use structure::{Choice, Frame, Structure};
@@ -91,6 +91,8 @@ pub struct Diagnosis<'a> {
 
 /// Error over the noise floor up to which nothing needs to be missing.
 const AT_FLOOR: f64 = 1.1;
+/// Error over a floor from out of band above which no colour of the noise accounts for it.
+const FAR_ABOVE: f64 = 2.0;
 /// Part of what is missing that an effect must explain to be named.
 const NAMED: f64 = 0.5;
 /// Effects that are added at most.
@@ -165,7 +167,7 @@ pub fn run<'a>(
     plain::set_starts(&plain, &mut records.train, &reference);
     plain::set_starts(&plain, &mut records.hold, &reference);
     let plain = Fitted {
-        starts: records.train.iter().map(|r| r.start).collect(),
+        begins: records.train.iter().map(|r| r.begin).collect(),
         ..plain
     };
     let declared = declared.and_then(|d| judge(as_declared(&plain, d), &records));
@@ -240,12 +242,18 @@ fn dependence(judged: &Judged, records: &Records) -> Dependence {
     Dependence::of(&sights)
 }
 
-/// Whether something above the noise is left.
+/// Whether something above the noise is left. Where the noise itself was seen, in the differences of periods, its level
+/// decides; a level from out of band may be too low for coloured noise, so that there the residual must also
+/// follow from input or motion, or lie far above it.
 fn remains(judged: &Judged, dependence: &Dependence, floor: Option<Floor>) -> bool {
     let structured = dependence.structure().is_some();
-    match floor {
-        Some(floor) if judged.hold_rms() <= AT_FLOOR * floor.rms => false,
-        _ => structured,
+    let Some(floor) = floor else {
+        return structured;
+    };
+    let ratio = judged.hold_rms() / floor.rms;
+    match floor.from {
+        "periods" => ratio > AT_FLOOR,
+        _ => ratio > AT_FLOOR && (structured || ratio > FAR_ABOVE && !dependence.white),
     }
 }
 

@@ -126,6 +126,7 @@ fn try_start(frame: &Frame, start: &mut Constants, record: &Record) -> Option<f6
         mode: start.mode(),
         gain,
         recorder: frame.recorder.clone(),
+        shift: 0.0,
         actions: Vec::new(),
     };
     let modelled = model.simulate(&record.input, State::default());
@@ -155,7 +156,7 @@ pub fn set_starts(plain: &Fitted, records: &mut [Record], reference: &Mode) {
         };
         let [x, speed] = model.state_at_start(&record.input);
         let [dx, dspeed] = found.taken.motion.unwrap_or_default();
-        record.start = State {
+        record.begin.start = State {
             x: x + dx,
             speed: speed + dspeed * reference.omega_rad_s,
         };

@@ -6,6 +6,15 @@ use std::sync::Arc;
 use torqcomp_model::effects::Mode;
 use torqcomp_model::simulate::{Input, State};
 
+/// How a record begins.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Begin {
+    /// Motion at the first sample.
+    pub start: State,
+    /// Displacement by a constant load that is not in the input.
+    pub shift: f64,
+}
+
 /// One record, or the part of it that is fitted or held out.
 #[derive(Clone)]
 pub struct Record {
@@ -17,8 +26,8 @@ pub struct Record {
     pub measured: Arc<Vec<f64>>,
     /// The samples that count.
     pub range: Range<usize>,
-    /// Motion at the first sample, as far as it is known.
-    pub start: State,
+    /// How the record begins, as far as it is known.
+    pub begin: Begin,
 }
 
 /// What belongs to a record and not to the stand: columns that its residual is cleared of.
@@ -30,6 +39,8 @@ pub struct Nuisance {
     mix: Vec<Vec<f64>>,
     /// Place of the raw columns of the free motion, if they are in it.
     motion: Option<usize>,
+    /// Place of the raw column of a constant load.
+    shift: Option<usize>,
     /// Place of the first raw column of the lines.
     lines: usize,
 }
@@ -46,8 +57,10 @@ impl Record {
 
     /// What belongs to this record: a constant, the free motion of the plain stand after the record's
     /// start, and lines of the given frequencies.
+    ///
+    /// `shift` is what a constant load does to the record, where that is more than a constant.
     #[must_use]
-    pub fn nuisance(&self, mode: &Mode, lines_hz: &[f64]) -> Nuisance {
+    pub fn nuisance(&self, mode: &Mode, lines_hz: &[f64], shift: Option<Vec<f64>>) -> Nuisance {
         let mut nuisance = Nuisance::none();
         nuisance.push(vec![1.0; self.count()]);
         let rate_hz = self.input.rate_hz();
@@ -59,11 +72,16 @@ impl Record {
                 mode: *mode,
                 gain: 1.0,
                 recorder: None,
+                shift: 0.0,
                 actions: Vec::new(),
             };
             for column in model.free_motion(rate_hz, self.range.end) {
                 nuisance.push(column[self.range.clone()].to_vec());
             }
+        }
+        if let Some(column) = shift {
+            nuisance.shift = Some(nuisance.mix.len());
+            nuisance.push(column);
         }
         nuisance.lines = nuisance.mix.len();
         for frequency_hz in lines_hz {
@@ -85,6 +103,8 @@ pub struct Taken {
     pub offset: f64,
     /// Displacement, and speed over `ω₀`, at the start of the record.
     pub motion: Option<[f64; 2]>,
+    /// The constant load's displacement.
+    pub shift: Option<f64>,
     /// Cosine and sine part of each line.
     pub lines: Vec<[f64; 2]>,
 }
@@ -97,6 +117,7 @@ impl Nuisance {
             columns: Vec::new(),
             mix: Vec::new(),
             motion: None,
+            shift: None,
             lines: 0,
         }
     }
@@ -163,6 +184,7 @@ impl Nuisance {
         Taken {
             offset: raw[0],
             motion: self.motion.map(|k| [raw[k], raw[k + 1]]),
+            shift: self.shift.map(|k| raw[k]),
             lines: raw[self.lines..]
                 .chunks_exact(2)
                 .map(|c| [c[0], c[1]])

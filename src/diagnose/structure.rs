@@ -82,6 +82,12 @@ impl Structure<'_> {
         all
     }
 
+    /// The structure's own values, without what a fit adds for each record.
+    #[must_use]
+    pub fn own<'v>(&self, values: &'v [f64]) -> &'v [f64] {
+        &values[..self.bounds().len()]
+    }
+
     /// The mode and gain of parameter values.
     #[must_use]
     pub fn mode(&self, values: &[f64]) -> (Mode, f64) {
@@ -136,6 +142,7 @@ impl Structure<'_> {
                 mode,
                 gain,
                 recorder,
+                shift: 0.0,
                 actions,
             },
             lines_hz,

@@ -9,7 +9,7 @@ use super::drawing::{beam, friction, part};
 use super::effects::effect;
 use super::measuring::{bridge, gage, recorder};
 use super::section::{Section, SourceText};
-use super::{Given, Mechanics, Stand, StaticGain};
+use super::{Diagnosed, Given, Mechanics, Stand, StaticGain};
 use crate::failure::Failure;
 
 /// The schema of a stand file.
@@ -76,11 +76,11 @@ pub fn parse(name: &str, text: &str) -> Result<Stand, Failure> {
     let bridge = top.section("bridge")?.map(|s| bridge(&s)).transpose()?;
     let recorder = recorder(top.section("recorder")?.as_ref())?;
     let effect_sections = top.sections("effects")?;
-    let measured_unit = top
+    let diagnosed = top
         .section("diagnosed")?
         .map(|s| diagnosed(&s))
         .transpose()?
-        .flatten();
+        .unwrap_or_default();
     top.finish()?;
     let mut stand = Stand {
         name: stand_name,
@@ -94,7 +94,7 @@ pub fn parse(name: &str, text: &str) -> Result<Stand, Failure> {
         bridge,
         recorder,
         effects: Vec::new(),
-        measured_unit,
+        diagnosed,
     };
     one_calibration(&top, &stand)?;
     stand.effects = effect_sections
@@ -228,14 +228,33 @@ fn static_gain(section: &Section) -> Result<Option<StaticGain>, Failure> {
     }))
 }
 
-/// What a diagnosis wrote about itself; the unit of the record is used, the rest is for people.
-fn diagnosed(section: &Section) -> Result<Option<String>, Failure> {
-    let unit = section.text("measured_unit")?.map(str::to_owned);
+/// What a diagnosis wrote about itself; what is not used is for people.
+fn diagnosed(section: &Section) -> Result<Diagnosed, Failure> {
     for key in ["applied_unit", "verdict", "records"] {
         let _ = section.text(key)?;
     }
+    let quantity = |key: &'static str| -> Result<f64, Failure> {
+        let Some(text) = section.raw(key)? else {
+            return Ok(0.0);
+        };
+        let (number, unit) = text.trim().split_once(' ').unwrap_or((text.trim(), ""));
+        let wrong = || {
+            section.fail(
+                key,
+                format_args!("\"{text}\": expected a number and the unit of the record"),
+            )
+        };
+        let number: f64 = number.parse().map_err(|_| wrong())?;
+        let unit = Unit::parse(unit).map_err(|error| section.fail(key, error))?;
+        Ok(number * unit.factor())
+    };
+    let found = Diagnosed {
+        measured_unit: section.text("measured_unit")?.map(str::to_owned),
+        offset: quantity("offset")?,
+        shift: quantity("shift")?,
+    };
     section.finish()?;
-    Ok(unit)
+    Ok(found)
 }
 
 fn calibration(section: &Section) -> Result<Estimate, Failure> {

@@ -43,8 +43,19 @@ pub struct Stand {
     pub recorder: RecorderData,
     /// What the plain stand lacks.
     pub effects: Vec<DeclaredEffect>,
-    /// Unit of the record that a diagnosis refined the stand with.
+    /// What a diagnosis wrote about itself.
+    pub diagnosed: Diagnosed,
+}
+
+/// What a diagnosis wrote about the records that it refined the stand with.
+#[derive(Debug, Clone, Default)]
+pub struct Diagnosed {
+    /// Unit of the record.
     pub measured_unit: Option<String>,
+    /// Constant in the record, in SI units.
+    pub offset: f64,
+    /// Displacement by a constant load, in SI units of the record.
+    pub shift: f64,
 }
 
 /// The stand's response, from measured constants.

@@ -18,6 +18,8 @@ pub struct Refined<'a> {
     pub units: (&'a str, &'a str),
     /// Unit of the record as its file gives it.
     pub measured_unit: &'a str,
+    /// Constant in the records, and displacement by a constant load, in SI units of the record.
+    pub constants: [f64; 2],
     /// Effects: kind, form, parameters with their texts.
     pub effects: Vec<(&'a str, &'a str, Vec<(&'a str, String)>)>,
     /// Where the numbers come from.
@@ -101,6 +103,10 @@ pub fn refine(declared: Option<(&Stand, &str)>, refined: &Refined) -> Result<Str
     let mut diagnosed = Table::new();
     diagnosed["measured_unit"] = value(refined.measured_unit);
     diagnosed["verdict"] = value(refined.verdict);
+    for (key, number) in ["offset", "shift"].iter().zip(refined.constants) {
+        let text = format!("{} {}", digits::text(number, 9), refined.units.0);
+        diagnosed[*key] = value(text.trim());
+    }
     document["diagnosed"] = Item::Table(diagnosed);
     Ok(document.to_string())
 }

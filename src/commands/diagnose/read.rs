@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use torqcomp_model::Dimension;
-use torqcomp_model::simulate::{Input, State, substeps};
+use torqcomp_model::simulate::{Input, substeps};
 
 use crate::cli::Diagnose;
-use crate::diagnose::{Case, Constants, Record};
+use crate::diagnose::{Begin, Case, Constants, Record};
 use crate::failure::Failure;
 use crate::io::csv::{NamedUnit, Options, Place};
 use crate::recording;
@@ -289,7 +289,7 @@ fn record(pair: Pair, stand: Option<&Stand>, scale: Scale) -> Result<Record, Fai
         input: Arc::new(Input::new(applied, pair.rate_hz, pair.start_s, FIRST_STEPS)),
         measured: Arc::new(measured),
         range: LEFT_OUT.min(count / 10)..count,
-        start: State::default(),
+        begin: Begin::default(),
     })
 }
 

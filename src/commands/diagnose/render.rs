@@ -291,6 +291,15 @@ impl Rendered<'_> {
         (!asked.is_empty()).then(|| asked.join("; "))
     }
 
+    /// Means over the training records of the constant in them and of the displacement by a constant load.
+    fn record_constants(&self) -> [f64; 2] {
+        let train = &self.diagnosis.after.train;
+        let mean = |of: &dyn Fn(&crate::diagnose::Residual) -> f64| {
+            train.iter().map(of).sum::<f64>() / train.len() as f64
+        };
+        [mean(&|r| r.taken.offset), mean(&|r| r.begin.shift)]
+    }
+
     /// The refined stand file.
     ///
     /// # Errors
@@ -332,6 +341,7 @@ impl Rendered<'_> {
             } else {
                 &self.units.measured
             },
+            constants: self.record_constants(),
             effects: effects.collect(),
             source: format!("diagnosed: {}", self.args.train.join(", ")),
             verdict: self.diagnosis.verdict.name(),

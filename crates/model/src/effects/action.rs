@@ -65,8 +65,13 @@ pub struct Line {
 
 /// What an effect does.
 pub enum Action {
-    /// A torque in the stand.
-    Torque(Box<dyn Torque>),
+    /// A torque in the stand; if `shown`, the gage shows it together with `x`.
+    Torque {
+        /// The torque.
+        torque: Box<dyn Torque>,
+        /// Whether the gage shows it: it then bends the part that the gage sits on.
+        shown: bool,
+    },
     /// A factor of the response.
     Factor(Frequency),
     /// A term of the response, past the stand: recorded at once what is applied.
@@ -98,6 +103,11 @@ pub trait Torque: Send + Sync {
         speed - impulse * self.value(memory, x, speed)
     }
 
+    /// Whether the torque depends on where zero is: a constant load then matters.
+    fn has_zero(&self) -> bool {
+        false
+    }
+
     /// What is remembered at the start.
     fn begin(&self, x: f64) -> Memory {
         let _ = x;
@@ -105,10 +115,30 @@ pub trait Torque: Send + Sync {
     }
 }
 
+impl Action {
+    /// A torque beside what the gage shows.
+    #[must_use]
+    pub fn beside(torque: impl Torque + 'static) -> Self {
+        Self::Torque {
+            torque: Box::new(torque),
+            shown: false,
+        }
+    }
+
+    /// A torque that the gage shows.
+    #[must_use]
+    pub fn shown(torque: impl Torque + 'static) -> Self {
+        Self::Torque {
+            torque: Box::new(torque),
+            shown: true,
+        }
+    }
+}
+
 impl std::fmt::Debug for Action {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
-            Self::Torque(_) => "Torque",
+            Self::Torque { .. } => "Torque",
             Self::Factor(_) => "Factor",
             Self::Feedthrough(_) => "Feedthrough",
             Self::Transform { .. } => "Transform",

@@ -1,7 +1,7 @@
 //! Play between stator and beam.
 //!
-//! `gap`: within `±g` of its middle the beam is not touched, `n = −clamp(x, −g, g)`. (A gap in which something
-//! softer carries is not offered: it is the same as an end stop beside the beam.) `joint`: the beam follows the stator with play,
+//! `gap`: within `±g` of its middle the beam is not touched, `n = −clamp(x, −g, g)`. `soft-gap`: something
+//! softer carries within it, `n = −r clamp(x, −g, g)`; with `g` far out this would be an end stop, so `g` is bounded. `joint`: the beam follows the stator with play,
 //! `n = w − x` with `w` dragged along at a distance of at most `g` (the play operator of M. A. Krasnoselskii, A. V.
 //! Pokrovskii, *Systems with Hysteresis* (1989)). `recorded`: the same play, in what the gage is moved by
 //! only. M. Nordin, P.-O. Gutman, *Controlling mechanical systems with backlash*, Automatica 38 (2002), 1633.
@@ -25,14 +25,34 @@ pub(super) static EFFECT: Effect = Effect {
             place: Place::Stand,
             parameters: &[GAP],
             starts: &[&[0.02], &[0.1], &[0.4]],
-            build: |p| Action::Torque(Box::new(Gap { gap: p[0] })),
+            build: |p| {
+                Action::beside(Gap {
+                    gap: p[0],
+                    share: 1.0,
+                })
+            },
+        },
+        Form {
+            name: "soft-gap",
+            place: Place::Stand,
+            parameters: &[
+                Parameter::motion("gap", 1, 0, 0.0, 0.8),
+                Parameter::number("softening", 0.0, 1.0),
+            ],
+            starts: &[&[0.05, 0.3], &[0.3, 0.3]],
+            build: |p| {
+                Action::beside(Gap {
+                    gap: p[0],
+                    share: p[1],
+                })
+            },
         },
         Form {
             name: "joint",
             place: Place::Stand,
             parameters: &[GAP],
             starts: &[&[0.02], &[0.1]],
-            build: |p| Action::Torque(Box::new(Joint { gap: p[0] })),
+            build: |p| Action::beside(Joint { gap: p[0] }),
         },
         Form {
             name: "recorded",
@@ -58,11 +78,16 @@ pub(super) static EFFECT: Effect = Effect {
 
 struct Gap {
     gap: f64,
+    share: f64,
 }
 
 impl Torque for Gap {
     fn value(&self, _: &mut Memory, x: f64, _: f64) -> f64 {
-        -x.clamp(-self.gap, self.gap)
+        -self.share * x.clamp(-self.gap, self.gap)
+    }
+
+    fn has_zero(&self) -> bool {
+        true
     }
 }
 

@@ -1,6 +1,7 @@
 //! Hysteresis with memory, smooth, of joints and clamps.
 //!
-//! `n = k z`, `z' = x' − (b |x'| z |z|^{m−1} + c x' |z|^m)`, `m = 1` or `2`. Y. K. Wen, *Method for random vibration of
+//! `n = k z`, `z' = x' − (b |x'| z + c x' |z|)` (`linear`; `shown`: the gage shows it), or with `m` in place of 1
+//! (`exponent`): `z' = x' − |s z|^m (b |x'| sgn z + c x')/s`, `s = b + |c|`. Y. K. Wen, *Method for random vibration of
 //! hysteretic systems*, J. Eng. Mech. Div. 102 (1976), 249. **Valid without drift of the loops**; does
 //! not close small inner loops as metals do. Mistaken for `coulomb-friction` (its limit for a stiff joint),
 //! `structural-damping` at one level.
@@ -10,6 +11,8 @@
 use super::{Action, Effect, Form, Memory, Parameter, Place, Torque};
 
 const PART: Parameter = Parameter::number("stiffness_ratio", 0.0, 50.0);
+const LOSS: Parameter = Parameter::motion("loss", -1, 0, 0.0, 100.0);
+const SHAPE: Parameter = Parameter::motion("shape", -1, 0, -100.0, 100.0);
 const STARTS: &[&[f64]] = &[&[0.1, 0.5, 0.0], &[0.5, 1.0, 0.5], &[1.0, 0.3, -0.1]];
 
 pub(super) static EFFECT: Effect = Effect {
@@ -23,24 +26,27 @@ pub(super) static EFFECT: Effect = Effect {
         Form {
             name: "linear",
             place: Place::Stand,
-            parameters: &[
-                PART,
-                Parameter::motion("loss", -1, 0, 0.0, 100.0),
-                Parameter::motion("shape", -1, 0, -100.0, 100.0),
-            ],
+            parameters: &[PART, LOSS, SHAPE],
             starts: STARTS,
-            build: |p| Action::Torque(Box::new(BoucWen::of(p, false))),
+            build: |p| Action::beside(BoucWen::of(p)),
         },
         Form {
-            name: "square",
+            name: "shown",
             place: Place::Stand,
-            parameters: &[
-                PART,
-                Parameter::motion("loss", -2, 0, 0.0, 100.0),
-                Parameter::motion("shape", -2, 0, -100.0, 100.0),
-            ],
+            parameters: &[PART, LOSS, SHAPE],
             starts: STARTS,
-            build: |p| Action::Torque(Box::new(BoucWen::of(p, true))),
+            build: |p| Action::shown(BoucWen::of(p)),
+        },
+        Form {
+            name: "exponent",
+            place: Place::Stand,
+            parameters: &[PART, LOSS, SHAPE, Parameter::number("exponent", 1.0, 5.0)],
+            starts: &[
+                &[0.1, 0.5, 0.1, 1.5],
+                &[0.5, 0.7, 0.3, 2.0],
+                &[0.2, 1.0, 0.3, 2.0],
+            ],
+            build: |p| Action::beside(BoucWen::of(p)),
         },
     ],
 };
@@ -49,23 +55,32 @@ struct BoucWen {
     ratio: f64,
     loss: f64,
     shape: f64,
-    square: bool,
+    exponent: f64,
 }
 
 impl BoucWen {
-    fn of(p: &[f64], square: bool) -> Self {
+    fn of(p: &[f64]) -> Self {
         Self {
             ratio: p[0],
             loss: p[1],
             shape: p[2],
-            square,
+            exponent: p.get(3).copied().unwrap_or(1.0),
         }
     }
 
     /// `dz/dx` for a step of that sign.
     fn slope(&self, z: f64, step: f64) -> f64 {
-        let size = if self.square { z * z } else { z.abs() };
-        1.0 - size * (self.loss.copysign(step * z) + self.shape)
+        let size = z.abs();
+        let sum = self.loss.copysign(step * z) + self.shape;
+        if self.exponent == 1.0 {
+            return 1.0 - size * sum;
+        }
+        // One scale of z for loss and shape keeps the two comparable for any exponent.
+        let scale = self.loss + self.shape.abs();
+        if scale == 0.0 {
+            return 1.0;
+        }
+        1.0 - (size * scale).powf(self.exponent) * sum / scale
     }
 }
 

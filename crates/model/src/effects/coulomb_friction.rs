@@ -31,10 +31,10 @@ pub(super) static EFFECT: Effect = Effect {
         ],
         starts: &[&[0.03, 0.02], &[0.3, 0.02]],
         build: |p| {
-            Action::Torque(Box::new(Friction {
+            Action::beside(Friction {
                 torque: p[0],
                 speed: p[1],
-            }))
+            })
         },
     }],
 };

@@ -20,7 +20,7 @@ pub(super) static EFFECT: Effect = Effect {
         place: Place::Stand,
         parameters: &[Parameter::motion("coefficient", -1, 2, 0.0, 20.0)],
         starts: &[&[0.02]],
-        build: |p| Action::Torque(Box::new(Drag { coefficient: p[0] })),
+        build: |p| Action::beside(Drag { coefficient: p[0] }),
     }],
 };
 

@@ -20,14 +20,21 @@ pub(super) static EFFECT: Effect = Effect {
             place: Place::Stand,
             parameters: &[Parameter::motion("coefficient", -1, 0, -0.5, 0.5)],
             starts: &[&[0.005]],
-            build: |p| Action::Torque(Box::new(Even { coefficient: p[0] })),
+            build: |p| Action::beside(Even { coefficient: p[0] }),
+        },
+        Form {
+            name: "even-shown",
+            place: Place::Stand,
+            parameters: &[Parameter::motion("coefficient", -1, 0, -0.5, 0.5)],
+            starts: &[&[0.005]],
+            build: |p| Action::shown(Even { coefficient: p[0] }),
         },
         Form {
             name: "odd",
             place: Place::Stand,
             parameters: &[Parameter::motion("coefficient", -1, 0, -0.3, 20.0)],
             starts: &[&[0.01]],
-            build: |p| Action::Torque(Box::new(Odd { coefficient: p[0] })),
+            build: |p| Action::beside(Odd { coefficient: p[0] }),
         },
     ],
 };
@@ -40,6 +47,10 @@ impl Torque for Even {
     fn value(&self, _: &mut Memory, x: f64, _: f64) -> f64 {
         self.coefficient * x * x
     }
+
+    fn has_zero(&self) -> bool {
+        true
+    }
 }
 
 struct Odd {
@@ -49,5 +60,9 @@ struct Odd {
 impl Torque for Odd {
     fn value(&self, _: &mut Memory, x: f64, _: f64) -> f64 {
         self.coefficient * x * x.abs()
+    }
+
+    fn has_zero(&self) -> bool {
+        true
     }
 }

@@ -1,6 +1,6 @@
 //! A recorder that does not follow fast changes.
 //!
-//! Butterworth low-pass of order 1 (an RC low-pass) to 4: `L = Π 1/(1 − (jf/f_c)/p_k)` over its poles
+//! `second-order`: `L = 1/(1 + 2ζ s/ω_c + s²/ω_c²)`. Otherwise: Butterworth low-pass of order 1 (an RC low-pass) to 4: `L = Π 1/(1 − (jf/f_c)/p_k)` over its poles
 //! `p_k = e^{jπ(2k+n−1)/2n}`. S. Butterworth, Exp. Wireless 7 (1930), 536. **Valid below half the sampling rate.**
 //! Mistaken for `time-delay` where the corner lies far above the excitation.
 
@@ -35,6 +35,19 @@ pub(super) static EFFECT: Effect = Effect {
         order!(2, "order-2"),
         order!(3, "order-3"),
         order!(4, "order-4"),
+        Form {
+            name: "second-order",
+            place: Place::Chain,
+            parameters: &[CORNER, Parameter::number("damping_ratio", 0.2, 3.0)],
+            starts: &[&[1.0, 0.8], &[3.0, 0.8], &[8.0, 0.8]],
+            build: |p| {
+                let (corner, damping) = (TAU * p[0], p[1]);
+                Action::Factor(Box::new(move |_, omega| {
+                    let w = omega / corner;
+                    Complex64::new(1.0 - w * w, 2.0 * damping * w).inv()
+                }))
+            },
+        },
     ],
 };
 

@@ -1,6 +1,7 @@
 //! A recorder or amplifier that reaches the end of its range.
 //!
-//! `y = clamp(x, −L, L)` (`hard`) or `y = L tanh(x/L)` (`soft`). **What was cut off cannot be recovered**; the soft
+//! `y = clamp(x, −L, L)` (`hard`; `uneven` with two limits), `y = L tanh(x/L)` (`soft`) or `y = x/(1 + |x/L|^p)^{1/p}`
+//! (`knee`). **What was cut off cannot be recovered**; the soft
 //! form can, up to just below `L`. Mistaken for `gage-nonlinearity` (cube) if soft.
 
 use super::{Action, Effect, Form, Parameter, Place, Ruler};
@@ -29,6 +30,49 @@ pub(super) static EFFECT: Effect = Effect {
                         }
                     }),
                     undo: None,
+                }
+            },
+        },
+        Form {
+            name: "uneven",
+            place: Place::Limit,
+            parameters: &[
+                LIMIT,
+                Parameter::motion("lower_limit", 1, 0, -4.0, -0.05).by(Ruler::Peak),
+            ],
+            starts: &[&[0.99, -0.99], &[0.7, -0.99], &[0.99, -0.7]],
+            build: |p| {
+                let (upper, lower) = (p[0], p[1]);
+                Action::Transform {
+                    apply: Box::new(move |_, samples| {
+                        for x in samples {
+                            *x = x.clamp(lower, upper);
+                        }
+                    }),
+                    undo: None,
+                }
+            },
+        },
+        Form {
+            name: "knee",
+            place: Place::Limit,
+            parameters: &[LIMIT, Parameter::number("sharpness", 1.0, 30.0)],
+            starts: &[&[1.1, 4.0], &[1.02, 10.0]],
+            build: |p| {
+                let (limit, sharpness) = (p[0], p[1]);
+                Action::Transform {
+                    apply: Box::new(move |_, samples| {
+                        for x in samples {
+                            let over = (*x / limit).abs().powf(sharpness);
+                            *x /= (1.0 + over).powf(1.0 / sharpness);
+                        }
+                    }),
+                    undo: Some(Box::new(move |_, samples| {
+                        for y in samples {
+                            let over = (*y / limit).abs().min(0.99).powf(sharpness);
+                            *y /= (1.0 - over).powf(1.0 / sharpness);
+                        }
+                    })),
                 }
             },
         },

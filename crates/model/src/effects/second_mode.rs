@@ -1,6 +1,6 @@
 //! Another resonance of the stand in the band.
 //!
-//! `H = H₁ + a H₂` (`added`), `(1 − a) H₁ + a H₂` (`shared`, the static gain stays), `H₁ H₂` (`series`), or
+//! `coupled`: a second inertia hangs on the first one. `H = H₁ + a H₂` (`added`), `(1 − a) H₁ + a H₂` (`shared`, the static gain stays), `H₁ H₂` (`series`), or
 //! `g H₁ + (a + b s/ω₂) H₂` (`free`), with `H_i = ω_i²/(s² + 2ζ_i ω_i s + ω_i²)`. D. J. Ewins, *Modal Testing* (2000), 2.
 //! **Valid for modes apart by more than their widths.** Mistaken for `recorder-lowpass` or `time-delay` if it lies
 //! above the excitation.
@@ -75,6 +75,27 @@ pub(super) static EFFECT: Effect = Effect {
             build: |p| {
                 let second = mode(p[0], p[1]);
                 factor(move |_, omega| second.response(omega))
+            },
+        },
+        Form {
+            name: "coupled",
+            place: Place::Dynamics,
+            parameters: &[
+                FREQUENCY,
+                DAMPING,
+                Parameter::number("inertia_ratio", 0.0, 3.0),
+            ],
+            starts: starts!(0.02),
+            build: |p| {
+                let (second, ratio) = (mode(p[0], p[1]), p[2]);
+                factor(move |first, omega| {
+                    // J₂ hangs on J₁: (s² + …)₁ x + μ s² (2ζ₂ω₂ s + ω₂²)/(s² + …)₂ x = ω₁² u.
+                    let w1 = omega / first.omega_rad_s;
+                    let hung = second.inverse(omega) + (omega / second.omega_rad_s).powi(2);
+                    let load = -ratio * w1 * w1 * hung * second.response(omega);
+                    let plain = first.inverse(omega);
+                    plain / (plain + load)
+                })
             },
         },
         Form {

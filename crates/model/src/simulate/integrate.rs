@@ -139,20 +139,25 @@ fn cubic(t: f64) -> [f64; 4] {
     ]
 }
 
-/// Displacements at the samples, from an initial state on. Values that are not finite or beyond `limit`
-/// end the run: the rest is NaN.
+/// A torque in the stand, and whether the gage shows it.
+pub(super) type Link<'a> = (&'a dyn Torque, bool);
+
+/// What the gage shows at the samples, from an initial state on. A load that does not change, and so is not in the
+/// input, shifts the displacement that the torques see. Once the motion is not finite the rest is NaN.
 pub(super) fn run(
     mode: &Mode,
     gain: f64,
-    torques: &[&dyn Torque],
+    torques: &[Link],
     input: &Input,
     start: State,
+    shift: f64,
 ) -> Vec<f64> {
     let substeps = input.substeps();
     let step_s = 1.0 / (input.rate_hz() * substeps as f64);
     let step = Step::new(mode, gain, step_s);
     let impulse = mode.omega_rad_s * mode.omega_rad_s * step_s;
-    let mut memories: Vec<Memory> = torques.iter().map(|t| t.begin(start.x)).collect();
+    let begin = |(torque, _): &Link| torque.begin(start.x + shift);
+    let mut memories: Vec<Memory> = torques.iter().map(begin).collect();
     let mut state = start;
     let mut samples = Vec::with_capacity(input.samples().len());
     for (node, window) in input.fine().windows(4).enumerate() {
@@ -160,16 +165,25 @@ pub(super) fn run(
             if !state.x.is_finite() {
                 break;
             }
-            samples.push(state.x);
+            samples.push(state.x + shown(torques, &mut memories, state, shift));
         }
         let moved = step.advance(state, window);
         let change = moved.speed - state.speed;
         let mut speed = moved.speed;
-        for (torque, memory) in torques.iter().zip(&mut memories) {
-            speed = torque.kick(memory, moved.x, speed, change, impulse);
+        for ((torque, _), memory) in torques.iter().zip(&mut memories) {
+            speed = torque.kick(memory, moved.x + shift, speed, change, impulse);
         }
         state = State { x: moved.x, speed };
     }
     samples.resize(input.samples().len(), f64::NAN);
     samples
+}
+
+/// Torques that the gage shows beside the displacement.
+fn shown(torques: &[Link], memories: &mut [Memory], state: State, shift: f64) -> f64 {
+    let pairs = torques.iter().zip(memories);
+    pairs
+        .filter(|((_, shown), _)| *shown)
+        .map(|((torque, _), memory)| torque.value(memory, state.x + shift, state.speed))
+        .sum()
 }

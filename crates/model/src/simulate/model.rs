@@ -5,8 +5,8 @@ use std::sync::Arc;
 use num_complex::Complex64;
 
 use super::input::Input;
-use super::integrate::{self, State, free_motion};
-use crate::effects::{Action, Clock, Mode, Place, Torque};
+use super::integrate::{self, Link, State, free_motion};
+use crate::effects::{Action, Clock, Mode, Place};
 
 /// A response that is known and not fitted, such as that of the recorder: of the frequency in Hz.
 pub type Fixed = Arc<dyn Fn(f64) -> Complex64 + Send + Sync>;
@@ -19,6 +19,9 @@ pub struct Model {
     pub gain: f64,
     /// The recorder, as far as it is known.
     pub recorder: Option<Fixed>,
+    /// Displacement, in units of the record, by a load that does not change and is not in the input: torques of
+    /// the stand see it; what the gage shows of it is left to the record's own constant.
+    pub shift: f64,
     /// The effects.
     pub actions: Vec<(Place, Action)>,
 }
@@ -56,7 +59,7 @@ impl Model {
         let moved = if torques.is_empty() {
             self.respond(input)
         } else {
-            let samples = integrate::run(&self.mode, self.gain, &torques, input, start);
+            let samples = integrate::run(&self.mode, self.gain, &torques, input, start, self.shift);
             if samples.last().is_none_or(|x| !x.is_finite()) {
                 return samples;
             }
@@ -68,7 +71,14 @@ impl Model {
     /// The record for an input when the stand is at rest before it, by integration in time.
     #[must_use]
     pub fn simulate_from(&self, input: &Input, start: State) -> Vec<f64> {
-        let samples = integrate::run(&self.mode, self.gain, &self.torques(), input, start);
+        let samples = integrate::run(
+            &self.mode,
+            self.gain,
+            &self.torques(),
+            input,
+            start,
+            self.shift,
+        );
         if samples.last().is_none_or(|x| !x.is_finite()) {
             return samples;
         }
@@ -102,11 +112,17 @@ impl Model {
         !self.torques().is_empty()
     }
 
-    fn torques(&self) -> Vec<&dyn Torque> {
+    /// Whether a constant load matters beyond a constant in the record.
+    #[must_use]
+    pub fn has_zero(&self) -> bool {
+        self.torques().iter().any(|(torque, _)| torque.has_zero())
+    }
+
+    fn torques(&self) -> Vec<Link<'_>> {
         self.actions
             .iter()
             .filter_map(|(_, action)| match action {
-                Action::Torque(torque) => Some(torque.as_ref()),
+                Action::Torque { torque, shown } => Some((torque.as_ref(), *shown)),
                 _ => None,
             })
             .collect()
@@ -161,7 +177,7 @@ impl Model {
                 apply(clock, &mut samples);
                 Signal::Samples(samples)
             }
-            Action::Torque(_) | Action::Lines(_) => signal,
+            Action::Torque { .. } | Action::Lines(_) => signal,
         }
     }
 }
