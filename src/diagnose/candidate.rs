@@ -6,7 +6,7 @@ use super::blocks::{Comparison, compare};
 use super::fit::{Fitted, Residual, difference, fit, look};
 use super::record::{Nuisance, Record, dot};
 use super::spectra::Peak;
-use super::structure::{Choice, Structure};
+use super::structure::{Choice, Structure, Waves};
 
 /// The records of a diagnosis.
 pub struct Records {
@@ -35,6 +35,8 @@ pub struct Base<'a> {
     pub judged: Judged<'a>,
     /// For each training record, the changes of its record with each parameter.
     pub slopes: Vec<Nuisance>,
+    /// For each training record, what belongs to it.
+    pub cleared: Vec<Nuisance>,
 }
 
 /// Relative step of the differences.
@@ -46,10 +48,11 @@ impl<'a> Base<'a> {
     pub fn of(judged: Judged<'a>, records: &Records) -> Self {
         let fitted = &judged.fitted;
         let mut slopes = Vec::new();
+        let mut cleared = Vec::new();
         for (record, begin) in records.train.iter().zip(&fitted.begins) {
             let mut record = record.clone();
             record.begin = *begin;
-            let nuisance = record.nuisance(&records.reference, &[], None);
+            let nuisance = record.nuisance(&records.reference, &Waves::NONE, None);
             let at = |values: &[f64]| {
                 let (model, _) = fitted.structure.model(values);
                 let mut residual = difference(&model, &record).ok()?;
@@ -74,8 +77,13 @@ impl<'a> Base<'a> {
                 }
             }
             slopes.push(own);
+            cleared.push(nuisance);
         }
-        Self { judged, slopes }
+        Self {
+            judged,
+            slopes,
+            cleared,
+        }
     }
 }
 
@@ -111,7 +119,8 @@ impl Judged<'_> {
     /// Count of parameters, amplitudes of lines included.
     #[must_use]
     pub fn parameters(&self) -> usize {
-        self.fitted.values.len() + self.fitted.amplitudes.len()
+        let (_, waves) = self.fitted.structure.model(&self.fitted.values);
+        self.fitted.values.len() + self.fitted.amplitudes.len() + waves.course
     }
 
     /// Comparison with another model on the held-out records.
@@ -236,11 +245,13 @@ fn starts(choice: Choice, peaks: &[Peak]) -> Vec<Vec<f64>> {
             .filter(|f| bounds.contains(f));
         return known.map(|f| vec![f]).collect();
     }
-    let lower = choice.form.parameters[0].lower;
-    let upper = choice.form.parameters[0].upper;
     let mut all: Vec<Vec<f64>> = choice.form.starts.iter().map(|s| s.to_vec()).collect();
     if choice.is_line() {
         // The line in the data nearest to the grid's frequency, if there is one.
+        let (lower, upper) = (
+            choice.form.parameters[0].lower,
+            choice.form.parameters[0].upper,
+        );
         let near = peaks
             .iter()
             .find(|p| (lower..=upper).contains(&p.frequency_hz));
@@ -273,7 +284,7 @@ fn best_starts(
 
 /// By how much the sum of squares of the training residual would fall with the right size of what the start adds.
 fn score(base: &Base, structure: &Structure, start: &[f64], records: &Records) -> f64 {
-    let (model, lines_hz) = structure.model(start);
+    let (model, waves) = structure.model(start);
     let mut fall = 0.0;
     let judged = &base.judged;
     let each = records
@@ -281,14 +292,14 @@ fn score(base: &Base, structure: &Structure, start: &[f64], records: &Records) -
         .iter()
         .zip(&judged.fitted.begins)
         .zip(&judged.train)
-        .zip(&base.slopes);
-    for (((record, begin), before), slopes) in each {
+        .zip(base.slopes.iter().zip(&base.cleared));
+    for (((record, begin), before), (slopes, cleared)) in each {
         let mut record = record.clone();
         record.begin = *begin;
-        if !lines_hz.is_empty() {
+        if !waves.is_empty() {
             let mut residual = before.samples.clone();
             record
-                .nuisance(&records.reference, &lines_hz, None)
+                .nuisance(&records.reference, &waves, None)
                 .clear(&mut residual);
             fall += dot(&before.samples, &before.samples) - dot(&residual, &residual);
             continue;
@@ -296,9 +307,7 @@ fn score(base: &Base, structure: &Structure, start: &[f64], records: &Records) -
         let Ok(mut moved) = difference(&model, &record) else {
             return 0.0;
         };
-        record
-            .nuisance(&records.reference, &[], None)
-            .clear(&mut moved);
+        cleared.clear(&mut moved);
         let mut change: Vec<f64> = before
             .samples
             .iter()

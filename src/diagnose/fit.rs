@@ -5,7 +5,7 @@ use torqcomp_model::fit::{self, Differences, FitError, Options, Parameter};
 use torqcomp_model::simulate::Model;
 
 use super::record::{Begin, Nuisance, Record, Taken, dot};
-use super::structure::Structure;
+use super::structure::{Structure, Waves};
 
 /// A structure with fitted values.
 #[derive(Clone)]
@@ -18,6 +18,8 @@ pub struct Fitted<'a> {
     pub std: Vec<Option<f64>>,
     /// Whether one of them ended at a bound.
     pub at_bound: Vec<bool>,
+    /// Whether the fit came to its end.
+    pub converged: bool,
     /// Amplitudes of its lines, from the training records.
     pub amplitudes: Vec<f64>,
     /// Sum of squares over the training records.
@@ -101,6 +103,7 @@ fn complete<'a>(
         std: found.std[..count].to_vec(),
         at_bound: found.at_bound[..count].to_vec(),
         train_sum: found.sum_of_squares,
+        converged: found.stop.converged(),
         begins: records.iter().map(|r| r.begin).collect(),
         values,
     }
@@ -122,18 +125,18 @@ fn minimize(
         // Without lines, what belongs to a record does not depend on the parameters.
         let fixed: Vec<Nuisance> = records
             .iter()
-            .map(|r| r.nuisance(reference, &[], None))
+            .map(|r| r.nuisance(reference, &Waves::NONE, None))
             .collect();
         let problem = |values: &[f64], out: &mut Vec<f64>| {
-            let (mut model, lines_hz) = structure.model(&values[..own]);
+            let (mut model, waves) = structure.model(&values[..own]);
             for (k, (record, fixed)) in records.iter().zip(&fixed).enumerate() {
                 model.shift = values.get(own + k).map_or(record.begin.shift, |s| s * size);
                 let mut residual = difference(&model, record)?;
-                if lines_hz.is_empty() {
+                if waves.is_empty() {
                     fixed.clear(&mut residual);
                 } else {
                     record
-                        .nuisance(reference, &lines_hz, None)
+                        .nuisance(reference, &waves, None)
                         .clear(&mut residual);
                 }
                 out.append(&mut residual);
@@ -199,7 +202,7 @@ fn correct_starts(
     records: &mut [Record],
     reference: &Mode,
 ) -> bool {
-    let (mut model, lines_hz) = structure.model(structure.own(values));
+    let (mut model, waves) = structure.model(structure.own(values));
     let mut any = false;
     for record in records {
         model.shift = record.begin.shift;
@@ -207,9 +210,7 @@ fn correct_starts(
             continue;
         };
         let before = dot(&residual, &residual) / residual.len() as f64;
-        let taken = record
-            .nuisance(reference, &lines_hz, None)
-            .fit(&mut residual);
+        let taken = record.nuisance(reference, &waves, None).fit(&mut residual);
         if let Some([x, speed]) = taken.motion {
             record.begin.start.x += x;
             record.begin.start.speed += speed * reference.omega_rad_s;
@@ -225,8 +226,8 @@ fn line_amplitudes(
     records: &[Record],
     reference: &Mode,
 ) -> Vec<f64> {
-    let (mut model, lines_hz) = structure.model(values);
-    let mut sums = vec![0.0; lines_hz.len()];
+    let (mut model, waves) = structure.model(values);
+    let mut sums = vec![0.0; waves.lines_hz.len()];
     if sums.is_empty() {
         return sums;
     }
@@ -235,9 +236,7 @@ fn line_amplitudes(
         let Ok(mut residual) = difference(&model, record) else {
             continue;
         };
-        let taken = record
-            .nuisance(reference, &lines_hz, None)
-            .fit(&mut residual);
+        let taken = record.nuisance(reference, &waves, None).fit(&mut residual);
         for (sum, [c, s]) in sums.iter_mut().zip(&taken.lines) {
             *sum += c.hypot(*s) / records.len() as f64;
         }
@@ -246,11 +245,17 @@ fn line_amplitudes(
 }
 
 impl Fitted<'_> {
+    /// Whether its motion is integrated in time.
+    #[must_use]
+    pub fn integrates(&self) -> bool {
+        self.structure.model(&self.values).0.has_torques()
+    }
+
     /// What the fitted model leaves of a record that it was not fitted to: the record's own constants, start and
     /// phases are estimated, nothing else.
     #[must_use]
     pub fn residual(&self, record: &Record, reference: &Mode) -> Option<Residual> {
-        let (mut model, lines_hz) = self.structure.model(&self.values);
+        let (mut model, waves) = self.structure.model(&self.values);
         let mut record = record.clone();
         let rounds = if model.has_torques() { BEGIN_ROUNDS } else { 1 };
         let step = SHIFT_STEP * self.structure.frame.rulers.rms;
@@ -272,11 +277,9 @@ impl Fitted<'_> {
             };
             let measured = &record.measured[record.range.clone()];
             let modelled: Vec<f64> = measured.iter().zip(&samples).map(|(y, r)| y - r).collect();
-            let taken = record
-                .nuisance(reference, &lines_hz, column)
-                .fit(&mut samples);
+            let taken = record.nuisance(reference, &waves, column).fit(&mut samples);
             if round == rounds {
-                self.restore_amplitudes(&record, &lines_hz, &taken, &mut samples);
+                self.restore_amplitudes(&record, &waves, &taken, &mut samples);
                 let begin = record.begin;
                 return Some(Residual {
                     samples,
@@ -300,12 +303,16 @@ impl Fitted<'_> {
     fn restore_amplitudes(
         &self,
         record: &Record,
-        lines_hz: &[f64],
+        waves: &Waves,
         taken: &Taken,
         samples: &mut [f64],
     ) {
         let rate_hz = record.input.rate_hz();
-        let lines = lines_hz.iter().zip(&taken.lines).zip(&self.amplitudes);
+        let lines = waves
+            .lines_hz
+            .iter()
+            .zip(&taken.lines)
+            .zip(&self.amplitudes);
         for ((frequency_hz, [c, s]), amplitude) in lines {
             let own = c.hypot(*s);
             if own == 0.0 {

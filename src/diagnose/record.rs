@@ -6,6 +6,8 @@ use std::sync::Arc;
 use torqcomp_model::effects::Mode;
 use torqcomp_model::simulate::{Input, State};
 
+use super::structure::Waves;
+
 /// How a record begins.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Begin {
@@ -60,7 +62,7 @@ impl Record {
     ///
     /// `shift` is what a constant load does to the record, where that is more than a constant.
     #[must_use]
-    pub fn nuisance(&self, mode: &Mode, lines_hz: &[f64], shift: Option<Vec<f64>>) -> Nuisance {
+    pub fn nuisance(&self, mode: &Mode, waves: &Waves, shift: Option<Vec<f64>>) -> Nuisance {
         let mut nuisance = Nuisance::none();
         nuisance.push(vec![1.0; self.count()]);
         let rate_hz = self.input.rate_hz();
@@ -83,8 +85,17 @@ impl Record {
             nuisance.shift = Some(nuisance.mix.len());
             nuisance.push(column);
         }
+        let count = self.count() as f64;
+        for wave in 1..=waves.course {
+            let turn = std::f64::consts::PI * wave as f64 / count;
+            nuisance.push(
+                (0..self.count())
+                    .map(|i| (turn * (i as f64 + 0.5)).cos())
+                    .collect(),
+            );
+        }
         nuisance.lines = nuisance.mix.len();
-        for frequency_hz in lines_hz {
+        for frequency_hz in &waves.lines_hz {
             let turn = std::f64::consts::TAU * frequency_hz / rate_hz;
             // A turning phasor, set right now and then.
             let wave =

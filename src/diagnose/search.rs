@@ -42,8 +42,10 @@ const LEAST_SHARE: f64 = 0.005;
 const LEAST_SIGNIFICANCE: f64 = 3.0;
 /// Significance up to which one effect counts as no better than another.
 const WITHIN_CHANCE: f64 = 2.33;
-/// Sum of squares of a first look, over the least of all, up to which a fit is taken on.
-const PROMISING: f64 = 4.0;
+/// Gain of a first look, over the largest of all, from which on a fit is taken on.
+const PROMISING: f64 = 0.05;
+/// Relative difference of errors that counts as none.
+const SAME_ERROR: f64 = 5e-4;
 /// Lines of the residual's spectrum that may be that of a shaft.
 const PEAKS: usize = 3;
 /// Prominence of a line over the spectrum around it.
@@ -95,20 +97,17 @@ pub fn try_all<'a>(
         progress(done.fetch_add(1, Ordering::Relaxed) + 1, jobs.len());
         found
     });
-    let least = looks
+    let whole = base.judged.fitted.train_sum;
+    let most = looks
         .iter()
         .flatten()
-        .map(|f| f.train_sum)
-        .fold(f64::INFINITY, f64::min);
-    let whole = base.judged.fitted.train_sum;
+        .map(|f| whole - f.train_sum)
+        .fold(0.0, f64::max);
     let fits = parallel(jobs.len(), threads, |k| {
         let first = looks[k].as_ref()?;
-        let promising = first.train_sum < PROMISING * least && first.train_sum < whole;
-        let taken_on = if promising {
-            finish(first, records)
-        } else {
-            None
-        };
+        let gain = whole - first.train_sum;
+        let done = first.converged && !first.integrates() || gain < PROMISING * most;
+        let taken_on = if done { None } else { finish(first, records) };
         judge(taken_on.unwrap_or_else(|| first.clone()), records)
     });
     let mut tried: Vec<Tried> = Vec::new();
@@ -236,18 +235,28 @@ fn is_tied(tried: &[Tried], k: usize, best: usize) -> bool {
         || comparison.gain() < 9.0 * other.hold_rms().powi(2)
 }
 
-/// The simpler first; of equal ones, the one with the smaller error on all records.
+/// The simpler first; of equally simple ones, the one with the smaller error on all records; of equal errors, the one that
+/// stands first in the list: a line on the frequency of the grid is the grid's rather than a shaft's by chance.
 fn order(tried: &[Tried], a: usize, b: usize) -> std::cmp::Ordering {
-    let key = |k: usize| {
-        tried[k]
-            .judged
-            .as_ref()
-            .map_or((usize::MAX, f64::INFINITY), |j| {
-                (j.parameters(), j.hold_rms() + j.train_rms())
-            })
+    let (Some(one), Some(other)) = (&tried[a].judged, &tried[b].judged) else {
+        return tried[b].judged.is_some().cmp(&tried[a].judged.is_some());
     };
-    let (a, b) = (key(a), key(b));
-    a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+    let error = |j: &Judged| j.hold_rms() + j.train_rms();
+    let (own, its) = (error(one), error(other));
+    let place = |k: usize| {
+        EFFECTS
+            .iter()
+            .position(|e| std::ptr::eq(*e, tried[k].effect))
+    };
+    let by_error = if (own / its - 1.0).abs() < SAME_ERROR {
+        std::cmp::Ordering::Equal
+    } else {
+        own.total_cmp(&its)
+    };
+    one.parameters()
+        .cmp(&other.parameters())
+        .then(by_error)
+        .then(place(a).cmp(&place(b)))
 }
 
 fn name_all(tried: &mut [Tried], passing: &[usize], tied: &[usize], chosen: usize) {

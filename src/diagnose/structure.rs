@@ -35,6 +35,29 @@ pub struct Structure<'a> {
     pub choices: Vec<Choice>,
 }
 
+/// What a model adds that belongs to a record: frequencies of lines, half waves of a slow course.
+#[derive(Debug, Clone, Default)]
+pub struct Waves {
+    /// Frequencies of the lines.
+    pub lines_hz: Vec<f64>,
+    /// Half waves of the course.
+    pub course: usize,
+}
+
+impl Waves {
+    /// No waves.
+    pub const NONE: Self = Self {
+        lines_hz: Vec::new(),
+        course: 0,
+    };
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.lines_hz.is_empty() && self.course == 0
+    }
+}
+
 /// One of the parameters.
 #[derive(Debug, Clone, Copy)]
 pub struct Bounds {
@@ -124,15 +147,16 @@ impl Structure<'_> {
         all
     }
 
-    /// The model of parameter values, and the frequencies of its lines.
+    /// The model of parameter values, and what it adds that belongs to a record.
     #[must_use]
-    pub fn model(&self, values: &[f64]) -> (Model, Vec<f64>) {
+    pub fn model(&self, values: &[f64]) -> (Model, Waves) {
         let (mode, gain) = self.mode(values);
-        let mut lines_hz = Vec::new();
+        let mut waves = Waves::NONE;
         let mut actions = Vec::new();
         for (choice, own) in self.choices.iter().zip(self.effect_values(values)) {
             match (choice.form.build)(&own) {
-                Action::Lines(lines) => lines_hz.extend(lines.iter().map(|l| l.frequency_hz)),
+                Action::Lines(lines) => waves.lines_hz.extend(lines.iter().map(|l| l.frequency_hz)),
+                Action::Course(count) => waves.course = waves.course.max(count),
                 action => actions.push((choice.form.place, action)),
             }
         }
@@ -145,7 +169,7 @@ impl Structure<'_> {
                 shift: 0.0,
                 actions,
             },
-            lines_hz,
+            waves,
         )
     }
 }

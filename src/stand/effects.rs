@@ -136,7 +136,7 @@ impl Stand {
                 (_, action @ (Action::Factor(_) | Action::Feedthrough(_))) => {
                     links.push((declared.form.place, action));
                 }
-                (_, Action::Torque { .. } | Action::Transform { .. } | Action::Lines(_)) => {
+                (_, _) => {
                     return Err(Failure::failed(format_args!(
                         "{}: the effect \"{}\" cannot be taken out by a response over frequency; leave it \
                          out to use the plain stand",

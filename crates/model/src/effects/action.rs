@@ -63,6 +63,18 @@ pub struct Line {
     pub amplitude: f64,
 }
 
+impl Line {
+    /// A frequency in Hz, then the amplitudes of it and of its orders 2, 3, …
+    #[must_use]
+    pub fn orders(p: &[f64]) -> Vec<Self> {
+        let line = |order: usize| Self {
+            frequency_hz: order as f64 * p[0],
+            amplitude: p[order],
+        };
+        (1..p.len()).map(line).collect()
+    }
+}
+
 /// What an effect does.
 pub enum Action {
     /// A torque in the stand; if `shown`, the gage shows it together with `x`.
@@ -85,6 +97,8 @@ pub enum Action {
     },
     /// Lines added.
     Lines(Vec<Line>),
+    /// A slow course added, that belongs to the record: as many half waves over its length as it may have.
+    Course(usize),
 }
 
 /// What a torque remembers from node to node.
@@ -143,6 +157,7 @@ impl std::fmt::Debug for Action {
             Self::Feedthrough(_) => "Feedthrough",
             Self::Transform { .. } => "Transform",
             Self::Lines(_) => "Lines",
+            Self::Course(_) => "Course",
         })
     }
 }

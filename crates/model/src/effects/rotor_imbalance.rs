@@ -20,7 +20,7 @@ pub(super) static EFFECT: Effect = Effect {
             parameters: &[RATE, Parameter::motion("amplitude", 1, 0, 0.0, 10.0)],
             // The rate is looked for in the spectrum of the residual.
             starts: &[],
-            build: |p| Action::Lines(lines(p)),
+            build: |p| Action::Lines(Line::orders(p)),
         },
         Form {
             name: "twice",
@@ -31,7 +31,7 @@ pub(super) static EFFECT: Effect = Effect {
                 Parameter::motion("amplitude_2", 1, 0, 0.0, 10.0),
             ],
             starts: &[],
-            build: |p| Action::Lines(lines(p)),
+            build: |p| Action::Lines(Line::orders(p)),
         },
     ],
 };
@@ -43,11 +43,3 @@ const RATE: Parameter = Parameter {
     lower: 0.1,
     upper: 5000.0,
 };
-
-fn lines(p: &[f64]) -> Vec<Line> {
-    let line = |order: usize| Line {
-        frequency_hz: order as f64 * p[0],
-        amplitude: p[order],
-    };
-    (1..p.len()).map(line).collect()
-}

@@ -1,11 +1,16 @@
 //! A zero or a sensitivity that moves with temperature.
 //!
 //! `linear`: `y = x + d t`; `exponential`: `y = x + D (1 − e^{−t/τ})`, a body that warms up; `sensitivity`:
-//! `y = (1 + g t) x`. `t` is the time of the record's own axis. Thesis, Appendix B: "temperatures … not large enough" for the
+//! `y = (1 + g t) x`. `t` is the time of the record's own axis.
+//! `course`: any slow course, of up to eight half waves over the record; like the phase of a line it belongs to the
+//! record and is found anew in each. Thesis, Appendix B: "temperatures … not large enough" for the
 //! gage factor; as a zero shift 2 % of resistance at 85 °F is. **Valid over one warm-up.** Mistaken for `ac-coupled` of
 //! `capacitive-coupling`, a slow disturbance.
 
 use super::{Action, Clock, Effect, Form, Parameter, Place, Ruler};
+
+/// Most half waves of a course over a record.
+const HALF_WAVES: usize = 8;
 
 pub(super) static EFFECT: Effect = Effect {
     name: "thermal-drift",
@@ -52,6 +57,13 @@ pub(super) static EFFECT: Effect = Effect {
                     })),
                 }
             },
+        },
+        Form {
+            name: "course",
+            place: Place::Disturbance,
+            parameters: &[],
+            starts: &[&[]],
+            build: |_| Action::Course(HALF_WAVES),
         },
     ],
 };

@@ -177,7 +177,7 @@ impl Model {
                 apply(clock, &mut samples);
                 Signal::Samples(samples)
             }
-            Action::Torque { .. } | Action::Lines(_) => signal,
+            Action::Torque { .. } | Action::Lines(_) | Action::Course(_) => signal,
         }
     }
 }
