@@ -44,6 +44,10 @@ pub enum Verb {
     Inspect(Inspect),
     /// Constants of the stand from records, with their uncertainties
     Identify(identify::Identify),
+    /// The stand's answer to a given input
+    Simulate(Simulate),
+    /// Find what a stand lacks, and the error before and after it is added
+    Diagnose(Diagnose),
 }
 
 /// Units that results are printed in.
@@ -363,6 +367,91 @@ impl Inspect {
             ..csv::Options::default()
         }
     }
+}
+
+/// Arguments of `simulate`.
+#[derive(Debug, Args)]
+pub struct Simulate {
+    /// Recording with the applied quantity, or - for standard input
+    #[arg(value_name = "INPUT")]
+    pub input: String,
+    /// The result.
+    #[command(flatten)]
+    pub result: Result,
+    /// Stand file
+    #[arg(long, value_name = "FILE")]
+    pub stand: PathBuf,
+    /// Column with the applied quantity
+    #[arg(long, value_name = "COL")]
+    pub applied: Option<String>,
+    /// Column with the measured quantity: the motion then starts as it tells, instead of at rest
+    #[arg(long, value_name = "COL")]
+    pub start_from: Option<String>,
+    /// Unit of the applied quantity, if its heading does not say
+    #[arg(long, value_name = "UNIT")]
+    pub unit: Option<String>,
+    /// Sampling rate, where there are no time stamps or they are wrong
+    #[arg(long, value_name = "HZ", value_parser = positive_frequency)]
+    pub rate: Option<f64>,
+    /// Column with the time stamps
+    #[arg(long, value_name = "NAME")]
+    pub time_column: Option<String>,
+    /// Significant digits of the result, 1 to 15, or "shortest" for as many as bring back every bit
+    #[arg(long, value_name = "N", default_value = "12", value_parser = digits)]
+    pub digits: Digits,
+    /// Say nothing on standard error but warnings
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// Arguments of `diagnose`.
+#[derive(Debug, Args)]
+pub struct Diagnose {
+    /// Stand file; without it a plain second-order stand is fitted
+    #[arg(long, value_name = "FILE")]
+    pub stand: Option<PathBuf>,
+    /// Record to fit; may be given several times
+    #[arg(long, value_name = "FILE", required = true)]
+    pub train: Vec<String>,
+    /// Record that is held out; may be given several times [default: the last 30 % of each training record]
+    #[arg(long, value_name = "FILE")]
+    pub holdout: Vec<String>,
+    /// Column with the applied quantity
+    #[arg(long, value_name = "COL")]
+    pub applied: String,
+    /// Column with the measured quantity
+    #[arg(long, value_name = "COL")]
+    pub measured: String,
+    /// Unit of the applied quantity, if its heading does not say
+    #[arg(long, value_name = "UNIT")]
+    pub applied_unit: Option<String>,
+    /// Unit of the measured quantity, if its heading does not say
+    #[arg(long, value_name = "UNIT")]
+    pub measured_unit: Option<String>,
+    /// Sampling rate, where there are no time stamps or they are wrong
+    #[arg(long, value_name = "HZ", value_parser = positive_frequency)]
+    pub rate: Option<f64>,
+    /// Column with the time stamps
+    #[arg(long, value_name = "NAME")]
+    pub time_column: Option<String>,
+    /// Stand file to write, refined, for simulate and compensate
+    #[arg(short, long, value_name = "OUT")]
+    pub output: Option<String>,
+    /// Replace outputs that exist
+    #[arg(long)]
+    pub force: bool,
+    /// Print JSON instead of text
+    #[arg(long)]
+    pub json: bool,
+    /// End with code 3 if there are warnings
+    #[arg(long)]
+    pub strict: bool,
+    /// Threads to use [default: one for each core, at most 8]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub threads: Option<u16>,
+    /// Say nothing on standard error but warnings
+    #[arg(short, long)]
+    pub quiet: bool,
 }
 
 /// Orders of a fundamental, rising.

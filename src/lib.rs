@@ -2,6 +2,7 @@
 
 pub mod cli;
 pub mod commands;
+pub mod diagnose;
 pub mod failure;
 pub mod identify;
 pub mod io;

@@ -1,12 +1,14 @@
 //! One file for each verb.
 
 mod compensate;
+mod diagnose;
 mod extract;
 mod harmonics;
 mod identify;
 mod inspect;
 mod predict;
 mod rows;
+mod simulate;
 mod table;
 
 use torqcomp_dsp::conversion::ConversionError;
@@ -39,6 +41,8 @@ pub fn run(cli: Cli) -> Result<Outcome, Failure> {
         Verb::Table(args) => table::run(&args),
         Verb::Predict(args) => predict::run(&args),
         Verb::Identify(args) => identify::run(&args),
+        Verb::Simulate(args) => simulate::run(&args),
+        Verb::Diagnose(args) => diagnose::run(&args),
     }
 }
 

@@ -2,6 +2,7 @@
 
 pub mod chart;
 pub mod compensate;
+pub mod diagnose;
 pub mod harmonics;
 pub mod identify;
 pub mod inspect;

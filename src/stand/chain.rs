@@ -1,9 +1,6 @@
 //! From the recorded channel to the applied quantity: unit, calibration, response.
 
-use std::sync::Arc;
-
 use torqcomp_dsp::bridge::{ArmLaw, Bridge};
-use torqcomp_dsp::compensate::Inverse;
 use torqcomp_dsp::conversion::Conversion;
 use torqcomp_model::{Dimension, Kind, Unit, UnitSystem};
 
@@ -281,17 +278,5 @@ impl Stand {
                 self.file
             ))),
         }
-    }
-
-    /// What a compensation divides by: the stand's response and the recorder's.
-    ///
-    /// # Errors
-    /// If the stand file gives no mechanics.
-    pub fn inverse(&self) -> Result<Inverse, Failure> {
-        let response = self.mechanics()?.response;
-        let recorder = self.recorder.recorder.clone();
-        Ok(Arc::new(move |frequency_hz| {
-            response.inverse(frequency_hz) / recorder.response(frequency_hz)
-        }))
     }
 }

@@ -6,9 +6,10 @@ use toml_edit::Document;
 use torqcomp_model::{Estimate, Kind, ParameterStd, SecondOrder, Unit};
 
 use super::drawing::{beam, friction, part};
+use super::effects::effect;
 use super::measuring::{bridge, gage, recorder};
 use super::section::{Section, SourceText};
-use super::{Given, Mechanics, Stand, StaticGain};
+use super::{Diagnosed, Given, Mechanics, Stand, StaticGain};
 use crate::failure::Failure;
 
 /// The schema of a stand file.
@@ -74,18 +75,14 @@ pub fn parse(name: &str, text: &str) -> Result<Stand, Failure> {
     let gage = top.section("gage")?.map(|s| gage(&s)).transpose()?;
     let bridge = top.section("bridge")?.map(|s| bridge(&s)).transpose()?;
     let recorder = recorder(top.section("recorder")?.as_ref())?;
-    if let Some(effect) = top.sections("effects")?.first() {
-        let kind = effect.text("kind")?.unwrap_or("");
-        return Err(effect.fail(
-            "kind",
-            format_args!(
-                "this version cannot apply the effect \"{kind}\"; leave it out to use the plain \
-                 stand"
-            ),
-        ));
-    }
+    let effect_sections = top.sections("effects")?;
+    let diagnosed = top
+        .section("diagnosed")?
+        .map(|s| diagnosed(&s))
+        .transpose()?
+        .unwrap_or_default();
     top.finish()?;
-    let stand = Stand {
+    let mut stand = Stand {
         name: stand_name,
         file: name.to_owned(),
         mechanics,
@@ -96,8 +93,14 @@ pub fn parse(name: &str, text: &str) -> Result<Stand, Failure> {
         gage,
         bridge,
         recorder,
+        effects: Vec::new(),
+        diagnosed,
     };
     one_calibration(&top, &stand)?;
+    stand.effects = effect_sections
+        .iter()
+        .map(|section| effect(section, stand.recorded_unit()))
+        .collect::<Result<_, _>>()?;
     Ok(stand)
 }
 
@@ -223,6 +226,35 @@ fn static_gain(section: &Section) -> Result<Option<StaticGain>, Failure> {
         recorded_unit: recorded.trim().to_owned(),
         applied_unit: applied.to_owned(),
     }))
+}
+
+/// What a diagnosis wrote about itself; what is not used is for people.
+fn diagnosed(section: &Section) -> Result<Diagnosed, Failure> {
+    for key in ["applied_unit", "verdict", "records"] {
+        let _ = section.text(key)?;
+    }
+    let quantity = |key: &'static str| -> Result<f64, Failure> {
+        let Some(text) = section.raw(key)? else {
+            return Ok(0.0);
+        };
+        let (number, unit) = text.trim().split_once(' ').unwrap_or((text.trim(), ""));
+        let wrong = || {
+            section.fail(
+                key,
+                format_args!("\"{text}\": expected a number and the unit of the record"),
+            )
+        };
+        let number: f64 = number.parse().map_err(|_| wrong())?;
+        let unit = Unit::parse(unit).map_err(|error| section.fail(key, error))?;
+        Ok(number * unit.factor())
+    };
+    let found = Diagnosed {
+        measured_unit: section.text("measured_unit")?.map(str::to_owned),
+        offset: quantity("offset")?,
+        shift: quantity("shift")?,
+    };
+    section.finish()?;
+    Ok(found)
 }
 
 fn calibration(section: &Section) -> Result<Estimate, Failure> {

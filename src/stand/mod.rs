@@ -2,8 +2,10 @@
 
 mod chain;
 mod drawing;
+mod effects;
 mod file;
 mod measuring;
+mod refine;
 mod section;
 pub mod update;
 
@@ -12,7 +14,10 @@ use torqcomp_dsp::recorder::Recorder;
 use torqcomp_model::{Estimate, ParameterStd, SecondOrder};
 
 pub use chain::{Applied, Chain, applied_by_unit};
+pub use effects::DeclaredEffect;
+pub use file::parse;
 pub use file::read;
+pub use refine::{Refined, refine, si_unit};
 
 /// A stand: its mechanics, and how its record becomes torque.
 #[derive(Debug, Clone)]
@@ -37,6 +42,21 @@ pub struct Stand {
     pub bridge: Option<BridgeData>,
     /// The recorder.
     pub recorder: RecorderData,
+    /// What the plain stand lacks.
+    pub effects: Vec<DeclaredEffect>,
+    /// What a diagnosis wrote about itself.
+    pub diagnosed: Diagnosed,
+}
+
+/// What a diagnosis wrote about the records that it refined the stand with.
+#[derive(Debug, Clone, Default)]
+pub struct Diagnosed {
+    /// Unit of the record.
+    pub measured_unit: Option<String>,
+    /// Constant in the record, in SI units.
+    pub offset: f64,
+    /// Displacement by a constant load, in SI units of the record.
+    pub shift: f64,
 }
 
 /// The stand's response, from measured constants.

@@ -43,6 +43,8 @@
 //! | [`inertia`] | mass moments of inertia of simple bodies |
 //! | [`damping`] | viscous coefficient, free decay |
 //! | [`response`] | transfer function and its inverse |
+//! | [`effects`] | what a plain stand can lack |
+//! | [`simulate`] | the stand's answer to an input, effects included |
 //! | [`uncertainty`] | uncertainty of the inverse |
 //! | [`calibration`] | torque per volt from a static load |
 //! | [`fit`] | least squares: parameters with uncertainties from data |
@@ -52,12 +54,14 @@ pub mod beam;
 pub mod calibration;
 mod check;
 pub mod damping;
+pub mod effects;
 pub mod error;
 pub mod fit;
 pub mod inertia;
 pub mod quantity;
 pub mod response;
 pub mod section;
+pub mod simulate;
 pub mod uncertainty;
 
 pub use beam::{Beam, Compliance, Segment};

@@ -113,7 +113,7 @@ fn missing_and_contradicting_entries_are_refused() {
     assert!(message(twice).contains("keep one"));
     assert!(message("name = \"x\"\n").contains("schema"));
     let effect = format!("{MECHANICS}[[effects]]\nkind = \"cubic-stiffness\"\n");
-    assert!(message(&effect).contains("cubic-stiffness"));
+    assert!(message(&effect).contains("coefficient is missing"));
 }
 
 #[test]

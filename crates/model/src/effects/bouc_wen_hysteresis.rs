@@ -1,0 +1,99 @@
+//! Hysteresis with memory, smooth, of joints and clamps.
+//!
+//! `n = k z`, `z' = x' − (b |x'| z + c x' |z|)` (`linear`; `shown`: the gage shows it), or with `m` in place of 1
+//! (`exponent`): `z' = x' − |s z|^m (b |x'| sgn z + c x')/s`, `s = b + |c|`. Y. K. Wen, *Method for random vibration of
+//! hysteretic systems*, J. Eng. Mech. Div. 102 (1976), 249. **Valid without drift of the loops**; does
+//! not close small inner loops as metals do. Mistaken for `coulomb-friction` (its limit for a stiff joint),
+//! `structural-damping` at one level.
+//!
+//! The law does not depend on rate: `z` follows the steps of `x`, by the midpoint rule.
+
+use super::{Action, Effect, Form, Memory, Parameter, Place, Torque};
+
+const PART: Parameter = Parameter::number("stiffness_ratio", 0.0, 50.0);
+const LOSS: Parameter = Parameter::motion("loss", -1, 0, 0.0, 100.0);
+const SHAPE: Parameter = Parameter::motion("shape", -1, 0, -100.0, 100.0);
+const STARTS: &[&[f64]] = &[&[0.1, 0.5, 0.0], &[0.5, 1.0, 0.5], &[1.0, 0.3, -0.1]];
+
+pub(super) static EFFECT: Effect = Effect {
+    name: "bouc-wen-hysteresis",
+    equation: "n = k z, z' = x' - b |x'| z - c x' |z|",
+    source: "Y. K. Wen, J. Eng. Mech. Div. 102 (1976), 249",
+    validity: "without drift of the loops",
+    mistaken_for: &["coulomb-friction", "backlash", "structural-damping"],
+    experiment: "a slow load and unload with inner loops, at two rates",
+    forms: &[
+        Form {
+            name: "linear",
+            place: Place::Stand,
+            parameters: &[PART, LOSS, SHAPE],
+            starts: STARTS,
+            build: |p| Action::beside(BoucWen::of(p)),
+        },
+        Form {
+            name: "shown",
+            place: Place::Stand,
+            parameters: &[PART, LOSS, SHAPE],
+            starts: STARTS,
+            build: |p| Action::shown(BoucWen::of(p)),
+        },
+        Form {
+            name: "exponent",
+            place: Place::Stand,
+            parameters: &[PART, LOSS, SHAPE, Parameter::number("exponent", 1.0, 5.0)],
+            starts: &[
+                &[0.1, 0.5, 0.1, 1.5],
+                &[0.5, 0.7, 0.3, 2.0],
+                &[0.2, 1.0, 0.3, 2.0],
+            ],
+            build: |p| Action::beside(BoucWen::of(p)),
+        },
+    ],
+};
+
+struct BoucWen {
+    ratio: f64,
+    loss: f64,
+    shape: f64,
+    exponent: f64,
+}
+
+impl BoucWen {
+    fn of(p: &[f64]) -> Self {
+        Self {
+            ratio: p[0],
+            loss: p[1],
+            shape: p[2],
+            exponent: p.get(3).copied().unwrap_or(1.0),
+        }
+    }
+
+    /// `dz/dx` for a step of that sign.
+    fn slope(&self, z: f64, step: f64) -> f64 {
+        let size = z.abs();
+        let sum = self.loss.copysign(step * z) + self.shape;
+        if self.exponent == 1.0 {
+            return 1.0 - size * sum;
+        }
+        // One scale of z for loss and shape keeps the two comparable for any exponent.
+        let scale = self.loss + self.shape.abs();
+        if scale == 0.0 {
+            return 1.0;
+        }
+        1.0 - (size * scale).powf(self.exponent) * sum / scale
+    }
+}
+
+impl Torque for BoucWen {
+    fn value(&self, memory: &mut Memory, x: f64, _: f64) -> f64 {
+        let [z, last] = *memory;
+        let step = x - last;
+        let middle = z + 0.5 * step * self.slope(z, step);
+        *memory = [z + step * self.slope(middle, step), x];
+        self.ratio * memory[0]
+    }
+
+    fn begin(&self, x: f64) -> Memory {
+        [0.0, x]
+    }
+}

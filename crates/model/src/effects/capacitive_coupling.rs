@@ -1,0 +1,75 @@
+//! A stray or series capacitance in the measuring chain.
+//!
+//! `slope-of-load`: `y = x + G τ u'`, the load's own slope gets into the record; at a load step it is the
+//! spike that the thesis puts down to "capacitive coupling within the recorder". `slope-of-record`:
+//! `y = x + τ x'`. `high-pass-leak`: `y = x + c s τ/(1 + s τ) G u`. `ac-coupled`: `y = s/(s + ω_c) x`, a series capacitor.
+//! **Valid far below the corner of the stray path** for the first two. Mistaken for `second-mode` below the excitation,
+//! `time-delay` of the other channel.
+
+use super::{Action, Effect, Form, Parameter, Place};
+use num_complex::Complex64;
+use std::f64::consts::TAU;
+
+pub(super) static EFFECT: Effect = Effect {
+    name: "capacitive-coupling",
+    equation: "y = x + G tau u'",
+    source: "T. P. Hertel's thesis, section III",
+    validity: "far below the corner of the stray path",
+    mistaken_for: &["second-mode", "time-delay"],
+    experiment: "the same excitation with the gage's supply off: what is left is coupled",
+    forms: &[
+        Form {
+            name: "slope-of-load",
+            place: Place::Chain,
+            parameters: &[Parameter::motion("time", 0, 1, -5.0, 5.0)],
+            starts: &[&[0.005]],
+            build: |p| {
+                let time_s = p[0];
+                Action::Feedthrough(Box::new(move |_, omega| {
+                    Complex64::new(0.0, omega * time_s)
+                }))
+            },
+        },
+        Form {
+            name: "slope-of-record",
+            place: Place::Chain,
+            parameters: &[Parameter::motion("time", 0, 1, -5.0, 5.0)],
+            starts: &[&[0.005]],
+            build: |p| {
+                let time_s = p[0];
+                Action::Factor(Box::new(move |_, omega| {
+                    Complex64::new(1.0, omega * time_s)
+                }))
+            },
+        },
+        Form {
+            name: "high-pass-leak",
+            place: Place::Chain,
+            parameters: &[
+                Parameter::number("share", -3.0, 3.0),
+                Parameter::frequency("corner", 0.01, 30.0),
+            ],
+            starts: &[&[0.01, 0.3], &[0.01, 1.0], &[0.01, 4.0]],
+            build: |p| {
+                let (share, corner) = (p[0], TAU * p[1]);
+                Action::Feedthrough(Box::new(move |_, omega| {
+                    let s = Complex64::new(0.0, omega / corner);
+                    share * s / (1.0 + s)
+                }))
+            },
+        },
+        Form {
+            name: "ac-coupled",
+            place: Place::Chain,
+            parameters: &[Parameter::frequency("corner", 1e-6, 3.0)],
+            starts: &[&[0.003], &[0.05], &[0.3]],
+            build: |p| {
+                let corner = TAU * p[0];
+                Action::Factor(Box::new(move |_, omega| {
+                    let s = Complex64::new(0.0, omega / corner);
+                    s / (1.0 + s)
+                }))
+            },
+        },
+    ],
+};

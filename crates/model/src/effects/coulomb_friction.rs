@@ -1,0 +1,72 @@
+//! Dry friction: a torque of constant size against the motion.
+//!
+//! `n = F tanh(x'/v)`; `v → 0` is the law of Coulomb, `n = F sgn(x')`, with sticking. C. A. Coulomb,
+//! *Théorie des machines simples* (1781). **Valid where sliding is full**; before that a joint gives a
+//! hysteresis with memory. Mistaken for `bouc-wen-hysteresis` and `quadratic-damping`.
+//!
+//! Integration: for a fixed `x` the speed follows `x'' = −ω₀² F tanh(x'/v)` exactly,
+//! `sinh(x'/v) ∝ e^{−ω₀² F t/v}`, which cannot overshoot zero, so sticking does not chatter. Where the
+//! speed changes sign between two nodes, `v` is taken no less than half the change, so that the sum
+//! over the nodes has the friction switch at the right time.
+
+use super::{Action, Effect, Form, Memory, Parameter, Place, Torque};
+
+pub(super) static EFFECT: Effect = Effect {
+    name: "coulomb-friction",
+    equation: "n = F tanh(x'/v)",
+    source: "C. A. Coulomb, Theorie des machines simples (1781)",
+    validity: "where sliding is full",
+    mistaken_for: &[
+        "bouc-wen-hysteresis",
+        "quadratic-damping",
+        "structural-damping",
+    ],
+    experiment: "a slow load and unload, a free decay down to rest, and the response at two levels",
+    forms: &[Form {
+        name: "tanh",
+        place: Place::Stand,
+        parameters: &[
+            Parameter::motion("torque", 1, 0, 0.0, 5.0),
+            Parameter::motion("transition_speed", 1, -1, 1e-5, 0.3),
+        ],
+        starts: &[&[0.03, 0.02], &[0.3, 0.02]],
+        build: |p| {
+            Action::beside(Friction {
+                torque: p[0],
+                speed: p[1],
+            })
+        },
+    }],
+};
+
+struct Friction {
+    torque: f64,
+    speed: f64,
+}
+
+impl Torque for Friction {
+    fn value(&self, _: &mut Memory, _: f64, speed: f64) -> f64 {
+        self.torque * (speed / self.speed).tanh()
+    }
+
+    fn kick(&self, _: &mut Memory, _: f64, speed: f64, change: f64, impulse: f64) -> f64 {
+        let width = self.speed.max(0.5 * change.abs());
+        let loss = impulse * self.torque;
+        let size = speed.abs();
+        if size - loss > 15.0 * width {
+            return speed - loss.copysign(speed);
+        }
+        decay(size / width, loss / width) * width.copysign(speed)
+    }
+}
+
+/// `asinh(sinh(a) e^{−b})` for `a, b ≥ 0`, also where `sinh(a)` would overflow.
+fn decay(a: f64, b: f64) -> f64 {
+    if a < 30.0 {
+        (a.sinh() * (-b).exp()).asinh()
+    } else if a - b > 15.0 {
+        a - b
+    } else {
+        (0.5 * (a - b).exp()).asinh()
+    }
+}

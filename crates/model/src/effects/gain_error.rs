@@ -1,0 +1,27 @@
+//! A calibration constant that is wrong.
+//!
+//! `y = (1 + e) x`. Only where the static gain is declared (both channels torque, or volts with a
+//! calibration); elsewhere the gain is a parameter of the plain stand. **Valid at all levels and
+//! frequencies alike.** Mistaken for wrong stiffness where only frequencies far above the natural one are excited.
+
+use super::{Action, Effect, Form, Parameter, Place};
+use num_complex::Complex64;
+
+pub(super) static EFFECT: Effect = Effect {
+    name: "gain-error",
+    equation: "y = (1 + e) x",
+    source: "the definition",
+    validity: "at all levels and frequencies alike",
+    mistaken_for: &["second-mode"],
+    experiment: "a known static load",
+    forms: &[Form {
+        name: "factor",
+        place: Place::Gage,
+        parameters: &[Parameter::number("error", -0.9, 10.0)],
+        starts: &[&[0.01]],
+        build: |p| {
+            let gain = Complex64::new(1.0 + p[0], 0.0);
+            Action::Factor(Box::new(move |_, _| gain))
+        },
+    }],
+};

@@ -1,0 +1,64 @@
+//! Hum of the mains in the record.
+//!
+//! A line at 50 or 60 Hz (`orders`: and its orders 2 to 5), added to the record; the phase belongs to the record,
+//! the frequency is that of the grid within ¼ %. **Valid for a steady grid.** Mistaken for an order of the shaft
+//! (`rotor-imbalance`) that falls on the same frequency.
+
+use super::{Action, Effect, Form, Line, Parameter, Place, Ruler, Unit};
+
+const fn amplitude(name: &'static str) -> Parameter {
+    Parameter::motion(name, 1, 0, 0.0, 10.0)
+}
+
+const fn grid(hz: f64) -> Parameter {
+    Parameter {
+        name: "frequency",
+        unit: Unit::Hertz,
+        ruler: Ruler::Absolute,
+        lower: 0.9975 * hz,
+        upper: 1.0025 * hz,
+    }
+}
+
+macro_rules! form {
+    ($name:literal, $hz:literal, $($amplitude:literal),+) => {
+        Form {
+            name: $name,
+            place: Place::Disturbance,
+            parameters: &[grid($hz), $(amplitude($amplitude)),+],
+            starts: &[&[$hz]],
+            build: |p| Action::Lines(Line::orders(p)),
+        }
+    };
+}
+
+pub(super) static EFFECT: Effect = Effect {
+    name: "mains-pickup",
+    equation: "y = x + sum of a_k sin(2 pi k f t + phase), f = 50 or 60 Hz",
+    source: "the definition",
+    validity: "for a steady grid",
+    mistaken_for: &["rotor-imbalance"],
+    experiment: "a record with the motor off, or at another speed: the mains stay",
+    forms: &[
+        form!("60-Hz", 60.0, "amplitude"),
+        form!("50-Hz", 50.0, "amplitude"),
+        form!(
+            "60-Hz-orders",
+            60.0,
+            "amplitude",
+            "amplitude_2",
+            "amplitude_3",
+            "amplitude_4",
+            "amplitude_5"
+        ),
+        form!(
+            "50-Hz-orders",
+            50.0,
+            "amplitude",
+            "amplitude_2",
+            "amplitude_3",
+            "amplitude_4",
+            "amplitude_5"
+        ),
+    ],
+};

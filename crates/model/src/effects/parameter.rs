@@ -1,0 +1,178 @@
+//! Parameters of effects: units, physical bounds, and the rulers that make them pure numbers.
+
+/// A parameter of an effect.
+#[derive(Debug)]
+pub struct Parameter {
+    /// Its name in stand files and reports.
+    pub name: &'static str,
+    /// Its unit.
+    pub unit: Unit,
+    /// What it is measured with in a fit.
+    pub ruler: Ruler,
+    /// Least physical value, in rulers.
+    pub lower: f64,
+    /// Greatest physical value, in rulers.
+    pub upper: f64,
+}
+
+/// Unit of a parameter: recorded unit to a power, seconds to a power; or hertz.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Unit {
+    /// A pure number.
+    Number,
+    /// Hertz.
+    Hertz,
+    /// Powers of the recorded unit and of the second.
+    Powers {
+        /// Power of the recorded unit.
+        recorded: i32,
+        /// Power of the second.
+        second: i32,
+    },
+}
+
+/// How a parameter is made a pure number near one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ruler {
+    /// Recorded units by the rms of the record, times by `1/ω₀`, frequencies by `f₀`.
+    Motion,
+    /// Recorded units by the largest recorded magnitude, times by `1/ω₀`.
+    Peak,
+    /// Recorded units by the rms of the record, times by the length of the record.
+    Record,
+    /// Not at all.
+    Absolute,
+}
+
+/// The rulers of a set of records; fixed before any effect is fitted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rulers {
+    /// Rms of the record, about its mean.
+    pub rms: f64,
+    /// Largest distance of the record from its mean.
+    pub peak: f64,
+    /// Natural frequency of the stand in Hz.
+    pub natural_hz: f64,
+    /// Length of a record in s.
+    pub duration_s: f64,
+}
+
+impl Parameter {
+    /// A pure number.
+    #[must_use]
+    pub const fn number(name: &'static str, lower: f64, upper: f64) -> Self {
+        Self {
+            name,
+            unit: Unit::Number,
+            ruler: Ruler::Absolute,
+            lower,
+            upper,
+        }
+    }
+
+    /// A frequency, in natural frequencies.
+    #[must_use]
+    pub const fn frequency(name: &'static str, lower: f64, upper: f64) -> Self {
+        Self {
+            name,
+            unit: Unit::Hertz,
+            ruler: Ruler::Motion,
+            lower,
+            upper,
+        }
+    }
+
+    /// Recorded unit to a power times second to a power, measured by the motion.
+    #[must_use]
+    pub const fn motion(
+        name: &'static str,
+        recorded: i32,
+        second: i32,
+        lower: f64,
+        upper: f64,
+    ) -> Self {
+        Self {
+            name,
+            unit: Unit::Powers { recorded, second },
+            ruler: Ruler::Motion,
+            lower,
+            upper,
+        }
+    }
+
+    /// The same with another ruler.
+    #[must_use]
+    pub const fn by(self, ruler: Ruler) -> Self {
+        Self { ruler, ..self }
+    }
+
+    /// The size of the parameter's ruler, in the parameter's unit.
+    ///
+    /// ```
+    /// use torqcomp_model::effects::{Parameter, Rulers};
+    /// let rulers = Rulers { rms: 2.0, peak: 5.0, natural_hz: 10.0, duration_s: 1.0 };
+    /// // A cubic coefficient, in 1/unit²: 1/2².
+    /// assert_eq!(Parameter::motion("coefficient", -2, 0, 0.0, 1.0).size(&rulers), 0.25);
+    /// // A corner frequency: 10 Hz.
+    /// assert_eq!(Parameter::frequency("corner", 0.0, 1.0).size(&rulers), 10.0);
+    /// ```
+    #[must_use]
+    pub fn size(&self, rulers: &Rulers) -> f64 {
+        let natural_s = 1.0 / (std::f64::consts::TAU * rulers.natural_hz);
+        let (length, time_s, frequency_hz) = match self.ruler {
+            Ruler::Motion => (rulers.rms, natural_s, rulers.natural_hz),
+            Ruler::Peak => (rulers.peak, natural_s, rulers.natural_hz),
+            Ruler::Record => (rulers.rms, rulers.duration_s, 1.0 / rulers.duration_s),
+            Ruler::Absolute => (1.0, 1.0, 1.0),
+        };
+        match self.unit {
+            Unit::Number => 1.0,
+            Unit::Hertz => frequency_hz,
+            Unit::Powers { recorded, second } => length.powi(recorded) * time_s.powi(second),
+        }
+    }
+}
+
+impl Unit {
+    /// The unit in text, for a record in a given unit (empty for a pure number).
+    ///
+    /// ```
+    /// use torqcomp_model::effects::Unit;
+    /// assert_eq!(Unit::Powers { recorded: -2, second: 0 }.text("N m"), "1/(N m)^2");
+    /// assert_eq!(Unit::Powers { recorded: -1, second: 2 }.text("V"), "s^2/V");
+    /// ```
+    #[must_use]
+    pub fn text(&self, recorded_unit: &str) -> String {
+        let (recorded, second) = match self {
+            Self::Number => return String::new(),
+            Self::Hertz => return "Hz".to_owned(),
+            Self::Powers { recorded, second } => (*recorded, *second),
+        };
+        let bracketed = if recorded_unit.contains([' ', '/', '*', '^']) {
+            format!("({recorded_unit})")
+        } else {
+            recorded_unit.to_owned()
+        };
+        let part = |unit: &str, power: i32| match (unit.is_empty(), power) {
+            (true, _) | (_, 0) => String::new(),
+            (_, 1) => unit.to_owned(),
+            _ => format!("{unit}^{power}"),
+        };
+        let join = |a: String, b: String| match (a.is_empty(), b.is_empty()) {
+            (false, false) => format!("{a} {b}"),
+            _ => a + &b,
+        };
+        let above = join(part(&bracketed, recorded.max(0)), part("s", second.max(0)));
+        let below_recorded = part(&bracketed, (-recorded).max(0));
+        let below_second = part("s", (-second).max(0));
+        let both = !below_recorded.is_empty() && !below_second.is_empty();
+        let below = join(below_recorded, below_second);
+        match (above.is_empty(), below.is_empty()) {
+            (_, true) => above,
+            (true, false) if both => format!("1/({below})"),
+            (true, false) => format!("1/{below}"),
+            (false, false) if both => format!("{above}/({below})"),
+            (false, false) => format!("{above}/{below}"),
+        }
+    }
+}

@@ -1,0 +1,39 @@
+//! Damping that grows with the square of the speed, as of air.
+//!
+//! `n = d x' |x'|`. J. W. Strutt (Rayleigh), *The Theory of Sound* I (1894), 39. **Valid for turbulent
+//! flow**; at low speed drag is viscous. Mistaken for `coulomb-friction` with the other sign of its dependence
+//! on level, `bouc-wen-hysteresis`.
+//!
+//! Integration: for a fixed `x`, `x' = v/(1 + ω₀² d |v| t)` exactly.
+
+use super::{Action, Effect, Form, Memory, Parameter, Place, Torque};
+
+pub(super) static EFFECT: Effect = Effect {
+    name: "quadratic-damping",
+    equation: "n = d x' |x'|",
+    source: "J. W. Strutt (Rayleigh), The Theory of Sound I (1894), 39",
+    validity: "for turbulent flow",
+    mistaken_for: &["coulomb-friction", "bouc-wen-hysteresis"],
+    experiment: "free decays from two amplitudes, or the response at two levels",
+    forms: &[Form {
+        name: "drag",
+        place: Place::Stand,
+        parameters: &[Parameter::motion("coefficient", -1, 2, 0.0, 20.0)],
+        starts: &[&[0.02]],
+        build: |p| Action::beside(Drag { coefficient: p[0] }),
+    }],
+};
+
+struct Drag {
+    coefficient: f64,
+}
+
+impl Torque for Drag {
+    fn value(&self, _: &mut Memory, _: f64, speed: f64) -> f64 {
+        self.coefficient * speed * speed.abs()
+    }
+
+    fn kick(&self, _: &mut Memory, _: f64, speed: f64, _: f64, impulse: f64) -> f64 {
+        speed / (1.0 + impulse * self.coefficient * speed.abs())
+    }
+}

@@ -1,0 +1,68 @@
+//! Stiffness that changes in proportion to the displacement.
+//!
+//! `n = c x²` (even: stiffer to one side, as of a beam with preload or a bent one) or `n = c x |x|` (odd:
+//! stiffer to both sides). A. H. Nayfeh, D. T. Mook, *Nonlinear Oscillations* (1979), 2.3. **Valid for small
+//! changes**: at `2 c x = −1` the even form has no stiffness left. Mistaken for `gage-nonlinearity` (even) and
+//! `cubic-stiffness` (odd).
+
+use super::{Action, Effect, Form, Memory, Parameter, Place, Torque};
+
+pub(super) static EFFECT: Effect = Effect {
+    name: "quadratic-stiffness",
+    equation: "n = c x^2, or c x |x|",
+    source: "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (1979), 2.3",
+    validity: "while the stiffness stays positive",
+    mistaken_for: &["gage-nonlinearity", "cubic-stiffness"],
+    experiment: "a slow load and unload to both sides, and the response at two levels",
+    forms: &[
+        Form {
+            name: "even",
+            place: Place::Stand,
+            parameters: &[Parameter::motion("coefficient", -1, 0, -0.5, 0.5)],
+            starts: &[&[0.005]],
+            build: |p| Action::beside(Even { coefficient: p[0] }),
+        },
+        Form {
+            name: "even-shown",
+            place: Place::Stand,
+            parameters: &[Parameter::motion("coefficient", -1, 0, -0.5, 0.5)],
+            starts: &[&[0.005]],
+            build: |p| Action::shown(Even { coefficient: p[0] }),
+        },
+        Form {
+            name: "odd",
+            place: Place::Stand,
+            parameters: &[Parameter::motion("coefficient", -1, 0, -0.3, 20.0)],
+            starts: &[&[0.01]],
+            build: |p| Action::beside(Odd { coefficient: p[0] }),
+        },
+    ],
+};
+
+struct Even {
+    coefficient: f64,
+}
+
+impl Torque for Even {
+    fn value(&self, _: &mut Memory, x: f64, _: f64) -> f64 {
+        self.coefficient * x * x
+    }
+
+    fn has_zero(&self) -> bool {
+        true
+    }
+}
+
+struct Odd {
+    coefficient: f64,
+}
+
+impl Torque for Odd {
+    fn value(&self, _: &mut Memory, x: f64, _: f64) -> f64 {
+        self.coefficient * x * x.abs()
+    }
+
+    fn has_zero(&self) -> bool {
+        true
+    }
+}

@@ -1,0 +1,67 @@
+//! A recorder that does not follow fast changes.
+//!
+//! `second-order`: `L = 1/(1 + 2ζ s/ω_c + s²/ω_c²)`. Otherwise: Butterworth low-pass of order 1 (an RC low-pass) to 4: `L = Π 1/(1 − (jf/f_c)/p_k)` over its poles
+//! `p_k = e^{jπ(2k+n−1)/2n}`. S. Butterworth, Exp. Wireless 7 (1930), 536. **Valid below half the sampling rate.**
+//! Mistaken for `time-delay` where the corner lies far above the excitation.
+
+use super::{Action, Effect, Form, Parameter, Place};
+use num_complex::Complex64;
+use std::f64::consts::{PI, TAU};
+
+const CORNER: Parameter = Parameter::frequency("cutoff", 0.02, 300.0);
+const STARTS: &[&[f64]] = &[&[0.3], &[1.0], &[2.5], &[6.0], &[15.0]];
+
+macro_rules! order {
+    ($order:literal, $name:literal) => {
+        Form {
+            name: $name,
+            place: Place::Chain,
+            parameters: &[CORNER],
+            starts: STARTS,
+            build: |p| butterworth($order, p[0]),
+        }
+    };
+}
+
+pub(super) static EFFECT: Effect = Effect {
+    name: "recorder-lowpass",
+    equation: "L = 1/(1 + j f/f_c), or Butterworth of order 2 to 4",
+    source: "S. Butterworth, Exp. Wireless 7 (1930), 536",
+    validity: "below half the sampling rate",
+    mistaken_for: &["time-delay", "second-mode"],
+    experiment: "one signal on both channels at once, with energy around the corner",
+    forms: &[
+        order!(1, "order-1"),
+        order!(2, "order-2"),
+        order!(3, "order-3"),
+        order!(4, "order-4"),
+        Form {
+            name: "second-order",
+            place: Place::Chain,
+            parameters: &[CORNER, Parameter::number("damping_ratio", 0.2, 3.0)],
+            starts: &[&[1.0, 0.8], &[3.0, 0.8], &[8.0, 0.8]],
+            build: |p| {
+                let (corner, damping) = (TAU * p[0], p[1]);
+                Action::Factor(Box::new(move |_, omega| {
+                    let w = omega / corner;
+                    Complex64::new(1.0 - w * w, 2.0 * damping * w).inv()
+                }))
+            },
+        },
+    ],
+};
+
+fn butterworth(order: u32, cutoff_hz: f64) -> Action {
+    let n = f64::from(order);
+    let poles: Vec<Complex64> = (1..=order)
+        .map(|k| Complex64::from_polar(1.0, PI * (2.0 * f64::from(k) + n - 1.0) / (2.0 * n)))
+        .collect();
+    Action::Factor(Box::new(move |_, omega| {
+        let s = Complex64::new(0.0, omega / (TAU * cutoff_hz));
+        poles
+            .iter()
+            .map(|p| 1.0 - s / p)
+            .product::<Complex64>()
+            .inv()
+    }))
+}

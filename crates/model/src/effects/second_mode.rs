@@ -1,0 +1,132 @@
+//! Another resonance of the stand in the band.
+//!
+//! `coupled`: a second inertia hangs on the first one. `H = H₁ + a H₂` (`added`), `(1 − a) H₁ + a H₂` (`shared`, the static gain stays), `H₁ H₂` (`series`), or
+//! `g H₁ + (a + b s/ω₂) H₂` (`free`), with `H_i = ω_i²/(s² + 2ζ_i ω_i s + ω_i²)`. D. J. Ewins, *Modal Testing* (2000), 2.
+//! **Valid for modes apart by more than their widths.** Mistaken for `recorder-lowpass` or `time-delay` if it lies
+//! above the excitation.
+
+use super::{Action, Effect, Form, Mode, Parameter, Place};
+use num_complex::Complex64;
+use std::f64::consts::TAU;
+
+const FREQUENCY: Parameter = Parameter::frequency("frequency", 0.05, 60.0);
+const DAMPING: Parameter = Parameter::number("damping_ratio", 1e-4, 1.0);
+const SHARE: Parameter = Parameter::number("share", -3.0, 3.0);
+
+macro_rules! starts {
+    ($($rest:literal),*) => {
+        &[
+            &[0.2, 0.03 $(, $rest)*],
+            &[0.35, 0.03 $(, $rest)*],
+            &[0.5, 0.03 $(, $rest)*],
+            &[0.7, 0.03 $(, $rest)*],
+            &[1.25, 0.03 $(, $rest)*],
+            &[1.5, 0.03 $(, $rest)*],
+            &[1.75, 0.03 $(, $rest)*],
+            &[2.0, 0.03 $(, $rest)*],
+            &[2.3, 0.03 $(, $rest)*],
+            &[2.6, 0.03 $(, $rest)*],
+            &[3.0, 0.03 $(, $rest)*],
+            &[3.5, 0.03 $(, $rest)*],
+            &[4.2, 0.03 $(, $rest)*],
+            &[5.0, 0.03 $(, $rest)*],
+            &[7.0, 0.03 $(, $rest)*],
+        ]
+    };
+}
+
+pub(super) static EFFECT: Effect = Effect {
+    name: "second-mode",
+    equation: "H = H1 + a H2",
+    source: "D. J. Ewins, Modal Testing (2000), 2",
+    validity: "for modes apart by more than their widths",
+    mistaken_for: &["recorder-lowpass", "time-delay", "gain-error"],
+    experiment: "excitation up to well above the second resonance",
+    forms: &[
+        Form {
+            name: "added",
+            place: Place::Dynamics,
+            parameters: &[FREQUENCY, DAMPING, SHARE],
+            starts: starts!(0.02),
+            build: |p| {
+                let (second, share) = (mode(p[0], p[1]), p[2]);
+                factor(move |first, omega| {
+                    1.0 + share * first.inverse(omega) * second.response(omega)
+                })
+            },
+        },
+        Form {
+            name: "shared",
+            place: Place::Dynamics,
+            parameters: &[FREQUENCY, DAMPING, SHARE],
+            starts: starts!(0.02),
+            build: |p| {
+                let (second, share) = (mode(p[0], p[1]), p[2]);
+                factor(move |first, omega| {
+                    1.0 - share + share * first.inverse(omega) * second.response(omega)
+                })
+            },
+        },
+        Form {
+            name: "series",
+            place: Place::Dynamics,
+            parameters: &[FREQUENCY, DAMPING],
+            starts: starts!(),
+            build: |p| {
+                let second = mode(p[0], p[1]);
+                factor(move |_, omega| second.response(omega))
+            },
+        },
+        Form {
+            name: "coupled",
+            place: Place::Dynamics,
+            parameters: &[
+                FREQUENCY,
+                DAMPING,
+                Parameter::number("inertia_ratio", 0.0, 3.0),
+            ],
+            starts: starts!(0.02),
+            build: |p| {
+                let (second, ratio) = (mode(p[0], p[1]), p[2]);
+                factor(move |first, omega| {
+                    // J₂ hangs on J₁: (s² + …)₁ x + μ s² (2ζ₂ω₂ s + ω₂²)/(s² + …)₂ x = ω₁² u.
+                    let w1 = omega / first.omega_rad_s;
+                    let hung = second.inverse(omega) + (omega / second.omega_rad_s).powi(2);
+                    let load = -ratio * w1 * w1 * hung * second.response(omega);
+                    let plain = first.inverse(omega);
+                    plain / (plain + load)
+                })
+            },
+        },
+        Form {
+            name: "free",
+            place: Place::Dynamics,
+            parameters: &[
+                FREQUENCY,
+                DAMPING,
+                Parameter::number("gain", 0.1, 3.0),
+                SHARE,
+                Parameter::number("slope_share", -3.0, 3.0),
+            ],
+            starts: starts!(1.0, 0.02, 0.0),
+            build: |p| {
+                let (second, gain, share, slope) = (mode(p[0], p[1]), p[2], p[3], p[4]);
+                factor(move |first, omega| {
+                    let term = Complex64::new(share, slope * omega / second.omega_rad_s);
+                    gain + term * first.inverse(omega) * second.response(omega)
+                })
+            },
+        },
+    ],
+};
+
+fn mode(frequency_hz: f64, damping_ratio: f64) -> Mode {
+    Mode {
+        omega_rad_s: TAU * frequency_hz,
+        damping_ratio,
+    }
+}
+
+fn factor(f: impl Fn(&Mode, f64) -> Complex64 + Send + Sync + 'static) -> Action {
+    Action::Factor(Box::new(f))
+}

@@ -1,0 +1,52 @@
+//! Loss in the material: out of phase with the displacement, not with the speed.
+//!
+//! `K (1 + jη)` for positive frequencies: the response becomes `1/(1 − (ω/ω₀)² + 2jζω/ω₀ + jη sgn ω)`.
+//! T. Theodorsen, I. E. Garrick, NACA Report 685 (1940). **Valid for steady vibration**; taken literally it acts
+//! before its cause (`springpot`, `K (jω/ω₀)^α`, does not; A. Gemant, Physics 7 (1936), 311), which shows in the first moments of a transient only. Mistaken for viscous damping where
+//! only the resonance is excited, `coulomb-friction` at one level.
+
+use super::{Action, Effect, Form, Parameter, Place};
+use num_complex::Complex64;
+
+pub(super) static EFFECT: Effect = Effect {
+    name: "structural-damping",
+    equation: "K (1 + j eta)",
+    source: "T. Theodorsen, I. E. Garrick, NACA Report 685 (1940)",
+    validity: "for steady vibration",
+    mistaken_for: &["coulomb-friction", "bouc-wen-hysteresis", "time-delay"],
+    experiment: "steady lines from far below to far above the natural frequency",
+    forms: &[
+        Form {
+            name: "loss-factor",
+            place: Place::Dynamics,
+            parameters: &[Parameter::number("loss_factor", 0.0, 2.0)],
+            starts: &[&[0.02]],
+            build: |p| {
+                let eta = p[0];
+                Action::Factor(Box::new(move |mode, omega| {
+                    if omega == 0.0 {
+                        return Complex64::ONE;
+                    }
+                    let plain = mode.inverse(omega);
+                    plain / (plain + Complex64::new(0.0, eta.copysign(omega)))
+                }))
+            },
+        },
+        Form {
+            name: "springpot",
+            place: Place::Dynamics,
+            parameters: &[Parameter::number("order", 0.0, 0.5)],
+            starts: &[&[0.02]],
+            build: |p| {
+                let order = p[0];
+                Action::Factor(Box::new(move |mode, omega| {
+                    // At rest the stiffness of a springpot is zero: far below the band it is held.
+                    let w = (omega / mode.omega_rad_s).abs().max(1e-4);
+                    let plain = mode.inverse(omega);
+                    let turn = (0.5 * std::f64::consts::PI * order).copysign(omega);
+                    plain / (plain - 1.0 + Complex64::from_polar(w.powf(order), turn))
+                }))
+            },
+        },
+    ],
+};

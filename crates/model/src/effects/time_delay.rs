@@ -1,0 +1,28 @@
+//! A record that lags behind by a constant time.
+//!
+//! `y(t) = x(t − τ)`, response `e^{−jωτ}`. **Valid if both channels share one clock**; where two recorders run,
+//! their clocks drift apart. Mistaken for `recorder-lowpass` with a corner far above the excitation.
+
+use super::{Action, Effect, Form, Parameter, Place};
+use num_complex::Complex64;
+
+pub(super) static EFFECT: Effect = Effect {
+    name: "time-delay",
+    equation: "y(t) = x(t - tau)",
+    source: "the definition",
+    validity: "if both channels share one clock",
+    mistaken_for: &["recorder-lowpass", "structural-damping"],
+    experiment: "one signal on both channels at once, with energy at high frequencies",
+    forms: &[Form {
+        name: "lag",
+        place: Place::Chain,
+        parameters: &[Parameter::motion("delay", 0, 1, 0.0, 20.0)],
+        starts: &[&[0.02], &[0.5], &[2.0]],
+        build: |p| {
+            let delay_s = p[0];
+            Action::Factor(Box::new(move |_, omega| {
+                Complex64::from_polar(1.0, -omega * delay_s)
+            }))
+        },
+    }],
+};

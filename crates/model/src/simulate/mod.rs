@@ -1,0 +1,13 @@
+//! The stand's answer to a given input, effects included.
+//!
+//! Torques of the stand are integrated in time, everything linear is applied in the frequency domain, what
+//! gage and recorder do follows sample by sample. Between samples the input is band-limited, not a
+//! straight line.
+
+mod input;
+mod integrate;
+mod model;
+
+pub use input::Input;
+pub use integrate::{State, substeps};
+pub use model::{Fixed, Model};

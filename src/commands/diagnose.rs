@@ -1,0 +1,75 @@
+//! `diagnose`: what the stand lacks, and the error before and after it is added.
+
+mod read;
+mod render;
+
+use std::io::IsTerminal;
+use std::path::Path;
+
+use super::{Outcome, conclude};
+use crate::cli::Diagnose;
+use crate::diagnose;
+use crate::failure::Failure;
+use crate::io::output::Output;
+use crate::report;
+use crate::stand::{self, Stand};
+
+/// Runs the verb.
+pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
+    let stand: Option<(Stand, String)> = match &args.stand {
+        None => None,
+        Some(path) => {
+            let text = std::fs::read_to_string(path).map_err(|e| Failure::reading(path, &e))?;
+            Some((stand::parse(&path.display().to_string(), &text)?, text))
+        }
+    };
+    let files: Vec<&Path> = args
+        .train
+        .iter()
+        .chain(&args.holdout)
+        .map(Path::new)
+        .chain(args.stand.as_deref())
+        .collect();
+    let refined = match &args.output {
+        Some(place) => Some(Output::open(Some(place), args.force, &files)?),
+        None => None,
+    };
+    let mut output = Output::open(None, args.force, &files)?;
+    let mut read = read::read(args, stand.as_ref().map(|(stand, _)| stand))?;
+    let (frame, found) = diagnose::prepare(&mut read.case)?;
+    read.refine_steps(found.natural_hz);
+    let levels = read.levels();
+    let shown = !args.quiet && std::io::stderr().is_terminal();
+    let progress = |done: usize, of: usize| {
+        if shown {
+            report::say(&format!(
+                "\r{done} of {of} fits{}",
+                if done == of { "\r\x1b[K" } else { "" }
+            ));
+        }
+    };
+    let declared = read.case.declared;
+    let diagnosis = diagnose::run(read.case, &frame, found, &progress)?;
+    let rendered = render::Rendered {
+        args,
+        diagnosis: &diagnosis,
+        units: &read.units,
+        declared,
+        levels,
+        warnings: read.warnings,
+    };
+    let report = rendered.report();
+    if let Some(mut refined) = refined {
+        let text = rendered.stand(stand.as_ref().map(|(stand, text)| (stand, text.as_str())))?;
+        refined.write(text.as_bytes())?;
+        refined.finish()?;
+    }
+    let text = if args.json {
+        report::json(&report)
+    } else {
+        report.text()
+    };
+    output.write(text.as_bytes())?;
+    output.finish()?;
+    Ok(conclude(&report.warnings, false, args.strict))
+}

@@ -1,0 +1,345 @@
+//! Reading the records of a diagnosis.
+
+use std::sync::Arc;
+
+use torqcomp_model::Dimension;
+use torqcomp_model::simulate::{Input, substeps};
+
+use crate::cli::Diagnose;
+use crate::diagnose::{Begin, Case, Constants, Record};
+use crate::failure::Failure;
+use crate::io::csv::{NamedUnit, Options, Place};
+use crate::recording;
+use crate::report::Warning;
+use crate::stand::{Given, Stand};
+
+/// Part of a training record that is fitted where none is held out.
+const FITTED: f64 = 0.7;
+/// Fewest samples of a record.
+const FEWEST: usize = 200;
+/// Steps of integration before the natural frequency is known.
+const FIRST_STEPS: usize = 4;
+/// Samples at the start that are left out, where the continuation backwards is felt most.
+const LEFT_OUT: usize = 32;
+
+const TORQUE: Dimension = Dimension::new([1, 2, -2, 0, 0, 0]);
+const VOLTAGE: Dimension = Dimension::new([1, 2, -3, -1, 0, 0]);
+
+/// Units of the two channels.
+pub struct Units {
+    /// Of the applied one, in the files; empty if unknown.
+    pub applied: String,
+    /// Of the measured one, in the files; empty if unknown.
+    pub measured: String,
+    /// Of the measured one as it is diagnosed: torque, or the SI unit.
+    pub diagnosed: String,
+    /// SI units of what is diagnosed per printed unit.
+    pub printed: f64,
+}
+
+/// The records.
+pub struct Read {
+    /// What is diagnosed.
+    pub case: Case,
+    /// Units.
+    pub units: Units,
+    /// What a user should know.
+    pub warnings: Vec<Warning>,
+}
+
+struct Pair {
+    source: String,
+    applied: Vec<f64>,
+    measured: Vec<f64>,
+    rate_hz: f64,
+    start_s: f64,
+    applied_unit: Option<NamedUnit>,
+    measured_unit: Option<NamedUnit>,
+}
+
+/// Reads all records and says what is declared of them.
+pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<Read, Failure> {
+    let train: Vec<Pair> = args
+        .train
+        .iter()
+        .map(|f| pair(args, f))
+        .collect::<Result<_, _>>()?;
+    let hold: Vec<Pair> = args
+        .holdout
+        .iter()
+        .map(|f| pair(args, f))
+        .collect::<Result<_, _>>()?;
+    let first = &train[0];
+    for other in train.iter().chain(&hold) {
+        same(first, other)?;
+    }
+    let (units, gain, scale) = units(first, stand)?;
+    let declared = stand
+        .map(|stand| declared(stand, gain.unwrap_or(1.0)))
+        .transpose()?;
+    let recorder = stand.map(|stand| {
+        let recorder = stand.recorder.recorder.clone();
+        let fixed: torqcomp_model::simulate::Fixed = Arc::new(move |hz| recorder.response(hz));
+        fixed
+    });
+    let gain_is_declared = gain.is_some() && !has_static_gain(stand);
+    let mut warnings = Vec::new();
+    let convert = |pairs: Vec<Pair>| -> Result<Vec<Record>, Failure> {
+        pairs.into_iter().map(|p| record(p, stand, scale)).collect()
+    };
+    let mut train = convert(train)?;
+    let mut hold = convert(hold)?;
+    if hold.is_empty() {
+        for record in &mut train {
+            let cut = (FITTED * record.measured.len() as f64) as usize;
+            let mut rest = record.clone();
+            rest.range = cut..record.measured.len();
+            record.range.end = cut;
+            hold.push(rest);
+        }
+        warnings.push(Warning::new(
+            "no-record-held-out",
+            "no record was held out: the last 30 % of each training record stand in for one",
+        ));
+    }
+    let threads = args.threads.map_or_else(
+        || std::thread::available_parallelism().map_or(1, |n| n.get().min(8)),
+        usize::from,
+    );
+    let case = Case {
+        train,
+        hold,
+        declared,
+        gain_is_declared,
+        recorder,
+        threads,
+    };
+    Ok(Read {
+        case,
+        units,
+        warnings,
+    })
+}
+
+fn pair(args: &Diagnose, file: &str) -> Result<Pair, Failure> {
+    let options = |channel: &str, unit: &Option<String>| Options {
+        channel: Some(channel.to_owned()),
+        unit: unit.clone(),
+        time_column: args.time_column.clone(),
+        rate_hz: args.rate,
+        ..Options::default()
+    };
+    let applied = options(&args.applied, &args.applied_unit);
+    let measured = options(&args.measured, &args.measured_unit);
+    let recording = recording::read(&Place::of(file), &applied)?;
+    let u = recording.select(&applied)?;
+    let y = recording.select(&measured)?;
+    if args.applied == args.measured {
+        return Err(Failure::usage(
+            "--applied and --measured name the same column",
+        ));
+    }
+    for (selection, name) in [(&u, &args.applied), (&y, &args.measured)] {
+        if let Some(place) = selection.samples.iter().position(|v| !v.is_finite()) {
+            return Err(Failure::failed(format_args!(
+                "{}: sample {} of \"{name}\" holds no number; correct it or cut the record there",
+                recording.source,
+                place + 1
+            )));
+        }
+    }
+    let count = u.samples.len().min(y.samples.len());
+    if count < FEWEST {
+        return Err(Failure::failed(format_args!(
+            "{}: {count} samples are too few; a diagnosis needs at least {FEWEST}, and ten periods of the stand",
+            recording.source
+        )));
+    }
+    Ok(Pair {
+        source: recording.source.clone(),
+        applied: u.samples[..count].to_vec(),
+        measured: y.samples[..count].to_vec(),
+        rate_hz: u.rate_hz,
+        start_s: u.start_s,
+        applied_unit: u.unit.clone(),
+        measured_unit: y.unit.clone(),
+    })
+}
+
+/// Records of one diagnosis must be of one stand, at one rate, in the same units.
+fn same(first: &Pair, other: &Pair) -> Result<(), Failure> {
+    if (first.rate_hz / other.rate_hz - 1.0).abs() > 1e-4 {
+        return Err(Failure::failed(format_args!(
+            "{} has {} Hz, {} has {} Hz; the records of a diagnosis must have one sampling rate",
+            first.source, first.rate_hz, other.source, other.rate_hz
+        )));
+    }
+    let differ = |a: &Option<NamedUnit>, b: &Option<NamedUnit>| {
+        a.as_ref().map(|u| u.unit.factor()) != b.as_ref().map(|u| u.unit.factor())
+    };
+    if differ(&first.applied_unit, &other.applied_unit)
+        || differ(&first.measured_unit, &other.measured_unit)
+    {
+        return Err(Failure::failed(format_args!(
+            "{} and {} have their channels in different units; give --applied-unit and --measured-unit, or convert one",
+            first.source, other.source
+        )));
+    }
+    Ok(())
+}
+
+fn has_static_gain(stand: Option<&Stand>) -> bool {
+    matches!(
+        stand.and_then(|s| s.mechanics.as_ref()).map(|m| &m.given),
+        Some(Given::Modal {
+            static_gain: Some(_),
+            ..
+        })
+    )
+}
+
+/// How the samples of the files become what is diagnosed.
+#[derive(Clone, Copy)]
+struct Scale {
+    applied: f64,
+    measured: f64,
+    /// Whether the stand's calibration makes torque of the record.
+    calibrated: bool,
+}
+
+/// Units, the declared gain if there is one, and the scales.
+fn units(pair: &Pair, stand: Option<&Stand>) -> Result<(Units, Option<f64>, Scale), Failure> {
+    let text =
+        |unit: &Option<NamedUnit>| unit.as_ref().map_or_else(String::new, |u| u.text.clone());
+    let dimension = |unit: &Option<NamedUnit>| unit.as_ref().map(|u| u.unit.dimension());
+    let (applied, measured) = (
+        dimension(&pair.applied_unit),
+        dimension(&pair.measured_unit),
+    );
+    let factor = |unit: &Option<NamedUnit>| unit.as_ref().map_or(1.0, |u| u.unit.factor());
+    let mut scale = Scale {
+        applied: factor(&pair.applied_unit),
+        measured: factor(&pair.measured_unit),
+        calibrated: false,
+    };
+    let torque_stand = stand.is_some_and(|s| s.mechanics.is_some()) && !has_static_gain(stand);
+    let calibrated = torque_stand
+        && measured == Some(VOLTAGE)
+        && stand.is_some_and(|s| s.torque_per_volt.is_some() || s.bridge.is_some());
+    let torque = applied == Some(TORQUE) && (measured == Some(TORQUE) || calibrated);
+    scale.calibrated = torque && calibrated;
+    let declared = match stand.and_then(|s| s.mechanics.as_ref()).map(|m| &m.given) {
+        Some(Given::Modal {
+            static_gain: Some(gain),
+            ..
+        }) => Some(gain.value),
+        _ if torque => Some(1.0),
+        _ => None,
+    };
+    let diagnosed = if torque {
+        "N m".to_owned()
+    } else {
+        crate::stand::si_unit(&text(&pair.measured_unit))
+    };
+    let printed = if torque || diagnosed.is_empty() {
+        1.0
+    } else {
+        factor(&pair.measured_unit)
+    };
+    let units = Units {
+        applied: text(&pair.applied_unit),
+        measured: text(&pair.measured_unit),
+        diagnosed,
+        printed,
+    };
+    Ok((units, declared, scale))
+}
+
+fn declared(stand: &Stand, gain: f64) -> Result<Constants, Failure> {
+    let mode = stand.mode()?;
+    Ok(Constants {
+        natural_hz: mode.omega_rad_s / std::f64::consts::TAU,
+        damping_ratio: mode.damping_ratio,
+        gain,
+    })
+}
+
+fn record(pair: Pair, stand: Option<&Stand>, scale: Scale) -> Result<Record, Failure> {
+    let applied: Vec<f64> = pair.applied.iter().map(|u| u * scale.applied).collect();
+    let measured: Vec<f64> = match stand.filter(|_| scale.calibrated) {
+        None => pair.measured.iter().map(|y| y * scale.measured).collect(),
+        Some(stand) => {
+            let chain = stand.chain(
+                "measured",
+                pair.measured_unit.as_ref(),
+                torqcomp_model::UnitSystem::Si,
+            )?;
+            let mut values = pair.measured.clone();
+            crate::commands::convert(&chain, &mut values).map_err(|(row, why)| {
+                Failure::failed(format_args!("{}: sample {}: {why}", pair.source, row + 1))
+            })?;
+            values
+        }
+    };
+    refuse_silence(&pair.source, "applied", &applied)?;
+    refuse_silence(&pair.source, "measured", &measured)?;
+    let count = measured.len();
+    Ok(Record {
+        source: pair.source,
+        input: Arc::new(Input::new(applied, pair.rate_hz, pair.start_s, FIRST_STEPS)),
+        measured: Arc::new(measured),
+        range: LEFT_OUT.min(count / 10)..count,
+        begin: Begin::default(),
+    })
+}
+
+fn refuse_silence(source: &str, which: &str, values: &[f64]) -> Result<(), Failure> {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let spread = values.iter().fold(0.0_f64, |m, v| m.max((v - mean).abs()));
+    if spread > 1e-12 * mean.abs() {
+        return Ok(());
+    }
+    Err(Failure::failed(format_args!(
+        "{source}: the {which} channel is constant at {mean}: without excitation nothing can be told; check the column"
+    )))
+}
+
+impl Read {
+    /// Sets the steps of integration for the natural frequency that was found.
+    pub fn refine_steps(&mut self, natural_hz: f64) {
+        let steps = substeps(natural_hz, self.case.train[0].input.rate_hz());
+        if steps == FIRST_STEPS {
+            return;
+        }
+        let mut made: Vec<(Arc<Input>, Arc<Input>)> = Vec::new();
+        for record in self.case.train.iter_mut().chain(&mut self.case.hold) {
+            let known = made.iter().find(|(old, _)| Arc::ptr_eq(old, &record.input));
+            let finer = match known {
+                Some((_, new)) => new.clone(),
+                None => {
+                    let old = &record.input;
+                    let new =
+                        Input::new(old.samples().to_vec(), old.rate_hz(), old.start_s(), steps);
+                    let new = Arc::new(new);
+                    made.push((old.clone(), new.clone()));
+                    new
+                }
+            };
+            record.input = finer;
+        }
+    }
+
+    /// Rms of the applied quantity on training and held-out records.
+    #[must_use]
+    pub fn levels(&self) -> [f64; 2] {
+        [&self.case.train, &self.case.hold].map(|records| {
+            let count: usize = records.iter().map(Record::count).sum();
+            let sum: f64 = records
+                .iter()
+                .flat_map(|r| &r.input.samples()[r.range.clone()])
+                .map(|u| u * u)
+                .sum();
+            (sum / count as f64).sqrt()
+        })
+    }
+}

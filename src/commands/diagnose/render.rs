@@ -1,0 +1,351 @@
+//! From a diagnosis to its report and to the refined stand file.
+
+use crate::cli::Diagnose;
+use crate::diagnose::{Constants, Dependence, Diagnosis, Judged, Status, Tried, Verdict};
+use crate::failure::Failure;
+use crate::io::digits;
+use crate::report::diagnose::{
+    Candidate, Constant, Error, Levels, Line, Parameter, Report, Residual, Rms, SCHEMA,
+};
+use crate::report::{Warning, rounded};
+use crate::stand::{self, Refined, Stand};
+
+use super::read::Units;
+
+/// A diagnosis with what belongs to its report.
+pub struct Rendered<'a> {
+    /// The command line.
+    pub args: &'a Diagnose,
+    /// What was found.
+    pub diagnosis: &'a Diagnosis<'a>,
+    /// Units.
+    pub units: &'a Units,
+    /// Declared constants.
+    pub declared: Option<Constants>,
+    /// Rms of the applied quantity, training and held out.
+    pub levels: [f64; 2],
+    /// Warnings so far.
+    pub warnings: Vec<Warning>,
+}
+
+impl Rendered<'_> {
+    /// The report.
+    #[must_use]
+    pub fn report(&self) -> Report {
+        let d = self.diagnosis;
+        let effects = d.effects();
+        Report {
+            schema: SCHEMA,
+            version: env!("CARGO_PKG_VERSION"),
+            stand: self.args.stand.as_ref().map(|p| p.display().to_string()),
+            train: self.args.train.clone(),
+            holdout: self.args.holdout.clone(),
+            verdict: d.verdict.name(),
+            error: Error {
+                unit: self.printed_unit(),
+                declared: d.declared.as_ref().map(|j| self.rms(j)),
+                before: self.rms(&d.before),
+                after: self.rms(&d.after),
+                improvement_ci95: (!effects.is_empty())
+                    .then(|| d.after.against(&d.before).improvement_ci95()),
+                noise_floor_rms: d.floor.map(|f| f.rms / self.units.printed),
+                noise_floor_from: d.floor.map(|f| f.from),
+            },
+            constants: self.constants(),
+            candidates: self.candidates(),
+            residual: self.residual(),
+            next_experiment: self.next_experiment(),
+            warnings: self.warnings.clone(),
+            effects,
+        }
+    }
+
+    fn printed_unit(&self) -> String {
+        if self.units.diagnosed == "N m" {
+            "N m".to_owned()
+        } else {
+            self.units.measured.clone()
+        }
+    }
+
+    fn rms(&self, judged: &Judged) -> Rms {
+        let d = self.diagnosis;
+        let (mut sum, mut count) = (0.0, 0_usize);
+        for residual in &d.before.hold {
+            let y: Vec<f64> = residual
+                .modelled
+                .iter()
+                .zip(&residual.samples)
+                .map(|(m, r)| m + r)
+                .collect();
+            let mean = y.iter().sum::<f64>() / y.len() as f64;
+            sum += y.iter().map(|y| (y - mean).powi(2)).sum::<f64>();
+            count += y.len();
+        }
+        let size = (sum / count as f64).sqrt();
+        Rms {
+            train_rms: judged.train_rms() / self.units.printed,
+            holdout_rms: judged.hold_rms() / self.units.printed,
+            holdout_relative: judged.hold_rms() / size,
+        }
+    }
+
+    fn constants(&self) -> Vec<Constant> {
+        let of = |judged: &Judged| {
+            let (mode, gain) = judged.fitted.structure.mode(&judged.fitted.values);
+            [
+                mode.omega_rad_s / std::f64::consts::TAU,
+                mode.damping_ratio,
+                gain,
+            ]
+        };
+        let (before, after) = (of(&self.diagnosis.before), of(&self.diagnosis.after));
+        let declared = self
+            .declared
+            .map(|d| [d.natural_hz, d.damping_ratio, d.gain]);
+        let names = [
+            ("natural_frequency", "Hz"),
+            ("damping_ratio", ""),
+            ("static_gain", ""),
+        ];
+        let free = self.diagnosis.before.fitted.structure.frame.gain_is_free;
+        let shown = if free { 3 } else { 2 };
+        names
+            .iter()
+            .take(shown)
+            .enumerate()
+            .map(|(k, (name, unit))| Constant {
+                name,
+                unit: if k == 2 {
+                    format!("{}/{}", self.units.measured, self.units.applied)
+                } else {
+                    (*unit).to_owned()
+                },
+                declared: declared.map(|d| d[k]),
+                before: before[k],
+                after: after[k],
+            })
+            .collect()
+    }
+
+    fn candidates(&self) -> Vec<Candidate> {
+        let mut all = Vec::new();
+        let mut with: Vec<&'static str> = Vec::new();
+        for round in &self.diagnosis.rounds {
+            let mut sorted: Vec<&Tried> = round.iter().collect();
+            let key = |t: &Tried| t.judged.as_ref().map_or(f64::INFINITY, Judged::hold_rms);
+            sorted.sort_by(|a, b| {
+                let first = |t: &Tried| t.status != Status::Accepted;
+                first(a).cmp(&first(b)).then(key(a).total_cmp(&key(b)))
+            });
+            all.extend(sorted.iter().map(|t| self.candidate(t, &with)));
+            with.extend(
+                round
+                    .iter()
+                    .filter(|t| t.status == Status::Accepted)
+                    .map(|t| t.effect.name),
+            );
+        }
+        all
+    }
+
+    fn candidate(&self, tried: &Tried, with: &[&'static str]) -> Candidate {
+        let judged = tried.judged.as_ref();
+        Candidate {
+            effect: tried.effect.name,
+            form: judged.and_then(|j| j.fitted.structure.choices.last().map(|c| c.form.name)),
+            with: with.to_vec(),
+            train_rms: judged.map(|j| j.train_rms() / self.units.printed),
+            holdout_rms: judged.map(|j| j.hold_rms() / self.units.printed),
+            p_value: tried.p_value,
+            parameters: judged
+                .map_or_else(Vec::new, |j| self.parameters(j).pop().unwrap_or_default()),
+            status: match tried.status {
+                Status::Accepted => "accepted",
+                Status::Rejected => "rejected",
+                Status::Indistinguishable => "indistinguishable",
+            },
+            why: tried.why.clone(),
+        }
+    }
+
+    /// Parameters of each effect of a model.
+    fn parameters(&self, judged: &Judged) -> Vec<Vec<Parameter>> {
+        let fitted = &judged.fitted;
+        let structure = &fitted.structure;
+        let rulers = &structure.frame.rulers;
+        let mut next = structure.frame.plain_count();
+        let mut amplitudes = fitted.amplitudes.iter();
+        let mut all = Vec::new();
+        for (choice, values) in structure
+            .choices
+            .iter()
+            .zip(structure.effect_values(&fitted.values))
+        {
+            let moved = choice.moved();
+            let own = choice
+                .form
+                .parameters
+                .iter()
+                .enumerate()
+                .map(|(k, parameter)| {
+                    let fitted_here = k < moved;
+                    Parameter {
+                        name: parameter.name,
+                        value: if fitted_here {
+                            values[k]
+                        } else {
+                            amplitudes.next().copied().unwrap_or(0.0)
+                        },
+                        std: fitted
+                            .std
+                            .get(next + k)
+                            .copied()
+                            .flatten()
+                            .filter(|_| fitted_here)
+                            .map(|s| s * parameter.size(rulers)),
+                        unit: parameter.unit.text(&self.units.diagnosed),
+                    }
+                });
+            all.push(own.collect());
+            next += moved;
+        }
+        all
+    }
+
+    fn residual(&self) -> Residual {
+        let d = self.diagnosis;
+        let tests: Dependence = d.dependence.clone();
+        let lines = d.lines.iter().map(|l| Line {
+            frequency_hz: l.frequency_hz,
+            amplitude: l.amplitude / self.units.printed,
+        });
+        let before = self.rms(&d.before);
+        let train_size = d.before.fitted.structure.frame.rulers.rms / self.units.printed;
+        Residual {
+            white: tests.white,
+            independent_of_input: tests.independent_of_input,
+            described: self.described(&tests),
+            tests,
+            lines: lines.collect(),
+            levels: Levels {
+                train_applied_rms: self.levels[0],
+                holdout_applied_rms: self.levels[1],
+                train_relative: before.train_rms / train_size,
+                holdout_relative: before.holdout_relative,
+            },
+        }
+    }
+
+    fn described(&self, tests: &Dependence) -> String {
+        let mut parts = Vec::new();
+        if let Some(floor) = self.diagnosis.floor {
+            parts.push(format!(
+                "{} times the noise floor",
+                rounded(self.diagnosis.after.hold_rms() / floor.rms, 3)
+            ));
+        }
+        parts.push(if tests.white {
+            "white".to_owned()
+        } else {
+            "not white".to_owned()
+        });
+        match tests.structure() {
+            Some(share) => parts.push(format!(
+                "{:.0} % of its power follows from {}",
+                100.0 * share.share,
+                share.of
+            )),
+            None => {
+                parts.push("independent of input and motion as far as the tests see".to_owned())
+            }
+        }
+        for line in &self.diagnosis.lines {
+            parts.push(format!("a line at {} Hz", rounded(line.frequency_hz, 5)));
+        }
+        parts.join("; ")
+    }
+
+    fn next_experiment(&self) -> Option<String> {
+        let rounds = &self.diagnosis.rounds;
+        let mut asked: Vec<&str> = rounds
+            .iter()
+            .flatten()
+            .filter(|t| t.status == Status::Indistinguishable)
+            .map(|t| t.effect.experiment)
+            .collect();
+        if asked.is_empty()
+            && matches!(
+                self.diagnosis.verdict,
+                Verdict::PartlyExplained | Verdict::Unexplained
+            )
+        {
+            let closest = rounds.last().into_iter().flatten().filter_map(|t| {
+                t.judged
+                    .as_ref()
+                    .map(|j| (j.hold_rms(), t.effect.experiment))
+            });
+            asked.extend(closest.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, e)| e));
+        }
+        asked.dedup();
+        (!asked.is_empty()).then(|| asked.join("; "))
+    }
+
+    /// Means over the training records of the constant in them and of the displacement by a constant load.
+    fn record_constants(&self) -> [f64; 2] {
+        let train = &self.diagnosis.after.train;
+        let mean = |of: &dyn Fn(&crate::diagnose::Residual) -> f64| {
+            train.iter().map(of).sum::<f64>() / train.len() as f64
+        };
+        [mean(&|r| r.taken.offset), mean(&|r| r.begin.shift)]
+    }
+
+    /// The refined stand file.
+    ///
+    /// # Errors
+    /// If the declared one cannot be read again.
+    pub fn stand(&self, declared: Option<(&Stand, &str)>) -> Result<String, Failure> {
+        let after = &self.diagnosis.after;
+        let (mode, gain) = after.fitted.structure.mode(&after.fitted.values);
+        let frame = after.fitted.structure.frame;
+        let parameters = self.parameters(after);
+        let effects =
+            after
+                .fitted
+                .structure
+                .choices
+                .iter()
+                .zip(&parameters)
+                .map(|(choice, own)| {
+                    let texts = own
+                        .iter()
+                        .map(|p| {
+                            (
+                                p.name,
+                                format!("{} {}", digits::text(p.value, 12), p.unit)
+                                    .trim()
+                                    .to_owned(),
+                            )
+                        })
+                        .collect();
+                    (choice.effect.name, choice.form.name, texts)
+                });
+        let applied = crate::stand::si_unit(&self.units.applied);
+        let refined = Refined {
+            natural_hz: mode.omega_rad_s / std::f64::consts::TAU,
+            damping_ratio: mode.damping_ratio,
+            gain: frame.gain_is_free.then_some(gain),
+            units: (&self.units.diagnosed, &applied),
+            measured_unit: if self.units.measured.is_empty() {
+                "1"
+            } else {
+                &self.units.measured
+            },
+            constants: self.record_constants(),
+            effects: effects.collect(),
+            source: format!("diagnosed: {}", self.args.train.join(", ")),
+            verdict: self.diagnosis.verdict.name(),
+        };
+        stand::refine(declared, &refined)
+    }
+}

@@ -1,0 +1,332 @@
+//! Closing the loop: what the model leaves unexplained, the effect behind it, and the error before and after.
+
+mod blocks;
+mod candidate;
+mod dependence;
+mod fit;
+mod floor;
+mod plain;
+mod record;
+mod search;
+mod spectra;
+mod structure;
+
+use torqcomp_model::effects::Rulers;
+
+use crate::failure::Failure;
+
+pub use candidate::{Base, Judged, Records, judge};
+pub use dependence::{Dependence, Share, Sight};
+pub use fit::{Fitted, Residual};
+pub use floor::Floor;
+pub use plain::Constants;
+pub use record::{Begin, Record, dot};
+pub use search::{Status, Tried, parallel};
+pub use spectra::{Peak, lines};
+pub use structure::{Choice, Frame, Structure};
+
+/// How the search ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// What was missing is found, nothing above the noise remains.
+    Explained,
+    /// An effect helps, and something above the noise remains.
+    PartlyExplained,
+    /// Something is missing, and no effect of the list explains it.
+    Unexplained,
+    /// The plain stand explains the records.
+    NothingMissing,
+}
+
+impl Verdict {
+    /// Its name in reports.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Explained => "explained",
+            Self::PartlyExplained => "partly-explained",
+            Self::Unexplained => "unexplained",
+            Self::NothingMissing => "nothing-missing",
+        }
+    }
+}
+
+/// What is diagnosed.
+pub struct Case {
+    /// Records that are fitted.
+    pub train: Vec<Record>,
+    /// Records that are held out.
+    pub hold: Vec<Record>,
+    /// The constants that the stand file declares.
+    pub declared: Option<Constants>,
+    /// Whether the gain is part of the declaration, not of the fit.
+    pub gain_is_declared: bool,
+    /// The recorder as declared.
+    pub recorder: Option<torqcomp_model::simulate::Fixed>,
+    /// Threads to use.
+    pub threads: usize,
+}
+
+/// What was found.
+pub struct Diagnosis<'a> {
+    /// The declared model.
+    pub declared: Option<Judged<'a>>,
+    /// The plain stand, fitted.
+    pub before: Judged<'a>,
+    /// The same with the accepted effects.
+    pub after: Judged<'a>,
+    /// The effects tried, the accepted one first; one list for each effect that was looked for.
+    pub rounds: Vec<Vec<Tried<'a>>>,
+    /// The noise.
+    pub floor: Option<Floor>,
+    /// What the residual before depends on.
+    pub dependence_before: Dependence,
+    /// What the residual after depends on.
+    pub dependence: Dependence,
+    /// Lines that stand out of the residual after.
+    pub lines: Vec<Peak>,
+    /// How it ended.
+    pub verdict: Verdict,
+}
+
+/// Error over the noise floor up to which nothing needs to be missing.
+const AT_FLOOR: f64 = 1.1;
+/// Error over a floor from out of band above which no colour of the noise accounts for it.
+const FAR_ABOVE: f64 = 2.0;
+/// Part of what is missing that an effect must explain to be named.
+const NAMED: f64 = 0.5;
+/// Effects that are added at most.
+const MOST_EFFECTS: usize = 2;
+
+/// Rulers of the training records.
+#[must_use]
+pub fn rulers(train: &[Record]) -> Rulers {
+    let (mut sum, mut count, mut peak) = (0.0, 0_usize, 0.0_f64);
+    for record in train {
+        let y = &record.measured[record.range.clone()];
+        let mean = y.iter().sum::<f64>() / y.len() as f64;
+        for y in y {
+            sum += (y - mean).powi(2);
+            peak = peak.max((y - mean).abs());
+        }
+        count += y.len();
+    }
+    let longest = train.iter().map(Record::count).max().unwrap_or(1);
+    Rulers {
+        rms: (sum / count.max(1) as f64).sqrt(),
+        peak,
+        natural_hz: 1.0,
+        duration_s: longest as f64 / train.first().map_or(1.0, |r| r.input.rate_hz()),
+    }
+}
+
+/// Fits the plain stand; sets the frame and the start of each record.
+///
+/// # Errors
+/// If the plain stand cannot be fitted.
+pub fn prepare(case: &mut Case) -> Result<(Frame, Constants), Failure> {
+    let mut frame = Frame {
+        rulers: rulers(&case.train),
+        gain: case.declared.map_or(1.0, |d| d.gain),
+        gain_is_free: !case.gain_is_declared,
+        recorder: case.recorder.clone(),
+    };
+    let found = plain::fit_plain(&mut frame, case.declared, &case.train)?;
+    Ok((frame, found))
+}
+
+/// Runs a diagnosis on prepared records.
+///
+/// # Errors
+/// If the plain stand cannot be judged.
+pub fn run<'a>(
+    case: Case,
+    frame: &'a Frame,
+    found: Constants,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Diagnosis<'a>, Failure> {
+    let reference = found.mode();
+    let threads = case.threads;
+    let declared = case.declared;
+    let mut records = Records {
+        train: case.train,
+        hold: case.hold,
+        reference,
+    };
+    let mut values = vec![1.0, found.damping_ratio];
+    if frame.gain_is_free {
+        values.push(1.0);
+    }
+    let structure = Structure {
+        frame,
+        choices: Vec::new(),
+    };
+    let cannot = || Failure::failed("the plain stand cannot be run on the held-out records");
+    let plain =
+        fit::fit(structure, &values, &records.train, &reference, 10).map_err(Failure::failed)?;
+    plain::set_starts(&plain, &mut records.train, &reference);
+    plain::set_starts(&plain, &mut records.hold, &reference);
+    let plain = Fitted {
+        begins: records.train.iter().map(|r| r.begin).collect(),
+        ..plain
+    };
+    let declared = declared.and_then(|d| judge(as_declared(&plain, d), &records));
+    let before = judge(plain, &records).ok_or_else(cannot)?;
+    let dependence_before = dependence(&before, &records);
+    let pairs: Vec<(&Record, &[f64])> = records
+        .train
+        .iter()
+        .zip(&before.train)
+        .chain(records.hold.iter().zip(&before.hold))
+        .map(|(record, residual)| (record, residual.modelled.as_slice()))
+        .collect();
+    let floor = floor::noise_floor(&pairs);
+
+    let mut after = before.clone();
+    let mut rounds = Vec::new();
+    for _ in 0..MOST_EFFECTS {
+        let base = Base::of(after.clone(), &records);
+        let tried = search::try_all(&base, &records, threads, progress);
+        let accepted = tried.first().filter(|t| t.status == Status::Accepted);
+        let next = accepted.and_then(|t| t.judged.clone());
+        rounds.push(tried);
+        let Some(next) = next else { break };
+        after = next;
+        if !remains(&after, &dependence(&after, &records), floor) {
+            break;
+        }
+    }
+    let dependence = dependence(&after, &records);
+    let mut diagnosis = Diagnosis {
+        declared,
+        lines: prominent_lines(&after, &records),
+        before,
+        after,
+        rounds,
+        floor,
+        dependence_before,
+        dependence,
+        verdict: Verdict::NothingMissing,
+    };
+    diagnosis.conclude();
+    Ok(diagnosis)
+}
+
+/// The declared constants in place of the fitted ones.
+fn as_declared<'a>(plain: &Fitted<'a>, declared: Constants) -> Fitted<'a> {
+    let frame = plain.structure.frame;
+    let mut values = vec![
+        declared.natural_hz / frame.rulers.natural_hz,
+        declared.damping_ratio,
+    ];
+    if frame.gain_is_free {
+        values.push(declared.gain / frame.gain);
+    }
+    Fitted {
+        values,
+        ..plain.clone()
+    }
+}
+
+fn dependence(judged: &Judged, records: &Records) -> Dependence {
+    let sights: Vec<Sight> = records
+        .hold
+        .iter()
+        .zip(&judged.hold)
+        .map(|(record, residual)| Sight {
+            residual: &residual.samples,
+            input: &record.input.samples()[record.range.clone()],
+            modelled: &residual.modelled,
+        })
+        .collect();
+    Dependence::of(&sights)
+}
+
+/// Whether something above the noise is left. Where the noise itself was seen, in the differences of periods, its level
+/// decides; a level from out of band may be too low for coloured noise, so that there the residual must also
+/// follow from input or motion, or lie far above it.
+fn remains(judged: &Judged, dependence: &Dependence, floor: Option<Floor>) -> bool {
+    let structured = dependence.structure().is_some();
+    let Some(floor) = floor else {
+        return structured;
+    };
+    let ratio = judged.hold_rms() / floor.rms;
+    match floor.from {
+        "periods" => ratio > AT_FLOOR,
+        _ => ratio > AT_FLOOR && (structured || ratio > FAR_ABOVE && !dependence.white),
+    }
+}
+
+fn prominent_lines(judged: &Judged, records: &Records) -> Vec<Peak> {
+    let rate_hz = records.train[0].input.rate_hz();
+    let residuals: Vec<(&[f64], f64)> = judged
+        .hold
+        .iter()
+        .map(|r| (r.samples.as_slice(), rate_hz))
+        .collect();
+    let longest = records.hold.iter().map(Record::count).max().unwrap_or(1);
+    let mut found = lines(
+        &residuals,
+        3.0 * rate_hz / longest as f64,
+        0.49 * rate_hz,
+        5,
+    );
+    found.retain(|p| p.prominence > 30.0);
+    found
+}
+
+impl Diagnosis<'_> {
+    /// The effects that were added.
+    #[must_use]
+    pub fn effects(&self) -> Vec<&'static str> {
+        self.after
+            .fitted
+            .structure
+            .choices
+            .iter()
+            .map(|c| c.effect.name)
+            .collect()
+    }
+
+    fn conclude(&mut self) {
+        let left = remains(&self.after, &self.dependence, self.floor);
+        if self.effects().is_empty() {
+            let missing = remains(&self.before, &self.dependence_before, self.floor);
+            self.verdict = if missing {
+                Verdict::Unexplained
+            } else {
+                Verdict::NothingMissing
+            };
+            return;
+        }
+        if !left {
+            self.verdict = Verdict::Explained;
+            return;
+        }
+        let noise = self.floor.map_or(0.0, |f| f.rms.powi(2));
+        let (before, after) = (
+            self.before.hold_rms().powi(2),
+            self.after.hold_rms().powi(2),
+        );
+        let explained = (before - after) / (before - noise).max(1e-300);
+        if explained >= NAMED {
+            self.verdict = Verdict::PartlyExplained;
+            return;
+        }
+        self.verdict = Verdict::Unexplained;
+        for one in self
+            .rounds
+            .iter_mut()
+            .flatten()
+            .filter(|t| t.status == Status::Accepted)
+        {
+            one.status = Status::Rejected;
+            one.why = format!(
+                "it helps, but explains only {:.0} % of what is missing: something else is behind it",
+                100.0 * explained.max(0.0)
+            );
+        }
+        self.after = self.before.clone();
+        self.dependence = self.dependence_before.clone();
+    }
+}

@@ -1,0 +1,225 @@
+//! A record of applied and measured quantity, ready to be compared with models.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use torqcomp_model::effects::Mode;
+use torqcomp_model::simulate::{Input, State};
+
+use super::structure::Waves;
+
+/// How a record begins.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Begin {
+    /// Motion at the first sample.
+    pub start: State,
+    /// Displacement by a constant load that is not in the input.
+    pub shift: f64,
+}
+
+/// One record, or the part of it that is fitted or held out.
+#[derive(Clone)]
+pub struct Record {
+    /// File it comes from.
+    pub source: String,
+    /// The applied quantity.
+    pub input: Arc<Input>,
+    /// The measured one, of the same length.
+    pub measured: Arc<Vec<f64>>,
+    /// The samples that count.
+    pub range: Range<usize>,
+    /// How the record begins, as far as it is known.
+    pub begin: Begin,
+}
+
+/// What belongs to a record and not to the stand: columns that its residual is cleared of.
+pub struct Nuisance {
+    /// Orthonormal columns over the record's range.
+    columns: Vec<Vec<f64>>,
+    /// The same columns before, each a combination of the orthonormal ones:
+    /// `raw_k = Σ_j mix[k][j] column_j`.
+    mix: Vec<Vec<f64>>,
+    /// Place of the raw columns of the free motion, if they are in it.
+    motion: Option<usize>,
+    /// Place of the raw column of a constant load.
+    shift: Option<usize>,
+    /// Place of the first raw column of the lines.
+    lines: usize,
+}
+
+/// Part of a column that must be left after the others are taken out of it.
+const LEFT: f64 = 1e-6;
+
+impl Record {
+    /// Samples of the range.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.range.len()
+    }
+
+    /// What belongs to this record: a constant, the free motion of the plain stand after the record's
+    /// start, and lines of the given frequencies.
+    ///
+    /// `shift` is what a constant load does to the record, where that is more than a constant.
+    #[must_use]
+    pub fn nuisance(&self, mode: &Mode, waves: &Waves, shift: Option<Vec<f64>>) -> Nuisance {
+        let mut nuisance = Nuisance::none();
+        nuisance.push(vec![1.0; self.count()]);
+        let rate_hz = self.input.rate_hz();
+        let decay = mode.damping_ratio * mode.omega_rad_s / rate_hz * self.range.start as f64;
+        // After many time constants nothing is left of it.
+        if decay < 12.0 {
+            nuisance.motion = Some(1);
+            let model = torqcomp_model::simulate::Model {
+                mode: *mode,
+                gain: 1.0,
+                recorder: None,
+                shift: 0.0,
+                actions: Vec::new(),
+            };
+            for column in model.free_motion(rate_hz, self.range.end) {
+                nuisance.push(column[self.range.clone()].to_vec());
+            }
+        }
+        if let Some(column) = shift {
+            nuisance.shift = Some(nuisance.mix.len());
+            nuisance.push(column);
+        }
+        let count = self.count() as f64;
+        for wave in 1..=waves.course {
+            let turn = std::f64::consts::PI * wave as f64 / count;
+            nuisance.push(
+                (0..self.count())
+                    .map(|i| (turn * (i as f64 + 0.5)).cos())
+                    .collect(),
+            );
+        }
+        nuisance.lines = nuisance.mix.len();
+        for frequency_hz in &waves.lines_hz {
+            let turn = std::f64::consts::TAU * frequency_hz / rate_hz;
+            // A turning phasor, set right now and then.
+            let wave =
+                |part: fn(f64) -> f64| self.range.clone().map(|i| part(turn * i as f64)).collect();
+            nuisance.push(wave(f64::cos));
+            nuisance.push(wave(f64::sin));
+        }
+        nuisance
+    }
+}
+
+/// Coefficients of what was taken out of a residual.
+#[derive(Debug, Clone, Default)]
+pub struct Taken {
+    /// The constant.
+    pub offset: f64,
+    /// Displacement, and speed over `ω₀`, at the start of the record.
+    pub motion: Option<[f64; 2]>,
+    /// The constant load's displacement.
+    pub shift: Option<f64>,
+    /// Cosine and sine part of each line.
+    pub lines: Vec<[f64; 2]>,
+}
+
+impl Nuisance {
+    /// No columns.
+    #[must_use]
+    pub fn none() -> Self {
+        Self {
+            columns: Vec::new(),
+            mix: Vec::new(),
+            motion: None,
+            shift: None,
+            lines: 0,
+        }
+    }
+
+    /// Adds a column: orthogonalised twice, as once is not enough for nearly dependent ones.
+    pub fn push(&mut self, mut column: Vec<f64>) {
+        let size = dot(&column, &column).sqrt();
+        let mut mix = vec![0.0; self.columns.len()];
+        for _ in 0..2 {
+            for (share, other) in mix.iter_mut().zip(&self.columns) {
+                let part = dot(&column, other);
+                *share += part;
+                column
+                    .iter_mut()
+                    .zip(other)
+                    .for_each(|(c, o)| *c -= part * o);
+            }
+        }
+        let left = dot(&column, &column).sqrt();
+        if left > LEFT * size && left > 0.0 {
+            column.iter_mut().for_each(|c| *c /= left);
+            self.columns.push(column);
+            mix.push(left);
+        }
+        self.mix.push(mix);
+    }
+
+    /// Clears a residual of all columns.
+    pub fn clear(&self, residual: &mut [f64]) {
+        let _ = self.take(residual);
+    }
+
+    fn take(&self, residual: &mut [f64]) -> Vec<f64> {
+        let mut parts = Vec::with_capacity(self.columns.len());
+        for column in &self.columns {
+            let part = dot(residual, column);
+            residual
+                .iter_mut()
+                .zip(column)
+                .for_each(|(r, c)| *r -= part * c);
+            parts.push(part);
+        }
+        parts
+    }
+
+    /// Clears a residual and tells the coefficients of the raw columns.
+    pub fn fit(&self, residual: &mut [f64]) -> Taken {
+        let parts = self.take(residual);
+        // mix is triangular: solved from the last column on. Dependent columns get no share.
+        let mut rest = parts;
+        let mut raw = vec![0.0; self.mix.len()];
+        let mut place = rest.len();
+        for k in (0..self.mix.len()).rev() {
+            let row = &self.mix[k];
+            if row.len() != place || place == 0 {
+                continue;
+            }
+            place -= 1;
+            raw[k] = rest[place] / row[place];
+            for (r, share) in rest.iter_mut().zip(row).take(place) {
+                *r -= raw[k] * share;
+            }
+        }
+        Taken {
+            offset: raw[0],
+            motion: self.motion.map(|k| [raw[k], raw[k + 1]]),
+            shift: self.shift.map(|k| raw[k]),
+            lines: raw[self.lines..]
+                .chunks_exact(2)
+                .map(|c| [c[0], c[1]])
+                .collect(),
+        }
+    }
+}
+
+/// Sum of products.
+#[must_use]
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    // Eight sums side by side: one would wait for each addition.
+    let mut sums = [0.0_f64; 8];
+    let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
+    let rest: f64 = a8
+        .remainder()
+        .iter()
+        .zip(b8.remainder())
+        .map(|(x, y)| x * y)
+        .sum();
+    for (x, y) in a8.zip(b8) {
+        for k in 0..8 {
+            sums[k] += x[k] * y[k];
+        }
+    }
+    sums.iter().sum::<f64>() + rest
+}

@@ -1,0 +1,307 @@
+//! The search: every effect put to the model, the best taken if it helps beyond chance.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use torqcomp_model::effects::{EFFECTS, Effect};
+
+use super::candidate::{Base, Judged, Records, choices, finish, first_look, judge};
+use super::spectra::{Peak, lines};
+use super::structure::Choice;
+
+/// What became of an effect that was tried.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Status {
+    /// It is added to the model.
+    Accepted,
+    /// It is not.
+    Rejected,
+    /// The data cannot tell it from the one that is added.
+    Indistinguishable,
+}
+
+/// An effect that was tried, in its best form.
+pub struct Tried<'a> {
+    /// The effect.
+    pub effect: &'static Effect,
+    /// The model with it; `None` if no fit came out.
+    pub judged: Option<Judged<'a>>,
+    /// Probability of its gain by chance.
+    pub p_value: Option<f64>,
+    /// What became of it.
+    pub status: Status,
+    /// Why.
+    pub why: String,
+}
+
+/// Least fall of the held-out sum of squares, in variances of the residual.
+const LEAST_GAIN: f64 = 40.0;
+/// Least relative fall of the held-out sum of squares.
+const LEAST_SHARE: f64 = 0.005;
+/// Least significance over the blocks of the held-out records.
+const LEAST_SIGNIFICANCE: f64 = 3.0;
+/// Significance up to which one effect counts as no better than another.
+const WITHIN_CHANCE: f64 = 2.33;
+/// Gain of a first look, over the largest of all, from which on a fit is taken on.
+const PROMISING: f64 = 0.05;
+/// Relative difference of errors that counts as none.
+const SAME_ERROR: f64 = 5e-4;
+/// Lines of the residual's spectrum that may be that of a shaft.
+const PEAKS: usize = 3;
+/// Prominence of a line over the spectrum around it.
+const PROMINENT: f64 = 12.0;
+
+/// Runs jobs on all threads; results in the order of the jobs.
+pub fn parallel<T: Send>(count: usize, threads: usize, run: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    let next = AtomicUsize::new(0);
+    let results: Vec<Mutex<Option<T>>> = (0..count).map(|_| Mutex::new(None)).collect();
+    std::thread::scope(|scope| {
+        for _ in 0..threads.max(1) {
+            scope.spawn(|| {
+                loop {
+                    let job = next.fetch_add(1, Ordering::Relaxed);
+                    if job >= count {
+                        break;
+                    }
+                    let result = run(job);
+                    *results[job].lock().unwrap_or_else(|e| e.into_inner()) = Some(result);
+                }
+            });
+        }
+    });
+    results
+        .into_iter()
+        .filter_map(|slot| slot.into_inner().unwrap_or_else(|e| e.into_inner()))
+        .collect()
+}
+
+/// Puts every effect to a base model and says which one, if any, is accepted: the first of the result then.
+pub fn try_all<'a>(
+    base: &Base<'a>,
+    records: &Records,
+    threads: usize,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Vec<Tried<'a>> {
+    let peaks = peaks(base, records);
+    let present = &base.judged.fitted.structure.choices;
+    let gain_is_free = base.judged.fitted.structure.frame.gain_is_free;
+    let jobs: Vec<Choice> = EFFECTS
+        .iter()
+        .filter(|e| present.iter().all(|c| c.effect.name != e.name))
+        .filter(|e| !(gain_is_free && e.name == "gain-error"))
+        .flat_map(|e| choices(e))
+        .collect();
+    let done = AtomicUsize::new(0);
+    let looks = parallel(jobs.len(), threads, |k| {
+        let found = first_look(base, jobs[k], &peaks, records);
+        progress(done.fetch_add(1, Ordering::Relaxed) + 1, jobs.len());
+        found
+    });
+    let whole = base.judged.fitted.train_sum;
+    let most = looks
+        .iter()
+        .flatten()
+        .map(|f| whole - f.train_sum)
+        .fold(0.0, f64::max);
+    let fits = parallel(jobs.len(), threads, |k| {
+        let first = looks[k].as_ref()?;
+        let gain = whole - first.train_sum;
+        let done = first.converged && !first.integrates() || gain < PROMISING * most;
+        let taken_on = if done { None } else { finish(first, records) };
+        judge(taken_on.unwrap_or_else(|| first.clone()), records)
+    });
+    let mut tried: Vec<Tried> = Vec::new();
+    for (choice, judged) in jobs.iter().zip(fits) {
+        match tried
+            .last_mut()
+            .filter(|t| std::ptr::eq(t.effect, choice.effect))
+        {
+            Some(last) => {
+                let better = judged.as_ref().is_some_and(|new| {
+                    last.judged
+                        .as_ref()
+                        .is_none_or(|old| new.criterion() < old.criterion())
+                });
+                if better {
+                    last.judged = judged;
+                }
+            }
+            None => tried.push(Tried {
+                effect: choice.effect,
+                judged,
+                p_value: None,
+                status: Status::Rejected,
+                why: String::new(),
+            }),
+        }
+    }
+    decide(base, &mut tried);
+    tried
+}
+
+/// Lines of the residual that stand out.
+fn peaks(base: &Base, records: &Records) -> Vec<Peak> {
+    let rate_hz = records.train[0].input.rate_hz();
+    let longest = records.train.iter().map(|r| r.count()).max().unwrap_or(1);
+    let residuals: Vec<(&[f64], f64)> = base
+        .judged
+        .train
+        .iter()
+        .map(|r| (r.samples.as_slice(), rate_hz))
+        .collect();
+    let from_hz = 3.0 * rate_hz / longest as f64;
+    let mut found = lines(&residuals, from_hz, 0.45 * rate_hz, 4 * PEAKS);
+    found.retain(|p| p.prominence > PROMINENT);
+    found.truncate(PEAKS);
+    found
+}
+
+fn decide<'a>(base: &Base<'a>, tried: &mut [Tried<'a>]) {
+    let before = &base.judged;
+    let mut passing: Vec<usize> = Vec::new();
+    for (k, one) in tried.iter_mut().enumerate() {
+        let Some(judged) = &one.judged else {
+            one.why = "no fit: the model with it cannot be run, or nothing in the data suggests where to start".to_owned();
+            continue;
+        };
+        let comparison = judged.against(before);
+        one.p_value = comparison.p_value();
+        match refusal(judged, before) {
+            Some(why) => one.why = why,
+            None => passing.push(k),
+        }
+    }
+    let hold = |k: usize| {
+        tried[k]
+            .judged
+            .as_ref()
+            .map_or(f64::INFINITY, Judged::hold_rms)
+    };
+    let Some(best) = passing
+        .iter()
+        .copied()
+        .min_by(|a, b| hold(*a).total_cmp(&hold(*b)))
+    else {
+        return;
+    };
+    let tied: Vec<usize> = passing
+        .iter()
+        .copied()
+        .filter(|k| is_tied(tried, *k, best))
+        .collect();
+    let simplest = tied
+        .iter()
+        .copied()
+        .min_by(|a, b| order(tried, *a, *b))
+        .unwrap_or(best);
+    name_all(tried, &passing, &tied, simplest);
+    tried.swap(0, simplest);
+}
+
+/// Why an effect is not accepted, as far as it alone tells.
+fn refusal(judged: &Judged, before: &Judged) -> Option<String> {
+    let comparison = judged.against(before);
+    let (gain, variance) = (comparison.gain(), judged.hold_rms().powi(2));
+    let total = before.hold_rms().powi(2) * before.held_out().len() as f64;
+    if gain <= 0.0 {
+        return Some(format!(
+            "the error on the held-out records does not fall (it changes by {:+.2} %)",
+            100.0 * (judged.hold_rms() / before.hold_rms() - 1.0)
+        ));
+    }
+    if gain < LEAST_GAIN * variance || comparison.significance() < LEAST_SIGNIFICANCE {
+        return Some("the error on the held-out records falls by no more than chance".to_owned());
+    }
+    if gain < LEAST_SHARE * total {
+        return Some(format!(
+            "it explains {:.2} % of the power of the residual: too little to tell from what else is not exact",
+            100.0 * gain / total
+        ));
+    }
+    if judged.criterion() >= before.criterion() {
+        return Some("it does not pay for its parameters on the training records".to_owned());
+    }
+    None
+}
+
+/// Whether an effect is within chance of the best one.
+fn is_tied(tried: &[Tried], k: usize, best: usize) -> bool {
+    let (Some(one), Some(other)) = (&tried[k].judged, &tried[best].judged) else {
+        return false;
+    };
+    let comparison = other.against(one);
+    k == best
+        || comparison.significance() < WITHIN_CHANCE
+        || comparison.gain() < 9.0 * other.hold_rms().powi(2)
+}
+
+/// The simpler first; of equally simple ones, the one with the smaller error on all records; of equal errors, the one that
+/// stands first in the list: a line on the frequency of the grid is the grid's rather than a shaft's by chance.
+fn order(tried: &[Tried], a: usize, b: usize) -> std::cmp::Ordering {
+    let (Some(one), Some(other)) = (&tried[a].judged, &tried[b].judged) else {
+        return tried[b].judged.is_some().cmp(&tried[a].judged.is_some());
+    };
+    let error = |j: &Judged| j.hold_rms() + j.train_rms();
+    let (own, its) = (error(one), error(other));
+    let place = |k: usize| {
+        EFFECTS
+            .iter()
+            .position(|e| std::ptr::eq(*e, tried[k].effect))
+    };
+    let by_error = if (own / its - 1.0).abs() < SAME_ERROR {
+        std::cmp::Ordering::Equal
+    } else {
+        own.total_cmp(&its)
+    };
+    one.parameters()
+        .cmp(&other.parameters())
+        .then(by_error)
+        .then(place(a).cmp(&place(b)))
+}
+
+fn name_all(tried: &mut [Tried], passing: &[usize], tied: &[usize], chosen: usize) {
+    let Some(judged) = &tried[chosen].judged else {
+        return;
+    };
+    let (own, parameters, name) = (
+        judged.hold_rms(),
+        judged.parameters(),
+        tried[chosen].effect.name,
+    );
+    for k in passing {
+        let Some(other) = &tried[*k].judged else {
+            continue;
+        };
+        let (rms, count) = (other.hold_rms(), other.parameters());
+        let (status, why) = if *k == chosen {
+            (
+                Status::Accepted,
+                "the error on the held-out records falls beyond chance, to the least of all"
+                    .to_owned(),
+            )
+        } else if !tied.contains(k) {
+            (
+                Status::Rejected,
+                format!(
+                    "it helps, but leaves {:.3} times the held-out error of {name}",
+                    rms / own
+                ),
+            )
+        } else if count > parameters {
+            (
+                Status::Rejected,
+                format!("no better than {name}, with more parameters"),
+            )
+        } else {
+            (
+                Status::Indistinguishable,
+                format!(
+                    "within chance of {name}; to tell them apart: {}",
+                    tried[*k].effect.experiment
+                ),
+            )
+        };
+        tried[*k].status = status;
+        tried[*k].why = why;
+    }
+}
