@@ -187,7 +187,7 @@ pub struct Compensate {
     /// Format of the result [default: mcap if the output is called so, else csv]
     #[arg(long, value_enum)]
     pub format: Option<Format>,
-    /// Topic of the result in an MCAP file [default: the one read, with _torque behind it]
+    /// Topic of the result in an MCAP file [default: /torqcomp/torque]
     #[arg(long, value_name = "TOPIC")]
     pub output_topic: Option<String>,
     /// Significant digits of the result, 1 to 15, or "shortest" for as many as bring back every bit

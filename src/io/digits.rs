@@ -188,8 +188,11 @@ static FOUR_DIGITS: [u32; 10_000] = {
     let mut value = 0;
     while value < 10_000 {
         let n = value as u32;
-        table[value] =
-            0x3030_3030 | n / 1000 | n / 100 % 10 << 8 | n / 10 % 10 << 16 | n % 10 << 24;
+        table[value] = 0x3030_3030
+            | (n / 1000)
+            | ((n / 100 % 10) << 8)
+            | ((n / 10 % 10) << 16)
+            | ((n % 10) << 24);
         value += 1;
     }
     table

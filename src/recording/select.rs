@@ -45,8 +45,7 @@ impl Recording {
         };
         if let (Some(assumed), None) = (&axis.assumed, options.rate_hz) {
             return Err(Failure::failed(format_args!(
-                "{}: {assumed}; confirm it with --time-column and --time-unit, or give --rate HZ",
-                self.source
+                "{assumed}; confirm it with --time-column and --time-unit, or give --rate HZ"
             )));
         }
         Ok(Selection {
@@ -106,9 +105,24 @@ impl Recording {
         )))
     }
 
+    /// The channels as they can be chosen: by name, or by number where a name is used twice.
     fn names(&self) -> String {
-        let names = self.channels.iter().map(|c| format!("\"{}\"", c.name));
-        crate::io::csv::list(names)
+        let one = |(place, channel): (usize, &Channel)| {
+            let same = self.channels.iter().filter(|c| c.name == channel.name);
+            match (same.count(), channel.segment) {
+                (1, _) => format!("\"{}\"", channel.name),
+                (_, None) => format!("{} (\"{}\")", place + 1, channel.name),
+                (_, Some(segment)) => {
+                    format!(
+                        "{} (\"{}\" of segment {})",
+                        place + 1,
+                        channel.name,
+                        segment + 1
+                    )
+                }
+            }
+        };
+        crate::io::csv::list(self.channels.iter().enumerate().map(one))
     }
 
     fn numbers(&self, is: &dyn Fn(&Channel) -> bool) -> String {
@@ -122,9 +136,9 @@ impl Recording {
             None => "the file has neither time stamps nor a rate",
         };
         Failure::failed(format_args!(
-            "{}: the sampling rate of \"{}\" is unknown, because {why}; give it with --rate HZ, or \
+            "the sampling rate of \"{}\" is unknown, because {why}; give it with --rate HZ, or \
              name the column of stamps with --time-column",
-            self.source, channel.name
+            channel.name
         ))
     }
 }

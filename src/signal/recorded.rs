@@ -18,7 +18,7 @@ impl Signal {
     /// If there is no such channel, its rate is unknown, or a cell of it holds no number.
     pub fn of_recording(recording: Recording, options: &Options) -> Result<Self, Failure> {
         let source = recording.source.clone();
-        let selection = recording.select(options)?;
+        let selection = recording.select(options).map_err(|f| f.at(&source))?;
         let channel = selection.channel;
         check_holes(channel).map_err(|failure| failure.at(&source))?;
         let stamps = used_stamps(channel, options);

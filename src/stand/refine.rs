@@ -6,6 +6,9 @@ use super::{Given, Stand};
 use crate::failure::Failure;
 use crate::io::digits;
 
+/// An effect as it is written: kind, form, parameters with their texts.
+pub type Written<'a> = (&'a str, &'a str, Vec<(&'a str, String)>);
+
 /// What a diagnosis found.
 pub struct Refined<'a> {
     /// Natural frequency in Hz.
@@ -21,7 +24,7 @@ pub struct Refined<'a> {
     /// Constant in the records, and displacement by a constant load, in SI units of the record.
     pub constants: [f64; 2],
     /// Effects: kind, form, parameters with their texts.
-    pub effects: Vec<(&'a str, &'a str, Vec<(&'a str, String)>)>,
+    pub effects: Vec<Written<'a>>,
     /// Where the numbers come from.
     pub source: String,
     /// How the diagnosis ended.

@@ -114,7 +114,8 @@ mod tests {
     #[test]
     fn a_record_that_rings_throughout_is_one_stretch() {
         let record = ringing(&[0], 1000);
-        assert_eq!(decays(&record), [0..1000]);
+        let found = decays(&record);
+        assert_eq!((found.len(), found[0].clone()), (1, 0..1000));
         assert!(decays(&[1.0; 100]).is_empty() && decays(&[]).is_empty());
     }
 

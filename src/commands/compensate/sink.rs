@@ -14,6 +14,9 @@ use crate::io::output::Output;
 use crate::report::compensate::Report;
 use crate::signal::Origin;
 
+/// Topic of the result unless another is named.
+const TOPIC: &str = "/torqcomp/torque";
+
 /// An open result.
 pub enum Sink {
     /// Text.
@@ -41,10 +44,7 @@ impl Sink {
             return Ok(Self::Text(output));
         }
         let origin = origin(args, plan)?;
-        let topic = match &args.output_topic {
-            Some(topic) => topic.clone(),
-            None => format!("{}_torque", origin.topic),
-        };
+        let topic = args.output_topic.as_deref().unwrap_or(TOPIC).to_owned();
         let encoding = origin.encoding.ok_or_else(|| {
             Failure::failed("the messages have an encoding that torqcomp does not write")
         })?;

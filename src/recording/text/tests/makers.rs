@@ -335,7 +335,7 @@ fn mitsubishi() {
         &[("Analog 1: Torque", "", 4), ("Digital 1: INP", "", 4)],
         Some(1500.0015),
     );
-    assert!((found.channels[0].axis.header_rate_hz.unwrap() - 1499.250_374).abs() < 1e-6);
+    assert!((found.channels[0].axis.header_rate_hz.unwrap() - 1_499.250_374).abs() < 1e-6);
 }
 
 #[test]
