@@ -7,8 +7,10 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use torqcomp_model::{Kind, UnitSystem};
 
-use crate::io::csv::{Delimiter, Options, Told};
+use crate::io::csv::{self, Delimiter, Told};
 use crate::io::digits::Digits;
+use crate::io::mcap::{Selection, TimeChoice};
+use crate::signal::{self, MessageOptions};
 
 /// True torque from the records of a reaction-torque stand.
 ///
@@ -38,6 +40,10 @@ pub enum Verb {
     Predict(Predict),
     /// Constants of the stand from records, with their uncertainties
     Identify(identify::Identify),
+    /// One channel of a recording as plain rows of time and value
+    Extract(Extract),
+    /// What recordings hold, and what is wrong with them
+    Inspect(Inspect),
 }
 
 /// Units that results are printed in.
@@ -63,14 +69,31 @@ impl From<Units> for UnitSystem {
 pub enum Format {
     /// Comma-separated text
     Csv,
+    /// A copy of the MCAP file that is read, with the torque as one channel more
+    Mcap,
 }
 
 /// How a record is read.
 #[derive(Debug, Args)]
 pub struct Record {
-    /// Recording to read (CSV, TSV or a recorder's text export), or - for standard input
+    /// Recording to read (CSV, TSV, a recorder's text export, or MCAP), or - for standard input
     #[arg(value_name = "INPUT")]
     pub input: String,
+    /// Topic of an MCAP file, as /joint_states
+    #[arg(long, value_name = "TOPIC")]
+    pub topic: Option<String>,
+    /// Field of its messages: effort[0], 'effort[name=motor]', 'data[:]'; none if it has one number
+    #[arg(long, value_name = "FIELD", requires = "topic")]
+    pub field: Option<String>,
+    /// Topic and field in one, as '/joint_states.effort[0]'
+    #[arg(long, value_name = "PATH", conflicts_with = "topic")]
+    pub signal: Option<String>,
+    /// Time of messages that counts [default: their own stamp if they have one, else log]
+    #[arg(long, value_name = "CLOCK", value_parser = clock)]
+    pub time: Option<TimeChoice>,
+    /// Field with the spacing of the samples, for messages that hold many
+    #[arg(long, value_name = "FIELD")]
+    pub spacing: Option<String>,
     /// Column with the signal: its heading, with or without the unit, or its number
     #[arg(long, value_name = "NAME")]
     pub channel: Option<String>,
@@ -99,19 +122,30 @@ pub struct Record {
 }
 
 impl Record {
-    /// The options that the table reader takes.
+    /// The options that opening a signal takes.
     #[must_use]
-    pub fn options(&self) -> Options {
-        Options {
-            channel: self.channel.clone(),
-            unit: self.unit.clone(),
-            time_column: self.time_column.clone(),
-            time_unit: self.time_unit.clone(),
-            rate_hz: self.rate,
-            resample: self.resample,
-            told: Told {
-                delimiter: self.delimiter,
-                decimal: self.decimal,
+    pub fn options(&self) -> signal::Options {
+        signal::Options {
+            table: csv::Options {
+                channel: self.channel.clone(),
+                unit: self.unit.clone(),
+                time_column: self.time_column.clone(),
+                time_unit: self.time_unit.clone(),
+                rate_hz: self.rate,
+                resample: self.resample,
+                told: Told {
+                    delimiter: self.delimiter,
+                    decimal: self.decimal,
+                },
+            },
+            messages: MessageOptions {
+                selection: Selection {
+                    topic: self.topic.clone(),
+                    field: self.field.clone(),
+                    signal: self.signal.clone(),
+                },
+                time: self.time,
+                spacing: self.spacing.clone(),
             },
         }
     }
@@ -146,9 +180,12 @@ pub struct Compensate {
     /// Units of the result
     #[arg(long, value_enum, default_value = "si")]
     pub units: Units,
-    /// Format of the result
-    #[arg(long, value_enum, default_value = "csv")]
-    pub format: Format,
+    /// Format of the result [default: mcap if the output is called so, else csv]
+    #[arg(long, value_enum)]
+    pub format: Option<Format>,
+    /// Topic of the result in an MCAP file [default: the one read, with _torque behind it]
+    #[arg(long, value_name = "TOPIC")]
+    pub output_topic: Option<String>,
     /// Significant digits of the result, 1 to 15, or "shortest" for as many as bring back every bit
     #[arg(long, value_name = "N", default_value = "12", value_parser = digits)]
     pub digits: Digits,
@@ -173,6 +210,26 @@ pub struct Compensate {
     /// Threads to use [default: one for each core, at most 8]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     pub threads: Option<u16>,
+    /// Say nothing on standard error but warnings
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// Arguments of `extract`.
+#[derive(Debug, Args)]
+pub struct Extract {
+    /// The recording.
+    #[command(flatten)]
+    pub record: Record,
+    /// The result.
+    #[command(flatten)]
+    pub result: Result,
+    /// Significant digits, 1 to 15, or "shortest" for as many as bring back every bit
+    #[arg(long, value_name = "N", default_value = "shortest", value_parser = digits)]
+    pub digits: Digits,
+    /// End with code 3 if there are warnings
+    #[arg(long)]
+    pub strict: bool,
     /// Say nothing on standard error but warnings
     #[arg(short, long)]
     pub quiet: bool,
@@ -256,6 +313,58 @@ pub struct Predict {
     pub json: bool,
 }
 
+/// Arguments of `inspect`.
+#[derive(Debug, Args)]
+pub struct Inspect {
+    /// Recordings to look at, or - for standard input; several are also compared with each other
+    #[arg(value_name = "FILE", required = true)]
+    pub files: Vec<String>,
+    /// The result.
+    #[command(flatten)]
+    pub result: Result,
+    /// Column with the time stamps
+    #[arg(long, value_name = "NAME")]
+    pub time_column: Option<String>,
+    /// Unit of the time stamps, if their heading does not say: s, ms, us, min
+    #[arg(long, value_name = "UNIT")]
+    pub time_unit: Option<String>,
+    /// Sampling rate, where there are no time stamps or they are wrong
+    #[arg(long, value_name = "HZ", value_parser = positive_frequency)]
+    pub rate: Option<f64>,
+    /// What separates the cells: , ; | tab space none
+    #[arg(long, value_name = "MARK", value_parser = delimiter)]
+    pub delimiter: Option<Delimiter>,
+    /// Decimal mark: . or ,
+    #[arg(long, value_name = "MARK", value_parser = decimal)]
+    pub decimal: Option<u8>,
+    /// Draw the channels into an SVG file
+    #[arg(long, value_name = "FILE")]
+    pub plot: Option<PathBuf>,
+    /// Print JSON instead of a table
+    #[arg(long)]
+    pub json: bool,
+    /// End with code 3 if there are warnings
+    #[arg(long)]
+    pub strict: bool,
+}
+
+impl Inspect {
+    /// The options that the readers take.
+    #[must_use]
+    pub fn options(&self) -> csv::Options {
+        csv::Options {
+            time_column: self.time_column.clone(),
+            time_unit: self.time_unit.clone(),
+            rate_hz: self.rate,
+            told: Told {
+                delimiter: self.delimiter,
+                decimal: self.decimal,
+            },
+            ..csv::Options::default()
+        }
+    }
+}
+
 /// Orders of a fundamental, rising.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Orders(pub Vec<f64>);
@@ -288,6 +397,10 @@ fn percent(text: &str) -> std::result::Result<f64, String> {
         Ok(value) if value > 0.0 && value < 50.0 => Ok(value),
         _ => Err("expected per cent between 0 and 50, such as 2".to_owned()),
     }
+}
+
+fn clock(text: &str) -> std::result::Result<TimeChoice, String> {
+    TimeChoice::parse(text).ok_or_else(|| "expected log, publish or header".to_owned())
 }
 
 fn delimiter(text: &str) -> std::result::Result<Delimiter, String> {

@@ -6,6 +6,8 @@ pub mod failure;
 pub mod identify;
 pub mod io;
 pub mod pipeline;
+pub mod quality;
 pub mod recording;
 pub mod report;
+pub mod signal;
 pub mod stand;

@@ -36,7 +36,7 @@ fn files_that_are_no_records() {
         1,
         &["no table of numbers", "hello"],
     );
-    refused(b"\x89MCAP0\r\n\x01\x02", &[], 1, &["MCAP"]);
+    refused(b"\x89MCAP0\r\n\x01\x02", &[], 1, &["no topic"]);
     refused(b"PK\x03\x04abc", &[], 1, &["spreadsheet", "CSV"]);
     refused(b"\x1F\x8Babc", &[], 1, &["gzip", "gunzip"]);
     refused(b"\x00\x01\x02\x03\n", &[], 1, &["binary"]);

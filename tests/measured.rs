@@ -2,6 +2,11 @@
 //!
 //! They are not part of the project. Where the folder is missing, the tests are reported as ignored.
 
+#[path = "measured/inspect.rs"]
+mod inspect;
+#[path = "measured/mcap_files.rs"]
+mod mcap_files;
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -28,11 +33,11 @@ fn main() {
             folder.display()
         );
     }
-    let test = |name: &str, run: fn(&Path) -> Result<(), Failed>| {
+    let test = |name: &str, run: fn(&Path) -> Result<(), Failed>| -> Trial {
         let folder = folder.clone();
         Trial::test(name, move || run(&folder)).with_ignored_flag(missing)
     };
-    let tests = vec![
+    let mut tests = vec![
         test("strain_beam_bridge_volts_are_compensated", strain_beam),
         test("torque_transducer_orders_are_found", torque_transducer),
         test(
@@ -48,7 +53,13 @@ fn main() {
         test("recordings_have_segments", recordings::segments),
         test("settings_are_no_recording", recordings::settings),
         test("assumptions_are_said", recordings::assumptions),
+        test("mcap_of_ros2_is_read", mcap_files::ros2_bag),
+        test("mcap_of_ros1_is_read", mcap_files::ros1_file),
+        test("mcap_with_an_open_chunk_is_told", mcap_files::open_chunk),
+        test("mcap_is_copied_with_a_channel_more", mcap_files::copied),
+        test("mcap_times_are_chosen", mcap_files::times),
     ];
+    tests.extend(inspect::TESTS.map(|(name, run)| test(name, run)));
     libtest_mimic::run(&Arguments::from_args(), tests).exit();
 }
 

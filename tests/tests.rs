@@ -6,6 +6,7 @@ mod bad_input;
 mod compensate;
 mod harmonics;
 mod identify;
+mod inspect;
 mod output;
 mod predict;
 mod table;

@@ -1,6 +1,6 @@
 //! `compensate`: a recorded signal in, the torque that acted out.
 
-mod rows;
+mod sink;
 mod stream;
 mod whole;
 
@@ -11,14 +11,16 @@ use torqcomp_dsp::compensate::InverseFilter;
 use torqcomp_dsp::noise::NoiseGain;
 use torqcomp_dsp::resample;
 
+use self::sink::Sink;
 use super::{Outcome, conclude, uncertainty};
 use crate::cli::Compensate;
 use crate::failure::Failure;
-use crate::io::csv::{Place, Summary, Table, TimeAxis, TimeSource};
+use crate::io::csv::Place;
 use crate::io::output::Output;
 use crate::report::compensate::{Ends, Gain, Noise, RecordNoise, Report, SCHEMA};
 use crate::report::svg::Traces;
 use crate::report::{self, Warning};
+use crate::signal::{Signal, Summary};
 use crate::stand::{self, Chain, Stand};
 
 /// The band unless another is asked for, as far as the rate allows: that of the thesis.
@@ -34,7 +36,7 @@ const NOISY_FRACTION: f64 = 0.5;
 
 /// All that is settled before the first sample is read.
 struct Plan {
-    table: Table,
+    signal: Signal,
     stand: Stand,
     chain: Chain,
     filter: InverseFilter,
@@ -52,7 +54,7 @@ struct Run {
 }
 
 /// Sums and ends of a result.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 struct Extent {
     count: f64,
     sum: f64,
@@ -63,32 +65,42 @@ struct Extent {
 
 impl Extent {
     fn of(values: &[f64]) -> Self {
-        let Some(&first) = values.first() else {
-            return Self::default();
-        };
-        let mut extent = Self {
-            count: values.len() as f64,
-            smallest: first,
-            largest: first,
-            ..Self::default()
-        };
-        for value in values {
-            extent.sum += value;
-            extent.square += value * value;
-            extent.smallest = extent.smallest.min(*value);
-            extent.largest = extent.largest.max(*value);
+        // Several sums side by side, so that one need not wait for the other.
+        const SIDE_BY_SIDE: usize = 8;
+        let (groups, rest) = values.as_chunks::<SIDE_BY_SIDE>();
+        let mut parts = [Self::NONE; SIDE_BY_SIDE];
+        for group in groups {
+            for (part, value) in parts.iter_mut().zip(group) {
+                part.take(*value);
+            }
         }
+        let mut extent = Self::NONE;
+        for part in &parts {
+            extent.join(part);
+        }
+        rest.iter().for_each(|value| extent.take(*value));
+        extent.count = values.len() as f64;
         extent
     }
 
+    /// Of no value.
+    const NONE: Self = Self {
+        count: 0.0,
+        sum: 0.0,
+        square: 0.0,
+        smallest: f64::INFINITY,
+        largest: f64::NEG_INFINITY,
+    };
+
+    #[inline(always)]
+    fn take(&mut self, value: f64) {
+        self.sum += value;
+        self.square += value * value;
+        self.smallest = self.smallest.min(value);
+        self.largest = self.largest.max(value);
+    }
+
     fn join(&mut self, other: &Self) {
-        if other.count == 0.0 {
-            return;
-        }
-        if self.count == 0.0 {
-            *self = *other;
-            return;
-        }
         self.count += other.count;
         self.sum += other.sum;
         self.square += other.square;
@@ -119,20 +131,20 @@ pub fn run(args: &Compensate) -> Result<Outcome, Failure> {
     let plan = plan(args)?;
     let input = Path::new(&args.record.input);
     let inputs = [input, args.stand.as_path()];
-    let mut output = Output::open(args.result.output.as_deref(), args.result.force, &inputs)?;
+    let output = Output::open(args.result.output.as_deref(), args.result.force, &inputs)?;
     let plot = args
         .plot
         .as_deref()
         .map(|path| open_plot(path, args, &inputs))
         .transpose()?;
-    output.write(heading(&plan.chain, args.with_recorded).as_bytes())?;
-
     let mut report = describe(args, &plan, output.name());
+    let mut sink = Sink::open(args, &plan, output)?;
+    report.output_signal = sink.describe();
     let unit = plan.chain.applied.unit.clone();
     let run = if args.whole_record {
-        whole::run(args, plan, &mut output)?
+        whole::run(args, plan, &mut sink)?
     } else {
-        stream::run(args, plan, &mut output)?
+        stream::run(args, plan, &mut sink)?
     };
     complete(&mut report, &run);
     // Whatever can fail comes before the first file takes its name.
@@ -143,7 +155,7 @@ pub fn run(args: &Compensate) -> Result<Outcome, Failure> {
     if args.json {
         crate::io::output::write_all(None, false, &[], &report::json(&report))?;
     }
-    output.finish()?;
+    sink.finish(args, &report)?;
     plot.map_or(Ok(()), Output::finish)?;
     if !args.quiet {
         report::say(&report.text());
@@ -169,20 +181,20 @@ fn plan(args: &Compensate) -> Result<Plan, Failure> {
     let stand = stand::read(&args.stand)?;
     let inverse = stand.inverse()?;
     let place = Place::of(&args.record.input);
-    let table = Table::open(&place, &args.record.options())?;
+    let signal = Signal::open(&place, &args.record.options())?;
     let chain = stand.chain(
-        &table.channel.name,
-        table.channel.unit.as_ref(),
+        &signal.channel.name,
+        signal.channel.unit.as_ref(),
         args.units.into(),
     )?;
     let band = match args.band {
-        Some(band_hz) => Band::new(table.time.rate_hz, band_hz),
-        None => Band::fitting(table.time.rate_hz, DEFAULT_BAND_HZ),
+        Some(band_hz) => Band::new(signal.time.rate_hz, band_hz),
+        None => Band::fitting(signal.time.rate_hz, DEFAULT_BAND_HZ),
     }
-    .map_err(|error| Failure::failed(error).at(&table.source))?;
+    .map_err(|error| Failure::failed(error).at(&signal.source))?;
     let filter = InverseFilter::design(inverse, band)?;
     Ok(Plan {
-        table,
+        signal,
         stand,
         chain,
         filter,
@@ -202,7 +214,7 @@ fn heading(chain: &Chain, with_recorded: bool) -> String {
 /// The report as far as it is known before the run.
 fn describe(args: &Compensate, plan: &Plan, output: &str) -> Report {
     let Plan {
-        table,
+        signal,
         stand,
         chain,
         filter,
@@ -212,21 +224,22 @@ fn describe(args: &Compensate, plan: &Plan, output: &str) -> Report {
     Report {
         schema: SCHEMA,
         version: env!("CARGO_PKG_VERSION"),
-        input: table.source.clone(),
-        dialect: table.layout.dialect.describe(),
-        channel: table.channel.name.clone(),
-        channel_unit: table
+        input: signal.source.clone(),
+        dialect: signal.dialect.clone(),
+        channel: signal.channel.name.clone(),
+        channel_unit: signal
             .channel
             .unit
             .as_ref()
             .map_or_else(String::new, |u| u.text.clone()),
         stand: stand.file.clone(),
         output: output.to_owned(),
+        output_signal: None,
         unit: chain.applied.unit.clone(),
         calibration: chain.described.clone(),
         samples: 0,
-        rate_hz: table.time.rate_hz,
-        rate_from: rate_from(&table.time),
+        rate_hz: signal.time.rate_hz,
+        rate_from: signal.time.rate_from(),
         start_s: 0.0,
         method: if args.whole_record {
             "whole-record"
@@ -255,20 +268,6 @@ fn describe(args: &Compensate, plan: &Plan, output: &str) -> Report {
             record: None,
         },
         warnings: Vec::new(),
-    }
-}
-
-fn rate_from(time: &TimeAxis) -> String {
-    match &time.source {
-        TimeSource::Given => "given with --rate".to_owned(),
-        TimeSource::Stamps {
-            heading, resampled, ..
-        } if *resampled => {
-            format!("from the stamps in \"{heading}\", interpolated")
-        }
-        TimeSource::Stamps { heading, .. } => {
-            format!("from the uniform stamps in \"{heading}\"")
-        }
     }
 }
 

@@ -6,10 +6,11 @@ use torqcomp_dsp::harmonics::{self, Fundamental, refine_fundamental};
 use super::{Outcome, conclude};
 use crate::cli::Harmonics;
 use crate::failure::Failure;
-use crate::io::csv::{Place, Record, Table};
+use crate::io::csv::Place;
 use crate::io::output::Output;
 use crate::report::harmonics::{Component, Report, SCHEMA};
 use crate::report::{self, Warning};
+use crate::signal::{Record, Signal};
 use crate::stand::{self, Chain, Stand};
 
 /// Distance of the record from time zero, in its own lengths, up to which phases refer to zero.
@@ -19,17 +20,17 @@ const FAR_FROM_ZERO: f64 = 10.0;
 pub fn run(args: &Harmonics) -> Result<Outcome, Failure> {
     let stand = stand::read(&args.stand)?;
     stand.mechanics()?;
-    let table = Table::open(&Place::of(&args.record.input), &args.record.options())?;
+    let signal = Signal::open(&Place::of(&args.record.input), &args.record.options())?;
     let chain = stand.chain(
-        &table.channel.name,
-        table.channel.unit.as_ref(),
+        &signal.channel.name,
+        signal.channel.unit.as_ref(),
         args.units.into(),
     )?;
     let inputs = [args.record.input.as_ref(), args.stand.as_path()];
     let mut output = Output::open(args.result.output.as_deref(), args.result.force, &inputs)?;
-    let mut report = describe(&table, &stand, &chain);
-    let source = table.source.clone();
-    let record = Record::read(table, &chain)?;
+    let mut report = describe(&signal, &stand, &chain);
+    let source = signal.source.clone();
+    let record = Record::read(signal, |values| super::convert(&chain, values))?;
     let fitted = fit(args, &stand, &chain, &record, &mut report);
     fitted.map_err(|failure| failure.at(&source))?;
     let text = if args.json {
@@ -47,13 +48,13 @@ pub fn run(args: &Harmonics) -> Result<Outcome, Failure> {
 }
 
 /// The report as far as it is known before the record is read.
-fn describe(table: &Table, stand: &Stand, chain: &Chain) -> Report {
+fn describe(signal: &Signal, stand: &Stand, chain: &Chain) -> Report {
     Report {
         schema: SCHEMA,
         version: env!("CARGO_PKG_VERSION"),
-        input: table.source.clone(),
-        channel: table.channel.name.clone(),
-        channel_unit: table
+        input: signal.source.clone(),
+        channel: signal.channel.name.clone(),
+        channel_unit: signal
             .channel
             .unit
             .as_ref()
@@ -62,7 +63,7 @@ fn describe(table: &Table, stand: &Stand, chain: &Chain) -> Report {
         calibration: chain.described.clone(),
         unit: chain.applied.unit.clone(),
         samples: 0,
-        rate_hz: table.time.rate_hz,
+        rate_hz: signal.time.rate_hz,
         duration_s: 0.0,
         fundamental_hz: 0.0,
         fundamental_std_hz: None,

@@ -1,9 +1,12 @@
 //! One file for each verb.
 
 mod compensate;
+mod extract;
 mod harmonics;
 mod identify;
+mod inspect;
 mod predict;
+mod rows;
 mod table;
 
 use torqcomp_dsp::conversion::ConversionError;
@@ -30,7 +33,9 @@ pub enum Outcome {
 pub fn run(cli: Cli) -> Result<Outcome, Failure> {
     match cli.verb {
         Verb::Compensate(args) => compensate::run(&args),
+        Verb::Extract(args) => extract::run(&args),
         Verb::Harmonics(args) => harmonics::run(&args),
+        Verb::Inspect(args) => inspect::run(&args),
         Verb::Table(args) => table::run(&args),
         Verb::Predict(args) => predict::run(&args),
         Verb::Identify(args) => identify::run(&args),
@@ -76,7 +81,7 @@ pub(crate) fn convert(chain: &Chain, values: &mut [f64]) -> Result<(), (usize, S
         Err(ConversionError::Sample { index, source }) => return Err((index, source.to_string())),
         Err(other) => return Err((0, other.to_string())),
     }
-    match values.iter().position(|v| v.is_nan() || v.abs() > LARGEST) {
+    match first_impossible(values) {
         Some(index) => Err((
             index,
             format!(
@@ -86,4 +91,14 @@ pub(crate) fn convert(chain: &Chain, values: &mut [f64]) -> Result<(), (usize, S
         )),
         None => Ok(()),
     }
+}
+
+/// Index of the first value that is no measurement. Looks at many at once, since there is none.
+fn first_impossible(values: &[f64]) -> Option<usize> {
+    const TOGETHER: usize = 64;
+    let is_possible = |v: &f64| v.abs() <= LARGEST;
+    let all = |part: &[f64]| part.iter().fold(true, |all, v| all & is_possible(v));
+    let part = values.chunks(TOGETHER).position(|part| !all(part))?;
+    let start = part * TOGETHER;
+    Some(start + values[start..].iter().position(|v| !is_possible(v))?)
 }

@@ -97,17 +97,30 @@ impl Decimal {
     }
 
     /// Puts it at the start of `text` and tells its length.
-    #[inline]
+    #[inline(always)]
     pub fn put(&self, text: &mut [u8; ROOM]) -> usize {
-        // A sign is overwritten where there is none.
-        text[0] = b'-';
-        let start = usize::from(self.value < 0.0);
-        let zeros_at_end = (self.digits ^ ASCII_ZEROS).leading_zeros() / 8;
-        let significant = 16 - zeros_at_end as usize;
         if (SMALLEST_PLAIN..LARGEST_PLAIN).contains(&self.exponent) {
-            put_plain(text, start, self.digits, significant, self.exponent)
-        } else if self.exponent != RARE {
-            put_scientific(text, start, self.digits, significant, self.exponent)
+            // A sign is overwritten where there is none.
+            text[0] = b'-';
+            let start = usize::from(self.value < 0.0);
+            put_plain(text, start, self.digits, self.significant(), self.exponent)
+        } else {
+            self.put_unusual(text)
+        }
+    }
+
+    /// Digits without the zeros at their end.
+    #[inline(always)]
+    fn significant(&self) -> usize {
+        16 - ((self.digits ^ ASCII_ZEROS).leading_zeros() / 8) as usize
+    }
+
+    #[cold]
+    fn put_unusual(&self, text: &mut [u8; ROOM]) -> usize {
+        if self.exponent != RARE {
+            text[0] = b'-';
+            let start = usize::from(self.value < 0.0);
+            put_scientific(text, start, self.digits, self.significant(), self.exponent)
         } else if self.value == 0.0 {
             put_text(text, "0")
         } else {
@@ -155,28 +168,37 @@ fn scale(power: i32) -> f64 {
 }
 
 /// Sixteen ASCII digits of a number below 10^16, the first in the lowest byte.
-#[inline]
+#[inline(always)]
 fn sixteen_digits(value: u64) -> u128 {
-    let high = eight_digits(value / 100_000_000);
-    let low = eight_digits(value % 100_000_000);
-    u128::from(high) | u128::from(low) << 64
+    let (high, low) = (value / 100_000_000, value % 100_000_000);
+    u128::from(eight_digits(high)) | u128::from(eight_digits(low)) << 64
 }
 
-/// Eight ASCII digits of a number below 10^8, the first in the lowest byte: fours, pairs, digits,
-/// each split for all parts at once by multiplying with a rounded reciprocal.
-#[inline]
+/// Eight ASCII digits of a number below 10^8, the first in the lowest byte.
+#[inline(always)]
 fn eight_digits(value: u64) -> u64 {
     let high = value / 10_000;
-    let fours = high | ((value - high * 10_000) << 32);
-    let hundreds = ((fours * 10_486) >> 20) & 0x0000_007F_0000_007F;
-    let pairs = hundreds | ((fours - hundreds * 100) << 16);
-    let tens = ((pairs * 103) >> 10) & 0x000F_000F_000F_000F;
-    let digits = tens | ((pairs - tens * 10) << 8);
-    digits | 0x3030_3030_3030_3030
+    let low = value - high * 10_000;
+    u64::from(FOUR_DIGITS[high as usize]) | u64::from(FOUR_DIGITS[low as usize]) << 32
 }
 
+/// Four ASCII digits of every number below 10^4, the first in the lowest byte.
+static FOUR_DIGITS: [u32; 10_000] = {
+    let mut table = [0; 10_000];
+    let mut value = 0;
+    while value < 10_000 {
+        let n = value as u32;
+        table[value] =
+            0x3030_3030 | n / 1000 | n / 100 % 10 << 8 | n / 10 % 10 << 16 | n % 10 << 24;
+        value += 1;
+    }
+    table
+};
+
 /// `0.00ddd`, `dd.ddd` or `dddd`. Bytes after the length told are left over.
-#[inline]
+///
+/// Written without a branch: whether a number is below one or above cannot be foreseen.
+#[inline(always)]
 fn put_plain(
     text: &mut [u8; ROOM],
     start: usize,
@@ -184,21 +206,20 @@ fn put_plain(
     significant: usize,
     exponent: i32,
 ) -> usize {
-    if exponent < 0 {
-        let first = start + 1 + exponent.unsigned_abs() as usize;
-        text[start..start + 8].copy_from_slice(b"0.000000");
-        text[first..first + 16].copy_from_slice(&digits.to_le_bytes());
-        return first + significant;
-    }
-    let whole = exponent as usize + 1;
-    text[start..start + 16].copy_from_slice(&digits.to_le_bytes());
+    let below_one = exponent < 0;
+    // Digits before the point, and zeros between the point and the first digit.
+    let whole = (exponent + 1).max(0) as usize;
+    let zeros = (-1 - exponent).max(0) as usize;
+    let before = if below_one { ASCII_ZEROS } else { digits };
+    let point = start + if below_one { 1 } else { whole };
+    let after = point + 1 + zeros;
+    text[start..start + 16].copy_from_slice(&before.to_le_bytes());
+    text[after..after + 16].copy_from_slice(&(digits >> (8 * whole)).to_le_bytes());
+    text[point] = b'.';
     if significant <= whole {
         return start + whole;
     }
-    let after = digits >> (8 * whole);
-    text[start + whole] = b'.';
-    text[start + whole + 1..start + whole + 17].copy_from_slice(&after.to_le_bytes());
-    start + significant + 1
+    after + significant - whole
 }
 
 fn put_scientific(

@@ -2,6 +2,7 @@
 
 pub mod csv;
 pub mod digits;
+pub mod mcap;
 pub mod number;
 pub mod output;
 pub mod text;

@@ -64,15 +64,87 @@ fn read_as<const EXACT: bool>(text: &[u8], at: usize, decimal: u8) -> Option<(f6
     if count > 19 || mantissa > EXACT_MANTISSA || exponent.unsigned_abs() > 22 {
         return slow(&text[at..place], decimal).map(|value| (value, place));
     }
-    let power = EXACT_POWERS[exponent.unsigned_abs() as usize];
-    let value = if exponent < 0 && !EXACT {
-        mantissa as f64 * INVERSE_POWERS[exponent.unsigned_abs() as usize]
-    } else if exponent < 0 {
-        mantissa as f64 / power
-    } else {
-        mantissa as f64 * power
+    let parts = Parts {
+        negative,
+        mantissa,
+        exponent,
     };
-    Some((if negative { -value } else { value }, place))
+    let value = if EXACT {
+        parts.exactly()?
+    } else {
+        parts.nearly()?
+    };
+    Some((value, place))
+}
+
+/// A decimal number taken apart: `±mantissa · 10^exponent`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Parts {
+    pub(crate) negative: bool,
+    pub(crate) mantissa: u64,
+    pub(crate) exponent: i32,
+}
+
+impl Parts {
+    /// The nearest `f64`; `None` if more than one rounding would stand between.
+    #[inline(always)]
+    pub(crate) fn exactly(self) -> Option<f64> {
+        let power = *EXACT_POWERS.get(self.exponent.unsigned_abs() as usize)?;
+        self.made(if self.exponent < 0 {
+            self.mantissa as i64 as f64 / power
+        } else {
+            self.mantissa as i64 as f64 * power
+        })
+    }
+
+    /// The same to within one unit of the last bit, without a division.
+    #[inline(always)]
+    pub(crate) fn nearly(self) -> Option<f64> {
+        let place = self.exponent.unsigned_abs() as usize;
+        self.made(if self.exponent < 0 {
+            self.mantissa as i64 as f64 * *INVERSE_POWERS.get(place)?
+        } else {
+            self.mantissa as i64 as f64 * *EXACT_POWERS.get(place)?
+        })
+    }
+
+    #[inline(always)]
+    fn made(self, magnitude: f64) -> Option<f64> {
+        let value = if self.negative { -magnitude } else { magnitude };
+        (self.mantissa <= EXACT_MANTISSA).then_some(value)
+    }
+}
+
+/// Value of the `count` digits (1 to 8) at `text[at..]`; `None` if they are not all digits. Eight bytes
+/// have to be there.
+#[inline(always)]
+pub(crate) fn run(text: &[u8], at: usize, count: usize) -> Option<u64> {
+    let eight = text.get(at..at + 8)?;
+    let chunk = u64::from_le_bytes(eight.try_into().expect("eight bytes")) ^ ASCII_ZEROS;
+    // What follows the digits is pushed out; zeros come before them.
+    let chunk = chunk << (8 * (8 - count));
+    are_digits(chunk).then(|| eight_digits(chunk))
+}
+
+/// Value of the one digit at `text[at]`.
+#[inline(always)]
+pub(crate) fn digit(text: &[u8], at: usize) -> Option<u64> {
+    let digit = text.get(at)?.wrapping_sub(b'0');
+    (digit < 10).then_some(u64::from(digit))
+}
+
+/// Exponent of the form `e-05` at `text[at..]`.
+#[inline(always)]
+pub(crate) fn two_digit_exponent(text: &[u8], at: usize) -> Option<i32> {
+    let &[mark, sign, tens, ones] = text.get(at..at + 4)? else {
+        return None;
+    };
+    let (tens, ones) = (tens.wrapping_sub(b'0'), ones.wrapping_sub(b'0'));
+    if mark | 0x20 != b'e' || tens > 9 || ones > 9 || (sign != b'-' && sign != b'+') {
+        return None;
+    }
+    let value = 10 * i32::from(tens) + i32::from(ones);
+    Some(if sign == b'-' { -value } else { value })
 }
 
 /// Reads the digits at `text[at..]` onto `mantissa` (wrapping: the caller counts the digits): eight at
@@ -80,9 +152,8 @@ fn read_as<const EXACT: bool>(text: &[u8], at: usize, decimal: u8) -> Option<(f6
 #[inline(always)]
 fn many_digits(text: &[u8], mut at: usize, mut mantissa: u64) -> (u64, usize) {
     while let Some(eight) = text.get(at..at + 8) {
-        // ASCII digits become 0 to 9; adding 0x76 sets the high bit of anything larger.
         let chunk = u64::from_le_bytes(eight.try_into().expect("eight bytes")) ^ ASCII_ZEROS;
-        if (chunk.wrapping_add(0x7676_7676_7676_7676) | chunk) & 0x8080_8080_8080_8080 != 0 {
+        if !are_digits(chunk) {
             break;
         }
         mantissa = mantissa
@@ -107,6 +178,13 @@ fn few_digits(text: &[u8], mut at: usize, mut mantissa: u64) -> (u64, usize) {
 
 /// Eight times the byte of the digit 0.
 const ASCII_ZEROS: u64 = 0x3030_3030_3030_3030;
+
+/// Whether all eight bytes are 0 to 9, as ASCII digits are once [`ASCII_ZEROS`] are taken off. Adding
+/// 0x76 sets the high bit of anything larger.
+#[inline(always)]
+fn are_digits(chunk: u64) -> bool {
+    (chunk.wrapping_add(0x7676_7676_7676_7676) | chunk) & 0x8080_8080_8080_8080 == 0
+}
 
 /// Value of eight digits of a byte each, the first in the lowest: pairs, then fours, then eight.
 #[inline]

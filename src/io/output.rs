@@ -138,6 +138,24 @@ impl Output {
     }
 }
 
+impl Write for Output {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match &mut self.kind {
+            Kind::Stdout(out) => out.write(bytes),
+            Kind::Device(file) => file.write(bytes),
+            Kind::File { part, .. } => part.as_file_mut().write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match &mut self.kind {
+            Kind::Stdout(out) => out.flush(),
+            Kind::Device(file) => file.flush(),
+            Kind::File { part, .. } => part.as_file_mut().flush(),
+        }
+    }
+}
+
 /// A nameless-to-be file in the folder of the output, removed if it is not completed.
 fn part_beside(path: &Path) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();

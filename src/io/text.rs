@@ -40,10 +40,53 @@ impl Text {
         self.length += digits::put(self.room(), value, digits);
     }
 
+    /// Appends a number of nanoseconds as seconds, every digit of it.
+    pub fn seconds(&mut self, nanoseconds: i64) {
+        const PER_SECOND: u64 = 1_000_000_000;
+        let magnitude = nanoseconds.unsigned_abs();
+        let sign = if nanoseconds < 0 { "-" } else { "" };
+        let (whole, part) = (magnitude / PER_SECOND, magnitude % PER_SECOND);
+        let text = format!("{sign}{whole}.{part:09}");
+        self.copy(text.as_bytes(), 0, text.len());
+    }
+
     /// Appends a number that was taken apart.
-    #[inline]
+    #[inline(always)]
     pub fn decimal(&mut self, decimal: &Decimal) {
         self.length += decimal.put(self.room());
+    }
+
+    /// Appends `source[offset..offset + length]`, a comma, a number and a line feed.
+    ///
+    /// # Panics
+    /// If the source is shorter than that.
+    #[inline(always)]
+    pub fn row(&mut self, source: &[u8], offset: usize, length: usize, decimal: &Decimal) {
+        let Some(piece) = source
+            .get(offset..offset + SHORT)
+            .filter(|_| length < SHORT)
+        else {
+            self.long_row(source, offset, length, decimal);
+            return;
+        };
+        if self.bytes.len() < self.length + SHORT + ROOM {
+            self.grow();
+        }
+        let row = &mut self.bytes[self.length..self.length + SHORT + ROOM];
+        row[..SHORT].copy_from_slice(piece);
+        row[length] = b',';
+        let number = &mut row[length + 1..length + 1 + ROOM];
+        let end = length + 1 + decimal.put(number.try_into().expect("a slice of that length"));
+        row[end] = b'\n';
+        self.length += end + 1;
+    }
+
+    #[cold]
+    fn long_row(&mut self, source: &[u8], offset: usize, length: usize, decimal: &Decimal) {
+        self.copy(source, offset, length);
+        self.byte(b',');
+        self.decimal(decimal);
+        self.byte(b'\n');
     }
 
     /// Appends `source[offset..offset + length]`.
@@ -89,6 +132,17 @@ impl Text {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    #[test]
+    fn nanoseconds_keep_every_digit() {
+        let mut text = Text::default();
+        for nanoseconds in [0, 1_700_000_000_123_456_789, -1_500_000_000] {
+            text.seconds(nanoseconds);
+            text.byte(b' ');
+        }
+        let expected = "0.000000000 1700000000.123456789 -1.500000000 ";
+        assert_eq!(text.as_bytes(), expected.as_bytes());
+    }
 
     proptest! {
         #[test]

@@ -29,6 +29,8 @@ pub struct Report {
     pub stand: String,
     /// File that was written.
     pub output: String,
+    /// Topic and field of the result in a file of messages.
+    pub output_signal: Option<String>,
     /// Unit of the result.
     pub unit: String,
     /// How the record became torque at rest.

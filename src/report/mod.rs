@@ -4,7 +4,9 @@ pub mod chart;
 pub mod compensate;
 pub mod harmonics;
 pub mod identify;
+pub mod inspect;
 pub mod page;
+pub mod panels;
 pub mod predict;
 pub mod svg;
 

@@ -172,7 +172,7 @@ impl Traces {
 }
 
 /// A range of values and the steps of its marks.
-struct Axis {
+pub(super) struct Axis {
     low: f64,
     high: f64,
     step: f64,
@@ -180,13 +180,23 @@ struct Axis {
 
 impl Axis {
     /// An axis over a range, its marks at 1, 2 or 5 times a power of ten.
-    fn around(low: f64, high: f64) -> Self {
+    pub(super) fn around(low: f64, high: f64) -> Self {
+        Self::with_marks(low, high, 6.0)
+    }
+
+    /// An axis with few marks, for a low picture.
+    pub(super) fn coarse(low: f64, high: f64) -> Self {
+        Self::with_marks(low, high, 4.0)
+    }
+
+    fn with_marks(low: f64, high: f64, count: f64) -> Self {
         let (low, high) = if high > low {
             (low, high)
         } else {
-            (low - 0.5, low + 0.5)
+            let half = 0.5_f64.max(1e-6 * low.abs());
+            (low - half, low + half)
         };
-        let rough = (high - low) / 6.0;
+        let rough = (high - low) / count;
         let power = 10_f64.powf(rough.log10().floor());
         let step = [1.0, 2.0, 5.0, 10.0]
             .into_iter()
@@ -196,11 +206,11 @@ impl Axis {
         Self { low, high, step }
     }
 
-    fn part(&self, value: f64) -> f64 {
+    pub(super) fn part(&self, value: f64) -> f64 {
         (value - self.low) / (self.high - self.low)
     }
 
-    fn marks(&self) -> impl Iterator<Item = f64> {
+    pub(super) fn marks(&self) -> impl Iterator<Item = f64> {
         let (first, last) = (
             (self.low / self.step).ceil(),
             (self.high / self.step).floor(),
@@ -261,7 +271,7 @@ fn legend(svg: &mut String) {
     }
 }
 
-fn escaped(text: &str) -> String {
+pub(super) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;")
 }
 

@@ -28,6 +28,7 @@ pub mod harmonics;
 pub mod noise;
 pub mod onset;
 pub mod peaks;
+pub mod quality;
 pub mod recorder;
 pub mod resample;
 pub mod spectrum;

@@ -7,16 +7,17 @@ use torqcomp_dsp::noise::RecordNoise;
 use torqcomp_dsp::resample::Resampler;
 use torqcomp_dsp::spectrum::{PowerSum, welch};
 
-use super::rows::{Rows, Times};
+use super::sink::Sink;
 use super::{Extent, Plan, Run};
 use crate::cli::Compensate;
 use crate::commands::convert;
+use crate::commands::rows::{Rows, Times};
 use crate::failure::Failure;
-use crate::io::csv::{Batch, TimeAxis, TimeSource};
-use crate::io::output::Output;
+use crate::io::csv::{TimeAxis, TimeSource};
 use crate::io::text::Text;
 use crate::pipeline::{self, Stages};
 use crate::report::svg::Traces;
+use crate::signal::Batch;
 
 /// Threads that are worth starting: reading and writing stay serial.
 const MOST_THREADS: usize = 8;
@@ -38,7 +39,7 @@ struct Job {
     torque: Vec<f64>,
     text: Text,
     power: Option<PowerSum>,
-    extent: Extent,
+    extent: Option<Extent>,
 }
 
 /// What each sample goes through, the same on every thread.
@@ -48,20 +49,22 @@ struct Steps<'a> {
     time: &'a TimeAxis,
     start_s: f64,
     scale: f64,
+    /// Whether the result is text.
+    is_text: bool,
     args: &'a Compensate,
 }
 
 /// Runs the stages over the whole record.
-pub fn run(args: &Compensate, plan: Plan, output: &mut Output) -> Result<Run, Failure> {
+pub fn run(args: &Compensate, plan: Plan, sink: &mut Sink) -> Result<Run, Failure> {
     let Plan {
-        table,
+        signal,
         chain,
         filter,
         ..
     } = plan;
     let half_length = filter.half_length();
-    let rate_hz = table.time.rate_hz;
-    let time = table.time.clone();
+    let rate_hz = signal.time.rate_hz;
+    let time = signal.time.clone();
     let first = BlockConvolver::new(&filter);
     let noise_block = first.block_length().min(LONGEST_NOISE_BLOCK);
     let mut joiner = Joiner::new(&time, half_length);
@@ -69,14 +72,15 @@ pub fn run(args: &Compensate, plan: Plan, output: &mut Output) -> Result<Run, Fa
         half_length,
         noise_block,
         time: &time,
-        start_s: table.first_time_s(),
+        start_s: signal.first_time_s(),
         scale: 1.0 / chain.applied.factor,
+        is_text: sink.is_text(),
         args,
     };
     // Rows enough that a piece needs no more than the one after it.
-    let (mut fetch, row_plan, mut sequence) = table.into_stream(2 * half_length);
+    let (mut fetch, row_plan, mut sequence) = signal.into_stream(2 * half_length);
     let mut power = PowerSum::new(noise_block);
-    let mut extent = Extent::default();
+    let mut extent = Extent::NONE;
     let mut traces = args.plot.as_ref().map(|_| Traces::new(args.plot_range));
     let mut short = Vec::new();
     let threads = threads(args);
@@ -89,7 +93,7 @@ pub fn run(args: &Compensate, plan: Plan, output: &mut Output) -> Result<Run, Fa
         Stages {
             read: |job: &mut Job| fetch.next(&mut job.batch),
             prepare: |job: &mut Job| {
-                job.batch.read_rows(&row_plan, &time);
+                job.batch.read_rows(row_plan.as_ref(), &time);
                 job.unconverted = convert(&chain, &mut job.batch.rows.values).err();
             },
             join: |job: Option<Job>, ready: &mut dyn FnMut(Job)| match job {
@@ -107,14 +111,17 @@ pub fn run(args: &Compensate, plan: Plan, output: &mut Output) -> Result<Run, Fa
             },
             work: |convolver: &mut BlockConvolver, job: &mut Job| steps.work(convolver, job),
             deliver: |job: &mut Job| {
-                output.write(job.text.as_bytes())?;
+                let rows = steps.rows(&job.batch, job.first);
+                sink.take(job.text.as_bytes(), &rows, &job.torque)?;
                 if let Some(part) = &job.power {
                     power.add(part);
                 }
                 if let Some(traces) = &mut traces {
                     steps.trace(job, traces);
                 }
-                extent.join(&job.extent);
+                if let Some(part) = &job.extent {
+                    extent.join(part);
+                }
                 // A record may be too short for a block of the noise estimate.
                 if short.len() < noise_block {
                     short.extend_from_slice(steps.recorded(&job.window));
@@ -137,7 +144,7 @@ pub fn run(args: &Compensate, plan: Plan, output: &mut Output) -> Result<Run, Fa
         noise
     };
     Ok(Run {
-        summary: sequence.finish()?,
+        summary: sequence.finish(&mut fetch)?,
         samples: joiner.samples,
         start_s: steps.start_s,
         extent: extent.scaled(steps.scale),
@@ -175,7 +182,7 @@ impl Joiner {
             TimeSource::Stamps {
                 seconds_per_unit, ..
             } => *seconds_per_unit,
-            TimeSource::Given => 1.0,
+            TimeSource::Given | TimeSource::Header { .. } => 1.0,
         };
         Self {
             windows: Windows::new(half_length),
@@ -249,8 +256,11 @@ impl Steps<'_> {
             convolver.convolve(&job.window, &mut job.torque, None);
             power.add_samples(&job.window[self.half_length..self.half_length + length]);
         }
-        job.extent = Extent::of(&job.torque);
+        job.extent = Some(Extent::of(&job.torque));
         job.text.clear();
+        if !self.is_text {
+            return;
+        }
         let rows = self.rows(&job.batch, job.first);
         let recorded = self.recorded(&job.window);
         let recorded = if self.args.with_recorded {
@@ -274,26 +284,7 @@ impl Steps<'_> {
     }
 
     fn rows<'a>(&self, batch: &'a Batch, first: usize) -> Rows<'a> {
-        let grid = Times::Grid {
-            start_s: self.start_s,
-            first,
-        };
-        let times = match &self.time.source {
-            TimeSource::Given
-            | TimeSource::Stamps {
-                resampled: true, ..
-            } => grid,
-            TimeSource::Stamps { copied: true, .. } => Times::Copied {
-                text: &batch.text,
-                spans: &batch.rows.time_text,
-            },
-            TimeSource::Stamps {
-                seconds_per_unit, ..
-            } => Times::Stamps {
-                times: &batch.rows.times,
-                seconds: *seconds_per_unit,
-            },
-        };
+        let times = Times::of(batch, self.time, self.start_s, first);
         Rows {
             digits: self.args.digits,
             scale: self.scale,

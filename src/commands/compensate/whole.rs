@@ -4,14 +4,15 @@ use torqcomp_dsp::compensate::whole_record;
 use torqcomp_dsp::noise::RecordNoise;
 use torqcomp_dsp::spectrum::welch;
 
-use super::rows::{Rows, Times};
+use super::sink::Sink;
 use super::{Extent, Plan, Run};
 use crate::cli::Compensate;
+use crate::commands::convert;
+use crate::commands::rows::{Rows, Times};
 use crate::failure::Failure;
-use crate::io::csv::Record;
-use crate::io::output::Output;
 use crate::io::text::Text;
 use crate::report::svg::Traces;
+use crate::signal::Record;
 
 /// Rows that are written at once.
 const ROWS_AT_ONCE: usize = 1 << 14;
@@ -19,15 +20,15 @@ const ROWS_AT_ONCE: usize = 1 << 14;
 const LONGEST_BLOCK: usize = 1 << 12;
 
 /// Reads, compensates and writes the record.
-pub fn run(args: &Compensate, plan: Plan, output: &mut Output) -> Result<Run, Failure> {
+pub fn run(args: &Compensate, plan: Plan, sink: &mut Sink) -> Result<Run, Failure> {
     let Plan {
-        table,
+        signal,
         chain,
         filter,
         ..
     } = plan;
-    let time = table.time.clone();
-    let record = Record::read(table, &chain)?;
+    let time = signal.time.clone();
+    let record = Record::read(signal, |values| convert(&chain, values))?;
     let torque = whole_record(&filter, &record.samples)?;
     let scale = 1.0 / chain.applied.factor;
     let mut traces = args.plot.as_ref().map(|_| Traces::new(args.plot_range));
@@ -49,7 +50,7 @@ pub fn run(args: &Compensate, plan: Plan, output: &mut Output) -> Result<Run, Fa
             part,
             if args.with_recorded { recorded } else { &[] },
         );
-        output.write(text.as_bytes())?;
+        sink.take(text.as_bytes(), &rows, part)?;
         if let Some(traces) = &mut traces {
             for (i, (torque, recorded)) in part.iter().zip(recorded).enumerate() {
                 traces.add(rows.time_s(i), recorded * scale, torque * scale);

@@ -42,14 +42,20 @@ impl Chunks {
     /// # Errors
     /// Those of the input, and [`io::ErrorKind::InvalidData`] for a line beyond 16 MiB.
     pub fn next(&mut self, piece: &mut Vec<u8>) -> io::Result<Piece> {
-        piece.clear();
         // What is carried may be more than one piece: the head of the file.
         let carried = self.carry.len().min(self.size);
-        piece.extend_from_slice(&self.carry[..carried]);
+        if piece.len() < carried {
+            piece.resize(carried, 0);
+        }
+        piece[..carried].copy_from_slice(&self.carry[..carried]);
         self.carry.drain(..carried);
+        // Old bytes behind it are kept for now: they need not be cleared to be read over.
+        let mut filled = carried;
         loop {
             if self.carry.is_empty() {
-                self.fill(piece)?;
+                self.fill(piece, filled)?;
+            } else {
+                piece.truncate(filled);
             }
             if let Some(last) = memchr::memrchr(b'\n', piece) {
                 let rest = piece[last + 1..].to_vec();
@@ -76,16 +82,22 @@ impl Chunks {
             self.size = self.size.max(2 * piece.len());
             let more = self.carry.len().min(self.size - piece.len());
             piece.extend(self.carry.drain(..more));
+            filled = piece.len();
         }
     }
 
-    /// Reads until the piece is full or the input ends.
-    fn fill(&mut self, piece: &mut Vec<u8>) -> io::Result<()> {
-        let wanted = self.size.saturating_sub(piece.len());
-        if wanted > 0 && !self.at_end {
-            let got = (&mut self.input).take(wanted as u64).read_to_end(piece)?;
-            self.at_end = got < wanted;
+    /// Reads behind the first `filled` bytes until the piece is full or the input ends.
+    fn fill(&mut self, piece: &mut Vec<u8>, mut filled: usize) -> io::Result<()> {
+        piece.resize(self.size.max(filled), 0);
+        while !self.at_end && filled < piece.len() {
+            match self.input.read(&mut piece[filled..]) {
+                Ok(0) => self.at_end = true,
+                Ok(count) => filled += count,
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(error),
+            }
         }
+        piece.truncate(filled);
         Ok(())
     }
 }

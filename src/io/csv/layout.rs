@@ -304,14 +304,15 @@ impl Table {
 fn numeric_width(line: &str, dialect: Dialect) -> Option<usize> {
     let cells = dialect.cells(line);
     let width = cells.iter().rposition(|cell| !cell.is_empty())? + 1;
-    let numeric =
-        |cell: &String| number::cell(cell, dialect.decimal).is_some() || is_not_a_number(cell);
-    let numbers = cells[..width]
-        .iter()
-        .filter(|cell| number::cell(cell, dialect.decimal).is_some())
-        .count();
-    let good = cells[..width].iter().all(|c| numeric(c) || c.is_empty());
-    (good && numbers > 0).then_some(width)
+    let mut numbers = 0;
+    for cell in &cells[..width] {
+        if number::cell(cell, dialect.decimal).is_some() {
+            numbers += 1;
+        } else if !cell.is_empty() && !is_not_a_number(cell) {
+            return None;
+        }
+    }
+    (numbers > 0).then_some(width)
 }
 
 /// Number of cells of a row that may hold texts beside its numbers.
@@ -329,11 +330,9 @@ fn partly_numeric_width(line: &str, dialect: Dialect) -> Option<usize> {
 /// Whether a cell says that there is no number: NaN, infinity and their Windows spellings.
 #[must_use]
 pub fn is_not_a_number(cell: &str) -> bool {
-    let text = cell.trim_start_matches(['+', '-']).to_lowercase();
-    matches!(
-        text.as_str(),
-        "nan" | "inf" | "infinity" | "1.#qnan" | "1.#ind" | "1.#inf"
-    )
+    const WORDS: [&str; 6] = ["nan", "inf", "infinity", "1.#qnan", "1.#ind", "1.#inf"];
+    let text = cell.trim_start_matches(['+', '-']);
+    WORDS.iter().any(|word| text.eq_ignore_ascii_case(word))
 }
 
 fn choose(

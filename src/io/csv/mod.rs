@@ -2,11 +2,10 @@
 
 mod chunks;
 mod columns;
+mod habit;
 mod layout;
 mod names;
-mod record;
 mod scan;
-mod stream;
 mod time;
 
 use std::io::Read;
@@ -15,15 +14,14 @@ use std::path::PathBuf;
 use crate::failure::Failure;
 use crate::report::Warning;
 
+pub use chunks::{Chunks, Piece};
 pub(crate) use columns::{list, time_column};
 pub use layout::{Delimiter, Dialect, Layout, Told, is_skipped};
 pub(crate) use layout::{dialects, find as find_layout_in, is_not_a_number};
 pub use names::{Column, NamedUnit};
-pub use record::Record;
-pub use scan::{RowPlan, Rows, place_of};
-pub use stream::{Batch, Fetch, Sequence, Summary};
+pub use scan::{Defect, Problem, RowPlan, Rows, place_of};
 pub(crate) use time::without_rounding;
-pub use time::{TimeAxis, TimeSource};
+pub use time::{Break, Stamps, TimeAxis, TimeSource};
 
 /// Bytes of a file that its layout is told from.
 const HEAD: usize = 1 << 16;
@@ -107,44 +105,33 @@ pub struct Table {
     pub channel: Column,
     /// How its samples lie in time.
     pub time: TimeAxis,
-    plan: RowPlan,
-    head: Vec<u8>,
-    input: Box<dyn Read + Send>,
+    pub(crate) plan: RowPlan,
+    pub(crate) head: Vec<u8>,
+    pub(crate) input: Box<dyn Read + Send>,
     /// Mean length of a row in the head, in bytes.
-    row_bytes: usize,
+    pub(crate) row_bytes: usize,
     /// Fewest characters of a value in the head.
-    shortest_value: usize,
+    pub(crate) shortest_value: usize,
     /// What the command line says otherwise than the file.
-    warnings: Vec<Warning>,
+    pub(crate) warnings: Vec<Warning>,
     /// First time stamp as written.
-    first_stamp: Option<f64>,
+    pub(crate) first_stamp: Option<f64>,
 }
 
 impl Table {
-    /// Time of the first sample: its stamp, or 0 where a rate was given.
-    #[must_use]
-    pub fn first_time_s(&self) -> f64 {
-        match (&self.time.source, self.first_stamp) {
-            (
-                TimeSource::Stamps {
-                    seconds_per_unit, ..
-                },
-                Some(stamp),
-            ) => stamp * seconds_per_unit,
-            _ => 0.0,
-        }
-    }
-
-    /// Opens a file, finds its table, its channel and its time axis.
+    /// Finds the table in a text, its channel and its time axis.
     ///
     /// # Errors
-    /// If the file cannot be read, holds no table, or leaves open what is to be read.
-    pub fn open(place: &Place, options: &Options) -> Result<Self, Failure> {
-        let name = place.name();
-        let mut input = place.open()?;
-        Self::read(&name, &mut input, options)
-            .map(|parts| parts.with(name.clone(), input))
-            .map_err(|failure| failure.at(&name))
+    /// If the text cannot be read, holds no table, or leaves open what is to be read.
+    pub fn of(
+        name: String,
+        mut input: Box<dyn Read + Send>,
+        options: &Options,
+    ) -> Result<Self, Failure> {
+        match Self::read(&name, &mut input, options) {
+            Ok(parts) => Ok(parts.with(name, input)),
+            Err(failure) => Err(failure.at(&name)),
+        }
     }
 
     fn read(name: &str, input: &mut dyn Read, options: &Options) -> Result<Parts, Failure> {
@@ -195,21 +182,6 @@ impl Table {
             sample,
             warnings,
         })
-    }
-
-    /// Splits the table into the parts that run side by side: reading pieces of at least
-    /// `rows` rows, and looking at the rows in order.
-    #[must_use]
-    pub fn into_stream(self, rows: usize) -> (Fetch, RowPlan, Sequence) {
-        let sequence = Sequence::new(&self);
-        let offset = self.layout.data_offset;
-        let fetch = Fetch::new(
-            self.source,
-            self.head[offset..].to_vec(),
-            self.input,
-            rows * self.row_bytes,
-        );
-        (fetch, self.plan, sequence)
     }
 }
 
@@ -296,11 +268,7 @@ fn find_layout(
 
 /// Names the formats that are often handed over in place of text.
 pub(crate) fn refuse_other_formats(head: &[u8]) -> Result<(), Failure> {
-    let known: [(&[u8], &str); 6] = [
-        (
-            b"\x89MCAP",
-            "an MCAP recording; only text tables are read so far",
-        ),
+    let known: [(&[u8], &str); 5] = [
         (b"\xFF\xFE", "UTF-16 text; save it as UTF-8"),
         (b"\xFE\xFF", "UTF-16 text; save it as UTF-8"),
         (

@@ -1,5 +1,6 @@
 //! Rows of numbers out of bytes: the quick way for plain rows, the careful way for the rest.
 
+use super::habit::Habit;
 use super::layout::{Delimiter, Dialect, is_not_a_number, is_skipped};
 use crate::io::number;
 
@@ -85,22 +86,28 @@ impl Rows {
     /// Reads all lines of a piece. Every line ends with a line feed but perhaps the last.
     pub fn read(&mut self, text: &[u8], plan: &RowPlan) {
         self.clear();
+        let mut habit = Habit::of(plan);
         let mut at = 0;
-        // The ends of lines are looked up on their own, so that a row need not wait until the one
-        // before it is read.
-        for line_feed in memchr::memchr_iter(b'\n', text) {
-            if !self.read_line(text, at, line_feed + 1, plan) {
+        while at < text.len() {
+            // A habit is made of a stamp and a value.
+            if let Some(row) = habit.row(text, at, plan) {
+                self.times.push(row.time);
+                self.time_text.push(row.time_text);
+                self.values.push(row.value);
+                self.lines += 1;
+                at = row.end;
+                continue;
+            }
+            let end = line_end(text, at);
+            if !self.read_line(text, at, end, plan) {
                 return;
             }
-            at = line_feed + 1;
-        }
-        if at < text.len() {
-            self.read_line(text, at, text.len(), plan);
+            habit.learn(text, at, plan);
+            at = end;
         }
     }
 
     /// Reads the line `text[at..end]`; `false` if it is wrong.
-    #[inline(always)]
     fn read_line(&mut self, text: &[u8], at: usize, end: usize, plan: &RowPlan) -> bool {
         let before = self.values.len();
         match plan.quick_row(text, at) {
@@ -185,7 +192,7 @@ fn read_cell(cells: &[String], place: usize, decimal: u8) -> Result<f64, (usize,
 
 /// Offset and length of a text in one number.
 #[inline]
-fn span(offset: usize, length: usize) -> u64 {
+pub(super) fn span(offset: usize, length: usize) -> u64 {
     (offset as u64) << 32 | length as u64
 }
 
@@ -202,11 +209,13 @@ fn line_end(text: &[u8], at: usize) -> usize {
     memchr::memchr(b'\n', &text[at..]).map_or(text.len(), |place| at + place + 1)
 }
 
-struct QuickRow {
-    time: f64,
-    time_text: u64,
-    value: f64,
-    end: usize,
+/// A row that was read without looking twice.
+pub(super) struct QuickRow {
+    pub(super) time: f64,
+    pub(super) time_text: u64,
+    pub(super) value: f64,
+    /// Where the next line starts.
+    pub(super) end: usize,
 }
 
 impl RowPlan {
@@ -286,7 +295,7 @@ fn skip_cell(text: &[u8], at: usize, separator: u8) -> Option<usize> {
 
 /// Position of the next line, if the cell ends where a number ended.
 #[inline]
-fn end_of_row(text: &[u8], at: usize, separator: u8) -> Option<usize> {
+pub(super) fn end_of_row(text: &[u8], at: usize, separator: u8) -> Option<usize> {
     match text.get(at) {
         Some(b'\n') => Some(at + 1),
         Some(b'\r') if text.get(at + 1) == Some(&b'\n') => Some(at + 2),

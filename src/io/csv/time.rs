@@ -41,9 +41,33 @@ pub enum TimeSource {
         resampled: bool,
         /// Whether the text of a stamp is a number of seconds as the output writes it.
         copied: bool,
+        /// Nanoseconds at which the stamps are zero.
+        origin_ns: i64,
+    },
+    /// From a rate that the head of the file gives.
+    Header {
+        /// The words that gave it.
+        words: String,
+        /// Time of the first sample.
+        start_s: f64,
     },
     /// From a rate that the user gave; the first sample is at time 0.
     Given,
+}
+
+/// What is known of stamps before their step.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stamps {
+    /// Heading of their column, or what they are.
+    pub heading: String,
+    /// Their unit as written.
+    pub unit: String,
+    /// Seconds per unit.
+    pub seconds_per_unit: f64,
+    /// Whether the text of a stamp is a number of seconds as the output writes it.
+    pub copied: bool,
+    /// Nanoseconds at which they are zero.
+    pub origin_ns: i64,
 }
 
 /// Where and how stamps stop being uniform.
@@ -81,28 +105,60 @@ impl TimeAxis {
             (None, None) => return Err(Failure::failed(missing(layout))),
         };
         let NamedUnit { text, unit } = unit(column, options)?;
-        let typical = typical_step(&rows.times)
-            .ok_or_else(|| Failure::failed(no_step(&column.heading, &rows.times)))?;
-        let seconds_per_unit = unit.factor();
-        let recorded_hz = 1.0 / (typical * seconds_per_unit);
+        let stamps = Stamps {
+            heading: column.heading.clone(),
+            unit: text,
+            seconds_per_unit: unit.factor(),
+            copied: unit.factor() == 1.0 && layout.dialect.decimal == b'.',
+            origin_ns: 0,
+        };
+        Self::of_stamps(stamps, &rows.times, options)
+    }
+
+    /// The time axis of stamps, told from the first of them.
+    ///
+    /// # Errors
+    /// If they do not rise, or are to be resampled to a rate far from theirs.
+    pub fn of_stamps(stamps: Stamps, first: &[f64], options: &Options) -> Result<Self, Failure> {
+        let typical =
+            typical_step(first).ok_or_else(|| Failure::failed(no_step(&stamps.heading, first)))?;
+        let seconds_per_unit = stamps.seconds_per_unit;
         let step = match options.rate_hz {
             None => typical,
             Some(rate_hz) => {
-                check_resampled(rate_hz, recorded_hz)?;
+                check_resampled(rate_hz, 1.0 / (typical * seconds_per_unit))?;
                 1.0 / rate_hz / seconds_per_unit
             }
         };
         Ok(Self {
             source: TimeSource::Stamps {
-                heading: column.heading.clone(),
-                unit: text,
+                heading: stamps.heading,
+                unit: stamps.unit,
                 seconds_per_unit,
                 step,
                 resampled: options.resample,
-                copied: seconds_per_unit == 1.0 && layout.dialect.decimal == b'.',
+                copied: stamps.copied,
+                origin_ns: stamps.origin_ns,
             },
             rate_hz: without_rounding(1.0 / (step * seconds_per_unit)),
         })
+    }
+
+    /// Where the rate comes from, for people.
+    #[must_use]
+    pub fn rate_from(&self) -> String {
+        match &self.source {
+            TimeSource::Given => "given with --rate".to_owned(),
+            TimeSource::Header { words, .. } => format!("from the head of the file: {words}"),
+            TimeSource::Stamps {
+                heading, resampled, ..
+            } if *resampled => {
+                format!("from the stamps in \"{heading}\", interpolated")
+            }
+            TimeSource::Stamps { heading, .. } => {
+                format!("from the uniform stamps in \"{heading}\"")
+            }
+        }
     }
 
     /// Whether stamps are read.
@@ -154,7 +210,7 @@ impl TimeAxis {
                 after: first,
             });
         }
-        let row = times.windows(2).position(|pair| !good(pair[0], pair[1]))? + 1;
+        let row = first_step(times, &good)? + 1;
         Some(Break {
             row,
             before: times[row - 1],
@@ -191,6 +247,19 @@ impl TimeAxis {
         };
         format!("{what}; use --resample to interpolate, or --rate HZ if the stamps are wrong")
     }
+}
+
+/// Index of the first step that is not good. Looks at many at once, since there rarely is one.
+fn first_step(times: &[f64], good: &impl Fn(f64, f64) -> bool) -> Option<usize> {
+    const TOGETHER: usize = 64;
+    let steps = times.len().saturating_sub(1);
+    let is_good = |i: usize| good(times[i], times[i + 1]);
+    let start = (0..steps).step_by(TOGETHER).find(|&start| {
+        let part = &times[start..(start + TOGETHER + 1).min(times.len())];
+        let pairs = part.iter().zip(&part[1..]);
+        !pairs.fold(true, |all, (a, b)| all & good(*a, *b))
+    })?;
+    (start..steps).find(|i| !is_good(*i))
 }
 
 /// The unit of a column of stamps: from the user, or from the heading.
@@ -330,6 +399,7 @@ mod tests {
                 step,
                 resampled,
                 copied: true,
+                origin_ns: 0,
             },
             rate_hz: 1.0 / step,
         }

@@ -298,13 +298,25 @@ impl Sources<'_> {
             };
             found.extend(stamps);
         }
-        let best = found
-            .iter()
-            .position(|stamps| typical_step(&stamps.stamps_s).is_some() && rises(&stamps.stamps_s));
+        // The finest is the one that repeats the fewest stamps.
+        let repeats = |stamps: &Stamps| {
+            stamps
+                .stamps_s
+                .windows(2)
+                .filter(|pair| pair[0] == pair[1])
+                .count()
+        };
+        let best = (0..found.len())
+            .filter(|place| typical_step(&found[*place].stamps_s).is_some())
+            .filter(|place| rises(&found[*place].stamps_s))
+            .min_by_key(|place| repeats(&found[*place]));
         if found.is_empty() {
             return Ok(None);
         }
-        Ok(Some(found.swap_remove(best.unwrap_or(0))))
+        let date = found.iter().find_map(|stamps| stamps.start_text.clone());
+        let mut best = found.swap_remove(best.unwrap_or(0));
+        best.start_text = best.start_text.or(date);
+        Ok(Some(best))
     }
 
     fn clock_stamps(
@@ -360,7 +372,7 @@ impl Sources<'_> {
                 .iter()
                 .map(|stamp| stamp * seconds_per_unit)
                 .collect(),
-            start_text: None,
+            start_text: column.first_ticks.map(|ticks| ticks.to_string()),
             assumed,
         }))
     }
@@ -406,14 +418,11 @@ impl Sources<'_> {
         if let Some(seconds) = epoch_unit(first) {
             return Ok(Some((seconds, None)));
         }
-        let (factor, words) = match first {
-            _ => match self.default_time_unit.and_then(units::read) {
-                Some(unit) => return Ok(Some((unit.unit.factor(), None))),
-                None => (1.0, "seconds"),
-            },
-        };
-        let assumed = format!("\"{}\" gives no unit: {words} were assumed", field.heading);
-        Ok(Some((factor, Some(assumed))))
+        if let Some(unit) = self.default_time_unit.and_then(units::read) {
+            return Ok(Some((unit.unit.factor(), None)));
+        }
+        let assumed = format!("\"{}\" gives no unit: seconds were assumed", field.heading);
+        Ok(Some((1.0, Some(assumed))))
     }
 }
 

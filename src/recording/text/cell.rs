@@ -125,8 +125,9 @@ fn grouped(text: &str, decimal: u8) -> Option<f64> {
     if !good {
         return None;
     }
-    let plain: String = text.chars().filter(|c| *c != mark).collect();
-    number::cell(&plain, decimal)
+    let sign = &text[..text.len() - body.len()];
+    let digits: String = whole.chars().filter(|c| *c != mark).collect();
+    number::cell(&format!("{sign}{digits}{}", &body[end..]), decimal)
 }
 
 #[cfg(test)]

@@ -157,8 +157,7 @@ pub fn find_in(head: &Head, told: &Told) -> Result<Table, Failure> {
         .filter_map(|dialect| Found::of(head, *dialect, strict_row))
         .collect();
     if let Some(best) = best(&strict) {
-        refuse_ambiguous(head, &strict, best)?;
-        return Ok(best.table.clone());
+        return Ok(unambiguous(head, &strict, best)?.table.clone());
     }
     let lenient: Vec<Found> = all
         .iter()
@@ -260,7 +259,10 @@ fn first_row(shapes: &[(usize, Option<Shape>)]) -> Option<usize> {
         };
         let mostly = rows_after[*place] as f64 >= MOSTLY * (shapes.len() - place) as f64;
         let next = shapes.get(place + 1).and_then(|(_, shape)| *shape);
-        mostly && (shape.width == usual || next.is_none_or(|next| next.width == shape.width))
+        // A line of numbers below a key of its own, with text after it, is no row.
+        let is_alone = place + 1 < shapes.len() && next.is_none();
+        let fits = shape.width == usual || next.is_none_or(|next| next.width == shape.width);
+        mostly && fits && !is_alone
     };
     (0..shapes.len()).find(is_first)
 }
@@ -288,8 +290,9 @@ fn best(found: &[Found]) -> Option<&Found> {
     })
 }
 
-/// Asks where a comma can be read in two ways that explain all rows.
-fn refuse_ambiguous(head: &Head, found: &[Found], best: &Found) -> Result<(), Failure> {
+/// The best way to read, unless a comma can be read in two ways that explain all rows: then headings
+/// settle it, or the user is asked.
+fn unambiguous<'a>(head: &Head, found: &'a [Found], best: &'a Found) -> Result<&'a Found, Failure> {
     let equal = |other: &&Found| other.rows == best.rows && other.table != best.table;
     let comma = Delimiter::Byte(b',');
     let (line, text) = {
@@ -297,7 +300,7 @@ fn refuse_ambiguous(head: &Head, found: &[Found], best: &Found) -> Result<(), Fa
         (head.number(line), head.lines[line].text.trim())
     };
     if !text.contains(',') {
-        return Ok(());
+        return Ok(best);
     }
     let shown: String = text.chars().take(60).collect();
     // 0,5 between cells or as a decimal mark; headings with as many cells settle it.
@@ -308,15 +311,13 @@ fn refuse_ambiguous(head: &Head, found: &[Found], best: &Found) -> Result<(), Fa
         f.table.dialect.decimal == b',' && f.table.dialect.delimiter != comma && f.rows == best.rows
     });
     if let (Some(separator), Some(_)) = (separator, decimal) {
-        let is_settled = best.table.dialect.delimiter == comma
-            && separator.table.width > 1
-            && has_heading(head, &separator.table);
-        if !is_settled {
-            return Err(Failure::failed(format_args!(
-                "line {line}: \"{shown}\" can be read with the comma between cells or as a decimal \
-                 mark; say which with --delimiter , or --decimal ,"
-            )));
+        if separator.table.width > 1 && has_heading(head, &separator.table) {
+            return Ok(separator);
         }
+        return Err(Failure::failed(format_args!(
+            "line {line}: \"{shown}\" can be read with the comma between cells or as a decimal \
+             mark; say which with --delimiter , or --decimal ,"
+        )));
     }
     // 1,234 with a decimal comma or with a mark between thousands.
     let dialect = best.table.dialect;
@@ -331,7 +332,7 @@ fn refuse_ambiguous(head: &Head, found: &[Found], best: &Found) -> Result<(), Fa
              thousands; say which with --decimal , or --decimal ."
         )));
     }
-    Ok(())
+    Ok(best)
 }
 
 /// Whether a line above the table splits into as many texts as the table has columns.

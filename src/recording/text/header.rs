@@ -71,6 +71,14 @@ impl Field {
         } = units::heading(heading);
         let below = unit.and_then(|unit| unit_of(&name, unit));
         let below_text = unit.and_then(units::as_written);
+        // Under a name with a unit below, what looks like a unit at its end may be none.
+        let is_plain = !heading.contains(['[', '(', '/']);
+        let name = match &below {
+            Some(_) if is_plain => heading.to_owned(),
+            _ => name,
+        };
+        let own = own.filter(|_| below.is_none() || !is_plain);
+        let unit_text = unit_text.filter(|_| own.is_some() || below.is_none());
         Self {
             heading: heading.to_owned(),
             name,
@@ -134,6 +142,12 @@ pub fn read(head: &Head, table: &Table, used: &[bool]) -> Header {
             .flat_map(|row| keys::entries(head.number(row.line), row.text, table.dialect))
             .collect()
     };
+    let keyed = entries_below_keys(head, &rows);
+    let entries = |without: &[usize]| -> Vec<Entry> {
+        let mut all = entries(without);
+        all.extend(keyed.iter().cloned());
+        all
+    };
     if let Some((fields, names)) = labelled(&rows, used) {
         return Header {
             fields,
@@ -153,6 +167,21 @@ pub fn read(head: &Head, table: &Table, used: &[bool]) -> Header {
         entries,
         names: found.names.map(|line| head.lines[line].text.clone()),
     }
+}
+
+/// Keys in a line of their own with their values in the next: `dt:` above `0.001`.
+fn entries_below_keys(head: &Head, rows: &[Row]) -> Vec<Entry> {
+    rows.windows(2)
+        .filter(|pair| pair[1].line == pair[0].line + 1)
+        .filter_map(|pair| {
+            let key = pair[0].text.trim().strip_suffix(':')?;
+            Some(Entry {
+                line: head.number(pair[0].line),
+                key: key.to_owned(),
+                values: pair[1].cells.clone(),
+            })
+        })
+        .collect()
 }
 
 /// Splits a line above the table as the table is split, or, if that does not give a cell for each
@@ -245,9 +274,11 @@ fn labelled(rows: &[Row], used: &[bool]) -> Option<(Vec<Field>, usize)> {
         .rev()
         .filter(wide)
         .find(|row| is_name_label(&row.cells[0]))?;
+    let block = block_around(rows, names.line);
     let others: Vec<&Row> = rows
         .iter()
-        .filter(|row| row.line != names.line && row.cells.len() > 1 && !row.cells[0].is_empty())
+        .filter(|row| row.line != names.line && block.contains(&row.line))
+        .filter(|row| row.cells.len() > 1 && !row.cells[0].is_empty())
         .filter(|row| row.cells.len() + 1 >= used.len())
         .collect();
     let about = |topic: Topic| {
@@ -306,6 +337,22 @@ fn labelled(rows: &[Row], used: &[bool]) -> Option<(Vec<Field>, usize)> {
     Some((fields, names.line))
 }
 
+/// The lines around one that no empty line parts from it.
+fn block_around(rows: &[Row], line: usize) -> std::ops::RangeInclusive<usize> {
+    let (mut first, mut last) = (line, line);
+    for row in rows {
+        if row.line == last + 1 {
+            last = row.line;
+        }
+    }
+    for row in rows.iter().rev() {
+        if row.line + 1 == first {
+            first = row.line;
+        }
+    }
+    first..=last
+}
+
 /// Columns named by the rows nearest above the data, and which lines those are.
 struct Positional {
     fields: Vec<Field>,
@@ -335,7 +382,7 @@ fn positional(rows: &[Row], table: &Table, used: &[bool]) -> Positional {
             (*above, Some(*below), Some(*below))
         }
         [below, above, ..] if is_units(&below.cells) => (*above, Some(*below), None),
-        [only, ..] if is_units(&only.cells) => (*only, Some(*only), None),
+        [only, ..] if is_nothing_but_units(&only.cells) => (*only, Some(*only), None),
         [names, ..] => (*names, None, None),
     };
     let mut lines = vec![names.line];
@@ -426,7 +473,9 @@ fn is_key_block(fitting: &[&Row], used: &[bool]) -> bool {
     });
     let (key, values) = (&nearest.cells[0], &nearest.cells[1..]);
     let is_known = keys::topic(key).is_some() && values.iter().all(|v| units::read(v).is_none());
-    two && !is_time && !is_units(&nearest.cells) && (fitting.len() > 2 || is_known)
+    // An empty line parts headings from keys.
+    let in_block = fitting.len() > 2 && fitting[1].line + 1 == nearest.line;
+    two && !is_time && !is_units(&nearest.cells) && (in_block || is_known)
 }
 
 /// Whether cells are units: all of them, or some where others repeat, or most are in brackets.
@@ -452,6 +501,12 @@ fn is_units(cells: &[String]) -> bool {
         .iter()
         .any(|cell| filled.iter().filter(|c| c == &cell).count() > 1);
     known > 0 && (repeats || 2 * like > filled.len()) || bracketed > 0 && bracketed == filled.len()
+}
+
+/// Whether a lone line above the data names its columns by their units: `s,V`.
+fn is_nothing_but_units(cells: &[String]) -> bool {
+    let mut filled = cells.iter().filter(|cell| !cell.is_empty()).peekable();
+    filled.peek().is_some() && filled.all(|cell| NamedUnit::parse(cell).is_some())
 }
 
 /// Whether the first cell is a unit of time under the name of time, and the others are remarks:

@@ -260,6 +260,10 @@ pub fn entries(line: usize, text: &str, dialect: Dialect) -> Vec<Entry> {
         .trim()
         .trim_start_matches(['#', '%', '!', '*', ';', '/'])
         .trim();
+    // `Abtastrate = 2,5 kHz` is one value, whatever the table's mark.
+    if let Some(entry) = one_cell(line, text).filter(is_quantity) {
+        return vec![entry];
+    }
     let cells = split(text, dialect);
     // `CH1V,CH2V,t0 =-5e-05, tInc = 1e-09,`: cells of their own.
     let assignments: Vec<Entry> = cells
@@ -286,6 +290,16 @@ pub fn entries(line: usize, text: &str, dialect: Dialect) -> Vec<Entry> {
         }
         _ => one_cell(line, text).into_iter().collect(),
     }
+}
+
+/// Whether the value is a number with or without a unit, and nothing else.
+fn is_quantity(entry: &Entry) -> bool {
+    let Some(text) = entry.value() else {
+        return false;
+    };
+    let is_unit = |c: char| c.is_alphabetic() || matches!(c, '/' | '%' | ' ' | '°' | '²');
+    text.starts_with(|c: char| c.is_ascii_digit() || c == '-' || c == '+')
+        && quantity(text, b'.').is_some_and(|(_, unit)| unit.chars().all(is_unit))
 }
 
 /// `Sampling Frequency - 5000`, `Date: 1.2.2024`, `T0 = 5`.

@@ -19,7 +19,6 @@ mod units;
 use super::{Recording, Segment};
 use crate::failure::Failure;
 use crate::io::csv::{self, Dialect, Options};
-use crate::report::Warning;
 
 pub use clock::Clock;
 use decode::Text;
@@ -29,6 +28,10 @@ use table::Hints;
 
 /// Bytes that a maker is told from.
 const FOR_MAKER: usize = 1 << 14;
+/// Fewest numbers in a text of one line that are the samples of one channel.
+const ONE_LINE: usize = 32;
+/// Most tables below each other.
+const MOST_TABLES: usize = 1000;
 /// Most details that are kept.
 const DETAILS: usize = 100;
 
@@ -62,12 +65,6 @@ pub fn read(source: &str, bytes: Vec<u8>, options: &Options) -> Result<Recording
     }
     recording.dialect = words.join(", ");
     recording.warnings.splice(0..0, text.warnings);
-    let holes: Vec<Warning> = recording
-        .channels
-        .iter()
-        .filter_map(table::holes_warning)
-        .collect();
-    recording.warnings.extend(holes);
     Ok(recording)
 }
 
@@ -119,30 +116,87 @@ pub fn is_plain(head: &[u8], complete: bool, options: &Options) -> bool {
         .iter()
         .filter(|field| field.is_named_time())
         .count();
+    let has_marks = head.lines[table.first..].iter().any(|line| {
+        let cells = table.dialect.cells(&line.text);
+        let read = |cell: &String| cell::Cell::read(cell, table.dialect.decimal);
+        cells
+            .iter()
+            .any(|cell| matches!(read(cell), cell::Cell::Grouped(_)))
+    });
+    let first_row = head.number(table::first_row(&head, &table, &header));
     same_columns
+        && !has_marks
         && layout.dialect == table.dialect
-        && layout.data_line == head.number(table::first_row(&head, &table, &header))
+        && (layout.data_line == first_row || begins_with_number(&layout, &text.bytes))
         && wanted
             .iter()
             .all(|kind| *kind == Some(rows::Wanted::Numbers))
         && times <= 1
 }
 
+/// Whether the first row that the quick reader sees begins as a row does: with something wrong behind
+/// that, it refuses the row, while this reader would begin after it.
+fn begins_with_number(layout: &csv::Layout, text: &[u8]) -> bool {
+    let line = text.split(|byte| *byte == b'\n').nth(layout.data_line - 1);
+    let line = head::decode(line.unwrap_or(&[]));
+    let cells = layout.dialect.cells(&line);
+    cells
+        .first()
+        .is_some_and(|cell| crate::io::number::cell(cell, layout.dialect.decimal).is_some())
+}
+
 /// A table, or several below each other under the same headings.
 fn general(text: &Text, hints: Hints, options: &Options) -> Result<Recording, Failure> {
     let mut parts = Vec::new();
     let (mut from, mut number) = (0, 1);
-    while from < text.bytes.len() {
+    if let Some(column) = one_line(&text.bytes, options) {
+        let part = table::read(&column, 0, 1, hints, options, &|_| false)?;
+        return Ok(recording_of(vec![part]));
+    }
+    loop {
         let part = match table::read(&text.bytes, from, number, hints, options, &|_| false) {
             Ok(part) => part,
             // What follows the last table need not be one.
             Err(_) if !parts.is_empty() => break,
             Err(failure) => return Err(failure),
         };
+        let is_last = part.end >= text.bytes.len() || part.end <= from;
         (from, number) = (part.end, part.next_line);
         parts.push(part);
+        if is_last {
+            break;
+        }
+        if parts.len() > MOST_TABLES {
+            return Err(Failure::failed(format_args!(
+                "line {number}: there are more than {MOST_TABLES} tables below each other; split the \
+                 file"
+            )));
+        }
     }
     Ok(recording_of(parts))
+}
+
+/// The numbers of a text that is one line of them, each in a line of its own: some oscilloscopes write
+/// the samples so.
+fn one_line(text: &[u8], options: &Options) -> Option<Vec<u8>> {
+    let line = text.trim_ascii();
+    if line.contains(&b'\n') || options.told.delimiter.is_some() {
+        return None;
+    }
+    let mark = *[b'\t', b';', b',', b' ']
+        .iter()
+        .find(|mark| line.contains(mark))?;
+    let decimal = options.told.decimal.unwrap_or(b'.');
+    let cells = line.split(|byte| *byte == mark);
+    let numbers = cells.clone().filter(|cell| !cell.is_empty()).all(|cell| {
+        std::str::from_utf8(cell).is_ok_and(|cell| crate::io::number::cell(cell, decimal).is_some())
+    });
+    let is_long = cells.count() >= ONE_LINE;
+    (numbers && is_long).then(|| {
+        line.iter()
+            .map(|byte| if *byte == mark { b'\n' } else { *byte })
+            .collect()
+    })
 }
 
 /// Puts tables together as the segments of a recording.

@@ -2,6 +2,7 @@
 
 use super::cell::Cell;
 use super::clock::{Clock, DAY};
+use crate::failure::Failure;
 use crate::io::csv::{Delimiter, Dialect, is_skipped};
 use crate::io::number;
 use crate::recording::{Hole, HoleKind};
@@ -51,15 +52,25 @@ pub struct Rows {
     pub odd_count: usize,
     /// Rows with more cells than columns; the first one's line.
     pub too_wide: Option<usize>,
+    /// Empty cells that may still be filled in; they cost memory that the file need not have.
+    budget: usize,
+    /// Line at which there was no budget left.
+    too_ragged: Option<usize>,
     /// Row and line of each first row after a line that is no row.
     breaks: Vec<(usize, usize)>,
 }
 
+/// Empty cells that any file may have, besides one for each byte.
+const FREE_CELLS: usize = 1 << 20;
 /// Odd lines that are kept to be shown.
 const ODD_LINES: usize = 5;
 
 /// Reads rows from `text[from..]`, whose first line has the number `line`, until `stop` says so of a
 /// line that is no row.
+///
+/// # Errors
+/// If the rows have so different lengths that the cells between would need far more memory than the
+/// file.
 pub fn read(
     text: &[u8],
     from: usize,
@@ -67,8 +78,9 @@ pub fn read(
     dialect: Dialect,
     wanted: &[Wanted],
     stop: &dyn Fn(&str) -> bool,
-) -> Rows {
+) -> Result<Rows, Failure> {
     let mut rows = Rows {
+        budget: text.len() + FREE_CELLS,
         columns: vec![Column::default(); wanted.len()],
         end: text.len(),
         ..Rows::default()
@@ -86,7 +98,13 @@ pub fn read(
         rows.lines += 1;
         at = end + 1;
     }
-    rows
+    match rows.too_ragged {
+        None => Ok(rows),
+        Some(line) => Err(Failure::failed(format_args!(
+            "line {line} is so much longer than the rows before it that these would need more memory \
+             than the whole file; expected rows of about the same number of cells"
+        ))),
+    }
 }
 
 /// Without the carriage returns at the end.
@@ -146,6 +164,12 @@ impl Rows {
             if let Some(value) = value {
                 let column = &mut self.columns[place];
                 if column.values.len() != row {
+                    let empty = row - column.values.len();
+                    if empty > self.budget {
+                        self.too_ragged = Some(number);
+                        return false;
+                    }
+                    self.budget -= empty;
                     column.fill(row, &self.breaks);
                 }
                 column.values.push(value);
@@ -208,7 +232,7 @@ impl Rows {
         stop: &dyn Fn(&str) -> bool,
     ) -> bool {
         let text = super::head::decode(line);
-        if stop(&text) {
+        if stop(&text) || self.too_ragged.is_some() {
             return false;
         }
         if is_skipped(&text) && !is_all_separators(&text, plan.dialect) {
@@ -257,6 +281,12 @@ impl Rows {
             (_, Cell::NonFinite) => Err(HoleKind::NonFinite),
             _ => Err(HoleKind::Text),
         };
+        let empty = row - column.values.len().min(row);
+        if empty > self.budget {
+            self.too_ragged = Some(line);
+            return;
+        }
+        self.budget -= empty;
         if column.values.len() < row {
             column.fill(row, &self.breaks);
         }

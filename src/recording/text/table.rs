@@ -8,7 +8,7 @@ use super::keys::{Entry, Topic};
 use super::rows::{self, Rows, Wanted};
 use crate::failure::Failure;
 use crate::io::csv::{Dialect, Options, is_skipped};
-use crate::recording::{Channel, Hole, HoleKind};
+use crate::recording::Channel;
 use crate::report::Warning;
 
 /// Rows that tell what a column holds.
@@ -82,7 +82,7 @@ pub fn read_at(
     let is_next = |line: &str| stop(line) || names.as_deref() == Some(line);
     let offset = head.lines[first].offset;
     let number = head.number(first);
-    let mut rows = rows::read(text, offset, number, table.dialect, &wanted, &is_next);
+    let mut rows = rows::read(text, offset, number, table.dialect, &wanted, &is_next)?;
     let lost = drop_cut_row(text, table.dialect, &mut rows);
     if let Some(unit) = hints.unit {
         default_units(&mut header, unit);
@@ -135,7 +135,7 @@ pub fn wanted(head: &Head, table: &Table) -> Vec<Option<Wanted>> {
             match Cell::read(cell, table.dialect.decimal) {
                 Cell::Number(_) | Cell::Grouped(_) | Cell::NonFinite => {
                     count.numbers += 1;
-                    let is_long = cell.len() > 15 && cell.parse::<i64>().is_ok();
+                    let is_long = cell.len() > 12 && cell.parse::<i64>().is_ok();
                     count.ticks += usize::from(is_long);
                 }
                 Cell::Clock(_) => count.clocks += 1,
@@ -182,7 +182,7 @@ pub fn first_row(head: &Head, table: &Table, header: &Header) -> usize {
                 .collect();
             let numbers = read.iter().filter(|cell| cell.is_number()).count();
             numbers > 0
-                && read.len() == table.width
+                && read.len() >= table.width
                 && !cells[0].is_empty()
                 && read[0] != Cell::Text
         })
@@ -303,38 +303,4 @@ fn count_differs(entries: &[Entry], rows: usize, dialect: Dialect) -> Option<War
             ),
         )
     })
-}
-
-/// Cells that hold no number, counted by kind, as a warning for a channel.
-#[must_use]
-pub fn holes_warning(channel: &Channel) -> Option<Warning> {
-    let count = |kind: HoleKind| {
-        channel
-            .holes
-            .iter()
-            .filter(|hole| hole.what == kind)
-            .count()
-    };
-    let first: &Hole = channel.holes.first()?;
-    let kinds = [
-        (HoleKind::Empty, "empty"),
-        (HoleKind::NonFinite, "not finite"),
-        (HoleKind::Text, "text"),
-    ];
-    let what: Vec<String> = kinds
-        .iter()
-        .filter(|(kind, _)| count(*kind) > 0)
-        .map(|(kind, word)| format!("{} {word}", count(*kind)))
-        .collect();
-    Some(Warning::new(
-        "non-finite",
-        format!(
-            "channel \"{}\": {} of {} cells hold no number ({}), the first in line {}",
-            channel.name,
-            channel.holes.len(),
-            channel.samples.len(),
-            what.join(", "),
-            first.line
-        ),
-    ))
 }

@@ -127,13 +127,16 @@ pub struct Heading {
 /// a unit in brackets before other words, units in square brackets that are not known.
 #[must_use]
 pub fn heading(text: &str) -> Heading {
-    let text = text.trim().trim_matches('"').trim();
+    // "Zeit" t / s
+    let unquoted = text.replace('"', "");
+    let text = unquoted.trim();
     let column = crate::io::csv::Column::read(text, None);
     if let Some(unit) = column.unit {
         return Heading::new(column.name, Some(unit), None);
     }
     if let Some((name, inside)) = bracket(text) {
-        let known = read(inside);
+        let is_seconds = inside == "S" && is_time_name(&name);
+        let known = read(if is_seconds { "s" } else { inside });
         let unknown = as_written(inside).filter(|_| known.is_none());
         if known.is_some() || unknown.is_some() {
             return Heading::new(name, known, unknown);
@@ -162,12 +165,7 @@ pub fn heading(text: &str) -> Heading {
         let name = if is_time(&unit) { "time" } else { text };
         return Heading::new(name.to_owned(), Some(unit), None);
     }
-    let name = match text.split_once(' ') {
-        // "U_k" U_k
-        Some((first, second)) if first == second => first,
-        _ => text,
-    };
-    Heading::new(name.to_owned(), time_word(text), None)
+    Heading::new(text.to_owned(), time_word(text), None)
 }
 
 /// The unit of time that is part of a name of time: `millis`, `Time ms`, `elapsed seconds`.
@@ -211,7 +209,11 @@ fn time_word(text: &str) -> Option<NamedUnit> {
 impl Heading {
     fn new(name: String, unit: Option<NamedUnit>, unknown: Option<String>) -> Self {
         Self {
-            name,
+            // "U_k" U_k
+            name: match name.split_once(' ') {
+                Some((first, second)) if first == second => first.to_owned(),
+                _ => name,
+            },
             unit_text: unit.as_ref().map(|unit| unit.text.clone()).or(unknown),
             unit,
         }
@@ -235,6 +237,7 @@ fn bracket(text: &str) -> Option<(String, &str)> {
                 && inside.chars().count() <= 16
                 && !inside.contains(odd)
                 || read(inside).is_some()
+                || inside == "S"
                 || inside.len() <= 8 && inside.contains(['/', '%', '°', '²', '^', 'µ']);
             if looks_like_unit && !inside.is_empty() {
                 let rest = [text[..start].trim(), text[start + length + 1..].trim()];
@@ -418,7 +421,7 @@ mod tests {
             ("C1 in V", "C1", Some("V"), true),
             ("in s", "time", Some("s"), true),
             ("U/V", "U", Some("V"), true),
-            ("\"Zeit\" t / s", "\"Zeit\" t", Some("s"), true),
+            ("\"Zeit\" t / s", "Zeit t", Some("s"), true),
             ("Kraft, N", "Kraft", Some("N"), true),
             ("Time (s) Run #1", "Time Run #1", Some("s"), true),
             ("Flow [l/min]", "Flow", Some("l/min"), false),

@@ -77,7 +77,7 @@ fn read(text: &Text, options: &Options) -> Result<Recording, Failure> {
             start_text: joined(&header.dates, &header.times, 0),
         };
         let channels =
-            segment_channels(&mut lines, &file, &header, &names, options, &mut recording);
+            segment_channels(&mut lines, &file, &header, &names, options, &mut recording)?;
         segment.start_s = channels.first().and_then(|channel| channel.axis.start_s);
         recording.channels.extend(channels);
         recording.segments.push(segment);
@@ -117,6 +117,23 @@ impl Cursor<'_> {
         Some(line.trim_end_matches('\r').to_owned())
     }
 
+    /// The decimal mark of the numbers in the header of the first segment, where the file does not
+    /// say it: `X0` is written with decimals.
+    fn decimal(&self, separator: u8) -> u8 {
+        let rest = &self.text[self.at.min(self.text.len())..];
+        let head = &rest[..rest.len().min(1 << 14)];
+        let start = memchr::memmem::find(head, b"\nX0").map_or(0, |place| place + 1);
+        let line = head[start..]
+            .split(|byte| *byte == b'\n')
+            .next()
+            .unwrap_or_default();
+        if separator != b',' && start > 0 && line.contains(&b',') {
+            b','
+        } else {
+            b'.'
+        }
+    }
+
     /// Goes to the next line that begins so; it is the next to be read.
     fn skip_to(&mut self, start: &str) -> bool {
         loop {
@@ -135,7 +152,7 @@ impl Cursor<'_> {
 
 fn file_header(lines: &mut Cursor, options: &Options) -> File {
     let mut separator = b'\t';
-    let mut decimal = b'.';
+    let mut decimal = None;
     let mut stamps = Stamps::No;
     let mut details = Vec::new();
     while let Some(line) = lines.next() {
@@ -149,7 +166,7 @@ fn file_header(lines: &mut Cursor, options: &Options) -> File {
         match key {
             "Separator" if value.starts_with("Comma") => separator = b',',
             "Separator" if value.starts_with("Semicolon") => separator = b';',
-            "Decimal_Separator" if value.starts_with(',') => decimal = b',',
+            "Decimal_Separator" => decimal = value.bytes().next(),
             "X_Columns" if value.starts_with("One") => stamps = Stamps::One,
             "X_Columns" if value.starts_with("Multi") => stamps = Stamps::Multi,
             _ => {}
@@ -161,7 +178,11 @@ fn file_header(lines: &mut Cursor, options: &Options) -> File {
     }
     let dialect = Dialect {
         delimiter: options.told.delimiter.unwrap_or(Delimiter::Byte(separator)),
-        decimal: options.told.decimal.unwrap_or(decimal),
+        decimal: options
+            .told
+            .decimal
+            .or(decimal)
+            .unwrap_or_else(|| lines.decimal(separator)),
     };
     File {
         dialect,
@@ -212,7 +233,7 @@ fn segment_channels(
     names: &str,
     options: &Options,
     recording: &mut Recording,
-) -> Vec<Channel> {
+) -> Result<Vec<Channel>, Failure> {
     let names = file.dialect.cells(names);
     // Names may go beyond the channels that the header counts, but for the comments.
     let named = names
@@ -238,7 +259,7 @@ fn segment_channels(
         file.dialect,
         &wanted,
         &is_next,
-    );
+    )?;
     lines.at = read.end;
     lines.number += read.lines;
     let segment = recording.segments.len();
@@ -261,7 +282,7 @@ fn segment_channels(
         }
         channels.push(channel(&field, column, axis, Some(segment)));
     }
-    channels
+    Ok(channels)
 }
 
 fn axis(file: &File, header: &Header, place: usize, times: &Column, options: &Options) -> Axis {

@@ -77,7 +77,7 @@ fn read(text: &Text, options: &Options) -> Result<Recording, Failure> {
         return Err(Failure::failed("the file ends before its first sample"));
     };
     let wanted = vec![Wanted::Numbers; start.width];
-    let read = rows::read(&text.bytes, first.offset, 3, DIALECT, &wanted, &|_| false);
+    let read = rows::read(&text.bytes, first.offset, 3, DIALECT, &wanted, &|_| false)?;
     let mut recording = empty();
     recording.dialect = describe(DIALECT);
     let mut axis = Axis::of_header(

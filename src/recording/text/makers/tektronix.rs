@@ -97,7 +97,7 @@ fn read(text: &Text, options: &Options) -> Result<Recording, Failure> {
         wanted[place + 3] = Wanted::Numbers;
         wanted[place + 4] = Wanted::Numbers;
     }
-    let read = rows::read(&text.bytes, 0, 1, dialect, &wanted, &|_| false);
+    let read = rows::read(&text.bytes, 0, 1, dialect, &wanted, &|_| false)?;
     let mut recording = empty();
     recording.dialect = describe(dialect);
     for place in blocks {

@@ -33,7 +33,7 @@ fn lvm_of_two_segments_with_comments() {
     assert_eq!(found.channels[2].axis.start_s, Some(5.0));
     assert_eq!(found.channels[2].segment, Some(1));
     assert_eq!(found.channels[1].holes.len(), 1);
-    assert_eq!(found.channels[1].holes[0].line, 25);
+    assert_eq!(found.channels[1].holes[0].line, 24);
     assert!(found.dialect.contains("LabVIEW LVM") && found.dialect.contains("2 segments"));
     assert_eq!(found.lost, None);
 }

@@ -1,6 +1,7 @@
 //! Samples of every dialect, written from what is known of the formats.
 
 mod makers;
+mod others;
 mod plain;
 mod wrong;
 

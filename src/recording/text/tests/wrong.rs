@@ -26,6 +26,13 @@ fn what_is_no_recording_is_refused() {
     assert!(failure(&text).contains("settings"), "{}", failure(&text));
 }
 
+#[test]
+fn rows_of_wild_lengths_do_not_fill_the_memory() {
+    let wide = "1,".repeat(8000) + "1\n";
+    let text = format!("{wide}{wide}{}{wide}", "1\n".repeat(2_000));
+    assert!(failure(&text).contains("longer than the rows before"));
+}
+
 const SAMPLES: [&str; 6] = [
     "LabVIEW Measurement\t\nSeparator\tTab\nX_Columns\tMulti\n***End_of_Header***\t\nChannels\t2\t\t\n\
      Samples\t2\t\t2\nX0\t0\t\t0\nDelta_X\t1\t\t1\n***End_of_Header***\nX_Value\tA\tX_Value\tB\tComment\n0\t1\t0\t2\n1\t2\t1\t3\n",

@@ -1,7 +1,9 @@
 //! The rows of a result as text.
 
+use crate::io::csv::{TimeAxis, TimeSource};
 use crate::io::digits::{self, Decimal, Digits};
 use crate::io::text::Text;
+use crate::signal::Batch;
 
 /// Rows whose numbers are taken apart together.
 const ROWS_TOGETHER: usize = 8;
@@ -21,8 +23,38 @@ pub(super) enum Times<'a> {
     Copied { text: &'a [u8], spans: &'a [u64] },
     /// Stamps in another unit, times seconds per unit.
     Stamps { times: &'a [f64], seconds: f64 },
+    /// Nanoseconds from an origin, in nanoseconds.
+    Nanoseconds { times: &'a [f64], origin: i64 },
     /// A grid: start, index of the first sample, rate.
     Grid { start_s: f64, first: usize },
+}
+
+impl<'a> Times<'a> {
+    /// The times of a batch whose first sample is the `first` of the record.
+    pub(super) fn of(batch: &'a Batch, time: &TimeAxis, start_s: f64, first: usize) -> Self {
+        let times = &batch.rows.times;
+        match &time.source {
+            TimeSource::Given
+            | TimeSource::Header { .. }
+            | TimeSource::Stamps {
+                resampled: true, ..
+            } => Self::Grid { start_s, first },
+            TimeSource::Stamps { copied: true, .. } => Self::Copied {
+                text: &batch.text,
+                spans: &batch.rows.time_text,
+            },
+            TimeSource::Stamps { origin_ns, .. } if *origin_ns != 0 => Self::Nanoseconds {
+                times,
+                origin: *origin_ns,
+            },
+            TimeSource::Stamps {
+                seconds_per_unit, ..
+            } => Self::Stamps {
+                times,
+                seconds: *seconds_per_unit,
+            },
+        }
+    }
 }
 
 impl Rows<'_> {
@@ -76,7 +108,15 @@ impl Rows<'_> {
             for (decimal, value) in decimals.iter_mut().zip(values) {
                 *decimal = Decimal::of(value * self.scale, count);
             }
-            for (decimal, i) in decimals[..values.len()].iter().zip(first..) {
+            let decimals = &decimals[..values.len()];
+            if let (Times::Copied { text, spans }, true) = (&self.times, recorded.is_empty()) {
+                for (decimal, span) in decimals.iter().zip(&spans[first..]) {
+                    let (offset, length) = crate::io::csv::place_of(*span);
+                    out.row(text, offset, length, decimal);
+                }
+                continue;
+            }
+            for (decimal, i) in decimals.iter().zip(first..) {
                 self.write_time(out, i, time_digits);
                 out.decimal(decimal);
                 self.end_row(out, recorded.get(i));
@@ -92,6 +132,7 @@ impl Rows<'_> {
                 out.copy(text, offset, length);
             }
             Times::Stamps { times, seconds } => out.number(times[i] * seconds, digits),
+            Times::Nanoseconds { times, origin } => out.seconds(origin + times[i] as i64),
             Times::Grid { .. } => out.number(self.time_s(i), digits),
         }
         out.byte(b',');
@@ -106,6 +147,17 @@ impl Rows<'_> {
         out.byte(b'\n');
     }
 
+    /// Time of the row `i` in ns; a grid begins at `start_ns`.
+    pub(super) fn time_ns(&self, i: usize, start_ns: i64) -> i64 {
+        match &self.times {
+            Times::Nanoseconds { times, origin } => origin + times[i] as i64,
+            Times::Grid { first, .. } => {
+                start_ns + (1e9 * (first + i) as f64 / self.rate_hz).round() as i64
+            }
+            _ => (1e9 * self.time_s(i)).round() as i64,
+        }
+    }
+
     /// Time of the row `i`.
     pub(super) fn time_s(&self, i: usize) -> f64 {
         match &self.times {
@@ -114,6 +166,7 @@ impl Rows<'_> {
                 crate::io::number::read(text, offset, b'.').map_or(f64::NAN, |(value, _)| value)
             }
             Times::Stamps { times, seconds } => times[i] * seconds,
+            Times::Nanoseconds { times, origin } => (*origin as f64 + times[i]) * 1e-9,
             Times::Grid { start_s, first } => start_s + (first + i) as f64 / self.rate_hz,
         }
     }

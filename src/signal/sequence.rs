@@ -1,80 +1,22 @@
-//! A table read piece by piece, and what is wrong with it, in order.
+//! What is wrong with a signal, found while its pieces pass in order.
 
-use std::io::Read;
-
-use super::Table;
-use super::chunks::{Chunks, Piece};
-use super::scan::{Defect, Problem, RowPlan, Rows};
-use super::time::{Break, TimeAxis, TimeSource};
+use super::feed::{Batch, Fetch};
 use crate::failure::Failure;
+use crate::io::csv::{Break, Defect, Problem, RowPlan, Rows, TimeAxis, TimeSource};
 use crate::report::Warning;
 
-/// Bytes of a piece: large enough to be quick, small enough to stay in cache.
-const PIECE: usize = 1 << 17;
 /// Difference of the mean rate from that of the first rows that is worth a warning.
 const RATE_DRIFT: f64 = 1e-4;
-
-/// A piece of a file and the rows in it.
-#[derive(Debug, Default)]
-pub struct Batch {
-    /// The bytes.
-    pub text: Vec<u8>,
-    /// What they say.
-    pub rows: Rows,
-    /// Whether the last line has no line feed.
-    unended: bool,
-    /// First irregular time stamp within the piece.
-    time_break: Option<Break>,
-}
-
-impl Batch {
-    /// Reads the rows and checks their stamps. Needs no other batch.
-    pub fn read_rows(&mut self, plan: &RowPlan, time: &TimeAxis) {
-        self.rows.read(&self.text, plan);
-        self.time_break = time.first_break(None, &self.rows.times);
-    }
-}
-
-/// Gets pieces of a file.
-pub struct Fetch {
-    source: String,
-    chunks: Chunks,
-}
-
-impl Fetch {
-    pub(super) fn new(
-        source: String,
-        head: Vec<u8>,
-        input: Box<dyn Read + Send>,
-        bytes: usize,
-    ) -> Self {
-        Self {
-            source,
-            chunks: Chunks::new(head, input, bytes.max(PIECE)),
-        }
-    }
-
-    /// Fills a batch with the next piece; `false` at the end.
-    ///
-    /// # Errors
-    /// If the file cannot be read.
-    pub fn next(&mut self, batch: &mut Batch) -> Result<bool, Failure> {
-        let piece = self.chunks.next(&mut batch.text).map_err(|error| {
-            Failure::failed(format_args!("{}: cannot be read: {error}", self.source))
-        })?;
-        batch.unended = piece == Piece::Unended;
-        Ok(piece != Piece::End)
-    }
-}
 
 /// Looks at the batches in order: what one alone cannot know.
 #[derive(Debug)]
 pub struct Sequence {
     source: String,
-    columns: Vec<String>,
-    plan: RowPlan,
+    /// What a row is called: `line`, `message`.
+    row_name: &'static str,
+    /// Of a text, how it is written.
+    text: Option<TextRows>,
     time: TimeAxis,
-    shortest_value: usize,
     /// Lines before the next batch.
     lines: usize,
     samples: usize,
@@ -86,7 +28,20 @@ pub struct Sequence {
     warnings: Vec<Warning>,
 }
 
-/// What a whole table held.
+/// How the rows of a text are written, as far as messages need it.
+#[derive(Debug, Clone)]
+pub struct TextRows {
+    /// Which cells are wanted.
+    pub plan: RowPlan,
+    /// Headings.
+    pub columns: Vec<String>,
+    /// Fewest characters of a value in the head.
+    pub shortest_value: usize,
+    /// Lines above the first row.
+    pub lines_before: usize,
+}
+
+/// What a whole signal held.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Summary {
     /// Rows read.
@@ -100,25 +55,25 @@ pub struct Summary {
 }
 
 impl Sequence {
-    pub(super) fn new(table: &Table) -> Self {
+    pub(super) fn new(
+        source: String,
+        row_name: &'static str,
+        text: Option<TextRows>,
+        time: TimeAxis,
+        warnings: Vec<Warning>,
+    ) -> Self {
         Self {
-            source: table.source.clone(),
-            columns: table
-                .layout
-                .columns
-                .iter()
-                .map(|c| c.heading.clone())
-                .collect(),
-            plan: table.plan,
-            time: table.time.clone(),
-            shortest_value: table.shortest_value,
-            lines: table.layout.data_line - 1,
+            source,
+            row_name,
+            lines: text.as_ref().map_or(0, |text| text.lines_before),
+            text,
+            time,
             samples: 0,
             first_stamp: None,
             last_stamp: None,
             empty_line: None,
             lost: None,
-            warnings: table.warnings.clone(),
+            warnings,
         }
     }
 
@@ -128,7 +83,7 @@ impl Sequence {
     /// The first row that cannot be read, and the first stamp that is not uniform, with its line.
     pub fn accept(&mut self, batch: &mut Batch) -> Result<(), Failure> {
         if let Some(found) = self.time_break(batch) {
-            let line = self.lines + line_of_row(&batch.text, &self.plan, found.row) + 1;
+            let line = self.line_of_row(batch, found.row);
             let is_last = found.row + 1 == batch.rows.times.len();
             if !(batch.unended && is_last && batch.rows.problem.is_none()) {
                 return Err(self.at(line, self.time.explain(&found)));
@@ -141,12 +96,27 @@ impl Sequence {
             let text = String::from_utf8_lossy(&batch.text[start..]).into_owned();
             self.lose_last_line(line, &text);
         }
+        if self.text.is_some() {
+            self.look_at_lines(batch)?;
+            self.lines += batch.rows.lines;
+        } else {
+            self.lines += batch.rows.values.len();
+        }
+        let rows = &batch.rows;
+        self.samples += rows.values.len();
+        self.first_stamp = self.first_stamp.or(rows.times.first().copied());
+        self.last_stamp = rows.times.last().copied().or(self.last_stamp);
+        Ok(())
+    }
+
+    /// What only lines of text can have wrong with them.
+    fn look_at_lines(&mut self, batch: &Batch) -> Result<(), Failure> {
         let rows = &batch.rows;
         if let Some(line) = self.empty_line
             && !rows.values.is_empty()
         {
-            let problem = Problem::empty_line(0, &self.plan);
-            return Err(self.at(line, self.describe(&problem, "")));
+            let what = self.describe(self.value_cell(), &Defect::Empty, "");
+            return Err(self.at(line, what));
         }
         if let Some(line) = rows.empty_at {
             self.empty_line = self.empty_line.or(Some(self.lines + line + 1));
@@ -156,24 +126,24 @@ impl Sequence {
         } else if batch.unended {
             self.look_at_unended_line(batch);
         }
-        self.lines += rows.lines;
-        self.samples += rows.values.len();
-        self.first_stamp = self.first_stamp.or(rows.times.first().copied());
-        self.last_stamp = rows.times.last().copied().or(self.last_stamp);
         Ok(())
     }
 
-    /// Ends the table.
+    /// Ends the signal; `fetch` gave its pieces.
     ///
     /// # Errors
     /// If it held fewer than two samples.
-    pub fn finish(mut self) -> Result<Summary, Failure> {
+    pub fn finish(mut self, fetch: &mut Fetch) -> Result<Summary, Failure> {
+        let (lost, warnings) = fetch.finish();
         if self.samples < 2 {
+            let why = lost.map_or(String::new(), |lost| format!(": {}", lost.message));
             return Err(Failure::failed(format_args!(
-                "{}: {} row(s) of numbers; a record has at least two",
+                "{}: {} row(s) of numbers; a record has at least two{why}",
                 self.source, self.samples
             )));
         }
+        self.lost = self.lost.or(lost);
+        self.warnings.extend(warnings);
         let stamps = self.first_stamp.zip(self.last_stamp);
         let span_s = match (&self.time.source, stamps) {
             (
@@ -200,15 +170,29 @@ impl Sequence {
     /// A failure at a row of the batch that was accepted last.
     #[must_use]
     pub fn failure_at_row(&self, batch: &Batch, row: usize, message: &str) -> Failure {
-        let before = self.lines - batch.rows.lines;
-        self.at(
-            before + line_of_row(&batch.text, &self.plan, row) + 1,
-            message,
-        )
+        let before = match &self.text {
+            Some(_) => batch.rows.lines,
+            None => batch.rows.values.len(),
+        };
+        self.at(self.line_of_row(batch, row) - before, message)
     }
 
     fn at(&self, line: usize, message: impl std::fmt::Display) -> Failure {
-        Failure::failed(format_args!("{}, line {line}: {message}", self.source))
+        let (source, name) = (&self.source, self.row_name);
+        Failure::failed(format_args!("{source}, {name} {line}: {message}"))
+    }
+
+    /// Line, from 1, of a row of the next batch.
+    fn line_of_row(&self, batch: &Batch, row: usize) -> usize {
+        let within = match &self.text {
+            Some(text) => line_of_row(&batch.text, &text.plan, row),
+            None => row,
+        };
+        self.lines + within + 1
+    }
+
+    fn value_cell(&self) -> usize {
+        self.text.as_ref().map_or(0, |text| text.plan.value)
     }
 
     fn time_break(&self, batch: &Batch) -> Option<Break> {
@@ -230,7 +214,11 @@ impl Sequence {
         }
         Err(self.at(
             line,
-            self.describe(problem, text.lines().next().unwrap_or("")),
+            self.describe(
+                problem.cell,
+                &problem.what,
+                text.lines().next().unwrap_or(""),
+            ),
         ))
     }
 
@@ -246,10 +234,17 @@ impl Sequence {
         ));
     }
 
-    fn describe(&self, problem: &Problem, line: &str) -> String {
-        let column = problem.cell + 1;
-        let name = self.columns.get(problem.cell).map_or("", String::as_str);
-        match &problem.what {
+    fn describe(&self, cell: usize, what: &Defect, line: &str) -> String {
+        let column = cell + 1;
+        let headings = self.text.as_ref().map(|text| &text.columns);
+        let name = headings
+            .and_then(|headings| headings.get(cell))
+            .map_or("", String::as_str);
+        let decimal = self
+            .text
+            .as_ref()
+            .map_or(b'.', |text| text.plan.dialect.decimal);
+        match what {
             Defect::Missing => format!(
                 "column {column} (\"{name}\") is missing: the line \"{}\" has too few cells; \
                  complete or remove it",
@@ -267,25 +262,28 @@ impl Sequence {
                 "column {column} (\"{name}\") reads \"{}\", expected a number{}; correct or remove \
                  the line",
                 shorten(text),
-                other_mark(text, self.plan.dialect.decimal)
+                other_mark(text, decimal)
             ),
         }
     }
 
     /// A last line without a line feed may have been cut within its last number.
     fn look_at_unended_line(&mut self, batch: &Batch) {
+        let Some(rows) = &self.text else {
+            return;
+        };
         let start = memchr::memrchr(b'\n', &batch.text).map_or(0, |place| place + 1);
         let text = String::from_utf8_lossy(&batch.text[start..]);
-        let cells = self.plan.dialect.cells(&text);
-        let is_last = cells.len() == self.plan.value + 1;
-        let length = cells.get(self.plan.value).map_or(0, String::len);
-        if is_last && length > 0 && length < self.shortest_value {
+        let cells = rows.plan.dialect.cells(&text);
+        let is_last = cells.len() == rows.plan.value + 1;
+        let length = cells.get(rows.plan.value).map_or(0, String::len);
+        if is_last && length > 0 && length < rows.shortest_value {
             self.warnings.push(Warning::new(
                 "unended-last-line",
                 format!(
                     "{}: the last line has no line end and its value \"{}\" is shorter than usual; \
                      if the file was cut there, do not trust the last sample",
-                    self.source, cells[self.plan.value]
+                    self.source, cells[rows.plan.value]
                 ),
             ));
         }

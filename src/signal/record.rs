@@ -2,9 +2,9 @@
 
 use torqcomp_dsp::resample::{Resampled, Resampler};
 
-use super::{Batch, Summary, Table, TimeSource};
+use super::{Batch, Signal, Summary};
 use crate::failure::Failure;
-use crate::stand::Chain;
+use crate::io::csv::TimeSource;
 
 /// A uniformly sampled record, in SI units of the applied quantity, not yet compensated.
 #[derive(Debug, Clone)]
@@ -22,21 +22,25 @@ pub struct Record {
 }
 
 impl Record {
-    /// Reads a table to its end.
+    /// Reads a signal to its end; `convert` brings its samples to the units wanted, or says which
+    /// cannot be.
     ///
     /// # Errors
     /// The first row that cannot be read or converted, with its line.
-    pub fn read(table: Table, chain: &Chain) -> Result<Self, Failure> {
-        let time = table.time.clone();
-        let start_s = table.first_time_s();
-        let (mut fetch, plan, mut sequence) = table.into_stream(0);
+    pub fn read(
+        signal: Signal,
+        convert: impl Fn(&mut [f64]) -> Result<(), (usize, String)>,
+    ) -> Result<Self, Failure> {
+        let time = signal.time.clone();
+        let start_s = signal.first_time_s();
+        let (mut fetch, plan, mut sequence) = signal.into_stream(0);
         let mut samples = Vec::new();
         let mut times = Vec::new();
         let mut batch = Batch::default();
         while fetch.next(&mut batch)? {
-            batch.read_rows(&plan, &time);
+            batch.read_rows(plan.as_ref(), &time);
             sequence.accept(&mut batch)?;
-            if let Err((row, message)) = crate::commands::convert(chain, &mut batch.rows.values) {
+            if let Err((row, message)) = convert(&mut batch.rows.values) {
                 return Err(sequence.failure_at_row(&batch, row, &message));
             }
             samples.extend_from_slice(&batch.rows.values);
@@ -63,7 +67,7 @@ impl Record {
             samples,
             start_s,
             rate_hz: time.rate_hz,
-            summary: sequence.finish()?,
+            summary: sequence.finish(&mut fetch)?,
             resampled,
         })
     }

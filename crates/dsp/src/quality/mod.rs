@@ -1,0 +1,95 @@
+//! What is wrong with a recording: faults that its samples and time stamps show by themselves.
+//!
+//! Each file has one criterion, what it rests on and how often it would be wrong on good data. All
+//! take plain slices; a sample that is not a number (`NaN`) belongs to no run, no level and no line.
+//!
+//! | fault | where |
+//! |---|---|
+//! | jitter, gaps, time running backwards, repeated stamps, clock jumps | [`steps`](mod@steps) |
+//! | stamps that are rounded | [`rounding`] |
+//! | a stated rate that the stamps contradict | [`rate`] |
+//! | cells that are no finite numbers | [`finite`] |
+//! | clipping | [`clipping`](mod@clipping) |
+//! | a channel that stands still | [`stuck`] |
+//! | samples that repeat the one before | [`repeats`](mod@repeats) |
+//! | coarse resolution | [`quantisation`](mod@quantisation) |
+//! | mains hum | [`mains`](mod@mains) |
+//! | channels that are copies of each other | [`copies`](mod@copies) |
+
+pub mod clipping;
+pub mod copies;
+pub mod finite;
+pub mod mains;
+pub mod quantisation;
+pub mod rate;
+pub mod repeats;
+pub mod rounding;
+mod runs;
+pub mod steps;
+pub mod stuck;
+#[cfg(test)]
+mod testing;
+
+pub use runs::{Run, runs};
+
+/// Smallest and largest finite sample; `None` if there is none.
+///
+/// ```
+/// use torqcomp_dsp::quality::range;
+/// assert_eq!(range(&[2.0, f64::NAN, -1.0]), Some((-1.0, 2.0)));
+/// assert_eq!(range(&[f64::NAN]), None);
+/// ```
+#[must_use]
+pub fn range(samples: &[f64]) -> Option<(f64, f64)> {
+    let (low, high) = samples
+        .iter()
+        .filter(|x| x.is_finite())
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+            (low.min(*x), high.max(*x))
+        });
+    (low <= high).then_some((low, high))
+}
+
+/// Distance from a straight line, as a part of the range, within which a channel is one.
+const STRAIGHT: f64 = 1e-3;
+
+/// Whether all samples lie within a thousandth of the range of the line through the first and the
+/// last: a counter, a time axis, a constant. Not if one of them is no number.
+///
+/// ```
+/// use torqcomp_dsp::quality::is_straight;
+/// assert!(is_straight(&[1.0, 3.0, 5.0, 7.0]));
+/// assert!(!is_straight(&[1.0, 3.0, 4.0, 7.0]));
+/// ```
+#[must_use]
+pub fn is_straight(samples: &[f64]) -> bool {
+    let (Some((low, high)), [first, .., last]) = (range(samples), samples) else {
+        return false;
+    };
+    let near = STRAIGHT * (high - low);
+    let slope = (last - first) / (samples.len() - 1) as f64;
+    let mut samples = samples.iter().enumerate();
+    samples.all(|(i, x)| (x - first - slope * i as f64).abs() <= near)
+}
+
+/// Blocks that are looked at in a long record, and samples of each.
+const BLOCKS: usize = 32;
+const BLOCK_LENGTH: usize = 4096;
+
+/// The samples, or blocks evenly spread over them where there are very many.
+fn excerpts(samples: &[f64]) -> Vec<&[f64]> {
+    if samples.len() <= BLOCKS * BLOCK_LENGTH {
+        return vec![samples];
+    }
+    let last = samples.len() - BLOCK_LENGTH;
+    (0..BLOCKS)
+        .map(|i| last / (BLOCKS - 1) * i)
+        .map(|start| &samples[start..start + BLOCK_LENGTH])
+        .collect()
+}
+
+/// Middle value of a set (the upper one of two); `None` if it is empty.
+fn median(values: &mut [f64]) -> Option<f64> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}

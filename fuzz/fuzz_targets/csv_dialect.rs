@@ -1,0 +1,12 @@
+//! Any bytes as a recorder's text file: its dialect is told or refused, nothing else happens.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use torqcomp::io::csv::Options;
+use torqcomp::recording::text;
+
+fuzz_target!(|bytes: &[u8]| {
+    if let Ok(recording) = text::read("fuzz", bytes.to_vec(), &Options::default()) {
+        assert!(!recording.channels.is_empty());
+    }
+});

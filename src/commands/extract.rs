@@ -1,0 +1,101 @@
+//! `extract`: one channel of a recording as plain rows, for other programs.
+
+use super::rows::{Rows, Times};
+use super::{Outcome, conclude};
+use crate::cli::Extract;
+use crate::failure::Failure;
+use crate::io::csv::Place;
+use crate::io::output::Output;
+use crate::io::text::Text;
+use crate::report;
+use crate::signal::{Batch, Record, Signal, Summary};
+
+/// Rows that are written at once.
+const ROWS_AT_ONCE: usize = 1 << 14;
+
+/// Runs the verb.
+pub fn run(args: &Extract) -> Result<Outcome, Failure> {
+    let signal = Signal::open(&Place::of(&args.record.input), &args.record.options())?;
+    let inputs = [args.record.input.as_ref()];
+    let mut output = Output::open(args.result.output.as_deref(), args.result.force, &inputs)?;
+    output.write(&heading(&signal))?;
+    let said = format!(
+        "{}: {}; {} Hz {}\n",
+        signal.source,
+        signal.dialect,
+        report::rounded(signal.time.rate_hz, 9),
+        signal.time.rate_from()
+    );
+    let summary = if signal.time.is_resampled() {
+        write_resampled(args, signal, &mut output)?
+    } else {
+        write_as_it_is(args, signal, &mut output)?
+    };
+    output.finish()?;
+    if !args.quiet {
+        report::say(&said);
+    }
+    let mut warnings: Vec<_> = summary.lost.iter().cloned().collect();
+    warnings.extend(summary.warnings);
+    Ok(conclude(&warnings, summary.lost.is_some(), args.strict))
+}
+
+/// `time_s`, and the name of the channel with its unit in brackets.
+fn heading(signal: &Signal) -> Vec<u8> {
+    let mut name = signal.channel.name.clone();
+    if let Some(unit) = &signal.channel.unit {
+        name = format!("{name} [{}]", unit.text);
+    }
+    if name.contains([',', '"', '\n']) {
+        name = format!("\"{}\"", name.replace('"', "\"\""));
+    }
+    format!("time_s,{name}\n").into_bytes()
+}
+
+fn write_as_it_is(args: &Extract, signal: Signal, output: &mut Output) -> Result<Summary, Failure> {
+    let (time, start_s) = (signal.time.clone(), signal.first_time_s());
+    let (mut fetch, plan, mut sequence) = signal.into_stream(0);
+    let mut batch = Batch::default();
+    let mut text = Text::default();
+    let mut first = 0;
+    while fetch.next(&mut batch)? {
+        batch.read_rows(plan.as_ref(), &time);
+        sequence.accept(&mut batch)?;
+        let rows = Rows {
+            digits: args.digits,
+            scale: 1.0,
+            rate_hz: time.rate_hz,
+            times: Times::of(&batch, &time, start_s, first),
+        };
+        text.clear();
+        rows.write(&mut text, &batch.rows.values, &[]);
+        output.write(text.as_bytes())?;
+        first += batch.rows.values.len();
+    }
+    sequence.finish(&mut fetch)
+}
+
+fn write_resampled(
+    args: &Extract,
+    signal: Signal,
+    output: &mut Output,
+) -> Result<Summary, Failure> {
+    let record = Record::read(signal, |_| Ok(()))?;
+    let mut text = Text::default();
+    let parts = record.samples.chunks(ROWS_AT_ONCE);
+    for (part, first) in parts.zip((0..).step_by(ROWS_AT_ONCE)) {
+        let rows = Rows {
+            digits: args.digits,
+            scale: 1.0,
+            rate_hz: record.rate_hz,
+            times: Times::Grid {
+                start_s: record.start_s,
+                first,
+            },
+        };
+        text.clear();
+        rows.write(&mut text, part, &[]);
+        output.write(text.as_bytes())?;
+    }
+    Ok(record.summary)
+}

@@ -1,0 +1,316 @@
+//! A recording as a report: what each channel is, and what is wrong with it.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use torqcomp_dsp::quality::clipping::Clipping;
+
+use super::content::Content;
+use crate::quality::{self, Findings, TimeFindings, copies, labels, unit_of};
+use crate::recording::{Axis, Channel, Recording};
+use crate::report::Warning;
+use crate::report::inspect::{self, Detail, File, Gap, MainsLine, Said, Segment};
+
+/// Describes the content of a file.
+pub fn file(content: &Content) -> File {
+    let recording = &content.recording;
+    let channels = &recording.channels;
+    let axes = distinct_axes(channels);
+    let times: Vec<TimeFindings> = axes
+        .iter()
+        .map(|(axis, _)| TimeFindings::of(axis))
+        .collect();
+    let findings = examine(channels);
+    let labels = labels(channels);
+
+    let mut warnings: Vec<Said> = recording
+        .lost
+        .iter()
+        .chain(&recording.warnings)
+        // What is said of each channel below need not be said of the file.
+        .filter(|warning| warning.code != "non-finite")
+        .map(|warning| said(warning.clone(), Vec::new()))
+        .collect();
+    for ((axis, members), found) in axes.iter().zip(&times) {
+        let names: Vec<String> = members.iter().map(|i| labels[*i].clone()).collect();
+        let all = members.len() == channels.len();
+        let mut found = found.warnings(&whose(&names, all), axis);
+        // The reader may have said it already.
+        found.retain(|w| recording.warnings.iter().all(|said| said.code != w.code));
+        warnings.extend(found.into_iter().map(|w| said(w, names.clone())));
+    }
+    warnings.extend(of_channels(channels, &labels, &findings));
+    let copies = copies::within(recording);
+    warnings.extend(copies.into_iter().map(|(w, names)| said(w, names)));
+
+    let time_of = |i: usize| axes.iter().position(|(_, members)| members.contains(&i));
+    let described = channels.iter().zip(&findings).enumerate();
+    File {
+        file: recording.source.clone(),
+        format: recording.format,
+        dialect: recording.dialect.clone(),
+        details: details(recording),
+        segments: segments(recording),
+        channels: described
+            .map(|(i, (channel, found))| {
+                let time = time_of(i).map(|place| &times[place]);
+                describe(channel, found, time)
+            })
+            .chain(content.listed.iter().cloned())
+            .collect(),
+        warnings,
+        data_lost: recording.lost.is_some()
+            || content.inventory.as_ref().is_some_and(|i| i.is_lossy),
+        mcap: content.inventory.clone(),
+    }
+}
+
+/// A warning with the names of the channels that it is about.
+pub fn said(warning: Warning, channels: Vec<String>) -> Said {
+    Said {
+        code: warning.code,
+        message: warning.message,
+        channels,
+    }
+}
+
+fn details(recording: &Recording) -> Vec<Detail> {
+    let pair = |(key, value): &(String, String)| Detail {
+        key: key.clone(),
+        value: value.clone(),
+    };
+    recording.details.iter().map(pair).collect()
+}
+
+fn segments(recording: &Recording) -> Vec<Segment> {
+    let segment = |segment: &crate::recording::Segment| Segment {
+        name: segment.name.clone(),
+        start_s: segment.start_s,
+        start_time: segment.start_text.clone(),
+    };
+    recording.segments.iter().map(segment).collect()
+}
+
+/// The time axes of the channels, each with the numbers of its channels.
+fn distinct_axes(channels: &[Channel]) -> Vec<(&Axis, Vec<usize>)> {
+    let mut axes: Vec<(&Axis, Vec<usize>)> = Vec::new();
+    for (i, channel) in channels.iter().enumerate() {
+        match axes
+            .iter_mut()
+            .find(|(axis, _)| is_same(axis, &channel.axis))
+        {
+            Some((_, members)) => members.push(i),
+            None => axes.push((&channel.axis, vec![i])),
+        }
+    }
+    axes
+}
+
+fn is_same(a: &Axis, b: &Axis) -> bool {
+    let stamps = match (&a.stamps_s, &b.stamps_s) {
+        (Some(a), Some(b)) => Arc::ptr_eq(a, b) || a == b,
+        (None, None) => true,
+        _ => false,
+    };
+    let head = |axis: &Axis| (axis.rate_hz, axis.rate_from.clone(), axis.assumed.clone());
+    stamps && head(a) == head(b)
+}
+
+/// The channels of an axis, for people.
+fn whose(names: &[String], all: bool) -> String {
+    match names {
+        [one] => format!("\"{one}\""),
+        _ if all => "all channels".to_owned(),
+        [first, second] => format!("\"{first}\" and \"{second}\""),
+        [first, others @ ..] => format!("\"{first}\" and {} others", others.len()),
+        [] => "no channel".to_owned(),
+    }
+}
+
+/// Looks at all channels, several at once. The result does not depend on how many.
+fn examine(channels: &[Channel]) -> Vec<Findings> {
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let mut done = Vec::new();
+        loop {
+            let i = next.fetch_add(1, Ordering::Relaxed);
+            let Some(channel) = channels.get(i) else {
+                return done;
+            };
+            done.push((i, Findings::of(&channel.samples, channel.axis.rate_hz)));
+        }
+    };
+    let mut all: Vec<(usize, Findings)> = std::thread::scope(|scope| {
+        let workers: Vec<_> = (1..threads.min(channels.len()))
+            .map(|_| scope.spawn(work))
+            .collect();
+        let mut all = work();
+        for worker in workers {
+            all.extend(worker.join().expect("looking at samples does not panic"));
+        }
+        all
+    });
+    all.sort_by_key(|(i, _)| *i);
+    all.into_iter().map(|(_, found)| found).collect()
+}
+
+/// Channels with the same fault from which on it is said once for all of them.
+const MANY: usize = 4;
+
+/// What is wrong with the samples; what many channels have in common is said once.
+fn of_channels(channels: &[Channel], labels: &[String], findings: &[Findings]) -> Vec<Said> {
+    let mut all = Vec::new();
+    let mut constant = Vec::new();
+    let mut coarse = Vec::new();
+    for ((channel, name), found) in channels.iter().zip(labels).zip(findings) {
+        let unit = unit_of(channel);
+        let warnings = found.warnings(name, unit, &channel.axis, &channel.holes);
+        let of_time = quality::time::stamps_in_channel(name, channel);
+        let warnings = of_time.into_iter().chain(warnings);
+        all.extend(warnings.map(|w| said(w, vec![name.clone()])));
+        constant.extend(found.dead().map(|value| (name.as_str(), value)));
+        coarse.extend(found.coarse().map(|q| (name.as_str(), unit, q)));
+    }
+    let mut all = gathered(all);
+    if !constant.is_empty() {
+        let names = constant.iter().map(|(name, _)| (*name).to_owned());
+        all.push(said(quality::constant(&constant), names.collect()));
+    }
+    if !coarse.is_empty() {
+        let names = coarse.iter().map(|(name, ..)| (*name).to_owned());
+        all.push(said(quality::coarse(&coarse), names.collect()));
+    }
+    all
+}
+
+/// Puts warnings of one code about many channels together.
+fn gathered(warnings: Vec<Said>) -> Vec<Said> {
+    let mut out: Vec<Said> = Vec::new();
+    for warning in &warnings {
+        let alike: Vec<&Said> = warnings.iter().filter(|w| w.code == warning.code).collect();
+        if alike.len() < MANY {
+            out.push(warning.clone());
+        } else if out.iter().all(|said| said.code != warning.code) {
+            let mut channels: Vec<String> = alike.iter().flat_map(|w| w.channels.clone()).collect();
+            channels.dedup();
+            out.push(Said {
+                code: warning.code,
+                message: format!(
+                    "{} channels, {}; the first: {}",
+                    channels.len(),
+                    listed(&channels),
+                    warning.message
+                ),
+                channels,
+            });
+        }
+    }
+    out
+}
+
+/// Some names, for people.
+fn listed(names: &[String]) -> String {
+    const MOST: usize = 6;
+    let quoted: Vec<String> = names
+        .iter()
+        .take(MOST)
+        .map(|n| format!("\"{n}\""))
+        .collect();
+    if names.len() > MOST {
+        format!("{} and {} more", quoted.join(", "), names.len() - MOST)
+    } else {
+        quoted.join(", ")
+    }
+}
+
+fn describe(channel: &Channel, found: &Findings, time: Option<&TimeFindings>) -> inspect::Channel {
+    let axis = &channel.axis;
+    let unit = unit_of(channel);
+    let of_axis = inspect::Channel {
+        name: channel.name.clone(),
+        heading: channel.heading.clone(),
+        segment: channel.segment.map(|segment| segment + 1),
+        unit: (!unit.is_empty()).then(|| unit.to_owned()),
+        unit_known: channel.unit.is_some(),
+        samples: channel.samples.len(),
+        rate_hz: axis.rate_hz,
+        rate_from: axis.rate_from.describe(),
+        header_rate_hz: axis.header_rate_hz,
+        start: axis.start_s,
+        start_unit: "s",
+        start_time: axis.start_text.clone(),
+        duration_s: duration_s(channel),
+        assumed: axis.assumed.clone(),
+        ..inspect::Channel::default()
+    };
+    with_samples(with_steps(of_axis, time), found)
+}
+
+fn duration_s(channel: &Channel) -> Option<f64> {
+    let axis = &channel.axis;
+    if let Some(stamps) = &axis.stamps_s {
+        let mut finite = stamps.iter().filter(|t| t.is_finite());
+        let first = finite.next()?;
+        return Some(finite.next_back().unwrap_or(first) - first);
+    }
+    let steps = channel.samples.len().checked_sub(1)?;
+    axis.rate_hz.map(|rate_hz| steps as f64 / rate_hz)
+}
+
+/// Adds what the stamps show.
+fn with_steps(channel: inspect::Channel, time: Option<&TimeFindings>) -> inspect::Channel {
+    let Some((time, steps)) = time.and_then(|time| time.steps.as_ref().map(|s| (time, s))) else {
+        return channel;
+    };
+    let gap = |event: &torqcomp_dsp::quality::steps::Event| Gap {
+        after_s: event.from_s,
+        length_s: event.step_s,
+    };
+    inspect::Channel {
+        jitter: steps.jitter.map(|jitter| jitter.std),
+        jitter_peak: steps.jitter.map(|jitter| jitter.peak),
+        stamps_rounded_to_s: time.rounded.map(|rounded| rounded.quantum_s),
+        gaps: Some(steps.gaps.count),
+        missing_samples: Some(steps.missing),
+        gap_list: steps.gaps.listed.iter().map(gap).collect(),
+        repeated_stamps: Some(steps.repeated.count),
+        backwards: Some(steps.backwards.count),
+        clock_jumps: Some(steps.jumps.count),
+        ..channel
+    }
+}
+
+/// Adds what the samples show.
+fn with_samples(channel: inspect::Channel, found: &Findings) -> inspect::Channel {
+    let rail = |of: fn(&Clipping) -> Option<f64>| found.clipping.as_ref().and_then(of);
+    let lines = found.mains.iter().flat_map(|mains| &mains.lines);
+    inspect::Channel {
+        smallest: found.range.map(|(low, _)| low),
+        largest: found.range.map(|(_, high)| high),
+        mean: found.mean,
+        rms: found.std,
+        repeated: match found.constant {
+            Some(_) => Some(1.0),
+            None => found.repeats.map(|r| r.fraction),
+        },
+        repeated_unexplained: found.repeats.and_then(|r| r.unexplained),
+        hold: found.repeats.and_then(|r| r.hold),
+        clipped: Some(found.clipping.map_or(0, |c| c.samples())),
+        clipped_low: rail(|c| c.low.map(|r| r.value)),
+        clipped_high: rail(|c| c.high.map(|r| r.value)),
+        stuck: Some(found.standstills.iter().map(|run| run.length).sum()),
+        constant: Some(found.constant.is_some()),
+        non_finite: Some(found.non_finite.map_or(0, |f| f.count)),
+        resolution: found.quantisation.map(|q| q.step),
+        resolution_bits: found.quantisation.map(|q| q.bits),
+        mains: lines
+            .map(|line| MainsLine {
+                frequency_hz: line.frequency_hz,
+                amplitude: line.amplitude,
+                prominence: line.prominence,
+            })
+            .collect(),
+        ..channel
+    }
+}

@@ -1,0 +1,312 @@
+//! The numbers in the messages of an MCAP file as channels.
+
+use std::sync::Arc;
+
+use super::content::Content;
+use crate::failure::Failure;
+use crate::io::csv::{NamedUnit, Place};
+use crate::io::mcap::inventory::{ChannelReport, LeafReport};
+use crate::io::mcap::{Inventory, Options, Selection, Source, Summary};
+use crate::recording::{Axis, Channel, RateFrom, Recording, typical_step};
+use crate::report::{Warning, inspect};
+
+/// Samples that are read at most, of all numbers together: eight bytes each, and as many for stamps.
+const MOST_SAMPLES: u64 = 20_000_000;
+/// Bytes of the file that are gone through at most: the file is read once for each number.
+const MOST_BYTES: u64 = 4_000_000_000;
+/// Numbers that are read at most.
+const MOST_NUMBERS: u64 = 64;
+
+/// Lists a file and reads the numbers in it, as far as they are not too many.
+pub fn read(place: &Place) -> Result<Content, Failure> {
+    let inventory = Inventory::scan(place)?;
+    let mut recording = Recording {
+        source: inventory.file.clone(),
+        format: "mcap",
+        dialect: dialect(&inventory),
+        details: details(&inventory),
+        channels: Vec::new(),
+        segments: Vec::new(),
+        warnings: inventory.warnings.clone(),
+        lost: None,
+    };
+    let mut listed = Vec::new();
+    let mut budget = Budget::of(place);
+    let mut left_out = 0;
+    for topic in &inventory.channels {
+        let numbers: Vec<&LeafReport> = topic.leaves.iter().filter(|l| !l.is_stamp).collect();
+        if numbers.is_empty() {
+            listed.push(entry(topic, None));
+        }
+        for number in numbers {
+            let is_affordable = topic.messages > 0 && budget.takes(topic.messages);
+            match is_affordable.then(|| samples(place, topic, number)) {
+                Some(Ok((channel, summary))) => {
+                    recording.channels.push(channel);
+                    let of_file = &inventory.warnings;
+                    add_warnings(&mut recording.warnings, summary.warnings, of_file);
+                }
+                // Lists that are empty at first, and the like: the warnings tell what is damaged.
+                Some(Err(_)) => listed.push(entry(topic, Some(number))),
+                None => {
+                    left_out += usize::from(topic.messages > 0);
+                    listed.push(entry(topic, Some(number)));
+                }
+            }
+        }
+    }
+    if left_out > 0 {
+        recording.warnings.push(Warning::new(
+            "samples-not-read",
+            format!(
+                "the samples of {left_out} number(s) were not looked at: together they are too many, \
+                 or the file can be read once only"
+            ),
+        ));
+    }
+    Ok(Content {
+        recording,
+        listed,
+        inventory: Some(inventory),
+    })
+}
+
+/// What may still be read.
+struct Budget {
+    numbers: u64,
+    samples: u64,
+}
+
+impl Budget {
+    fn of(place: &Place) -> Self {
+        let length = match place {
+            Place::Stdin => None,
+            Place::File(path) => std::fs::metadata(path).ok().map(|meta| meta.len()),
+        };
+        Self {
+            numbers: length.map_or(0, |length| (MOST_BYTES / length.max(1)).min(MOST_NUMBERS)),
+            samples: MOST_SAMPLES,
+        }
+    }
+
+    /// Whether a number with that many messages may be read; if so, it is counted.
+    fn takes(&mut self, messages: u64) -> bool {
+        if self.numbers == 0 || messages > self.samples {
+            return false;
+        }
+        self.numbers -= 1;
+        self.samples -= messages;
+        true
+    }
+}
+
+/// Reads one number of a topic.
+fn samples(
+    place: &Place,
+    topic: &ChannelReport,
+    number: &LeafReport,
+) -> Result<(Channel, Summary), Failure> {
+    let selection = Selection {
+        topic: Some(topic.topic.clone()),
+        field: Some(first_item(&number.path)),
+        signal: None,
+    };
+    let mut source = Source::open(place, &selection, &Options::default())?;
+    let (mut times_ns, mut values) = (Vec::new(), Vec::new());
+    let (mut stamps_ns, mut samples) = (Vec::new(), Vec::new());
+    while source.next(&mut times_ns, &mut values)? {
+        stamps_ns.append(&mut times_ns);
+        samples.append(&mut values);
+    }
+    let chosen = source.chosen();
+    let unit = chosen.unit.as_ref().map(|found| found.unit.clone());
+    let time = &chosen.time;
+    let axis = axis(
+        &stamps_ns,
+        match &time.field {
+            Some(field) => format!("{} time, {field}", time.choice.name()),
+            None => format!("{} time", time.choice.name()),
+        },
+    );
+    let channel = Channel {
+        name: name(topic, Some(number)),
+        heading: number.path.clone(),
+        unit: unit.as_deref().and_then(NamedUnit::parse),
+        unit_text: unit,
+        samples,
+        holes: Vec::new(),
+        axis,
+        segment: None,
+    };
+    Ok((channel, source.finish()))
+}
+
+/// Stamps from the first on: seconds since 1970 would cost them their last digits.
+fn axis(stamps_ns: &[i64], words: String) -> Axis {
+    let first = stamps_ns.first().copied();
+    let from_first = |t: &i64| t.saturating_sub(first.unwrap_or(0)) as f64 * 1e-9;
+    let stamps_s: Vec<f64> = stamps_ns.iter().map(from_first).collect();
+    let step = typical_step(&stamps_s);
+    Axis {
+        rate_hz: step.map(|step| 1.0 / step),
+        rate_from: step.map_or(RateFrom::None, |_| RateFrom::Stamps(words)),
+        start_s: first.map(|t| t as f64 * 1e-9),
+        start_text: first.and_then(date_and_time),
+        stamps_s: Some(Arc::new(stamps_s)),
+        ..Axis::default()
+    }
+}
+
+/// Name of a number: topic and path, the first item of lists.
+fn name(topic: &ChannelReport, number: Option<&LeafReport>) -> String {
+    match number {
+        Some(number) => format!("{}.{}", topic.topic, first_item(&number.path)),
+        None => topic.topic.clone(),
+    }
+}
+
+/// A path with the first item in place of lists and arrays.
+fn first_item(path: &str) -> String {
+    let mut pieces = path.split('[');
+    let mut item = pieces.next().unwrap_or_default().to_owned();
+    for piece in pieces {
+        item.push_str("[0]");
+        item.push_str(piece.split_once(']').map_or("", |(_, behind)| behind));
+    }
+    item
+}
+
+/// A channel whose samples are not known.
+fn entry(topic: &ChannelReport, number: Option<&LeafReport>) -> inspect::Channel {
+    let start_ns = topic.log_ns.map(|(first, _)| first);
+    inspect::Channel {
+        name: name(topic, number),
+        heading: number.map_or_else(String::new, |number| number.path.clone()),
+        unit: number.and_then(|number| number.unit.clone()),
+        samples: usize::try_from(topic.messages).unwrap_or(usize::MAX),
+        rate_hz: topic.rate_hz,
+        rate_from: match topic.rate_hz {
+            Some(_) => "mean of the log times".to_owned(),
+            None => "none".to_owned(),
+        },
+        start: start_ns.map(|ns| ns as f64 * 1e-9),
+        start_unit: "s",
+        start_time: start_ns.and_then(|ns| date_and_time(i64::try_from(ns).ok()?)),
+        ..inspect::Channel::default()
+    }
+}
+
+/// Adds what was found reading one number and is not said of the file already.
+fn add_warnings(all: &mut Vec<Warning>, more: Vec<Warning>, of_file: &[Warning]) {
+    for warning in more {
+        if !all.contains(&warning) && of_file.iter().all(|said| said.code != warning.code) {
+            all.push(warning);
+        }
+    }
+}
+
+fn dialect(inventory: &Inventory) -> String {
+    let profile = match inventory.profile.as_str() {
+        "" => "no profile".to_owned(),
+        profile => format!("profile {profile}"),
+    };
+    let chunks: Vec<String> = inventory
+        .chunks
+        .iter()
+        .map(|chunk| match chunk.compression.as_str() {
+            "" => format!("{} uncompressed chunk(s)", chunk.chunks),
+            name => format!("{} {name} chunk(s)", chunk.chunks),
+        })
+        .collect();
+    let chunks = match chunks.as_slice() {
+        [] => "no chunks".to_owned(),
+        some => some.join(", "),
+    };
+    format!("MCAP, {profile}, {chunks}")
+}
+
+fn details(inventory: &Inventory) -> Vec<(String, String)> {
+    let mut details = vec![("messages".to_owned(), inventory.messages.to_string())];
+    if !inventory.library.is_empty() {
+        details.push(("library".to_owned(), inventory.library.clone()));
+    }
+    for topic in &inventory.channels {
+        let schema = topic.schema.as_deref().unwrap_or("no schema");
+        let value = format!(
+            "{schema}, {}, {} message(s)",
+            topic.message_encoding, topic.messages
+        );
+        details.push((topic.topic.clone(), value));
+    }
+    for file in &inventory.attachments {
+        let value = format!("{}, {}, {} bytes", file.name, file.media_type, file.size);
+        details.push(("attachment".to_owned(), value));
+    }
+    for record in &inventory.metadata {
+        let keys: Vec<&str> = record.pairs.keys().map(String::as_str).collect();
+        let value = format!("{}: {}", record.name, keys.join(", "));
+        details.push(("metadata".to_owned(), value));
+    }
+    details
+}
+
+/// Date and time in UTC of nanoseconds since 1970, if they can be meant: from 2000 on.
+///
+/// The date by counting years from March of the year 0, so that leap days come last: an era of 400
+/// years has 146 097 days (ISO 8601, proleptic Gregorian calendar).
+fn date_and_time(ns: i64) -> Option<String> {
+    const YEAR_2000_NS: i64 = 946_684_800_000_000_000;
+    if ns < YEAR_2000_NS {
+        return None;
+    }
+    let (seconds, rest) = (ns / 1_000_000_000, ns % 1_000_000_000);
+    let (days, of_day) = (seconds / 86_400 + 719_468, seconds % 86_400);
+    let (era, of_era) = (days / 146_097, days % 146_097);
+    let year = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;
+    let of_year = of_era - (365 * year + year / 4 - year / 100);
+    let month = (5 * of_year + 2) / 153;
+    let day = of_year - (153 * month + 2) / 5 + 1;
+    let (month, later) = if month < 10 {
+        (month + 3, 0)
+    } else {
+        (month - 9, 1)
+    };
+    Some(format!(
+        "{:04}-{month:02}-{day:02}T{:02}:{:02}:{:02}.{rest:09}Z",
+        400 * era + year + later,
+        of_day / 3600,
+        of_day / 60 % 60,
+        of_day % 60
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dates_are_those_of_the_calendar() {
+        let at = |seconds: i64| date_and_time(seconds * 1_000_000_000).unwrap();
+        assert_eq!(at(946_684_800), "2000-01-01T00:00:00.000000000Z");
+        assert_eq!(at(951_782_400), "2000-02-29T00:00:00.000000000Z");
+        assert_eq!(at(1_000_000_000), "2001-09-09T01:46:40.000000000Z");
+        assert_eq!(at(1_709_210_096), "2024-02-29T12:34:56.000000000Z");
+        assert_eq!(at(4_102_444_799), "2099-12-31T23:59:59.000000000Z");
+        assert_eq!(date_and_time(12), None);
+    }
+
+    #[test]
+    fn first_items() {
+        assert_eq!(first_item("wrench.force.x"), "wrench.force.x");
+        assert_eq!(first_item("poses[].c[9].x"), "poses[0].c[0].x");
+    }
+
+    #[test]
+    fn stamps_keep_their_nanoseconds() {
+        let start = 1_700_000_000_000_000_001_i64;
+        let stamps: Vec<i64> = (0..100).map(|i| start + 20_000 * i).collect();
+        let axis = axis(&stamps, "log time".to_owned());
+        assert!((axis.rate_hz.unwrap() - 50_000.0).abs() < 1e-6);
+        assert_eq!(axis.start_text.unwrap(), "2023-11-14T22:13:20.000000001Z");
+    }
+}

@@ -1,0 +1,118 @@
+//! `inspect`: what recordings hold, and what is wrong with them.
+
+mod content;
+mod describe;
+mod messages;
+mod plot;
+mod same;
+
+use std::path::{Path, PathBuf};
+
+use self::content::Content;
+use super::Outcome;
+use crate::cli::Inspect;
+use crate::failure::Failure;
+use crate::io::csv::Place;
+use crate::io::output::Output;
+use crate::quality::copies;
+use crate::recording::Recording;
+use crate::report;
+use crate::report::inspect::{Entry, Report, Said};
+
+/// Runs the verb.
+pub fn run(args: &Inspect) -> Result<Outcome, Failure> {
+    check(args)?;
+    let inputs: Vec<PathBuf> = args.files.iter().map(PathBuf::from).collect();
+    let mut taken: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
+    let output = Output::open(args.result.output.as_deref(), args.result.force, &taken)?;
+    taken.extend(args.result.output.as_deref().map(Path::new));
+    let plot = args
+        .plot
+        .as_deref()
+        .map(|path| plot::open(path, args.result.force, &taken))
+        .transpose()?;
+
+    let read: Vec<Result<Content, Failure>> = args
+        .files
+        .iter()
+        .map(|file| content::read(&Place::of(file), &args.options()))
+        .collect();
+    if let [Err(failure)] = read.as_slice() {
+        return Err(failure.clone());
+    }
+    let report = Report {
+        files: read.iter().zip(&args.files).map(entry).collect(),
+        warnings: between(&args.files, &read),
+    };
+    finish(args, &report, &read, output, plot)
+}
+
+/// Refuses what cannot be done.
+fn check(args: &Inspect) -> Result<(), Failure> {
+    if args.files.iter().filter(|file| *file == "-").count() > 1 {
+        return Err(Failure::usage(
+            "standard input can be read once only; name files",
+        ));
+    }
+    Ok(())
+}
+
+fn entry((read, file): (&Result<Content, Failure>, &String)) -> Entry {
+    match read {
+        Ok(content) => Entry::Read(Box::new(describe::file(content))),
+        Err(failure) => Entry::Failed {
+            file: file.clone(),
+            error: failure.to_string(),
+        },
+    }
+}
+
+/// What comparing the files shows. Files that are the same need no comparison of their channels.
+fn between(files: &[String], read: &[Result<Content, Failure>]) -> Vec<Said> {
+    let (mut found, firsts) = same::files(files);
+    let recordings: Vec<&Recording> = firsts
+        .iter()
+        .filter_map(|i| read[*i].as_ref().ok().map(|content| &content.recording))
+        .collect();
+    found.extend(copies::across(&recordings));
+    found
+        .into_iter()
+        .map(|warning| describe::said(warning, Vec::new()))
+        .collect()
+}
+
+/// Writes everything that was found; files that could not be read are a failure in the end.
+fn finish(
+    args: &Inspect,
+    report: &Report,
+    read: &[Result<Content, Failure>],
+    mut output: Output,
+    plot: Option<Output>,
+) -> Result<Outcome, Failure> {
+    let text = if args.json {
+        report.json()
+    } else {
+        report.text()
+    };
+    output.write(text.as_bytes())?;
+    output.finish()?;
+    if let Some(mut plot) = plot {
+        let contents = read.iter().flatten();
+        let recordings: Vec<&Recording> = contents.map(|content| &content.recording).collect();
+        plot.write(plot::svg(&recordings, report).as_bytes())?;
+        plot.finish()?;
+    }
+    let failed: Vec<&Failure> = read.iter().filter_map(|r| r.as_ref().err()).collect();
+    if let Some((last, others)) = failed.split_last() {
+        for failure in others {
+            report::say(&format!("torqcomp: {failure}\n"));
+        }
+        return Err((*last).clone());
+    }
+    let warned = args.strict && report.all_warnings().next().is_some();
+    Ok(if report.is_lossy() || warned {
+        Outcome::WithLoss
+    } else {
+        Outcome::Done
+    })
+}

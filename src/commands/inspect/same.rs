@@ -1,0 +1,96 @@
+//! Files that are the same, byte by byte, though named differently.
+
+use std::fs::File;
+use std::io::{self, BufReader, Read};
+
+use crate::report::Warning;
+
+/// Bytes that are compared at a time.
+const PIECE: usize = 1 << 16;
+
+/// The warnings about files that hold the same bytes, and the numbers of those that differ from all
+/// before them. Standard input is different from all.
+pub fn files(names: &[String]) -> (Vec<Warning>, Vec<usize>) {
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    for (i, name) in names.iter().enumerate() {
+        let group = groups
+            .iter_mut()
+            .find(|group| is_same(&names[group[0]], name).unwrap_or(false));
+        match group {
+            Some(group) => group.push(i),
+            None => groups.push(vec![i]),
+        }
+    }
+    let warnings = groups
+        .iter()
+        .filter(|group| group.len() > 1)
+        .map(|group| {
+            let others: Vec<&str> = group[1..].iter().map(|i| names[*i].as_str()).collect();
+            Warning::new(
+                "identical-files",
+                format!(
+                    "{} and {} are the same, byte by byte: one record under several names",
+                    names[group[0]],
+                    others.join(", ")
+                ),
+            )
+        })
+        .collect();
+    (warnings, groups.iter().map(|group| group[0]).collect())
+}
+
+fn is_same(a: &str, b: &str) -> io::Result<bool> {
+    if a == "-" || b == "-" {
+        return Ok(false);
+    }
+    let (a, b) = (File::open(a)?, File::open(b)?);
+    let (of_a, of_b) = (a.metadata()?, b.metadata()?);
+    if !of_a.is_file() || !of_b.is_file() || of_a.len() != of_b.len() {
+        return Ok(false);
+    }
+    let (mut a, mut b) = (BufReader::new(a), BufReader::new(b));
+    let (mut from_a, mut from_b) = (vec![0; PIECE], vec![0; PIECE]);
+    let mut left = of_a.len();
+    while left > 0 {
+        let piece = usize::try_from(left).unwrap_or(PIECE).min(PIECE);
+        a.read_exact(&mut from_a[..piece])?;
+        b.read_exact(&mut from_b[..piece])?;
+        if from_a[..piece] != from_b[..piece] {
+            return Ok(false);
+        }
+        left -= piece as u64;
+    }
+    Ok(true)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_files_are_grouped_and_others_are_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |name: &str, bytes: &[u8]| -> String {
+            let path = folder.path().join(name);
+            std::fs::write(&path, bytes).unwrap();
+            path.to_str().unwrap().to_owned()
+        };
+        let long = vec![7; 3 * PIECE + 5];
+        let mut other = long.clone();
+        other[2 * PIECE] = 8;
+        let names = [
+            write("a", &long),
+            write("b", &other),
+            write("c", &long),
+            write("d", b""),
+            write("e", b""),
+            "missing".to_owned(),
+            "-".to_owned(),
+            "-".to_owned(),
+        ];
+        let (warnings, firsts) = files(&names);
+        assert_eq!(firsts, [0, 1, 3, 5, 6, 7]);
+        assert_eq!(warnings.len(), 2);
+        assert!(warnings[0].message.contains(&names[2]));
+    }
+}

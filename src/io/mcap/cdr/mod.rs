@@ -1,0 +1,180 @@
+//! Messages of ROS 2 in CDR, and messages of ROS 1, whose layout is CDR without padding.
+//!
+//! CDR: CORBA 3.4, part 2, 9.3; XCDR2 and the encapsulation: DDS-XTypes 1.3, 7.4 and 7.6.3.1.2.
+
+pub mod plan;
+pub mod run;
+pub mod walk;
+
+use std::sync::Arc;
+
+use super::decode::{Damage, Reading, Targets};
+use super::schema::{Kind, Schema};
+use plan::{Plan, Rules};
+use walk::Walk;
+
+/// Bytes of the encapsulation in front of a message.
+const ENCAPSULATION: usize = 4;
+/// Most padding behind a message.
+const TAIL: usize = 3;
+
+/// Takes wanted numbers out of messages of one type.
+pub struct Decoder {
+    schema: Arc<Schema>,
+    targets: Targets,
+    is_ros1: bool,
+    has_wide_text: bool,
+    /// For CDR (and ROS 1) and for XCDR2.
+    layouts: [Option<Layout>; 2],
+}
+
+/// Plans for the ways in which messages of an encapsulation may be laid out.
+struct Layout {
+    plans: Vec<Plan>,
+    chosen: usize,
+    is_decided: bool,
+}
+
+impl Decoder {
+    /// Prepares for messages of one type that does not contain itself.
+    #[must_use]
+    pub fn new(schema: &Arc<Schema>, targets: Targets, is_ros1: bool) -> Self {
+        let fields = schema.structs.iter().flat_map(|s| &s.fields);
+        let has_wide_text = fields.map(|field| &field.kind).any(|mut kind| {
+            while let Kind::Many(many) = kind {
+                kind = &many.item;
+            }
+            *kind == Kind::WideText
+        });
+        Self {
+            schema: Arc::clone(schema),
+            targets,
+            is_ros1,
+            has_wide_text,
+            layouts: [None, None],
+        }
+    }
+
+    /// Reads a message.
+    ///
+    /// # Errors
+    /// [`Damage`] if the message does not hold the value.
+    pub fn read(&mut self, message: &[u8], reading: &mut Reading) -> Result<(), Damage> {
+        let (is_big, is_second, data) = if self.is_ros1 {
+            (false, false, message)
+        } else {
+            encapsulation(message)?
+        };
+        if self.layouts[usize::from(is_second)].is_none() {
+            self.layouts[usize::from(is_second)] = Some(self.layout(is_second));
+        }
+        let Some(layout) = &mut self.layouts[usize::from(is_second)] else {
+            return Err(Damage::Short);
+        };
+        if !layout.is_decided {
+            layout.decide(data, is_big, reading);
+        }
+        let plan = &layout.plans[layout.chosen];
+        let name = self.targets.value.lookup.as_ref();
+        let name = name.map_or(&[][..], |lookup| lookup.name.as_bytes());
+        let mut walk = Walk {
+            data,
+            at: 0,
+            is_big,
+            plan,
+            reading,
+            name,
+            seen: 0,
+            found: None,
+        };
+        if !plan.lookup.is_empty() {
+            walk.follow(&plan.lookup)?;
+            walk.at = 0;
+        }
+        walk.follow(&plan.steps)
+    }
+
+    fn layout(&self, is_second: bool) -> Layout {
+        let rules = Rules {
+            largest_align: match (self.is_ros1, is_second) {
+                (true, _) => 1,
+                (false, false) => 8,
+                (false, true) => 4,
+            },
+            empty: u8::from(!self.is_ros1),
+            wide: 4,
+            size_ahead: is_second,
+        };
+        // Writers differ in the width of wide characters, and some leave out the sizes that
+        // XCDR2 wants before lists: messages tell which.
+        let wides: &[u8] = if self.has_wide_text { &[4, 2] } else { &[4] };
+        let ahead: &[bool] = if is_second { &[true, false] } else { &[false] };
+        let mut plans: Vec<Plan> = Vec::new();
+        for &size_ahead in ahead {
+            for &wide in wides {
+                let rules = Rules {
+                    wide,
+                    size_ahead,
+                    ..rules
+                };
+                let plan = Plan::new(&self.schema, &self.targets, rules);
+                let is_new = plans.iter().all(|other| {
+                    (&other.steps, &other.whole, &other.structs)
+                        != (&plan.steps, &plan.whole, &plan.structs)
+                        || other.rules.wide != plan.rules.wide
+                });
+                if is_new {
+                    plans.push(plan);
+                }
+            }
+        }
+        Layout {
+            is_decided: plans.len() == 1,
+            plans,
+            chosen: 0,
+        }
+    }
+}
+
+impl Layout {
+    /// Chooses the plan by which the message ends where its bytes do.
+    fn decide(&mut self, data: &[u8], is_big: bool, reading: &mut Reading) {
+        let mut fitting = (0..self.plans.len()).filter(|place| {
+            let plan = &self.plans[*place];
+            let mut walk = Walk {
+                data,
+                at: 0,
+                is_big,
+                plan,
+                reading,
+                name: &[],
+                seen: 0,
+                found: None,
+            };
+            walk.skip(&plan.whole).is_ok() && data.len() - walk.at <= TAIL
+        });
+        let (first, second) = (fitting.next(), fitting.next());
+        drop(fitting);
+        if let Some(first) = first {
+            self.chosen = first;
+            self.is_decided = second.is_none();
+        }
+    }
+}
+
+/// Byte order, whether it is XCDR2, and the message behind.
+fn encapsulation(message: &[u8]) -> Result<(bool, bool, &[u8]), Damage> {
+    let (head, data) = message
+        .split_at_checked(ENCAPSULATION)
+        .ok_or(Damage::Short)?;
+    match head[1] {
+        0x00 => Ok((true, false, data)),
+        0x01 => Ok((false, false, data)),
+        0x06 | 0x10 => Ok((true, true, data)),
+        0x07 | 0x11 => Ok((false, true, data)),
+        other => Err(Damage::Encapsulation(other)),
+    }
+}
+
+#[cfg(test)]
+mod tests;

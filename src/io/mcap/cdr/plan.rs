@@ -1,0 +1,308 @@
+//! A message's layout turned into the fewest steps that lead to the wanted numbers.
+
+use super::run::Run;
+use crate::io::mcap::decode::Targets;
+use crate::io::mcap::route::Hop;
+use crate::io::mcap::schema::{Kind, Number, Schema};
+
+/// How data are laid out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Rules {
+    /// Largest padding: 8 in CDR, 4 in XCDR2, 1 in ROS 1.
+    pub largest_align: u8,
+    /// Bytes of a type without fields: 1 in ROS 2, 0 in ROS 1.
+    pub empty: u8,
+    /// Bytes of a wide character.
+    pub wide: u8,
+    /// Whether lists of anything but numbers begin with their size in bytes, as XCDR2 has it.
+    pub size_ahead: bool,
+}
+
+/// Where a number goes, as a set of bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sinks(u8);
+
+impl Sinks {
+    /// To the values.
+    pub const VALUE: Self = Self(1);
+    /// To the seconds of the stamp.
+    pub const SECONDS: Self = Self(2);
+    /// To its nanoseconds.
+    pub const NANOSECONDS: Self = Self(4);
+    /// To the spacing of samples.
+    pub const SPACING: Self = Self(8);
+    /// To the names that are searched.
+    pub const NAME: Self = Self(16);
+
+    /// Whether one of the others is among these.
+    #[must_use]
+    pub fn has(self, other: Self) -> bool {
+        self.0 & other.0 != 0
+    }
+}
+
+/// Something that is passed over.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Item {
+    /// Of a size that follows from where it begins.
+    Fixed(Run),
+    /// Text.
+    Text,
+    /// Text of wide characters.
+    WideText,
+    /// A type whose size varies, by its place.
+    Struct(usize),
+    /// A list.
+    List(Box<List>),
+}
+
+/// A list, or an array of items whose size varies.
+#[derive(Debug, Clone, PartialEq)]
+pub struct List {
+    /// Number of items if it is not in the message.
+    pub count: Option<u32>,
+    /// Its items.
+    pub item: Item,
+    /// Length of each item but the first, if all have the same.
+    pub stride: Option<u64>,
+    /// Whether its size in bytes stands before it.
+    pub size_ahead: bool,
+}
+
+/// One step through a message.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Step {
+    /// Over something.
+    Skip(Item),
+    /// Takes a number.
+    Read(Number, Sinks),
+    /// Compares a text with the name that is looked for.
+    Name,
+    /// Into an item of a list.
+    Pick(Box<Pick>),
+    /// Through all numbers of a list.
+    Numbers(Box<List>, Number),
+}
+
+/// Which items of a list.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pick {
+    /// The list.
+    pub list: List,
+    /// The item, or all.
+    pub which: Hop,
+    /// Steps in the item.
+    pub inside: Vec<Step>,
+    /// Whether something behind the list is wanted too.
+    pub resume: bool,
+}
+
+/// Steps to the wanted numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// How data are laid out.
+    pub rules: Rules,
+    /// The steps.
+    pub steps: Vec<Step>,
+    /// Steps that find the named item.
+    pub lookup: Vec<Step>,
+    /// Steps over each type whose size varies.
+    pub structs: Vec<Vec<Step>>,
+    /// The whole message.
+    pub whole: Item,
+}
+
+impl Plan {
+    /// Plans the way through messages of a type that does not contain itself.
+    #[must_use]
+    pub fn new(schema: &Schema, targets: &Targets, rules: Rules) -> Self {
+        let mut planner = Planner {
+            schema,
+            rules,
+            items: vec![None; schema.structs.len()],
+            structs: vec![Vec::new(); schema.structs.len()],
+        };
+        let mut wanted = vec![(&targets.value.hops[..], Sinks::VALUE)];
+        if let Some(stamp) = &targets.stamp {
+            wanted.push((&stamp.seconds, Sinks::SECONDS));
+            wanted.push((&stamp.nanoseconds, Sinks::NANOSECONDS));
+        }
+        if let Some(spacing) = &targets.spacing {
+            wanted.push((spacing, Sinks::SPACING));
+        }
+        let names = targets.value.lookup.as_ref();
+        let names = names.map(|lookup| (&lookup.hops[..], Sinks::NAME));
+        let names: Vec<_> = names.into_iter().collect();
+        let whole = planner.item(&Kind::Struct(schema.root));
+        Self {
+            rules,
+            steps: planner.steps(&Kind::Struct(schema.root), &wanted, false),
+            lookup: match names.is_empty() {
+                true => Vec::new(),
+                false => planner.steps(&Kind::Struct(schema.root), &names, false),
+            },
+            structs: planner.structs,
+            whole,
+        }
+    }
+}
+
+type Wanted<'a> = (&'a [Hop], Sinks);
+
+struct Planner<'a> {
+    schema: &'a Schema,
+    rules: Rules,
+    /// How each type is passed over, once it is known.
+    items: Vec<Option<Item>>,
+    structs: Vec<Vec<Step>>,
+}
+
+impl Planner<'_> {
+    fn item(&mut self, kind: &Kind) -> Item {
+        let largest = self.rules.largest_align;
+        let align = |size: u8| size.min(largest);
+        match kind {
+            Kind::Number(number) => Item::Fixed(Run::of(number.size(), align(number.size()))),
+            Kind::Text => Item::Text,
+            Kind::WideText => Item::WideText,
+            Kind::Nothing => Item::Fixed(Run::NONE),
+            Kind::Struct(index) => self.structure(*index),
+            Kind::Many(many) => {
+                let list = self.list(&many.item, many.count);
+                match (&list.item, list.count) {
+                    // An array of nothing takes no bytes, whatever its items would take.
+                    (_, Some(0)) if !list.size_ahead => Item::Fixed(Run::NONE),
+                    (Item::Fixed(run), Some(count)) => {
+                        let items = run.repeat(count);
+                        let size = Run::of(4, align(4));
+                        Item::Fixed(if list.size_ahead {
+                            size.then(&items)
+                        } else {
+                            items
+                        })
+                    }
+                    _ => Item::List(Box::new(list)),
+                }
+            }
+        }
+    }
+
+    fn list(&mut self, item: &Kind, count: Option<u32>) -> List {
+        let size_ahead = self.rules.size_ahead && !matches!(item, Kind::Number(_));
+        let item = self.item(item);
+        List {
+            count,
+            stride: match &item {
+                Item::Fixed(run) => run.stride(),
+                _ => None,
+            },
+            item,
+            size_ahead,
+        }
+    }
+
+    fn structure(&mut self, index: usize) -> Item {
+        if let Some(item) = &self.items[index] {
+            return item.clone();
+        }
+        let schema = self.schema;
+        let mut steps = Vec::new();
+        if schema.structs[index].fields.is_empty() {
+            push_skip(&mut steps, Item::Fixed(Run::of(self.rules.empty, 1)));
+        }
+        for field in &schema.structs[index].fields {
+            let item = self.item(&field.kind);
+            push_skip(&mut steps, item);
+        }
+        let item = match &steps[..] {
+            [] => Item::Fixed(Run::NONE),
+            [Step::Skip(Item::Fixed(run))] => Item::Fixed(*run),
+            _ => {
+                self.structs[index] = steps;
+                Item::Struct(index)
+            }
+        };
+        self.items[index] = Some(item.clone());
+        item
+    }
+
+    /// Steps to what is wanted in data of a kind, and to their end if something follows.
+    fn steps(&mut self, kind: &Kind, wanted: &[Wanted], to_end: bool) -> Vec<Step> {
+        match kind {
+            Kind::Struct(index) => self.fields(*index, wanted, to_end),
+            Kind::Many(many) => {
+                let list = self.list(&many.item, many.count);
+                vec![self.pick(list, &many.item, wanted, to_end)]
+            }
+            Kind::Number(number) => {
+                let sinks = wanted.iter().fold(0, |bits, (_, sinks)| bits | sinks.0);
+                vec![Step::Read(*number, Sinks(sinks))]
+            }
+            Kind::Text if wanted.iter().any(|(_, sinks)| sinks.has(Sinks::NAME)) => {
+                vec![Step::Name]
+            }
+            other => vec![Step::Skip(self.item(other))],
+        }
+    }
+
+    fn fields(&mut self, index: usize, wanted: &[Wanted], to_end: bool) -> Vec<Step> {
+        let schema = self.schema;
+        let fields = &schema.structs[index].fields;
+        let place = |hops: &[Hop]| match hops.first() {
+            Some(Hop::Field(place)) => Some(*place),
+            _ => None,
+        };
+        let last = wanted.iter().filter_map(|(hops, _)| place(hops)).max();
+        let end = if to_end {
+            fields.len()
+        } else {
+            last.map_or(0, |last| last + 1)
+        };
+        let mut steps = Vec::new();
+        for (at, field) in fields.iter().enumerate().take(end) {
+            let inside: Vec<Wanted> = wanted
+                .iter()
+                .filter(|(hops, _)| place(hops) == Some(at))
+                .map(|(hops, sinks)| (&hops[1..], *sinks))
+                .collect();
+            if inside.is_empty() {
+                let item = self.item(&field.kind);
+                push_skip(&mut steps, item);
+            } else {
+                let more = to_end || last.is_some_and(|last| at < last);
+                steps.append(&mut self.steps(&field.kind, &inside, more));
+            }
+        }
+        steps
+    }
+
+    fn pick(&mut self, list: List, item: &Kind, wanted: &[Wanted], resume: bool) -> Step {
+        // Only the value or the names lie in lists, so all that is wanted takes the same hop.
+        let which = wanted.first().and_then(|(hops, _)| hops.first());
+        let which = which.copied().unwrap_or(Hop::All);
+        if let (Hop::All, Kind::Number(number)) = (which, item) {
+            return Step::Numbers(Box::new(list), *number);
+        }
+        let inside: Vec<Wanted> = wanted
+            .iter()
+            .map(|(hops, sinks)| (hops.get(1..).unwrap_or(&[]), *sinks))
+            .collect();
+        Step::Pick(Box::new(Pick {
+            inside: self.steps(item, &inside, which == Hop::All),
+            list,
+            which,
+            resume,
+        }))
+    }
+}
+
+/// Adds a skip, joined to the one before if both are of fixed size.
+fn push_skip(steps: &mut Vec<Step>, item: Item) {
+    if let (Some(Step::Skip(Item::Fixed(last))), Item::Fixed(next)) = (steps.last_mut(), &item) {
+        *last = last.then(next);
+        return;
+    }
+    if item != Item::Fixed(Run::NONE) {
+        steps.push(Step::Skip(item));
+    }
+}

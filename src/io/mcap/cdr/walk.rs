@@ -1,0 +1,259 @@
+//! Following the steps of a plan through the bytes of a message.
+
+use super::plan::{Item, List, Pick, Plan, Sinks, Step};
+use crate::io::mcap::decode::{Damage, Reading};
+use crate::io::mcap::route::Hop;
+use crate::io::mcap::schema::Number;
+
+/// A place in a message.
+pub struct Walk<'a> {
+    /// The message behind its encapsulation; padding counts from its start.
+    pub data: &'a [u8],
+    /// The place.
+    pub at: usize,
+    /// Whether numbers have their large end first.
+    pub is_big: bool,
+    /// The plan.
+    pub plan: &'a Plan,
+    /// What is filled.
+    pub reading: &'a mut Reading,
+    /// Name that is looked for.
+    pub name: &'a [u8],
+    /// Names seen so far.
+    pub seen: usize,
+    /// Place of the name.
+    pub found: Option<usize>,
+}
+
+impl<'a> Walk<'a> {
+    /// Follows steps.
+    pub fn follow(&mut self, steps: &'a [Step]) -> Result<(), Damage> {
+        for step in steps {
+            match step {
+                Step::Skip(item) => self.skip(item)?,
+                Step::Read(number, sinks) => self.read(*number, *sinks)?,
+                Step::Name => self.compare()?,
+                Step::Numbers(list, number) => self.numbers(list, *number)?,
+                Step::Pick(pick) => self.pick(pick)?,
+            }
+        }
+        Ok(())
+    }
+
+    /// Goes over something.
+    pub fn skip(&mut self, item: &'a Item) -> Result<(), Damage> {
+        match item {
+            Item::Fixed(run) => self.forward(run.length_from(self.at)),
+            Item::Text => {
+                let length = self.count()?;
+                self.forward(length);
+            }
+            Item::WideText => {
+                let length = self.count()?;
+                self.forward(length.saturating_mul(usize::from(self.plan.rules.wide)));
+            }
+            Item::Struct(index) => {
+                let steps = &self.plan.structs[*index];
+                self.follow(steps)?;
+            }
+            Item::List(list) => self.skip_list(list)?,
+        }
+        if self.at > self.data.len() {
+            return Err(Damage::Short);
+        }
+        Ok(())
+    }
+
+    fn forward(&mut self, length: usize) {
+        self.at = self.at.saturating_add(length);
+    }
+
+    fn skip_list(&mut self, list: &'a List) -> Result<(), Damage> {
+        if list.size_ahead {
+            let size = self.count()?;
+            self.forward(size);
+            return Ok(());
+        }
+        let count = self.length(list)?;
+        self.skip_items(list, count)
+    }
+
+    /// Number of items of a list, at whose front this is.
+    fn length(&mut self, list: &List) -> Result<usize, Damage> {
+        match list.count {
+            Some(count) => Ok(count as usize),
+            None => self.count(),
+        }
+    }
+
+    fn skip_items(&mut self, list: &'a List, count: usize) -> Result<(), Damage> {
+        match (&list.item, list.stride) {
+            _ if count == 0 => {}
+            (Item::Fixed(run), Some(stride)) => {
+                self.forward(run.length_from(self.at));
+                let stride = usize::try_from(stride).unwrap_or(usize::MAX);
+                self.forward(stride.saturating_mul(count - 1));
+            }
+            (Item::Fixed(run), None) => {
+                let count = u32::try_from(count).unwrap_or(u32::MAX);
+                self.forward(run.repeat(count).length_from(self.at));
+            }
+            (item, _) => {
+                // Each of them has a length of its own, so bytes run out before the count does.
+                for _ in 0..count {
+                    self.skip(item)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn pick(&mut self, pick: &'a Pick) -> Result<(), Damage> {
+        let list = &pick.list;
+        let start = self.at;
+        if list.size_ahead {
+            self.count()?;
+        }
+        let count = self.length(list)?;
+        let index = match pick.which {
+            Hop::All => {
+                for _ in 0..count {
+                    self.follow(&pick.inside)?;
+                    if self.at > self.data.len() {
+                        return Err(Damage::Short);
+                    }
+                }
+                return Ok(());
+            }
+            Hop::Called => self
+                .found
+                .and_then(|place| i64::try_from(place).ok())
+                .ok_or_else(|| Damage::NoName(String::from_utf8_lossy(self.name).into_owned()))?,
+            Hop::Item(index) => index,
+            Hop::Field(_) => return Err(Damage::Malformed("a list has no fields".to_owned())),
+        };
+        let from_front = if index < 0 {
+            index.saturating_add(count as i64)
+        } else {
+            index
+        };
+        let place = usize::try_from(from_front).ok().filter(|p| *p < count);
+        let place = place.ok_or(Damage::NoItem {
+            index,
+            count: count as u64,
+        })?;
+        self.skip_items(list, place)?;
+        self.follow(&pick.inside)?;
+        if pick.resume {
+            self.at = start;
+            self.skip_list(list)?;
+        }
+        Ok(())
+    }
+
+    fn numbers(&mut self, list: &'a List, number: Number) -> Result<(), Damage> {
+        let count = self.length(list)?;
+        let there = self.data.len().saturating_sub(self.at) / usize::from(number.size());
+        if count > there {
+            return Err(Damage::Short);
+        }
+        self.reading.values.reserve(count);
+        for _ in 0..count {
+            self.read(number, Sinks::VALUE)?;
+        }
+        Ok(())
+    }
+
+    fn compare(&mut self) -> Result<(), Damage> {
+        let length = self.count()?;
+        let end = self.at.checked_add(length);
+        let text = end.and_then(|end| self.data.get(self.at..end));
+        let text = text.ok_or(Damage::Short)?;
+        // CDR writes the zero at the end of a text, ROS 1 does not.
+        let text = text.strip_suffix(&[0]).unwrap_or(text);
+        if self.found.is_none() && text == self.name {
+            self.found = Some(self.seen);
+        }
+        self.seen += 1;
+        self.at += length;
+        Ok(())
+    }
+
+    fn count(&mut self) -> Result<usize, Damage> {
+        let bytes = self.take::<4>()?;
+        Ok(if self.is_big {
+            u32::from_be_bytes(bytes)
+        } else {
+            u32::from_le_bytes(bytes)
+        } as usize)
+    }
+
+    /// The bytes of a number, behind its padding.
+    fn take<const N: usize>(&mut self) -> Result<[u8; N], Damage> {
+        let align = N.min(usize::from(self.plan.rules.largest_align));
+        let start = self
+            .at
+            .checked_next_multiple_of(align)
+            .ok_or(Damage::Short)?;
+        let bytes = self.data.get(start..).and_then(|rest| rest.first_chunk());
+        self.at = start.saturating_add(N);
+        bytes.copied().ok_or(Damage::Short)
+    }
+
+    fn read(&mut self, number: Number, sinks: Sinks) -> Result<(), Damage> {
+        macro_rules! take {
+            ($kind:ty) => {{
+                let bytes = self.take()?;
+                if self.is_big {
+                    <$kind>::from_be_bytes(bytes)
+                } else {
+                    <$kind>::from_le_bytes(bytes)
+                }
+            }};
+        }
+        // Stamps are whole numbers; what they are as f64 does not matter, and the other way round.
+        let (value, whole) = match number {
+            Number::Bool => {
+                let whole = i64::from(take!(u8) != 0);
+                (whole as f64, whole)
+            }
+            Number::I8 => both(take!(i8)),
+            Number::U8 => both(take!(u8)),
+            Number::I16 => both(take!(i16)),
+            Number::U16 => both(take!(u16)),
+            Number::I32 => both(take!(i32)),
+            Number::U32 => both(take!(u32)),
+            Number::I64 => {
+                let whole = take!(i64);
+                (whole as f64, whole)
+            }
+            Number::U64 => {
+                let whole = take!(u64);
+                (whole as f64, i64::try_from(whole).unwrap_or(i64::MAX))
+            }
+            Number::F32 => float(f64::from(take!(f32))),
+            Number::F64 => float(take!(f64)),
+        };
+        if sinks.has(Sinks::VALUE) {
+            self.reading.values.push(value);
+        }
+        if sinks.has(Sinks::SECONDS) {
+            self.reading.seconds = Some(whole);
+        }
+        if sinks.has(Sinks::NANOSECONDS) {
+            self.reading.nanoseconds = Some(whole);
+        }
+        if sinks.has(Sinks::SPACING) {
+            self.reading.spacing = Some(value);
+        }
+        Ok(())
+    }
+}
+
+fn both<T: Copy + Into<f64> + Into<i64>>(number: T) -> (f64, i64) {
+    (number.into(), number.into())
+}
+
+fn float(value: f64) -> (f64, i64) {
+    (value, value as i64)
+}

@@ -1,0 +1,183 @@
+//! Channels of a file and how their messages are read.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use mcap::records::op;
+
+use super::decode::Encoding;
+use super::record::{ChannelRecord, SchemaRecord};
+use super::schema::ros2msg::Generation;
+use super::schema::{Schema, json, protobuf, ros2idl, ros2msg};
+
+/// Schemas and channels as the file declares them.
+#[derive(Debug, Default)]
+pub struct Channels {
+    schemas: BTreeMap<u16, Arc<SchemaRecord>>,
+    channels: BTreeMap<u16, Arc<Channel>>,
+    /// Declarations that contradict an earlier one.
+    pub conflicts: u64,
+}
+
+/// A channel and its schema.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Channel {
+    /// The channel as the file declares it.
+    pub record: ChannelRecord,
+    /// Its schema, if it has one.
+    pub schema: Option<Arc<SchemaRecord>>,
+}
+
+impl Channels {
+    /// Takes note of a schema or a channel; other records are left alone.
+    pub fn note(&mut self, op: u8, body: &[u8]) {
+        match op {
+            op::SCHEMA => {
+                if let Some(schema) = SchemaRecord::read(body).filter(|schema| schema.id != 0) {
+                    self.add_schema(schema);
+                }
+            }
+            op::CHANNEL => {
+                if let Some(channel) = ChannelRecord::read(body) {
+                    self.add_channel(channel);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn add_schema(&mut self, schema: SchemaRecord) {
+        match self.schemas.get(&schema.id) {
+            Some(known) if **known != schema => self.conflicts += 1,
+            Some(_) => {}
+            None => drop(self.schemas.insert(schema.id, Arc::new(schema))),
+        }
+    }
+
+    fn add_channel(&mut self, record: ChannelRecord) {
+        match self.channels.get(&record.id) {
+            Some(known) if known.record != record => self.conflicts += 1,
+            // Its schema may have been declared since.
+            Some(known) if known.schema.is_some() || record.schema_id == 0 => {}
+            _ => {
+                let schema = self.schemas.get(&record.schema_id).cloned();
+                let channel = Channel { record, schema };
+                self.channels.insert(channel.record.id, Arc::new(channel));
+            }
+        }
+    }
+
+    /// A channel by its number.
+    #[must_use]
+    pub fn get(&self, id: u16) -> Option<&Arc<Channel>> {
+        self.channels.get(&id)
+    }
+
+    /// All channels, by number.
+    pub fn iter(&self) -> impl Iterator<Item = &Arc<Channel>> {
+        self.channels.values()
+    }
+}
+
+impl Channel {
+    /// How its messages are encoded, and what they are made of. JSON is told from a message.
+    ///
+    /// # Errors
+    /// A sentence that says why they cannot be read.
+    pub fn layout(&self, message: &[u8]) -> Result<(Encoding, Arc<Schema>), String> {
+        let record = &self.record;
+        if record.message_encoding == "json" {
+            let value = serde_json::from_slice(message)
+                .map_err(|error| format!("its first message is no JSON: {error}"))?;
+            let schema = json::read(&value).map_err(|error| error.to_string())?;
+            return Ok((Encoding::Json, Arc::new(schema)));
+        }
+        let Some(schema) = &self.schema else {
+            return Err(match record.schema_id {
+                0 => format!(
+                    "it has no schema, and messages in \"{}\" cannot be read without one",
+                    record.message_encoding
+                ),
+                id => format!("its schema {id} is not in the file"),
+            });
+        };
+        let text = || String::from_utf8_lossy(&schema.data);
+        let pair = (&*record.message_encoding, &*schema.encoding);
+        let (encoding, read) = match pair {
+            ("cdr", "ros2msg") => {
+                let read = ros2msg::read(&schema.name, &text(), Generation::Ros2);
+                (Encoding::Cdr, read)
+            }
+            ("cdr", "ros2idl" | "omgidl") => (Encoding::Cdr, ros2idl::read(&schema.name, &text())),
+            ("ros1", "ros1msg") => {
+                let read = ros2msg::read(&schema.name, &text(), Generation::Ros1);
+                (Encoding::Ros1, read)
+            }
+            ("protobuf", "protobuf") => (
+                Encoding::Protobuf,
+                protobuf::read(&schema.name, &schema.data),
+            ),
+            (message, schema) => {
+                return Err(format!(
+                    "message encoding \"{message}\" with schema encoding \"{schema}\" is not \
+                     supported; expected cdr with ros2msg or ros2idl, ros1 with ros1msg, protobuf \
+                     or json"
+                ));
+            }
+        };
+        read.map(|schema| (encoding, Arc::new(schema)))
+            .map_err(|error| format!("schema \"{}\", {error}", schema.name))
+    }
+
+    /// Name and encoding of its schema, for people.
+    #[must_use]
+    pub fn schema_name(&self) -> &str {
+        self.schema.as_ref().map_or("", |schema| &schema.name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn channel(message_encoding: &str, schema_encoding: &str) -> Channel {
+        Channel {
+            record: ChannelRecord {
+                id: 1,
+                schema_id: 1,
+                topic: "/t".to_owned(),
+                message_encoding: message_encoding.to_owned(),
+                metadata: BTreeMap::new(),
+            },
+            schema: Some(Arc::new(SchemaRecord {
+                id: 1,
+                name: "p/msg/M".to_owned(),
+                encoding: schema_encoding.to_owned(),
+                data: b"float64 x".to_vec(),
+            })),
+        }
+    }
+
+    #[test]
+    fn encodings_are_told_or_refused_by_name() {
+        let (encoding, _) = channel("cdr", "ros2msg").layout(b"").unwrap();
+        assert_eq!(encoding, Encoding::Cdr);
+        let (encoding, _) = channel("json", "jsonschema").layout(b"{}").unwrap();
+        assert_eq!(encoding, Encoding::Json);
+        let said = channel("flatbuffer", "flatbuffer").layout(b"").unwrap_err();
+        assert!(said.contains("message encoding \"flatbuffer\""), "{said}");
+        let said = channel("cdr", "ros2idl").layout(b"").unwrap_err();
+        assert!(said.contains("schema \"p/msg/M\", line 1"), "{said}");
+    }
+
+    #[test]
+    fn a_contradicting_declaration_is_counted_and_left_out() {
+        let mut channels = Channels::default();
+        let body = |name: &[u8]| [b"\x01\0\x01\0\0\0", name, &[0; 8]].concat();
+        for name in [b"a", b"a", b"b"] {
+            channels.note(op::SCHEMA, &body(name));
+        }
+        assert_eq!(channels.conflicts, 1);
+        assert_eq!(channels.schemas[&1].name, "a");
+    }
+}

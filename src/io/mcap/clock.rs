@@ -1,0 +1,100 @@
+//! The clock of the messages' own stamps beside that of the recorder.
+
+/// Largest difference of two clocks that need no word, in ns: one day.
+const DAY_NS: i64 = 86_400_000_000_000;
+/// Share of the record's length by which clocks may drift apart without a word.
+const DRIFT: f64 = 0.01;
+/// The same in ns.
+const DRIFT_NS: i64 = 100_000_000;
+
+/// What was seen of both clocks.
+#[derive(Debug, Default)]
+pub struct Clock {
+    /// Stamp minus log time: of the first message, least and greatest, in ns.
+    offsets: Option<(i64, i64, i64)>,
+    /// Log times, first and last, in ns.
+    log: Option<(i64, i64)>,
+    /// Stamps that are zero.
+    zeros: u64,
+}
+
+impl Clock {
+    /// Takes note of a message's two times.
+    #[inline]
+    pub fn note(&mut self, stamp_ns: Option<i64>, log_time_ns: u64) {
+        let Some(stamp_ns) = stamp_ns else {
+            return;
+        };
+        self.zeros += u64::from(stamp_ns == 0);
+        let Ok(log_ns) = i64::try_from(log_time_ns) else {
+            return;
+        };
+        let offset = stamp_ns.saturating_sub(log_ns);
+        self.offsets = Some(match self.offsets {
+            None => (offset, offset, offset),
+            Some((first, least, greatest)) => (first, least.min(offset), greatest.max(offset)),
+        });
+        self.log = Some(match self.log {
+            None => (log_ns, log_ns),
+            Some((first, last)) => (first.min(log_ns), last.max(log_ns)),
+        });
+    }
+
+    /// What should be said about them.
+    #[must_use]
+    pub fn warnings(&self) -> Vec<String> {
+        let mut said = Vec::new();
+        if self.zeros > 0 {
+            said.push(format!("{} messages have a time stamp of zero", self.zeros));
+        }
+        let (Some((first, least, greatest)), Some((start, end))) = (self.offsets, self.log) else {
+            return said;
+        };
+        let drift = greatest.saturating_sub(least);
+        let length = end.saturating_sub(start) as f64;
+        if first.saturating_abs() > DAY_NS {
+            said.push(format!(
+                "the messages' own clock and the recorder's differ by {:.0} s: they do not count \
+                 from the same time",
+                first as f64 / 1e9
+            ));
+        }
+        if drift > DRIFT_NS && drift as f64 > DRIFT * length {
+            said.push(format!(
+                "the messages' own stamps and the log times drift apart by {:.3} s over {:.3} s: \
+                 one of the clocks is wrong or was set, or messages were delayed",
+                drift as f64 / 1e9,
+                length / 1e9
+            ));
+        }
+        said
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn said(times: &[(i64, u64)]) -> Vec<String> {
+        let mut clock = Clock::default();
+        for (stamp, log) in times {
+            clock.note(Some(*stamp), *log);
+        }
+        clock.warnings()
+    }
+
+    #[test]
+    fn clocks_that_agree_need_no_word() {
+        assert!(said(&[(1_000, 2_000), (1_000_001_000, 1_050_000_000)]).is_empty());
+        assert!(said(&[]).is_empty());
+    }
+
+    #[test]
+    fn other_zeros_and_drift_are_said() {
+        let day = 100_000 * 1_000_000_000_u64;
+        assert!(said(&[(1, day)])[0].contains("do not count from the same time"));
+        let second = 1_000_000_000;
+        assert!(said(&[(1, 1), (2 * second, 1_000_000_000)])[0].contains("drift apart by 1.000 s"));
+        assert!(said(&[(0, 1)])[0].contains("time stamp of zero"));
+    }
+}

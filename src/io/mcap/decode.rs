@@ -1,0 +1,157 @@
+//! One interface to the encodings of messages.
+
+use std::fmt;
+use std::sync::Arc;
+
+use super::cdr;
+use super::json;
+use super::protobuf;
+use super::route::{Hop, Route};
+use super::schema::Schema;
+use super::time::Stamp;
+
+/// What is wanted of every message.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Targets {
+    /// The value or values.
+    pub value: Route,
+    /// The time stamp within the message.
+    pub stamp: Option<Stamp>,
+    /// Way to the number that says how far samples are apart.
+    pub spacing: Option<Vec<Hop>>,
+}
+
+/// What a message holds of it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Reading {
+    /// Values in order; one unless all items of a list are wanted.
+    pub values: Vec<f64>,
+    /// Seconds of the stamp.
+    pub seconds: Option<i64>,
+    /// Nanoseconds of the stamp.
+    pub nanoseconds: Option<i64>,
+    /// The number that says how far samples are apart.
+    pub spacing: Option<f64>,
+}
+
+impl Reading {
+    /// Forgets the last message.
+    pub fn clear(&mut self) {
+        self.values.clear();
+        self.seconds = None;
+        self.nanoseconds = None;
+        self.spacing = None;
+    }
+
+    /// The stamp in ns.
+    #[must_use]
+    pub fn stamp_ns(&self) -> Option<i64> {
+        self.seconds?
+            .checked_mul(1_000_000_000)?
+            .checked_add(self.nanoseconds?)
+    }
+}
+
+/// Why a message gives no value.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Damage {
+    /// It ends before the field.
+    Short,
+    /// The list has not that many items.
+    NoItem {
+        /// Item asked for.
+        index: i64,
+        /// Items there are.
+        count: u64,
+    },
+    /// No item has that name.
+    NoName(String),
+    /// The message says it is encoded in a way that is not known.
+    Encapsulation(u8),
+    /// The field is not set.
+    Absent,
+    /// The bytes are no message of the encoding.
+    Malformed(String),
+}
+
+impl fmt::Display for Damage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Short => f.write_str("the message ends before the field"),
+            Self::NoItem { index, count } => {
+                write!(f, "there is no item [{index}], the list has {count}")
+            }
+            Self::NoName(name) => write!(f, "no item is called \"{name}\""),
+            Self::Encapsulation(kind) => write!(
+                f,
+                "its encapsulation 0x{kind:02x} is not supported; expected plain CDR (0x00, 0x01) \
+                 or plain XCDR2 (0x06, 0x07, 0x10, 0x11)"
+            ),
+            Self::Absent => f.write_str("the field is not set"),
+            Self::Malformed(why) => write!(f, "the message cannot be read: {why}"),
+        }
+    }
+}
+
+/// Encodings that can be read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Encoding {
+    /// CDR, of ROS 2.
+    Cdr,
+    /// ROS 1.
+    Ros1,
+    /// Protobuf.
+    Protobuf,
+    /// JSON.
+    Json,
+}
+
+impl Encoding {
+    /// Reads the name that channels give.
+    #[must_use]
+    pub fn of(name: &str) -> Option<Self> {
+        match name {
+            "cdr" => Some(Self::Cdr),
+            "ros1" => Some(Self::Ros1),
+            "protobuf" => Some(Self::Protobuf),
+            "json" => Some(Self::Json),
+            _ => None,
+        }
+    }
+}
+
+/// Takes wanted numbers out of messages.
+pub enum Decoder {
+    /// CDR and ROS 1.
+    Cdr(cdr::Decoder),
+    /// Protobuf.
+    Protobuf(protobuf::Decoder),
+    /// JSON.
+    Json(json::Decoder),
+}
+
+impl Decoder {
+    /// Prepares for messages of one type.
+    #[must_use]
+    pub fn new(encoding: Encoding, schema: &Arc<Schema>, targets: Targets) -> Self {
+        match encoding {
+            Encoding::Cdr => Self::Cdr(cdr::Decoder::new(schema, targets, false)),
+            Encoding::Ros1 => Self::Cdr(cdr::Decoder::new(schema, targets, true)),
+            Encoding::Protobuf => Self::Protobuf(protobuf::Decoder::new(schema, targets)),
+            Encoding::Json => Self::Json(json::Decoder::new(schema, &targets)),
+        }
+    }
+
+    /// Reads a message; `reading` is cleared first.
+    ///
+    /// # Errors
+    /// [`Damage`] if the message does not hold the value.
+    pub fn read(&mut self, data: &[u8], reading: &mut Reading) -> Result<(), Damage> {
+        reading.clear();
+        match self {
+            Self::Cdr(decoder) => decoder.read(data, reading),
+            Self::Protobuf(decoder) => decoder.read(data, reading),
+            Self::Json(decoder) => decoder.read(data, reading),
+        }
+    }
+}

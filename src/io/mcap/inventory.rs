@@ -1,0 +1,436 @@
+//! What is in a file.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use mcap::records::op;
+use serde::Serialize;
+
+use super::channels::{Channel, Channels};
+use super::decode::{Decoder, Encoding, Reading, Targets};
+use super::path;
+use super::record::frames::Frames;
+use super::record::{AttachmentHead, HeaderRecord, Message, MetadataRecord};
+use super::route::Route;
+use super::schema::Schema;
+use super::schema::leaves::{self, Leaf};
+use super::selection::Wanted;
+use super::summary;
+use super::time::Stamp;
+use super::units;
+use crate::failure::Failure;
+use crate::io::csv::Place;
+use crate::report::Warning;
+
+/// Leaves of a channel whose value in the first message is shown.
+const EXAMPLES: usize = 64;
+
+/// What is in a file.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Inventory {
+    /// Name of the file.
+    pub file: String,
+    /// Profile, as `ros2`.
+    pub profile: String,
+    /// Library that wrote it.
+    pub library: String,
+    /// Messages in all channels.
+    pub messages: u64,
+    /// Earliest log time, in ns.
+    pub first_log_ns: Option<u64>,
+    /// Latest log time, in ns.
+    pub last_log_ns: Option<u64>,
+    /// Channels in the order of their topics.
+    pub channels: Vec<ChannelReport>,
+    /// Attachments in the order of the file.
+    pub attachments: Vec<AttachmentReport>,
+    /// Metadata in the order of the file.
+    pub metadata: Vec<MetadataReport>,
+    /// Chunks by compression.
+    pub chunks: Vec<ChunkReport>,
+    /// Whether the file has its end record.
+    pub is_closed: bool,
+    /// Whether data were lost: exit code 3.
+    pub is_lossy: bool,
+    /// What is wrong.
+    pub warnings: Vec<Warning>,
+}
+
+/// A channel.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ChannelReport {
+    /// Number in the file.
+    pub id: u16,
+    /// Topic.
+    pub topic: String,
+    /// Encoding of its messages.
+    pub message_encoding: String,
+    /// Name of its schema, if it has one.
+    pub schema: Option<String>,
+    /// Language of its schema.
+    pub schema_encoding: Option<String>,
+    /// Messages.
+    pub messages: u64,
+    /// Log time of the first and the last message, in ns.
+    pub log_ns: Option<(u64, u64)>,
+    /// Publish time of the first and the last message, in ns.
+    pub publish_ns: Option<(u64, u64)>,
+    /// Messages per second by log time; none with fewer than two messages or no time between.
+    pub rate_hz: Option<f64>,
+    /// Messages logged before the one in front of them.
+    pub out_of_order: u64,
+    /// Why its messages cannot be read, if they cannot.
+    pub unreadable: Option<String>,
+    /// Field of the messages' own time stamp.
+    pub stamp: Option<String>,
+    /// The numbers in its messages.
+    pub leaves: Vec<LeafReport>,
+    /// Whether there are more numbers than listed.
+    pub has_more_leaves: bool,
+}
+
+/// A number in a channel's messages.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LeafReport {
+    /// Path; lists with `[]`, arrays with `[3]`.
+    pub path: String,
+    /// Kind of number.
+    pub kind: &'static str,
+    /// Unit, if the file tells it.
+    pub unit: Option<String>,
+    /// Value in the first message, of the first item in lists.
+    pub example: Option<f64>,
+    /// Whether it is part of a time stamp.
+    pub is_stamp: bool,
+}
+
+/// An attachment.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AttachmentReport {
+    /// Name.
+    pub name: String,
+    /// Media type.
+    pub media_type: String,
+    /// Length in bytes.
+    pub size: u64,
+    /// Time it was recorded at, in ns.
+    pub log_ns: u64,
+}
+
+/// A metadata record.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MetadataReport {
+    /// Name.
+    pub name: String,
+    /// Keys and values.
+    pub pairs: BTreeMap<String, String>,
+}
+
+/// Chunks with the same compression.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ChunkReport {
+    /// Compression, empty for none.
+    pub compression: String,
+    /// Chunks.
+    pub chunks: u64,
+    /// Bytes in the file.
+    pub packed_bytes: u64,
+    /// Bytes unpacked.
+    pub unpacked_bytes: u64,
+}
+
+impl Inventory {
+    /// Reads a file from front to end.
+    ///
+    /// # Errors
+    /// If it cannot be read or is not MCAP. Damage is no error: it is among the warnings.
+    pub fn scan(place: &Place) -> Result<Self, Failure> {
+        Self::read(Frames::open(place)?)
+    }
+
+    /// The same of a file that is open.
+    ///
+    /// # Errors
+    /// If it cannot be read.
+    pub fn read(mut frames: Frames) -> Result<Self, Failure> {
+        let mut scan = Scan::default();
+        while let Some(frame) = frames.advance()? {
+            scan.note(frame.op, frames.body(&frame));
+        }
+        Ok(scan.finish(&frames))
+    }
+}
+
+/// The file's only topic with numbers.
+///
+/// # Errors
+/// If there are several, or none, or the file can only be read once.
+pub fn only_topic(place: &Place) -> Result<Wanted, Failure> {
+    if *place == Place::Stdin {
+        return Err(Failure::usage(
+            "choose what to read from standard input with --topic, as --topic /joint_states \
+             --field effort[0]",
+        ));
+    }
+    let inventory = Inventory::scan(place)?;
+    let has_numbers = |channel: &&ChannelReport| channel.leaves.iter().any(|leaf| !leaf.is_stamp);
+    let with_numbers = inventory.channels.iter().filter(has_numbers);
+    let mut topics: Vec<_> = with_numbers.map(|channel| channel.topic.as_str()).collect();
+    topics.dedup();
+    match topics[..] {
+        [topic] => Ok(Wanted::Topic(topic.to_owned(), Vec::new())),
+        [] => Err(Failure::failed(format_args!(
+            "{}: there is no topic whose numbers can be read{}",
+            inventory.file,
+            inventory
+                .channels
+                .iter()
+                .filter_map(|channel| {
+                    let why = channel.unreadable.as_ref()?;
+                    Some(format!("; {}: {why}", channel.topic))
+                })
+                .collect::<String>()
+        ))),
+        _ => Err(Failure::usage(format_args!(
+            "{}: choose a topic with --topic; there are: {}",
+            inventory.file,
+            topics.join(", ")
+        ))),
+    }
+}
+
+#[derive(Default)]
+struct Scan {
+    header: HeaderRecord,
+    channels: Channels,
+    seen: BTreeMap<u16, Seen>,
+    attachments: Vec<AttachmentReport>,
+    metadata: Vec<MetadataReport>,
+    /// Message records that are cut short.
+    broken: u64,
+}
+
+/// What was seen of a channel's messages.
+struct Seen {
+    messages: u64,
+    log_ns: (u64, u64),
+    publish_ns: (u64, u64),
+    least_log_ns: u64,
+    greatest_log_ns: u64,
+    out_of_order: u64,
+    first: Vec<u8>,
+}
+
+impl Scan {
+    fn note(&mut self, op: u8, body: &[u8]) {
+        match op {
+            op::MESSAGE => match Message::read(body) {
+                Some(message) => self.message(&message),
+                None => self.broken += 1,
+            },
+            op::HEADER => self.header = HeaderRecord::read(body).unwrap_or_default(),
+            op::ATTACHMENT => {
+                if let Some((head, _)) = AttachmentHead::read(body) {
+                    self.attachments.push(AttachmentReport {
+                        name: head.name,
+                        media_type: head.media_type,
+                        size: head.size,
+                        log_ns: head.log_time_ns,
+                    });
+                }
+            }
+            op::METADATA => {
+                if let Some(MetadataRecord { name, pairs }) = MetadataRecord::read(body) {
+                    self.metadata.push(MetadataReport { name, pairs });
+                }
+            }
+            _ => self.channels.note(op, body),
+        }
+    }
+
+    fn message(&mut self, message: &Message) {
+        let (log, publish) = (message.log_time_ns, message.publish_time_ns);
+        match self.seen.get_mut(&message.channel_id) {
+            Some(seen) => {
+                seen.messages += 1;
+                seen.out_of_order += u64::from(log < seen.log_ns.1);
+                seen.log_ns.1 = log;
+                seen.publish_ns.1 = publish;
+                seen.least_log_ns = seen.least_log_ns.min(log);
+                seen.greatest_log_ns = seen.greatest_log_ns.max(log);
+            }
+            None => {
+                let seen = Seen {
+                    messages: 1,
+                    log_ns: (log, log),
+                    publish_ns: (publish, publish),
+                    least_log_ns: log,
+                    greatest_log_ns: log,
+                    out_of_order: 0,
+                    first: message.data.to_vec(),
+                };
+                self.seen.insert(message.channel_id, seen);
+            }
+        }
+    }
+
+    fn finish(self, frames: &Frames) -> Inventory {
+        let mut channels: Vec<_> = self
+            .channels
+            .iter()
+            .map(|channel| report(channel, self.seen.get(&channel.record.id)))
+            .collect();
+        channels.sort_by(|a, b| (&a.topic, a.id).cmp(&(&b.topic, b.id)));
+        let first_log_ns = self.seen.values().map(|seen| seen.least_log_ns).min();
+        let last_log_ns = self.seen.values().map(|seen| seen.greatest_log_ns).max();
+        let last = last_log_ns.and_then(|last| i64::try_from(last).ok());
+        let mut warnings = summary::losses(frames, last);
+        warnings.extend(self.warnings(&channels));
+        Inventory {
+            file: frames.name().to_owned(),
+            profile: self.header.profile,
+            library: self.header.library,
+            messages: self.seen.values().map(|seen| seen.messages).sum(),
+            first_log_ns,
+            last_log_ns,
+            channels,
+            attachments: self.attachments,
+            metadata: self.metadata,
+            chunks: frames
+                .compressions()
+                .iter()
+                .map(|(compression, count)| ChunkReport {
+                    compression: compression.clone(),
+                    chunks: count.chunks,
+                    packed_bytes: count.packed,
+                    unpacked_bytes: count.unpacked,
+                })
+                .collect(),
+            is_closed: frames.is_closed(),
+            is_lossy: frames.loss_count() > 0 || self.broken > 0,
+            warnings,
+        }
+    }
+
+    fn warnings(&self, channels: &[ChannelReport]) -> Vec<Warning> {
+        let mut warnings = Vec::new();
+        let mut say = |code, message: String| warnings.push(Warning::new(code, message));
+        for channel in channels {
+            if channel.out_of_order > 0 {
+                let message = format!(
+                    "{}: {} of {} messages were logged before the one in front of them",
+                    channel.topic, channel.out_of_order, channel.messages
+                );
+                say("mcap-out-of-order", message);
+            }
+            if let Some(why) = &channel.unreadable {
+                say("mcap-unreadable", format!("{}: {why}", channel.topic));
+            }
+        }
+        let unknown = self.seen.iter();
+        let unknown = unknown.filter(|(id, _)| self.channels.get(**id).is_none());
+        let unknown: u64 = unknown.map(|(_, seen)| seen.messages).sum();
+        if unknown > 0 {
+            let message = format!("{unknown} messages are of channels that are not declared");
+            say("mcap-unknown-channel", message);
+        }
+        if self.broken > 0 {
+            let message = format!("{} message records are cut short", self.broken);
+            say("mcap-skipped", message);
+        }
+        if self.channels.conflicts > 0 {
+            let message = format!(
+                "{} schemas or channels are declared again with another content; the first \
+                 declaration was used",
+                self.channels.conflicts
+            );
+            say("mcap-conflict", message);
+        }
+        warnings
+    }
+}
+
+fn report(channel: &Channel, seen: Option<&Seen>) -> ChannelReport {
+    let record = &channel.record;
+    let schema = channel.schema.as_ref();
+    let first = seen.map(|seen| seen.first.as_slice());
+    let layout = match (first, record.message_encoding.as_str()) {
+        // What JSON messages are made of only a message can tell.
+        (None, "json") => Err("there is no message to tell its fields from".to_owned()),
+        (first, _) => channel.layout(first.unwrap_or(&[])),
+    };
+    let mut report = ChannelReport {
+        id: record.id,
+        topic: record.topic.clone(),
+        message_encoding: record.message_encoding.clone(),
+        schema: schema.map(|schema| schema.name.clone()),
+        schema_encoding: schema.map(|schema| schema.encoding.clone()),
+        messages: seen.map_or(0, |seen| seen.messages),
+        log_ns: seen.map(|seen| seen.log_ns),
+        publish_ns: seen.map(|seen| seen.publish_ns),
+        rate_hz: seen.and_then(rate_hz),
+        out_of_order: seen.map_or(0, |seen| seen.out_of_order),
+        unreadable: None,
+        stamp: None,
+        leaves: Vec::new(),
+        has_more_leaves: false,
+    };
+    match layout {
+        Ok((encoding, schema)) => {
+            let (found, more) = leaves::leaves(&schema);
+            report.has_more_leaves = more;
+            report.stamp = Stamp::find(&schema).map(|stamp| stamp.text);
+            report.leaves = found
+                .iter()
+                .enumerate()
+                .map(|(place, leaf)| {
+                    let message = first.filter(|_| place < EXAMPLES);
+                    leaf_report(leaf, encoding, &schema, message, &record.metadata)
+                })
+                .collect();
+        }
+        Err(why) => report.unreadable = Some(why),
+    }
+    report
+}
+
+fn leaf_report(
+    leaf: &Leaf,
+    encoding: Encoding,
+    schema: &Arc<Schema>,
+    message: Option<&[u8]>,
+    metadata: &BTreeMap<String, String>,
+) -> LeafReport {
+    let route = path::parse(&leaf.first_item())
+        .and_then(|parts| Route::find(schema, &parts))
+        .ok();
+    LeafReport {
+        path: leaf.path.clone(),
+        kind: leaf.number.name(),
+        unit: route
+            .as_ref()
+            .filter(|_| !leaf.is_stamp)
+            .and_then(|route| units::find(route, metadata))
+            .map(|found| found.unit),
+        example: route.zip(message).and_then(|(value, message)| {
+            let targets = Targets {
+                value,
+                stamp: None,
+                spacing: None,
+            };
+            let mut reading = Reading::default();
+            let read = Decoder::new(encoding, schema, targets).read(message, &mut reading);
+            read.ok().and_then(|()| reading.values.first().copied())
+        }),
+        is_stamp: leaf.is_stamp,
+    }
+}
+
+fn rate_hz(seen: &Seen) -> Option<f64> {
+    let span_ns = seen.greatest_log_ns - seen.least_log_ns;
+    (seen.messages > 1 && span_ns > 0).then(|| (seen.messages - 1) as f64 * 1e9 / span_ns as f64)
+}
+
+#[cfg(test)]
+#[path = "inventory_tests.rs"]
+mod tests;

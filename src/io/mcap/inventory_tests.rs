@@ -1,0 +1,92 @@
+use mcap::Compression;
+
+use super::super::testing::{File, float64, frames, options};
+use super::*;
+
+fn file(compression: Option<Compression>) -> Vec<u8> {
+    let mut file = File::new(options(compression));
+    let joints = b"string[] name\nfloat64[] effort";
+    file.channel(
+        1,
+        "/joints",
+        "cdr+ros2msg",
+        ("sensor_msgs/msg/JointState", joints),
+    );
+    file.channel(
+        2,
+        "/x",
+        "cdr+ros2msg",
+        ("std_msgs/msg/Float64", b"float64 data"),
+    );
+    file.channel(3, "/flat", "flatbuffer+flatbuffer", ("F", b"?"));
+    file.channel(4, "/empty", "json+", ("", b""));
+    for time in [10, 30, 20, 40] {
+        file.message(2, time * 1_000_000, &float64(time as f64));
+    }
+    let mut joint = vec![0, 1, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0];
+    joint.extend_from_slice(&(-2.5_f64).to_le_bytes());
+    file.message(1, 15_000_000, &joint);
+    file.message(3, 15_000_000, b"?");
+    let pairs = BTreeMap::from([("stand".to_owned(), "A".to_owned())]);
+    let metadata = mcap::records::Metadata {
+        name: "about".to_owned(),
+        metadata: pairs,
+    };
+    file.writer().write_metadata(&metadata).unwrap();
+    file.writer()
+        .attach(&mcap::Attachment {
+            log_time: 1,
+            create_time: 2,
+            name: "photo".to_owned(),
+            media_type: "image/png".to_owned(),
+            data: vec![1; 1000].into(),
+        })
+        .unwrap();
+    file.finish()
+}
+
+#[test]
+fn everything_in_a_file_is_listed() {
+    let inventory = Inventory::read(frames(&file(Some(Compression::Zstd)))).unwrap();
+    assert_eq!(
+        (inventory.profile.as_str(), inventory.messages),
+        ("ros2", 6)
+    );
+    assert_eq!(inventory.first_log_ns, Some(10_000_000));
+    assert_eq!(inventory.last_log_ns, Some(40_000_000));
+    let topics: Vec<_> = inventory
+        .channels
+        .iter()
+        .map(|c| c.topic.as_str())
+        .collect();
+    assert_eq!(topics, ["/empty", "/flat", "/joints", "/x"]);
+    let x = &inventory.channels[3];
+    assert_eq!((x.messages, x.out_of_order), (4, 1));
+    assert!((x.rate_hz.unwrap() - 100.0).abs() < 1e-9);
+    assert_eq!(x.leaves[0].example, Some(10.0));
+    let joints = &inventory.channels[2];
+    assert_eq!(joints.leaves[0].path, "effort[]");
+    assert_eq!(joints.leaves[0].unit.as_deref(), Some("N m"));
+    assert_eq!(joints.leaves[0].example, Some(-2.5));
+    assert_eq!(joints.rate_hz, None);
+    let flat = &inventory.channels[1];
+    assert!(flat.unreadable.as_ref().unwrap().contains("\"flatbuffer\""));
+    assert_eq!(inventory.attachments[0].size, 1000);
+    assert_eq!(inventory.metadata[0].pairs["stand"], "A");
+    assert_eq!(inventory.chunks[0].compression, "zstd");
+    assert!(inventory.is_closed && !inventory.is_lossy);
+    let codes: Vec<_> = inventory.warnings.iter().map(|w| w.code).collect();
+    assert_eq!(
+        codes,
+        ["mcap-unreadable", "mcap-unreadable", "mcap-out-of-order"]
+    );
+}
+
+#[test]
+fn a_cut_file_is_lossy_and_says_where() {
+    let bytes = file(None);
+    let inventory = Inventory::read(frames(&bytes[..700])).unwrap();
+    assert!(inventory.is_lossy && !inventory.is_closed);
+    let said = &inventory.warnings[0].message;
+    assert!(said.contains("the file ends within a chunk"), "{said}");
+}

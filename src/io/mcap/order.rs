@@ -1,0 +1,95 @@
+//! Samples put in the order of their times.
+
+use std::collections::VecDeque;
+
+/// Samples that are held back to be put in order.
+pub const WINDOW: usize = 1 << 16;
+
+/// A window that samples pass through: one that comes late is put where it belongs if it is no
+/// more than [`WINDOW`] samples late. Records of up to that many samples are sorted as a whole.
+#[derive(Debug, Default)]
+pub struct Sorter {
+    held: VecDeque<(i64, f64)>,
+    /// Time of the last sample given away.
+    given: Option<i64>,
+    /// Latest time seen.
+    latest: Option<i64>,
+    /// Samples that came after a later one.
+    pub out_of_order: u64,
+    /// Samples that came too late to be put in order, and were left out.
+    pub too_late: u64,
+}
+
+impl Sorter {
+    /// Takes a sample.
+    #[inline]
+    pub fn push(&mut self, time_ns: i64, value: f64) {
+        match self.latest {
+            Some(latest) if time_ns < latest => self.push_late(time_ns, value),
+            _ => {
+                self.latest = Some(time_ns);
+                self.held.push_back((time_ns, value));
+            }
+        }
+    }
+
+    fn push_late(&mut self, time_ns: i64, value: f64) {
+        self.out_of_order += 1;
+        if self.given.is_some_and(|given| time_ns < given) {
+            self.too_late += 1;
+            return;
+        }
+        // Behind all of the same time, so that those keep the order of the file.
+        let place = self.held.partition_point(|(held, _)| *held <= time_ns);
+        self.held.insert(place, (time_ns, value));
+    }
+
+    /// Gives away what need not be held back any more, or everything at the end.
+    pub fn give(&mut self, all: bool, times_ns: &mut Vec<i64>, values: &mut Vec<f64>) {
+        let keep = if all { 0 } else { WINDOW };
+        let count = self.held.len().saturating_sub(keep);
+        times_ns.reserve(count);
+        values.reserve(count);
+        for (time_ns, value) in self.held.drain(..count) {
+            times_ns.push(time_ns);
+            values.push(value);
+            self.given = Some(time_ns);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sorted(samples: &[(i64, f64)]) -> (Vec<i64>, Vec<f64>, Sorter) {
+        let mut sorter = Sorter::default();
+        let (mut times, mut values) = (Vec::new(), Vec::new());
+        for (time, value) in samples {
+            sorter.push(*time, *value);
+            sorter.give(false, &mut times, &mut values);
+        }
+        sorter.give(true, &mut times, &mut values);
+        (times, values, sorter)
+    }
+
+    #[test]
+    fn few_samples_are_sorted_as_a_whole() {
+        let (times, values, sorter) = sorted(&[(3, 0.3), (1, 0.1), (2, 0.2), (1, 0.11), (5, 0.5)]);
+        assert_eq!(times, [1, 1, 2, 3, 5]);
+        assert_eq!(values, [0.1, 0.11, 0.2, 0.3, 0.5]);
+        assert_eq!((sorter.out_of_order, sorter.too_late), (3, 0));
+    }
+
+    #[test]
+    fn a_sample_later_than_the_window_is_left_out_and_counted() {
+        let mut samples: Vec<_> = (0..100_000).map(|i| (i, i as f64)).collect();
+        samples.push((99_000, -1.0));
+        samples.push((10, -2.0));
+        let (times, values, sorter) = sorted(&samples);
+        assert_eq!(times.len(), 100_001);
+        assert!(times.is_sorted());
+        assert_eq!(values[99_001], -1.0);
+        assert_eq!((sorter.out_of_order, sorter.too_late), (2, 1));
+    }
+}

@@ -1,0 +1,167 @@
+//! A field as people write it: `wrench.torque.z`, `effort[0]`, `effort[-1]`,
+//! `effort[name=motor_joint]`, `data[:]`.
+
+/// One step into a message.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Part {
+    /// A field by its name.
+    Name(String),
+    /// An item by its place; negative ones count from the end.
+    Index(i64),
+    /// All items.
+    All,
+    /// The item whose name is known: `[name=motor_joint]`, `[motor_joint]` for short.
+    Called {
+        /// Field that holds the names, if it was given.
+        key: Option<String>,
+        /// The name.
+        name: String,
+    },
+}
+
+/// Takes a field apart; empty text is the message itself.
+///
+/// # Errors
+/// A sentence that says what was expected.
+pub fn parse(text: &str) -> Result<Vec<Part>, String> {
+    let mut parts = Vec::new();
+    let mut rest = text.trim();
+    while !rest.is_empty() {
+        if let Some(inside) = rest.strip_prefix('[') {
+            let (word, behind) = bracket(inside).ok_or_else(|| {
+                format!("\"{text}\" has a bracket that is not closed; write it as effort[0]")
+            })?;
+            parts.push(item(word, text)?);
+            rest = behind;
+        } else {
+            let name = match (rest.strip_prefix('.'), parts.is_empty()) {
+                (Some(name), false) => name,
+                (None, true) => rest,
+                _ => {
+                    return Err(format!(
+                        "\"{text}\" is no field; write it as wrench.torque.z"
+                    ));
+                }
+            };
+            let end = name.find(['.', '[']).unwrap_or(name.len());
+            if end == 0 {
+                return Err(format!("\"{text}\" is no field: a name is missing in it"));
+            }
+            parts.push(Part::Name(name[..end].to_owned()));
+            rest = &name[end..];
+        }
+    }
+    Ok(parts)
+}
+
+/// What is in a bracket, and what is behind it. Quotes may hold brackets.
+fn bracket(text: &str) -> Option<(&str, &str)> {
+    let mut quote = None;
+    for (at, sign) in text.char_indices() {
+        match (quote, sign) {
+            (None, ']') => return Some((&text[..at], &text[at + 1..])),
+            (None, '"' | '\'') => quote = Some(sign),
+            (Some(open), _) if open == sign => quote = None,
+            _ => {}
+        }
+    }
+    None
+}
+
+fn item(word: &str, text: &str) -> Result<Part, String> {
+    let word = word.trim();
+    if word == ":" {
+        return Ok(Part::All);
+    }
+    if let Ok(index) = word.parse() {
+        return Ok(Part::Index(index));
+    }
+    let (key, name) = match word.split_once('=') {
+        Some((key, name)) => (Some(key.trim().to_owned()), name.trim()),
+        None => (None, word),
+    };
+    let name = ['"', '\'']
+        .iter()
+        .find_map(|quote| name.strip_prefix(*quote)?.strip_suffix(*quote))
+        .unwrap_or(name);
+    if name.is_empty() || key.as_deref() == Some("") || word.contains(':') && key.is_none() {
+        return Err(format!(
+            "\"[{word}]\" in \"{text}\" is no choice of an item; write [0], [-1], [name=joint] or \
+             [:] for all"
+        ));
+    }
+    let name = name.to_owned();
+    Ok(Part::Called { key, name })
+}
+
+/// The text again.
+#[must_use]
+pub fn text(parts: &[Part]) -> String {
+    let mut text = String::new();
+    for part in parts {
+        match part {
+            Part::Name(name) if text.is_empty() => text.push_str(name),
+            Part::Name(name) => text.push_str(&format!(".{name}")),
+            Part::Index(index) => text.push_str(&format!("[{index}]")),
+            Part::All => text.push_str("[:]"),
+            Part::Called { key, name } => {
+                let key = key.as_deref().unwrap_or("name");
+                text.push_str(&format!("[{key}={name}]"));
+            }
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_way_to_write_a_field() {
+        let name = |name: &str| Part::Name(name.to_owned());
+        let called = |key: Option<&str>, name: &str| Part::Called {
+            key: key.map(str::to_owned),
+            name: name.to_owned(),
+        };
+        let cases = [
+            ("", vec![]),
+            (
+                "wrench.torque.z",
+                vec![name("wrench"), name("torque"), name("z")],
+            ),
+            ("effort[0]", vec![name("effort"), Part::Index(0)]),
+            ("effort[-1]", vec![name("effort"), Part::Index(-1)]),
+            (
+                "a[1][2].b",
+                vec![name("a"), Part::Index(1), Part::Index(2), name("b")],
+            ),
+            ("data[:]", vec![name("data"), Part::All]),
+            (
+                "effort[name=m_1]",
+                vec![name("effort"), called(Some("name"), "m_1")],
+            ),
+            ("effort[ m ]", vec![name("effort"), called(None, "m")]),
+            (
+                "e[n='a ] b'].x",
+                vec![name("e"), called(Some("n"), "a ] b"), name("x")],
+            ),
+        ];
+        for (text, parts) in cases {
+            assert_eq!(parse(text).unwrap(), parts, "{text}");
+        }
+        assert_eq!(
+            text(&parse("a.b[0][x='y z'].c[:]").unwrap()),
+            "a.b[0][x=y z].c[:]"
+        );
+    }
+
+    #[test]
+    fn what_is_no_field_is_refused() {
+        for text in [
+            "a..b", "a[", "a[]", "a[=x]", "a[n=]", ".a", "a.", "a[1:2]", "a[0]b",
+        ] {
+            assert!(parse(text).is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! Bytes of a file or stream, as many at a time as a record needs.
+
+use std::io::{self, Read};
+
+/// Bytes asked for at a time: a claim of a huge record takes no more memory than the bytes
+/// that really are there.
+const PIECE: usize = 1 << 18;
+
+/// A stream with a window of bytes that have been read and not yet used.
+pub struct Input {
+    stream: Box<dyn Read + Send>,
+    buffer: Vec<u8>,
+    start: usize,
+    end: usize,
+    /// Place of `start` in the file.
+    offset: u64,
+}
+
+impl Input {
+    /// Begins at the front of a stream.
+    #[must_use]
+    pub fn new(stream: Box<dyn Read + Send>) -> Self {
+        Self {
+            stream,
+            buffer: Vec::new(),
+            start: 0,
+            end: 0,
+            offset: 0,
+        }
+    }
+
+    /// Place in the file of the next byte.
+    #[must_use]
+    pub fn offset(&self) -> u64 {
+        self.offset
+    }
+
+    /// Reads until that many bytes are in the window, or the file ends; gives how many there are,
+    /// at most as many as wanted.
+    ///
+    /// # Errors
+    /// If the stream cannot be read.
+    pub fn want(&mut self, count: usize) -> io::Result<usize> {
+        while self.end - self.start < count {
+            let missing = (count - (self.end - self.start)).min(PIECE);
+            if self.start == self.end || self.buffer.len() - self.end < missing {
+                self.buffer.copy_within(self.start..self.end, 0);
+                self.end -= self.start;
+                self.start = 0;
+            }
+            if self.buffer.len() - self.end < missing {
+                // Doubling keeps the work proportional to the bytes there are.
+                self.buffer.resize((2 * self.end).max(PIECE), 0);
+            }
+            match self.stream.read(&mut self.buffer[self.end..]) {
+                Ok(0) => return Ok(self.end - self.start),
+                Ok(read) => self.end += read,
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(count)
+    }
+
+    /// The bytes in the window.
+    #[must_use]
+    pub fn window(&self) -> &[u8] {
+        &self.buffer[self.start..self.end]
+    }
+
+    /// Where in the buffer a part of the window lies, for [`Self::at`].
+    #[must_use]
+    pub fn place(&self, from: usize, length: usize) -> std::ops::Range<usize> {
+        let start = self.start + from;
+        start..start + length
+    }
+
+    /// Bytes at a place, valid until the next call of [`Self::want`] or [`Self::skip`].
+    #[must_use]
+    pub fn at(&self, place: std::ops::Range<usize>) -> &[u8] {
+        &self.buffer[place]
+    }
+
+    /// Goes on behind that many bytes of the window.
+    pub fn used(&mut self, count: usize) {
+        let count = count.min(self.end - self.start);
+        self.start += count;
+        self.offset += count as u64;
+    }
+
+    /// Goes on behind that many bytes without keeping them; gives how many there were.
+    ///
+    /// # Errors
+    /// If the stream cannot be read.
+    pub fn skip(&mut self, count: u64) -> io::Result<u64> {
+        let mut left = count;
+        while left > 0 {
+            let step = usize::try_from(left.min(PIECE as u64)).unwrap_or(PIECE);
+            let there = self.want(step)?;
+            self.used(there);
+            left -= there as u64;
+            if there < step {
+                break;
+            }
+        }
+        Ok(count - left)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_come_in_order_whatever_the_steps() {
+        let bytes: Vec<u8> = (0..2_000_000_u32).map(|i| (i % 251) as u8).collect();
+        let mut input = Input::new(Box::new(io::Cursor::new(bytes.clone())));
+        let mut at = 0;
+        for step in [1, 9, 300_000, 17, 600_000, 5] {
+            assert_eq!(input.want(step).unwrap(), step);
+            assert!(input.window()[..step] == bytes[at..at + step]);
+            input.used(step);
+            at += step;
+            assert_eq!(input.offset(), at as u64);
+        }
+        assert_eq!(input.skip(1_000_000).unwrap(), 1_000_000);
+        at += 1_000_000;
+        assert_eq!(input.want(usize::MAX).unwrap(), bytes.len() - at);
+        assert!(*input.window() == bytes[at..]);
+    }
+
+    #[test]
+    fn a_huge_wish_takes_no_more_memory_than_there_are_bytes() {
+        let mut input = Input::new(Box::new(io::Cursor::new(vec![1_u8; 10])));
+        assert_eq!(input.want(1 << 40).unwrap(), 10);
+        assert!(input.buffer.len() <= 2 * PIECE);
+    }
+}

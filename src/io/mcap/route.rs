@@ -1,0 +1,291 @@
+//! The way to a number in messages of one type.
+
+use super::path::{self, Part};
+use super::schema::leaves::{self, Leaf};
+use super::schema::{Field, Kind, Number, Schema};
+use crate::failure::did_you_mean;
+
+/// Leaves that an error message lists.
+const LISTED: usize = 40;
+
+/// One step on the way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Hop {
+    /// Into a field, by its place in the type.
+    Field(usize),
+    /// To one item, from the front or (negative) from the end.
+    Item(i64),
+    /// To the item whose name was found.
+    Called,
+    /// Through all items.
+    All,
+}
+
+/// Texts of a message, one of which is looked for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Lookup {
+    /// Way to the texts.
+    pub hops: Vec<Hop>,
+    /// The text.
+    pub name: String,
+}
+
+/// The way to a number, or to several.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Route {
+    /// Path as text, all choices made.
+    pub text: String,
+    /// The way.
+    pub hops: Vec<Hop>,
+    /// What must be found first.
+    pub lookup: Option<Lookup>,
+    /// Kind of number.
+    pub number: Number,
+    /// Unit as the definition states it.
+    pub unit: Option<String>,
+    /// Names of the types passed, from the message's own to the one that holds the number.
+    pub types: Vec<String>,
+    /// Names of the fields passed.
+    pub fields: Vec<String>,
+}
+
+impl Route {
+    /// Whether a message gives several values.
+    #[must_use]
+    pub fn is_whole_list(&self) -> bool {
+        self.hops.contains(&Hop::All)
+    }
+
+    /// Finds the way to a field. Without any parts it is the only number there is.
+    ///
+    /// # Errors
+    /// A sentence that says what is there and what was probably meant.
+    pub fn find(schema: &Schema, parts: &[Part]) -> Result<Self, String> {
+        let only;
+        let parts = if parts.is_empty() {
+            only = only_leaf(schema)?;
+            &only[..]
+        } else {
+            parts
+        };
+        let mut walk = Walk::new(schema, parts);
+        for place in 0..parts.len() {
+            walk.step(place)?;
+        }
+        walk.finish()
+    }
+}
+
+fn only_leaf(schema: &Schema) -> Result<Vec<Part>, String> {
+    let (found, _) = leaves::leaves(schema);
+    let mut numbers = found.iter().filter(|leaf| !leaf.is_stamp);
+    match (numbers.next(), numbers.next()) {
+        (Some(leaf), None) => path::parse(&leaf.with_items("[:]")),
+        _ => Err(format!("choose a field with --field; {}", list(&found))),
+    }
+}
+
+/// What is there, for the end of an error message.
+fn list(found: &[Leaf]) -> String {
+    if found.is_empty() {
+        return "there is no number in its messages".to_owned();
+    }
+    let shown = found.iter().take(LISTED);
+    let shown: Vec<_> = shown
+        .map(|leaf| format!("{} ({})", leaf.path, leaf.number.name()))
+        .collect();
+    let more = match found.len().saturating_sub(LISTED) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    format!("there are: {}{more}", shown.join(", "))
+}
+
+struct Walk<'a> {
+    schema: &'a Schema,
+    parts: &'a [Part],
+    kind: Kind,
+    hops: Vec<Hop>,
+    lookup: Option<Lookup>,
+    unit: Option<String>,
+    types: Vec<String>,
+    fields: Vec<String>,
+    /// The type that holds the last field.
+    owner: usize,
+    /// Hops to it.
+    owner_hops: usize,
+}
+
+impl<'a> Walk<'a> {
+    fn new(schema: &'a Schema, parts: &'a [Part]) -> Self {
+        Self {
+            schema,
+            parts,
+            kind: Kind::Struct(schema.root),
+            hops: Vec::new(),
+            lookup: None,
+            unit: None,
+            types: vec![schema.root().name.clone()],
+            fields: Vec::new(),
+            owner: schema.root,
+            owner_hops: 0,
+        }
+    }
+
+    fn step(&mut self, place: usize) -> Result<(), String> {
+        let parts = self.parts;
+        match &parts[place] {
+            Part::Name(name) => self.field(place, name),
+            Part::Index(index) => self.item(place, Hop::Item(*index)),
+            Part::All => {
+                if self.hops.contains(&Hop::All) {
+                    return Err("only one [:] can be in a field".to_owned());
+                }
+                self.item(place, Hop::All)
+            }
+            Part::Called { key, name } => self.called(place, key.as_deref(), name),
+        }
+    }
+
+    fn field(&mut self, place: usize, name: &str) -> Result<(), String> {
+        let Kind::Struct(index) = self.kind else {
+            let before = path::text(&self.parts[..place]);
+            let why = match &self.kind {
+                Kind::Many(_) => format!("\"{before}\" is a list: choose an item, as {before}[0]"),
+                _ => format!("\"{before}\" has no fields"),
+            };
+            return Err(self.miss(&why));
+        };
+        let fields = &self.schema.structs[index].fields;
+        let Some(found) = position(fields, name) else {
+            let hint = did_you_mean(name, fields.iter().map(|f| f.name.as_str()));
+            return Err(self.miss(&format!("there is no field \"{name}\"{hint}")));
+        };
+        let field = &fields[found];
+        self.owner = index;
+        self.owner_hops = self.hops.len();
+        self.hops.push(Hop::Field(found));
+        self.kind = field.kind.clone();
+        self.unit = field.unit.clone();
+        self.fields.push(field.name.clone());
+        if let Kind::Struct(inner) = innermost(&field.kind) {
+            self.types.push(self.schema.structs[*inner].name.clone());
+        }
+        Ok(())
+    }
+
+    fn item(&mut self, place: usize, hop: Hop) -> Result<(), String> {
+        let before = path::text(&self.parts[..place]);
+        let Kind::Many(many) = &self.kind else {
+            return Err(self.miss(&format!("\"{before}\" is no list")));
+        };
+        if let (Some(count), Hop::Item(index)) = (many.count, hop) {
+            let count = i64::from(count);
+            if !(-count..count).contains(&index) {
+                return Err(self.miss(&format!(
+                    "\"{before}\" has {count} items, [{index}] is none of them"
+                )));
+            }
+        }
+        self.kind = many.item.clone();
+        self.hops.push(hop);
+        Ok(())
+    }
+
+    /// The names are in a list beside this one, or in a field of its items.
+    fn called(&mut self, place: usize, key: Option<&str>, name: &str) -> Result<(), String> {
+        if self.lookup.is_some() {
+            return Err("only one item can be chosen by name".to_owned());
+        }
+        let keys: &[&str] = match key {
+            Some(ref key) => std::slice::from_ref(key),
+            None => &["name", "names", "joint_names", "key"],
+        };
+        let hops = keys.iter().find_map(|key| self.names(key));
+        let Some(hops) = hops else {
+            let wanted = key.unwrap_or("name");
+            return Err(self.miss(&format!(
+                "there are no texts \"{wanted}\" beside or in \"{}\" to find \"{name}\" in",
+                path::text(&self.parts[..place])
+            )));
+        };
+        self.item(place, Hop::Called)?;
+        self.lookup = Some(Lookup {
+            hops,
+            name: name.to_owned(),
+        });
+        Ok(())
+    }
+
+    fn names(&self, key: &str) -> Option<Vec<Hop>> {
+        let Kind::Many(many) = &self.kind else {
+            return None;
+        };
+        if let Kind::Struct(inner) = many.item {
+            let fields = &self.schema.structs[inner].fields;
+            let found = position(fields, key)?;
+            let is_text = fields[found].kind == Kind::Text;
+            let mut hops = self.hops.clone();
+            hops.extend([Hop::All, Hop::Field(found)]);
+            return is_text.then_some(hops);
+        }
+        let fields = &self.schema.structs[self.owner].fields;
+        let found = position(fields, key)?;
+        let is_texts = matches!(&fields[found].kind, Kind::Many(many) if many.item == Kind::Text);
+        let mut hops = self.hops[..self.owner_hops].to_vec();
+        hops.extend([Hop::Field(found), Hop::All]);
+        is_texts.then_some(hops)
+    }
+
+    fn finish(self) -> Result<Route, String> {
+        let text = path::text(self.parts);
+        let number = match &self.kind {
+            Kind::Number(number) => *number,
+            Kind::Many(many) if matches!(many.item, Kind::Number(_)) => {
+                return Err(self.miss(&format!(
+                    "\"{text}\" is a list of numbers: choose one item, as {text}[0] or \
+                     {text}[-1], or all as {text}[:]"
+                )));
+            }
+            Kind::Text | Kind::WideText => {
+                return Err(self.miss(&format!("\"{text}\" is text")));
+            }
+            _ => return Err(self.miss(&format!("\"{text}\" is not one number"))),
+        };
+        Ok(Route {
+            text,
+            hops: self.hops,
+            lookup: self.lookup,
+            number,
+            unit: self.unit,
+            types: self.types,
+            fields: self.fields,
+        })
+    }
+
+    /// An error with what is there, what lies below the part that was found first.
+    fn miss(&self, why: &str) -> String {
+        let (found, _) = leaves::leaves(self.schema);
+        let start = self.fields.join(".");
+        let (mut below, mut rest): (Vec<_>, Vec<_>) = found
+            .into_iter()
+            .partition(|leaf| !start.is_empty() && leaf.path.starts_with(&start));
+        below.append(&mut rest);
+        format!("{why}; {}", list(&below))
+    }
+}
+
+fn position(fields: &[Field], name: &str) -> Option<usize> {
+    fields.iter().position(|field| field.name == name)
+}
+
+fn innermost(mut kind: &Kind) -> &Kind {
+    while let Kind::Many(many) = kind {
+        kind = &many.item;
+    }
+    kind
+}
+
+#[cfg(test)]
+#[path = "route_tests.rs"]
+mod tests;

@@ -1,0 +1,250 @@
+//! What messages are made of, whatever language says so.
+
+pub mod json;
+pub mod leaves;
+pub mod protobuf;
+pub mod ros2idl;
+pub mod ros2msg;
+mod token;
+
+use std::fmt;
+
+/// Deepest nesting of a type.
+pub const DEEPEST: usize = 64;
+/// Most types a definition may have.
+pub const MOST_STRUCTS: usize = 4096;
+
+/// A kind of number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[allow(missing_docs)]
+pub enum Number {
+    Bool,
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    I64,
+    U64,
+    F32,
+    F64,
+}
+
+impl Number {
+    /// Bytes it takes in CDR and ROS 1.
+    #[must_use]
+    pub fn size(self) -> u8 {
+        match self {
+            Self::Bool | Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::I64 | Self::U64 | Self::F64 => 8,
+        }
+    }
+
+    /// Name as ROS writes it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Bool => "bool",
+            Self::I8 => "int8",
+            Self::U8 => "uint8",
+            Self::I16 => "int16",
+            Self::U16 => "uint16",
+            Self::I32 => "int32",
+            Self::U32 => "uint32",
+            Self::I64 => "int64",
+            Self::U64 => "uint64",
+            Self::F32 => "float32",
+            Self::F64 => "float64",
+        }
+    }
+}
+
+/// The type of a field.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Kind {
+    /// A number.
+    Number(Number),
+    /// Text of bytes, or bytes in protobuf.
+    Text,
+    /// Text of wide characters.
+    WideText,
+    /// Another type, by its place in [`Schema::structs`].
+    Struct(usize),
+    /// Several of the same.
+    Many(Box<Many>),
+    /// Nothing that could be read, as JSON's null.
+    Nothing,
+}
+
+/// Several items of the same type.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Many {
+    /// Type of each.
+    pub item: Kind,
+    /// Their number if it is fixed.
+    pub count: Option<u32>,
+}
+
+impl Kind {
+    /// A list of any length.
+    #[must_use]
+    pub fn list(item: Self) -> Self {
+        Self::Many(Box::new(Many { item, count: None }))
+    }
+
+    /// A list of that many.
+    #[must_use]
+    pub fn array(item: Self, count: u32) -> Self {
+        let count = Some(count);
+        Self::Many(Box::new(Many { item, count }))
+    }
+}
+
+/// How protobuf writes a field.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wire {
+    /// Field number.
+    pub number: u32,
+    /// Whether whole numbers are written zigzag.
+    pub zigzag: bool,
+    /// Whether whole numbers are written with a fixed width.
+    pub fixed: bool,
+    /// What a field that is not there means; none if its absence says that there is no value.
+    pub absent: Option<f64>,
+}
+
+/// A field of a type.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Field {
+    /// Name.
+    pub name: String,
+    /// Type.
+    pub kind: Kind,
+    /// Unit, where the definition states one.
+    pub unit: Option<String>,
+    /// For protobuf.
+    pub wire: Option<Wire>,
+}
+
+impl Field {
+    /// A field without a unit.
+    #[must_use]
+    pub fn new(name: impl Into<String>, kind: Kind) -> Self {
+        Self {
+            name: name.into(),
+            kind,
+            unit: None,
+            wire: None,
+        }
+    }
+}
+
+/// A type: fields in order.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Struct {
+    /// Full name.
+    pub name: String,
+    /// Its fields.
+    pub fields: Vec<Field>,
+}
+
+/// A definition, resolved: types refer to each other by number.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Schema {
+    /// All types.
+    pub structs: Vec<Struct>,
+    /// The type of the messages.
+    pub root: usize,
+}
+
+/// Why a definition cannot be used.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SchemaError {
+    /// Line in the definition, from 1, if it can be told.
+    pub line: Option<usize>,
+    /// What is wrong.
+    pub why: String,
+}
+
+impl SchemaError {
+    /// An error somewhere.
+    pub fn new(why: impl fmt::Display) -> Self {
+        Self {
+            line: None,
+            why: why.to_string(),
+        }
+    }
+
+    /// An error in a line.
+    pub fn at(line: usize, why: impl fmt::Display) -> Self {
+        Self {
+            line: Some(line),
+            why: why.to_string(),
+        }
+    }
+}
+
+impl fmt::Display for SchemaError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.line {
+            Some(line) => write!(f, "line {line} of its definition: {}", self.why),
+            None => write!(f, "its definition: {}", self.why),
+        }
+    }
+}
+
+impl Schema {
+    /// The type of the messages.
+    #[must_use]
+    pub fn root(&self) -> &Struct {
+        &self.structs[self.root]
+    }
+
+    /// Refuses types that contain themselves or are nested too deeply.
+    ///
+    /// # Errors
+    /// [`SchemaError`] with the type's name.
+    pub fn check_nesting(&self) -> Result<(), SchemaError> {
+        let mut depths = vec![None; self.structs.len()];
+        self.depth(self.root, &mut depths, 0).map(drop)
+    }
+
+    /// Levels of types within a type, itself included.
+    fn depth(
+        &self,
+        index: usize,
+        depths: &mut [Option<usize>],
+        above: usize,
+    ) -> Result<usize, SchemaError> {
+        if let Some(depth) = depths[index] {
+            return Ok(depth);
+        }
+        if above >= DEEPEST {
+            return Err(SchemaError::new(format_args!(
+                "{} contains itself or is nested deeper than {DEEPEST} levels",
+                self.structs[index].name
+            )));
+        }
+        let mut deepest = 0;
+        for field in &self.structs[index].fields {
+            let mut kind = &field.kind;
+            while let Kind::Many(many) = kind {
+                kind = &many.item;
+            }
+            if let Kind::Struct(inner) = kind {
+                deepest = deepest.max(self.depth(*inner, depths, above + 1)?);
+            }
+        }
+        if above + deepest >= DEEPEST {
+            return Err(SchemaError::new(format_args!(
+                "{} is nested deeper than {DEEPEST} levels",
+                self.structs[index].name
+            )));
+        }
+        depths[index] = Some(deepest + 1);
+        Ok(deepest + 1)
+    }
+}

@@ -1,0 +1,235 @@
+use super::super::testing::{File, float64, frames, options};
+use super::*;
+use mcap::Compression;
+
+const FLOAT64: (&str, &[u8]) = ("std_msgs/msg/Float64", b"float64 data");
+
+fn wanted(topic: &str, field: &str) -> Wanted {
+    let selection = Selection {
+        topic: Some(topic.to_owned()),
+        field: Some(field.to_owned()),
+        signal: None,
+    };
+    selection.check().unwrap()
+}
+
+fn read(bytes: &[u8], topic: &str, field: &str) -> (Vec<i64>, Vec<f64>, Summary) {
+    let mut source =
+        Source::read(frames(bytes), &wanted(topic, field), &Options::default()).unwrap();
+    let (mut times, mut values) = (Vec::new(), Vec::new());
+    let (mut some_times, mut some_values) = (Vec::new(), Vec::new());
+    while source.next(&mut some_times, &mut some_values).unwrap() {
+        times.append(&mut some_times);
+        values.append(&mut some_values);
+    }
+    (times, values, source.finish())
+}
+
+fn numbers(options: mcap::WriteOptions, count: u64) -> Vec<u8> {
+    let mut file = File::new(options);
+    file.channel(3, "/x", "cdr+ros2msg", FLOAT64);
+    file.channel(4, "/y", "cdr+ros2msg", FLOAT64);
+    for place in 0..count {
+        file.message(3, 1000 + place, &float64(place as f64 + 0.1));
+        file.message(4, 1000 + place, &float64(-1.0));
+    }
+    file.finish()
+}
+
+#[test]
+fn every_compression_and_none_and_no_chunks() {
+    let all = [
+        options(None),
+        options(Some(Compression::Zstd)),
+        options(Some(Compression::Lz4)),
+        options(None).use_chunks(false),
+        options(Some(Compression::Zstd)).emit_summary_records(false),
+    ];
+    for options in all {
+        let (times, values, summary) = read(&numbers(options.clone(), 5000), "/x", "data");
+        assert_eq!(times, (1000..6000).collect::<Vec<_>>(), "{options:?}");
+        assert!(values.iter().enumerate().all(|(i, v)| *v == i as f64 + 0.1));
+        assert_eq!((summary.messages, summary.samples), (5000, 5000));
+        assert!(!summary.is_lossy && summary.warnings.is_empty());
+        assert_eq!(
+            (summary.first_ns, summary.last_ns),
+            (Some(1000), Some(5999))
+        );
+    }
+}
+
+#[test]
+fn a_cut_anywhere_gives_what_is_whole_and_is_said() {
+    for compression in [None, Some(Compression::Zstd), Some(Compression::Lz4)] {
+        let whole = numbers(options(compression), 300);
+        let mut last = 0;
+        for end in (whole.len() / 2..whole.len() - 1).step_by(97) {
+            let (_, values, summary) = read(&whole[..end], "/x", "data");
+            assert!(summary.is_lossy, "{end}");
+            assert_eq!(summary.warnings[0].code, "mcap-truncated");
+            assert!(values.iter().enumerate().all(|(i, v)| *v == i as f64 + 0.1));
+            assert!(values.len() >= last, "{end}");
+            last = values.len();
+        }
+        assert_eq!(last, 300);
+    }
+}
+
+#[test]
+fn a_cut_chunk_without_compression_is_used_to_the_last_whole_message() {
+    let whole = numbers(options(None).chunk_size(None), 300);
+    let lengths: Vec<_> = [0.25, 0.5]
+        .map(|share| (whole.len() as f64 * share) as usize)
+        .map(|end| read(&whole[..end], "/x", "data").1.len())
+        .into();
+    assert!(
+        lengths[0] > 40 && lengths[1] > lengths[0] + 40,
+        "{lengths:?}"
+    );
+}
+
+#[test]
+fn a_damaged_chunk_is_left_out_and_the_others_are_used() {
+    for compression in [None, Some(Compression::Zstd)] {
+        let mut bytes = numbers(options(compression), 1000);
+        let (mut some, mut chunks) = (frames(&bytes), Vec::new());
+        while let Some(frame) = some.advance().unwrap() {
+            if frame.is_in_chunk && chunks.last() != Some(&frame.offset) {
+                chunks.push(frame.offset);
+            }
+        }
+        bytes[chunks[2] as usize + 150] ^= 0x55;
+        let (times, values, summary) = read(&bytes, "/x", "data");
+        assert!(summary.is_lossy);
+        assert_eq!(summary.warnings[0].code, "mcap-damaged-chunk");
+        assert!(
+            values.len() > 800 && values.len() < 1000,
+            "{}",
+            values.len()
+        );
+        let is_right = |(time, value): (&i64, &f64)| *value == (*time - 1000) as f64 + 0.1;
+        assert!(times.iter().zip(&values).all(is_right));
+    }
+}
+
+#[test]
+fn messages_out_of_order_are_sorted_and_counted() {
+    let mut file = File::new(options(None));
+    file.channel(1, "/x", "cdr+ros2msg", FLOAT64);
+    for time in [5, 3, 4, 9, 7] {
+        file.message(1, time, &float64(time as f64));
+    }
+    let (times, values, summary) = read(&file.finish(), "x", "");
+    assert_eq!(times, [3, 4, 5, 7, 9]);
+    assert_eq!(values, [3.0, 4.0, 5.0, 7.0, 9.0]);
+    assert_eq!((summary.out_of_order, summary.is_lossy), (3, false));
+    assert_eq!(summary.warnings[0].code, "mcap-out-of-order");
+}
+
+#[test]
+fn channels_of_a_topic_are_one_signal_unless_they_differ() {
+    let mut file = File::new(options(None));
+    file.channel(1, "/x", "cdr+ros2msg", FLOAT64);
+    file.channel(2, "/x", "cdr+ros2msg", FLOAT64);
+    file.message(1, 1, &float64(1.0));
+    file.message(2, 2, &float64(2.0));
+    file.message(1, 3, &float64(3.0));
+    let (_, values, _) = read(&file.finish(), "/x", "data");
+    assert_eq!(values, [1.0, 2.0, 3.0]);
+
+    let mut file = File::new(options(None));
+    file.channel(1, "/x", "cdr+ros2msg", FLOAT64);
+    file.channel(2, "/x", "json+", ("", b""));
+    file.message(1, 1, &float64(1.0));
+    file.message(2, 2, b"{}");
+    let bytes = file.finish();
+    let said = Source::read(frames(&bytes), &wanted("/x", ""), &Options::default());
+    let said = said.err().unwrap().to_string();
+    assert!(said.contains("channels of different types"), "{said}");
+}
+
+#[test]
+fn the_time_is_the_messages_own_if_it_has_one_that_is_set() {
+    let text = b"builtin_interfaces/Time stamp\nfloat64 data";
+    let stamped = |seconds: u32| {
+        let mut data = vec![0, 1, 0, 0];
+        data.extend_from_slice(&seconds.to_le_bytes());
+        data.extend_from_slice(&5_u32.to_le_bytes());
+        data.extend_from_slice(&1.5_f64.to_le_bytes());
+        data
+    };
+    let open = |seconds: u32, time: Option<TimeChoice>| {
+        let mut file = File::new(options(None));
+        file.channel(1, "/x", "cdr+ros2msg", ("p/msg/M", text));
+        let mut data = stamped(seconds);
+        if seconds == 0 {
+            data[8] = 0;
+        }
+        file.message(1, 8_000_000_000, &data);
+        let bytes = file.finish();
+        let options = Options {
+            time,
+            spacing: None,
+        };
+        let mut source = Source::read(frames(&bytes), &wanted("/x", ""), &options).unwrap();
+        let (mut times, mut values) = (Vec::new(), Vec::new());
+        source.next(&mut times, &mut values).unwrap();
+        (times[0], source.chosen().time.choice)
+    };
+    assert_eq!(open(7, None), (7_000_000_005, TimeChoice::Header));
+    assert_eq!(open(0, None), (8_000_000_000, TimeChoice::Log));
+    let publish = Some(TimeChoice::Publish);
+    assert_eq!(open(7, publish), (7_999_999_999, TimeChoice::Publish));
+}
+
+#[test]
+fn messages_without_the_item_or_unreadable_are_counted_apart() {
+    let mut file = File::new(options(None));
+    file.channel(1, "/x", "cdr+ros2msg", ("p/msg/M", b"float64[] data"));
+    let list = |values: &[f64]| {
+        let mut data = vec![0, 1, 0, 0];
+        data.extend_from_slice(&(values.len() as u32).to_le_bytes());
+        data.extend_from_slice(&[0; 4]);
+        values
+            .iter()
+            .for_each(|value| data.extend_from_slice(&value.to_le_bytes()));
+        data
+    };
+    file.message(1, 1, &list(&[1.0, 2.0]));
+    file.message(1, 2, &list(&[1.0]));
+    file.message(1, 3, &list(&[1.0, 2.0])[..14]);
+    let (_, values, summary) = read(&file.finish(), "/x", "data[1]");
+    assert_eq!(values, [2.0]);
+    assert_eq!((summary.without_item, summary.unreadable), (1, 1));
+    assert!(summary.is_lossy);
+    let codes: Vec<_> = summary.warnings.iter().map(|w| w.code).collect();
+    assert_eq!(codes, ["mcap-unreadable", "mcap-without-item"]);
+}
+
+#[test]
+fn whole_lists_have_times_between_messages() {
+    let mut file = File::new(options(None));
+    file.channel(1, "/x", "json+", ("", b""));
+    for (time, text) in [(0, "[1, 2, 3, 4]"), (1000, "[5, 6]"), (1500, "[7, 8]")] {
+        file.message(1, time, format!("{{\"data\": {text}}}").as_bytes());
+    }
+    let (times, values, _) = read(&file.finish(), "/x", "data[:]");
+    assert_eq!(times, [0, 250, 500, 750, 1000, 1250, 1500, 1750]);
+    assert_eq!(values, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]);
+}
+
+#[test]
+fn a_miss_says_what_is_there() {
+    let bytes = numbers(options(None), 3);
+    let said = |topic: &str, field: &str| {
+        let source = Source::read(frames(&bytes), &wanted(topic, field), &Options::default());
+        source.err().unwrap().to_string()
+    };
+    assert!(said("/z", "").contains("/x (std_msgs/msg/Float64), /y"));
+    assert!(said("/x", "dat").contains("did you mean \"data\"?"));
+    let not = Frames::new(
+        "no.mcap".to_owned(),
+        super::super::record::input::Input::new(Box::new(&b"time,v"[..])),
+    );
+    assert!(not.err().unwrap().to_string().contains("not an MCAP file"));
+}

@@ -1,0 +1,81 @@
+//! MCAP files for tests, written by the crate `mcap`.
+
+use std::collections::BTreeMap;
+use std::io::Cursor;
+
+use mcap::records::MessageHeader;
+use mcap::{Compression, WriteOptions, Writer};
+
+use super::record::frames::Frames;
+use super::record::input::Input;
+
+/// Frames of bytes in memory.
+pub fn frames(bytes: &[u8]) -> Frames {
+    let input = Input::new(Box::new(Cursor::new(bytes.to_vec())));
+    Frames::new("test.mcap".to_owned(), input).unwrap()
+}
+
+/// A file under construction.
+pub struct File {
+    writer: Writer<Cursor<Vec<u8>>>,
+}
+
+/// Options with that compression and small chunks.
+pub fn options(compression: Option<Compression>) -> WriteOptions {
+    WriteOptions::new()
+        .compression(compression)
+        .compression_threads(0)
+        .chunk_size(Some(4096))
+        .profile("ros2")
+        .library("test")
+}
+
+impl File {
+    /// An empty file.
+    pub fn new(options: WriteOptions) -> Self {
+        let writer = options.create(Cursor::new(Vec::new())).unwrap();
+        Self { writer }
+    }
+
+    /// Adds a channel with its schema; the encodings as `cdr+ros2msg`.
+    pub fn channel(&mut self, id: u16, topic: &str, encodings: &str, schema: (&str, &[u8])) {
+        let (message, language) = encodings.split_once('+').unwrap();
+        let schema = self
+            .writer
+            .add_schema(schema.0, language, schema.1)
+            .unwrap();
+        let metadata = BTreeMap::from([("id".to_owned(), id.to_string())]);
+        self.writer
+            .add_channel_with_id(id, schema, topic, message, &metadata)
+            .unwrap();
+    }
+
+    /// Adds a message, published 1 ns before it is logged.
+    pub fn message(&mut self, channel_id: u16, log_time: u64, data: &[u8]) {
+        let header = MessageHeader {
+            channel_id,
+            sequence: 0,
+            log_time,
+            publish_time: log_time.saturating_sub(1),
+        };
+        self.writer.write_to_known_channel(&header, data).unwrap();
+    }
+
+    /// The writer, for anything else.
+    pub fn writer(&mut self) -> &mut Writer<Cursor<Vec<u8>>> {
+        &mut self.writer
+    }
+
+    /// The bytes.
+    pub fn finish(mut self) -> Vec<u8> {
+        self.writer.finish().unwrap();
+        self.writer.into_inner().into_inner()
+    }
+}
+
+/// The message `float64 data` in CDR.
+pub fn float64(value: f64) -> Vec<u8> {
+    let mut data = vec![0, 1, 0, 0];
+    data.extend_from_slice(&value.to_le_bytes());
+    data
+}

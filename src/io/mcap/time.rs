@@ -1,0 +1,141 @@
+//! Which of a message's times counts.
+
+use super::route::Hop;
+use super::schema::leaves::{is_nanoseconds, is_seconds, is_stamp};
+use super::schema::{Kind, Schema};
+
+/// The time that samples are placed at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TimeChoice {
+    /// When the message was recorded.
+    Log,
+    /// When it was published.
+    Publish,
+    /// The stamp within the message.
+    Header,
+}
+
+impl TimeChoice {
+    /// Reads `log`, `publish` or `header`.
+    #[must_use]
+    pub fn parse(text: &str) -> Option<Self> {
+        match text {
+            "log" => Some(Self::Log),
+            "publish" => Some(Self::Publish),
+            "header" => Some(Self::Header),
+            _ => None,
+        }
+    }
+
+    /// As a user writes it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Log => "log",
+            Self::Publish => "publish",
+            Self::Header => "header",
+        }
+    }
+}
+
+/// The choice made, and why.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TimeUsed {
+    /// The time.
+    pub choice: TimeChoice,
+    /// Field of the stamp, if it is the header's.
+    pub field: Option<String>,
+    /// Why, for people.
+    pub why: String,
+}
+
+/// A time stamp within messages.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Stamp {
+    /// Path of the field.
+    pub text: String,
+    /// Way to its seconds.
+    pub seconds: Vec<Hop>,
+    /// Way to its nanoseconds.
+    pub nanoseconds: Vec<Hop>,
+}
+
+impl Stamp {
+    /// Finds it: `header.stamp`, then `stamp` or `timestamp` in the message itself or in its
+    /// header, then the only field that is a `google.protobuf.Timestamp`.
+    #[must_use]
+    pub fn find(schema: &Schema) -> Option<Self> {
+        let named = [
+            &["header", "stamp"][..],
+            &["stamp"],
+            &["timestamp"],
+            &["header", "timestamp"],
+        ];
+        let found = named.iter().find_map(|names| Self::at(schema, names));
+        found.or_else(|| {
+            let root = schema.root();
+            let mut stamps = root.fields.iter().filter(|field| match field.kind {
+                Kind::Struct(inner) => schema.structs[inner].name == "google.protobuf.Timestamp",
+                _ => false,
+            });
+            match (stamps.next(), stamps.next()) {
+                (Some(field), None) => Self::at(schema, &[&field.name]),
+                _ => None,
+            }
+        })
+    }
+
+    fn at(schema: &Schema, names: &[&str]) -> Option<Self> {
+        let mut index = schema.root;
+        let mut hops = Vec::new();
+        for name in names {
+            let fields = &schema.structs[index].fields;
+            let place = fields.iter().position(|field| field.name == *name)?;
+            let Kind::Struct(inner) = fields[place].kind else {
+                return None;
+            };
+            hops.push(Hop::Field(place));
+            index = inner;
+        }
+        let fields = &schema.structs[index].fields;
+        // JSON has no order, so the fields are told by their names.
+        let place = |is: fn(&str) -> bool| fields.iter().position(|field| is(&field.name));
+        let (seconds, nanoseconds) = (place(is_seconds)?, place(is_nanoseconds)?);
+        let is_numbers = [seconds, nanoseconds]
+            .iter()
+            .all(|place| matches!(fields[*place].kind, Kind::Number(_)));
+        let way = |place| {
+            let mut way = hops.clone();
+            way.push(Hop::Field(place));
+            way
+        };
+        (is_numbers && (fields.len() == 2 || is_stamp(schema, index))).then(|| Self {
+            text: names.join("."),
+            seconds: way(seconds),
+            nanoseconds: way(nanoseconds),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::schema::ros2msg::{Generation, read};
+    use super::*;
+
+    fn found(text: &str) -> Option<String> {
+        let text = text.replace("---", &"=".repeat(80));
+        let schema = read("p/M", &text, Generation::Ros2).unwrap();
+        Stamp::find(&schema).map(|stamp| stamp.text)
+    }
+
+    #[test]
+    fn the_header_comes_before_a_bare_stamp() {
+        let header = "---\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id";
+        let both = format!("builtin_interfaces/Time stamp\nstd_msgs/Header header\n{header}");
+        assert_eq!(found(&both).as_deref(), Some("header.stamp"));
+        let bare = "float64 x\nbuiltin_interfaces/Time stamp";
+        assert_eq!(found(bare).as_deref(), Some("stamp"));
+        assert_eq!(found("float64 stamp"), None);
+        assert_eq!(found("float64 x"), None);
+    }
+}

@@ -1,0 +1,259 @@
+//! The message that holds a torque, in the encoding of the file.
+//!
+//! For ROS it is `sensor_msgs/JointState`: it has a header with a stamp, its `effort` is defined
+//! as the torque of a turning joint in N m, and position and velocity may be left empty, so
+//! nothing is said that is not known. A `WrenchStamped` would have to claim five other components.
+
+use prost::Message as _;
+use prost_types::field_descriptor_proto::{Label, Type};
+use prost_types::{DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet};
+
+use crate::io::mcap::decode::Encoding;
+
+const ROS2_DEFINITION: &str = "\
+std_msgs/Header header
+string[] name
+float64[] position
+float64[] velocity
+float64[] effort
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+";
+
+const ROS1_DEFINITION: &str = "\
+Header header
+string[] name
+float64[] position
+float64[] velocity
+float64[] effort
+================================================================================
+MSG: std_msgs/Header
+uint32 seq
+time stamp
+string frame_id
+";
+
+const JSON_DEFINITION: &str = r#"{
+  "title": "torqcomp.Torque",
+  "type": "object",
+  "properties": {
+    "timestamp": {
+      "type": "object",
+      "title": "time",
+      "properties": {"sec": {"type": "integer", "minimum": 0}, "nsec": {"type": "integer", "minimum": 0, "maximum": 999999999}}
+    },
+    "name": {"type": "string"},
+    "torque_n_m": {"type": "number", "description": "torque in N m"}
+  }
+}
+"#;
+
+/// Writes torques as messages.
+#[derive(Debug)]
+pub struct Torque {
+    encoding: Encoding,
+    name: String,
+    sequence: u32,
+}
+
+impl Torque {
+    /// For a joint or channel of that name.
+    #[must_use]
+    pub fn new(encoding: Encoding, name: &str) -> Self {
+        Self {
+            encoding,
+            name: name.to_owned(),
+            sequence: 0,
+        }
+    }
+
+    /// Encoding of the messages, as the channel names it.
+    #[must_use]
+    pub fn message_encoding(&self) -> &'static str {
+        match self.encoding {
+            Encoding::Cdr => "cdr",
+            Encoding::Ros1 => "ros1",
+            Encoding::Protobuf => "protobuf",
+            Encoding::Json => "json",
+        }
+    }
+
+    /// Name, language and text of the schema.
+    #[must_use]
+    pub fn schema(&self) -> (&'static str, &'static str, Vec<u8>) {
+        match self.encoding {
+            Encoding::Cdr => (
+                "sensor_msgs/msg/JointState",
+                "ros2msg",
+                ROS2_DEFINITION.as_bytes().to_vec(),
+            ),
+            Encoding::Ros1 => (
+                "sensor_msgs/JointState",
+                "ros1msg",
+                ROS1_DEFINITION.as_bytes().to_vec(),
+            ),
+            Encoding::Protobuf => ("torqcomp.Torque", "protobuf", descriptor()),
+            Encoding::Json => (
+                "torqcomp.Torque",
+                "jsonschema",
+                JSON_DEFINITION.as_bytes().to_vec(),
+            ),
+        }
+    }
+
+    /// Path of the torque in the message.
+    #[must_use]
+    pub fn field(&self) -> &'static str {
+        match self.encoding {
+            Encoding::Cdr | Encoding::Ros1 => "effort[0]",
+            Encoding::Protobuf | Encoding::Json => "torque_n_m",
+        }
+    }
+
+    /// Appends the message of a torque in N m at a time in ns. JSON has no word for a value that
+    /// is not finite; it is written as null.
+    pub fn write(&mut self, time_ns: i64, torque_n_m: f64, out: &mut Vec<u8>) {
+        let seconds = time_ns.div_euclid(1_000_000_000);
+        let nanoseconds = time_ns.rem_euclid(1_000_000_000) as u32;
+        match self.encoding {
+            Encoding::Cdr => self.cdr(seconds, nanoseconds, torque_n_m, out),
+            Encoding::Ros1 => self.ros1(seconds, nanoseconds, torque_n_m, out),
+            Encoding::Protobuf => self.protobuf(seconds, nanoseconds, torque_n_m, out),
+            Encoding::Json => {
+                let value = serde_json::json!({
+                    "timestamp": {"sec": seconds, "nsec": nanoseconds},
+                    "name": self.name,
+                    "torque_n_m": torque_n_m,
+                });
+                out.extend_from_slice(value.to_string().as_bytes());
+            }
+        }
+        self.sequence = self.sequence.wrapping_add(1);
+    }
+
+    fn cdr(&self, seconds: i64, nanoseconds: u32, torque_n_m: f64, out: &mut Vec<u8>) {
+        out.extend_from_slice(&[0, 1, 0, 0]);
+        let start = out.len();
+        let pad = |out: &mut Vec<u8>, align: usize| {
+            let length = (out.len() - start).next_multiple_of(align);
+            out.resize(start + length, 0);
+        };
+        out.extend_from_slice(&(seconds as i32).to_le_bytes());
+        out.extend_from_slice(&nanoseconds.to_le_bytes());
+        // frame_id, empty: its end alone.
+        out.extend_from_slice(&[1, 0, 0, 0, 0]);
+        pad(out, 4);
+        out.extend_from_slice(&1_u32.to_le_bytes());
+        out.extend_from_slice(&(self.name.len() as u32 + 1).to_le_bytes());
+        out.extend_from_slice(self.name.as_bytes());
+        out.push(0);
+        pad(out, 4);
+        // No positions, no velocities, one effort.
+        out.extend_from_slice(&[0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0]);
+        pad(out, 8);
+        out.extend_from_slice(&torque_n_m.to_le_bytes());
+    }
+
+    fn ros1(&self, seconds: i64, nanoseconds: u32, torque_n_m: f64, out: &mut Vec<u8>) {
+        for word in [self.sequence, seconds as u32, nanoseconds, 0, 1] {
+            out.extend_from_slice(&word.to_le_bytes());
+        }
+        out.extend_from_slice(&(self.name.len() as u32).to_le_bytes());
+        out.extend_from_slice(self.name.as_bytes());
+        out.extend_from_slice(&[0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0]);
+        out.extend_from_slice(&torque_n_m.to_le_bytes());
+    }
+
+    fn protobuf(&self, seconds: i64, nanoseconds: u32, torque_n_m: f64, out: &mut Vec<u8>) {
+        let stamp = prost_types::Timestamp {
+            seconds,
+            nanos: nanoseconds as i32,
+        };
+        let stamp = stamp.encode_to_vec();
+        out.push(0x0a);
+        varint(stamp.len() as u64, out);
+        out.extend_from_slice(&stamp);
+        out.push(0x12);
+        varint(self.name.len() as u64, out);
+        out.extend_from_slice(self.name.as_bytes());
+        out.push(0x19);
+        out.extend_from_slice(&torque_n_m.to_le_bytes());
+    }
+}
+
+fn varint(mut number: u64, out: &mut Vec<u8>) {
+    while number >= 0x80 {
+        out.push(number as u8 | 0x80);
+        number >>= 7;
+    }
+    out.push(number as u8);
+}
+
+/// `message Torque { google.protobuf.Timestamp timestamp = 1; string name = 2;
+/// double torque_n_m = 3; }`, with what it needs.
+fn descriptor() -> Vec<u8> {
+    let field = |name: &str, number, kind: Type, type_name: Option<&str>| FieldDescriptorProto {
+        name: Some(name.to_owned()),
+        number: Some(number),
+        r#type: Some(kind as i32),
+        label: Some(Label::Optional as i32),
+        type_name: type_name.map(str::to_owned),
+        ..Default::default()
+    };
+    let file = |name: &str, package: &str, needs: Vec<String>, message, fields| {
+        let message = DescriptorProto {
+            name: Some(message),
+            field: fields,
+            ..Default::default()
+        };
+        FileDescriptorProto {
+            name: Some(name.to_owned()),
+            package: Some(package.to_owned()),
+            dependency: needs,
+            message_type: vec![message],
+            syntax: Some("proto3".to_owned()),
+            ..Default::default()
+        }
+    };
+    let stamp_file = "google/protobuf/timestamp.proto";
+    let stamp = vec![
+        field("seconds", 1, Type::Int64, None),
+        field("nanos", 2, Type::Int32, None),
+    ];
+    let torque = vec![
+        field(
+            "timestamp",
+            1,
+            Type::Message,
+            Some(".google.protobuf.Timestamp"),
+        ),
+        field("name", 2, Type::String, None),
+        field("torque_n_m", 3, Type::Double, None),
+    ];
+    let needs = vec![stamp_file.to_owned()];
+    let set = FileDescriptorSet {
+        file: vec![
+            file(
+                stamp_file,
+                "google.protobuf",
+                Vec::new(),
+                "Timestamp".to_owned(),
+                stamp,
+            ),
+            file(
+                "torqcomp/torque.proto",
+                "torqcomp",
+                needs,
+                "Torque".to_owned(),
+                torque,
+            ),
+        ],
+    };
+    set.encode_to_vec()
+}

@@ -1,0 +1,145 @@
+//! What is wrong with a recording, in words and with stable codes.
+//!
+//! The criteria are those of [`torqcomp_dsp::quality`]; here they are applied to the channels and time
+//! axes of a recording. `docs/inspect.md` lists the codes.
+
+pub mod copies;
+pub mod samples;
+pub mod time;
+
+use std::collections::HashMap;
+
+use crate::recording::{Axis, Channel};
+use crate::report::Warning;
+
+pub use samples::Findings;
+pub use time::TimeFindings;
+
+/// The warnings about samples that a verb is going to use, and about their time axis.
+///
+/// `name` is that of the channel, `unit` the unit of the samples.
+///
+/// ```
+/// use torqcomp::quality;
+/// use torqcomp::recording::Axis;
+/// let samples: Vec<f64> = (0..1000).map(|i| (0.1 * f64::from(i)).sin().min(0.7)).collect();
+/// let axis = Axis::of_header("Delta_X", 1000.0, None);
+/// let found = quality::warnings("torque", "N m", &samples, &axis);
+/// assert_eq!(found[0].code, "clipped");
+/// ```
+#[must_use]
+pub fn warnings(name: &str, unit: &str, samples: &[f64], axis: &Axis) -> Vec<Warning> {
+    let mut found = TimeFindings::of(axis).warnings(&format!("\"{name}\""), axis);
+    let findings = Findings::of(samples, axis.rate_hz);
+    found.extend(findings.warnings(name, unit, axis, &[]));
+    found.extend(findings.dead().map(|value| constant(&[(name, value)])));
+    found.extend(findings.coarse().map(|q| coarse(&[(name, unit, q)])));
+    found
+}
+
+/// The warning about channels that have one value only.
+#[must_use]
+pub fn constant(channels: &[(&str, f64)]) -> Warning {
+    let named = channels
+        .iter()
+        .map(|(name, value)| format!("\"{name}\" is always {}", crate::report::short(*value)));
+    Warning::new(
+        "constant-channel",
+        format!(
+            "{}: not connected, not selected, or nothing happened",
+            join(named)
+        ),
+    )
+}
+
+/// The warning about channels that are coarsely resolved.
+#[must_use]
+pub fn coarse(
+    channels: &[(
+        &str,
+        &str,
+        torqcomp_dsp::quality::quantisation::Quantisation,
+    )],
+) -> Warning {
+    let named = channels.iter().map(|(name, unit, q)| {
+        format!(
+            "\"{name}\" has {} steps of {} in its range ({} bits)",
+            crate::report::short(q.levels - 1.0),
+            with_unit(q.step, unit, 4),
+            crate::report::rounded(q.bits, 2)
+        )
+    });
+    Warning::new(
+        "coarse-quantisation",
+        format!(
+            "{}: rounding alone adds noise of 0.29 steps rms; use a smaller range of the recorder",
+            join(named)
+        ),
+    )
+}
+
+/// `a; b; c`, the end left out if there are very many.
+fn join(items: impl Iterator<Item = String>) -> String {
+    const MOST: usize = 12;
+    let items: Vec<String> = items.collect();
+    if items.len() <= MOST {
+        return items.join("; ");
+    }
+    format!(
+        "{}; and {} more",
+        items[..MOST].join("; "),
+        items.len() - MOST
+    )
+}
+
+/// A number with its unit, if that is known.
+pub(crate) fn with_unit(value: f64, unit: &str, digits: u32) -> String {
+    let value = crate::report::rounded(value, digits);
+    if unit.is_empty() {
+        value
+    } else {
+        format!("{value} {unit}")
+    }
+}
+
+/// Where a sample lies, for people: its time if that is known, or its number from 1.
+fn place(axis: &Axis, index: usize) -> String {
+    let stamp = axis.stamps_s.as_ref().and_then(|t| t.get(index).copied());
+    let counted = || {
+        axis.rate_hz
+            .map(|rate| axis.start_s.unwrap_or(0.0) + index as f64 / rate)
+    };
+    match stamp.filter(|t| t.is_finite()).or_else(counted) {
+        Some(time_s) => format!("{} s", crate::report::rounded(time_s, 7)),
+        None => format!("sample {}", index + 1),
+    }
+}
+
+/// Unit of a channel as the file writes it; empty if it gives none.
+#[must_use]
+pub fn unit_of(channel: &Channel) -> &str {
+    let known = channel.unit.as_ref().map(|unit| unit.text.as_str());
+    channel.unit_text.as_deref().or(known).unwrap_or("")
+}
+
+/// Names of channels, told apart: with the segment, or the number of the channel where several of one
+/// segment have the same name.
+#[must_use]
+pub fn labels(channels: &[Channel]) -> Vec<String> {
+    let key = |channel: &Channel| (channel.name.clone(), channel.segment);
+    let mut counts: HashMap<(String, Option<usize>), usize> = HashMap::new();
+    for channel in channels {
+        *counts.entry(key(channel)).or_default() += 1;
+    }
+    let label = |(i, channel): (usize, &Channel)| {
+        let mut label = channel.name.clone();
+        if let Some(segment) = channel.segment {
+            label.push_str(&format!(" (segment {})", segment + 1));
+        }
+        if counts[&key(channel)] > 1 {
+            label.push_str(&format!(" (channel {})", i + 1));
+        }
+        label
+    };
+    channels.iter().enumerate().map(label).collect()
+}

@@ -1,0 +1,244 @@
+//! The samples of a channel: what they show.
+
+use torqcomp_dsp::quality::clipping::{Clipping, Rail, clipping};
+use torqcomp_dsp::quality::finite::{NonFinite, non_finite};
+use torqcomp_dsp::quality::mains::{Mains, mains};
+use torqcomp_dsp::quality::quantisation::{Quantisation, quantisation};
+use torqcomp_dsp::quality::repeats::{Repeats, repeats};
+use torqcomp_dsp::quality::stuck::{constant, standstills};
+use torqcomp_dsp::quality::{Run, is_straight, range};
+
+use super::{place, with_unit};
+use crate::recording::{Axis, Hole, HoleKind};
+use crate::report::{Warning, rounded, short};
+
+/// Levels in the range below which a resolution is coarse: 8 bits.
+const COARSE: f64 = 256.0;
+/// Levels up to which a channel is a state, not a measurement.
+const STATES: usize = 4;
+
+/// Samples below which nothing is said of their resolution: a table of a few readings.
+const FEWEST: usize = 100;
+
+/// Samples below which a channel of one value is nothing to wonder at.
+const FEW: usize = 10;
+
+/// What the samples of a channel show.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Findings {
+    /// Number of samples.
+    pub samples: usize,
+    /// Smallest and largest finite sample.
+    pub range: Option<(f64, f64)>,
+    /// Mean of the finite samples.
+    pub mean: Option<f64>,
+    /// Their standard deviation: rms without the mean.
+    pub std: Option<f64>,
+    /// Samples that are no finite numbers.
+    pub non_finite: Option<NonFinite>,
+    /// Whether it is a straight line: a counter, a time axis.
+    pub is_straight: bool,
+    /// The value of a channel that has only one.
+    pub constant: Option<f64>,
+    /// Where it is clipped.
+    pub clipping: Option<Clipping>,
+    /// Where it stands still.
+    pub standstills: Vec<Run>,
+    /// How often samples repeat.
+    pub repeats: Option<Repeats>,
+    /// Its resolution.
+    pub quantisation: Option<Quantisation>,
+    /// Mains lines; `None` also if they cannot be looked for.
+    pub mains: Option<Mains>,
+}
+
+impl Findings {
+    /// Looks at the samples of a channel.
+    #[must_use]
+    pub fn of(samples: &[f64], rate_hz: Option<f64>) -> Self {
+        let (mean, std) = mean_and_std(samples).unzip();
+        let clipping = clipping(samples);
+        let rails = clipping.map(|c| [c.low, c.high]).unwrap_or_default();
+        let at_rail = |run: &Run| rails.iter().flatten().any(|rail| rail.value == run.value);
+        let mut standstills = standstills(samples);
+        standstills.retain(|run| !at_rail(run));
+        Self {
+            samples: samples.len(),
+            range: range(samples),
+            mean,
+            std,
+            non_finite: non_finite(samples),
+            is_straight: is_straight(samples),
+            constant: constant(samples),
+            clipping,
+            standstills,
+            repeats: repeats(samples),
+            quantisation: quantisation(samples),
+            mains: rate_hz.and_then(|rate_hz| mains(samples, rate_hz)),
+        }
+    }
+
+    /// The value of a channel that has only one, if it had the chance of having others.
+    #[must_use]
+    pub fn dead(&self) -> Option<f64> {
+        self.constant.filter(|_| self.samples >= FEW)
+    }
+
+    /// The resolution, if it is coarse for a measurement.
+    #[must_use]
+    pub fn coarse(&self) -> Option<Quantisation> {
+        self.quantisation
+            .filter(|q| q.levels < COARSE && q.seen > STATES)
+            .filter(|_| self.samples >= FEWEST && !self.is_straight)
+    }
+
+    /// The warnings about the channel alone, but for those that are said of several channels at once
+    /// ([`super::constant`], [`super::coarse`]). `holes` are the cells that held no number, as far as
+    /// they are known.
+    #[must_use]
+    pub fn warnings(&self, name: &str, unit: &str, axis: &Axis, holes: &[Hole]) -> Vec<Warning> {
+        let mut found = Vec::new();
+        found.extend(
+            self.non_finite
+                .map(|f| non_finite_cells(name, &f, axis, holes)),
+        );
+        for (rail, end) in self
+            .clipping
+            .iter()
+            .flat_map(|c| [(c.low, "lowest"), (c.high, "highest")])
+        {
+            found.extend(rail.map(|rail| clipped(name, unit, end, &rail, axis)));
+        }
+        found.extend(stuck(name, unit, &self.standstills, axis));
+        found.extend(
+            self.repeats
+                .filter(|r| r.unexplained == Some(true))
+                .map(|r| repeated(name, &r, axis)),
+        );
+        found.extend(self.mains.as_ref().map(|m| hum(name, unit, m)));
+        found
+    }
+}
+
+fn mean_and_std(samples: &[f64]) -> Option<(f64, f64)> {
+    let finite = || samples.iter().filter(|x| x.is_finite());
+    let count = finite().count() as f64;
+    let mean = finite().sum::<f64>() / count;
+    let square = finite().map(|x| (x - mean) * (x - mean)).sum::<f64>();
+    (count > 0.0).then(|| (mean, (square / count).sqrt()))
+}
+
+fn non_finite_cells(name: &str, found: &NonFinite, axis: &Axis, holes: &[Hole]) -> Warning {
+    let kinds = [
+        (HoleKind::Empty, "empty"),
+        (HoleKind::Missing, "beyond the end of their line"),
+        (HoleKind::NonFinite, "NaN or infinite"),
+        (HoleKind::Text, "text"),
+    ];
+    let counts: Vec<String> = kinds
+        .iter()
+        .map(|(kind, word)| (holes.iter().filter(|hole| hole.what == *kind).count(), word))
+        .filter(|(count, _)| *count > 0)
+        .map(|(count, word)| format!("{count} {word}"))
+        .collect();
+    let counts = match counts.as_slice() {
+        [] => String::new(),
+        some => format!(" ({})", some.join(", ")),
+    };
+    let line = match holes.first() {
+        Some(hole) if hole.line > 0 => format!(", line {}", hole.line),
+        _ => String::new(),
+    };
+    Warning::new(
+        "non-finite",
+        format!(
+            "\"{name}\": {} sample(s) are missing or no finite numbers{counts}, the first at \
+             {}{line}, at most {} in a row; remove or repair them before processing",
+            found.count,
+            place(axis, found.first),
+            found.longest
+        ),
+    )
+}
+
+fn clipped(name: &str, unit: &str, end: &str, rail: &Rail, axis: &Axis) -> Warning {
+    Warning::new(
+        "clipped",
+        format!(
+            "\"{name}\" is cut off at its {end} value of {}: {} samples have exactly that, {} run(s) \
+             of up to {} begin or end in full motion, the first at {}; use a larger range of the \
+             recorder, unless the signal itself is limited there",
+            with_unit(rail.value, unit, 6),
+            rail.samples,
+            rail.runs,
+            rail.longest,
+            place(axis, rail.first)
+        ),
+    )
+}
+
+fn stuck(name: &str, unit: &str, runs: &[Run], axis: &Axis) -> Option<Warning> {
+    let longest = runs.iter().max_by_key(|run| run.length)?;
+    let samples: usize = runs.iter().map(|run| run.length).sum();
+    Some(Warning::new(
+        "stuck-channel",
+        format!(
+            "\"{name}\" stands still {} time(s), for {samples} samples in all; the longest is at {} \
+             from {} on, {} samples: at rest, or a cable, a transmitter or the recorder dropped out",
+            runs.len(),
+            with_unit(longest.value, unit, 6),
+            place(axis, longest.start),
+            longest.length
+        ),
+    ))
+}
+
+fn repeated(name: &str, found: &Repeats, axis: &Axis) -> Warning {
+    let percent = rounded(100.0 * found.fraction, 3);
+    let rate = axis.rate_hz.map_or_else(String::new, |rate_hz| {
+        format!(
+            "; new values come at about {} Hz, not {} Hz",
+            rounded(found.fresh * rate_hz, 3),
+            short(rate_hz)
+        )
+    });
+    let how = match found.hold {
+        Some(hold) => format!("every value is held for {hold} samples"),
+        None => "more than its resolution explains".to_owned(),
+    };
+    Warning::new(
+        "repeated-samples",
+        format!("\"{name}\": {percent} % of the samples repeat the one before, {how}{rate}"),
+    )
+}
+
+fn hum(name: &str, unit: &str, found: &Mains) -> Warning {
+    let lines: Vec<String> = found
+        .lines
+        .iter()
+        .map(|line| {
+            format!(
+                "{} at {} Hz",
+                with_unit(line.amplitude, unit, 3),
+                rounded(line.frequency_hz, 5)
+            )
+        })
+        .collect();
+    let doubt = match found.shaft_hz {
+        Some(shaft_hz) => format!(
+            "; there is a line at {} Hz too, a simple fraction of it, so all may be orders of a shaft",
+            rounded(shaft_hz, 4)
+        ),
+        None => "; a machine that turns in step with the mains makes such lines as well".to_owned(),
+    };
+    Warning::new(
+        "mains-lines",
+        format!(
+            "\"{name}\" has lines at multiples of {} Hz, as mains hum makes them: {} (peak; others \
+             closer than {} Hz are not told apart){doubt}",
+            short(found.nominal_hz),
+            lines.join(", "),
+            rounded(found.resolution_hz, 2)
+        ),
+    )
+}

@@ -1,0 +1,284 @@
+//! The time axis of a channel: what its stamps show.
+
+use torqcomp_dsp::quality::is_straight;
+use torqcomp_dsp::quality::rate::{Contradiction, contradiction};
+use torqcomp_dsp::quality::rounding::{Rounded, rounded};
+use torqcomp_dsp::quality::steps::{Event, Events, Steps, rounded_steps, steps};
+
+use crate::recording::{Axis, Channel};
+use crate::report::{Warning, rounded as number};
+
+/// Largest deviation of a step, as a part of it, in an axis that counts as uniform.
+const UNIFORM: f64 = 0.01;
+/// A step backwards by more than this many usual ones is more than samples out of order.
+const SET_BACK: f64 = 10.0;
+
+/// What a time axis shows.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct TimeFindings {
+    /// Its steps; `None` without stamps, or if none rises.
+    pub steps: Option<Steps>,
+    /// What its stamps are rounded to, if that is all that is wrong with them.
+    pub rounded: Option<Rounded>,
+    /// The rate that the head of the file gives and the stamps contradict.
+    pub contradiction: Option<Contradiction>,
+}
+
+impl TimeFindings {
+    /// Looks at an axis.
+    #[must_use]
+    pub fn of(axis: &Axis) -> Self {
+        let Some(stamps_s) = &axis.stamps_s else {
+            return Self::default();
+        };
+        let plain = steps(stamps_s);
+        let is_uniform = plain.as_ref().is_some_and(|found| {
+            found.jitter.is_none_or(|j| j.peak <= UNIFORM) && found.repeated.count == 0
+        });
+        let rounded = if is_uniform { None } else { rounded(stamps_s) };
+        let steps = match &rounded {
+            Some(r) => rounded_steps(stamps_s, r.step_s, r.quantum_s),
+            None => plain,
+        };
+        let contradiction = axis
+            .header_rate_hz
+            .zip(steps.as_ref())
+            .and_then(|(stated, steps)| contradiction(stated, 1.0 / steps.typical_s, steps.stamps));
+        Self {
+            steps,
+            rounded,
+            contradiction,
+        }
+    }
+
+    /// The warnings; `whose` names the channels that the axis belongs to.
+    #[must_use]
+    pub fn warnings(&self, whose: &str, axis: &Axis) -> Vec<Warning> {
+        let mut found: Vec<Warning> = missing(whose, axis).into_iter().collect();
+        if let Some(assumed) = &axis.assumed {
+            found.push(Warning::new("time-assumed", format!("{whose}: {assumed}")));
+        }
+        found.extend(self.contradiction.map(|c| contradicted(whose, &c)));
+        let Some(steps) = &self.steps else {
+            return found;
+        };
+        if steps.non_finite > 0 {
+            found.push(Warning::new(
+                "non-finite-stamps",
+                format!("{whose}: {} time stamp(s) are no numbers", steps.non_finite),
+            ));
+        }
+        found.extend(backwards(whose, steps));
+        found.extend(repeated(whose, steps));
+        if axis.rate_hz.is_none() {
+            // Without a usual step, every step would be a gap.
+            return found;
+        }
+        found.extend(jumps(whose, steps));
+        found.extend(gaps(whose, steps));
+        found.extend(match &self.rounded {
+            Some(rounded) => Some(rounded_stamps(whose, rounded)),
+            None => jitter(whose, steps),
+        });
+        found
+    }
+}
+
+/// A warning about a channel that is a time axis itself (in a unit of time, rising along a straight
+/// line), if the rate that the head of the file gives for it is another one.
+#[must_use]
+pub fn stamps_in_channel(name: &str, channel: &Channel) -> Option<Warning> {
+    let stated_hz = channel.axis.header_rate_hz?;
+    let unit = channel.unit.as_ref().filter(|unit| unit.is_time())?;
+    if channel.axis.stamps_s.is_some() || !is_straight(&channel.samples) {
+        return None;
+    }
+    let step_s = steps(&channel.samples)?.typical_s * unit.unit.factor();
+    let found = contradiction(stated_hz, 1.0 / step_s, channel.samples.len())?;
+    Some(Warning::new(
+        "rate-contradicts-stamps",
+        format!(
+            "\"{name}\" rises like a time axis of {} Hz, the head of the file says {} Hz for it; find \
+             out which is right, and give it with --rate, or the column with --time-column",
+            number(found.stamped_hz, 6),
+            number(found.stated_hz, 6)
+        ),
+    ))
+}
+
+fn missing(whose: &str, axis: &Axis) -> Option<Warning> {
+    if axis.rate_hz.is_some() {
+        return None;
+    }
+    let why = match &axis.stamps_s {
+        Some(_) => "the time stamps have no usual step",
+        None => "the file has neither time stamps nor a rate",
+    };
+    Some(Warning::new(
+        "missing-rate",
+        format!(
+            "{whose}: the sampling rate is unknown, because {why}; what needs a rate refuses it \
+             unless one is given with --rate HZ, or the column of stamps with --time-column"
+        ),
+    ))
+}
+
+fn contradicted(whose: &str, found: &Contradiction) -> Warning {
+    Warning::new(
+        "rate-contradicts-stamps",
+        format!(
+            "{whose}: the head of the file says {} Hz, the time stamps come at {} Hz; find out which \
+             is right, and give it with --rate if it is not the stamps",
+            number(found.stated_hz, 6),
+            number(found.stamped_hz, 6)
+        ),
+    )
+}
+
+/// `3 of …, the first at …`; nothing if there are none.
+fn counted(events: &Events) -> Option<(&Event, &Event)> {
+    events.listed.first().zip(events.longest.as_ref())
+}
+
+fn backwards(whose: &str, steps: &Steps) -> Option<Warning> {
+    let (first, longest) = counted(&steps.backwards)?;
+    let why = if -longest.step_s > SET_BACK * steps.typical_s {
+        "the clock was set back, or two recordings were joined; split the file there"
+    } else {
+        "the samples are out of order"
+    };
+    Some(Warning::new(
+        "time-backwards",
+        format!(
+            "{whose}: time runs backwards {}, first at {} s and at most by {} s: {why}",
+            times(steps.backwards.count),
+            number(first.from_s, 7),
+            number(-longest.step_s, 4)
+        ),
+    ))
+}
+
+fn repeated(whose: &str, steps: &Steps) -> Option<Warning> {
+    let (first, _) = counted(&steps.repeated)?;
+    Some(Warning::new(
+        "repeated-stamps",
+        format!(
+            "{whose}: {} time stamp(s) equal the one before, first {} s: samples stored twice, or a \
+             clock coarser than the samples; --resample leaves them out",
+            steps.repeated.count,
+            number(first.from_s, 7)
+        ),
+    ))
+}
+
+fn jumps(whose: &str, steps: &Steps) -> Option<Warning> {
+    let (first, _) = counted(&steps.jumps)?;
+    Some(Warning::new(
+        "clock-jump",
+        format!(
+            "{whose}: the time stamps jump by {} s after {} s, more than all of the rest takes: the \
+             clock was set, or two recordings were joined; split the file there",
+            number(first.step_s, 4),
+            number(first.from_s, 7)
+        ),
+    ))
+}
+
+fn gaps(whose: &str, steps: &Steps) -> Option<Warning> {
+    let (first, longest) = counted(&steps.gaps)?;
+    let samples = steps.stamps as f64;
+    Some(Warning::new(
+        "time-gaps",
+        format!(
+            "{whose}: {} gap(s) in the time stamps, about {} sample(s) missing ({} %); the first \
+             after {} s, the longest of {} s after {} s; --resample bridges short ones",
+            steps.gaps.count,
+            number(steps.missing, 6),
+            number(100.0 * steps.missing / (samples + steps.missing), 2),
+            number(first.from_s, 7),
+            number(longest.step_s, 4),
+            number(longest.from_s, 7)
+        ),
+    ))
+}
+
+fn jitter(whose: &str, steps: &Steps) -> Option<Warning> {
+    let jitter = steps.jitter.filter(|jitter| jitter.peak > UNIFORM)?;
+    Some(Warning::new(
+        "time-jitter",
+        format!(
+            "{whose}: the time stamps jitter about a step of {} s by {} % rms, {} % at most; \
+             --resample interpolates to a uniform step",
+            number(steps.typical_s, 6),
+            number(100.0 * jitter.std, 3),
+            number(100.0 * jitter.peak, 3)
+        ),
+    ))
+}
+
+fn rounded_stamps(whose: &str, rounded: &Rounded) -> Warning {
+    Warning::new(
+        "rounded-time-stamps",
+        format!(
+            "{whose}: the time stamps are written in multiples of {} s; but for that they are \
+             uniform, {} Hz. Give it with --rate",
+            number(rounded.quantum_s, 3),
+            number(1.0 / rounded.step_s, 7)
+        ),
+    )
+}
+
+fn times(count: usize) -> String {
+    match count {
+        1 => "once".to_owned(),
+        _ => format!("{count} times"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+
+    fn codes(axis: &Axis) -> Vec<&'static str> {
+        let found = TimeFindings::of(axis).warnings("\"a\"", axis);
+        found.iter().map(|w| w.code).collect()
+    }
+
+    fn stamped(stamps: Vec<f64>) -> Axis {
+        Axis::of_stamps("t", Arc::new(stamps))
+    }
+
+    #[test]
+    fn each_fault_has_its_code_and_a_good_axis_none() {
+        let good: Vec<f64> = (0..1000).map(|i| 1e-3 * f64::from(i)).collect();
+        assert!(codes(&stamped(good.clone())).is_empty());
+        assert!(codes(&Axis::of_header("Delta_X", 1000.0, None)).is_empty());
+        assert_eq!(codes(&Axis::default()), ["missing-rate"]);
+
+        let mut gap = good.clone();
+        gap.iter_mut().skip(400).for_each(|t| *t += 0.005);
+        assert_eq!(codes(&stamped(gap)), ["time-gaps"]);
+
+        let mut back = good.clone();
+        back.iter_mut().skip(400).for_each(|t| *t -= 0.1);
+        assert_eq!(codes(&stamped(back)), ["time-backwards"]);
+
+        let mut jump = good.clone();
+        jump.iter_mut().skip(400).for_each(|t| *t += 5000.0);
+        assert_eq!(codes(&stamped(jump)), ["clock-jump"]);
+
+        let jitter: Vec<f64> = (0..1000)
+            .map(|i| 1e-3 * f64::from(i) + 1e-4 * f64::from(i * i % 7) / 7.0)
+            .collect();
+        assert_eq!(codes(&stamped(jitter)), ["time-jitter"]);
+
+        let coarse = (0..999).map(|i| (f64::from(i) / 1.5).round() * 1e-3);
+        assert_eq!(codes(&stamped(coarse.collect())), ["rounded-time-stamps"]);
+
+        let mut stated = stamped(good);
+        stated.header_rate_hz = Some(2000.0);
+        assert_eq!(codes(&stated), ["rate-contradicts-stamps"]);
+    }
+}
