@@ -92,7 +92,7 @@ pub struct Diagnosis<'a> {
 /// Error over the noise floor up to which nothing needs to be missing.
 const AT_FLOOR: f64 = 1.1;
 /// Error over a floor from out of band above which no colour of the noise accounts for it.
-const FAR_ABOVE: f64 = 2.0;
+const FAR_ABOVE: f64 = 1.5;
 /// Part of what is missing that an effect must explain to be named.
 const NAMED: f64 = 0.5;
 /// Effects that are added at most.
@@ -174,10 +174,9 @@ pub fn run<'a>(
     let before = judge(plain, &records).ok_or_else(cannot)?;
     let dependence_before = dependence(&before, &records);
     let pairs: Vec<(&Record, &[f64])> = records
-        .train
+        .hold
         .iter()
-        .zip(&before.train)
-        .chain(records.hold.iter().zip(&before.hold))
+        .zip(&before.hold)
         .map(|(record, residual)| (record, residual.modelled.as_slice()))
         .collect();
     let floor = floor::noise_floor(&pairs);

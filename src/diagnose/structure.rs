@@ -136,7 +136,7 @@ impl Structure<'_> {
             let moved = choice.moved();
             let own = choice.form.parameters.iter().enumerate().map(|(k, p)| {
                 if k < moved {
-                    values[next + k] * p.size(&self.frame.rulers)
+                    p.value(values[next + k], &self.frame.rulers)
                 } else {
                     0.0
                 }

@@ -52,7 +52,7 @@ pub struct Error {
     pub after: Rms,
     /// Relative fall of the held-out rms from before to after, 95 % interval; null if nothing was added.
     pub improvement_ci95: Option<[f64; 2]>,
-    /// Rms of the noise, estimated without a model.
+    /// Rms of the noise of the held-out records, estimated without a model.
     pub noise_floor_rms: Option<f64>,
     /// How: `periods`, `out-of-band`.
     pub noise_floor_from: Option<&'static str>,

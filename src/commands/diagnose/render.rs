@@ -203,7 +203,7 @@ impl Rendered<'_> {
                             .copied()
                             .flatten()
                             .filter(|_| fitted_here)
-                            .map(|s| s * parameter.size(rulers)),
+                            .map(|s| parameter.std(fitted.values[next + k], s, rulers)),
                         unit: parameter.unit.text(&self.units.diagnosed),
                     }
                 });

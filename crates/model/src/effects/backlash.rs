@@ -1,6 +1,7 @@
 //! Play between stator and beam.
 //!
-//! `gap`: within `±g` of its middle the beam is not touched, `n = −clamp(x, −g, g)`. `soft-gap`: something
+//! `gap`: within `±g` of its middle the beam is not touched, `n = −clamp(x, −g, g)`, and the gage shows nothing
+//! (`gap-beside`: the gage follows the displacement all the same). `soft-gap`: something
 //! softer carries within it, `n = −r clamp(x, −g, g)`; with `g` far out this would be an end stop, so `g` is bounded. `joint`: the beam follows the stator with play,
 //! `n = w − x` with `w` dragged along at a distance of at most `g` (the play operator of M. A. Krasnoselskii, A. V.
 //! Pokrovskii, *Systems with Hysteresis* (1989)). `recorded`: the same play, in what the gage is moved by
@@ -11,6 +12,11 @@
 use super::{Action, Effect, Form, Memory, Parameter, Place, Torque};
 
 const GAP: Parameter = Parameter::motion("gap", 1, 0, 0.0, 3.0);
+/// With the gap far out, this would be an end stop beside the beam.
+const SMALL_GAP: Parameter = Parameter::motion("gap", 1, 0, 0.0, 0.8);
+const SOFTENING: Parameter = Parameter::number("softening", 0.0, 1.0);
+const GAPS: &[&[f64]] = &[&[0.005], &[0.02], &[0.1], &[0.4]];
+const SOFT_GAPS: &[&[f64]] = &[&[0.01, 0.4], &[0.05, 0.4], &[0.3, 0.4]];
 
 pub(super) static EFFECT: Effect = Effect {
     name: "backlash",
@@ -24,28 +30,29 @@ pub(super) static EFFECT: Effect = Effect {
             name: "gap",
             place: Place::Stand,
             parameters: &[GAP],
-            starts: &[&[0.02], &[0.1], &[0.4]],
-            build: |p| {
-                Action::beside(Gap {
-                    gap: p[0],
-                    share: 1.0,
-                })
-            },
+            starts: GAPS,
+            build: |p| Action::shown(Gap::of(p)),
+        },
+        Form {
+            name: "gap-beside",
+            place: Place::Stand,
+            parameters: &[GAP],
+            starts: GAPS,
+            build: |p| Action::beside(Gap::of(p)),
         },
         Form {
             name: "soft-gap",
             place: Place::Stand,
-            parameters: &[
-                Parameter::motion("gap", 1, 0, 0.0, 0.8),
-                Parameter::number("softening", 0.0, 1.0),
-            ],
-            starts: &[&[0.05, 0.3], &[0.3, 0.3]],
-            build: |p| {
-                Action::beside(Gap {
-                    gap: p[0],
-                    share: p[1],
-                })
-            },
+            parameters: &[SMALL_GAP, SOFTENING],
+            starts: SOFT_GAPS,
+            build: |p| Action::shown(Gap::of(p)),
+        },
+        Form {
+            name: "soft-gap-beside",
+            place: Place::Stand,
+            parameters: &[SMALL_GAP, SOFTENING],
+            starts: SOFT_GAPS,
+            build: |p| Action::beside(Gap::of(p)),
         },
         Form {
             name: "joint",
@@ -79,6 +86,15 @@ pub(super) static EFFECT: Effect = Effect {
 struct Gap {
     gap: f64,
     share: f64,
+}
+
+impl Gap {
+    fn of(p: &[f64]) -> Self {
+        Self {
+            gap: p[0],
+            share: p.get(1).copied().unwrap_or(1.0),
+        }
+    }
 }
 
 impl Torque for Gap {

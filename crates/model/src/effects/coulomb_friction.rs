@@ -1,6 +1,6 @@
 //! Dry friction: a torque of constant size against the motion.
 //!
-//! `n = F tanh(x'/v)`; `v → 0` is the law of Coulomb, `n = F sgn(x')`, with sticking. C. A. Coulomb,
+//! `n = F sgn(x')`, with sticking (`sharp`), or `n = F tanh(x'/v)` (`tanh`). C. A. Coulomb,
 //! *Théorie des machines simples* (1781). **Valid where sliding is full**; before that a joint gives a
 //! hysteresis with memory. Mistaken for `bouc-wen-hysteresis` and `quadratic-damping`.
 //!
@@ -13,7 +13,7 @@ use super::{Action, Effect, Form, Memory, Parameter, Place, Torque};
 
 pub(super) static EFFECT: Effect = Effect {
     name: "coulomb-friction",
-    equation: "n = F tanh(x'/v)",
+    equation: "n = F sgn(x'), or F tanh(x'/v)",
     source: "C. A. Coulomb, Theorie des machines simples (1781)",
     validity: "where sliding is full",
     mistaken_for: &[
@@ -22,21 +22,35 @@ pub(super) static EFFECT: Effect = Effect {
         "structural-damping",
     ],
     experiment: "a slow load and unload, a free decay down to rest, and the response at two levels",
-    forms: &[Form {
-        name: "tanh",
-        place: Place::Stand,
-        parameters: &[
-            Parameter::motion("torque", 1, 0, 0.0, 5.0),
-            Parameter::motion("transition_speed", 1, -1, 1e-5, 0.3),
-        ],
-        starts: &[&[0.03, 0.02], &[0.3, 0.02]],
-        build: |p| {
-            Action::beside(Friction {
-                torque: p[0],
-                speed: p[1],
-            })
+    forms: &[
+        Form {
+            name: "sharp",
+            place: Place::Stand,
+            parameters: &[Parameter::motion("torque", 1, 0, 0.0, 5.0)],
+            starts: &[&[0.02], &[0.2]],
+            build: |p| {
+                Action::beside(Friction {
+                    torque: p[0],
+                    speed: 0.0,
+                })
+            },
         },
-    }],
+        Form {
+            name: "tanh",
+            place: Place::Stand,
+            parameters: &[
+                Parameter::motion("torque", 1, 0, 0.0, 5.0),
+                Parameter::motion("transition_speed", 1, -1, 1e-5, 0.3),
+            ],
+            starts: &[&[0.03, 0.02], &[0.3, 0.02]],
+            build: |p| {
+                Action::beside(Friction {
+                    torque: p[0],
+                    speed: p[1],
+                })
+            },
+        },
+    ],
 };
 
 struct Friction {
@@ -46,13 +60,22 @@ struct Friction {
 
 impl Torque for Friction {
     fn value(&self, _: &mut Memory, _: f64, speed: f64) -> f64 {
-        self.torque * (speed / self.speed).tanh()
+        if self.speed > 0.0 {
+            self.torque * (speed / self.speed).tanh()
+        } else if speed == 0.0 {
+            0.0
+        } else {
+            self.torque.copysign(speed)
+        }
     }
 
     fn kick(&self, _: &mut Memory, _: f64, speed: f64, change: f64, impulse: f64) -> f64 {
         let width = self.speed.max(0.5 * change.abs());
         let loss = impulse * self.torque;
         let size = speed.abs();
+        if width == 0.0 {
+            return (size - loss).max(0.0).copysign(speed);
+        }
         if size - loss > 15.0 * width {
             return speed - loss.copysign(speed);
         }

@@ -17,6 +17,7 @@ const fn grid(hz: f64) -> Parameter {
         ruler: Ruler::Absolute,
         lower: 0.9975 * hz,
         upper: 1.0025 * hz,
+        reciprocal: false,
     }
 }
 

@@ -13,6 +13,8 @@ pub struct Parameter {
     pub lower: f64,
     /// Greatest physical value, in rulers.
     pub upper: f64,
+    /// Whether a fit moves the reciprocal: zero is then an effect that is not there.
+    pub reciprocal: bool,
 }
 
 /// Unit of a parameter: recorded unit to a power, seconds to a power; or hertz.
@@ -67,6 +69,7 @@ impl Parameter {
             ruler: Ruler::Absolute,
             lower,
             upper,
+            reciprocal: false,
         }
     }
 
@@ -79,6 +82,7 @@ impl Parameter {
             ruler: Ruler::Motion,
             lower,
             upper,
+            reciprocal: false,
         }
     }
 
@@ -97,6 +101,17 @@ impl Parameter {
             ruler: Ruler::Motion,
             lower,
             upper,
+            reciprocal: false,
+        }
+    }
+
+    /// A frequency that a fit moves as its reciprocal, in periods of the natural frequency: infinite frequencies
+    /// are in reach then.
+    #[must_use]
+    pub const fn corner(name: &'static str, lower: f64, upper: f64) -> Self {
+        Self {
+            reciprocal: true,
+            ..Self::frequency(name, lower, upper)
         }
     }
 
@@ -104,6 +119,28 @@ impl Parameter {
     #[must_use]
     pub const fn by(self, ruler: Ruler) -> Self {
         Self { ruler, ..self }
+    }
+
+    /// The value, in its unit, of what a fit moves.
+    #[must_use]
+    pub fn value(&self, moved: f64, rulers: &Rulers) -> f64 {
+        let size = self.size(rulers);
+        if self.reciprocal {
+            size / moved
+        } else {
+            size * moved
+        }
+    }
+
+    /// The standard uncertainty, in its unit, of what a fit moves.
+    #[must_use]
+    pub fn std(&self, moved: f64, std: f64, rulers: &Rulers) -> f64 {
+        let size = self.size(rulers);
+        if self.reciprocal {
+            size * std / (moved * moved)
+        } else {
+            size * std
+        }
     }
 
     /// The size of the parameter's ruler, in the parameter's unit.

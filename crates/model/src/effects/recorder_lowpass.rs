@@ -8,8 +8,8 @@ use super::{Action, Effect, Form, Parameter, Place};
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
 
-const CORNER: Parameter = Parameter::frequency("cutoff", 0.02, 300.0);
-const STARTS: &[&[f64]] = &[&[0.3], &[1.0], &[2.5], &[6.0], &[15.0]];
+const CORNER: Parameter = Parameter::corner("cutoff", 0.0, 50.0);
+const STARTS: &[&[f64]] = &[&[3.0], &[1.0], &[0.4], &[0.15], &[0.02]];
 
 macro_rules! order {
     ($order:literal, $name:literal) => {
@@ -39,7 +39,7 @@ pub(super) static EFFECT: Effect = Effect {
             name: "second-order",
             place: Place::Chain,
             parameters: &[CORNER, Parameter::number("damping_ratio", 0.2, 3.0)],
-            starts: &[&[1.0, 0.8], &[3.0, 0.8], &[8.0, 0.8]],
+            starts: &[&[1.0, 0.8], &[0.3, 0.8], &[0.1, 0.8]],
             build: |p| {
                 let (corner, damping) = (TAU * p[0], p[1]);
                 Action::Factor(Box::new(move |_, omega| {

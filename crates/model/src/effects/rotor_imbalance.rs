@@ -42,4 +42,5 @@ const RATE: Parameter = Parameter {
     ruler: Ruler::Absolute,
     lower: 0.1,
     upper: 5000.0,
+    reciprocal: false,
 };

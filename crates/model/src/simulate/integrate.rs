@@ -18,7 +18,7 @@ pub struct State {
 }
 
 /// Largest `ω₀ h` of a step; the error of the splitting is about `(ω₀ h)²/24` of the torques.
-const LARGEST_STEP: f64 = 0.06;
+const LARGEST_STEP: f64 = 0.1;
 /// Fewest steps from sample to sample: the input may go up to half the sampling rate.
 const FEWEST_SUBSTEPS: usize = 4;
 /// Most steps from sample to sample.
