@@ -137,6 +137,7 @@ impl Record {
                 time_unit: self.time_unit.clone(),
                 rate_hz: self.rate,
                 resample: self.resample,
+                any_steps: false,
                 told: Told {
                     delimiter: self.delimiter,
                     decimal: self.decimal,

@@ -59,6 +59,7 @@ impl Reading {
             time_unit: self.time_unit.clone(),
             rate_hz: self.rate,
             resample: false,
+            any_steps: false,
             told: Told {
                 delimiter: self.delimiter,
                 decimal: self.decimal,

@@ -15,7 +15,9 @@ const ROWS_AT_ONCE: usize = 1 << 14;
 
 /// Runs the verb.
 pub fn run(args: &Extract) -> Result<Outcome, Failure> {
-    let signal = Signal::open(&Place::of(&args.record.input), &args.record.options())?;
+    let mut options = args.record.options();
+    options.table.any_steps = true;
+    let signal = Signal::open(&Place::of(&args.record.input), &options)?;
     let inputs = [args.record.input.as_ref()];
     let mut output = Output::open(args.result.output.as_deref(), args.result.force, &inputs)?;
     output.write(&heading(&signal))?;

@@ -65,6 +65,7 @@ impl Signal {
             first_stamp: time.uses_stamps().then_some(0.0),
             time,
             warnings: Vec::new(),
+            any_steps: table.any_steps,
             origin: Some(Origin {
                 encoding: mcap::decode::Encoding::of(&chosen.encoding),
                 topic: chosen.topic,

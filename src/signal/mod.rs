@@ -30,6 +30,8 @@ pub struct Signal {
     pub time: TimeAxis,
     /// Of messages, what a copy of their file needs to know.
     pub origin: Option<Origin>,
+    /// Whether irregular stamps are only said.
+    any_steps: bool,
     /// First time stamp as written.
     first_stamp: Option<f64>,
     /// What is known to be odd before reading.
@@ -97,6 +99,7 @@ impl Signal {
                 self.time.clone(),
                 self.warnings.clone(),
             )
+            .with_any_steps(self.any_steps)
         };
         match self.feed {
             Feed::Text {

@@ -5,7 +5,7 @@ use std::io::{Cursor, Read};
 use super::sequence::TextRows;
 use super::{Feed, Options, Signal};
 use crate::failure::Failure;
-use crate::io::csv::{Place, Table};
+use crate::io::csv::{self, Place, Table};
 use crate::io::mcap::record::frames::Frames;
 use crate::io::mcap::record::input::Input;
 use crate::io::mcap::{self, Source, selection::Wanted};
@@ -35,7 +35,7 @@ impl Signal {
         let table = &options.table;
         if complete && head.is_empty() || recording::text::is_plain(&head, complete, table) {
             let input = Box::new(Cursor::new(head).chain(input));
-            return Table::of(name, input, table).map(Self::of_table);
+            return Table::of(name, input, table).map(|found| Self::of_table(found, table));
         }
         input.read_to_end(&mut head).map_err(unreadable)?;
         let recording = recording::text::read(&name, head, table).map_err(|f| f.at(&name))?;
@@ -61,7 +61,7 @@ impl Signal {
     }
 
     /// The signal of a plain table.
-    fn of_table(table: Table) -> Self {
+    fn of_table(table: Table, options: &csv::Options) -> Self {
         let Table {
             source,
             layout,
@@ -90,6 +90,7 @@ impl Signal {
             first_stamp,
             warnings,
             origin: None,
+            any_steps: options.any_steps,
             feed: Feed::Text {
                 rows,
                 head,

@@ -44,6 +44,7 @@ impl Signal {
             },
             time,
             origin: None,
+            any_steps: options.any_steps,
             warnings: recording.warnings.clone(),
             feed: Feed::Rows(Box::new(Memory {
                 samples: channel.samples.clone(),

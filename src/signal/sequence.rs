@@ -5,6 +5,8 @@ use crate::failure::Failure;
 use crate::io::csv::{Break, Defect, Problem, RowPlan, Rows, TimeAxis, TimeSource};
 use crate::report::Warning;
 
+/// Code of the warning that stamps are irregular.
+const IRREGULAR: &str = "irregular-stamps";
 /// Difference of the mean rate from that of the first rows that is worth a warning.
 const RATE_DRIFT: f64 = 1e-4;
 
@@ -26,6 +28,8 @@ pub struct Sequence {
     empty_line: Option<usize>,
     lost: Option<Warning>,
     warnings: Vec<Warning>,
+    /// Whether irregular stamps are only said.
+    any_steps: bool,
 }
 
 /// How the rows of a text are written, as far as messages need it.
@@ -74,7 +78,15 @@ impl Sequence {
             empty_line: None,
             lost: None,
             warnings,
+            any_steps: false,
         }
+    }
+
+    /// Lets irregular stamps pass with a warning.
+    #[must_use]
+    pub(super) fn with_any_steps(mut self, any_steps: bool) -> Self {
+        self.any_steps = any_steps;
+        self
     }
 
     /// Takes the next batch.
@@ -85,16 +97,13 @@ impl Sequence {
         if let Some(found) = self.time_break(batch) {
             let line = self.line_of_row(batch, found.row);
             let is_last = found.row + 1 == batch.rows.times.len();
-            if !(batch.unended && is_last && batch.rows.problem.is_none()) {
+            if self.any_steps {
+                self.say_irregular(line, &found);
+            } else if !(batch.unended && is_last && batch.rows.problem.is_none()) {
                 return Err(self.at(line, self.time.explain(&found)));
+            } else {
+                self.drop_cut_stamp(batch, line);
             }
-            // The file was cut within this stamp.
-            batch.rows.times.pop();
-            batch.rows.time_text.pop();
-            batch.rows.values.pop();
-            let start = memchr::memrchr(b'\n', &batch.text).map_or(0, |place| place + 1);
-            let text = String::from_utf8_lossy(&batch.text[start..]).into_owned();
-            self.lose_last_line(line, &text);
         }
         if self.text.is_some() {
             self.look_at_lines(batch)?;
@@ -107,6 +116,26 @@ impl Sequence {
         self.first_stamp = self.first_stamp.or(rows.times.first().copied());
         self.last_stamp = rows.times.last().copied().or(self.last_stamp);
         Ok(())
+    }
+
+    /// The file was cut within its last stamp.
+    fn drop_cut_stamp(&mut self, batch: &mut Batch, line: usize) {
+        batch.rows.times.pop();
+        batch.rows.time_text.pop();
+        batch.rows.values.pop();
+        let start = memchr::memrchr(b'\n', &batch.text).map_or(0, |place| place + 1);
+        let text = String::from_utf8_lossy(&batch.text[start..]).into_owned();
+        self.lose_last_line(line, &text);
+    }
+
+    /// Says once that the stamps are irregular.
+    fn say_irregular(&mut self, line: usize, found: &Break) {
+        if !self.warnings.iter().any(|w| w.code == IRREGULAR) {
+            let (source, name) = (&self.source, self.row_name);
+            let what = self.time.explain(found);
+            let message = format!("{source}, {name} {line}: {what}");
+            self.warnings.push(Warning::new(IRREGULAR, message));
+        }
     }
 
     /// What only lines of text can have wrong with them.

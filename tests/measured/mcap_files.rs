@@ -54,7 +54,11 @@ pub fn ros2_bag(folder: &Path) -> Result<(), Failed> {
         ),
         ("/test/sensor_msgs/joint_state", "effort[-1]", &[3.0, 3.0]),
         ("/test/sensor_msgs/imu", "orientation.w", &[1.0, 1.0]),
-        ("/test/std_msgs/float64", "", &[2.71828, 2.71828]),
+        (
+            "/test/std_msgs/float64",
+            "",
+            &[271_828.0 / 1e5, 271_828.0 / 1e5],
+        ),
         ("/test/std_msgs/int64", "data", &[-1e10, -1e10]),
         (
             "/test/sensor_msgs/point_cloud",

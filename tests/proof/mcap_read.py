@@ -25,7 +25,7 @@ def read(torqcomp, folder, case):
         sys.exit(f"{case['name']}: exit code {done.returncode}, not {expected}\n{done.stderr}")
     with open(out, newline="") as rows:
         reader = csv.reader(rows)
-        assert next(reader)[:2] == ["time_s", "value"]
+        assert next(reader)[0] == "time_s"
         return [(Decimal(time), float(value)) for time, value, *_ in reader]
 
 

@@ -43,6 +43,8 @@ pub struct Options {
     pub rate_hz: Option<f64>,
     /// Whether irregular stamps are brought onto a grid.
     pub resample: bool,
+    /// Whether stamps may be irregular, because they are only handed on.
+    pub any_steps: bool,
     /// How the file is written.
     pub told: Told,
 }
