@@ -340,7 +340,7 @@ fn name_mode(outcome: &mut Outcome, fit: &ModesFit, k: usize, place: usize, coun
 fn correlations(outcome: &mut Outcome, fit: &ModesFit) {
     let count = 2 * fit.poles.len();
     let name = |i: usize| {
-        let what = if i % 2 == 0 {
+        let what = if i.is_multiple_of(2) {
             "decay rate"
         } else {
             "frequency"

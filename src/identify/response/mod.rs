@@ -757,7 +757,7 @@ fn draw(
         .clone()
         .filter_map(|k| {
             let (middle, std) = (h1.response[k].norm(), 2.0 * h1.relative_std(k)?);
-            (std < 1.0).then(|| {
+            (std < 1.0).then_some({
                 (
                     k as f64 * step_hz,
                     middle * (1.0 - std),

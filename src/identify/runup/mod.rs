@@ -123,8 +123,10 @@ pub fn identify(run: &Run, options: &Options) -> Result<Outcome, Failure> {
             (half, evaluate(run, &directions, half, split)?)
         }
     };
-    let mut outcome = Outcome::default();
-    outcome.found = named(run, &directions, split, &fitted);
+    let mut outcome = Outcome {
+        found: named(run, &directions, split, &fitted),
+        ..Outcome::default()
+    };
     let effort_rms = rms(&fitted.right);
     outcome.quality = Some(Quality {
         rms: rms(&fitted.residuals),
