@@ -49,20 +49,32 @@ pub fn gage_bridge(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
 /// Clipping on both sides.
 pub fn clip(scene: &Scene, size: f64, _: &mut Draw) -> Built {
     let limit = scene.shown_peak * (1.0 - size);
-    Built::curve(scene, move |y| y.clamp(-limit, limit), &[("limit_n_m", limit)])
+    Built::curve(
+        scene,
+        move |y| y.clamp(-limit, limit),
+        &[("limit_n_m", limit)],
+    )
 }
 
 /// Clipping on both sides at limits that differ.
 pub fn clip_uneven(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     let high = scene.shown_peak * (1.0 - size);
     let low = -high * draw.between(0.85, 1.15);
-    Built::curve(scene, move |y| y.clamp(low, high), &[("high_n_m", high), ("low_n_m", low)])
+    Built::curve(
+        scene,
+        move |y| y.clamp(low, high),
+        &[("high_n_m", high), ("low_n_m", low)],
+    )
 }
 
 /// `L tanh(y/L)`.
 pub fn saturate_soft(scene: &Scene, size: f64, _: &mut Draw) -> Built {
     let limit = scene.shown_peak / size;
-    Built::curve(scene, move |y| limit * (y / limit).tanh(), &[("limit_n_m", limit)])
+    Built::curve(
+        scene,
+        move |y| limit * (y / limit).tanh(),
+        &[("limit_n_m", limit)],
+    )
 }
 
 /// `y / (1 + |y/L|^p)^(1/p)`, a knee between soft and hard.

@@ -28,7 +28,11 @@ pub fn mains(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
 /// The mains with harmonics.
 pub fn mains_harmonics(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     let shares = [
-        if draw.chance(0.4) { draw.between(0.1, 0.5) } else { 0.0 },
+        if draw.chance(0.4) {
+            draw.between(0.1, 0.5)
+        } else {
+            0.0
+        },
         draw.between(0.1, 0.6),
         draw.between(0.0, 0.4),
     ];
@@ -83,16 +87,28 @@ fn rotor_with(scene: &Scene, size: f64, second: f64, draw: &mut Draw) -> Built {
     };
     let torque = size * scene.shown_rms;
     let factor = |f: f64| {
-        let (ratio, damping) = (TAU * f / scene.constants.omega(), scene.constants.damping_ratio());
-        ((1.0 - ratio * ratio).powi(2) + (2.0 * damping * ratio).powi(2)).sqrt().recip()
+        let (ratio, damping) = (
+            TAU * f / scene.constants.omega(),
+            scene.constants.damping_ratio(),
+        );
+        ((1.0 - ratio * ratio).powi(2) + (2.0 * damping * ratio).powi(2))
+            .sqrt()
+            .recip()
     };
     lines(
         scene,
         vec![
             (frequency_hz, torque * factor(frequency_hz)),
-            (2.0 * frequency_hz, second * torque * factor(2.0 * frequency_hz)),
+            (
+                2.0 * frequency_hz,
+                second * torque * factor(2.0 * frequency_hz),
+            ),
         ],
-        &[("frequency_hz", frequency_hz), ("torque_n_m", torque), ("second", second)],
+        &[
+            ("frequency_hz", frequency_hz),
+            ("torque_n_m", torque),
+            ("second", second),
+        ],
     )
 }
 

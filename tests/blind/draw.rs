@@ -12,9 +12,11 @@ impl Draw {
     /// The stream of a case, apart from its other streams by `purpose`.
     pub fn new(seed: u64, purpose: &str) -> Self {
         // FNV-1a over the purpose: a stream of its own for whatever is drawn.
-        let hash = purpose.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
-            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-        });
+        let hash = purpose
+            .bytes()
+            .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
+                (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+            });
         let mut bytes = [0; 32];
         bytes[..8].copy_from_slice(&seed.to_le_bytes());
         bytes[8..16].copy_from_slice(&hash.to_le_bytes());

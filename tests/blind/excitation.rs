@@ -78,7 +78,11 @@ impl Excitation {
     /// A sweep of the given amplitude.
     pub fn sweep(draw: &mut Draw, amplitude: f64) -> Self {
         let (low, high) = (draw.between(2.0, 20.0), draw.between(1000.0, 2200.0));
-        let (from_hz, to_hz) = if draw.chance(0.8) { (low, high) } else { (high, low) };
+        let (from_hz, to_hz) = if draw.chance(0.8) {
+            (low, high)
+        } else {
+            (high, low)
+        };
         Self::Sweep {
             amplitude,
             from_hz,
@@ -111,16 +115,30 @@ impl Excitation {
     /// What it is, for people.
     pub fn describe(&self) -> String {
         match self {
-            Self::Multisine { lines, second_half, settled } => format!(
+            Self::Multisine {
+                lines,
+                second_half,
+                settled,
+            } => format!(
                 "multisine, {} lines to {:.0} Hz, rms {:.3} N m, second half times {second_half}, {}",
                 lines.len(),
                 self.top_hz(),
                 (lines.iter().map(|line| line.amplitude.powi(2)).sum::<f64>() / 2.0).sqrt(),
                 if *settled { "settled" } else { "from rest" }
             ),
-            Self::Sweep { amplitude, from_hz, to_hz, logarithmic, fade_s } => format!(
+            Self::Sweep {
+                amplitude,
+                from_hz,
+                to_hz,
+                logarithmic,
+                fade_s,
+            } => format!(
                 "{} sweep {from_hz:.0} to {to_hz:.0} Hz, amplitude {amplitude:.3} N m, fade {fade_s} s",
-                if *logarithmic { "logarithmic" } else { "linear" }
+                if *logarithmic {
+                    "logarithmic"
+                } else {
+                    "linear"
+                }
             ),
         }
     }
@@ -128,7 +146,11 @@ impl Excitation {
     /// The torque on the fine grid.
     pub fn input(&self) -> Input {
         let settled = matches!(self, Self::Multisine { settled: true, .. });
-        let before = if settled { (SETTLING_S * RATE_HZ) as usize * FINER } else { 0 };
+        let before = if settled {
+            (SETTLING_S * RATE_HZ) as usize * FINER
+        } else {
+            0
+        };
         let points = before + SAMPLES * FINER + 8 * FINER;
         let mut input = Input {
             before,
@@ -136,7 +158,9 @@ impl Excitation {
             nodes: vec![[0.0; 3]; points],
         };
         match self {
-            Self::Multisine { lines, second_half, .. } => {
+            Self::Multisine {
+                lines, second_half, ..
+            } => {
                 lines.iter().for_each(|line| line.add_to(&mut input));
                 input.shape(|time_s| step(1.0, *second_half, time_s - LENGTH_S / 2.0, 0.01));
                 if settled {
@@ -149,9 +173,8 @@ impl Excitation {
                     input.nodes[index] = self.sweep_at(input.time_s(index));
                 }
                 input.shape(|time_s| step(0.0, 1.0, time_s - fade_s / 2.0, fade_s / 2.0));
-                input.shape(|time_s| {
-                    step(1.0, 0.0, time_s - LENGTH_S + fade_s / 2.0, fade_s / 2.0)
-                });
+                input
+                    .shape(|time_s| step(1.0, 0.0, time_s - LENGTH_S + fade_s / 2.0, fade_s / 2.0));
             }
         }
         input
@@ -159,13 +182,24 @@ impl Excitation {
 
     /// A sweep's value and two derivatives, without its fades.
     fn sweep_at(&self, time_s: f64) -> [f64; 3] {
-        let Self::Sweep { amplitude, from_hz, to_hz, logarithmic, .. } = self else {
+        let Self::Sweep {
+            amplitude,
+            from_hz,
+            to_hz,
+            logarithmic,
+            ..
+        } = self
+        else {
             return [0.0; 3];
         };
         let (phase, rate, change) = if *logarithmic {
             let scale_s = LENGTH_S / (to_hz / from_hz).ln();
             let rate = TAU * from_hz * (time_s / scale_s).exp();
-            (TAU * from_hz * scale_s * ((time_s / scale_s).exp() - 1.0), rate, rate / scale_s)
+            (
+                TAU * from_hz * scale_s * ((time_s / scale_s).exp() - 1.0),
+                rate,
+                rate / scale_s,
+            )
         } else {
             let change = TAU * (to_hz - from_hz) / LENGTH_S;
             (
@@ -247,6 +281,14 @@ impl Input {
         p0 + part * (d0 + part * (c0 + part * (third + part * (fourth + part * fifth))))
     }
 
+    /// The torque at a node, halfway to the next, and there.
+    pub fn around(&self, node: usize) -> [f64; 3] {
+        let ([p0, v0, a0], [p1, v1, a1]) = (self.nodes[node], self.nodes[node + 1]);
+        let h = self.step_s;
+        let middle = (p0 + p1) / 2.0 + h * (5.0 * (v0 - v1) + h / 2.0 * (a0 + a1)) / 32.0;
+        [p0, middle, p1]
+    }
+
     /// Values at the samples.
     pub fn samples(&self) -> Vec<f64> {
         self.at_samples(0)
@@ -255,7 +297,11 @@ impl Input {
     /// Values at samples from the start of the input on, before the record begins.
     pub fn samples_with_start(&self) -> Vec<f64> {
         let nodes = self.before + SAMPLES * FINER;
-        self.nodes[..nodes].iter().step_by(FINER).map(|node| node[0]).collect()
+        self.nodes[..nodes]
+            .iter()
+            .step_by(FINER)
+            .map(|node| node[0])
+            .collect()
     }
 
     /// Time derivative at the samples.

@@ -26,7 +26,11 @@ impl Dry {
 
     fn at_rest(&self, torque: f64, state: &State) -> i8 {
         let pull = self.pull(torque, state);
-        if pull.abs() <= self.friction(0.0) { 0 } else { pull.signum() as i8 }
+        if pull.abs() <= self.friction(0.0) {
+            0
+        } else {
+            pull.signum() as i8
+        }
     }
 }
 
@@ -88,7 +92,10 @@ pub fn coulomb_smooth(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
         resists: move |_, _, v: f64| friction * (v / speed).tanh(),
         in_gage: false,
     };
-    Built::dynamics(system, &[("friction_n_m", friction), ("over_speed_rad_s", speed)])
+    Built::dynamics(
+        system,
+        &[("friction_n_m", friction), ("over_speed_rad_s", speed)],
+    )
 }
 
 /// Friction that is larger at rest (not listed).

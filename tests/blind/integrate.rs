@@ -155,11 +155,11 @@ impl Walk<'_> {
     fn runge_kutta(&self, node: usize, from: f64, to: f64) -> State {
         let count = self.system.states();
         let (h, start_s) = ((to - from) * self.input.step_s, self.input.time_s(node));
-        let slope = |part: f64, state: &State| {
+        let slope = |part: f64, torque: f64, state: &State| {
             let mut rates = [0.0; STATES];
             let time_s = start_s + part * self.input.step_s;
-            let torque = self.input.between(node, part);
-            self.system.rates(self.mode, time_s, torque, state, &mut rates);
+            self.system
+                .rates(self.mode, time_s, torque, state, &mut rates);
             rates
         };
         let moved = |by: f64, rates: &State| {
@@ -170,10 +170,11 @@ impl Walk<'_> {
             state
         };
         let middle = 0.5 * (from + to);
-        let k1 = slope(from, &self.state);
-        let k2 = slope(middle, &moved(h / 2.0, &k1));
-        let k3 = slope(middle, &moved(h / 2.0, &k2));
-        let k4 = slope(to, &moved(h, &k3));
+        let [u0, u1, u2] = [from, middle, to].map(|part| self.input.between(node, part));
+        let k1 = slope(from, u0, &self.state);
+        let k2 = slope(middle, u1, &moved(h / 2.0, &k1));
+        let k3 = slope(middle, u1, &moved(h / 2.0, &k2));
+        let k4 = slope(to, u2, &moved(h, &k3));
         let mut state = self.state;
         for i in 0..count {
             state[i] += h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]);

@@ -57,7 +57,11 @@ fn coupled(scene: &Scene, size: f64, rubbing: bool, draw: &mut Draw) -> Built {
     let omega = TAU * second_frequency_hz(scene, draw);
     let ratio = draw.log_between(0.008, 0.05);
     let inertia = size * scene.constants.inertia_kg_m2;
-    let friction = if rubbing { draw.log_between(0.03, 0.3) } else { 0.0 };
+    let friction = if rubbing {
+        draw.log_between(0.03, 0.3)
+    } else {
+        0.0
+    };
     let system = Coupled {
         constants: scene.constants,
         inertia,
@@ -111,7 +115,11 @@ impl Dynamics for Additional {
 
     fn shown(&self, _: i8, _: f64, _: f64, state: &State) -> f64 {
         let first = self.constants.stiffness_n_m * state[0];
-        let rest = if self.kept_static { 1.0 - self.share } else { 1.0 };
+        let rest = if self.kept_static {
+            1.0 - self.share
+        } else {
+            1.0
+        };
         rest * first + self.share * state[2]
     }
 }
@@ -159,9 +167,14 @@ fn complex_stiffness(constants: Constants, loss: f64, place: &Place) -> Vec<f64>
     let length = 4 * SAMPLES;
     padded.resize(length, 0.0);
     let mut planner = RealFftPlanner::<f64>::new();
-    let (forward, inverse) = (planner.plan_fft_forward(length), planner.plan_fft_inverse(length));
+    let (forward, inverse) = (
+        planner.plan_fft_forward(length),
+        planner.plan_fft_inverse(length),
+    );
     let mut spectrum = forward.make_output_vec();
-    forward.process(&mut padded, &mut spectrum).expect("lengths agree");
+    forward
+        .process(&mut padded, &mut spectrum)
+        .expect("lengths agree");
     for (bin, value) in spectrum.iter_mut().enumerate() {
         let omega = TAU * RATE_HZ * bin as f64 / length as f64;
         let twist = if bin == 0 { 0.0 } else { loss };
@@ -173,7 +186,9 @@ fn complex_stiffness(constants: Constants, loss: f64, place: &Place) -> Vec<f64>
         *value *= constants.stiffness_n_m / (stiffness + rest) / length as f64;
     }
     spectrum[length / 2].im = 0.0;
-    inverse.process(&mut spectrum, &mut padded).expect("lengths agree");
+    inverse
+        .process(&mut spectrum, &mut padded)
+        .expect("lengths agree");
     padded[before..before + SAMPLES].to_vec()
 }
 
@@ -193,7 +208,11 @@ impl Ladder {
         let rates_s = (0..20)
             .map(|i| TAU * 10_f64.powf(-0.5 + f64::from(i) / per_decade))
             .collect();
-        Self { constants, each, rates_s }
+        Self {
+            constants,
+            each,
+            rates_s,
+        }
     }
 }
 

@@ -24,14 +24,16 @@ pub fn answer(constants: PlainConstants, input: &Input) -> Vec<f64> {
         if node >= input.before && (node - input.before) % FINER == 0 {
             samples.push(y);
         }
-        let (u0, u1, u2) = (
-            input.between(node, 0.0),
-            input.between(node, 0.5),
-            input.between(node, 1.0),
-        );
+        let [u0, u1, u2] = input.around(node);
         let (y1, v1) = (v, rate(y, v, u0));
-        let (y2, v2) = (v + h / 2.0 * v1, rate(y + h / 2.0 * y1, v + h / 2.0 * v1, u1));
-        let (y3, v3) = (v + h / 2.0 * v2, rate(y + h / 2.0 * y2, v + h / 2.0 * v2, u1));
+        let (y2, v2) = (
+            v + h / 2.0 * v1,
+            rate(y + h / 2.0 * y1, v + h / 2.0 * v1, u1),
+        );
+        let (y3, v3) = (
+            v + h / 2.0 * v2,
+            rate(y + h / 2.0 * y2, v + h / 2.0 * v2, u1),
+        );
         let (y4, v4) = (v + h * v3, rate(y + h * y3, v + h * v3, u2));
         y += h / 6.0 * (y1 + 2.0 * y2 + 2.0 * y3 + y4);
         v += h / 6.0 * (v1 + 2.0 * v2 + 2.0 * v3 + v4);
@@ -47,7 +49,10 @@ pub fn rms(values: &[f64]) -> f64 {
 /// What is left of a signal after offset and free decay are taken off: the columns are orthogonal
 /// enough for the normal equations.
 fn without_nuisance(constants: PlainConstants, residual: &[f64], more: &[Vec<f64>]) -> Fit {
-    let columns = nuisance(constants).into_iter().chain(more.iter().cloned()).collect::<Vec<_>>();
+    let columns = nuisance(constants)
+        .into_iter()
+        .chain(more.iter().cloned())
+        .collect::<Vec<_>>();
     let n = columns.len();
     let mut matrix = vec![vec![0.0; n + 1]; n];
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
@@ -61,9 +66,14 @@ fn without_nuisance(constants: PlainConstants, residual: &[f64], more: &[Vec<f64
     let weights = solve(matrix);
     let mut left = residual.to_vec();
     for (column, weight) in columns.iter().zip(&weights) {
-        left.iter_mut().zip(column).for_each(|(value, entry)| *value -= weight * entry);
+        left.iter_mut()
+            .zip(column)
+            .for_each(|(value, entry)| *value -= weight * entry);
     }
-    Fit { steps: weights[3..].to_vec(), rms: rms(&left) }
+    Fit {
+        steps: weights[3..].to_vec(),
+        rms: rms(&left),
+    }
 }
 
 struct Fit {
@@ -75,7 +85,9 @@ fn nuisance(constants: PlainConstants) -> Vec<Vec<f64>> {
     let decay = constants.omega * constants.damping_ratio;
     let swing = constants.omega * (1.0 - constants.damping_ratio.powi(2)).max(1e-9).sqrt();
     let column = |value: &dyn Fn(f64) -> f64| {
-        (0..SAMPLES).map(|i| value(i as f64 / RATE_HZ)).collect::<Vec<f64>>()
+        (0..SAMPLES)
+            .map(|i| value(i as f64 / RATE_HZ))
+            .collect::<Vec<f64>>()
     };
     vec![
         column(&|_| 1.0),
@@ -130,7 +142,11 @@ pub fn fit(start: PlainConstants, input: &Input, signal: &[f64]) -> (PlainConsta
             damping_ratio: best.damping_ratio * (1.0 + ratio),
         };
         let slope = |other: PlainConstants| -> Vec<f64> {
-            answer(other, input).iter().zip(&model).map(|(a, b)| (a - b) / small).collect()
+            answer(other, input)
+                .iter()
+                .zip(&model)
+                .map(|(a, b)| (a - b) / small)
+                .collect()
         };
         let slopes = [slope(moved(small, 0.0)), slope(moved(0.0, small))];
         let steps = without_nuisance(best, &residual, &slopes).steps;
@@ -149,7 +165,7 @@ pub fn fit(start: PlainConstants, input: &Input, signal: &[f64]) -> (PlainConsta
                 break 0.0;
             }
         };
-        if improved < 1e-3 {
+        if improved < 5e-3 {
             break;
         }
     }

@@ -107,8 +107,6 @@ impl Scene {
 /// The record that a step of the measuring chain works on.
 pub struct Place<'a> {
     pub input: &'a Input,
-    /// 0 for training, 1 for held-out.
-    pub record: usize,
     /// Numbers that differ from record to record.
     pub draw: Draw,
 }
@@ -129,10 +127,7 @@ pub struct Built {
 
 impl Built {
     /// An effect in the stand itself.
-    pub fn dynamics(
-        dynamics: impl Dynamics + 'static,
-        parameters: &[(&'static str, f64)],
-    ) -> Self {
+    pub fn dynamics(dynamics: impl Dynamics + 'static, parameters: &[(&'static str, f64)]) -> Self {
         Self {
             dynamics: Box::new(dynamics),
             on_dense: None,
@@ -159,7 +154,10 @@ impl Built {
         parameters: &[(&'static str, f64)],
     ) -> Self {
         let change = move |mut dense: Dense| {
-            dense.values.iter_mut().for_each(|value| *value = curve(*value));
+            dense
+                .values
+                .iter_mut()
+                .for_each(|value| *value = curve(*value));
             dense
         };
         Self::dense(scene, change, parameters)

@@ -67,7 +67,11 @@ fn excitations(draw: &mut Draw, alike: bool) -> [Excitation; 2] {
     let rms = draw.log_between(1.0, 8.0);
     let settled = draw.chance(0.6);
     let kind = draw.one_of(&[0, 0, 1, 1, 2, 3, 4, 5]);
-    let drawn = if draw.chance(0.8) { draw.between(0.4, 0.8) } else { draw.between(1.2, 1.5) };
+    let drawn = if draw.chance(0.8) {
+        draw.between(0.4, 0.8)
+    } else {
+        draw.between(1.2, 1.5)
+    };
     let level = if alike { 1.0 } else { drawn };
     let mut first = match kind {
         3 | 4 => Excitation::sweep(draw, 1.5 * rms),
@@ -99,13 +103,27 @@ fn setting(seed: u64, number: usize, alike: bool) -> Setting {
     let noise = Noise {
         share: draw.log_between(0.001, 0.01),
         absolute: draw.chance(0.7),
-        memory: if draw.chance(0.1) { draw.between(0.2, 0.5) } else { 0.0 },
-        quantum: if draw.chance(0.1) { draw.between(0.3, 1.5) } else { 0.0 },
+        memory: if draw.chance(0.1) {
+            draw.between(0.2, 0.5)
+        } else {
+            0.0
+        },
+        quantum: if draw.chance(0.1) {
+            draw.between(0.3, 1.5)
+        } else {
+            0.0
+        },
     };
     let target = target(&mut draw, number);
     let excitations = excitations(&mut draw, alike);
     let inputs = [excitations[0].input(), excitations[1].input()];
-    Setting { constants, excitations, inputs, noise, target }
+    Setting {
+        constants,
+        excitations,
+        inputs,
+        noise,
+        target,
+    }
 }
 
 fn scene(setting: &Setting) -> Scene {
@@ -122,7 +140,9 @@ fn scene(setting: &Setting) -> Scene {
         shown_rms: rms(&shown),
         speed_rms: rms(&speeds),
         applied_rms: rms(&setting.inputs[0].samples()),
-        top_hz: setting.excitations[0].top_hz().min(setting.excitations[1].top_hz()),
+        top_hz: setting.excitations[0]
+            .top_hz()
+            .min(setting.excitations[1].top_hz()),
     }
 }
 
@@ -135,7 +155,7 @@ fn noise_free(built: &Built, input: &Input, record: usize, seed: u64) -> Vec<f64
     let mut samples = dense.samples();
     if let Some(change) = &built.on_samples {
         let draw = Draw::new(seed, if record == 0 { "train" } else { "holdout" });
-        change(&mut Place { input, record, draw }, &mut samples);
+        change(&mut Place { input, draw }, &mut samples);
     }
     samples
 }
@@ -169,47 +189,71 @@ struct Sized {
 }
 
 /// One try of a size.
-fn try_size(setting: &Setting, scene: &Scene, variant: &Variant, seed: u64, size: f64) -> Sized {
+fn try_size(
+    setting: &Setting,
+    scene: &Scene,
+    variant: &Variant,
+    seed: u64,
+    (size, start): (f64, PlainConstants),
+) -> Sized {
     let built = (variant.build)(scene, size, &mut Draw::new(seed, "effect"));
     let signal = noise_free(&built, &setting.inputs[0], 0, seed);
-    let start = PlainConstants {
-        omega: setting.constants.omega(),
-        damping_ratio: setting.constants.damping_ratio(),
-    };
     let (plain, left) = if signal.iter().all(|value| value.is_finite()) {
         fit(start, &setting.inputs[0], &signal)
     } else {
         (start, f64::INFINITY)
     };
     let strength = left / (setting.noise.share * rms(&signal));
-    Sized { size, built, signal, plain, strength }
+    Sized {
+        size,
+        built,
+        signal,
+        plain,
+        strength,
+    }
 }
 
-/// The size at which the effect has about the strength wanted, or the largest that is physical.
+/// The size at which the effect has about the strength wanted, within what is physical.
 fn sized(setting: &Setting, scene: &Scene, variant: &Variant, seed: u64) -> Sized {
-    let (mut size, most) = variant.sizes;
-    let mut power = 1.0;
+    let (least, first, most) = variant.sizes;
+    let mut size = first.max(least);
+    let (mut too_small, mut too_large) = (least * 0.999, most * 1.001);
+    let truth = PlainConstants {
+        omega: setting.constants.omega(),
+        damping_ratio: setting.constants.damping_ratio(),
+    };
+    let (mut power, mut start) = (1.0, truth);
     let mut last: Option<(f64, f64)> = None;
-    for _ in 0..7 {
-        let tried = try_size(setting, scene, variant, seed, size);
-        let off = (setting.target / tried.strength).ln();
-        let done = variant.effect == "none" || off.abs() < 0.25 || (size >= most && off > 0.0);
-        if done && tried.strength.is_finite() {
-            return tried;
-        }
+    for tries in 0..9 {
+        let tried = try_size(setting, scene, variant, seed, (size, start));
         if !tried.strength.is_finite() {
-            size *= 0.4;
-            last = None;
+            (size, start, last) = (size * 0.4, truth, None);
             continue;
+        }
+        let off = (setting.target / tried.strength).ln();
+        let at_limit = (size >= most && off > 0.0) || (size <= least && off < 0.0);
+        if variant.effect == "none" || off.abs() < 0.3 || at_limit || tries == 8 {
+            return tried;
         }
         let log = (size.ln(), tried.strength.max(1e-9).ln());
         if let Some(before) = last.filter(|before| (before.0 - log.0).abs() > 1e-6) {
             power = ((log.1 - before.1) / (log.0 - before.0)).clamp(0.4, 6.0);
         }
         last = Some(log);
-        size = (size * (off / power).clamp(-3.0, 3.0).exp()).min(most);
+        start = tried.plain;
+        let side = if off > 0.0 {
+            &mut too_small
+        } else {
+            &mut too_large
+        };
+        *side = size;
+        size = (size * (off / power).clamp(-3.0, 3.0).exp()).clamp(least, most);
+        if size <= too_small || size >= too_large {
+            // An effect with a threshold: between what was too little and what was too much.
+            size = (too_small.max(too_large * 1e-3) * too_large).sqrt();
+        }
     }
-    try_size(setting, scene, variant, seed, size)
+    try_size(setting, scene, variant, seed, (size, start))
 }
 
 /// The seed of a case.
@@ -257,9 +301,16 @@ fn attempt(master: u64, variant: &'static Variant, number: usize, again: u64) ->
         noise_rms[index] = setting.noise.add(record, noise_rms[index], &mut draw);
     }
     let shows = variant.effect == "none"
-        || held_strength > 0.4 * sized.strength
+        || held_strength > 0.4 * sized.strength.max(0.5)
         || held_strength > 3.0;
-    let truth = truth(variant, number, seed, &setting, &sized, (held_left, noise_rms));
+    let truth = truth(
+        variant,
+        number,
+        seed,
+        &setting,
+        &sized,
+        (held_left, noise_rms),
+    );
     let [train, holdout] = records;
     let record = |index: usize, measured_n_m: Vec<f64>| Record {
         applied_n_m: setting.inputs[index].samples(),
@@ -271,7 +322,11 @@ fn attempt(master: u64, variant: &'static Variant, number: usize, again: u64) ->
         number,
         train: record(0, train),
         holdout: record(1, holdout),
-        top_hz: setting.excitations.iter().map(Excitation::top_hz).fold(0.0, f64::max),
+        top_hz: setting
+            .excitations
+            .iter()
+            .map(Excitation::top_hz)
+            .fold(0.0, f64::max),
         plain: sized.plain,
         truth,
     };

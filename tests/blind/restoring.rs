@@ -15,7 +15,10 @@ fn curved(scene: &Scene, s: f64, power: i32, in_gage: bool) -> Built {
     };
     Built::dynamics(
         system,
-        &[("share_at_peak", s), ("n_m_per_rad_to_the_power", coefficient)],
+        &[
+            ("share_at_peak", s),
+            ("n_m_per_rad_to_the_power", coefficient),
+        ],
     )
 }
 
@@ -75,8 +78,8 @@ impl Contact {
 
 impl Dynamics for Contact {
     fn rates(&self, mode: i8, _: f64, torque: f64, state: &State, rates: &mut State) {
-        let damping = self.constants.damping_n_m_s
-            + if mode == 0 { 0.0 } else { self.outer_damping };
+        let damping =
+            self.constants.damping_n_m_s + if mode == 0 { 0.0 } else { self.outer_damping };
         rates[0] = state[1];
         rates[1] = (torque - damping * state[1] - self.spring(mode, state[0]))
             / self.constants.inertia_kg_m2;
@@ -121,7 +124,11 @@ pub fn soft_gap(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
 
 fn partial_gap(scene: &Scene, size: f64, left: f64, draw: &mut Draw) -> Built {
     let half_rad = size * scene.peak_rad();
-    let shift = if draw.chance(0.3) { draw.between(-0.8, 0.8) } else { 0.0 };
+    let shift = if draw.chance(0.3) {
+        draw.between(-0.8, 0.8)
+    } else {
+        0.0
+    };
     let stiffness = scene.constants.stiffness_n_m;
     let contact = Contact {
         constants: scene.constants,
@@ -134,7 +141,11 @@ fn partial_gap(scene: &Scene, size: f64, left: f64, draw: &mut Draw) -> Built {
     };
     Built::dynamics(
         contact,
-        &[("half_gap_rad", half_rad), ("shift_of_half_gap", shift), ("stiffness_left", left)],
+        &[
+            ("half_gap_rad", half_rad),
+            ("shift_of_half_gap", shift),
+            ("stiffness_left", left),
+        ],
     )
 }
 
@@ -154,7 +165,11 @@ fn stop(scene: &Scene, size: f64, harder: f64, both: bool, draw: &mut Draw) -> B
     let bounce = draw.between(0.5, 5.0);
     let contact = Contact {
         constants,
-        low_rad: if both { -at_rad * draw.between(0.9, 1.0) } else { -1e3 },
+        low_rad: if both {
+            -at_rad * draw.between(1.0, 1.1)
+        } else {
+            -1e3
+        },
         high_rad: at_rad,
         inner_n_m: constants.stiffness_n_m,
         outer_n_m: harder * constants.stiffness_n_m,
@@ -163,7 +178,11 @@ fn stop(scene: &Scene, size: f64, harder: f64, both: bool, draw: &mut Draw) -> B
     };
     Built::dynamics(
         contact,
-        &[("at_share_of_peak", 1.0 - size), ("harder", harder), ("damping_ratio_of_stop", bounce)],
+        &[
+            ("at_share_of_peak", 1.0 - size),
+            ("harder", harder),
+            ("damping_ratio_of_stop", bounce),
+        ],
     )
 }
 
@@ -194,7 +213,11 @@ impl Dynamics for BoucWen {
 
     fn shown(&self, _: i8, _: f64, _: f64, state: &State) -> f64 {
         let linear = self.constants.stiffness_n_m * state[0];
-        if self.in_gage { linear + state[2] } else { linear }
+        if self.in_gage {
+            linear + state[2]
+        } else {
+            linear
+        }
     }
 }
 

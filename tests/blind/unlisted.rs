@@ -128,7 +128,9 @@ pub fn zero_steps(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
         for _ in 0..count as usize {
             let from = (place.draw.unit() * samples.len() as f64) as usize;
             let step = height * place.draw.sign() * place.draw.between(0.5, 1.0);
-            samples[from..].iter_mut().for_each(|sample| *sample += step);
+            samples[from..]
+                .iter_mut()
+                .for_each(|sample| *sample += step);
         }
     };
     Built::samples(scene, change, &[("count", count), ("height_n_m", height)])

@@ -28,7 +28,11 @@ pub fn in_volts(case: &Case) -> bool {
 
 /// Heading of the measured column.
 pub fn measured_column(case: &Case) -> &'static str {
-    if in_volts(case) { "measured_V" } else { "measured_n_m" }
+    if in_volts(case) {
+        "measured_V"
+    } else {
+        "measured_n_m"
+    }
 }
 
 /// A record as a table.
@@ -39,12 +43,19 @@ pub fn table(record: &Record, volts: bool) -> String {
         ("measured_n_m", 1.0, 8)
     };
     let mut text = format!("time_s,applied_n_m,{heading}\n");
-    for (index, (applied, measured)) in
-        record.applied_n_m.iter().zip(&record.measured_n_m).enumerate()
+    for (index, (applied, measured)) in record
+        .applied_n_m
+        .iter()
+        .zip(&record.measured_n_m)
+        .enumerate()
     {
         let time_s = index as f64 / RATE_HZ;
         // Writing to a String cannot fail.
-        let _ = writeln!(text, "{time_s:.5},{applied:.8},{:.digits$}", measured * scale);
+        let _ = writeln!(
+            text,
+            "{time_s:.5},{applied:.8},{:.digits$}",
+            measured * scale
+        );
     }
     text
 }
