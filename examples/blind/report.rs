@@ -10,7 +10,7 @@ pub fn line(answer: &Answer) -> String {
     let [train, holdout] = answer.case.strength();
     format!(
         "{} {}/{:03} ({}, strength {train:.2} and {holdout:.2}): {} {:?}, error over noise \
-         {:.2} (plain {:.2}) -> {:.3}, {:.1} s{}",
+         {:.2} (plain {:.2}) -> {:.3}, {:.1} s ({:.1} s of the processors){}",
         if answer.is_right() { "right" } else { "WRONG" },
         answer.case.effect(),
         answer.case.number(),
@@ -21,6 +21,7 @@ pub fn line(answer: &Answer) -> String {
         answer.case.plain_error() / answer.case.floor(),
         answer.after_over_floor(),
         answer.seconds,
+        answer.processor_seconds.unwrap_or(f64::NAN),
         match answer.code {
             Some(0) => String::new(),
             code => format!(
@@ -121,14 +122,24 @@ fn marks(text: &mut String, answers: &[Answer]) {
             .after_over_floor()
             <= 1.2)
     );
-    let mut seconds: Vec<f64> = answers.iter().map(|answer| answer.seconds).collect();
-    seconds.sort_by(f64::total_cmp);
-    if let (Some(middle), Some(most)) = (seconds.get(seconds.len() / 2), seconds.last()) {
-        let _ = writeln!(
-            text,
-            "| time of a run: median, longest | 15 s | {middle:.1} s, {most:.1} s |"
-        );
-    }
+    let times = |pick: fn(&Answer) -> Option<f64>| {
+        let mut times: Vec<f64> = answers.iter().filter_map(pick).collect();
+        times.sort_by(f64::total_cmp);
+        match (times.get(times.len() / 2), times.last()) {
+            (Some(middle), Some(most)) => format!("{middle:.1} s, {most:.1} s"),
+            _ => "–".to_owned(),
+        }
+    };
+    let _ = writeln!(
+        text,
+        "| time of a run: median, longest | 15 s | {} |",
+        times(|answer| Some(answer.seconds))
+    );
+    let _ = writeln!(
+        text,
+        "| time of the processors: median, longest | 30 s | {} |",
+        times(|answer| answer.processor_seconds)
+    );
 }
 
 fn effects(answers: &[Answer]) -> Vec<&str> {

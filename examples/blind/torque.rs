@@ -1,6 +1,7 @@
 //! The inverse check: the torque that `compensate` recovers with the plain stand and with the refined
 //! one, against the torque that was applied.
 
+use std::f64::consts::PI;
 use std::path::Path;
 use std::process::Command;
 
@@ -33,20 +34,21 @@ fn band_hz(answer: &Answer) -> f64 {
         .unwrap_or(2200.0)
 }
 
-/// White noise through `1 − r² + 2jζr` up to the band's end, root of the integral of the square.
+/// White noise through `1 − r² + 2jζr` up to the band's end and through its edge, a fifth as wide.
 fn floor(answer: &Answer) -> f64 {
     let constants = &answer.case.truth["true_constants"];
     let number = |key: &str| constants[key].as_f64().unwrap_or(f64::NAN);
     let (natural_hz, ratio) = (number("natural_frequency_hz"), number("damping_ratio"));
-    let (band_hz, steps) = (band_hz(answer), 2000);
-    let mean: f64 = (0..steps)
+    let (band_hz, steps) = (band_hz(answer), 2400);
+    let sum: f64 = (0..steps)
         .map(|step| {
-            let r = band_hz * (f64::from(step) + 0.5) / f64::from(steps) / natural_hz;
-            (1.0 - r * r).powi(2) + (2.0 * ratio * r).powi(2)
+            let part = 1.2 * (f64::from(step) + 0.5) / f64::from(steps);
+            let edge = 0.5 * (1.0 + (PI * ((part - 1.0) / 0.2).max(0.0)).cos());
+            let r = band_hz * part / natural_hz;
+            edge * edge * ((1.0 - r * r).powi(2) + (2.0 * ratio * r).powi(2))
         })
-        .sum::<f64>()
-        / f64::from(steps);
-    answer.case.floor() * (mean * band_hz / (RATE_HZ / 2.0)).sqrt()
+        .sum();
+    answer.case.floor() * (sum * 1.2 / f64::from(steps) * band_hz / (RATE_HZ / 2.0)).sqrt()
 }
 
 fn recovered(answer: &Answer, binary: &Path, stand: &Path) -> Result<f64, String> {

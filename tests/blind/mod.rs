@@ -19,5 +19,8 @@ pub mod plain_fit;
 pub mod plant;
 pub mod record;
 pub mod restoring;
+pub mod setting;
+pub mod sizing;
+pub mod truth;
 pub mod unlisted;
 pub mod write;
