@@ -18,6 +18,8 @@ pub const LENGTH_S: f64 = SAMPLES as f64 / RATE_HZ;
 pub const FINER: usize = 8;
 /// The stand has settled to 1e-11 after this time.
 const SETTLING_S: f64 = 0.12;
+/// A multisine goes on for this time after the record and fades over the second half of it.
+const AFTER_S: f64 = 0.25;
 
 /// One sine of a multisine.
 #[derive(Debug, Clone, Copy)]
@@ -151,7 +153,9 @@ impl Excitation {
         } else {
             0
         };
-        let points = before + SAMPLES * FINER + 8 * FINER;
+        let multisine = matches!(self, Self::Multisine { .. });
+        let after_s = if multisine { AFTER_S } else { 0.0 };
+        let points = before + (SAMPLES + (after_s * RATE_HZ) as usize + 8) * FINER;
         let mut input = Input {
             before,
             step_s: 1.0 / (RATE_HZ * FINER as f64),
@@ -163,6 +167,8 @@ impl Excitation {
             } => {
                 lines.iter().for_each(|line| line.add_to(&mut input));
                 input.shape(|time_s| step(1.0, *second_half, time_s - LENGTH_S / 2.0, 0.01));
+                let fade_s = AFTER_S / 4.0;
+                input.shape(|time_s| step(1.0, 0.0, time_s - LENGTH_S - 3.0 * fade_s, fade_s));
                 if settled {
                     let start_s = input.time_s(0);
                     input.shape(|time_s| step(0.0, 1.0, time_s - start_s - 0.01, 0.01));
@@ -294,10 +300,9 @@ impl Input {
         self.at_samples(0)
     }
 
-    /// Values at samples from the start of the input on, before the record begins.
-    pub fn samples_with_start(&self) -> Vec<f64> {
-        let nodes = self.before + SAMPLES * FINER;
-        self.nodes[..nodes]
+    /// Values at samples from the start of the input, before the record begins, to its end.
+    pub fn all_samples(&self) -> Vec<f64> {
+        self.nodes
             .iter()
             .step_by(FINER)
             .map(|node| node[0])

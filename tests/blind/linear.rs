@@ -159,11 +159,11 @@ pub fn structural_complex(scene: &Scene, size: f64, _: &mut Draw) -> Built {
     Built::samples(scene, change, &[("loss_factor", size)])
 }
 
-/// The steady answer of a stand with complex stiffness: a multisine is continued over the settling
-/// time before the record, what the transform wraps around falls into zeros.
+/// The answer of a stand with complex stiffness. It precedes its cause, so the input must go on after the
+/// record; what the transform wraps around falls into zeros.
 fn complex_stiffness(constants: Constants, loss: f64, place: &Place) -> Vec<f64> {
     let before = place.input.before / super::excitation::FINER;
-    let mut padded = place.input.samples_with_start();
+    let mut padded = place.input.all_samples();
     let length = 4 * SAMPLES;
     padded.resize(length, 0.0);
     let mut planner = RealFftPlanner::<f64>::new();
