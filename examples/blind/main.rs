@@ -1,0 +1,39 @@
+//! Makes blind records and scores `torqcomp diagnose` on them.
+//!
+//! ```text
+//! cargo run --release --example blind -- make DIR [--per-effect 20] [--seed 1] [--only EFFECT]
+//! cargo run --release --example blind -- score DIR --binary PATH [--out docs/blind-records.md]
+//! ```
+
+#[path = "../../tests/blind/mod.rs"]
+mod blind;
+mod case;
+mod make;
+mod parallel;
+mod report;
+mod score;
+mod torque;
+
+use clap::{Parser, Subcommand};
+
+/// Blind records for `torqcomp diagnose`.
+#[derive(Parser)]
+struct Arguments {
+    #[command(subcommand)]
+    task: Task,
+}
+
+#[derive(Subcommand)]
+enum Task {
+    /// Make records: one folder per case, `DIR/EFFECT/NUMBER`.
+    Make(make::Make),
+    /// Run `torqcomp diagnose` on them and compare its answers with the truth.
+    Score(score::Score),
+}
+
+fn main() -> std::io::Result<()> {
+    match Arguments::parse().task {
+        Task::Make(arguments) => make::make(&arguments),
+        Task::Score(arguments) => score::score(&arguments),
+    }
+}

@@ -1,0 +1,160 @@
+//! Disturbances that are added to the signal: mains, drift, the rotor.
+
+use std::f64::consts::TAU;
+
+use super::draw::Draw;
+use super::excitation::{LENGTH_S, RATE_HZ};
+use super::plant::{Built, Place, Scene};
+
+/// A sum of sines with phases drawn for each record.
+fn lines(scene: &Scene, lines: Vec<(f64, f64)>, parameters: &[(&'static str, f64)]) -> Built {
+    let change = move |place: &mut Place, samples: &mut [f64]| {
+        for (frequency_hz, amplitude) in &lines {
+            let phase = place.draw.phase();
+            for (index, sample) in samples.iter_mut().enumerate() {
+                let time_s = index as f64 / RATE_HZ;
+                *sample += amplitude * (TAU * frequency_hz * time_s + phase).sin();
+            }
+        }
+    };
+    Built::samples(scene, change, parameters)
+}
+
+/// The mains alone.
+pub fn mains(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
+    hum(scene, size, [0.0, 0.0, 0.0], draw)
+}
+
+/// The mains with harmonics.
+pub fn mains_harmonics(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
+    let shares = [
+        if draw.chance(0.4) {
+            draw.between(0.1, 0.5)
+        } else {
+            0.0
+        },
+        draw.between(0.1, 0.6),
+        draw.between(0.0, 0.4),
+    ];
+    hum(scene, size, shares, draw)
+}
+
+fn hum(scene: &Scene, size: f64, shares: [f64; 3], draw: &mut Draw) -> Built {
+    let base_hz = draw.one_of(&[50.0, 60.0]) + draw.between(-0.02, 0.02);
+    let amplitude = size * scene.shown_rms;
+    let parts = vec![
+        (base_hz, amplitude),
+        (2.0 * base_hz, shares[0] * amplitude),
+        (3.0 * base_hz, shares[1] * amplitude),
+        (5.0 * base_hz, shares[2] * amplitude),
+    ];
+    lines(
+        scene,
+        parts,
+        &[
+            ("frequency_hz", base_hz),
+            ("amplitude_n_m", amplitude),
+            ("second", shares[0]),
+            ("third", shares[1]),
+            ("fifth", shares[2]),
+        ],
+    )
+}
+
+/// The rotor, once a turn, as a torque on the stand.
+pub fn rotor(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
+    rotor_with(scene, size, 0.0, draw)
+}
+
+/// Once and twice a turn.
+pub fn rotor_twice(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
+    let second = draw.between(0.1, 0.6);
+    rotor_with(scene, size, second, draw)
+}
+
+fn rotor_with(scene: &Scene, size: f64, second: f64, draw: &mut Draw) -> Built {
+    // Away from the mains, its half and its harmonics, which would make both names right.
+    let near = |f: f64| {
+        [25.0, 30.0, 50.0, 60.0, 100.0, 120.0]
+            .iter()
+            .any(|mains| (f - mains).abs() < 0.8)
+    };
+    let frequency_hz = loop {
+        let frequency_hz = draw.between(10.0, 58.0);
+        if !near(frequency_hz) {
+            break frequency_hz;
+        }
+    };
+    let torque = size * scene.shown_rms;
+    let factor = |f: f64| {
+        let (ratio, damping) = (
+            TAU * f / scene.constants.omega(),
+            scene.constants.damping_ratio(),
+        );
+        ((1.0 - ratio * ratio).powi(2) + (2.0 * damping * ratio).powi(2))
+            .sqrt()
+            .recip()
+    };
+    lines(
+        scene,
+        vec![
+            (frequency_hz, torque * factor(frequency_hz)),
+            (
+                2.0 * frequency_hz,
+                second * torque * factor(2.0 * frequency_hz),
+            ),
+        ],
+        &[
+            ("frequency_hz", frequency_hz),
+            ("torque_n_m", torque),
+            ("second", second),
+        ],
+    )
+}
+
+/// Adds a function of the time since the record began, the same in every record.
+fn course(
+    scene: &Scene,
+    course: impl Fn(f64) -> f64 + 'static,
+    parameters: &[(&'static str, f64)],
+) -> Built {
+    let change = move |_: &mut Place, samples: &mut [f64]| {
+        for (index, sample) in samples.iter_mut().enumerate() {
+            *sample += course(index as f64 / RATE_HZ);
+        }
+    };
+    Built::samples(scene, change, parameters)
+}
+
+/// Zero that runs away evenly; the zero at the start of a record is part of it.
+pub fn drift_linear(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
+    let rate = size * scene.shown_rms * draw.sign() / LENGTH_S;
+    course(scene, move |t| rate * t, &[("n_m_per_s", rate)])
+}
+
+/// Zero that approaches another value.
+pub fn drift_exponential(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
+    let range = size * scene.shown_rms * draw.sign();
+    let time_s = draw.log_between(0.2, 3.0);
+    course(
+        scene,
+        move |t| range * (1.0 - (-t / time_s).exp()),
+        &[("range_n_m", range), ("time_constant_s", time_s)],
+    )
+}
+
+/// Zero that wanders: steps at random through two low-passes of 0.25 s, another course in each record.
+pub fn drift_random(scene: &Scene, size: f64, _: &mut Draw) -> Built {
+    let range = size * scene.shown_rms;
+    let change = move |place: &mut Place, samples: &mut [f64]| {
+        let keep = (-1.0 / (0.25 * RATE_HZ)).exp();
+        let (mut walk, mut first, mut second) = (0.0, 0.0, 0.0);
+        for sample in samples {
+            walk += place.draw.normal() / (LENGTH_S * RATE_HZ).sqrt();
+            first = keep * first + (1.0 - keep) * walk;
+            second = keep * second + (1.0 - keep) * first;
+            *sample += range * 2.0 * second;
+        }
+    };
+    Built::samples(scene, change, &[("range_n_m", range)])
+}

@@ -1,0 +1,184 @@
+//! Integration in time: the classical Runge-Kutta method of fourth order at 32 steps a sample, with
+//! switches located inside a step.
+
+use super::excitation::{FINER, Input, SAMPLES};
+
+/// Most states that a system may have.
+pub const STATES: usize = 28;
+/// States of a system; the first two are angle (rad) and speed (rad/s) of the stator.
+pub type State = [f64; STATES];
+/// Steps per node of the input's grid.
+const STEPS: usize = 4;
+/// Steps per sample.
+pub const DENSE: usize = STEPS * FINER;
+/// Switches within one step after which the step is taken as it is.
+const SWITCHES: usize = 12;
+
+/// A system of ordinary differential equations, smooth within each of its modes.
+pub trait Dynamics {
+    /// How many of the states are used.
+    fn states(&self) -> usize {
+        2
+    }
+
+    /// Derivatives of the states.
+    fn rates(&self, mode: i8, time_s: f64, torque: f64, state: &State, rates: &mut State);
+
+    /// What the gage shows, as torque.
+    fn shown(&self, mode: i8, time_s: f64, torque: f64, state: &State) -> f64;
+
+    /// Mode at the start.
+    fn first_mode(&self, _torque: f64) -> i8 {
+        0
+    }
+
+    /// Negative when the mode has ended.
+    fn guard(&self, _mode: i8, _torque: f64, _state: &State) -> f64 {
+        1.0
+    }
+
+    /// The mode after the guard has reached zero.
+    fn next_mode(&self, mode: i8, _torque: f64, _state: &mut State) -> i8 {
+        mode
+    }
+}
+
+/// A signal on the dense grid, 32 points a sample.
+#[derive(Debug, Clone)]
+pub struct Dense {
+    /// Points before the record begins.
+    pub before: usize,
+    /// Time between points.
+    pub step_s: f64,
+    pub values: Vec<f64>,
+}
+
+impl Dense {
+    /// The signal at the samples, `later_s` after their times.
+    pub fn samples(&self) -> Vec<f64> {
+        (0..SAMPLES)
+            .map(|sample| self.values[self.before + sample * DENSE])
+            .collect()
+    }
+
+    /// The signal at any time, through the six points around it; what lies before the first is the first.
+    pub fn at(&self, time_s: f64) -> f64 {
+        let position = time_s / self.step_s + self.before as f64;
+        let base = position.floor();
+        let part = position - base;
+        let mut sum = 0.0;
+        for i in -2_i32..=3 {
+            let mut weight = 1.0;
+            for j in (-2_i32..=3).filter(|j| *j != i) {
+                weight *= (part - f64::from(j)) / f64::from(i - j);
+            }
+            let index = (base + f64::from(i)).clamp(0.0, (self.values.len() - 1) as f64);
+            sum += weight * self.values[index as usize];
+        }
+        sum
+    }
+}
+
+/// Integrates from rest over the whole input.
+pub fn run(system: &dyn Dynamics, input: &Input) -> Dense {
+    let nodes = input.before + SAMPLES * FINER + 4 * FINER;
+    let mut values = Vec::with_capacity(nodes * STEPS);
+    let mut walk = Walk {
+        system,
+        input,
+        state: [0.0; STATES],
+        mode: system.first_mode(input.between(0, 0.0)),
+    };
+    for node in 0..nodes {
+        for step in 0..STEPS {
+            let part = step as f64 / STEPS as f64;
+            let time_s = input.time_s(node) + part * input.step_s;
+            let torque = input.between(node, part);
+            values.push(system.shown(walk.mode, time_s, torque, &walk.state));
+            walk.step(node, part);
+        }
+    }
+    Dense {
+        before: input.before * STEPS,
+        step_s: input.step_s / STEPS as f64,
+        values,
+    }
+}
+
+/// Where the integration stands.
+struct Walk<'a> {
+    system: &'a dyn Dynamics,
+    input: &'a Input,
+    state: State,
+    mode: i8,
+}
+
+impl Walk<'_> {
+    /// One step, in as many pieces as there are switches within it.
+    fn step(&mut self, node: usize, part: f64) {
+        let (mut from, to) = (part, part + 1.0 / STEPS as f64);
+        for _ in 0..SWITCHES {
+            let next = self.runge_kutta(node, from, to);
+            if self.guard(node, to, &next) >= 0.0 {
+                self.state = next;
+                return;
+            }
+            let (at, mut state) = self.switch(node, from, to);
+            let torque = self.input.between(node, at);
+            self.mode = self.system.next_mode(self.mode, torque, &mut state);
+            self.state = state;
+            from = at;
+        }
+        self.state = self.runge_kutta(node, from, to);
+    }
+
+    fn guard(&self, node: usize, part: f64, state: &State) -> f64 {
+        let torque = self.input.between(node, part);
+        self.system.guard(self.mode, torque, state)
+    }
+
+    /// Where within the step the guard turns negative, and the state there, by bisection.
+    fn switch(&self, node: usize, from: f64, to: f64) -> (f64, State) {
+        let (mut low, mut high) = (from, to);
+        for _ in 0..44 {
+            let middle = 0.5 * (low + high);
+            let state = self.runge_kutta(node, from, middle);
+            if self.guard(node, middle, &state) >= 0.0 {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        (high, self.runge_kutta(node, from, high))
+    }
+
+    fn runge_kutta(&self, node: usize, from: f64, to: f64) -> State {
+        let count = self.system.states();
+        let (h, start_s) = ((to - from) * self.input.step_s, self.input.time_s(node));
+        let slope = |part: f64, torque: f64, state: &State| {
+            let mut rates = [0.0; STATES];
+            let time_s = start_s + part * self.input.step_s;
+            self.system
+                .rates(self.mode, time_s, torque, state, &mut rates);
+            rates
+        };
+        let moved = |by: f64, rates: &State| {
+            let mut state = self.state;
+            for i in 0..count {
+                state[i] += by * rates[i];
+            }
+            state
+        };
+        let middle = 0.5 * (from + to);
+        let [u0, u1, u2] = [from, middle, to].map(|part| self.input.between(node, part));
+        let k1 = slope(from, u0, &self.state);
+        let k2 = slope(middle, u1, &moved(h / 2.0, &k1));
+        let k3 = slope(middle, u1, &moved(h / 2.0, &k2));
+        let k4 = slope(to, u2, &moved(h, &k3));
+        let mut state = self.state;
+        for i in 0..count {
+            state[i] += h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]);
+        }
+        state
+    }
+}

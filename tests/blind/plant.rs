@@ -1,0 +1,176 @@
+//! The stand `J θ'' + f θ' + K θ = T` and what a variant of an effect makes of it.
+
+use super::draw::Draw;
+use super::excitation::Input;
+use super::integrate::{Dense, Dynamics, State};
+
+/// Constants of a stand in SI units.
+#[derive(Debug, Clone, Copy)]
+pub struct Constants {
+    pub inertia_kg_m2: f64,
+    pub damping_n_m_s: f64,
+    pub stiffness_n_m: f64,
+}
+
+/// One pound-foot in N m (and one slug ft² in kg m²).
+pub const FT_LBF: f64 = 1.355_817_948_331_400_4;
+
+impl Constants {
+    /// Those of the thesis, equation (31).
+    pub fn hertel() -> Self {
+        Self {
+            inertia_kg_m2: 5.85e-3 * FT_LBF,
+            damping_n_m_s: 3.07 * FT_LBF,
+            stiffness_n_m: 8.1e4 * FT_LBF,
+        }
+    }
+
+    /// Angular acceleration under a net torque besides spring and damper.
+    pub fn acceleration(&self, torque: f64, state: &State) -> f64 {
+        (torque - self.damping_n_m_s * state[1] - self.stiffness_n_m * state[0])
+            / self.inertia_kg_m2
+    }
+
+    /// Undamped angular frequency in rad/s.
+    pub fn omega(&self) -> f64 {
+        (self.stiffness_n_m / self.inertia_kg_m2).sqrt()
+    }
+
+    /// Part of critical damping.
+    pub fn damping_ratio(&self) -> f64 {
+        self.damping_n_m_s / (2.0 * (self.stiffness_n_m * self.inertia_kg_m2).sqrt())
+    }
+}
+
+/// The plain stand.
+pub struct Plain(pub Constants);
+
+impl Dynamics for Plain {
+    fn rates(&self, _: i8, _: f64, torque: f64, state: &State, rates: &mut State) {
+        rates[0] = state[1];
+        rates[1] = self.0.acceleration(torque, state);
+    }
+
+    fn shown(&self, _: i8, _: f64, _: f64, state: &State) -> f64 {
+        self.0.stiffness_n_m * state[0]
+    }
+}
+
+/// A stand with a torque that depends on angle, speed and time besides spring and damper.
+pub struct With<F> {
+    pub constants: Constants,
+    /// The torque that resists, from time, angle and speed.
+    pub resists: F,
+    /// Whether the gage shows the part of it that the beam carries, too.
+    pub in_gage: bool,
+}
+
+impl<F: Fn(f64, f64, f64) -> f64> Dynamics for With<F> {
+    fn rates(&self, _: i8, time_s: f64, torque: f64, state: &State, rates: &mut State) {
+        let net = torque - (self.resists)(time_s, state[0], state[1]);
+        rates[0] = state[1];
+        rates[1] = self.constants.acceleration(net, state);
+    }
+
+    fn shown(&self, _: i8, time_s: f64, _: f64, state: &State) -> f64 {
+        let linear = self.constants.stiffness_n_m * state[0];
+        if self.in_gage {
+            linear + (self.resists)(time_s, state[0], 0.0)
+        } else {
+            linear
+        }
+    }
+}
+
+/// What is known before an effect is put in: constants and the size of what the plain stand does.
+pub struct Scene {
+    pub constants: Constants,
+    /// Largest torque that the plain stand shows.
+    pub shown_peak: f64,
+    /// Its root mean square.
+    pub shown_rms: f64,
+    /// Root mean square of the speed.
+    pub speed_rms: f64,
+    /// Root mean square of the applied torque.
+    pub applied_rms: f64,
+    /// Highest frequency applied.
+    pub top_hz: f64,
+}
+
+impl Scene {
+    /// Largest angle of the plain stand.
+    pub fn peak_rad(&self) -> f64 {
+        self.shown_peak / self.constants.stiffness_n_m
+    }
+}
+
+/// The record that a step of the measuring chain works on.
+pub struct Place<'a> {
+    pub input: &'a Input,
+    /// Numbers that differ from record to record.
+    pub draw: Draw,
+}
+
+/// A change of the dense signal.
+pub type OnDense = Box<dyn Fn(Dense) -> Dense>;
+/// A change of the samples.
+pub type OnSamples = Box<dyn Fn(&mut Place, &mut [f64])>;
+
+/// A stand with an effect in it.
+pub struct Built {
+    pub dynamics: Box<dyn Dynamics>,
+    pub on_dense: Option<OnDense>,
+    pub on_samples: Option<OnSamples>,
+    /// What was put in, for the truth file.
+    pub parameters: Vec<(&'static str, f64)>,
+}
+
+impl Built {
+    /// An effect in the stand itself.
+    pub fn dynamics(dynamics: impl Dynamics + 'static, parameters: &[(&'static str, f64)]) -> Self {
+        Self {
+            dynamics: Box::new(dynamics),
+            on_dense: None,
+            on_samples: None,
+            parameters: parameters.to_vec(),
+        }
+    }
+
+    /// An effect on what the gage shows.
+    pub fn dense(
+        scene: &Scene,
+        change: impl Fn(Dense) -> Dense + 'static,
+        parameters: &[(&'static str, f64)],
+    ) -> Self {
+        let mut built = Self::dynamics(Plain(scene.constants), parameters);
+        built.on_dense = Some(Box::new(change));
+        built
+    }
+
+    /// A static curve of the measuring chain.
+    pub fn curve(
+        scene: &Scene,
+        curve: impl Fn(f64) -> f64 + 'static,
+        parameters: &[(&'static str, f64)],
+    ) -> Self {
+        let change = move |mut dense: Dense| {
+            dense
+                .values
+                .iter_mut()
+                .for_each(|value| *value = curve(*value));
+            dense
+        };
+        Self::dense(scene, change, parameters)
+    }
+
+    /// An effect on the samples.
+    pub fn samples(
+        scene: &Scene,
+        change: impl Fn(&mut Place, &mut [f64]) + 'static,
+        parameters: &[(&'static str, f64)],
+    ) -> Self {
+        let mut built = Self::dynamics(Plain(scene.constants), parameters);
+        built.on_samples = Some(Box::new(change));
+        built
+    }
+}

@@ -1,0 +1,123 @@
+//! What a case is drawn from: constants, excitations, noise, strength.
+
+use super::draw::Draw;
+use super::excitation::{Excitation, Input};
+use super::plant::Constants;
+
+/// What a case is drawn from.
+pub struct Setting {
+    pub constants: Constants,
+    pub excitations: [Excitation; 2],
+    pub inputs: [Input; 2],
+    pub noise: Noise,
+    pub target: f64,
+}
+
+/// The noise of the recorder.
+#[derive(Debug, Clone, Copy)]
+pub struct Noise {
+    /// Relative to the rms of the signal.
+    pub share: f64,
+    /// The same in both records, or the same share of both.
+    pub absolute: bool,
+    /// Correlation from one sample to the next.
+    pub memory: f64,
+    /// Smallest step of the recorder over the noise; 0 for none.
+    pub quantum: f64,
+}
+
+/// Constants that differ from those of the thesis by 2 to 20 per cent, either way.
+fn constants(draw: &mut Draw) -> Constants {
+    let mut off = |value: f64| value * (1.0 + draw.sign() * draw.log_between(0.02, 0.2));
+    let thesis = Constants::hertel();
+    Constants {
+        inertia_kg_m2: off(thesis.inertia_kg_m2),
+        damping_n_m_s: off(thesis.damping_n_m_s),
+        stiffness_n_m: off(thesis.stiffness_n_m),
+    }
+}
+
+/// Training and held-out input. `alike` keeps the held-out one at the level of the training.
+fn excitations(draw: &mut Draw, alike: bool) -> [Excitation; 2] {
+    let rms = draw.log_between(1.0, 8.0);
+    let settled = draw.chance(0.6);
+    let kind = draw.one_of(&[0, 0, 1, 1, 2, 3, 4, 5]);
+    let drawn = if draw.chance(0.8) {
+        draw.between(0.4, 0.8)
+    } else {
+        draw.between(1.2, 1.5)
+    };
+    let level = if alike { 1.0 } else { drawn };
+    let mut first = match kind {
+        3 | 4 => Excitation::sweep(draw, 1.5 * rms),
+        _ => Excitation::multisine(draw, rms, settled),
+    };
+    let second = match kind {
+        0 => first.at_level(level),
+        2 | 4 => Excitation::sweep(draw, 1.5 * rms * level),
+        _ => Excitation::multisine(draw, rms * level, settled),
+    };
+    if let (5, Excitation::Multisine { second_half, .. }) = (kind, &mut first) {
+        *second_half = draw.between(0.3, 0.7);
+    }
+    [first, second]
+}
+
+/// Strengths from marginal to plain to see: the plain fit's noise-free residual over the noise.
+fn target(draw: &mut Draw, number: usize) -> f64 {
+    match number % 4 {
+        0 => draw.log_between(0.3, 1.0),
+        3 => draw.log_between(5.0, 25.0),
+        _ => draw.log_between(1.0, 5.0),
+    }
+}
+
+/// Draws the setting of a case.
+pub fn setting(seed: u64, number: usize, alike: bool) -> Setting {
+    let mut draw = Draw::new(seed, "setting");
+    let constants = constants(&mut draw);
+    let noise = Noise {
+        share: draw.log_between(0.001, 0.01),
+        absolute: draw.chance(0.7),
+        memory: if draw.chance(0.1) {
+            draw.between(0.2, 0.5)
+        } else {
+            0.0
+        },
+        quantum: if draw.chance(0.1) {
+            draw.between(0.3, 1.5)
+        } else {
+            0.0
+        },
+    };
+    let target = target(&mut draw, number);
+    let excitations = excitations(&mut draw, alike);
+    let inputs = [excitations[0].input(), excitations[1].input()];
+    Setting {
+        constants,
+        excitations,
+        inputs,
+        noise,
+        target,
+    }
+}
+
+impl Noise {
+    /// Adds noise of an rms and the steps of the recorder; the rms of both together.
+    pub fn add(&self, samples: &mut [f64], rms_n_m: f64, draw: &mut Draw) -> f64 {
+        let fresh = (1.0 - self.memory * self.memory).sqrt();
+        let mut noise = draw.normal();
+        let step = self.quantum * rms_n_m;
+        let mut square = 0.0;
+        for sample in samples.iter_mut() {
+            let clean = *sample;
+            *sample += rms_n_m * noise;
+            if step > 0.0 {
+                *sample = (*sample / step).round() * step;
+            }
+            square += (*sample - clean).powi(2);
+            noise = self.memory * noise + fresh * draw.normal();
+        }
+        (square / samples.len() as f64).sqrt()
+    }
+}

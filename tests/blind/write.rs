@@ -1,0 +1,87 @@
+//! Cases as files: `train.csv`, `holdout.csv`, `stand.toml`, `plain.toml` and `truth.json`.
+
+use std::fmt::Write as _;
+use std::io;
+use std::path::Path;
+
+use super::excitation::RATE_HZ;
+use super::plant::{Constants, FT_LBF};
+use super::record::{Case, Record};
+
+/// The stand as the thesis declares it.
+pub const DECLARED: &str = r#"schema = "torqcomp.stand/1"
+name = "Hertel single-phase motor stand"
+
+[mechanics]
+inertia = "5.85e-3 slug ft^2"
+damping = "3.07 ft lbf s/rad"
+stiffness = "8.1e4 ft lbf/rad"
+
+[calibration]
+torque_per_volt = "1.23e3 ft lbf/V"
+"#;
+
+/// Every eighth case records volts instead of torque.
+pub fn in_volts(case: &Case) -> bool {
+    case.number % 8 == 6
+}
+
+/// Heading of the measured column.
+pub fn measured_column(case: &Case) -> &'static str {
+    if in_volts(case) {
+        "measured_V"
+    } else {
+        "measured_n_m"
+    }
+}
+
+/// A record as a table.
+pub fn table(record: &Record, volts: bool) -> String {
+    let (heading, scale, digits) = if volts {
+        ("measured_V", 1.0 / (1.23e3 * FT_LBF), 11)
+    } else {
+        ("measured_n_m", 1.0, 8)
+    };
+    let mut text = format!("time_s,applied_n_m,{heading}\n");
+    for (index, (applied, measured)) in record
+        .applied_n_m
+        .iter()
+        .zip(&record.measured_n_m)
+        .enumerate()
+    {
+        let time_s = index as f64 / RATE_HZ;
+        // Writing to a String cannot fail.
+        let _ = writeln!(
+            text,
+            "{time_s:.5},{applied:.8},{:.digits$}",
+            measured * scale
+        );
+    }
+    text
+}
+
+/// The stand of the best plain fit: stiffness as declared, natural frequency and damping ratio fitted.
+fn plain_stand(case: &Case) -> String {
+    let stiffness = Constants::hertel().stiffness_n_m;
+    let inertia = stiffness / case.plain.omega.powi(2);
+    let damping = 2.0 * case.plain.damping_ratio * (stiffness * inertia).sqrt();
+    format!(
+        "schema = \"torqcomp.stand/1\"\nname = \"best plain fit\"\n\n[mechanics]\n\
+         inertia = \"{inertia:.12e} kg m^2\"\ndamping = \"{damping:.12e} N m s/rad\"\n\
+         stiffness = \"{stiffness:.12e} N m/rad\"\n\n[calibration]\n\
+         torque_per_volt = \"1.23e3 ft lbf/V\"\n"
+    )
+}
+
+/// Writes a case into a folder of its own.
+pub fn write(case: &Case, folder: &Path) -> io::Result<()> {
+    std::fs::create_dir_all(folder)?;
+    let volts = in_volts(case);
+    let mut truth = case.truth.clone();
+    truth["measured_column"] = measured_column(case).into();
+    std::fs::write(folder.join("train.csv"), table(&case.train, volts))?;
+    std::fs::write(folder.join("holdout.csv"), table(&case.holdout, volts))?;
+    std::fs::write(folder.join("stand.toml"), DECLARED)?;
+    std::fs::write(folder.join("plain.toml"), plain_stand(case))?;
+    std::fs::write(folder.join("truth.json"), format!("{truth:#}\n"))
+}
