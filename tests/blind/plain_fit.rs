@@ -21,7 +21,7 @@ pub fn answer(constants: PlainConstants, input: &Input) -> Vec<f64> {
     let (mut y, mut v) = (0.0, 0.0);
     let mut samples = Vec::with_capacity(SAMPLES);
     for node in 0..input.before + SAMPLES * FINER {
-        if node >= input.before && (node - input.before) % FINER == 0 {
+        if node >= input.before && (node - input.before).is_multiple_of(FINER) {
             samples.push(y);
         }
         let [u0, u1, u2] = input.around(node);
@@ -104,10 +104,12 @@ fn solve(mut rows: Vec<Vec<f64>>) -> Vec<f64> {
             .max_by(|a, b| rows[*a][i].abs().total_cmp(&rows[*b][i].abs()))
             .expect("a row");
         rows.swap(i, pivot);
-        for j in i + 1..n {
-            let factor = rows[j][i] / rows[i][i];
-            for k in i..=n {
-                rows[j][k] -= factor * rows[i][k];
+        let (above, below) = rows.split_at_mut(i + 1);
+        let upper = &above[i];
+        for row in below {
+            let factor = row[i] / upper[i];
+            for (cell, pivot) in row[i..].iter_mut().zip(&upper[i..]) {
+                *cell -= factor * pivot;
             }
         }
     }
