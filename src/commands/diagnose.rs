@@ -37,7 +37,7 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
     let mut output = Output::open(None, args.force, &files)?;
     let mut read = read::read(args, stand.as_ref().map(|(stand, _)| stand))?;
     let (frame, found) = diagnose::prepare(&mut read.case)?;
-    read.refine_steps(found.natural_hz);
+    read.refine(&found);
     let levels = read.levels();
     let shown = !args.quiet && std::io::stderr().is_terminal();
     let progress = |done: usize, of: usize| {

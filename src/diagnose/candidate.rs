@@ -90,7 +90,7 @@ impl<'a> Base<'a> {
 /// Rounds of a first look.
 const FIRST_ROUNDS: usize = 6;
 /// Rounds of a fit.
-const MOST_ROUNDS: usize = 30;
+const MOST_ROUNDS: usize = 15;
 /// Starts that are fitted in full.
 const FULL: usize = 2;
 

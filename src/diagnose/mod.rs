@@ -95,6 +95,8 @@ const AT_FLOOR: f64 = 1.1;
 const FAR_ABOVE: f64 = 1.5;
 /// Part of what is missing that an effect must explain to be named.
 const NAMED: f64 = 0.5;
+/// Part of what is missing at first that a second effect must explain to be named.
+const SECOND: f64 = 0.02;
 /// Effects that are added at most.
 const MOST_EFFECTS: usize = 2;
 
@@ -190,8 +192,16 @@ pub fn run<'a>(
         let next = accepted.and_then(|t| t.judged.clone());
         rounds.push(tried);
         let Some(next) = next else { break };
+        if !after.fitted.structure.choices.is_empty()
+            && share(&before, &after, &next, floor) < SECOND
+        {
+            refuse_second(&mut rounds);
+            break;
+        }
         after = next;
-        if !remains(&after, &dependence(&after, &records), floor) {
+        if !remains(&after, &dependence(&after, &records), floor)
+            || share(&before, &before, &after, floor) < NAMED
+        {
             break;
         }
     }
@@ -209,6 +219,27 @@ pub fn run<'a>(
     };
     diagnosis.conclude();
     Ok(diagnosis)
+}
+
+/// Part of what the plain stand leaves above the noise that one model explains more than another.
+fn share(before: &Judged, from: &Judged, to: &Judged, floor: Option<Floor>) -> f64 {
+    let noise = floor.map_or(0.0, |f| f.rms.powi(2));
+    let missing = before.hold_rms().powi(2) - noise;
+    (from.hold_rms().powi(2) - to.hold_rms().powi(2)) / missing.max(1e-300)
+}
+
+/// A second effect that explains next to nothing of what was missing at first is not named: what no model has
+/// exactly looks a little like many effects.
+fn refuse_second(rounds: &mut [Vec<Tried>]) {
+    for one in rounds.last_mut().into_iter().flatten() {
+        if one.status != Status::Rejected {
+            one.status = Status::Rejected;
+            one.why = format!(
+                "it explains less than {:.0} % of what was missing at first: too little to be named beside the first effect",
+                100.0 * SECOND
+            );
+        }
+    }
 }
 
 /// The declared constants in place of the fitted ones.
@@ -302,12 +333,7 @@ impl Diagnosis<'_> {
             self.verdict = Verdict::Explained;
             return;
         }
-        let noise = self.floor.map_or(0.0, |f| f.rms.powi(2));
-        let (before, after) = (
-            self.before.hold_rms().powi(2),
-            self.after.hold_rms().powi(2),
-        );
-        let explained = (before - after) / (before - noise).max(1e-300);
+        let explained = share(&self.before, &self.before, &self.after, self.floor);
         if explained >= NAMED {
             self.verdict = Verdict::PartlyExplained;
             return;

@@ -43,7 +43,7 @@ const LEAST_SIGNIFICANCE: f64 = 3.0;
 /// Significance up to which one effect counts as no better than another.
 const WITHIN_CHANCE: f64 = 2.33;
 /// Gain of a first look, over the largest of all, from which on a fit is taken on.
-const PROMISING: f64 = 0.05;
+const PROMISING: f64 = 0.3;
 /// Relative difference of errors that counts as none.
 const SAME_ERROR: f64 = 5e-4;
 /// Lines of the residual's spectrum that may be that of a shaft.

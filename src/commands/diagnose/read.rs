@@ -19,8 +19,13 @@ const FITTED: f64 = 0.7;
 const FEWEST: usize = 200;
 /// Steps of integration before the natural frequency is known.
 const FIRST_STEPS: usize = 4;
-/// Samples at the start that are left out, where the continuation backwards is felt most.
+/// Samples at both ends that are left out at least, where the continuation beyond them is felt most.
 const LEFT_OUT: usize = 32;
+/// Time constants of the stand that are left out at the start: what recorder and joints remember of the time before the
+/// record has faded then.
+const SETTLING: f64 = 3.0;
+/// Largest part of a record that is left out.
+const MOST_LEFT_OUT: f64 = 0.1;
 
 const TORQUE: Dimension = Dimension::new([1, 2, -2, 0, 0, 0]);
 const VOLTAGE: Dimension = Dimension::new([1, 2, -3, -1, 0, 0]);
@@ -305,8 +310,28 @@ fn refuse_silence(source: &str, which: &str, values: &[f64]) -> Result<(), Failu
 }
 
 impl Read {
-    /// Sets the steps of integration for the natural frequency that was found.
-    pub fn refine_steps(&mut self, natural_hz: f64) {
+    /// Sets the steps of integration and the samples that count for the plain stand that was found.
+    pub fn refine(&mut self, found: &Constants) {
+        self.leave_out(found);
+        self.refine_steps(found.natural_hz);
+    }
+
+    fn leave_out(&mut self, found: &Constants) {
+        let rate_hz = self.case.train[0].input.rate_hz();
+        let decay = found.damping_ratio * std::f64::consts::TAU * found.natural_hz / rate_hz;
+        for record in self.case.train.iter_mut().chain(&mut self.case.hold) {
+            let count = record.measured.len();
+            let most = (MOST_LEFT_OUT * count as f64) as usize;
+            let least = LEFT_OUT.min(most);
+            let settled = ((SETTLING / decay.max(1e-9)) as usize).clamp(least, most);
+            record.range.start = record.range.start.max(settled);
+            if record.range.end == count {
+                record.range.end = count - least;
+            }
+        }
+    }
+
+    fn refine_steps(&mut self, natural_hz: f64) {
         let steps = substeps(natural_hz, self.case.train[0].input.rate_hz());
         if steps == FIRST_STEPS {
             return;
