@@ -86,11 +86,21 @@ pub struct Record {
     /// Topic of an MCAP file, as /joint_states
     #[arg(long, value_name = "TOPIC")]
     pub topic: Option<String>,
-    /// Field of its messages: effort[0], 'effort[name=motor]', 'data[:]'; none if it has one number
-    #[arg(long, value_name = "FIELD", requires = "topic")]
+    /// Field of its messages.
+    #[arg(
+        long,
+        value_name = "FIELD",
+        requires = "topic",
+        help = "Field of its messages: effort[0], 'effort[name=motor]', 'data[:]'; none if it has one number"
+    )]
     pub field: Option<String>,
-    /// Topic and field in one, as '/joint_states.effort[0]'
-    #[arg(long, value_name = "PATH", conflicts_with = "topic")]
+    /// Topic and field in one.
+    #[arg(
+        long,
+        value_name = "PATH",
+        conflicts_with = "topic",
+        help = "Topic and field in one, as '/joint_states.effort[0]'"
+    )]
     pub signal: Option<String>,
     /// Time of messages that counts [default: their own stamp if they have one, else log]
     #[arg(long, value_name = "CLOCK", value_parser = clock)]

@@ -11,8 +11,10 @@ use crate::io::mcap::record::input::Input;
 use crate::io::mcap::{self, Source, selection::Wanted};
 use crate::recording;
 
-/// Bytes that the format of a file is told from.
+/// Bytes that are read before anything is told.
 const HEAD: u64 = 1 << 16;
+/// Bytes that tell whether a text is a plain table.
+const FRONT: usize = 1 << 14;
 
 impl Signal {
     /// Opens a file, finds the channel and its time axis.
@@ -33,7 +35,9 @@ impl Signal {
         }
         options.check_for_text()?;
         let table = &options.table;
-        if complete && head.is_empty() || recording::text::is_plain(&head, complete, table) {
+        let front = &head[..head.len().min(FRONT)];
+        let is_whole = complete && front.len() == head.len();
+        if complete && head.is_empty() || recording::text::is_plain(front, is_whole, table) {
             let input = Box::new(Cursor::new(head).chain(input));
             return Table::of(name, input, table).map(|found| Self::of_table(found, table));
         }

@@ -97,7 +97,9 @@ def main():
         command += ["--topic", case["topic"], "--field", case["field"], "--unit", "N m"]
         for path, kind in ((out, "mcap"), (table, "csv")):
             done = subprocess.run(
-                [*command, "--format", kind, "-o", str(path)], capture_output=True, text=True
+                [*command, "--format", kind, "--digits", "shortest", "-o", str(path)],
+                capture_output=True,
+                text=True,
             )
             if done.returncode != 0:
                 sys.exit(f"{name}: exit code {done.returncode}\n{done.stderr}")

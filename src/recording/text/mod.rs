@@ -1,8 +1,8 @@
 //! Recordings in text: decoding the bytes, telling the dialect, reading every column.
 //!
-//! [`decode`] brings the bytes to lines; [`makers`] knows who writes how; [`head`] finds the table and
-//! [`header`] reads what stands above it, with the help of [`keys`] and [`units`]; [`rows`] reads the
-//! numbers and [`axes`] finds the time.
+//! `decode` brings the bytes to lines; `makers` knows who writes how; `head` finds the table and
+//! `header` reads what stands above it, with the help of `keys` and `units`; `rows` reads the
+//! numbers and `axes` finds the time.
 
 mod axes;
 mod cell;
