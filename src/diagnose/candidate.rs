@@ -190,7 +190,10 @@ pub fn first_look<'a>(
     structure.choices.push(choice);
     let from: Vec<Vec<f64>> = starts(choice, peaks)
         .into_iter()
-        .map(|own| [fitted.values.as_slice(), &own[..choice.moved()]].concat())
+        .map(|own| {
+            let together = [fitted.values.as_slice(), &own[..choice.moved()]].concat();
+            with_stiffness_shared(&structure, together)
+        })
         .collect();
     let from = best_starts(base, &structure, from, records);
     let training = begun(&records.train, fitted);
@@ -209,6 +212,16 @@ pub fn first_look<'a>(
         }
     }
     best
+}
+
+/// Takes the stiffness that an effect adds off the plain stand, so that the whole is as stiff as before.
+fn with_stiffness_shared(structure: &Structure, mut values: Vec<f64>) -> Vec<f64> {
+    let factor = 1.0 + structure.model(&values).0.added_stiffness();
+    values[0] /= factor.sqrt();
+    if structure.frame.gain_is_free {
+        values[2] *= factor;
+    }
+    values
 }
 
 /// The fit taken on to its end.

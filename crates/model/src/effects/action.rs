@@ -117,6 +117,12 @@ pub trait Torque: Send + Sync {
         speed - impulse * self.value(memory, x, speed)
     }
 
+    /// Its stiffness at small displacements, relative to that of the plain stand, where it has one: a fit that begins
+    /// with it takes it off the plain stand.
+    fn stiffness(&self) -> f64 {
+        0.0
+    }
+
     /// Whether the torque depends on where zero is: a constant load then matters.
     fn has_zero(&self) -> bool {
         false

@@ -13,7 +13,13 @@ use super::{Action, Effect, Form, Memory, Parameter, Place, Torque};
 const PART: Parameter = Parameter::number("stiffness_ratio", 0.0, 50.0);
 const LOSS: Parameter = Parameter::motion("loss", -1, 0, 0.0, 100.0);
 const SHAPE: Parameter = Parameter::motion("shape", -1, 0, -100.0, 100.0);
-const STARTS: &[&[f64]] = &[&[0.1, 0.5, 0.0], &[0.5, 1.0, 0.5], &[1.0, 0.3, -0.1]];
+const STARTS: &[&[f64]] = &[
+    &[0.02, 0.5, 0.0],
+    &[0.1, 0.5, 0.0],
+    &[0.5, 1.0, 0.5],
+    &[1.0, 0.5, -0.5],
+    &[1.0, 0.5, 0.2],
+];
 
 pub(super) static EFFECT: Effect = Effect {
     name: "bouc-wen-hysteresis",
@@ -91,6 +97,10 @@ impl Torque for BoucWen {
         let middle = z + 0.5 * step * self.slope(z, step);
         *memory = [z + step * self.slope(middle, step), x];
         self.ratio * memory[0]
+    }
+
+    fn stiffness(&self) -> f64 {
+        self.ratio
     }
 
     fn begin(&self, x: f64) -> Memory {

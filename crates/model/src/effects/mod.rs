@@ -41,8 +41,9 @@ pub use parameter::{Parameter, Ruler, Rulers, Unit};
 pub const EFFECTS: &[&Effect] = &[
     &second_mode::EFFECT,
     &structural_damping::EFFECT,
-    &recorder_lowpass::EFFECT,
+    // Before the low-pass: one whose corner cannot be seen is a delay.
     &time_delay::EFFECT,
+    &recorder_lowpass::EFFECT,
     &capacitive_coupling::EFFECT,
     &gain_error::EFFECT,
     &mains_pickup::EFFECT,

@@ -112,6 +112,15 @@ impl Model {
         !self.torques().is_empty()
     }
 
+    /// Stiffness that the torques add at small displacements, relative to that of the plain stand.
+    #[must_use]
+    pub fn added_stiffness(&self) -> f64 {
+        self.torques()
+            .iter()
+            .map(|(torque, _)| torque.stiffness())
+            .sum()
+    }
+
     /// Whether a constant load matters beyond a constant in the record.
     #[must_use]
     pub fn has_zero(&self) -> bool {
