@@ -8,6 +8,7 @@ mod floor;
 mod plain;
 mod record;
 mod search;
+mod series;
 mod spectra;
 mod structure;
 
@@ -22,6 +23,7 @@ pub use floor::Floor;
 pub use plain::Constants;
 pub use record::{Begin, Record, dot};
 pub use search::{Status, Tried, parallel};
+pub use series::Series;
 pub use spectra::{Peak, lines};
 pub use structure::{Choice, Frame, Structure};
 
@@ -69,6 +71,8 @@ pub struct Case {
 
 /// What was found.
 pub struct Diagnosis<'a> {
+    /// The records; residuals are over the samples of each one's range.
+    pub records: Records,
     /// The declared model.
     pub declared: Option<Judged<'a>>,
     /// The plain stand, fitted.
@@ -206,9 +210,11 @@ pub fn run<'a>(
         }
     }
     let dependence = dependence(&after, &records);
+    let lines = prominent_lines(&after, &records);
     let mut diagnosis = Diagnosis {
+        records,
         declared,
-        lines: prominent_lines(&after, &records),
+        lines,
         before,
         after,
         rounds,
