@@ -16,7 +16,7 @@ use torqcomp_model::effects::Rulers;
 
 use crate::failure::Failure;
 
-pub use candidate::{Base, Judged, Records, judge};
+pub use candidate::{Base, Judged, Records, judge, set_substeps};
 pub use dependence::{Dependence, Share, Sight};
 pub use fit::{Fitted, Residual};
 pub use floor::Floor;
@@ -202,7 +202,7 @@ pub fn run<'a>(
             refuse_second(&mut rounds);
             break;
         }
-        after = next;
+        after = candidate::refine_step(next, &mut records);
         if !remains(&after, &dependence(&after, &records), floor)
             || share(&before, &before, &after, floor) < NAMED
         {
