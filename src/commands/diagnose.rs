@@ -8,10 +8,10 @@ use std::path::Path;
 
 use super::{Outcome, conclude};
 use crate::cli::Diagnose;
-use crate::diagnose;
+use crate::diagnose::{self, Diagnosis, Verdict};
 use crate::failure::Failure;
 use crate::io::output::Output;
-use crate::report;
+use crate::report::{self, Warning};
 use crate::stand::{self, Stand};
 
 /// Runs the verb.
@@ -37,6 +37,7 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
     let mut output = Output::open(None, args.force, &files)?;
     let mut read = read::read(args, stand.as_ref().map(|(stand, _)| stand))?;
     let (frame, found) = diagnose::prepare(&mut read.case)?;
+    diagnose::check(&read.case, &frame, found)?;
     read.refine(&found);
     let levels = read.levels();
     let shown = !args.quiet && std::io::stderr().is_terminal();
@@ -50,13 +51,15 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
     };
     let declared = read.case.declared;
     let diagnosis = diagnose::run(read.case, &frame, found, &progress)?;
+    let mut warnings = read.warnings;
+    warnings.extend(apart(&diagnosis));
     let rendered = render::Rendered {
         args,
         diagnosis: &diagnosis,
         units: &read.units,
         declared,
         levels,
-        warnings: read.warnings,
+        warnings,
     };
     let report = rendered.report();
     if let Some(mut refined) = refined {
@@ -72,4 +75,23 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
     output.write(text.as_bytes())?;
     output.finish()?;
     Ok(conclude(&report.warnings, false, args.strict))
+}
+
+/// Says so where training and held-out records do not follow one stand.
+fn apart(diagnosis: &Diagnosis) -> Option<Warning> {
+    if matches!(
+        diagnosis.verdict,
+        Verdict::Explained | Verdict::NothingMissing
+    ) {
+        return None;
+    }
+    let [train, hold] = diagnose::apart(diagnosis)?;
+    Some(Warning::new(
+        "records-apart",
+        format!(
+            "no one stand fits both: the training records alone give {:.5} Hz and a damping ratio of {:.4}, the held-out ones \
+             {:.5} Hz and {:.4}; they are of two stands or settings, or the stand changes with the level",
+            train.natural_hz, train.damping_ratio, hold.natural_hz, hold.damping_ratio
+        ),
+    ))
 }

@@ -1,7 +1,7 @@
 //! `simulate`: the stand's answer to a given input.
 
 use torqcomp_model::effects::Action;
-use torqcomp_model::simulate::{Input, Model, State, substeps};
+use torqcomp_model::simulate::{Fixed, Input, Model, State, substeps};
 
 use super::Outcome;
 use crate::cli::Simulate;
@@ -139,9 +139,9 @@ fn model(stand: &Stand, gain: f64) -> Result<Model, Failure> {
         mode: stand.mode()?,
         gain,
         shift: stand.diagnosed.shift,
-        recorder: Some(std::sync::Arc::new(move |frequency_hz| {
-            recorder.response(frequency_hz)
-        })),
+        recorder: (!recorder.is_ideal()).then(|| -> Fixed {
+            std::sync::Arc::new(move |frequency_hz| recorder.response(frequency_hz))
+        }),
         actions: actions
             .filter(|(_, a)| !matches!(a, Action::Lines(_)))
             .collect(),

@@ -9,7 +9,8 @@ use super::blocks::{Comparison, compare};
 use super::fit::{Fitted, Residual, difference, fit, look};
 use super::record::{Nuisance, Record, dot};
 use super::spectra::Peak;
-use super::structure::{Choice, Structure, Waves};
+use super::starts;
+use super::structure::{Choice, Waves};
 
 /// The records of a diagnosis.
 pub struct Records {
@@ -164,11 +165,11 @@ impl<'a> Base<'a> {
 }
 
 /// Rounds of a first look.
-const FIRST_ROUNDS: usize = 6;
+const FIRST_ROUNDS: usize = 3;
+/// Rounds of a second look.
+const SECOND_ROUNDS: usize = 5;
 /// Rounds of a fit.
 const MOST_ROUNDS: usize = 15;
-/// Starts that are fitted in full.
-const FULL: usize = 2;
 
 impl Judged<'_> {
     /// Rms over the training records.
@@ -196,7 +197,10 @@ impl Judged<'_> {
     #[must_use]
     pub fn parameters(&self) -> usize {
         let (_, waves) = self.fitted.structure.model(&self.fitted.values);
-        self.fitted.values.len() + self.fitted.amplitudes.len() + waves.course
+        self.fitted.values.len()
+            + self.fitted.amplitudes.len()
+            + waves.course
+            + waves.fades_per_s.len()
     }
 
     /// Comparison with another model on the held-out records.
@@ -208,10 +212,22 @@ impl Judged<'_> {
     /// Criterion of Schwarz on the training records, less a constant: smaller is better.
     #[must_use]
     pub fn criterion(&self) -> f64 {
-        let count: usize = self.train.iter().map(|r| r.samples.len()).sum();
-        let n = count as f64;
-        n * (self.fitted.train_sum / n).ln() + self.parameters() as f64 * n.ln()
+        let (fit, n) = likelihood(&self.train);
+        fit + self.parameters() as f64 * n.ln()
     }
+
+    /// The same on all records.
+    #[must_use]
+    pub fn pooled_criterion(&self) -> f64 {
+        let ((train, n), (hold, m)) = (likelihood(&self.train), likelihood(&self.hold));
+        train + hold + self.parameters() as f64 * (n + m).ln()
+    }
+}
+
+/// `n ln s²`, twice the negative logarithm of the likelihood of normal residuals less a constant, and `n`.
+fn likelihood(residuals: &[Residual]) -> (f64, f64) {
+    let n = residuals.iter().map(|r| r.samples.len()).sum::<usize>() as f64;
+    (2.0 * n * rms(residuals).ln(), n)
 }
 
 fn rms(residuals: &[Residual]) -> f64 {
@@ -253,51 +269,44 @@ pub fn judge<'a>(fitted: Fitted<'a>, records: &Records) -> Option<Judged<'a>> {
     })
 }
 
-/// A first look at one effect in one form: a few rounds from its best starts.
+/// A first look at one effect in one form: very few rounds from each of its best starts.
 #[must_use]
 pub fn first_look<'a>(
     base: &Base<'a>,
     choice: Choice,
     peaks: &[Peak],
     records: &Records,
-) -> Option<Fitted<'a>> {
+) -> Vec<Fitted<'a>> {
     let fitted = &base.judged.fitted;
     let mut structure = fitted.structure.clone();
     structure.choices.push(choice);
-    let from: Vec<Vec<f64>> = starts(choice, peaks)
-        .into_iter()
-        .map(|own| {
-            let together = [fitted.values.as_slice(), &own[..choice.moved()]].concat();
-            with_stiffness_shared(&structure, together)
-        })
-        .collect();
-    let from = best_starts(base, &structure, from, records);
+    let from = starts::best(base, &structure, starts::own(choice, peaks), records);
     let training = begun(&records.train, fitted);
-    let mut best: Option<Fitted> = None;
-    for start in from {
-        let found = look(
+    let each = from.iter().map(|start| {
+        look(
             structure.clone(),
-            &start,
+            start,
             &training,
             &records.reference,
             FIRST_ROUNDS,
-        );
-        let Ok(found) = found else { continue };
-        if best.as_ref().is_none_or(|b| found.train_sum < b.train_sum) {
-            best = Some(found);
-        }
-    }
-    best
+        )
+    });
+    each.filter_map(Result::ok).collect()
 }
 
-/// Takes the stiffness that an effect adds off the plain stand, so that the whole is as stiff as before.
-fn with_stiffness_shared(structure: &Structure, mut values: Vec<f64>) -> Vec<f64> {
-    let factor = 1.0 + structure.model(&values).0.added_stiffness();
-    values[0] /= factor.sqrt();
-    if structure.frame.gain_is_free {
-        values[2] *= factor;
-    }
-    values
+/// A few rounds more.
+#[must_use]
+pub fn second_look<'a>(first: &Fitted<'a>, records: &Records) -> Option<Fitted<'a>> {
+    let training = begun(&records.train, first);
+    let (structure, values) = (first.structure.clone(), &first.values);
+    look(
+        structure,
+        values,
+        &training,
+        &records.reference,
+        SECOND_ROUNDS,
+    )
+    .ok()
 }
 
 /// The fit taken on to its end.
@@ -322,94 +331,6 @@ fn begun(train: &[Record], fitted: &Fitted) -> Vec<Record> {
         record.begin = *start;
     }
     training
-}
-
-/// Start values of the effect's own parameters.
-fn starts(choice: Choice, peaks: &[Peak]) -> Vec<Vec<f64>> {
-    if choice.is_line() && choice.form.starts.is_empty() {
-        let bounds = choice.form.parameters[0].lower..choice.form.parameters[0].upper;
-        let known = peaks
-            .iter()
-            .map(|p| p.frequency_hz)
-            .filter(|f| bounds.contains(f));
-        return known.map(|f| vec![f]).collect();
-    }
-    let mut all: Vec<Vec<f64>> = choice.form.starts.iter().map(|s| s.to_vec()).collect();
-    if choice.is_line() {
-        // The line in the data nearest to the grid's frequency, if there is one.
-        let (lower, upper) = (
-            choice.form.parameters[0].lower,
-            choice.form.parameters[0].upper,
-        );
-        let near = peaks
-            .iter()
-            .find(|p| (lower..=upper).contains(&p.frequency_hz));
-        if let Some(peak) = near {
-            all.push(vec![peak.frequency_hz]);
-        }
-    }
-    all
-}
-
-/// The starts towards which the residual points most: a score test of each, with what a change of the base's own
-/// parameters could do left in.
-fn best_starts(
-    base: &Base,
-    structure: &Structure,
-    mut starts: Vec<Vec<f64>>,
-    records: &Records,
-) -> Vec<Vec<f64>> {
-    if starts.len() <= FULL {
-        return starts;
-    }
-    let mut scored: Vec<(f64, Vec<f64>)> = starts
-        .drain(..)
-        .map(|start| (score(base, structure, &start, records), start))
-        .collect();
-    scored.sort_by(|a, b| b.0.total_cmp(&a.0));
-    scored.truncate(FULL);
-    scored.into_iter().map(|(_, start)| start).collect()
-}
-
-/// By how much the sum of squares of the training residual would fall with the right size of what the start adds.
-fn score(base: &Base, structure: &Structure, start: &[f64], records: &Records) -> f64 {
-    let (model, waves) = structure.model(start);
-    let mut fall = 0.0;
-    let judged = &base.judged;
-    let each = records
-        .train
-        .iter()
-        .zip(&judged.fitted.begins)
-        .zip(&judged.train)
-        .zip(base.slopes.iter().zip(&base.cleared));
-    for (((record, begin), before), (slopes, cleared)) in each {
-        let mut record = record.clone();
-        record.begin = *begin;
-        if !waves.is_empty() {
-            let mut residual = before.samples.clone();
-            record
-                .nuisance(&records.reference, &waves, None)
-                .clear(&mut residual);
-            fall += dot(&before.samples, &before.samples) - dot(&residual, &residual);
-            continue;
-        }
-        let Ok(mut moved) = difference(&model, &record) else {
-            return 0.0;
-        };
-        cleared.clear(&mut moved);
-        let mut change: Vec<f64> = before
-            .samples
-            .iter()
-            .zip(&moved)
-            .map(|(b, m)| b - m)
-            .collect();
-        slopes.clear(&mut change);
-        let size = dot(&change, &change);
-        if size > 0.0 {
-            fall += dot(&change, &before.samples).max(0.0).powi(2) / size;
-        }
-    }
-    fall
 }
 
 /// All forms of an effect that the search tries.

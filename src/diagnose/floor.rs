@@ -44,6 +44,21 @@ pub fn noise_floor(records: &[(&Record, &[f64])]) -> Option<Floor> {
     })
 }
 
+/// The noise as [`noise_floor`] finds it in residuals of the model that was found: what does not repeat with the input,
+/// as a line of the mains, is not in them.
+#[must_use]
+pub fn from_residuals(records: &[(&Record, &[f64])]) -> Option<Floor> {
+    let squares: Option<Vec<(f64, usize)>> = records
+        .iter()
+        .map(|(record, residual)| differences(record, residual))
+        .collect();
+    let squares = squares.filter(|s| !s.is_empty())?;
+    Some(Floor {
+        rms: pooled(&squares),
+        from: "periods",
+    })
+}
+
 fn pooled(squares: &[(f64, usize)]) -> f64 {
     let count: usize = squares.iter().map(|(_, n)| n).sum();
     let sum: f64 = squares.iter().map(|(s, n)| s * *n as f64).sum();
@@ -53,8 +68,11 @@ fn pooled(squares: &[(f64, usize)]) -> f64 {
 /// Mean square of the noise from differences of periods, and the samples compared: those before which the input has
 /// repeated for long enough that the motion has settled.
 fn from_periods(record: &Record) -> Option<(f64, usize)> {
+    differences(record, &record.measured[record.range.clone()])
+}
+
+fn differences(record: &Record, y: &[f64]) -> Option<(f64, usize)> {
     let u = &record.input.samples()[record.range.clone()];
-    let y = &record.measured[record.range.clone()];
     let period = period(u)?;
     let small = SAME * dot(u, u) / u.len() as f64;
     let settled = (SETTLED_S * record.input.rate_hz()) as usize;

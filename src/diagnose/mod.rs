@@ -7,9 +7,11 @@ mod fit;
 mod floor;
 mod plain;
 mod record;
+mod refuse;
 mod search;
 mod series;
 mod spectra;
+mod starts;
 mod structure;
 
 use torqcomp_model::effects::Rulers;
@@ -22,6 +24,7 @@ pub use fit::{Fitted, Residual};
 pub use floor::Floor;
 pub use plain::Constants;
 pub use record::{Begin, Record, dot};
+pub use refuse::{apart, check};
 pub use search::{Status, Tried, parallel};
 pub use series::Series;
 pub use spectra::{Peak, lines};
@@ -210,6 +213,7 @@ pub fn run<'a>(
         }
     }
     let dependence = dependence(&after, &records);
+    let floor = without_disturbances(floor, &after, &records);
     let lines = prominent_lines(&after, &records);
     let mut diagnosis = Diagnosis {
         records,
@@ -225,6 +229,21 @@ pub fn run<'a>(
     };
     diagnosis.conclude();
     Ok(diagnosis)
+}
+
+/// The floor, where the model found takes something out that does not repeat with the input.
+fn without_disturbances(floor: Option<Floor>, after: &Judged, records: &Records) -> Option<Floor> {
+    let Some(seen) = floor.filter(|f| f.from == "periods") else {
+        return floor;
+    };
+    let residuals: Vec<(&Record, &[f64])> = records
+        .hold
+        .iter()
+        .zip(&after.hold)
+        .map(|(record, residual)| (record, residual.samples.as_slice()))
+        .collect();
+    let again = floor::from_residuals(&residuals);
+    Some(again.filter(|f| f.rms < seen.rms).unwrap_or(seen))
 }
 
 /// Part of what the plain stand leaves above the noise that one model explains more than another.

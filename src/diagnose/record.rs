@@ -94,6 +94,14 @@ impl Record {
                     .collect(),
             );
         }
+        for rate_per_s in &waves.fades_per_s {
+            let step = rate_per_s / rate_hz;
+            nuisance.push(
+                (0..self.count())
+                    .map(|i| (-step * i as f64).exp())
+                    .collect(),
+            );
+        }
         nuisance.lines = nuisance.mix.len();
         for frequency_hz in &waves.lines_hz {
             let turn = std::f64::consts::TAU * frequency_hz / rate_hz;

@@ -5,7 +5,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use torqcomp_model::effects::{EFFECTS, Effect};
 
-use super::candidate::{Base, Judged, Records, choices, finish, first_look, judge};
+use super::candidate::{Base, Judged, Records, choices, finish, first_look, judge, second_look};
+use super::fit::Fitted;
 use super::spectra::{Peak, lines};
 use super::structure::Choice;
 
@@ -42,10 +43,16 @@ const LEAST_SHARE: f64 = 0.005;
 const LEAST_SIGNIFICANCE: f64 = 3.0;
 /// Significance up to which one effect counts as no better than another.
 const WITHIN_CHANCE: f64 = 2.33;
-/// Gain of a first look, over the largest of all, from which on a fit is taken on.
-const PROMISING: f64 = 0.3;
-/// Relative difference of errors that counts as none.
-const SAME_ERROR: f64 = 5e-4;
+/// Gain of a first look, over the largest of all, from which on a second one follows.
+const FOLLOWED_UP: f64 = 0.03;
+/// Gain of a second look, over the largest of all, from which on a fit is taken to its end.
+const PROMISING: f64 = 0.5;
+/// Least such gain in variances of the residual: what does not pay for a parameter is not taken on.
+const PAYS: f64 = 5.0;
+/// Forms that are fitted to the end at most, ties aside.
+const MOST_FITS: usize = 12;
+/// Difference of the criterion on all records that counts as none.
+const SAME: f64 = 4.0;
 /// Lines of the residual's spectrum that may be that of a shaft.
 const PEAKS: usize = 3;
 /// Prominence of a line over the spectrum around it.
@@ -91,25 +98,7 @@ pub fn try_all<'a>(
         .filter(|e| !(gain_is_free && e.name == "gain-error"))
         .flat_map(|e| choices(e))
         .collect();
-    let done = AtomicUsize::new(0);
-    let looks = parallel(jobs.len(), threads, |k| {
-        let found = first_look(base, jobs[k], &peaks, records);
-        progress(done.fetch_add(1, Ordering::Relaxed) + 1, jobs.len());
-        found
-    });
-    let whole = base.judged.fitted.train_sum;
-    let most = looks
-        .iter()
-        .flatten()
-        .map(|f| whole - f.train_sum)
-        .fold(0.0, f64::max);
-    let fits = parallel(jobs.len(), threads, |k| {
-        let first = looks[k].as_ref()?;
-        let gain = whole - first.train_sum;
-        let done = first.converged && !first.integrates() || gain < PROMISING * most;
-        let taken_on = if done { None } else { finish(first, records) };
-        judge(taken_on.unwrap_or_else(|| first.clone()), records)
-    });
+    let fits = fit_all(base, &jobs, &peaks, records, threads, progress);
     let mut tried: Vec<Tried> = Vec::new();
     for (choice, judged) in jobs.iter().zip(fits) {
         match tried
@@ -139,6 +128,52 @@ pub fn try_all<'a>(
     tried
 }
 
+/// The best fit of each form, judged: all get a first look, those that lower the training error a second one, and those
+/// that lower it nearly most a fit to the end. How much work that is depends on the records alone, not on the clock.
+fn fit_all<'a>(
+    base: &Base<'a>,
+    jobs: &[Choice],
+    peaks: &[Peak],
+    records: &Records,
+    threads: usize,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Vec<Option<Judged<'a>>> {
+    let whole = base.judged.fitted.train_sum;
+    let variance = base.judged.train_rms().powi(2);
+    let done = AtomicUsize::new(0);
+    let first = parallel(jobs.len(), threads, |k| {
+        let found = first_look(base, jobs[k], peaks, records);
+        progress(done.fetch_add(1, Ordering::Relaxed) + 1, jobs.len());
+        found
+    });
+    let most = first.iter().flatten().map(|f| whole - f.train_sum);
+    let least = FOLLOWED_UP * most.fold(0.0, f64::max);
+    let second = parallel(jobs.len(), threads, |k| {
+        let looks = first[k].iter().map(|look| {
+            let followed = !look.converged && whole - look.train_sum >= least;
+            let found = followed.then(|| second_look(look, records)).flatten();
+            found.unwrap_or_else(|| look.clone())
+        });
+        looks.min_by(|a, b| a.train_sum.total_cmp(&b.train_sum))
+    });
+    let gain = |look: &Option<Fitted>| look.as_ref().map_or(0.0, |f| whole - f.train_sum);
+    let mut gains: Vec<f64> = second.iter().map(gain).collect();
+    gains.sort_by(|a, b| b.total_cmp(a));
+    let least = gains
+        .get(MOST_FITS)
+        .copied()
+        .unwrap_or(0.0)
+        .max(PROMISING * gains.first().copied().unwrap_or(0.0))
+        .max(PAYS * variance);
+    parallel(jobs.len(), threads, |k| {
+        // A form that only raises the training error is not worth judging.
+        let look = second[k].as_ref().filter(|f| f.train_sum < whole)?;
+        let done = look.converged && !look.integrates() || gain(&second[k]) < least;
+        let taken_on = if done { None } else { finish(look, records) };
+        judge(taken_on.unwrap_or_else(|| look.clone()), records)
+    })
+}
+
 /// Lines of the residual that stand out.
 fn peaks(base: &Base, records: &Records) -> Vec<Peak> {
     let rate_hz = records.train[0].input.rate_hz();
@@ -161,7 +196,7 @@ fn decide<'a>(base: &Base<'a>, tried: &mut [Tried<'a>]) {
     let mut passing: Vec<usize> = Vec::new();
     for (k, one) in tried.iter_mut().enumerate() {
         let Some(judged) = &one.judged else {
-            one.why = "no fit: the model with it cannot be run, or nothing in the data suggests where to start".to_owned();
+            one.why = "not followed: its first steps do not lower the error on the training records, or nothing in them suggests where to start".to_owned();
             continue;
         };
         let comparison = judged.against(before);
@@ -189,11 +224,7 @@ fn decide<'a>(base: &Base<'a>, tried: &mut [Tried<'a>]) {
         .copied()
         .filter(|k| is_tied(tried, *k, best))
         .collect();
-    let simplest = tied
-        .iter()
-        .copied()
-        .min_by(|a, b| order(tried, *a, *b))
-        .unwrap_or(best);
+    let simplest = best_of(tried, &tied).unwrap_or(best);
     name_all(tried, &passing, &tied, simplest);
     tried.swap(0, simplest);
 }
@@ -235,28 +266,22 @@ fn is_tied(tried: &[Tried], k: usize, best: usize) -> bool {
         || comparison.gain() < 9.0 * other.hold_rms().powi(2)
 }
 
-/// The simpler first; of equally simple ones, the one with the smaller error on all records; of equal errors, the one that
-/// stands first in the list: a line on the frequency of the grid is the grid's rather than a shaft's by chance.
-fn order(tried: &[Tried], a: usize, b: usize) -> std::cmp::Ordering {
-    let (Some(one), Some(other)) = (&tried[a].judged, &tried[b].judged) else {
-        return tried[b].judged.is_some().cmp(&tried[a].judged.is_some());
+/// Of effects that the held-out records do not tell apart: the one with the least criterion on all records, which has a
+/// price for parameters; of those within a hair of it, the one that stands first in the list: a line on the
+/// frequency of the grid is the grid's rather than a shaft's by chance, a lag without a corner is a delay.
+fn best_of(tried: &[Tried], tied: &[usize]) -> Option<usize> {
+    let criterion = |k: &usize| {
+        let judged = tried[*k].judged.as_ref();
+        judged.map_or(f64::INFINITY, Judged::pooled_criterion)
     };
-    let error = |j: &Judged| j.hold_rms() + j.train_rms();
-    let (own, its) = (error(one), error(other));
-    let place = |k: usize| {
+    let least = tied.iter().map(criterion).fold(f64::INFINITY, f64::min);
+    let place = |k: &usize| {
         EFFECTS
             .iter()
-            .position(|e| std::ptr::eq(*e, tried[k].effect))
+            .position(|e| std::ptr::eq(*e, tried[*k].effect))
     };
-    let by_error = if (own / its - 1.0).abs() < SAME_ERROR {
-        std::cmp::Ordering::Equal
-    } else {
-        own.total_cmp(&its)
-    };
-    one.parameters()
-        .cmp(&other.parameters())
-        .then(by_error)
-        .then(place(a).cmp(&place(b)))
+    let near = tied.iter().filter(|k| criterion(k) <= least + SAME);
+    near.min_by_key(|k| place(k)).copied()
 }
 
 fn name_all(tried: &mut [Tried], passing: &[usize], tied: &[usize], chosen: usize) {

@@ -42,6 +42,8 @@ pub struct Waves {
     pub lines_hz: Vec<f64>,
     /// Half waves of the course.
     pub course: usize,
+    /// Rates at which what was before the record fades, per s.
+    pub fades_per_s: Vec<f64>,
 }
 
 impl Waves {
@@ -49,12 +51,19 @@ impl Waves {
     pub const NONE: Self = Self {
         lines_hz: Vec::new(),
         course: 0,
+        fades_per_s: Vec::new(),
     };
 
     /// Whether there are none.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.lines_hz.is_empty() && self.course == 0
+        !self.disturb() && self.fades_per_s.is_empty()
+    }
+
+    /// Whether something is added that does not come from what is applied.
+    #[must_use]
+    pub fn disturb(&self) -> bool {
+        !self.lines_hz.is_empty() || self.course > 0
     }
 }
 
@@ -154,6 +163,12 @@ impl Structure<'_> {
         let mut waves = Waves::NONE;
         let mut actions = Vec::new();
         for (choice, own) in self.choices.iter().zip(self.effect_values(values)) {
+            let fading = choice.form.parameters.iter().zip(&own);
+            waves.fades_per_s.extend(
+                fading
+                    .filter(|(p, _)| p.fades)
+                    .map(|(_, corner_hz)| std::f64::consts::TAU * corner_hz),
+            );
             match (choice.form.build)(&own) {
                 Action::Lines(lines) => waves.lines_hz.extend(lines.iter().map(|l| l.frequency_hz)),
                 Action::Course(count) => waves.course = waves.course.max(count),

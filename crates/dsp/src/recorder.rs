@@ -60,6 +60,12 @@ impl Recorder {
         self.gain
     }
 
+    /// Whether it changes nothing but the gain: no low-pass, no delay.
+    #[must_use]
+    pub fn is_ideal(&self) -> bool {
+        self.low_pass.is_none() && self.delay_s == 0.0
+    }
+
     /// Response without its static gain: `L(f) e^{−j2πfτ}`, with `L(0) = 1`.
     ///
     /// ```

@@ -18,9 +18,12 @@ const FITTED: f64 = 0.7;
 /// Fewest samples of a record.
 const FEWEST: usize = 200;
 /// Steps of integration before the natural frequency is known.
-const FIRST_STEPS: usize = 4;
+const FIRST_STEPS: usize = 2;
 /// Samples at both ends that are left out at least, where the continuation beyond them is felt most.
 const LEFT_OUT: usize = 32;
+/// Part of a record that is left out at its start, and at its end: a second mode, a filter or a joint fades more slowly
+/// than the stand, and a complex stiffness answers before its cause.
+const PARTS_LEFT_OUT: [f64; 2] = [0.04, 0.01];
 /// Time constants of the stand that are left out at the start: what recorder and joints remember of the time before the
 /// record has faded then.
 const SETTLING: f64 = 3.0;
@@ -82,11 +85,13 @@ pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<Read, Failure> {
     let declared = stand
         .map(|stand| declared(stand, gain.unwrap_or(1.0)))
         .transpose()?;
-    let recorder = stand.map(|stand| {
-        let recorder = stand.recorder.recorder.clone();
-        let fixed: torqcomp_model::simulate::Fixed = Arc::new(move |hz| recorder.response(hz));
-        fixed
-    });
+    let recorder = stand
+        .map(|stand| stand.recorder.recorder.clone())
+        .filter(|recorder| !recorder.is_ideal())
+        .map(|recorder| {
+            let fixed: torqcomp_model::simulate::Fixed = Arc::new(move |hz| recorder.response(hz));
+            fixed
+        });
     let gain_is_declared = gain.is_some() && !has_static_gain(stand);
     let mut warnings = Vec::new();
     let convert = |pairs: Vec<Pair>| -> Result<Vec<Record>, Failure> {
@@ -322,11 +327,12 @@ impl Read {
         for record in self.case.train.iter_mut().chain(&mut self.case.hold) {
             let count = record.measured.len();
             let most = (MOST_LEFT_OUT * count as f64) as usize;
-            let least = LEFT_OUT.min(most);
-            let settled = ((SETTLING / decay.max(1e-9)) as usize).clamp(least, most);
+            let [first, last] =
+                PARTS_LEFT_OUT.map(|part| LEFT_OUT.max((part * count as f64) as usize).min(most));
+            let settled = ((SETTLING / decay.max(1e-9)) as usize).clamp(first, most);
             record.range.start = record.range.start.max(settled);
             if record.range.end == count {
-                record.range.end = count - least;
+                record.range.end = count - last;
             }
         }
     }

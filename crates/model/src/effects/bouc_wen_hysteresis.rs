@@ -1,7 +1,8 @@
 //! Hysteresis with memory, smooth, of joints and clamps.
 //!
 //! `n = k z`, `z' = x' − (b |x'| z + c x' |z|)` (`linear`; `shown`: the gage shows it), or with `m` in place of 1
-//! (`exponent`): `z' = x' − |s z|^m (b |x'| sgn z + c x')/s`, `s = b + |c|`. Y. K. Wen, *Method for random vibration of
+//! (`exponent`): `z' = x' − |s z|^m (b |x'| sgn z + c x')/s`, `s = b + |c|`. In `part` and `exponent-part` a share of the
+//! stand's own stiffness has it, `n = k (z − x)`: the record is then the whole stiffness times the displacement. Y. K. Wen, *Method for random vibration of
 //! hysteretic systems*, J. Eng. Mech. Div. 102 (1976), 249. **Valid without drift of the loops**; does
 //! not close small inner loops as metals do. Mistaken for `coulomb-friction` (its limit for a stiff joint),
 //! `structural-damping` at one level.
@@ -13,6 +14,13 @@ use super::{Action, Effect, Form, Memory, Parameter, Place, Torque};
 const PART: Parameter = Parameter::number("stiffness_ratio", 0.0, 50.0);
 const LOSS: Parameter = Parameter::motion("loss", -1, 0, 0.0, 100.0);
 const SHAPE: Parameter = Parameter::motion("shape", -1, 0, -100.0, 100.0);
+const SHARE: Parameter = Parameter::number("stiffness_share", 0.0, 1.0);
+const EXPONENT: Parameter = Parameter::number("exponent", 1.0, 5.0);
+const CURVED: &[&[f64]] = &[
+    &[0.1, 0.5, 0.1, 1.5],
+    &[0.5, 0.7, 0.3, 2.0],
+    &[0.2, 1.0, 0.3, 2.0],
+];
 const STARTS: &[&[f64]] = &[
     &[0.02, 0.5, 0.0],
     &[0.1, 0.5, 0.0],
@@ -44,15 +52,32 @@ pub(super) static EFFECT: Effect = Effect {
             build: |p| Action::shown(BoucWen::of(p)),
         },
         Form {
+            name: "part",
+            place: Place::Stand,
+            parameters: &[SHARE, LOSS, SHAPE],
+            starts: STARTS,
+            build: |p| Action::beside(Part::of(p)),
+        },
+        Form {
+            name: "exponent-part",
+            place: Place::Stand,
+            parameters: &[SHARE, LOSS, SHAPE, EXPONENT],
+            starts: CURVED,
+            build: |p| Action::beside(Part::of(p)),
+        },
+        Form {
             name: "exponent",
             place: Place::Stand,
-            parameters: &[PART, LOSS, SHAPE, Parameter::number("exponent", 1.0, 5.0)],
-            starts: &[
-                &[0.1, 0.5, 0.1, 1.5],
-                &[0.5, 0.7, 0.3, 2.0],
-                &[0.2, 1.0, 0.3, 2.0],
-            ],
+            parameters: &[PART, LOSS, SHAPE, EXPONENT],
+            starts: CURVED,
             build: |p| Action::beside(BoucWen::of(p)),
+        },
+        Form {
+            name: "exponent-shown",
+            place: Place::Stand,
+            parameters: &[PART, LOSS, SHAPE, EXPONENT],
+            starts: CURVED,
+            build: |p| Action::shown(BoucWen::of(p)),
         },
     ],
 };
@@ -105,5 +130,29 @@ impl Torque for BoucWen {
 
     fn begin(&self, x: f64) -> Memory {
         [0.0, x]
+    }
+}
+
+/// Part of the stand's own stiffness has the hysteresis: `n = k (z − x)`.
+struct Part {
+    whole: BoucWen,
+}
+
+impl Part {
+    fn of(p: &[f64]) -> Self {
+        Self {
+            whole: BoucWen::of(p),
+        }
+    }
+}
+
+impl Torque for Part {
+    fn value(&self, memory: &mut Memory, x: f64, speed: f64) -> f64 {
+        self.whole.value(memory, x, speed) - self.whole.ratio * x
+    }
+
+    fn begin(&self, x: f64) -> Memory {
+        // A joint that has not slipped yet.
+        [x, x]
     }
 }

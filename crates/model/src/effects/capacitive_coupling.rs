@@ -61,7 +61,7 @@ pub(super) static EFFECT: Effect = Effect {
         Form {
             name: "ac-coupled",
             place: Place::Chain,
-            parameters: &[Parameter::frequency("corner", 1e-6, 3.0)],
+            parameters: &[Parameter::frequency("corner", 1e-6, 3.0).fading()],
             starts: &[&[0.003], &[0.05], &[0.3]],
             build: |p| {
                 let corner = TAU * p[0];

@@ -18,6 +18,7 @@ const fn grid(hz: f64) -> Parameter {
         lower: 0.9975 * hz,
         upper: 1.0025 * hz,
         reciprocal: false,
+        fades: false,
     }
 }
 

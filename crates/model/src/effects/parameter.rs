@@ -15,6 +15,9 @@ pub struct Parameter {
     pub upper: f64,
     /// Whether a fit moves the reciprocal: zero is then an effect that is not there.
     pub reciprocal: bool,
+    /// Whether it is a corner in Hz with which what was before a record fades: an unknown share of that belongs to the
+    /// record.
+    pub fades: bool,
 }
 
 /// Unit of a parameter: recorded unit to a power, seconds to a power; or hertz.
@@ -70,6 +73,7 @@ impl Parameter {
             lower,
             upper,
             reciprocal: false,
+            fades: false,
         }
     }
 
@@ -83,6 +87,7 @@ impl Parameter {
             lower,
             upper,
             reciprocal: false,
+            fades: false,
         }
     }
 
@@ -102,6 +107,7 @@ impl Parameter {
             lower,
             upper,
             reciprocal: false,
+            fades: false,
         }
     }
 
@@ -112,6 +118,15 @@ impl Parameter {
         Self {
             reciprocal: true,
             ..Self::frequency(name, lower, upper)
+        }
+    }
+
+    /// The same, as a corner below the band with which what was before a record fades.
+    #[must_use]
+    pub const fn fading(self) -> Self {
+        Self {
+            fades: true,
+            ..self
         }
     }
 

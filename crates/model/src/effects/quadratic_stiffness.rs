@@ -36,6 +36,13 @@ pub(super) static EFFECT: Effect = Effect {
             starts: &[&[0.01]],
             build: |p| Action::beside(Odd { coefficient: p[0] }),
         },
+        Form {
+            name: "odd-shown",
+            place: Place::Stand,
+            parameters: &[Parameter::motion("coefficient", -1, 0, -0.3, 20.0)],
+            starts: &[&[0.01]],
+            build: |p| Action::shown(Odd { coefficient: p[0] }),
+        },
     ],
 };
 

@@ -38,7 +38,7 @@ pub(super) static EFFECT: Effect = Effect {
         Form {
             name: "second-order",
             place: Place::Chain,
-            parameters: &[CORNER, Parameter::number("damping_ratio", 0.2, 3.0)],
+            parameters: &[CORNER, Parameter::number("damping_ratio", 0.3, 3.0)],
             starts: &[&[1.0, 0.8], &[0.3, 0.8], &[0.1, 0.8]],
             build: |p| {
                 let (corner, damping) = (TAU * p[0], p[1]);

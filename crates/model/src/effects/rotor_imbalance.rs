@@ -43,4 +43,5 @@ const RATE: Parameter = Parameter {
     lower: 0.1,
     upper: 5000.0,
     reciprocal: false,
+    fades: false,
 };

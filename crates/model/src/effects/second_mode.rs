@@ -70,7 +70,8 @@ pub(super) static EFFECT: Effect = Effect {
         Form {
             name: "series",
             place: Place::Dynamics,
-            parameters: &[FREQUENCY, DAMPING],
+            // With more damping it is a low-pass of second order.
+            parameters: &[FREQUENCY, Parameter::number("damping_ratio", 1e-4, 0.3)],
             starts: starts!(),
             build: |p| {
                 let second = mode(p[0], p[1]);

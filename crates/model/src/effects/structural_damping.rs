@@ -48,5 +48,23 @@ pub(super) static EFFECT: Effect = Effect {
                 }))
             },
         },
+        Form {
+            name: "springpot-stiffness",
+            place: Place::Dynamics,
+            parameters: &[
+                Parameter::number("order", 0.0, 0.5),
+                Parameter::number("stiffness_ratio", 0.3, 3.0),
+            ],
+            starts: &[&[0.02, 1.0]],
+            build: |p| {
+                let (order, ratio) = (p[0], p[1]);
+                Action::Factor(Box::new(move |mode, omega| {
+                    let w = (omega / mode.omega_rad_s).abs().max(1e-4);
+                    let plain = mode.inverse(omega);
+                    let turn = (0.5 * std::f64::consts::PI * order).copysign(omega);
+                    plain / (plain - 1.0 + Complex64::from_polar(ratio * w.powf(order), turn))
+                }))
+            },
+        },
     ],
 };

@@ -17,7 +17,7 @@ pub(super) static EFFECT: Effect = Effect {
         name: "lag",
         place: Place::Chain,
         parameters: &[Parameter::motion("delay", 0, 1, 0.0, 20.0)],
-        starts: &[&[0.02], &[0.5], &[2.0]],
+        starts: &[&[0.02], &[0.5], &[1.0], &[2.0], &[4.0], &[7.0]],
         build: |p| {
             let delay_s = p[0];
             Action::Factor(Box::new(move |_, omega| {

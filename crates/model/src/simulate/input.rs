@@ -7,15 +7,16 @@ use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
 /// A record of the applied quantity, prepared for simulation.
 ///
-/// Beyond its ends the record is continued by point reflection that fades out, so that the transform,
-/// which takes it for periodic, meets no step. What that makes up differs from what was there before the
-/// record by an initial state of the stand.
+/// Beyond an end where it repeats, the record is continued by its period, beyond others by point reflection; both fade
+/// out, so that the transform, which takes it for periodic, meets no step. What that makes up differs from
+/// what was there before the record by an initial state of the stand.
 pub struct Input {
     samples: Vec<f64>,
     rate_hz: f64,
     start_s: f64,
     lead: usize,
     total: usize,
+    periods: [Option<usize>; 2],
     spectrum: Vec<Complex64>,
     forward: Arc<dyn RealToComplex<f64>>,
     backward: Arc<dyn ComplexToReal<f64>>,
@@ -34,6 +35,7 @@ impl Input {
         let forward = planner.plan_fft_forward(total);
         let backward = planner.plan_fft_inverse(total);
         let mut input = Self {
+            periods: periods(&samples),
             samples,
             rate_hz,
             start_s,
@@ -45,7 +47,7 @@ impl Input {
             substeps,
             fine: Vec::new(),
         };
-        input.spectrum = input.transform(&input.samples);
+        input.spectrum = input.transform_with(&input.samples, input.periods);
         input.fine = input.refine(substeps);
         input
     }
@@ -97,10 +99,15 @@ impl Input {
         &self.fine
     }
 
-    /// Spectrum of a record of the same length.
+    /// Spectrum of a record of the same length, that follows from the input: where that repeats at its end, it does, too;
+    /// how it was before it begins is not known.
     #[must_use]
     pub fn transform(&self, samples: &[f64]) -> Vec<Complex64> {
-        let mut extended = extend(samples, self.lead, self.total);
+        self.transform_with(samples, [None, self.periods[1]])
+    }
+
+    fn transform_with(&self, samples: &[f64], periods: [Option<usize>; 2]) -> Vec<Complex64> {
+        let mut extended = extend(samples, self.lead, self.total, periods);
         let mut spectrum = self.forward.make_output_vec();
         // The lengths are those that the plan was made for.
         let _ = self.forward.process(&mut extended, &mut spectrum);
@@ -148,18 +155,62 @@ impl Input {
     }
 }
 
-/// Continues a record by point reflection at its ends, fading to zero over `lead` samples.
-fn extend(samples: &[f64], lead: usize, total: usize) -> Vec<f64> {
+/// Continues a record at its ends, fading to zero over `lead` samples: by its period at the start and at the end where
+/// there is one, by point reflection otherwise.
+fn extend(samples: &[f64], lead: usize, total: usize, periods: [Option<usize>; 2]) -> Vec<f64> {
     let mut extended = vec![0.0; total];
     let count = samples.len();
     extended[lead..lead + count].copy_from_slice(samples);
     let (first, last) = (samples[0], samples[count - 1]);
     for k in 1..=lead.min(count - 1) {
         let fade = 0.5 + 0.5 * (std::f64::consts::PI * k as f64 / (lead + 1) as f64).cos();
-        extended[lead - k] = fade * (2.0 * first - samples[k]);
-        extended[lead + count - 1 + k] = fade * (2.0 * last - samples[count - 1 - k]);
+        // The last of a whole number of periods before sample −k or after sample count − 1 + k.
+        let before = match periods[0] {
+            Some(period) => samples[(period - k % period) % period],
+            None => 2.0 * first - samples[k],
+        };
+        let after = match periods[1] {
+            Some(period) => samples[count - period + (k - 1) % period],
+            None => 2.0 * last - samples[count - 1 - k],
+        };
+        extended[lead - k] = fade * before;
+        extended[lead + count - 1 + k] = fade * after;
     }
     extended
+}
+
+/// Samples that must repeat.
+const REPEATED: usize = 512;
+/// Shortest period.
+const SHORTEST: usize = 64;
+/// Mean square by which a repeated piece may differ, over that of the record.
+const DIFFERS: f64 = 1e-4;
+
+/// Periods with which a record begins and ends, where it does.
+fn periods(samples: &[f64]) -> [Option<usize>; 2] {
+    let reversed: Vec<f64> = samples.iter().rev().copied().collect();
+    [period(samples), period(&reversed)]
+}
+
+/// The period with which a record begins.
+fn period(samples: &[f64]) -> Option<usize> {
+    let size = samples.iter().map(|x| x * x).sum::<f64>() / samples.len() as f64;
+    let piece = &samples[..REPEATED.min(samples.len() / 4)];
+    // A quiet beginning repeats anything quiet.
+    let energy = piece.iter().map(|x| x * x).sum::<f64>();
+    if energy < 0.1 * size * piece.len() as f64 {
+        return None;
+    }
+    let most = DIFFERS * energy;
+    let repeats = |lag: &usize| {
+        let mut sum = 0.0;
+        let there = &samples[*lag..];
+        piece.iter().zip(there).all(|(a, b)| {
+            sum += (a - b) * (a - b);
+            sum <= most
+        })
+    };
+    (SHORTEST..samples.len().saturating_sub(piece.len())).find(repeats)
 }
 
 /// The least even length from `least` on that is a product of 2, 3 and 5.

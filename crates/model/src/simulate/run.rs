@@ -15,8 +15,8 @@ struct Run<'a> {
     step_s: f64,
     /// What a torque of one changes the speed by at a node.
     impulse: f64,
-    torques: &'a [Link<'a>],
-    memories: Vec<Memory>,
+    /// Torques that act at the nodes, with what they remember: all but sharp dry friction.
+    acting: Vec<(Link<'a>, Memory)>,
     /// Displacement by a constant load.
     shift: f64,
     /// Sharp dry friction, and the direction that the stand slides in: 0 while it sticks.
@@ -29,7 +29,7 @@ struct Run<'a> {
 pub(super) fn run(
     mode: &Mode,
     gain: f64,
-    torques: &[Link],
+    torques: &[Link<'_>],
     input: &Input,
     start: State,
     shift: f64,
@@ -42,10 +42,10 @@ pub(super) fn run(
         step: Step::new(mode, gain, step_s),
         step_s,
         impulse: mode.omega_rad_s * mode.omega_rad_s * step_s,
-        torques,
-        memories: torques
+        acting: torques
             .iter()
-            .map(|(t, _)| t.begin(start.x + shift))
+            .filter(|(torque, _)| torque.dry().is_none())
+            .map(|link| (*link, link.0.begin(start.x + shift)))
             .collect(),
         shift,
         dry: torques.iter().filter_map(|(t, _)| t.dry()).sum(),
@@ -86,19 +86,16 @@ impl Run<'_> {
     #[inline]
     fn kick(&mut self, moved: State, change: f64) -> State {
         let mut speed = moved.speed;
-        for ((torque, _), memory) in self.torques.iter().zip(&mut self.memories) {
-            if torque.dry().is_none() {
-                speed = torque.kick(memory, moved.x + self.shift, speed, change, self.impulse);
-            }
+        for ((torque, _), memory) in &mut self.acting {
+            speed = torque.kick(memory, moved.x + self.shift, speed, change, self.impulse);
         }
         State { x: moved.x, speed }
     }
 
     /// Sum of the torques, dry friction left out, at rest.
     fn held(&mut self, x: f64) -> f64 {
-        let pairs = self.torques.iter().zip(&mut self.memories);
-        pairs
-            .filter(|((torque, _), _)| torque.dry().is_none())
+        self.acting
+            .iter_mut()
             .map(|((torque, _), memory)| torque.value(memory, x + self.shift, 0.0))
             .sum()
     }
@@ -158,8 +155,8 @@ impl Run<'_> {
 
     /// Torques that the gage shows beside the displacement.
     fn shown(&mut self, state: State) -> f64 {
-        let pairs = self.torques.iter().zip(&mut self.memories);
-        pairs
+        self.acting
+            .iter_mut()
             .filter(|((_, shown), _)| *shown)
             .map(|((torque, _), memory)| torque.value(memory, state.x + self.shift, state.speed))
             .sum()
