@@ -16,6 +16,9 @@ use crate::stand::{self, Chain, Stand};
 /// Distance of the record from time zero, in its own lengths, up to which phases refer to zero.
 const FAR_FROM_ZERO: f64 = 10.0;
 
+/// Orders of the mains that are looked at.
+const MAINS_LINES: f64 = 5.0;
+
 /// Runs the verb.
 pub fn run(args: &Harmonics) -> Result<Outcome, Failure> {
     let stand = stand::read(&args.stand)?;
@@ -117,6 +120,9 @@ fn fit(
         .map(|c| component(c, inverse(c.frequency_hz), printed, stand, chain))
         .collect();
     report.warnings.extend(lost_warning(&report.components));
+    report
+        .warnings
+        .extend(mains_warning(&report.components, duration_s));
     Ok(())
 }
 
@@ -178,6 +184,32 @@ fn component(
         std_stand: of_stand.as_ref().map(|u| u.magnitude_relative * torque),
         phase_std_stand_deg: of_stand.as_ref().map(|u| u.phase_rad.to_degrees()),
     }
+}
+
+/// Orders of a slower shaft that lie where lines of the mains lie: one record cannot tell them apart.
+fn mains_warning(components: &[Component], duration_s: f64) -> Option<Warning> {
+    let doubtful: Vec<String> = components
+        .iter()
+        .filter(|c| c.order > 1.0 && c.torque > 5.0 * c.std)
+        .filter(|c| {
+            [50.0, 60.0].iter().any(|grid_hz| {
+                let line = (c.frequency_hz / grid_hz).round().clamp(1.0, MAINS_LINES) * grid_hz;
+                let slower = c.frequency_hz / c.order < 0.9 * grid_hz;
+                slower && (c.frequency_hz - line).abs() < 1.0 / duration_s
+            })
+        })
+        .map(|c| format!("{} ({:.2} Hz)", report::short(c.order), c.frequency_hz))
+        .collect();
+    (!doubtful.is_empty()).then(|| {
+        Warning::new(
+            "order-or-mains",
+            format!(
+                "orders {} lie where lines of the mains lie; at one speed order and mains cannot be told apart: record at \
+                 another speed, where an order moves and the mains stay",
+                doubtful.join(", ")
+            ),
+        )
+    })
 }
 
 fn lost_warning(components: &[Component]) -> Option<Warning> {

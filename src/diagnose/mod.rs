@@ -364,17 +364,17 @@ impl Diagnosis<'_> {
             return;
         }
         self.verdict = Verdict::Unexplained;
-        for one in self
-            .rounds
-            .iter_mut()
-            .flatten()
-            .filter(|t| t.status == Status::Accepted)
-        {
+        for one in self.rounds.iter_mut().flatten() {
+            let why = match one.status {
+                Status::Rejected => continue,
+                Status::Indistinguishable => "no effect is accepted".to_owned(),
+                Status::Accepted => format!(
+                    "it helps, but explains only {:.0} % of what is missing: something else is behind it",
+                    100.0 * explained.max(0.0)
+                ),
+            };
             one.status = Status::Rejected;
-            one.why = format!(
-                "it helps, but explains only {:.0} % of what is missing: something else is behind it",
-                100.0 * explained.max(0.0)
-            );
+            one.why = why;
         }
         self.after = self.before.clone();
         self.dependence = self.dependence_before.clone();

@@ -12,6 +12,11 @@ use crate::stand::{self, Refined, Stand};
 
 use super::read::Units;
 
+/// Factor between levels of excitation from which on errors are compared.
+const LEVELS_DIFFER: f64 = 1.2;
+/// Factor between relative errors at two levels from which on it is said.
+const ERRORS_DIFFER: f64 = 1.3;
+
 /// A diagnosis with what belongs to its report.
 pub struct Rendered<'a> {
     /// The command line.
@@ -260,10 +265,31 @@ impl Rendered<'_> {
                 parts.push("independent of input and motion as far as the tests see".to_owned())
             }
         }
+        parts.extend(self.grows_with_level());
         for line in &self.diagnosis.lines {
             parts.push(format!("a line at {} Hz", rounded(line.frequency_hz, 5)));
         }
         parts.join("; ")
+    }
+
+    /// Whether the plain stand does worse on one set of records than on the other, which is excited less or more.
+    fn grows_with_level(&self) -> Option<String> {
+        let d = self.diagnosis;
+        let size = d.before.fitted.structure.frame.rulers.rms / self.units.printed;
+        let before = self.rms(&d.before);
+        let relative = [before.train_rms / size, before.holdout_relative];
+        let level = self.levels[1] / self.levels[0];
+        let error = relative[1] / relative[0];
+        let differ = |ratio: f64, factor: f64| ratio.ln().abs() > factor.ln();
+        (differ(level, LEVELS_DIFFER) && differ(error, ERRORS_DIFFER)).then(|| {
+            format!(
+                "the plain stand leaves {:.1} % of the training records and {:.1} % of the held-out ones, which are excited {} times \
+                 as much: what it lacks depends on amplitude",
+                100.0 * relative[0],
+                100.0 * relative[1],
+                rounded(level, 3)
+            )
+        })
     }
 
     fn next_experiment(&self) -> Option<String> {
@@ -280,6 +306,15 @@ impl Rendered<'_> {
                 Verdict::PartlyExplained | Verdict::Unexplained
             )
         {
+            let follows = self.diagnosis.dependence.structure().map(|share| share.of);
+            if let Some(of) = follows.filter(|of| *of != "the input") {
+                let record = if of.contains("displacement") {
+                    "a slow load and unload over the whole range, and the response at two more levels"
+                } else {
+                    "free decays from several amplitudes, and the response at two more levels"
+                };
+                return Some(record.to_owned());
+            }
             let closest = rounds.last().into_iter().flatten().filter_map(|t| {
                 t.judged
                     .as_ref()
