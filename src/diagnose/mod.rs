@@ -10,6 +10,7 @@ mod record;
 mod search;
 mod spectra;
 mod structure;
+mod views;
 
 use torqcomp_model::effects::Rulers;
 
@@ -24,6 +25,7 @@ pub use record::{Begin, Record, dot};
 pub use search::{Status, Tried, parallel};
 pub use spectra::{Peak, lines};
 pub use structure::{Choice, Frame, Structure};
+pub use views::{Against, Trace, autocorrelation, binned, density, response};
 
 /// How the search ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -87,6 +89,8 @@ pub struct Diagnosis<'a> {
     pub lines: Vec<Peak>,
     /// How it ended.
     pub verdict: Verdict,
+    /// The records.
+    pub records: Records,
 }
 
 /// Error over the noise floor up to which nothing needs to be missing.
@@ -216,6 +220,7 @@ pub fn run<'a>(
         dependence_before,
         dependence,
         verdict: Verdict::NothingMissing,
+        records,
     };
     diagnosis.conclude();
     Ok(diagnosis)

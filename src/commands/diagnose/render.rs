@@ -1,12 +1,13 @@
 //! From a diagnosis to its report and to the refined stand file.
 
 use crate::cli::Diagnose;
-use crate::diagnose::{Constants, Dependence, Diagnosis, Judged, Status, Tried, Verdict};
+use crate::diagnose::{Constants, Dependence, Diagnosis, Judged, Status, Trace, Tried, Verdict};
 use crate::failure::Failure;
 use crate::io::digits;
 use crate::report::diagnose::{
     Candidate, Constant, Error, Levels, Line, Parameter, Report, Residual, Rms, SCHEMA,
 };
+use crate::report::diagnose_page::Sights;
 use crate::report::{Warning, rounded};
 use crate::stand::{self, Refined, Stand};
 
@@ -57,6 +58,26 @@ impl Rendered<'_> {
             next_experiment: self.next_experiment(),
             warnings: self.warnings.clone(),
             effects,
+        }
+    }
+
+    /// What the page shows beside the report, in the units of the report.
+    #[must_use]
+    pub fn sights(&self) -> Sights {
+        let printed = |mut traces: Vec<Trace>| {
+            let values = traces
+                .iter_mut()
+                .flat_map(|t| [&mut t.measured, &mut t.before, &mut t.after]);
+            values.flatten().for_each(|v| *v /= self.units.printed);
+            traces
+        };
+        let after = &self.diagnosis.after.fitted;
+        let (mode, _) = after.structure.mode(&after.values);
+        Sights {
+            trained: printed(self.diagnosis.trained()),
+            held_out: printed(self.diagnosis.held_out()),
+            applied_unit: stand::si_unit(&self.units.applied),
+            natural_hz: mode.omega_rad_s / std::f64::consts::TAU,
         }
     }
 
