@@ -1,6 +1,9 @@
 //! One effect put to the model: fitted on the training records, judged on the held-out ones.
 
+use std::sync::Arc;
+
 use torqcomp_model::effects::{Effect, Mode};
+use torqcomp_model::simulate::Input;
 
 use super::blocks::{Comparison, compare};
 use super::fit::{Fitted, Residual, difference, fit, look};
@@ -16,6 +19,79 @@ pub struct Records {
     pub hold: Vec<Record>,
     /// The plain mode, that free motion is taken from.
     pub reference: Mode,
+}
+
+impl Records {
+    /// Gives all records that many steps of integration from sample to sample.
+    pub fn set_substeps(&mut self, substeps: usize) {
+        set_substeps(self.train.iter_mut().chain(&mut self.hold), substeps);
+    }
+}
+
+/// Gives records that many steps of integration from sample to sample; records that share an input go on to share it.
+pub fn set_substeps<'r>(records: impl Iterator<Item = &'r mut Record>, substeps: usize) {
+    let mut made: Vec<(Arc<Input>, Arc<Input>)> = Vec::new();
+    for record in records {
+        let known = made.iter().find(|(old, _)| Arc::ptr_eq(old, &record.input));
+        let new = match known {
+            Some((_, new)) => new.clone(),
+            None => {
+                let new = Arc::new(record.input.with_substeps(substeps));
+                made.push((record.input.clone(), new.clone()));
+                new
+            }
+        };
+        record.input = new;
+    }
+}
+
+/// Error of the integration over the rms of the held-out residual, above which the step is halved.
+const STEP_ERROR: f64 = 0.1;
+/// Most steps from sample to sample.
+const MOST_SUBSTEPS: usize = 128;
+/// Rounds of a fit with a finer step.
+const FINER_ROUNDS: usize = 6;
+
+/// Halves the step of integration, and fits again, until its error no longer matters.
+#[must_use]
+pub fn refine_step<'a>(mut judged: Judged<'a>, records: &mut Records) -> Judged<'a> {
+    while judged.fitted.integrates() {
+        let substeps = records.train[0].input.substeps();
+        let Some(change) = step_change(&judged.fitted, &records.train[0]) else {
+            break;
+        };
+        if change <= STEP_ERROR * judged.hold_rms() || 2 * substeps > MOST_SUBSTEPS {
+            break;
+        }
+        records.set_substeps(2 * substeps);
+        let training = begun(&records.train, &judged.fitted);
+        let structure = judged.fitted.structure.clone();
+        let again = fit(
+            structure,
+            &judged.fitted.values,
+            &training,
+            &records.reference,
+            FINER_ROUNDS,
+        );
+        match again.ok().and_then(|fitted| judge(fitted, records)) {
+            Some(finer) => judged = finer,
+            None => break,
+        }
+    }
+    judged
+}
+
+/// Rms by which a record changes with half the step.
+fn step_change(fitted: &Fitted, record: &Record) -> Option<f64> {
+    let (mut model, _) = fitted.structure.model(&fitted.values);
+    let mut record = record.clone();
+    record.begin = *fitted.begins.first()?;
+    model.shift = record.begin.shift;
+    let coarse = difference(&model, &record).ok()?;
+    record.input = Arc::new(record.input.with_substeps(2 * record.input.substeps()));
+    let fine = difference(&model, &record).ok()?;
+    let sum: f64 = coarse.iter().zip(&fine).map(|(a, b)| (a - b).powi(2)).sum();
+    Some((sum / coarse.len() as f64).sqrt())
 }
 
 /// A model with its residuals.
@@ -162,7 +238,7 @@ pub fn judge<'a>(fitted: Fitted<'a>, records: &Records) -> Option<Judged<'a>> {
         let same = records
             .train
             .iter()
-            .position(|t| std::sync::Arc::ptr_eq(&t.input, &r.input));
+            .position(|t| Arc::ptr_eq(&t.input, &r.input));
         let mut record = r.clone();
         if let Some(place) = same {
             record.begin = fitted.begins[place];

@@ -8,6 +8,7 @@ mod floor;
 mod plain;
 mod record;
 mod search;
+mod series;
 mod spectra;
 mod structure;
 mod views;
@@ -16,13 +17,14 @@ use torqcomp_model::effects::Rulers;
 
 use crate::failure::Failure;
 
-pub use candidate::{Base, Judged, Records, judge};
+pub use candidate::{Base, Judged, Records, judge, set_substeps};
 pub use dependence::{Dependence, Share, Sight};
 pub use fit::{Fitted, Residual};
 pub use floor::Floor;
 pub use plain::Constants;
 pub use record::{Begin, Record, dot};
 pub use search::{Status, Tried, parallel};
+pub use series::Series;
 pub use spectra::{Peak, lines};
 pub use structure::{Choice, Frame, Structure};
 pub use views::{Against, Trace, autocorrelation, binned, density, response};
@@ -71,6 +73,8 @@ pub struct Case {
 
 /// What was found.
 pub struct Diagnosis<'a> {
+    /// The records; residuals are over the samples of each one's range.
+    pub records: Records,
     /// The declared model.
     pub declared: Option<Judged<'a>>,
     /// The plain stand, fitted.
@@ -202,7 +206,7 @@ pub fn run<'a>(
             refuse_second(&mut rounds);
             break;
         }
-        after = next;
+        after = candidate::refine_step(next, &mut records);
         if !remains(&after, &dependence(&after, &records), floor)
             || share(&before, &before, &after, floor) < NAMED
         {
@@ -210,9 +214,11 @@ pub fn run<'a>(
         }
     }
     let dependence = dependence(&after, &records);
+    let lines = prominent_lines(&after, &records);
     let mut diagnosis = Diagnosis {
+        records,
         declared,
-        lines: prominent_lines(&after, &records),
+        lines,
         before,
         after,
         rounds,

@@ -6,7 +6,7 @@ use torqcomp_model::Dimension;
 use torqcomp_model::simulate::{Input, substeps};
 
 use crate::cli::Diagnose;
-use crate::diagnose::{Begin, Case, Constants, Record};
+use crate::diagnose::{Begin, Case, Constants, Record, set_substeps};
 use crate::failure::Failure;
 use crate::io::csv::{NamedUnit, Options, Place};
 use crate::recording;
@@ -333,24 +333,8 @@ impl Read {
 
     fn refine_steps(&mut self, natural_hz: f64) {
         let steps = substeps(natural_hz, self.case.train[0].input.rate_hz());
-        if steps == FIRST_STEPS {
-            return;
-        }
-        let mut made: Vec<(Arc<Input>, Arc<Input>)> = Vec::new();
-        for record in self.case.train.iter_mut().chain(&mut self.case.hold) {
-            let known = made.iter().find(|(old, _)| Arc::ptr_eq(old, &record.input));
-            let finer = match known {
-                Some((_, new)) => new.clone(),
-                None => {
-                    let old = &record.input;
-                    let new =
-                        Input::new(old.samples().to_vec(), old.rate_hz(), old.start_s(), steps);
-                    let new = Arc::new(new);
-                    made.push((old.clone(), new.clone()));
-                    new
-                }
-            };
-            record.input = finer;
+        if steps != FIRST_STEPS {
+            set_substeps(self.case.train.iter_mut().chain(&mut self.case.hold), steps);
         }
     }
 

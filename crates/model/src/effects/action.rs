@@ -123,6 +123,12 @@ pub trait Torque: Send + Sync {
         0.0
     }
 
+    /// The size of a sharp dry friction: the integration then looks for the moments in which it switches and does not
+    /// call [`Torque::kick`].
+    fn dry(&self) -> Option<f64> {
+        None
+    }
+
     /// Whether the torque depends on where zero is: a constant load then matters.
     fn has_zero(&self) -> bool {
         false

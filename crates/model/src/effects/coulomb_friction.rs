@@ -4,10 +4,11 @@
 //! *Théorie des machines simples* (1781). **Valid where sliding is full**; before that a joint gives a
 //! hysteresis with memory. Mistaken for `bouc-wen-hysteresis` and `quadratic-damping`.
 //!
-//! Integration: for a fixed `x` the speed follows `x'' = −ω₀² F tanh(x'/v)` exactly,
-//! `sinh(x'/v) ∝ e^{−ω₀² F t/v}`, which cannot overshoot zero, so sticking does not chatter. Where the
-//! speed changes sign between two nodes, `v` is taken no less than half the change, so that the sum
-//! over the nodes has the friction switch at the right time.
+//! Integration: `sharp` friction is a constant torque between the moments in which the speed is zero, which are looked
+//! for; there the stand sticks if the other torques do not exceed the friction. For `tanh`, with `x` fixed, the
+//! speed follows `x'' = −ω₀² F tanh(x'/v)` exactly, `sinh(x'/v) ∝ e^{−ω₀² F t/v}`, which cannot overshoot zero; where
+//! the speed changes sign between two nodes, `v` is taken no less than half the change, so that the sum over
+//! the nodes has the friction switch at the right time.
 
 use super::{Action, Effect, Form, Memory, Parameter, Place, Torque};
 
@@ -69,13 +70,14 @@ impl Torque for Friction {
         }
     }
 
+    fn dry(&self) -> Option<f64> {
+        (self.speed == 0.0).then_some(self.torque)
+    }
+
     fn kick(&self, _: &mut Memory, _: f64, speed: f64, change: f64, impulse: f64) -> f64 {
         let width = self.speed.max(0.5 * change.abs());
         let loss = impulse * self.torque;
         let size = speed.abs();
-        if width == 0.0 {
-            return (size - loss).max(0.0).copysign(speed);
-        }
         if size - loss > 15.0 * width {
             return speed - loss.copysign(speed);
         }

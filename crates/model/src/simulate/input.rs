@@ -50,6 +50,12 @@ impl Input {
         input
     }
 
+    /// The same record with another number of steps.
+    #[must_use]
+    pub fn with_substeps(&self, substeps: usize) -> Self {
+        Self::new(self.samples.clone(), self.rate_hz, self.start_s, substeps)
+    }
+
     /// The samples.
     #[must_use]
     pub fn samples(&self) -> &[f64] {

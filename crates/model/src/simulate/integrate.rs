@@ -1,12 +1,11 @@
 //! Integration of `x'' + 2ζω₀ x' + ω₀² (x + n(x, x', z)) = ω₀² G u` in time.
 //!
 //! The linear part is exact: from node to node by the matrix exponential, the input between nodes as the cubic
-//! through four of them. The torques `n` act at the nodes, for the time of a whole step (Strang's
+//! through four of them. The torques `n` act at the nodes (`run`), for the time of a whole step (Strang's
 //! splitting, SIAM J. Numer. Anal. 5 (1968), 506): second order in the step, stable for any size of the
 //! linear terms, and a torque that switches is switched by its own exact flow.
 
-use super::input::Input;
-use crate::effects::{Memory, Mode, Torque};
+use crate::effects::Mode;
 
 /// Displacement and speed, in units of the record.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -37,11 +36,11 @@ pub fn substeps(natural_hz: f64, rate_hz: f64) -> usize {
 }
 
 /// One step of the linear part.
-struct Step {
+pub(super) struct Step {
     /// `x ← a x + b x'`, `x' ← c x + d x'`.
-    a: f64,
+    pub(super) a: f64,
     b: f64,
-    c: f64,
+    pub(super) c: f64,
     d: f64,
     /// What inputs at the nodes −1, 0, 1, 2 add to `x` and `x'`.
     to_x: [f64; 4],
@@ -49,7 +48,7 @@ struct Step {
 }
 
 /// Free motion after a time: the matrix exponential of the linear part.
-fn free(mode: &Mode, time_s: f64) -> [f64; 4] {
+pub(super) fn free(mode: &Mode, time_s: f64) -> [f64; 4] {
     let omega = mode.omega_rad_s;
     let sigma = mode.damping_ratio * omega;
     let square = omega * omega - sigma * sigma;
@@ -96,7 +95,7 @@ const GAUSS: [(f64, f64); 6] = [
 ];
 
 impl Step {
-    fn new(mode: &Mode, gain: f64, step_s: f64) -> Self {
+    pub(super) fn new(mode: &Mode, gain: f64, step_s: f64) -> Self {
         let [a, b, c, d] = free(mode, step_s);
         let mut to_x = [0.0; 4];
         let mut to_speed = [0.0; 4];
@@ -119,7 +118,7 @@ impl Step {
     }
 
     #[inline]
-    fn advance(&self, state: State, input: &[f64]) -> State {
+    pub(super) fn advance(&self, state: State, input: &[f64]) -> State {
         let force =
             |w: &[f64; 4]| w[0] * input[0] + w[1] * input[1] + w[2] * input[2] + w[3] * input[3];
         State {
@@ -137,53 +136,4 @@ fn cubic(t: f64) -> [f64; 4] {
         -(t + 1.0) * t * (t - 2.0) / 2.0,
         (t + 1.0) * t * (t - 1.0) / 6.0,
     ]
-}
-
-/// A torque in the stand, and whether the gage shows it.
-pub(super) type Link<'a> = (&'a dyn Torque, bool);
-
-/// What the gage shows at the samples, from an initial state on. A load that does not change, and so is not in the
-/// input, shifts the displacement that the torques see. Once the motion is not finite the rest is NaN.
-pub(super) fn run(
-    mode: &Mode,
-    gain: f64,
-    torques: &[Link],
-    input: &Input,
-    start: State,
-    shift: f64,
-) -> Vec<f64> {
-    let substeps = input.substeps();
-    let step_s = 1.0 / (input.rate_hz() * substeps as f64);
-    let step = Step::new(mode, gain, step_s);
-    let impulse = mode.omega_rad_s * mode.omega_rad_s * step_s;
-    let begin = |(torque, _): &Link| torque.begin(start.x + shift);
-    let mut memories: Vec<Memory> = torques.iter().map(begin).collect();
-    let mut state = start;
-    let mut samples = Vec::with_capacity(input.samples().len());
-    for (node, window) in input.fine().windows(4).enumerate() {
-        if node % substeps == 0 {
-            if !state.x.is_finite() {
-                break;
-            }
-            samples.push(state.x + shown(torques, &mut memories, state, shift));
-        }
-        let moved = step.advance(state, window);
-        let change = moved.speed - state.speed;
-        let mut speed = moved.speed;
-        for ((torque, _), memory) in torques.iter().zip(&mut memories) {
-            speed = torque.kick(memory, moved.x + shift, speed, change, impulse);
-        }
-        state = State { x: moved.x, speed };
-    }
-    samples.resize(input.samples().len(), f64::NAN);
-    samples
-}
-
-/// Torques that the gage shows beside the displacement.
-fn shown(torques: &[Link], memories: &mut [Memory], state: State, shift: f64) -> f64 {
-    let pairs = torques.iter().zip(memories);
-    pairs
-        .filter(|((_, shown), _)| *shown)
-        .map(|((torque, _), memory)| torque.value(memory, state.x + shift, state.speed))
-        .sum()
 }

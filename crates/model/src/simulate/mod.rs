@@ -7,7 +7,11 @@
 mod input;
 mod integrate;
 mod model;
+mod run;
 
 pub use input::Input;
 pub use integrate::{State, substeps};
 pub use model::{Fixed, Model};
+
+#[cfg(test)]
+mod tests;

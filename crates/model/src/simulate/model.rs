@@ -5,7 +5,8 @@ use std::sync::Arc;
 use num_complex::Complex64;
 
 use super::input::Input;
-use super::integrate::{self, Link, State, free_motion};
+use super::integrate::{State, free_motion};
+use super::run::{self, Link};
 use crate::effects::{Action, Clock, Mode, Place};
 
 /// A response that is known and not fitted, such as that of the recorder: of the frequency in Hz.
@@ -59,7 +60,7 @@ impl Model {
         let moved = if torques.is_empty() {
             self.respond(input)
         } else {
-            let samples = integrate::run(&self.mode, self.gain, &torques, input, start, self.shift);
+            let samples = run::run(&self.mode, self.gain, &torques, input, start, self.shift);
             if samples.last().is_none_or(|x| !x.is_finite()) {
                 return samples;
             }
@@ -71,7 +72,7 @@ impl Model {
     /// The record for an input when the stand is at rest before it, by integration in time.
     #[must_use]
     pub fn simulate_from(&self, input: &Input, start: State) -> Vec<f64> {
-        let samples = integrate::run(
+        let samples = run::run(
             &self.mode,
             self.gain,
             &self.torques(),

@@ -1,0 +1,167 @@
+//! The motion with the torques of the stand, node by node.
+
+use super::input::Input;
+use super::integrate::{State, Step, free};
+use crate::effects::{Memory, Mode, Torque};
+
+/// A torque in the stand, and whether the gage shows it.
+pub(super) type Link<'a> = (&'a dyn Torque, bool);
+
+/// The stand on its way through a record.
+struct Run<'a> {
+    mode: Mode,
+    gain: f64,
+    step: Step,
+    step_s: f64,
+    /// What a torque of one changes the speed by at a node.
+    impulse: f64,
+    torques: &'a [Link<'a>],
+    memories: Vec<Memory>,
+    /// Displacement by a constant load.
+    shift: f64,
+    /// Sharp dry friction, and the direction that the stand slides in: 0 while it sticks.
+    dry: f64,
+    direction: f64,
+}
+
+/// What the gage shows at the samples, from an initial state on. A load that does not change, and so is not in the
+/// input, shifts the displacement that the torques see. Once the motion is not finite the rest is NaN.
+pub(super) fn run(
+    mode: &Mode,
+    gain: f64,
+    torques: &[Link],
+    input: &Input,
+    start: State,
+    shift: f64,
+) -> Vec<f64> {
+    let substeps = input.substeps();
+    let step_s = 1.0 / (input.rate_hz() * substeps as f64);
+    let mut run = Run {
+        mode: *mode,
+        gain,
+        step: Step::new(mode, gain, step_s),
+        step_s,
+        impulse: mode.omega_rad_s * mode.omega_rad_s * step_s,
+        torques,
+        memories: torques
+            .iter()
+            .map(|(t, _)| t.begin(start.x + shift))
+            .collect(),
+        shift,
+        dry: torques.iter().filter_map(|(t, _)| t.dry()).sum(),
+        direction: if start.speed == 0.0 {
+            0.0
+        } else {
+            start.speed.signum()
+        },
+    };
+    let mut state = start;
+    let mut samples = Vec::with_capacity(input.samples().len());
+    for (node, window) in input.fine().windows(4).enumerate() {
+        if node % substeps == 0 {
+            if !state.x.is_finite() {
+                break;
+            }
+            samples.push(state.x + run.shown(state));
+        }
+        state = match (run.dry > 0.0, run.direction == 0.0) {
+            (false, _) => run.advance(state, window),
+            (true, true) => run.stick(state, window),
+            (true, false) => run.slide(state, window),
+        };
+    }
+    samples.resize(input.samples().len(), f64::NAN);
+    samples
+}
+
+impl Run<'_> {
+    /// A step without dry friction.
+    #[inline]
+    fn advance(&mut self, state: State, window: &[f64]) -> State {
+        let moved = self.step.advance(state, window);
+        self.kick(moved, moved.speed - state.speed)
+    }
+
+    /// What the torques do at a node.
+    #[inline]
+    fn kick(&mut self, moved: State, change: f64) -> State {
+        let mut speed = moved.speed;
+        for ((torque, _), memory) in self.torques.iter().zip(&mut self.memories) {
+            if torque.dry().is_none() {
+                speed = torque.kick(memory, moved.x + self.shift, speed, change, self.impulse);
+            }
+        }
+        State { x: moved.x, speed }
+    }
+
+    /// Sum of the torques, dry friction left out, at rest.
+    fn held(&mut self, x: f64) -> f64 {
+        let pairs = self.torques.iter().zip(&mut self.memories);
+        pairs
+            .filter(|((torque, _), _)| torque.dry().is_none())
+            .map(|((torque, _), memory)| torque.value(memory, x + self.shift, 0.0))
+            .sum()
+    }
+
+    /// A step of a stand that sticks: it is let go where the rest of the torques exceeds the friction.
+    fn stick(&mut self, state: State, window: &[f64]) -> State {
+        let rest = State {
+            x: state.x,
+            speed: 0.0,
+        };
+        let force = self.gain * window[2] - rest.x - self.held(rest.x);
+        if force.abs() > self.dry {
+            self.direction = force.signum();
+        }
+        rest
+    }
+
+    /// A step of a stand that slides: friction is a constant torque until the speed changes sign; there the stand
+    /// sticks or slides back.
+    fn slide(&mut self, state: State, window: &[f64]) -> State {
+        let friction = -self.dry * self.direction;
+        let linear = self.step.advance(state, window);
+        let moved = State {
+            x: linear.x + friction * (1.0 - self.step.a),
+            speed: linear.speed - friction * self.step.c,
+        };
+        let moved = self.kick(moved, moved.speed - state.speed);
+        if moved.speed * self.direction > 0.0 {
+            return moved;
+        }
+        let before = (state.speed * self.direction).max(0.0);
+        let part = before / (before + moved.speed.abs()).max(f64::MIN_POSITIVE);
+        let turned = state.x + 0.5 * part * self.step_s * state.speed;
+        let input = window[1] + part * (window[2] - window[1]);
+        let force = self.gain * input - turned - self.held(turned);
+        let rest = State {
+            x: turned,
+            speed: 0.0,
+        };
+        if force.abs() <= self.dry || force * self.direction > 0.0 {
+            self.direction = 0.0;
+            return rest;
+        }
+        // For the rest of the step friction has the other sign.
+        let [a, _, c, _] = free(&self.mode, (1.0 - part) * self.step_s);
+        let back = State {
+            x: moved.x - 2.0 * friction * (1.0 - a),
+            speed: moved.speed + 2.0 * friction * c,
+        };
+        if back.speed * self.direction >= 0.0 {
+            self.direction = 0.0;
+            return rest;
+        }
+        self.direction = -self.direction;
+        back
+    }
+
+    /// Torques that the gage shows beside the displacement.
+    fn shown(&mut self, state: State) -> f64 {
+        let pairs = self.torques.iter().zip(&mut self.memories);
+        pairs
+            .filter(|((_, shown), _)| *shown)
+            .map(|((torque, _), memory)| torque.value(memory, state.x + self.shift, state.speed))
+            .sum()
+    }
+}

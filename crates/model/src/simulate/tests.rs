@@ -1,0 +1,322 @@
+//! The simulator against closed forms and against an independent integrator at a far finer step.
+
+use std::f64::consts::TAU;
+
+use super::{Input, Model, State};
+use crate::effects::{Action, Effect, Mode, Place};
+
+const RATE_HZ: f64 = 20_000.0;
+const COUNT: usize = 2000;
+const MODE: Mode = Mode {
+    omega_rad_s: TAU * 590.0,
+    damping_ratio: 0.07,
+};
+/// Tones of the input: amplitude, frequency, phase. Their sum and its slope are zero at the start.
+const TONES: [(f64, f64); 4] = [(1.0, 80.0), (0.8, 310.0), (0.7, 620.0), (0.4, 1430.0)];
+
+/// Input that begins and ends smoothly, so that it is band-limited as it stands.
+fn input_at(time_s: f64) -> f64 {
+    let length_s = COUNT as f64 / RATE_HZ;
+    let fade = (0.5 * TAU * (time_s / length_s).clamp(0.0, 1.0))
+        .sin()
+        .powi(4);
+    let tones = TONES.iter().map(|(a, f)| a * (TAU * f * time_s).sin());
+    fade * tones.sum::<f64>()
+}
+
+fn input(substeps: usize) -> Input {
+    let samples = (0..COUNT).map(|i| input_at(i as f64 / RATE_HZ)).collect();
+    Input::new(samples, RATE_HZ, 0.0, substeps)
+}
+
+fn model(effect: &str, form: &str, values: &[f64]) -> Model {
+    let form = Effect::named(effect).unwrap().form(Some(form)).unwrap();
+    Model {
+        mode: MODE,
+        gain: 1.0,
+        recorder: None,
+        shift: 0.0,
+        actions: vec![(form.place, (form.build)(values))],
+    }
+}
+
+fn plain() -> Model {
+    Model {
+        mode: MODE,
+        gain: 1.0,
+        recorder: None,
+        shift: 0.0,
+        actions: Vec::new(),
+    }
+}
+
+fn rms(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0), |(s, n), v| (s + v * v, n + 1));
+    (sum / f64::from(count)).sqrt()
+}
+
+/// Runge's and Kutta's fourth-order rule on `(x, x', z)` with steps of a 200th of a sample.
+fn oracle(rates: impl Fn(f64, [f64; 3]) -> [f64; 3]) -> Vec<f64> {
+    const FINE: usize = 200;
+    let h = 1.0 / (RATE_HZ * FINE as f64);
+    let mut state = [0.0; 3];
+    let mut samples = Vec::new();
+    let moved =
+        |s: [f64; 3], k: [f64; 3], h: f64| [s[0] + h * k[0], s[1] + h * k[1], s[2] + h * k[2]];
+    for step in 0..(COUNT - 1) * FINE + 1 {
+        if step % FINE == 0 {
+            samples.push(state[0]);
+        }
+        let t = step as f64 * h;
+        let a = rates(t, state);
+        let b = rates(t + 0.5 * h, moved(state, a, 0.5 * h));
+        let c = rates(t + 0.5 * h, moved(state, b, 0.5 * h));
+        let d = rates(t + h, moved(state, c, h));
+        for i in 0..3 {
+            state[i] += h / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]);
+        }
+    }
+    samples
+}
+
+/// `x''` without the torques.
+fn linear(t: f64, s: [f64; 3]) -> f64 {
+    let w = MODE.omega_rad_s;
+    w * w * (input_at(t) - s[0]) - 2.0 * MODE.damping_ratio * w * s[1]
+}
+
+fn error(model: &Model, truth: &[f64], substeps: usize) -> f64 {
+    let found = model.simulate_from(&input(substeps), State::default());
+    rms(found.iter().zip(truth).map(|(a, b)| a - b)) / rms(truth.iter().copied())
+}
+
+#[test]
+fn both_ways_of_the_linear_stand_agree_with_the_oracle() {
+    let truth = oracle(|t, s| [s[1], linear(t, s), 0.0]);
+    let in_time = error(&plain(), &truth, 4);
+    assert!(in_time < 4e-5, "{in_time:e}");
+    // What the record is continued by backwards is forgotten in the second half.
+    let through_spectrum = plain().simulate(&input(4), State::default());
+    let late = COUNT / 2;
+    let difference = through_spectrum[late..]
+        .iter()
+        .zip(&truth[late..])
+        .map(|(a, b)| a - b);
+    let error = rms(difference) / rms(truth[late..].iter().copied());
+    assert!(error < 1e-6, "{error:e}");
+}
+
+/// From rest under a constant input: `1 − e^{−ζω₀t} (cos ω_d t + ζω₀/ω_d sin ω_d t)`.
+#[test]
+fn free_motion_is_the_closed_form() {
+    let [from_one, from_speed] = plain().free_motion(RATE_HZ, 100);
+    let sigma = MODE.damping_ratio * MODE.omega_rad_s;
+    let damped = MODE.omega_rad_s * (1.0 - MODE.damping_ratio.powi(2)).sqrt();
+    for i in 0..100 {
+        let t = i as f64 / RATE_HZ;
+        let decay = (-sigma * t).exp();
+        let expected = decay * ((damped * t).cos() + sigma / damped * (damped * t).sin());
+        assert!((from_one[i] - expected).abs() < 1e-12);
+        let expected = decay * MODE.omega_rad_s / damped * (damped * t).sin();
+        assert!((from_speed[i] - expected).abs() < 1e-12);
+    }
+}
+
+/// Error at two steps, which tells the order.
+fn converges(model: &Model, truth: &[f64], at_four: f64, at_sixteen: f64) {
+    let (coarse, fine) = (error(model, truth, 4), error(model, truth, 16));
+    println!("{coarse:e} {fine:e}");
+    assert!(coarse < at_four, "{coarse:e}");
+    assert!(fine < at_sixteen, "{fine:e}");
+}
+
+#[test]
+fn cubic_stiffness() {
+    let w2 = MODE.omega_rad_s.powi(2);
+    let truth = oracle(|t, s| [s[1], linear(t, s) - w2 * 0.02 * s[0].powi(3), 0.0]);
+    converges(
+        &model("cubic-stiffness", "beside", &[0.02]),
+        &truth,
+        1e-4,
+        6e-6,
+    );
+}
+
+#[test]
+fn quadratic_damping() {
+    let w2 = MODE.omega_rad_s.powi(2);
+    let d = 1e-8;
+    let truth = oracle(|t, s| [s[1], linear(t, s) - w2 * d * s[1] * s[1].abs(), 0.0]);
+    converges(
+        &model("quadratic-damping", "drag", &[d]),
+        &truth,
+        1e-4,
+        6e-6,
+    );
+}
+
+#[test]
+fn smooth_friction() {
+    let w2 = MODE.omega_rad_s.powi(2);
+    let truth = oracle(|t, s| [s[1], linear(t, s) - w2 * 0.2 * (s[1] / 200.0).tanh(), 0.0]);
+    converges(
+        &model("coulomb-friction", "tanh", &[0.2, 200.0]),
+        &truth,
+        4e-4,
+        3e-5,
+    );
+}
+
+#[test]
+fn gap() {
+    let w2 = MODE.omega_rad_s.powi(2);
+    let truth = oracle(|t, s| [s[1], linear(t, s) + w2 * s[0].clamp(-0.2, 0.2), 0.0]);
+    converges(&model("backlash", "gap-beside", &[0.2]), &truth, 2e-3, 3e-4);
+}
+
+#[test]
+fn hysteresis() {
+    let w2 = MODE.omega_rad_s.powi(2);
+    let truth = oracle(|t, s| {
+        let z = s[2];
+        let rate = s[1] - 0.5 * s[1].abs() * z - 0.2 * s[1] * z.abs();
+        [s[1], linear(t, s) - w2 * 0.4 * z, rate]
+    });
+    converges(
+        &model("bouc-wen-hysteresis", "linear", &[0.4, 0.5, 0.2]),
+        &truth,
+        4e-4,
+        3e-5,
+    );
+}
+
+/// Sharp friction by Heun's rule at a 400th of a sample: between sign changes a constant torque. A step in which the speed
+/// would change sign ends where it is zero; there the stand stays unless the rest of the torques exceeds the friction.
+fn dry_oracle(friction: f64) -> Vec<f64> {
+    let step = 1.0 / (RATE_HZ * 400.0);
+    let limit = MODE.omega_rad_s.powi(2) * friction;
+    let (mut t, mut x, mut v) = (0.0_f64, 0.0_f64, 0.0_f64);
+    let mut samples = vec![0.0];
+    for sample in 1..COUNT {
+        let end = sample as f64 / RATE_HZ;
+        while end - t > 1e-15 {
+            let mut h = step.min(end - t);
+            let free = linear(t, [x, v, 0.0]);
+            let sign = if v == 0.0 { free.signum() } else { v.signum() };
+            if v == 0.0 && free.abs() <= limit {
+                t += h;
+                continue;
+            }
+            let first = free - limit * sign;
+            let second = linear(t + h, [x + h * v, v + h * first, 0.0]) - limit * sign;
+            let mut next = v + 0.5 * h * (first + second);
+            if next * sign < 0.0 {
+                h *= v / (v - next);
+                next = 0.0;
+            }
+            x += 0.5 * h * (v + next);
+            v = next;
+            t += h;
+        }
+        samples.push(x);
+    }
+    samples
+}
+
+#[test]
+fn sharp_friction() {
+    for friction in [0.05, 0.4] {
+        let truth = dry_oracle(friction);
+        converges(
+            &model("coulomb-friction", "sharp", &[friction]),
+            &truth,
+            3e-4,
+            5e-5,
+        );
+    }
+}
+
+/// A stand that friction holds does not creep or chatter.
+#[test]
+fn a_stand_that_sticks_stays() {
+    let held = model("coulomb-friction", "sharp", &[100.0]);
+    let found = held.simulate_from(&input(4), State::default());
+    assert!(
+        found.iter().all(|x| *x == 0.0),
+        "{:?}",
+        found.iter().fold(0.0_f64, |m, x| m.max(x.abs()))
+    );
+}
+
+#[test]
+fn a_delay_of_whole_samples_shifts_the_record() {
+    let late = model("time-delay", "lag", &[5.0 / RATE_HZ]);
+    let (now, then) = (
+        plain().simulate(&input(1), State::default()),
+        late.simulate(&input(1), State::default()),
+    );
+    for i in 100..COUNT - 100 {
+        assert!((then[i] - now[i - 5]).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn effects_of_no_size_change_nothing() {
+    let base = plain().simulate_from(&input(4), State::default());
+    for (effect, form, values) in [
+        ("cubic-stiffness", "beside", vec![0.0]),
+        ("quadratic-stiffness", "even", vec![0.0]),
+        ("coulomb-friction", "sharp", vec![0.0]),
+        ("quadratic-damping", "drag", vec![0.0]),
+        ("backlash", "gap", vec![0.0]),
+        ("bouc-wen-hysteresis", "linear", vec![0.0, 1.0, 1.0]),
+        ("structural-damping", "loss-factor", vec![0.0]),
+        ("time-delay", "lag", vec![0.0]),
+        ("gain-error", "factor", vec![0.0]),
+        ("recorder-lowpass", "order-2", vec![f64::INFINITY]),
+        ("gage-nonlinearity", "both", vec![0.0, 0.0]),
+        ("saturation", "hard", vec![1e9]),
+        ("thermal-drift", "linear", vec![0.0]),
+        ("capacitive-coupling", "slope-of-load", vec![0.0]),
+    ] {
+        let with = model(effect, form, &values).simulate_from(&input(4), State::default());
+        let change = rms(with.iter().zip(&base).map(|(a, b)| a - b));
+        assert!(change < 1e-9, "{effect}: {change:e}");
+    }
+}
+
+#[test]
+fn what_the_chain_does_can_be_undone() {
+    for (effect, form, values) in [
+        ("gage-nonlinearity", "both", vec![0.02, 0.003]),
+        ("saturation", "soft", vec![9.0]),
+        ("saturation", "knee", vec![9.0, 3.0]),
+        ("thermal-drift", "exponential", vec![0.5, 0.02]),
+        ("thermal-drift", "sensitivity", vec![2.0]),
+    ] {
+        let model = model(effect, form, &values);
+        let (
+            _,
+            Action::Transform {
+                apply,
+                undo: Some(undo),
+            },
+        ) = &model.actions[0]
+        else {
+            panic!("{effect} has no way back");
+        };
+        let clock = crate::effects::Clock {
+            start_s: 0.0,
+            step_s: 1.0 / RATE_HZ,
+        };
+        let before: Vec<f64> = (0..200).map(|i| 3.0 * (0.1 * f64::from(i)).sin()).collect();
+        let mut samples = before.clone();
+        apply(clock, &mut samples);
+        assert!(samples != before);
+        undo(clock, &mut samples);
+        for (a, b) in samples.iter().zip(&before) {
+            assert!((a - b).abs() < 1e-9, "{effect}: {a} {b}");
+        }
+    }
+    assert!(Place::Stand < Place::Dynamics && Place::Gage < Place::Chain);
+}
