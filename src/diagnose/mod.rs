@@ -8,7 +8,6 @@ mod floor;
 mod plain;
 mod record;
 mod search;
-mod series;
 mod spectra;
 mod structure;
 mod views;
@@ -24,7 +23,6 @@ pub use floor::Floor;
 pub use plain::Constants;
 pub use record::{Begin, Record, dot};
 pub use search::{Status, Tried, parallel};
-pub use series::Series;
 pub use spectra::{Peak, lines};
 pub use structure::{Choice, Frame, Structure};
 pub use views::{Against, Trace, autocorrelation, binned, density, response};
@@ -93,8 +91,6 @@ pub struct Diagnosis<'a> {
     pub lines: Vec<Peak>,
     /// How it ended.
     pub verdict: Verdict,
-    /// The records.
-    pub records: Records,
 }
 
 /// Error over the noise floor up to which nothing needs to be missing.
@@ -226,7 +222,6 @@ pub fn run<'a>(
         dependence_before,
         dependence,
         verdict: Verdict::NothingMissing,
-        records,
     };
     diagnosis.conclude();
     Ok(diagnosis)
