@@ -7,6 +7,7 @@ mod bad_input;
 mod blind;
 mod blind_generator;
 mod compensate;
+mod diagnose;
 mod harmonics;
 mod identify;
 mod inspect;

@@ -29,6 +29,12 @@ pub(super) fn covariance(
     variance: impl Fn(usize) -> Option<f64>,
 ) -> (Covariance, Vec<Undetermined>) {
     let n = indices.len();
+    if n == 0 {
+        // Every parameter is held at a bound: nothing was fitted, and there is nothing to be uncertain about.
+        let places = vec![None; count];
+        let matrix = DMatrix::zeros(0, 0);
+        return (Covariance { places, matrix }, Vec::new());
+    }
     let norms: Vec<f64> = (0..n).map(|j| r.column(j).norm()).collect();
     let scaled = DMatrix::from_fn(n, n, |i, j| {
         if norms[j] > 0.0 {
