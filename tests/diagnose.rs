@@ -110,6 +110,23 @@ fn a_complete_stand_lacks_nothing() {
 }
 
 #[test]
+fn training_that_leaves_the_resonance_open_is_said() {
+    // A quarter of a logarithmic sweep ends at 19 Hz, far below the resonance.
+    let case = make(7, "none", 3).expect("the catalogue has it");
+    let folder = folder(&case);
+    let report = folder.json(&diagnose(&["--json"]));
+    let warnings = report["warnings"].as_array().expect("a list");
+    let open = warnings
+        .iter()
+        .find(|w| w["code"] == "training-leaves-constants-open");
+    let message = open.expect("a warning")["message"]
+        .as_str()
+        .expect("a text");
+    assert!(message.contains("the natural frequency to ±"), "{message}");
+    assert_eq!(report["effects"], serde_json::json!([]));
+}
+
+#[test]
 fn threads_do_not_change_a_byte() {
     let case = make(7, "gain-error", 3).expect("the catalogue has it");
     let folder = folder(&case);

@@ -13,6 +13,9 @@ use crate::stand::{self, Refined, Stand};
 
 use super::read::Units;
 
+/// Relative standard uncertainty of natural frequency and damping ratio above which held-out records say little.
+const MOST_OPEN: [f64; 2] = [0.005, 0.1];
+
 /// A diagnosis with what belongs to its report.
 pub struct Rendered<'a> {
     /// The command line.
@@ -56,7 +59,7 @@ impl Rendered<'_> {
             candidates: self.candidates(),
             residual: self.residual(),
             next_experiment: self.next_experiment(),
-            warnings: self.warnings.clone(),
+            warnings: [self.warnings.clone(), self.left_open()].concat(),
             effects,
         }
     }
@@ -79,6 +82,38 @@ impl Rendered<'_> {
             applied_unit: stand::si_unit(&self.units.applied),
             natural_hz: mode.omega_rad_s / std::f64::consts::TAU,
         }
+    }
+
+    /// What the training records do not determine well enough to judge held-out ones by it.
+    fn left_open(&self) -> Vec<Warning> {
+        let plain = &self.diagnosis.before.fitted;
+        let names = [
+            ("natural frequency", 0, MOST_OPEN[0]),
+            ("damping ratio", 1, MOST_OPEN[1]),
+        ];
+        let open = names.into_iter().filter_map(|(name, k, most)| {
+            let relative = plain.std[k].map(|s| s / plain.values[k].abs());
+            match relative {
+                Some(relative) if relative <= most => None,
+                Some(relative) => Some(format!(
+                    "the {name} to ± {} %",
+                    rounded(100.0 * relative, 2)
+                )),
+                None => Some(format!("the {name} not at all")),
+            }
+        });
+        let open: Vec<String> = open.collect();
+        if open.is_empty() {
+            return Vec::new();
+        }
+        vec![Warning::new(
+            "training-leaves-constants-open",
+            format!(
+                "the training records determine {}: what is left on held-out records may be that and no missing effect; \
+                 train on records that excite the resonance",
+                open.join(" and ")
+            ),
+        )]
     }
 
     fn printed_unit(&self) -> String {
