@@ -117,6 +117,31 @@ impl Stand {
         })
     }
 
+    /// Whether a response over frequency describes the stand with all its effects, down to rest.
+    #[must_use]
+    pub fn is_a_response(&self) -> bool {
+        let Ok(mode) = self.mode() else { return true };
+        self.effects
+            .iter()
+            .all(|declared| match declared.action().1 {
+                Action::Factor(factor) => factor(&mode, 0.0).norm() > 0.0,
+                Action::Feedthrough(_) => true,
+                _ => false,
+            })
+    }
+
+    /// Recorded per applied quantity at rest, in SI units; 1 for a stand that records torque.
+    #[must_use]
+    pub fn gain(&self) -> f64 {
+        match self.mechanics.as_ref().map(|m| &m.given) {
+            Some(Given::Modal {
+                static_gain: Some(gain),
+                ..
+            }) => gain.value,
+            _ => 1.0,
+        }
+    }
+
     /// What a compensation divides by: the response of the stand and the recorder, linear effects included.
     ///
     /// # Errors
@@ -138,8 +163,8 @@ impl Stand {
                 }
                 (_, _) => {
                     return Err(Failure::failed(format_args!(
-                        "{}: the effect \"{}\" cannot be taken out by a response over frequency; leave it \
-                         out to use the plain stand",
+                        "{}: the effect \"{}\" is no response over frequency; leave it out to use the plain \
+                         stand, or take it out of the record with compensate",
                         self.file, declared.effect.name
                     )));
                 }
