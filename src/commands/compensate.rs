@@ -264,6 +264,7 @@ fn describe(args: &Compensate, plan: &Plan, output: &str) -> Report {
         effects: refined::effects(stand, undo.as_ref()),
         seen_to_hz: None,
         lost: Vec::new(),
+        lines: Vec::new(),
         band_hz: band.top_hz(),
         band_end_hz: band.end_hz(),
         edge_s: filter.half_length() as f64 / band.sample_rate_hz(),

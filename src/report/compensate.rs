@@ -51,6 +51,8 @@ pub struct Report {
     pub seen_to_hz: Option<f64>,
     /// Times in which the record does not tell the torque.
     pub lost: Vec<LostSpan>,
+    /// Lines that were taken off.
+    pub lines: Vec<Line>,
     /// End of the part that is compensated in full.
     pub band_hz: f64,
     /// Frequency from which on nothing is passed.
@@ -77,6 +79,21 @@ pub struct Effect {
     /// `divided out`, `inverted`, `subtracted`, `integrated` (with memory, along the motion), or `marked` where it
     /// cannot be taken out.
     pub done: &'static str,
+}
+
+/// A line that was taken off, in the unit of the result as a record at rest has it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Line {
+    /// Its frequency.
+    pub frequency_hz: f64,
+    /// Its amplitude in the stand file.
+    pub amplitude: f64,
+    /// What the record has at this frequency, signal included.
+    pub recorded: f64,
+    /// Phase of its sine at the first sample.
+    pub phase_rad: f64,
+    /// Part of the amplitude that was taken off: less than 1 where the signal hides the phase.
+    pub share: f64,
 }
 
 /// A time in which the record does not tell the torque.

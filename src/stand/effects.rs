@@ -5,11 +5,16 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use torqcomp_dsp::compensate::Inverse;
 use torqcomp_model::Unit as TextUnit;
-use torqcomp_model::effects::{Action, EFFECTS, Effect, Form, Mode, Parameter, Place, Unit};
+use torqcomp_model::effects::{
+    Action, EFFECTS, Effect, Form, Frequency, Mode, Parameter, Place, Unit,
+};
 
 use super::section::Section;
 use super::{Given, Stand};
 use crate::failure::Failure;
+
+/// Frequency, over the natural one, that is next to rest.
+const NEAR_REST: f64 = 1e-6;
 
 /// An effect that the stand file declares.
 #[derive(Debug, Clone)]
@@ -188,6 +193,15 @@ impl Stand {
             through.inv()
         }))
     }
+}
+
+/// Whether a factor goes over into a constant at rest that is not zero, without a step: the impulse response of its
+/// inverse then dies out.
+#[must_use]
+pub fn is_smooth_at_rest(factor: &Frequency, mode: &Mode) -> bool {
+    let at_rest = factor(mode, 0.0);
+    let near = factor(mode, NEAR_REST * mode.omega_rad_s);
+    at_rest.norm() > 0.0 && (near - at_rest).norm() < 1e-3 * at_rest.norm()
 }
 
 fn along(action: &Action, mode: &Mode, omega_rad_s: f64, through: Complex64) -> Complex64 {

@@ -6,12 +6,14 @@ use num_complex::Complex64;
 use torqcomp_model::effects::Line;
 
 /// Distances from a line, in lines of the record's spectrum, at which the signal beside it is looked at: beyond
-/// the window's own width.
-const BESIDE: [f64; 4] = [3.0, 4.0, 5.0, 6.0];
+/// the window's own width, and over more than the spacing of a usual comb.
+const BESIDE: std::ops::RangeInclusive<u32> = 3..=20;
 /// Half waves above those of a course, over as many as it has, that tell how much of them is signal.
 const COURSE_BESIDE: usize = 2;
-/// How sure the record's own amplitude, compared with that of the stand, makes of a phase.
-const AGREEMENT: f64 = 8.0;
+/// Standard deviations of the noise within which the record's own amplitude agrees with that of the stand.
+const AGREEMENT: f64 = 4.0;
+/// Samples after which a turning phasor is set right.
+const TURNS: usize = 4096;
 
 /// A line as it was found in a record.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,8 +33,9 @@ pub struct FoundLine {
 /// Takes lines off a record: the amplitude is that of the stand, the phase that of the record.
 ///
 /// With a phasor `P = A e^{jφ} + S`, a known amplitude `A`, an unknown phase and signal `S` of variance `σ²` beside it,
-/// the mean of `A e^{jφ}` is `A I₁(κ)/I₀(κ) e^{j arg P}`, `κ = 2 A |P|/σ²`. `σ²` is the power at
-/// frequencies beside the line, or less if `|P|` agrees with `A` better than that.
+/// the mean of `A e^{jφ}` is `A I₁(κ)/I₀(κ) e^{j arg P}`, `κ = 2 A |P|/σ²`. `σ²` is the largest
+/// power at the frequencies beside the line, since a comb may have one of its lines there; that of the noise alone if
+/// `|P|` agrees with `A` as no signal would have it.
 pub fn take_lines(
     samples: &mut [f64],
     rate_hz: f64,
@@ -55,21 +58,17 @@ pub fn take_lines(
                     .iter()
                     .any(|other| (other.frequency_hz - hz).abs() < 2.5 * step_hz)
             };
-            let beside: Vec<f64> = BESIDE
-                .iter()
+            let signal = BESIDE
                 .flat_map(|d| {
-                    [
-                        line.frequency_hz - d * step_hz,
-                        line.frequency_hz + d * step_hz,
-                    ]
+                    [-1.0, 1.0].map(|side| line.frequency_hz + side * f64::from(d) * step_hz)
                 })
                 .filter(|hz| *hz > 2.0 * step_hz && !others(*hz))
                 .map(|hz| at(hz).norm_sqr())
-                .collect();
+                .fold(0.0, f64::max);
             let phasor = at(line.frequency_hz);
-            let signal = beside.iter().sum::<f64>() / beside.len().max(1) as f64;
             let off = phasor.norm() - line.amplitude;
-            let variance = signal.min(AGREEMENT * off * off + noise).max(noise);
+            let agrees = noise > 0.0 && off * off < AGREEMENT * AGREEMENT * noise;
+            let variance = if agrees { noise } else { signal.max(noise) };
             let share = if variance > 0.0 {
                 bessel_ratio(2.0 * line.amplitude * phasor.norm() / variance)
             } else {
@@ -99,10 +98,19 @@ fn phasor(samples: &[f64], cycles: f64) -> Complex64 {
     let mean = samples.iter().sum::<f64>() / count;
     let mut sum = Complex64::ZERO;
     let mut weights = 0.0;
+    let turn = Complex64::from_polar(1.0, -TAU * cycles);
+    let hann = Complex64::from_polar(1.0, TAU / count);
+    let (mut phase, mut window) = (Complex64::ONE, Complex64::ONE);
     for (i, sample) in samples.iter().enumerate() {
-        let weight = 0.5 - 0.5 * (TAU * (i as f64 + 0.5) / count).cos();
+        if i % TURNS == 0 {
+            phase = Complex64::from_polar(1.0, -TAU * cycles * i as f64);
+            window = Complex64::from_polar(1.0, TAU * (i as f64 + 0.5) / count);
+        }
+        let weight = 0.5 - 0.5 * window.re;
         weights += weight;
-        sum += weight * (sample - mean) * Complex64::from_polar(1.0, -TAU * cycles * i as f64);
+        sum += weight * (sample - mean) * phase;
+        phase *= turn;
+        window *= hann;
     }
     2.0 * sum / weights
 }

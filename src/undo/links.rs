@@ -65,6 +65,14 @@ impl Link {
         self.action.as_ref().is_some_and(what)
     }
 
+    /// Whether its inverse has an impulse response that dies out.
+    pub fn dies_out(&self, mode: &Mode) -> bool {
+        match &self.action {
+            Some(Action::Factor(factor)) => crate::stand::is_smooth_at_rest(factor, mode),
+            _ => true,
+        }
+    }
+
     /// Its factor at a frequency, with what comes before it.
     fn factor(&self, before: Complex64, mode: &Mode, hz: f64) -> Complex64 {
         let omega = std::f64::consts::TAU * hz;

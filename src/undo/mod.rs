@@ -101,8 +101,8 @@ impl Undo {
         let links: Arc<[Link]> = links::of(stand)?.into();
         let all = links.clone();
         let inverse: Inverse = Arc::new(move |hz| {
-            let passes = |link: &Link| !link.blocks(&mode);
-            mode.inverse(TAU * hz) / links::response(&all, &mode, hz, passes)
+            let regular = |link: &Link| link.dies_out(&mode);
+            mode.inverse(TAU * hz) / links::response(&all, &mode, hz, regular)
         });
         Ok(Self {
             filter: InverseFilter::design(inverse, band)?,
@@ -113,7 +113,7 @@ impl Undo {
         })
     }
 
-    /// The linear part of the way back, as far as it ends at rest.
+    /// The linear part of the way back, without factors whose inverse has no end in time.
     #[must_use]
     pub fn filter(&self) -> &InverseFilter {
         &self.filter

@@ -9,11 +9,11 @@ use super::{Extent, Plan, Run};
 use crate::cli::Compensate;
 use crate::commands::convert;
 use crate::failure::Failure;
-use crate::report::compensate::{Effect, LostSpan, Report};
+use crate::report::compensate::{Effect, Line, LostSpan, Report};
 use crate::report::{Warning, rounded};
 use crate::signal::Record;
 use crate::stand::Stand;
-use crate::undo::{Undo, Undone, treatment};
+use crate::undo::{FoundLine, Undo, Undone, treatment};
 
 /// Most samples of a record: about 100 bytes of memory each are needed.
 const MOST_SAMPLES: usize = 1 << 24;
@@ -21,8 +21,8 @@ const MOST_SAMPLES: usize = 1 << 24;
 const SPANS_TOLD: usize = 5;
 /// Weight of the filter's taps, relative to all, beyond which a lost sample no longer matters.
 const REACH: f64 = 0.01;
-/// Share of a line's amplitude below which its phase is not told by the record.
-const SURE: f64 = 0.9;
+/// Share of a line's amplitude below which its phase is not told by the record: from 0.2 rad on.
+const SURE: f64 = 0.98;
 /// Part of the record in which the direction of the motion is not known, from which it is worth a warning.
 const STILL: f64 = 0.02;
 
@@ -35,6 +35,8 @@ pub struct Found {
     reach_s: f64,
     start_s: f64,
     rate_hz: f64,
+    /// Printed units per SI unit of the record.
+    scale: f64,
 }
 
 /// Reads the record, takes it back and writes what came out.
@@ -76,6 +78,7 @@ pub fn run(args: &Compensate, plan: Plan, sink: &mut Sink) -> Result<Run, Failur
             reach_s: reach(filter.taps()) as f64 / record.rate_hz,
             start_s: record.start_s,
             rate_hz: record.rate_hz,
+            scale: scale / stand.gain(),
         }),
         resampled: record.resampled,
         noise,
@@ -163,6 +166,11 @@ pub fn effects(stand: &Stand, undo: Option<&Undo>) -> Vec<Effect> {
 pub fn complete(report: &mut Report, found: &Found) {
     let undone = &found.undone;
     report.seen_to_hz = undone.seen_to_hz;
+    report.lines = undone
+        .lines
+        .iter()
+        .map(|line| line_of(line, found))
+        .collect();
     if let (Some(noise), Some(rms)) = (&mut report.noise.record, found.noise_rms) {
         noise.compensated_rms = rms;
     }
@@ -182,7 +190,7 @@ pub fn complete(report: &mut Report, found: &Found) {
             "phase-hidden",
             format!(
                 "the record's own signal at {} Hz hides the phase of the line there: {} % of its amplitude was taken \
-                 off; record without excitation at this frequency",
+                 off, and some of it is left; record without excitation at this frequency",
                 rounded(line.frequency_hz, 5),
                 rounded(100.0 * line.share, 2)
             ),
@@ -197,6 +205,17 @@ pub fn complete(report: &mut Report, found: &Found) {
                 rounded(100.0 * still, 2)
             ),
         ));
+    }
+}
+
+/// A line in printed units.
+fn line_of(line: &FoundLine, found: &Found) -> Line {
+    Line {
+        frequency_hz: line.frequency_hz,
+        amplitude: line.amplitude * found.scale,
+        recorded: line.recorded * found.scale,
+        phase_rad: line.phase_rad,
+        share: line.share,
     }
 }
 
