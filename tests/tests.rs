@@ -13,6 +13,7 @@ mod identify;
 mod inspect;
 mod output;
 mod predict;
+mod refined;
 mod table;
 mod text_tables;
 mod thesis;
