@@ -445,6 +445,9 @@ pub struct Diagnose {
     /// Column with the time stamps
     #[arg(long, value_name = "NAME")]
     pub time_column: Option<String>,
+    /// Write a page for a browser: models beside the records, residuals, candidates
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
     /// Stand file to write, refined, for simulate and compensate
     #[arg(short, long, value_name = "OUT")]
     pub output: Option<String>,

@@ -12,3 +12,4 @@ pub mod recording;
 pub mod report;
 pub mod signal;
 pub mod stand;
+pub mod undo;

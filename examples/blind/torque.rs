@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::Command;
 
 use crate::blind::excitation::RATE_HZ;
-use crate::case::Answer;
+use crate::case::{Answer, Case};
 
 /// Errors of the recovered torque, rms in N m.
 pub struct Torque {
@@ -20,26 +20,29 @@ pub struct Torque {
 
 /// Runs both.
 pub fn check(answer: &Answer, binary: &Path) -> Torque {
-    let plain = answer.case.folder.join("plain.toml");
+    with_stand(&answer.case, binary, &answer.refined)
+}
+
+/// Runs the plain stand and another one.
+pub fn with_stand(case: &Case, binary: &Path, stand: &Path) -> Torque {
+    let plain = case.folder.join("plain.toml");
     Torque {
-        plain: recovered(answer, binary, &plain),
-        refined: recovered(answer, binary, &answer.refined),
-        floor: floor(answer),
+        plain: recovered(case, binary, &plain),
+        refined: recovered(case, binary, stand),
+        floor: floor(case),
     }
 }
 
-fn band_hz(answer: &Answer) -> f64 {
-    1.02 * answer.case.truth["records"]["top_hz"]
-        .as_f64()
-        .unwrap_or(2200.0)
+fn band_hz(case: &Case) -> f64 {
+    1.02 * case.truth["records"]["top_hz"].as_f64().unwrap_or(2200.0)
 }
 
 /// White noise through `1 − r² + 2jζr` up to the band's end and through its edge, a fifth as wide.
-fn floor(answer: &Answer) -> f64 {
-    let constants = &answer.case.truth["true_constants"];
+fn floor(case: &Case) -> f64 {
+    let constants = &case.truth["true_constants"];
     let number = |key: &str| constants[key].as_f64().unwrap_or(f64::NAN);
     let (natural_hz, ratio) = (number("natural_frequency_hz"), number("damping_ratio"));
-    let (band_hz, steps) = (band_hz(answer), 2400);
+    let (band_hz, steps) = (band_hz(case), 2400);
     let sum: f64 = (0..steps)
         .map(|step| {
             let part = 1.2 * (f64::from(step) + 0.5) / f64::from(steps);
@@ -48,22 +51,17 @@ fn floor(answer: &Answer) -> f64 {
             edge * edge * ((1.0 - r * r).powi(2) + (2.0 * ratio * r).powi(2))
         })
         .sum();
-    answer.case.floor() * (sum * 1.2 / f64::from(steps) * band_hz / (RATE_HZ / 2.0)).sqrt()
+    case.floor() * (sum * 1.2 / f64::from(steps) * band_hz / (RATE_HZ / 2.0)).sqrt()
 }
 
-fn recovered(answer: &Answer, binary: &Path, stand: &Path) -> Result<f64, String> {
-    let folder = &answer.case.folder;
+fn recovered(case: &Case, binary: &Path, stand: &Path) -> Result<f64, String> {
+    let folder = &case.folder;
     let output = Command::new(binary)
         .current_dir(folder)
-        .args([
-            "compensate",
-            "holdout.csv",
-            "--channel",
-            answer.case.column(),
-        ])
+        .args(["compensate", "holdout.csv", "--channel", case.column()])
         .args([
             "--band",
-            &format!("{} Hz", band_hz(answer).floor()),
+            &format!("{} Hz", band_hz(case).floor()),
             "-o",
             "-",
             "--stand",

@@ -1,5 +1,7 @@
 //! `compensate`: a recorded signal in, the torque that acted out.
 
+mod deliver;
+mod refined;
 mod sink;
 mod stream;
 mod whole;
@@ -22,6 +24,7 @@ use crate::report::svg::Traces;
 use crate::report::{self, Warning};
 use crate::signal::{Signal, Summary};
 use crate::stand::{self, Chain, Stand};
+use crate::undo::Undo;
 
 /// The band unless another is asked for, as far as the rate allows: that of the thesis.
 const DEFAULT_BAND_HZ: f64 = 2400.0;
@@ -40,6 +43,8 @@ struct Plan {
     stand: Stand,
     chain: Chain,
     filter: InverseFilter,
+    /// How effects are taken back that no filter describes, if there are any.
+    undo: Option<Undo>,
 }
 
 /// What a run found out.
@@ -51,6 +56,8 @@ struct Run {
     resampled: Option<resample::Resampled>,
     noise: Option<torqcomp_dsp::noise::RecordNoise>,
     traces: Option<Traces>,
+    /// What the way back through effects that no filter describes found.
+    refined: Option<refined::Found>,
 }
 
 /// Sums and ends of a result.
@@ -141,7 +148,9 @@ pub fn run(args: &Compensate) -> Result<Outcome, Failure> {
     let mut sink = Sink::open(args, &plan, output)?;
     report.output_signal = sink.describe();
     let unit = plan.chain.applied.unit.clone();
-    let run = if args.whole_record {
+    let run = if plan.undo.is_some() {
+        refined::run(args, plan, &mut sink)?
+    } else if args.whole_record {
         whole::run(args, plan, &mut sink)?
     } else {
         stream::run(args, plan, &mut sink)?
@@ -179,7 +188,6 @@ fn open_plot(path: &Path, args: &Compensate, inputs: &[&Path]) -> Result<Output,
 
 fn plan(args: &Compensate) -> Result<Plan, Failure> {
     let stand = stand::read(&args.stand)?;
-    let inverse = stand.inverse()?;
     let place = Place::of(&args.record.input);
     let signal = Signal::open(&place, &args.record.options())?;
     let chain = stand.chain(
@@ -192,12 +200,18 @@ fn plan(args: &Compensate) -> Result<Plan, Failure> {
         None => Band::fitting(signal.time.rate_hz, DEFAULT_BAND_HZ),
     }
     .map_err(|error| Failure::failed(error).at(&signal.source))?;
-    let filter = InverseFilter::design(inverse, band)?;
+    let (filter, undo) = if stand.is_a_response() {
+        (InverseFilter::design(stand.inverse()?, band)?, None)
+    } else {
+        let undo = Undo::new(&stand, band)?;
+        (undo.filter().clone(), Some(undo))
+    };
     Ok(Plan {
         signal,
         stand,
         chain,
         filter,
+        undo,
     })
 }
 
@@ -218,6 +232,7 @@ fn describe(args: &Compensate, plan: &Plan, output: &str) -> Report {
         stand,
         chain,
         filter,
+        undo,
     } = plan;
     let band = filter.band();
     let gain = NoiseGain::of(filter, GAIN_POINTS);
@@ -241,11 +256,15 @@ fn describe(args: &Compensate, plan: &Plan, output: &str) -> Report {
         rate_hz: signal.time.rate_hz,
         rate_from: signal.time.rate_from(),
         start_s: 0.0,
-        method: if args.whole_record {
-            "whole-record"
-        } else {
-            "stream"
+        method: match undo {
+            Some(_) => "refined",
+            None if args.whole_record => "whole-record",
+            None => "stream",
         },
+        effects: refined::effects(stand, undo.as_ref()),
+        seen_to_hz: None,
+        lost: Vec::new(),
+        lines: Vec::new(),
         band_hz: band.top_hz(),
         band_end_hz: band.end_hz(),
         edge_s: filter.half_length() as f64 / band.sample_rate_hz(),
@@ -286,6 +305,9 @@ fn complete(report: &mut Report, run: &Run) {
         above_band_rms: noise.above_band_rms,
         lost_hz: noise.lost.iter().map(|(from, to)| [*from, *to]).collect(),
     });
+    if let Some(found) = &run.refined {
+        refined::complete(report, found);
+    }
     let mut warnings = Vec::new();
     warnings.extend(run.summary.lost.clone());
     warnings.extend(run.summary.warnings.clone());

@@ -34,6 +34,14 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
         Some(place) => Some(Output::open(Some(place), args.force, &files)?),
         None => None,
     };
+    let page = match &args.html {
+        Some(place) => Some(Output::open(
+            Some(&place.display().to_string()),
+            args.force,
+            &files,
+        )?),
+        None => None,
+    };
     let mut output = Output::open(None, args.force, &files)?;
     let mut read = read::read(args, stand.as_ref().map(|(stand, _)| stand))?;
     let (frame, found) = diagnose::prepare(&mut read.case)?;
@@ -66,6 +74,10 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
         let text = rendered.stand(stand.as_ref().map(|(stand, text)| (stand, text.as_str())))?;
         refined.write(text.as_bytes())?;
         refined.finish()?;
+    }
+    if let Some(mut page) = page {
+        page.write(report.page(&rendered.sights()).as_bytes())?;
+        page.finish()?;
     }
     let text = if args.json {
         report::json(&report)

@@ -85,6 +85,9 @@ pub(crate) fn convert(chain: &Chain, values: &mut [f64]) -> Result<(), (usize, S
         Err(ConversionError::Sample { index, source }) => return Err((index, source.to_string())),
         Err(other) => return Err((0, other.to_string())),
     }
+    if chain.zero != 0.0 {
+        values.iter_mut().for_each(|v| *v -= chain.zero);
+    }
     match first_impossible(values) {
         Some(index) => Err((
             index,

@@ -9,10 +9,10 @@ mod plain;
 mod record;
 mod refuse;
 mod search;
-mod series;
 mod spectra;
 mod starts;
 mod structure;
+mod views;
 
 use torqcomp_model::effects::Rulers;
 
@@ -26,9 +26,9 @@ pub use plain::Constants;
 pub use record::{Begin, Record, dot};
 pub use refuse::{apart, check};
 pub use search::{Status, Tried, parallel};
-pub use series::Series;
 pub use spectra::{Peak, lines};
 pub use structure::{Choice, Frame, Structure};
+pub use views::{Against, Trace, autocorrelation, binned, density, response};
 
 /// How the search ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -43,14 +43,15 @@ const LEAST_SHARE: f64 = 0.005;
 const LEAST_SIGNIFICANCE: f64 = 3.0;
 /// Significance up to which one effect counts as no better than another.
 const WITHIN_CHANCE: f64 = 2.33;
-/// Gain of a first look, over the largest of all, from which on a second one follows.
-const FOLLOWED_UP: f64 = 0.03;
+/// Gain of a first look, over the largest of all, from which on a second one follows; beside an effect that is accepted
+/// already, where each look costs more and finds less.
+const FOLLOWED_UP: [f64; 2] = [0.03, 0.1];
 /// Gain of a second look, over the largest of all, from which on a fit is taken to its end.
 const PROMISING: f64 = 0.5;
 /// Least such gain in variances of the residual: what does not pay for a parameter is not taken on.
 const PAYS: f64 = 5.0;
-/// Forms that are fitted to the end at most, ties aside.
-const MOST_FITS: usize = 12;
+/// Forms that are fitted to the end at most, ties aside; and beside an effect.
+const MOST_FITS: [usize; 2] = [12, 6];
 /// Difference of the criterion on all records that counts as none.
 const SAME: f64 = 4.0;
 /// Lines of the residual's spectrum that may be that of a shaft.
@@ -147,7 +148,8 @@ fn fit_all<'a>(
         found
     });
     let most = first.iter().flatten().map(|f| whole - f.train_sum);
-    let least = FOLLOWED_UP * most.fold(0.0, f64::max);
+    let later = usize::from(!base.judged.fitted.structure.choices.is_empty());
+    let least = FOLLOWED_UP[later] * most.fold(0.0, f64::max);
     let second = parallel(jobs.len(), threads, |k| {
         let looks = first[k].iter().map(|look| {
             let followed = !look.converged && whole - look.train_sum >= least;
@@ -160,7 +162,7 @@ fn fit_all<'a>(
     let mut gains: Vec<f64> = second.iter().map(gain).collect();
     gains.sort_by(|a, b| b.total_cmp(a));
     let least = gains
-        .get(MOST_FITS)
+        .get(MOST_FITS[later])
         .copied()
         .unwrap_or(0.0)
         .max(PROMISING * gains.first().copied().unwrap_or(0.0))

@@ -9,8 +9,8 @@ use super::rounded;
 const WIDTH: f64 = 720.0;
 const HEIGHT: f64 = 300.0;
 const LEFT: f64 = 74.0;
-const RIGHT: f64 = 14.0;
-const TOP: f64 = 34.0;
+const RIGHT: f64 = 26.0;
+const TOP: f64 = 30.0;
 const BOTTOM: f64 = 46.0;
 /// Columns that a long series is drawn as the envelope of.
 const COLUMNS: usize = 900;
@@ -27,6 +27,7 @@ svg .s0{stroke:#b8690a;fill:#b8690a}svg .s1{stroke:#1f5fa8;fill:#1f5fa8}\
 svg .s2{stroke:#2b7d3d;fill:#2b7d3d}svg .s3{stroke:#8a3f99;fill:#8a3f99}\
 svg polyline{fill:none!important}svg .s1.line{stroke-dasharray:7 3}svg .s2.line{stroke-dasharray:2 3}\
 svg .band{stroke:none;opacity:.2}\
+svg.swatch{display:inline;width:28px;height:8px}.key span{margin-right:1.2rem;white-space:nowrap;font-size:.85em}\
 @media(prefers-color-scheme:dark){svg .s0{stroke:#eda94c;fill:#eda94c}svg .s1{stroke:#74b3f5;fill:#74b3f5}\
 svg .s2{stroke:#7ccb8c;fill:#7ccb8c}svg .s3{stroke:#d294df;fill:#d294df}}";
 
@@ -47,6 +48,8 @@ pub struct Chart {
     pub series: Vec<Series>,
     /// Ranges drawn behind the series: x, low, high.
     pub band: Vec<(f64, f64, f64)>,
+    /// Colour of the first series: what is the same on several charts has the same colour on all of them.
+    pub first_colour: usize,
 }
 
 /// A series of a chart.
@@ -117,9 +120,8 @@ impl Chart {
         self.frame(&mut svg, &x, &y);
         self.draw_band(&mut svg, &x, &y);
         for (k, series) in self.series.iter().enumerate() {
-            draw(&mut svg, series, k % 4, &x, &y);
+            draw(&mut svg, series, self.colour(k), &x, &y);
         }
-        self.legend(&mut svg);
         svg.push_str("</svg>\n");
         svg
     }
@@ -176,25 +178,28 @@ impl Chart {
         let points: Vec<String> = there.chain(back).collect();
         let _ = writeln!(
             svg,
-            "<polygon class=\"band s0\" points=\"{}\"/>",
+            "<polygon class=\"band s{}\" points=\"{}\"/>",
+            self.colour(0),
             points.join(" ")
         );
     }
 
-    fn legend(&self, svg: &mut String) {
-        let mut at = WIDTH - RIGHT;
-        for (k, series) in self.series.iter().enumerate().rev() {
-            at -= 7.0 * series.name.chars().count() as f64 + 44.0;
-            let _ = writeln!(
-                svg,
-                "<line class=\"line s{}\" x1=\"{at:.0}\" y1=\"14\" x2=\"{:.0}\" y2=\"14\"/>\
-                 <text x=\"{:.0}\" y=\"18\">{}</text>",
-                k % 4,
-                at + 24.0,
-                at + 30.0,
+    fn colour(&self, series: usize) -> usize {
+        (self.first_colour + series) % 4
+    }
+
+    /// Which line is which, as text beside a piece of each: a page sets it in lines as wide as the screen.
+    #[must_use]
+    pub fn key(&self) -> String {
+        let entry = |(k, series): (usize, &Series)| {
+            format!(
+                "<span><svg class=\"swatch\" viewBox=\"0 0 28 8\" aria-hidden=\"true\">\
+                 <polyline class=\"line s{}\" points=\"0,4 28,4\"/></svg> {}</span>",
+                self.colour(k),
                 escaped(&series.name)
-            );
-        }
+            )
+        };
+        self.series.iter().enumerate().map(entry).collect()
     }
 }
 
@@ -299,9 +304,16 @@ impl Scale {
         if self.log && self.high - self.low > 1.2 {
             let every = ((self.high - self.low) / 6.0).ceil().max(1.0) as i32;
             let (from, to) = (self.low.ceil() as i32, self.high.floor() as i32);
-            return (from..=to)
+            let powers = (from..=to)
                 .filter(|d| d % every == 0)
-                .map(|d| 10_f64.powi(d))
+                .map(|d| 10_f64.powi(d));
+            if to - from >= 3 {
+                return powers.collect();
+            }
+            // Few powers are too few to read from: 2 and 5 times them as well.
+            return (from - 1..=to)
+                .flat_map(|d| [1.0, 2.0, 5.0].map(|f| f * 10_f64.powi(d)))
+                .filter(|v| (self.low..=self.high).contains(&v.log10()))
                 .collect();
         }
         let value = |place: f64| if self.log { 10_f64.powf(place) } else { place };

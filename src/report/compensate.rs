@@ -43,8 +43,16 @@ pub struct Report {
     pub rate_from: String,
     /// First time of the result.
     pub start_s: f64,
-    /// `stream` or `whole-record`.
+    /// `stream`, `whole-record`, or `refined` for a stand with effects that no filter describes.
     pub method: &'static str,
+    /// Effects of the stand that were taken out, the last link of the chain first.
+    pub effects: Vec<Effect>,
+    /// Highest frequency of the record that curves and torques of the stand were evaluated with.
+    pub seen_to_hz: Option<f64>,
+    /// Times in which the record does not tell the torque.
+    pub lost: Vec<LostSpan>,
+    /// Lines that were taken off.
+    pub lines: Vec<Line>,
     /// End of the part that is compensated in full.
     pub band_hz: f64,
     /// Frequency from which on nothing is passed.
@@ -59,6 +67,44 @@ pub struct Report {
     pub noise: Noise,
     /// What should be known.
     pub warnings: Vec<Warning>,
+}
+
+/// An effect that was taken out.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Effect {
+    /// Its name.
+    pub effect: &'static str,
+    /// Its form.
+    pub form: &'static str,
+    /// `divided out`, `inverted`, `subtracted`, `integrated` (with memory, along the motion), or `marked` where it
+    /// cannot be taken out.
+    pub done: &'static str,
+}
+
+/// A line that was taken off, in the unit of the result as a record at rest has it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Line {
+    /// Its frequency.
+    pub frequency_hz: f64,
+    /// Its amplitude in the stand file.
+    pub amplitude: f64,
+    /// What the record has at this frequency, signal included.
+    pub recorded: f64,
+    /// Phase of its sine at the first sample.
+    pub phase_rad: f64,
+    /// Part of the amplitude that was taken off: less than 1 where the signal hides the phase.
+    pub share: f64,
+}
+
+/// A time in which the record does not tell the torque.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LostSpan {
+    /// The effect that took it away.
+    pub effect: &'static str,
+    /// First sample.
+    pub from_s: f64,
+    /// Last sample.
+    pub to_s: f64,
 }
 
 /// A result in figures, in its unit.
@@ -157,6 +203,9 @@ impl Report {
                 rounded(1e3 * self.edge_s, 3)
             ),
         );
+        if !self.effects.is_empty() {
+            line("effects", self.effects_text());
+        }
         line("gain", self.noise.gain_text());
         line("noise", self.noise.record_text(&self.unit));
         let result = &self.result;
@@ -173,6 +222,14 @@ impl Report {
         );
         line("output", self.output.clone());
         text
+    }
+}
+
+impl Report {
+    fn effects_text(&self) -> String {
+        let each = |e: &Effect| format!("{} ({}) {}", e.effect, e.form, e.done);
+        let list: Vec<String> = self.effects.iter().map(each).collect();
+        list.join(", ")
     }
 }
 

@@ -3,6 +3,7 @@
 pub mod chart;
 pub mod compensate;
 pub mod diagnose;
+pub mod diagnose_page;
 pub mod harmonics;
 pub mod identify;
 pub mod inspect;

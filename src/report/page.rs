@@ -15,9 +15,13 @@ color:var(--ink);font:15px/1.5 system-ui,sans-serif;overflow-wrap:anywhere}h1{fo
 h2{font-size:1.1rem;margin:1.8rem 0 .5rem}p{margin:.4rem 0}.wide{overflow-x:auto}\
 table{border-collapse:collapse;font-variant-numeric:tabular-nums}\
 th,td{padding:.25rem .8rem .25rem 0;text-align:right;border-bottom:1px solid var(--faint);white-space:nowrap}\
-th:first-child,td:first-child{text-align:left}.warn{border-left:3px solid var(--mark);padding-left:.7rem}\
+th:first-child,td:first-child{text-align:left}\
+th.prose,td.prose{text-align:left;white-space:normal;min-width:15rem}.warn{border-left:3px solid var(--mark);padding-left:.7rem}\
 code{font-size:.9em}figure{margin:1rem 0}figcaption{font-weight:600;font-size:.95rem}\
-@media(max-width:480px){body{padding:.7rem;font-size:14px}svg text{font-size:19px!important}}";
+@media(max-width:480px){body{padding:.7rem;font-size:14px}svg text{font-size:16px!important}}";
+
+/// Letters of the longest cell above which a column holds sentences.
+const PROSE: usize = 36;
 
 /// A page under construction.
 #[derive(Debug, Clone, Default)]
@@ -55,14 +59,24 @@ impl Page {
         );
     }
 
-    /// A table; the first row is its head.
+    /// A table; the first row is its head. A column of sentences is set as text, one of numbers to the right.
     pub fn table(&mut self, rows: &[Vec<String>]) {
+        let width = rows.iter().map(Vec::len).max().unwrap_or(0);
+        let is_prose = |k: usize| {
+            let cells = rows.iter().filter_map(|row| row.get(k));
+            cells.map(|cell| cell.chars().count()).max().unwrap_or(0) > PROSE
+        };
+        let prose: Vec<bool> = (0..width).map(is_prose).collect();
         self.body.push_str("<div class=\"wide\"><table>\n");
         for (i, row) in rows.iter().enumerate() {
             let tag = if i == 0 { "th" } else { "td" };
             let cells: String = row
                 .iter()
-                .map(|cell| format!("<{tag}>{}</{tag}>", escaped(cell)))
+                .enumerate()
+                .map(|(k, cell)| {
+                    let class = if prose[k] { " class=\"prose\"" } else { "" };
+                    format!("<{tag}{class}>{}</{tag}>", escaped(cell))
+                })
                 .collect();
             let _ = writeln!(self.body, "<tr>{cells}</tr>");
         }
@@ -72,10 +86,10 @@ impl Page {
     /// A chart under its heading.
     pub fn chart(&mut self, chart: &Chart) {
         let caption = escaped(&chart.title);
-        let svg = chart.svg();
+        let (svg, key) = (chart.svg(), chart.key());
         let _ = writeln!(
             self.body,
-            "<figure><figcaption>{caption}</figcaption>\n{svg}</figure>"
+            "<figure><figcaption>{caption}</figcaption>\n<div class=\"key\">{key}</div>\n{svg}</figure>"
         );
     }
 

@@ -26,6 +26,8 @@ pub struct Chain {
     pub recorded_factor: f64,
     /// From the record in SI units to the applied quantity in SI units, at rest.
     pub conversion: Conversion,
+    /// Constant that a diagnosis found in the records, as the applied quantity at rest in SI units.
+    pub zero: f64,
     /// What comes out.
     pub applied: Applied,
     /// How the static constant came about, for people.
@@ -139,6 +141,7 @@ impl Stand {
         Ok(Chain {
             recorded_factor: named.unit.factor(),
             conversion: conversion.map_err(Failure::failed)?,
+            zero: self.diagnosed.offset,
             applied: torque(),
             described,
             relative_std,
@@ -177,6 +180,7 @@ impl Stand {
         Ok(Chain {
             recorded_factor: named.unit.factor(),
             conversion: Conversion::linear(slope, -slope * zero).map_err(Failure::failed)?,
+            zero: slope * self.diagnosed.offset,
             applied: applied_by_unit(&gain.applied_unit, units)?,
             described: "static gain of the stand file".to_owned(),
             relative_std: None,

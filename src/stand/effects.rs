@@ -5,11 +5,16 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use torqcomp_dsp::compensate::Inverse;
 use torqcomp_model::Unit as TextUnit;
-use torqcomp_model::effects::{Action, EFFECTS, Effect, Form, Mode, Parameter, Place, Unit};
+use torqcomp_model::effects::{
+    Action, EFFECTS, Effect, Form, Frequency, Mode, Parameter, Place, Unit,
+};
 
 use super::section::Section;
 use super::{Given, Stand};
 use crate::failure::Failure;
+
+/// Frequency, over the natural one, that is next to rest.
+const NEAR_REST: f64 = 1e-6;
 
 /// An effect that the stand file declares.
 #[derive(Debug, Clone)]
@@ -117,6 +122,31 @@ impl Stand {
         })
     }
 
+    /// Whether a response over frequency describes the stand with all its effects, down to rest.
+    #[must_use]
+    pub fn is_a_response(&self) -> bool {
+        let Ok(mode) = self.mode() else { return true };
+        self.effects
+            .iter()
+            .all(|declared| match declared.action().1 {
+                Action::Factor(factor) => factor(&mode, 0.0).norm() > 0.0,
+                Action::Feedthrough(_) => true,
+                _ => false,
+            })
+    }
+
+    /// Recorded per applied quantity at rest, in SI units; 1 for a stand that records torque.
+    #[must_use]
+    pub fn gain(&self) -> f64 {
+        match self.mechanics.as_ref().map(|m| &m.given) {
+            Some(Given::Modal {
+                static_gain: Some(gain),
+                ..
+            }) => gain.value,
+            _ => 1.0,
+        }
+    }
+
     /// What a compensation divides by: the response of the stand and the recorder, linear effects included.
     ///
     /// # Errors
@@ -138,8 +168,8 @@ impl Stand {
                 }
                 (_, _) => {
                     return Err(Failure::failed(format_args!(
-                        "{}: the effect \"{}\" cannot be taken out by a response over frequency; leave it \
-                         out to use the plain stand",
+                        "{}: the effect \"{}\" is no response over frequency; leave it out to use the plain \
+                         stand, or take it out of the record with compensate",
                         self.file, declared.effect.name
                     )));
                 }
@@ -163,6 +193,15 @@ impl Stand {
             through.inv()
         }))
     }
+}
+
+/// Whether a factor goes over into a constant at rest that is not zero, without a step: the impulse response of its
+/// inverse then dies out.
+#[must_use]
+pub fn is_smooth_at_rest(factor: &Frequency, mode: &Mode) -> bool {
+    let at_rest = factor(mode, 0.0);
+    let near = factor(mode, NEAR_REST * mode.omega_rad_s);
+    at_rest.norm() > 0.0 && (near - at_rest).norm() < 1e-3 * at_rest.norm()
 }
 
 fn along(action: &Action, mode: &Mode, omega_rad_s: f64, through: Complex64) -> Complex64 {

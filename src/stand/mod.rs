@@ -14,7 +14,7 @@ use torqcomp_dsp::recorder::Recorder;
 use torqcomp_model::{Estimate, ParameterStd, SecondOrder};
 
 pub use chain::{Applied, Chain, applied_by_unit};
-pub use effects::DeclaredEffect;
+pub use effects::{DeclaredEffect, is_smooth_at_rest};
 pub use file::parse;
 pub use file::read;
 pub use refine::{Refined, refine, si_unit};

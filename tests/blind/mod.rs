@@ -9,6 +9,7 @@
 
 pub mod catalogue;
 pub mod chain;
+pub mod declared;
 pub mod disturbance;
 pub mod draw;
 pub mod excitation;

@@ -229,3 +229,18 @@ fn places_where_the_model_fails_are_stepped_around() {
     close(fit.values[0], 0.01, 1e-6);
     assert_ne!(fit.stop, StopReason::Evaluations);
 }
+
+#[test]
+fn a_fit_with_nothing_left_free_ends_at_its_bound_without_uncertainty() {
+    // The data want −1; at 0 nothing is free any more.
+    let residuals = |p: &[f64], out: &mut Vec<f64>| {
+        out.extend((0..5).map(|_| p[0] + 1.0));
+        Ok(())
+    };
+    let start = [Parameter::new("size", 0.5).at_least(0.0)];
+    let fit = minimize(&residuals, &start, &Options::default()).expect("the bound is an answer");
+    assert_eq!(fit.values, [0.0]);
+    assert_eq!(fit.std, [None]);
+    assert_eq!(fit.at_bound, [true]);
+    assert!(fit.undetermined.is_empty());
+}

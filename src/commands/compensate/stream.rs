@@ -153,6 +153,7 @@ pub fn run(args: &Compensate, plan: Plan, sink: &mut Sink) -> Result<Run, Failur
             .and_then(|density| RecordNoise::of(&filter, &density))
             .map(in_print),
         traces,
+        refined: None,
     })
 }
 

@@ -1,12 +1,13 @@
 //! From a diagnosis to its report and to the refined stand file.
 
 use crate::cli::Diagnose;
-use crate::diagnose::{Constants, Dependence, Diagnosis, Judged, Status, Tried, Verdict};
+use crate::diagnose::{Constants, Dependence, Diagnosis, Judged, Status, Trace, Tried, Verdict};
 use crate::failure::Failure;
 use crate::io::digits;
 use crate::report::diagnose::{
     Candidate, Constant, Error, Levels, Line, Parameter, Report, Residual, Rms, SCHEMA,
 };
+use crate::report::diagnose_page::Sights;
 use crate::report::{Warning, rounded};
 use crate::stand::{self, Refined, Stand};
 
@@ -16,6 +17,8 @@ use super::read::Units;
 const LEVELS_DIFFER: f64 = 1.2;
 /// Factor between relative errors at two levels from which on it is said.
 const ERRORS_DIFFER: f64 = 1.3;
+/// Relative standard uncertainty of natural frequency and damping ratio above which held-out records say little.
+const MOST_OPEN: [f64; 2] = [0.005, 0.1];
 
 /// A diagnosis with what belongs to its report.
 pub struct Rendered<'a> {
@@ -60,9 +63,61 @@ impl Rendered<'_> {
             candidates: self.candidates(),
             residual: self.residual(),
             next_experiment: self.next_experiment(),
-            warnings: self.warnings.clone(),
+            warnings: [self.warnings.clone(), self.left_open()].concat(),
             effects,
         }
+    }
+
+    /// What the page shows beside the report, in the units of the report.
+    #[must_use]
+    pub fn sights(&self) -> Sights {
+        let printed = |mut traces: Vec<Trace>| {
+            let values = traces
+                .iter_mut()
+                .flat_map(|t| [&mut t.measured, &mut t.before, &mut t.after]);
+            values.flatten().for_each(|v| *v /= self.units.printed);
+            traces
+        };
+        let after = &self.diagnosis.after.fitted;
+        let (mode, _) = after.structure.mode(&after.values);
+        Sights {
+            trained: printed(self.diagnosis.trained()),
+            held_out: printed(self.diagnosis.held_out()),
+            applied_unit: stand::si_unit(&self.units.applied),
+            natural_hz: mode.omega_rad_s / std::f64::consts::TAU,
+        }
+    }
+
+    /// What the training records do not determine well enough to judge held-out ones by it.
+    fn left_open(&self) -> Vec<Warning> {
+        let plain = &self.diagnosis.before.fitted;
+        let names = [
+            ("natural frequency", 0, MOST_OPEN[0]),
+            ("damping ratio", 1, MOST_OPEN[1]),
+        ];
+        let open = names.into_iter().filter_map(|(name, k, most)| {
+            let relative = plain.std[k].map(|s| s / plain.values[k].abs());
+            match relative {
+                Some(relative) if relative <= most => None,
+                Some(relative) => Some(format!(
+                    "the {name} to ± {} %",
+                    rounded(100.0 * relative, 2)
+                )),
+                None => Some(format!("the {name} not at all")),
+            }
+        });
+        let open: Vec<String> = open.collect();
+        if open.is_empty() {
+            return Vec::new();
+        }
+        vec![Warning::new(
+            "training-leaves-constants-open",
+            format!(
+                "the training records determine {}: what is left on held-out records may be that and no missing effect; \
+                 train on records that excite the resonance",
+                open.join(" and ")
+            ),
+        )]
     }
 
     fn printed_unit(&self) -> String {

@@ -20,6 +20,8 @@
 //! end the result leans on that continuation.
 
 mod blocks;
+mod extension;
+mod fine;
 mod whole;
 mod windows;
 
@@ -33,6 +35,8 @@ use crate::Error;
 use crate::band::Band;
 
 pub use blocks::BlockConvolver;
+pub use extension::{Extension, Spectrum};
+pub use fine::Fine;
 pub use whole::whole_record;
 pub use windows::{Stream, Windows};
 
@@ -217,7 +221,18 @@ fn half_length(circular: &[f64], tolerance: f64) -> Option<usize> {
 
 /// Sample `index` of a record that is continued by point reflection about its end samples, and
 /// held constant where the record is too short for that.
-fn continued(samples: &[f64], index: isize) -> f64 {
+///
+/// ```
+/// use torqcomp_dsp::compensate::continued;
+/// // 2·1 − 4 = −2 before the start, 2·9 − 4 = 14 after the end.
+/// let record = [1.0, 4.0, 9.0];
+/// assert_eq!([continued(&record, -1), continued(&record, 3)], [-2.0, 14.0]);
+/// ```
+///
+/// # Panics
+/// If the record has no sample.
+#[must_use]
+pub fn continued(samples: &[f64], index: isize) -> f64 {
     let last = samples.len() - 1;
     if index < 0 {
         2.0 * samples[0] - samples[index.unsigned_abs().min(last)]

@@ -81,7 +81,7 @@ pub fn whole_record(filter: &InverseFilter, samples: &[f64]) -> Result<Vec<f64>,
 }
 
 /// Smallest even length of at least `least` samples with no prime factor above 5.
-fn fast_length(least: usize) -> usize {
+pub(super) fn fast_length(least: usize) -> usize {
     let mut best = least.next_power_of_two().max(2);
     let mut fives = 1;
     while fives <= best {

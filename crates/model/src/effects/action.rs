@@ -109,6 +109,18 @@ pub trait Torque: Send + Sync {
     /// The torque at a state; what is remembered moves on to it.
     fn value(&self, memory: &mut Memory, x: f64, speed: f64) -> f64;
 
+    /// The mean torque where the speed is known up to a standard uncertainty only: what switches with the sign of
+    /// the speed does so gradually.
+    fn blurred(&self, memory: &mut Memory, x: f64, speed: f64, speed_std: f64) -> f64 {
+        let _ = speed_std;
+        self.value(memory, x, speed)
+    }
+
+    /// Half the range of `x` about zero in which a gage that shows `x + n` shows nothing.
+    fn hidden(&self) -> f64 {
+        0.0
+    }
+
     /// The speed after the torque has acted for a short time, in which `x` stays:
     /// `impulse = ω₀² h`. `change` is what the speed changed by since the last node: a torque that
     /// switches with the sign of the speed does so somewhere in between.

@@ -102,6 +102,11 @@ impl Torque for Gap {
         -self.share * x.clamp(-self.gap, self.gap)
     }
 
+    fn hidden(&self) -> f64 {
+        // A soft gap shows its inside, if weakly.
+        if self.share < 1.0 { 0.0 } else { self.gap }
+    }
+
     fn has_zero(&self) -> bool {
         true
     }

@@ -74,6 +74,15 @@ impl Torque for Friction {
         (self.speed == 0.0).then_some(self.torque)
     }
 
+    /// `F tanh(x'/√(v² + πσ²/2))`: for `v = 0` it has the slope that the mean of `sgn` has at zero.
+    fn blurred(&self, memory: &mut Memory, x: f64, speed: f64, speed_std: f64) -> f64 {
+        let width = (0.5 * std::f64::consts::PI).sqrt() * speed_std;
+        if width == 0.0 {
+            return self.value(memory, x, speed);
+        }
+        self.torque * (speed / self.speed.hypot(width)).tanh()
+    }
+
     fn kick(&self, _: &mut Memory, _: f64, speed: f64, change: f64, impulse: f64) -> f64 {
         let width = self.speed.max(0.5 * change.abs());
         let loss = impulse * self.torque;

@@ -30,12 +30,10 @@ pub(super) fn covariance(
 ) -> (Covariance, Vec<Undetermined>) {
     let n = indices.len();
     if n == 0 {
-        // All parameters are held at their bounds.
-        let nothing = Covariance {
-            places: vec![None; count],
-            matrix: DMatrix::zeros(0, 0),
-        };
-        return (nothing, Vec::new());
+        // Every parameter is held at a bound: nothing was fitted, and there is nothing to be uncertain about.
+        let places = vec![None; count];
+        let matrix = DMatrix::zeros(0, 0);
+        return (Covariance { places, matrix }, Vec::new());
     }
     let norms: Vec<f64> = (0..n).map(|j| r.column(j).norm()).collect();
     let scaled = DMatrix::from_fn(n, n, |i, j| {

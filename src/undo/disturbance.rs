@@ -1,0 +1,223 @@
+//! Lines and slow courses that were added to a record: what belongs to the record is found in the record.
+
+use std::f64::consts::{PI, TAU};
+
+use num_complex::Complex64;
+use torqcomp_model::effects::Line;
+
+/// Distances from a line, in lines of the record's spectrum, at which the signal beside it is looked at: beyond
+/// the window's own width, and over more than the spacing of a usual comb.
+const BESIDE: std::ops::RangeInclusive<u32> = 3..=20;
+/// Half waves above those of a course, over as many as it has, that tell how much of them is signal.
+const COURSE_BESIDE: usize = 2;
+/// Standard deviations of the noise within which the record's own amplitude agrees with that of the stand.
+const AGREEMENT: f64 = 4.0;
+/// Samples after which a turning phasor is set right.
+const TURNS: usize = 4096;
+
+/// A line as it was found in a record.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FoundLine {
+    /// Frequency in Hz.
+    pub frequency_hz: f64,
+    /// Amplitude of the stand, in units of the record.
+    pub amplitude: f64,
+    /// Amplitude at that frequency in the record, signal included.
+    pub recorded: f64,
+    /// Phase of the sine at the record's first sample, in rad.
+    pub phase_rad: f64,
+    /// Part of the amplitude that was taken off: 1 where the phase is certain, 0 where the signal hides it.
+    pub share: f64,
+}
+
+/// Takes lines off a record: the amplitude is that of the stand, the phase that of the record.
+///
+/// With a phasor `P = A e^{jφ} + S`, a known amplitude `A`, an unknown phase and signal `S` of variance `σ²` beside it,
+/// the mean of `A e^{jφ}` is `A I₁(κ)/I₀(κ) e^{j arg P}`, `κ = 2 A |P|/σ²`. `σ²` is the largest
+/// power at the frequencies beside the line, since a comb may have one of its lines there; that of the noise alone if
+/// `|P|` agrees with `A` as no signal would have it.
+pub fn take_lines(
+    samples: &mut [f64],
+    rate_hz: f64,
+    lines: &[Line],
+    noise_std: f64,
+) -> Vec<FoundLine> {
+    let lines: Vec<Line> = lines
+        .iter()
+        .copied()
+        .filter(|line| line.amplitude > 0.0 && line.frequency_hz < 0.5 * rate_hz)
+        .collect();
+    let step_hz = rate_hz / samples.len() as f64;
+    let noise = 4.0 * noise_std * noise_std / samples.len() as f64;
+    let found: Vec<FoundLine> = lines
+        .iter()
+        .map(|line| {
+            let at = |hz: f64| phasor(samples, hz / rate_hz);
+            let others = |hz: f64| {
+                lines
+                    .iter()
+                    .any(|other| (other.frequency_hz - hz).abs() < 2.5 * step_hz)
+            };
+            let signal = BESIDE
+                .flat_map(|d| {
+                    [-1.0, 1.0].map(|side| line.frequency_hz + side * f64::from(d) * step_hz)
+                })
+                .filter(|hz| *hz > 2.0 * step_hz && !others(*hz))
+                .map(|hz| at(hz).norm_sqr())
+                .fold(0.0, f64::max);
+            let phasor = at(line.frequency_hz);
+            let off = phasor.norm() - line.amplitude;
+            let agrees = noise > 0.0 && off * off < AGREEMENT * AGREEMENT * noise;
+            let variance = if agrees { noise } else { signal.max(noise) };
+            let share = if variance > 0.0 {
+                bessel_ratio(2.0 * line.amplitude * phasor.norm() / variance)
+            } else {
+                1.0
+            };
+            FoundLine {
+                frequency_hz: line.frequency_hz,
+                amplitude: line.amplitude,
+                recorded: phasor.norm(),
+                phase_rad: phasor.arg() + 0.5 * PI,
+                share,
+            }
+        })
+        .collect();
+    for line in &found {
+        let turn = TAU * line.frequency_hz / rate_hz;
+        for (i, sample) in samples.iter_mut().enumerate() {
+            *sample -= line.share * line.amplitude * (turn * i as f64 + line.phase_rad).sin();
+        }
+    }
+    found
+}
+
+/// `P` of the part `Re(P e^{jωt})`, through a Hann window; the frequency in cycles a sample.
+fn phasor(samples: &[f64], cycles: f64) -> Complex64 {
+    let count = samples.len() as f64;
+    let mean = samples.iter().sum::<f64>() / count;
+    let mut sum = Complex64::ZERO;
+    let mut weights = 0.0;
+    let turn = Complex64::from_polar(1.0, -TAU * cycles);
+    let hann = Complex64::from_polar(1.0, TAU / count);
+    let (mut phase, mut window) = (Complex64::ONE, Complex64::ONE);
+    for (i, sample) in samples.iter().enumerate() {
+        if i % TURNS == 0 {
+            phase = Complex64::from_polar(1.0, -TAU * cycles * i as f64);
+            window = Complex64::from_polar(1.0, TAU * (i as f64 + 0.5) / count);
+        }
+        let weight = 0.5 - 0.5 * window.re;
+        weights += weight;
+        sum += weight * (sample - mean) * phase;
+        phase *= turn;
+        window *= hann;
+    }
+    2.0 * sum / weights
+}
+
+/// `I₁(κ)/I₀(κ)`: series up to 12, asymptotic expansion above (Abramowitz and Stegun, 9.6.10 and 9.7.1).
+fn bessel_ratio(kappa: f64) -> f64 {
+    if kappa > 12.0 {
+        let x = 8.0 * kappa;
+        let zero = 1.0 + 1.0 / x + 9.0 / (2.0 * x * x) + 225.0 / (6.0 * x * x * x);
+        let one = 1.0 - 3.0 / x - 15.0 / (2.0 * x * x) - 315.0 / (6.0 * x * x * x);
+        return one / zero;
+    }
+    let quarter = 0.25 * kappa * kappa;
+    let (mut zero, mut one) = (1.0, 1.0);
+    let (mut term_zero, mut term_one) = (1.0, 1.0);
+    for k in 1..60 {
+        let k = f64::from(k);
+        term_zero *= quarter / (k * k);
+        term_one *= quarter / (k * (k + 1.0));
+        zero += term_zero;
+        one += term_one;
+    }
+    0.5 * kappa * one / zero
+}
+
+/// Takes a slow course of as many half waves off a record, its mean left; the rms of what was taken.
+///
+/// Each half wave is shrunk by `1 − S/c²`, `S` being the mean square of the half waves just above, which are signal.
+pub fn take_course(samples: &mut [f64], half_waves: usize) -> f64 {
+    let count = samples.len() as f64;
+    let wave = |k: usize, i: usize| (PI * k as f64 * (i as f64 + 0.5) / count).cos();
+    let part = |samples: &[f64], k: usize| {
+        let sum: f64 = samples
+            .iter()
+            .enumerate()
+            .map(|(i, x)| x * wave(k, i))
+            .sum();
+        2.0 * sum / count
+    };
+    let beside: f64 = (half_waves + 1..=(1 + COURSE_BESIDE) * half_waves)
+        .map(|k| part(samples, k).powi(2))
+        .sum::<f64>()
+        / (COURSE_BESIDE * half_waves).max(1) as f64;
+    let mut square = 0.0;
+    for k in 1..=half_waves {
+        let own = part(samples, k);
+        let share = (1.0 - beside / (own * own)).max(0.0);
+        if share.is_nan() {
+            continue;
+        }
+        for (i, sample) in samples.iter_mut().enumerate() {
+            *sample -= share * own * wave(k, i);
+        }
+        square += 0.5 * (share * own).powi(2);
+    }
+    square.sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_ratio_of_bessel_functions_is_that_of_tables() {
+        // I₁/I₀ at 1 (0.565159/1.266066), at 10 (2670.988/2815.717), and near 12 from both sides.
+        assert!((bessel_ratio(1.0) - 0.446_390).abs() < 1e-6);
+        assert!((bessel_ratio(10.0) - 0.948_600).abs() < 1e-6);
+        assert!((bessel_ratio(12.0) - bessel_ratio(12.000_001)).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_line_beside_a_strong_signal_is_taken_off() {
+        let rate_hz = 1000.0;
+        let clean: Vec<f64> = (0..2000)
+            .map(|i| 5.0 * (TAU * 31.3 * f64::from(i) / rate_hz).sin() + 2.0)
+            .collect();
+        let line = Line {
+            frequency_hz: 60.1,
+            amplitude: 0.3,
+        };
+        let mut samples: Vec<f64> = clean
+            .iter()
+            .enumerate()
+            .map(|(i, x)| x + 0.3 * (TAU * 60.1 * i as f64 / rate_hz + 1.1).sin())
+            .collect();
+        let found = take_lines(&mut samples, rate_hz, &[line], 0.0);
+        assert!((found[0].phase_rad - 1.1).abs() < 1e-3, "{found:?}");
+        let left = samples.iter().zip(&clean).map(|(a, b)| (a - b).abs());
+        assert!(left.fold(0.0, f64::max) < 1e-3, "{found:?}");
+    }
+
+    #[test]
+    fn a_signal_on_the_line_keeps_what_cannot_be_told_from_it() {
+        // A comb of one amplitude, one line of it at 60 Hz; a tenth of it is said to be hum.
+        let rate_hz = 1000.0;
+        let mut samples: Vec<f64> = (0..2000)
+            .map(|i| {
+                (1..100)
+                    .map(|k| (TAU * 2.0 * f64::from(k * i) / rate_hz + f64::from(k * k)).sin())
+                    .sum()
+            })
+            .collect();
+        let line = Line {
+            frequency_hz: 60.0,
+            amplitude: 0.1,
+        };
+        let found = take_lines(&mut samples, rate_hz, &[line], 0.0);
+        assert!(found[0].share < 0.3, "{found:?}");
+    }
+}

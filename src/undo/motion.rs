@@ -1,0 +1,165 @@
+//! The torque from the measured motion: what restoring and friction torques of the stand add to it.
+//!
+//! With the gage's signal `y = x + Σ n_shown(x)` the displacement `x` is found, then every torque `n(x, x', z)` of the
+//! stand along it, on a grid several times finer than the samples so that what they make of the motion does
+//! not alias; memory moves on from the record's start. The applied quantity follows as
+//! `G u = x''/ω₀² + 2ζ x'/ω₀ + x + n` (the linear part by its response).
+
+use num_complex::Complex64;
+use torqcomp_dsp::band::Band;
+use torqcomp_dsp::compensate::{Fine, continued};
+use torqcomp_model::effects::{Memory, Torque};
+
+use super::shown::Shown;
+
+/// Samples of a block, and those on both sides that are computed to spare.
+const BLOCK: usize = 16_384;
+const MARGIN: usize = 1024;
+/// Shortest block of a short record.
+const SHORTEST: usize = 256;
+
+/// A torque of the stand.
+pub struct Link<'a> {
+    /// The torque.
+    pub torque: &'a dyn Torque,
+    /// Whether the gage shows it.
+    pub shown: bool,
+}
+
+/// How the motion is looked at.
+pub struct View<'a> {
+    /// Samples a second.
+    pub rate_hz: f64,
+    /// Steps from sample to sample.
+    pub factor: usize,
+    /// Displacement by a constant load that the torques see.
+    pub shift: f64,
+    /// Band in which the torques see displacement and speed.
+    pub band: &'a Band,
+    /// Standard uncertainty of the speed, per second.
+    pub speed_std: f64,
+    /// Standard uncertainty of a sample.
+    pub noise_std: f64,
+}
+
+/// Displacement and torques at the samples.
+#[derive(Debug, Default)]
+pub struct Motion {
+    /// Displacement.
+    pub x: Vec<f64>,
+    /// Sum of the torques.
+    pub torque: Vec<f64>,
+    /// Samples at which the gage's signal does not tell the displacement.
+    pub hidden: Vec<usize>,
+    /// Part of the record in which the speed is within two standard uncertainties of zero.
+    pub still: f64,
+}
+
+/// Displacement and torques along a signal of the gage.
+pub fn motion(links: &[Link], signal: &[f64], view: &View) -> Motion {
+    let block = signal.len().next_multiple_of(SHORTEST).min(BLOCK);
+    let margin = MARGIN.min(4 * block);
+    let mut walk = Walk {
+        links,
+        view,
+        margin,
+        fine: Fine::new(block + 2 * margin, margin, view.factor, view.rate_hz),
+        memories: Vec::new(),
+        shown: Shown::new(links, view),
+        kept: None,
+        still: 0,
+        found: Motion::default(),
+    };
+    for start in (0..signal.len()).step_by(block) {
+        let window: Vec<f64> = (0..block + 2 * margin)
+            .map(|i| continued(signal, (start + i) as isize - margin as isize))
+            .collect();
+        walk.block(&window, start, block.min(signal.len() - start));
+    }
+    let steps = (signal.len() * view.factor) as f64;
+    walk.found.still = walk.still as f64 / steps;
+    walk.found
+}
+
+struct Walk<'a> {
+    links: &'a [Link<'a>],
+    view: &'a View<'a>,
+    margin: usize,
+    fine: Fine,
+    memories: Vec<Memory>,
+    shown: Shown<'a>,
+    /// Torques of the end of the block before.
+    kept: Option<Vec<f64>>,
+    still: usize,
+    found: Motion,
+}
+
+impl Walk<'_> {
+    fn block(&mut self, window: &[f64], start: usize, count: usize) {
+        let (margin, factor) = (self.margin, self.view.factor);
+        let inner = margin..margin + count;
+        let mut lines = self.fine.spectrum(window);
+        if self.shown.is_there() {
+            let signal = self.fine.refined(&lines, |_| Complex64::ONE);
+            let part = margin * factor..(margin + count) * factor;
+            let (x, hidden) = self.shown.displacement(&signal, part);
+            lines = self.fine.spectrum_of_fine(&x);
+            let base = self.fine.samples(&lines);
+            self.found.x.extend_from_slice(&base[inner.clone()]);
+            let mut hidden: Vec<usize> =
+                hidden.iter().map(|i| start + i / factor - margin).collect();
+            hidden.dedup();
+            self.found.hidden.extend(hidden);
+        } else {
+            self.found.x.extend_from_slice(&window[inner.clone()]);
+        }
+        let torque = self.torques(&lines, count);
+        let base = self.fine.samples(&self.fine.spectrum_of_fine(&torque));
+        self.found.torque.extend_from_slice(&base[inner]);
+    }
+
+    /// The torques over a window.
+    fn torques(&mut self, lines: &[Complex64], count: usize) -> Vec<f64> {
+        let (band, factor) = (self.view.band, self.view.factor);
+        let x = self.fine.refined(lines, |f| Complex64::from(band.gain(f)));
+        let speed = self.fine.refined(lines, |f| {
+            Complex64::new(0.0, std::f64::consts::TAU * f * band.gain(f))
+        });
+        let (first, last) = (self.margin * factor, (self.margin + count) * factor);
+        if self.memories.is_empty() {
+            let begin = |link: &Link| link.torque.begin(x[first] + self.view.shift);
+            self.memories = self.links.iter().map(begin).collect();
+        }
+        let mut torque = vec![0.0; x.len()];
+        let mut memories = std::mem::take(&mut self.memories);
+        let mut after = Vec::new();
+        for i in first..x.len() {
+            if i == last {
+                // What follows is computed again in the next block.
+                after = memories.clone();
+            }
+            let change = 0.5 * (speed[(i + 1).min(x.len() - 1)] - speed[i - 1]);
+            torque[i] = self.sum(&mut memories, x[i], speed[i], change);
+            self.still += usize::from(i < last && speed[i].abs() < 2.0 * self.view.speed_std);
+        }
+        self.memories = after;
+        match &self.kept {
+            Some(kept) => torque[..first].copy_from_slice(kept),
+            None => {
+                let start = torque[first];
+                torque[..first].fill(start);
+            }
+        }
+        self.kept = Some(torque[last - first..last].to_vec());
+        torque
+    }
+
+    fn sum(&self, memories: &mut [Memory], x: f64, speed: f64, change: f64) -> f64 {
+        // Within a step the speed takes all values of the step.
+        let std = self.view.speed_std.hypot(change / 12.0_f64.sqrt());
+        let pairs = self.links.iter().zip(memories);
+        pairs
+            .map(|(link, memory)| link.torque.blurred(memory, x + self.view.shift, speed, std))
+            .sum()
+    }
+}

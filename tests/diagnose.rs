@@ -1,0 +1,138 @@
+//! `diagnose` and `simulate` through the binary, on blind records made by other code (see [`crate::blind`]).
+
+use crate::blind::record::{Case, make};
+use crate::blind::write;
+use crate::util::{Folder, HERTEL, table};
+
+/// Samples of a record that are kept: enough for a diagnosis, few enough for a test.
+const KEPT: usize = 8000;
+const COLUMNS: [&str; 4] = ["--applied", "applied_n_m", "--measured", "measured_n_m"];
+
+/// A folder with both records of a case and its stand.
+fn folder(case: &Case) -> Folder {
+    let folder = Folder::new();
+    folder.write("stand.toml", HERTEL);
+    for (name, record) in [("train.csv", &case.train), ("holdout.csv", &case.holdout)] {
+        let whole = write::table(record, false);
+        let kept: Vec<&str> = whole.lines().take(KEPT + 1).collect();
+        folder.write(name, kept.join("\n") + "\n");
+    }
+    folder
+}
+
+fn diagnose<'a>(more: &[&'a str]) -> Vec<&'a str> {
+    let files = [
+        "--stand",
+        "stand.toml",
+        "--train",
+        "train.csv",
+        "--holdout",
+        "holdout.csv",
+    ];
+    [&["diagnose"][..], &files, &COLUMNS, more].concat()
+}
+
+/// Rms of the noise that was added to the held-out record.
+fn noise_rms(case: &Case) -> f64 {
+    case.truth["noise"]["holdout_rms_n_m"]
+        .as_f64()
+        .expect("the truth says it")
+}
+
+#[test]
+fn an_effect_is_named_added_and_simulated() {
+    let case = make(7, "cubic-stiffness", 1).expect("the catalogue has it");
+    let folder = folder(&case);
+    let args = diagnose(&["-o", "refined.toml", "--html", "page.html", "--json"]);
+    let report = folder.json(&args);
+    assert_eq!(report["schema"], "torqcomp.diagnose/1");
+    assert_eq!(report["verdict"], "explained");
+    assert_eq!(report["effects"], serde_json::json!(["cubic-stiffness"]));
+    let rms = |which: &str| {
+        report["error"][which]["holdout_rms"]
+            .as_f64()
+            .expect("a number")
+    };
+    assert!(rms("declared") > rms("before") && rms("before") > 3.0 * rms("after"));
+    assert!(rms("after") < 1.2 * noise_rms(&case), "{}", rms("after"));
+
+    // The refined stand says the same of the held-out record when it is run forward on its own.
+    let simulated = folder.run(&[
+        "simulate",
+        "holdout.csv",
+        "--stand",
+        "refined.toml",
+        "--applied",
+        "applied_n_m",
+        "-o",
+        "simulated.csv",
+    ]);
+    assert_eq!(simulated.code, 0, "{}", simulated.stderr);
+    let (head, rows) = table(&folder.read("simulated.csv"));
+    assert_eq!(head, ["time_s", "measured"]);
+    // What was before the record has died out after 50 ms.
+    let settled = 1000..KEPT - 40;
+    let squares = settled
+        .clone()
+        .map(|i| (rows[i][1] - case.holdout.measured_n_m[i]).powi(2));
+    let left = (squares.sum::<f64>() / settled.len() as f64).sqrt();
+    assert!(left < 1.2 * noise_rms(&case), "{left}");
+    page_is_complete(&folder.read("page.html"));
+}
+
+fn page_is_complete(page: &str) {
+    let parts = [
+        "Explained: with cubic-stiffness",
+        "Error before and after",
+        "What was measured",
+        "holdout.csv",
+        "Autocorrelation",
+        "Spectrum",
+        "Against displacement",
+        "Candidates",
+        "coulomb-friction",
+        "Next experiment",
+    ];
+    for part in parts {
+        assert!(page.contains(part), "{part}");
+    }
+    assert!(!page.contains("NaN") && !page.contains("src=") && !page.contains("href="));
+}
+
+#[test]
+fn a_complete_stand_lacks_nothing() {
+    let case = make(7, "none", 1).expect("the catalogue has it");
+    let folder = folder(&case);
+    let report = folder.json(&diagnose(&["--json"]));
+    assert_eq!(report["verdict"], "nothing-missing");
+    assert_eq!(report["effects"], serde_json::json!([]));
+    assert_eq!(report["error"]["before"], report["error"]["after"]);
+}
+
+#[test]
+fn training_that_leaves_the_resonance_open_is_said() {
+    // A quarter of a logarithmic sweep ends at 19 Hz, far below the resonance.
+    let case = make(7, "none", 3).expect("the catalogue has it");
+    let folder = folder(&case);
+    let report = folder.json(&diagnose(&["--json"]));
+    let warnings = report["warnings"].as_array().expect("a list");
+    let open = warnings
+        .iter()
+        .find(|w| w["code"] == "training-leaves-constants-open");
+    let message = open.expect("a warning")["message"]
+        .as_str()
+        .expect("a text");
+    assert!(message.contains("the natural frequency to ±"), "{message}");
+    assert_eq!(report["effects"], serde_json::json!([]));
+}
+
+#[test]
+fn threads_do_not_change_a_byte() {
+    let case = make(7, "gain-error", 3).expect("the catalogue has it");
+    let folder = folder(&case);
+    let one = folder.run(&diagnose(&["--json", "--threads", "1"]));
+    let three = folder.run(&diagnose(&["--json", "--threads", "3"]));
+    assert_eq!(one.code, 0, "{}", one.stderr);
+    assert_eq!(one.stdout, three.stdout);
+    assert!(one.stdout.contains("\"gain-error\""));
+}
