@@ -4,7 +4,9 @@ use nalgebra::DMatrix;
 use torqcomp_dsp::zero_phase::low_pass;
 use torqcomp_model::fit::linear;
 
-use super::{Directions, Motion, Run, comparison, names};
+use super::directions::Directions;
+use super::words::{comparison, names};
+use super::{Motion, Run};
 use crate::failure::Failure;
 use crate::identify::{Comparison, rms};
 
