@@ -52,74 +52,115 @@ fn intervals_of_decays_cover_the_truth() {
 }
 
 /// Least standard deviations of frequency (Hz) and decay rate (1/s) that any unbiased estimator can have
-/// (Cramér and Rao), from the sensitivities of 2e^{−σt}cos(ωt + φ) + c + dt to σ, ω, amplitude, φ, c, d.
-fn least_std(t: &[f64], std: f64) -> (f64, f64) {
+/// (Cramér and Rao), from the sensitivities of Ae^{−σt}cos(ωt + φ) + c + dt to σ, ω, A, φ, c, d.
+fn least_std(t: &[f64], (amplitude, sigma, omega): (f64, f64, f64), std: f64) -> (f64, f64) {
+    let length = t[t.len() - 1];
     let rows = DMatrix::from_fn(t.len(), 6, |i, j| {
-        let fall = 2.0 * (-sigma() * t[i]).exp();
-        let (sin, cos) = (OMEGA * t[i]).sin_cos();
+        let fall = amplitude * (-sigma * t[i]).exp();
+        let (sin, cos) = (omega * t[i]).sin_cos();
         [
             -t[i] * fall * cos,
             -t[i] * fall * sin,
             fall * cos,
             -fall * sin,
             1.0,
-            t[i] * 1e3,
+            t[i] / length,
         ][j]
     });
     let bound = rows.tr_mul(&rows).try_inverse().expect("regular") * std * std;
     (bound[(1, 1)].sqrt() / TAU, bound[(0, 0)].sqrt())
 }
 
+/// A stand: σ in 1/s, ω in rad/s, samples a second, seconds, decays one after another.
+struct Stand {
+    sigma: f64,
+    omega: f64,
+    rate_hz: f64,
+    length_s: f64,
+    decays: u32,
+}
+
+impl Stand {
+    /// Decays of amplitude 2 with noise 40 dB below it.
+    fn record(&self, noise: &mut Noise) -> (Vec<f64>, Vec<f64>) {
+        let each = (self.length_s * self.rate_hz) as usize;
+        let t = times(each * self.decays as usize, self.rate_hz);
+        let one = |(i, _): (usize, &f64)| {
+            let t = (i % each) as f64 / self.rate_hz;
+            2.0 * (-self.sigma * t).exp() * (self.omega * t).cos() + 0.1 + 0.02 * noise.normal()
+        };
+        let y = t.iter().enumerate().map(one).collect();
+        (t, y)
+    }
+
+    /// Errors of frequency and damping ratio over the true ones, and of the bounds of both.
+    fn errors(&self, noise: &mut Noise) -> ([f64; 2], [f64; 2]) {
+        let (t, y) = self.record(noise);
+        let found = ring(&t, &y, self.rate_hz);
+        assert_eq!(found.stretches.len(), self.decays as usize);
+        let natural = self.omega.hypot(self.sigma);
+        let frequency = of(&found.outcome, "damped_frequency").value * TAU / self.omega - 1.0;
+        let ratio = of(&found.outcome, "damping_ratio").value * natural / self.sigma - 1.0;
+        // Each stretch begins where the fit lets it begin; decays add their information.
+        let (mut of_frequency, mut of_rate) = (0.0, 0.0);
+        for (start, stretch) in found.starts_s.iter().zip(&found.stretches) {
+            let late = start % self.length_s;
+            let amplitude = 2.0 * (-self.sigma * late).exp();
+            let truth = (amplitude, self.sigma, self.omega);
+            let (frequency, rate) = least_std(&stretch.times_s, truth, 0.02);
+            of_frequency += frequency.powi(-2);
+            of_rate += rate.powi(-2);
+        }
+        let bounds = [
+            of_frequency.powf(-0.5) * TAU / self.omega,
+            of_rate.powf(-0.5) / self.sigma,
+        ];
+        ([frequency, ratio], bounds)
+    }
+}
+
+/// Every record within 0.02 % of the frequency and 1 % of the damping ratio, and the spread no more
+/// than 1.3 times the bound. One decay of the stand of figure 5 at 40 kHz does not hold 0.02 %: its bound is
+/// 0.016 %, so that one record in five would miss it whatever is done; eight hits do.
 #[test]
 fn decays_are_as_exact_as_the_noise_allows() {
-    let mut noise = Noise(12);
-    let natural = OMEGA.hypot(sigma());
-    let (mut squares, mut rates) = (0.0, 0.0);
-    let mut least = (0.0, 0.0);
-    let runs = 120;
-    for _ in 0..runs {
-        let (t, y, rate_hz) = figure_5(40.0, &mut noise);
-        let found = ring(&t, &y, rate_hz);
-        let frequency = of(&found.outcome, "damped_frequency").value;
-        assert_close(
-            of(&found.outcome, "natural_frequency").value,
-            natural / TAU,
-            1e-3,
-        );
-        squares += (frequency - OMEGA / TAU).powi(2);
-        rates += (of(&found.outcome, "decay_rate").value - sigma()).powi(2);
-        let start = found.starts_s[0];
-        let used: Vec<f64> = t
-            .iter()
-            .filter(|t| **t >= start)
-            .map(|t| t - start)
-            .collect();
-        // What is left of the amplitude where the fit begins scales both alike.
-        let fallen = (-sigma() * start).exp();
-        least = least_std(&used, 2.0 * 0.01 / fallen);
+    let of_thesis = Stand {
+        sigma: sigma(),
+        omega: OMEGA,
+        rate_hz: 40_000.0,
+        length_s: 0.03,
+        decays: 8,
+    };
+    let light = Stand {
+        sigma: 20.0,
+        omega: TAU * 590.0,
+        rate_hz: 20_000.0,
+        length_s: 0.3,
+        decays: 1,
+    };
+    for (stand, seed) in [(of_thesis, 12), (light, 18)] {
+        let mut noise = Noise(seed);
+        let mut squares = [0.0; 2];
+        let mut bounds = [0.0; 2];
+        let runs = 120;
+        for _ in 0..runs {
+            let (errors, least) = stand.errors(&mut noise);
+            assert!(
+                errors[0].abs() < 2e-4 && errors[1].abs() < 1e-2,
+                "{errors:?}"
+            );
+            for i in 0..2 {
+                squares[i] += errors[i].powi(2) / f64::from(runs);
+                bounds[i] += least[i] / f64::from(runs);
+            }
+        }
+        for i in 0..2 {
+            let ratio = squares[i].sqrt() / bounds[i];
+            println!("std {:.2e}, over the bound {ratio:.3}", squares[i].sqrt());
+            // 120 runs tell a standard deviation to 6.5 %.
+            assert!(ratio < 1.3, "{i}: {ratio} times the bound");
+        }
     }
-    let spread = (
-        (squares / f64::from(runs)).sqrt(),
-        (rates / f64::from(runs)).sqrt(),
-    );
-    // 120 runs tell a standard deviation to 6.5 %.
-    assert!(
-        spread.0 < 1.3 * least.0,
-        "frequency: {} against {}",
-        spread.0,
-        least.0
-    );
-    assert!(
-        spread.1 < 1.3 * least.1,
-        "rate: {} against {}",
-        spread.1,
-        least.1
-    );
-    // 0.02 % of the frequency, 1 % of the damping ratio.
-    assert!(
-        spread.0 / (OMEGA / TAU) < 2e-4 * 5.0 && spread.1 / sigma() < 1e-2,
-        "{spread:?}"
-    );
 }
 
 #[test]
@@ -183,4 +224,3 @@ fn the_law_of_damping_is_told() {
             .any(|w| w.code == "amplitude-dependent" || w.code == "not-viscous")
     );
 }
-

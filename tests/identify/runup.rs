@@ -203,4 +203,3 @@ fn a_run_in_one_direction_does_not_invent_a_dry_friction() {
         ),
     }
 }
-

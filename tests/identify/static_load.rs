@@ -1,6 +1,8 @@
 //! Known loads.
 
-use super::parameter;
+use torqcomp::identify::static_load::{Options, Point, Units, identify, series_of};
+
+use super::{Coverage, Noise, of, parameter};
 use crate::util::{Folder, assert_close};
 
 #[test]
@@ -39,3 +41,59 @@ fn known_loads_give_the_calibration() {
     );
 }
 
+/// Three series of eleven loads up and ten down; readings 0.02 V + 0.1 V/(N m) times the load, noise so
+/// many decibels below the largest, of one size or growing with the load (and then known).
+fn points(decibel: f64, known: bool, noise: &mut Noise) -> Vec<Point> {
+    let up = (0..=10).map(f64::from);
+    let loads: Vec<f64> = (0..3)
+        .flat_map(|_| up.clone().chain(up.clone().rev().skip(1)))
+        .collect();
+    let series = series_of(&loads);
+    let size = 10_f64.powf(-decibel / 20.0);
+    loads
+        .iter()
+        .zip(series)
+        .map(|(load, series)| {
+            let std = if known {
+                size * (0.2 + 0.08 * load)
+            } else {
+                size
+            };
+            Point {
+                load: *load,
+                reading: 0.02 + 0.1 * load + std * noise.normal(),
+                std: known.then_some(std),
+                series,
+                position: 0,
+            }
+        })
+        .collect()
+}
+
+#[test]
+fn intervals_of_known_loads_cover_the_truth() {
+    let units = Units {
+        load: "N m".to_owned(),
+        reading: "V".to_owned(),
+    };
+    for known in [false, true] {
+        let mut noise = Noise(31);
+        let names = [
+            ("torque_per_volt", 10.0),
+            ("sensitivity", 0.1),
+            ("zero", 0.02),
+        ];
+        let mut covered = [0; 3].map(|_| Coverage::default());
+        for k in 0..400 {
+            let decibel = [20.0, 30.0, 40.0, 50.0, 60.0][k % 5];
+            let points = points(decibel, known, &mut noise);
+            let found = identify(&points, Options { degree: 1 }, &units).unwrap();
+            for ((name, truth), coverage) in names.iter().zip(&mut covered) {
+                coverage.count(of(&found.outcome, name), *truth);
+            }
+        }
+        for ((name, _), coverage) in names.iter().zip(&covered) {
+            coverage.check(&format!("{name}, uncertainty known: {known}"));
+        }
+    }
+}

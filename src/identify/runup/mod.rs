@@ -15,6 +15,7 @@ mod classical;
 mod directions;
 mod regression;
 mod scatter;
+mod turns;
 mod windows;
 mod words;
 
@@ -156,8 +157,8 @@ fn method(run: &Run, fitted: &Fitted) -> String {
     let used = fitted.used.iter().filter(|u| **u).count();
     let which = if used < all {
         format!(
-            "{used} of {all} windows; in the others the body turns round or stands, where dry friction is not \
-             told by the equation"
+            "{used} of {all} windows; in the others the body turns round or stands and does not follow the \
+             equation"
         )
     } else {
         format!("{all} windows")

@@ -85,12 +85,7 @@ fn trace_of_fit(a: &DMatrix<f64>, inverse: &DMatrix<f64>, shape: &[f64]) -> f64 
 }
 
 /// Covariance of Σ aᵢ rᵢ with Bartlett's weights over neighbouring rows.
-fn scores(
-    a: &DMatrix<f64>,
-    residuals: &DVector<f64>,
-    rows: usize,
-    overlap: usize,
-) -> DMatrix<f64> {
+fn scores(a: &DMatrix<f64>, residuals: &DVector<f64>, rows: usize, overlap: usize) -> DMatrix<f64> {
     let (all, count) = a.shape();
     let scores = DMatrix::from_fn(all, count, |r, c| a[(r, c)] * residuals[r]);
     let lags = (4.0 * (rows as f64 / 100.0).powf(2.0 / 9.0)).floor() as usize + overlap;
@@ -98,7 +93,9 @@ fn scores(
     let mut sum = scores.tr_mul(&scores);
     for lag in 1..=lags {
         let weight = 1.0 - lag as f64 / (lags + 1) as f64;
-        let cross = scores.rows(lag, all - lag).tr_mul(&scores.rows(0, all - lag));
+        let cross = scores
+            .rows(lag, all - lag)
+            .tr_mul(&scores.rows(0, all - lag));
         sum += (&cross + cross.transpose()) * weight;
     }
     sum

@@ -6,6 +6,10 @@ use super::directions::Directions;
 use super::regression::{Corrected, Errors, solve};
 use super::{LEAST_WINDOWS, Run, SHORTEST_HALF};
 use crate::failure::Failure;
+use crate::identify::rms;
+
+/// Residual over the root mean square of clean windows up to which another window follows the equation.
+const FOLLOWS: f64 = 3.0;
 
 /// Rows of the regression.
 pub(super) struct Rows {
@@ -74,16 +78,24 @@ impl Rows {
         })
     }
 
-    /// The windows to be fitted: those in which the body goes one way, if they are enough. At a stop
-    /// dry friction is whatever it takes to hold the body, and where it turns round the moment of turning
-    /// counts for more than the noise.
-    fn chosen(&self) -> Vec<bool> {
+    /// Whether there are enough windows in which the body goes one way.
+    fn enough_clean(&self) -> bool {
         let clean = self.clean.iter().filter(|c| **c).count();
-        if clean >= LEAST_WINDOWS && 3 * clean >= self.clean.len() {
-            self.clean.clone()
-        } else {
-            vec![true; self.clean.len()]
-        }
+        clean >= LEAST_WINDOWS && 3 * clean >= self.clean.len()
+    }
+
+    /// The clean windows, and those others that follow the same equation as closely: at a stop dry friction
+    /// is whatever it takes to hold the body, which the equation does not say.
+    fn following(&self, fit: &Corrected) -> Vec<bool> {
+        let residual = |k: usize| fit.residuals[k];
+        let clean: Vec<f64> = (0..self.clean.len())
+            .filter(|k| self.clean[*k])
+            .map(residual)
+            .collect();
+        let most = FOLLOWS * rms(&clean);
+        (0..self.clean.len())
+            .map(|k| self.clean[k] || residual(k).abs() <= most)
+            .collect()
     }
 
     /// Covariance of white noise of the motion between two columns of one row.
@@ -119,19 +131,28 @@ impl Rows {
     /// # Errors
     /// If the terms cannot be told apart.
     pub fn fit(self) -> Result<Fitted, Failure> {
-        let chosen = self.chosen();
+        let mut used = vec![true; self.clean.len()];
+        if self.enough_clean() && self.clean.contains(&false) {
+            // The clean windows alone may not tell all terms apart.
+            if let Ok(fit) = self.solve(&self.clean) {
+                used = self.following(&fit);
+            }
+        }
+        Ok(Fitted {
+            fit: self.solve(&used)?,
+            rows: self,
+            used,
+        })
+    }
+
+    fn solve(&self, used: &[bool]) -> Result<Corrected, Failure> {
         let errors = Errors {
             noise: &|i, j| self.noise(i, j),
             torque: &|lag| self.torque_errors(lag),
             motion: &|lag, factors| self.motion_errors(lag, factors),
             overlap: 2 * self.half / self.stride,
         };
-        let fit = solve(&self.columns, &self.right, &chosen, &errors)?;
-        Ok(Fitted {
-            fit,
-            rows: self,
-            used: chosen,
-        })
+        solve(&self.columns, &self.right, used, &errors)
     }
 }
 

@@ -33,7 +33,12 @@ pub(super) fn names(
     names
 }
 
-pub(super) fn named(run: &Run, directions: &Directions, split: bool, fitted: &Corrected) -> Vec<Found> {
+pub(super) fn named(
+    run: &Run,
+    directions: &Directions,
+    split: bool,
+    fitted: &Corrected,
+) -> Vec<Found> {
     names(run, directions, split)
         .into_iter()
         .enumerate()

@@ -1,5 +1,7 @@
 //! Sensitivity and zero from known loads (Appendix C, IV), with the terms of the standards.
 
+mod terms;
+
 use nalgebra::DMatrix;
 use torqcomp_model::fit::linear::{self, LinearFit};
 
@@ -38,7 +40,7 @@ pub struct Units {
     pub reading: String,
 }
 
-/// A term of a calibration standard.
+/// A term of a calibration standard; the formulas are those of `terms`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Term {
     /// Name, such as `repeatability`.
@@ -118,7 +120,7 @@ pub fn identify(points: &[Point], options: Options, units: &Units) -> Result<Eva
         points: points.to_vec(),
         coefficients: scaled(&fit, largest),
     };
-    evaluated.terms = terms(points, &steps, &evaluated.coefficients, largest);
+    evaluated.terms = terms::terms(points, &steps, &evaluated.coefficients, largest);
     draw(&mut evaluated, units);
     say(&mut evaluated.outcome, points, options);
     Ok(evaluated)
@@ -237,139 +239,6 @@ fn steps(points: &[Point], largest: f64) -> Vec<f64> {
     loads
 }
 
-/// Whether a point was reached by raising (in size) or lowering the load.
-fn rising(points: &[Point], i: usize) -> bool {
-    let before = (0..i).rev().find(|j| points[*j].series == points[i].series);
-    before.is_none_or(|j| points[i].load.abs() >= points[j].load.abs())
-}
-
-/// Largest values over all loads of the terms of ISO 376 and DIN 51309, in per cent.
-fn terms(points: &[Point], steps: &[f64], curve: &[f64], largest: f64) -> Vec<Term> {
-    let zero = zeros(points, largest);
-    let net = |i: usize| points[i].reading - zero[points[i].series].0.unwrap_or(curve[0]);
-    let at = |step: f64, up: bool, filter: &dyn Fn(&Point) -> bool| -> Vec<f64> {
-        (0..points.len())
-            .filter(|i| (points[*i].load - step).abs() <= SAME * largest)
-            .filter(|i| rising(points, *i) == up && filter(&points[*i]))
-            .map(net)
-            .collect()
-    };
-    let loaded: Vec<f64> = steps
-        .iter()
-        .copied()
-        .filter(|s| s.abs() > NONE * largest)
-        .collect();
-    let first = points[0].position;
-    let mut positions: Vec<usize> = points.iter().map(|p| p.position).collect();
-    positions.sort_unstable();
-    positions.dedup();
-    let spread = |values: &[f64]| -> Option<f64> {
-        (values.len() > 1).then(|| {
-            let (low, high) = ends(values);
-            100.0 * (high - low) / mean(values).abs()
-        })
-    };
-    let repeatability = worst(
-        loaded
-            .iter()
-            .map(|s| spread(&at(*s, true, &|p| p.position == first))),
-    );
-    let reproducibility = worst(loaded.iter().map(|s| {
-        let each: Vec<f64> = positions
-            .iter()
-            .map(|q| at(*s, true, &|p| p.position == *q))
-            .filter(|v| !v.is_empty())
-            .map(|v| mean(&v))
-            .collect();
-        spread(&each)
-    }));
-    let reversibility = worst(loaded.iter().map(|s| {
-        let (up, down) = (at(*s, true, &|_| true), at(*s, false, &|_| true));
-        (!up.is_empty() && !down.is_empty())
-            .then(|| 100.0 * (mean(&down) - mean(&up)).abs() / mean(&up).abs())
-    }));
-    let value = |load: f64| -> f64 {
-        curve
-            .iter()
-            .enumerate()
-            .skip(1)
-            .map(|(k, c)| c * load.powi(k as i32))
-            .sum()
-    };
-    let interpolation = worst(loaded.iter().map(|s| {
-        let up = at(*s, true, &|_| true);
-        (!up.is_empty()).then(|| 100.0 * (mean(&up) - value(*s)).abs() / value(*s).abs())
-    }));
-    let full = value(largest).abs();
-    let zero_return = worst(zero.iter().map(|(before, after)| match (before, after) {
-        (Some(before), Some(after)) => Some(100.0 * (after - before).abs() / full),
-        _ => None,
-    }));
-    let creep = creep(points, largest, full);
-    vec![
-        Term {
-            name: "repeatability",
-            formula: "ISO 376 b', DIN 51309 b': spread at one load, one mounting, over its mean",
-            percent: repeatability,
-        },
-        Term {
-            name: "reproducibility",
-            formula: "ISO 376 b, DIN 51309 b: spread at one load over mountings, over its mean",
-            percent: reproducibility,
-        },
-        Term {
-            name: "hysteresis",
-            formula: "ISO 376 v, DIN 51309 h (reversibility), VDI/VDE 2646: |unloading - loading| over loading",
-            percent: reversibility,
-        },
-        Term {
-            name: "interpolation error",
-            formula: "ISO 376 f_c, DIN 51309 f_a: |mean of loading - curve| over curve",
-            percent: interpolation,
-        },
-        Term {
-            name: "zero return",
-            formula: "ISO 376 f_0, DIN 51309 f_0: |zero after - zero before| over the largest deflection",
-            percent: zero_return,
-        },
-        Term {
-            name: "creep",
-            formula: "ISO 376 c: change at the largest load held, over the largest deflection",
-            percent: creep,
-        },
-    ]
-}
-
-/// Readings of the empty stand before and after each series.
-fn zeros(points: &[Point], largest: f64) -> Vec<(Option<f64>, Option<f64>)> {
-    let count = points.iter().map(|p| p.series).max().map_or(0, |m| m + 1);
-    (0..count)
-        .map(|series| {
-            let of: Vec<&Point> = points.iter().filter(|p| p.series == series).collect();
-            let empty = |p: &&&Point| p.load.abs() <= NONE * largest;
-            let before = of.first().filter(empty).map(|p| p.reading);
-            let after = (of.len() > 1)
-                .then(|| of.last().filter(empty).map(|p| p.reading))
-                .flatten();
-            (before, after)
-        })
-        .collect()
-}
-
-/// Readings one after another at the largest load: the first and the last.
-fn creep(points: &[Point], largest: f64, full: f64) -> Option<f64> {
-    let held = |p: &Point| (p.load.abs() - largest).abs() <= SAME * largest;
-    let mut worst = None;
-    for series in points.chunk_by(|a, b| a.series == b.series) {
-        let run: Vec<&Point> = series.iter().filter(|p| held(p)).collect();
-        if let [first, .., last] = run[..] {
-            let percent = 100.0 * (last.reading - first.reading).abs() / full;
-            worst = Some(percent.max(worst.unwrap_or(0.0)));
-        }
-    }
-    worst
-}
-
 fn say(outcome: &mut Outcome, points: &[Point], options: Options) {
     let series = points.iter().map(|p| p.series).max().map_or(0, |m| m + 1);
     if series < 2 {
@@ -378,7 +247,7 @@ fn say(outcome: &mut Outcome, points: &[Point], options: Options) {
             "the loads were applied once: how far the readings repeat is not known",
         );
     }
-    if !(0..points.len()).any(|i| !rising(points, i)) {
+    if (0..points.len()).all(|i| terms::rising(points, i)) {
         outcome.warn(
             "no-unloading",
             "there are no readings while unloading: hysteresis is not known",
@@ -390,25 +259,6 @@ fn say(outcome: &mut Outcome, points: &[Point], options: Options) {
             "the constants are the slope of the curve at no load; at large loads the curve is to be used",
         );
     }
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
-}
-
-fn ends(values: &[f64]) -> (f64, f64) {
-    values
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
-            (l.min(*v), h.max(*v))
-        })
-}
-
-/// The largest of those that are known.
-fn worst(values: impl Iterator<Item = Option<f64>>) -> Option<f64> {
-    values
-        .flatten()
-        .fold(None, |m: Option<f64>, v| Some(m.map_or(v, |m| m.max(v))))
 }
 
 #[cfg(test)]
