@@ -184,13 +184,25 @@ impl Chart {
     fn legend(&self, svg: &mut String) {
         let mut at = WIDTH - RIGHT;
         for (k, series) in self.series.iter().enumerate().rev() {
-            at -= 7.0 * series.name.chars().count() as f64 + 44.0;
+            // Room for the larger letters of a small screen.
+            at -= 11.0 * series.name.chars().count() as f64 + 44.0;
+            let colour = k % 4;
+            let _ = if series.dots {
+                let middle = at + 12.0;
+                write!(
+                    svg,
+                    "<circle class=\"s{colour}\" cx=\"{middle:.0}\" cy=\"14\" r=\"3.5\"/>"
+                )
+            } else {
+                let end = at + 24.0;
+                write!(
+                    svg,
+                    "<line class=\"line s{colour}\" x1=\"{at:.0}\" y1=\"14\" x2=\"{end:.0}\" y2=\"14\"/>"
+                )
+            };
             let _ = writeln!(
                 svg,
-                "<line class=\"line s{}\" x1=\"{at:.0}\" y1=\"14\" x2=\"{:.0}\" y2=\"14\"/>\
-                 <text x=\"{:.0}\" y=\"18\">{}</text>",
-                k % 4,
-                at + 24.0,
+                "<text x=\"{:.0}\" y=\"18\">{}</text>",
                 at + 30.0,
                 escaped(&series.name)
             );
@@ -212,7 +224,7 @@ fn draw(svg: &mut String, series: &Series, colour: usize, x: &Scale, y: &Scale) 
         for (px, py) in inside {
             let _ = write!(
                 svg,
-                "<circle class=\"s{colour}\" cx=\"{:.1}\" cy=\"{:.1}\" r=\"2.6\"/>",
+                "<circle class=\"s{colour}\" cx=\"{:.1}\" cy=\"{:.1}\" r=\"3.5\"/>",
                 across(x, *px),
                 up(y, *py)
             );

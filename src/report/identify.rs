@@ -338,7 +338,7 @@ impl Report {
                 .into_iter()
                 .chain(self.terms.iter().map(row))
                 .collect();
-            page.table(&rows);
+            page.table_of_words(&rows);
         }
     }
 

@@ -1,7 +1,7 @@
 //! `identify` through the binary: reports, stand files, pages, refusals.
 
 use super::decay::figure_5;
-use super::{Noise, parameter};
+use super::{Noise, TAU, parameter};
 use crate::util::{Folder, assert_close};
 
 fn decay_file(folder: &Folder) {
@@ -168,4 +168,115 @@ fn what_cannot_be_identified_is_said() {
     folder.run(&args).says(1, &["mV", "expected an angle"]);
     let args = ["identify", "decay", "decay.csv", "--inertia", "5"];
     folder.run(&args).says(2, &["--inertia", "unit"]);
+}
+
+/// Noise up to half the rate and a file of it beside others, for what cannot be evaluated.
+fn table(folder: &Folder, name: &str, columns: &[(&str, Vec<f64>)]) {
+    let head: Vec<&str> = columns.iter().map(|c| c.0).collect();
+    let rows: String = (0..columns[0].1.len())
+        .map(|i| {
+            let cells: Vec<String> = columns.iter().map(|c| c.1[i].to_string()).collect();
+            format!("{},{}\n", f64::from(i as u32) * 1e-3, cells.join(","))
+        })
+        .collect();
+    folder.write(name, format!("time_s,{}\n{rows}", head.join(",")));
+}
+
+/// What was recorded of a filter of one mode at 60 Hz, by its recursion.
+fn ringing_filter(applied: &[f64]) -> Vec<f64> {
+    let (fall, turn) = (0.989_f64, (TAU * 0.06).cos());
+    let (mut last, mut before) = (0.0, 0.0);
+    applied
+        .iter()
+        .map(|x| {
+            let now = 2.0 * fall * turn * last - fall * fall * before + 0.05 * x;
+            before = last;
+            last = now;
+            now
+        })
+        .collect()
+}
+
+#[test]
+fn responses_of_nonsense_are_refused() {
+    let folder = Folder::new();
+    let mut noise = Noise(41);
+    let mut random = || (0..4000).map(|_| noise.normal()).collect::<Vec<f64>>();
+    let (x, unrelated) = (random(), random());
+    let y = ringing_filter(&x);
+    let heads = ["force_N m", "beam_N m"];
+    let both = |name: &str, a: &[f64], b: &[f64]| {
+        table(
+            &folder,
+            name,
+            &[(heads[0], a.to_vec()), (heads[1], b.to_vec())],
+        );
+    };
+    both("good.csv", &x, &y);
+    both("unrelated.csv", &x, &unrelated);
+    both("still.csv", &x, &[3.0; 4000]);
+    both("silent.csv", &[0.0; 4000], &y);
+    both("same.csv", &x, &x);
+    let run = |files: &[&str], applied: &str, measured: &str| {
+        let channels = ["--applied", applied, "--measured", measured];
+        folder.run(&[&["identify", "response"], files, &channels[..]].concat())
+    };
+    assert_eq!(run(&["good.csv"], "force", "beam").code, 0);
+    run(&["unrelated.csv"], "force", "beam")
+        .says(1, &["does not follow the applied one", "--band"]);
+    run(&["still.csv"], "force", "beam")
+        .says(1, &["still.csv", "measured channel does not change"]);
+    run(&["silent.csv"], "force", "beam").says(1, &["applied channel does not change"]);
+    run(&["same.csv"], "force", "beam").says(1, &["same numbers"]);
+    // Swapped: the answer would come before its cause.
+    let swapped = run(&["good.csv"], "beam", "force");
+    assert!(
+        swapped.stderr.contains("channels may be swapped"),
+        "{}",
+        swapped.stderr
+    );
+    // Another rate.
+    let slow = folder.read("good.csv").replace("0.001,", "0.0013,");
+    folder.write("odd.csv", slow);
+    run(&["odd.csv"], "force", "beam").says(1, &["not uniform", "--rate"]);
+}
+
+#[test]
+fn loads_and_runs_of_nonsense_are_refused() {
+    let folder = Folder::new();
+    let head = "weight_N m,bridge_V\n";
+    folder.write("flat.csv", format!("{head}0,1\n5,1\n10,1\n0,1\n"));
+    folder.write("wild.csv", format!("{head}0,1\n5,0.2\n10,7\n5,-3\n0,1\n"));
+    let loads = |file: &str, load: &str, reading: &str| {
+        folder.run(&[
+            "identify",
+            "static",
+            file,
+            "--load",
+            load,
+            "--reading",
+            reading,
+        ])
+    };
+    loads("flat.csv", "weight", "bridge").says(1, &["same under every load"]);
+    loads("wild.csv", "bridge", "weight").says(2, &["swapped"]);
+    loads("wild.csv", "weight", "bridge").says(0, &["poor-fit"]);
+    // An angle of the wrong sign.
+    let torque: Vec<f64> = (0..4000)
+        .map(|i| (TAU * 0.7e-3 * f64::from(i)).sin())
+        .collect();
+    let omega = TAU * 0.7;
+    let angle = torque.iter().map(|t| t / (omega * omega)).collect();
+    table(
+        &folder,
+        "run.csv",
+        &[("angle_rad", angle), ("torque_N m", torque)],
+    );
+    let args = [
+        "identify", "runup", "run.csv", "--motion", "angle", "--torque", "torque",
+    ];
+    folder.run(&args).says(0, &["impossible"]);
+    folder
+        .run(&[&args[..], &["-o", "new.toml"]].concat())
+        .says(1, &["inertia came out as -", "check the sign"]);
 }

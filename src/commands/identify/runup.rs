@@ -56,6 +56,16 @@ pub fn run(args: &Runup) -> Result<Outcome, Failure> {
         half_window_s: args.window,
     };
     let outcome = identify(&run, &options)?;
+    let negative = outcome.get("inertia").filter(|found| found.value <= 0.0);
+    if let (Some(found), Some(_)) = (negative, &args.findings.result.output) {
+        return Err(Failure::failed(format_args!(
+            "the inertia came out as {} kg m^2, which no body has, and is not written: check the sign of \"{}\" and \
+             \"{}\"",
+            crate::report::short(found.value),
+            args.motion,
+            args.torque
+        )));
+    }
     let source = format!("identify runup: {}", args.input);
     let entries: Vec<Entry> = outcome
         .get("inertia")

@@ -34,6 +34,13 @@ pub fn run(args: &Static) -> Result<Outcome, Failure> {
         args.reading_unit.as_deref(),
         "--reading-unit",
     )?;
+    let is_effort = |unit: &NamedUnit| [TORQUE, FORCE].contains(&unit.unit.dimension());
+    if load_unit.unit.dimension() == VOLTAGE && is_effort(&unit) {
+        return Err(Failure::usage(format_args!(
+            "--load \"{}\" is in {} and --reading \"{}\" in {}; the columns are swapped",
+            args.load, load_unit.text, args.reading, unit.text
+        )));
+    }
     let (load_factor, load_text) = load_of(args, &load_unit)?;
     let (factor, text) = match unit.unit.dimension() {
         VOLTAGE => (unit.unit.factor(), "V".to_owned()),

@@ -80,7 +80,9 @@ pub fn identify(records: &[Ringing], options: &Options) -> Result<Evaluated, Fai
     for (place, k) in order.iter().enumerate() {
         words::name_mode(&mut outcome, &fit, *k, place, order.len());
     }
-    outcome.quality = Some(quality(&fit, &stretches));
+    let quality = quality(&fit, &stretches);
+    words::poor(&mut outcome, quality.relative);
+    outcome.quality = Some(quality);
     outcome.method.push(format!(
         "nonlinear least squares over {} stretch(es), {} samples: {} decaying sine(s), with an offset and a \
          drift of each stretch",

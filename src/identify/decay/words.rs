@@ -84,6 +84,23 @@ pub(super) fn doubts(outcome: &mut Outcome, fit: &ModesFit) {
     }
 }
 
+/// Part of the swing that a free decay may leave.
+const POOR: f64 = 0.3;
+
+/// Says if the record is hardly a decay of those modes.
+pub(super) fn poor(outcome: &mut Outcome, relative: f64) {
+    if relative > POOR {
+        outcome.warn(
+            "poor-fit",
+            format!(
+                "{} % of the swing is left: this is hardly a free decay; cut the record to where nothing drives the \
+                 stand with --range, or look at another --channel",
+                rounded(100.0 * relative, 2)
+            ),
+        );
+    }
+}
+
 /// Says which numbers are hard to tell apart.
 pub(super) fn correlations(outcome: &mut Outcome, fit: &ModesFit) {
     let count = 2 * fit.poles.len();

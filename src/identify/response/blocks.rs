@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use torqcomp_dsp::frf::{self, Block, Window};
 
-use super::{Driven, Excitation, Options};
+use super::{Driven, Excitation, Options, check};
 use crate::failure::Failure;
 use crate::identify::{Outcome, rms};
 use crate::report::{rounded, short};
@@ -36,30 +36,10 @@ pub(super) fn blocks(
     options: &Options,
     outcome: &mut Outcome,
 ) -> Result<Set, Failure> {
-    let first = records
-        .first()
-        .ok_or_else(|| Failure::failed("there is no record"))?;
-    let rate_hz = first.rate_hz;
-    for record in records {
-        if (record.rate_hz / rate_hz - 1.0).abs() > 1e-6 {
-            return Err(Failure::failed(format_args!(
-                "{} has {} samples a second and {} has {}; records of one response must have one rate",
-                first.name,
-                short(rate_hz),
-                record.name,
-                short(record.rate_hz)
-            )));
-        }
-        let numbers = record.applied.iter().chain(record.measured);
-        if record.applied.len() != record.measured.len() || numbers.clone().any(|v| !v.is_finite())
-        {
-            return Err(Failure::failed(format_args!(
-                "{}: both channels need a number in every row",
-                record.name
-            )));
-        }
-    }
-    let excitation = options.excitation.unwrap_or_else(|| guess(first.applied));
+    check::records(records)?;
+    let excitation = options
+        .excitation
+        .unwrap_or_else(|| guess(records[0].applied));
     match excitation {
         Excitation::Impact => impacts(records, outcome),
         Excitation::Random => random(records, options, outcome),

@@ -1,6 +1,7 @@
 //! Modes from a known input and a measured output.
 
 mod blocks;
+mod check;
 mod lines;
 mod modal;
 mod order;
@@ -86,11 +87,20 @@ pub fn identify(records: &[Driven], options: &Options) -> Result<Evaluated, Fail
     let mut outcome = Outcome::default();
     let set = blocks::blocks(records, options, &mut outcome)?;
     let lines = lines::band(&set, options)?;
-    let (best, held_out) = order::order(&set, &lines, options)?;
+    let leads = check::leads(&set, &lines, options.order);
+    let (best, held_out) = order::order(&set, &lines, options).map_err(|failure| {
+        if leads {
+            Failure::failed(check::LEADS)
+        } else {
+            failure
+        }
+    })?;
     let fitted = order::grown(&set, &lines, options, best)?;
     let spread = scatter::of_poles(&set, &lines, options, &fitted)?;
     words::name_modes(&mut outcome, &fitted, &spread);
-    outcome.quality = Some(quality(&set, &lines, &fitted));
+    let quality = quality(&set, &lines, &fitted);
+    check::doubts(&mut outcome, quality.relative, leads, &fitted);
+    outcome.quality = Some(quality);
     say_method(&mut outcome, &set, &lines, options, &fitted);
     let held = held_out.get(fitted.poles.len()).copied();
     say_others(&mut outcome, options, &fitted, held);

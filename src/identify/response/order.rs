@@ -96,7 +96,8 @@ pub(super) fn order(
     match options.modes {
         Some(modes) => Ok((modes, errors)),
         None if best == 0 => Err(Failure::failed(
-            "no mode explains data that were held out; check the channels and the band",
+            "no mode explains data that were held out: the measured signal does not follow the applied one; check \
+             --applied, --measured and --band",
         )),
         None => Ok((best, errors)),
     }

@@ -1,14 +1,17 @@
 //! How sure the poles of a response are.
 //!
 //! ```text
-//! Cov p = (JᵀJ)⁻¹ · ½ Re(J̄ᵀ Γ J) · (JᵀJ)⁻¹,   Γ_kl = s² d(k − l) Σ_b X̄_kb X_lb / √(S_k S_l)
+//! Cov p = (JᵀJ)⁻¹ · ½ Re(J̄ᵀ Γ J) · (JᵀJ)⁻¹,   Γ_kl = s_k s_l d(k − l) Σ_b X̄_kb X_lb / √(S_k S_l)
 //! ```
 //!
 //! J: derivatives of the weighted model, lines down, with what the residues make up for taken out; Γ:
-//! covariance of the weighted errors of H1 at lines k and l where the noise of the measured signal is
-//! white; X_kb: applied signal at line k of block b, S_k = Σ_b |X_kb|²; d: transform of the squared
-//! window over its value at 0, which makes neighbouring lines err together; s²: power of the weighted
-//! residuals. (R. Pintelon, J. Schoukens, System Identification, 2nd ed., 2012, 2.6 and 9.)
+//! covariance of the weighted errors of H1 at lines k and l where the noise of the measured signal changes
+//! little from line to line; X_kb: applied signal at line k of block b, S_k = Σ_b |X_kb|²; d:
+//! transform of the squared window over its value at 0, which makes neighbouring lines err together; s_k²:
+//! power of the weighted errors, from what of the measured signal does not go with the applied one from block
+//! to block, or from the residuals where that is more or there is one block alone. (R. Pintelon, J. Schoukens,
+//! System Identification, 2nd ed., 2012, 2.6 and 9; J. S. Bendat, A. G. Piersol, Random Data, 4th ed.,
+//! 2010, 9.2.)
 //!
 //! Beside it, groups of blocks are left out in turn (B. Efron, The Jackknife, 1982, 3), which also sees
 //! what differs from hit to hit. Few groups tell it badly, so it counts only where it is larger than
@@ -36,6 +39,10 @@ const CHANCE: f64 = 0.05;
 const REACH: usize = 40;
 /// Weight over the largest below which a line tells nothing.
 const SILENT: f64 = 1e-3;
+/// Lines to both sides over which the power of the errors is averaged.
+const NEIGHBOURS: usize = 5;
+/// Part of the noise's amplitude that half-overlapping Hann-weighted segments share.
+const SHARED: f64 = 1.0 / 6.0;
 
 /// Covariance of the poles.
 ///
@@ -90,7 +97,8 @@ fn from_noise(set: &Set, lines: &Lines, data: &Data, fitted: &Modal) -> Result<S
     let linear = 2 * modes + 2;
     let freedom = (2 * heard).saturating_sub(free.len() + linear).max(1);
     let power = 2.0 * fit.sum_of_squares / freedom as f64;
-    let middle = gathered(set, lines, &slopes) * (0.5 * power);
+    let sizes = error_sizes(set, lines, &data.weight, power, heard);
+    let middle = gathered(set, lines, &slopes, &sizes) * 0.5;
     let covariance = &inverse * middle * &inverse;
     let place = |i: usize| free.iter().position(|f| *f == i);
     let one = |k: usize| {
@@ -100,8 +108,60 @@ fn from_noise(set: &Set, lines: &Lines, data: &Data, fitted: &Modal) -> Result<S
     Ok((0..modes).map(one).collect())
 }
 
-/// Re(J̄ᵀ Γ J) for s² = 1.
-fn gathered(set: &Set, lines: &Lines, slopes: &DMatrix<f64>) -> DMatrix<f64> {
+/// s_k of each line; `power` is that of the residuals, over the lines that are heard.
+fn error_sizes(set: &Set, lines: &Lines, weight: &[f64], power: f64, heard: usize) -> Vec<f64> {
+    let blocks = set.blocks.len();
+    if blocks < 2 {
+        return vec![power.sqrt(); weight.len()];
+    }
+    let scattered: Vec<f64> = lines
+        .clone()
+        .zip(weight)
+        .map(|(k, w)| w * w * variance(set, k))
+        .collect();
+    let smooth: Vec<f64> = (0..scattered.len())
+        .map(|k| {
+            let from = k.saturating_sub(NEIGHBOURS);
+            let part = &scattered[from..(k + NEIGHBOURS + 1).min(scattered.len())];
+            part.iter().sum::<f64>() / part.len() as f64
+        })
+        .collect();
+    let mean = smooth.iter().sum::<f64>() / heard.max(1) as f64;
+    let overlap = match set.window {
+        Window::Hann => 1.0 + 2.0 * SHARED * SHARED,
+        _ => 1.0,
+    };
+    // What the model leaves may be more than the scatter from block to block.
+    let more = if mean > 0.0 {
+        (power / mean).max(overlap)
+    } else {
+        0.0
+    };
+    let least = if mean > 0.0 { 0.0 } else { power };
+    smooth
+        .iter()
+        .map(|p| (p * more).max(least).sqrt())
+        .collect()
+}
+
+/// Variance of H1 at a line from the scatter of its blocks.
+fn variance(set: &Set, line: usize) -> f64 {
+    let (mut xx, mut yy, mut xy) = (0.0, 0.0, Complex64::ZERO);
+    for block in &set.blocks {
+        let (x, y) = (block.applied[line], block.measured[line]);
+        xx += x.norm_sqr();
+        yy += y.norm_sqr();
+        xy += x.conj() * y;
+    }
+    if xx == 0.0 {
+        return 0.0;
+    }
+    let left = (yy - xy.norm_sqr() / xx).max(0.0);
+    left / (set.blocks.len() - 1) as f64 / xx
+}
+
+/// Re(J̄ᵀ Γ J).
+fn gathered(set: &Set, lines: &Lines, slopes: &DMatrix<f64>, sizes: &[f64]) -> DMatrix<f64> {
     let (count, columns) = (lines.len(), slopes.ncols());
     let slope = |k: usize, p: usize| Complex64::new(slopes[(2 * k, p)], slopes[(2 * k + 1, p)]);
     let length = 2 * (set.blocks[0].applied.len() - 1);
@@ -128,7 +188,7 @@ fn gathered(set: &Set, lines: &Lines, slopes: &DMatrix<f64>) -> DMatrix<f64> {
                 .blocks
                 .iter()
                 .map(|b| b.applied[at].conj() * b.applied[at + lag]);
-            let gamma = window * pairs.sum::<Complex64>() / size;
+            let gamma = window * pairs.sum::<Complex64>() * (sizes[k] * sizes[l] / size);
             for p in 0..columns {
                 let left = slope(k, p).conj() * gamma;
                 for q in 0..columns {

@@ -173,40 +173,34 @@ pub(super) fn draw(
     held_out: &[f64],
 ) {
     let hz: Vec<f64> = lines.clone().map(|k| k as f64 * step_hz).collect();
-    let of =
-        |values: &[Complex64], f: fn(&Complex64) -> f64| values.iter().map(f).collect::<Vec<f64>>();
     let part = &h1.response[lines.clone()];
-    let size = |c: &Complex64| c.norm();
-    let turn = |c: &Complex64| c.arg().to_degrees();
-    let pair = |f: fn(&Complex64) -> f64| {
-        vec![
-            Series::line("H1", &hz, &of(part, f)),
-            Series::line("model", &hz, &of(&fitted.response, f)),
-        ]
-    };
+    let sizes = |values: &[Complex64]| values.iter().map(|c| c.norm()).collect::<Vec<f64>>();
     let mut magnitude = Chart::new(
         "Response",
         "frequency, Hz",
         "measured over applied",
-        pair(size),
+        vec![
+            Series::line("H1", &hz, &sizes(part)),
+            Series::line("model", &hz, &sizes(&fitted.response)),
+        ],
     );
     magnitude.y_log = true;
-    // Twice the standard uncertainty to both sides.
-    magnitude.band = lines
-        .clone()
-        .filter_map(|k| {
-            let (middle, std) = (h1.response[k].norm(), 2.0 * h1.relative_std(k)?);
-            (std < 1.0).then_some((
-                k as f64 * step_hz,
-                middle * (1.0 - std),
-                middle * (1.0 + std),
-            ))
-        })
-        .collect();
+    magnitude.band = bounds(h1, lines, step_hz);
     outcome.charts.push(magnitude);
+    let model = unwrapped(&fitted.response);
+    let measured: Vec<f64> = part
+        .iter()
+        .zip(&fitted.response)
+        .zip(&model)
+        .map(|((h, m), turn)| turn + (h * m.conj()).arg().to_degrees())
+        .collect();
+    let phase = vec![
+        Series::line("H1", &hz, &measured),
+        Series::line("model", &hz, &model),
+    ];
     outcome
         .charts
-        .push(Chart::new("Phase", "frequency, Hz", "degrees", pair(turn)));
+        .push(Chart::new("Phase", "frequency, Hz", "degrees", phase));
     let coherence = vec![Series::line("coherence", &hz, &h1.coherence[lines.clone()])];
     outcome
         .charts
@@ -220,4 +214,28 @@ pub(super) fn draw(
         "per cent",
         error,
     ));
+}
+
+/// Twice the standard uncertainty to both sides of the magnitude: x, low, high.
+fn bounds(h1: &Frf, lines: &Lines, step_hz: f64) -> Vec<(f64, f64, f64)> {
+    let one = |k: usize| {
+        let (middle, std) = (h1.response[k].norm(), 2.0 * h1.relative_std(k)?);
+        let place = k as f64 * step_hz;
+        (std < 1.0).then_some((place, middle * (1.0 - std), middle * (1.0 + std)))
+    };
+    lines.clone().filter_map(one).collect()
+}
+
+/// Phase in degrees without jumps of a turn, from the angle between neighbours.
+fn unwrapped(response: &[Complex64]) -> Vec<f64> {
+    let mut turn = response.first().map_or(0.0, |c| c.arg().to_degrees());
+    let mut last = response.first().copied().unwrap_or_default();
+    response
+        .iter()
+        .map(|c| {
+            turn += (c * last.conj()).arg().to_degrees();
+            last = *c;
+            turn
+        })
+        .collect()
 }

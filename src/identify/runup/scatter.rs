@@ -15,7 +15,7 @@ use nalgebra::{DMatrix, DVector};
 use super::regression::Errors;
 
 /// Ratio of the coloured to the white standard uncertainty from which the coloured one counts.
-const CLEARLY: f64 = 1.2;
+const CLEARLY: f64 = 1.1;
 
 /// Covariance of the (scaled) parameters, and the largest factor by which colour made an uncertainty
 /// larger.

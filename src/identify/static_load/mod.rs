@@ -8,6 +8,7 @@ use torqcomp_model::fit::linear::{self, LinearFit};
 use super::{Found, Outcome, Quality, rms};
 use crate::failure::Failure;
 use crate::report::chart::{Chart, Series};
+use crate::report::rounded;
 
 /// One reading under a known load.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -108,6 +109,11 @@ pub fn identify(points: &[Point], options: Options, units: &Units) -> Result<Eva
             options.degree + 2
         )));
     }
+    if points.iter().all(|p| p.reading == points[0].reading) {
+        return Err(Failure::failed(
+            "the reading is the same under every load; check --reading and whether the bridge was supplied",
+        ));
+    }
     let design = DMatrix::from_fn(points.len(), options.degree + 1, |r, c| {
         (points[r].load / largest).powi(c as i32)
     });
@@ -122,6 +128,7 @@ pub fn identify(points: &[Point], options: Options, units: &Units) -> Result<Eva
     };
     evaluated.terms = terms::terms(points, &steps, &evaluated.coefficients, largest);
     draw(&mut evaluated, units);
+    poor(&mut evaluated.outcome);
     say(&mut evaluated.outcome, points, options);
     Ok(evaluated)
 }
@@ -237,6 +244,23 @@ fn steps(points: &[Point], largest: f64) -> Vec<f64> {
     loads.sort_by(f64::total_cmp);
     loads.dedup_by(|a, b| (*a - *b).abs() <= SAME * largest);
     loads
+}
+
+/// Part of the readings' swing that a calibration may leave.
+const POOR: f64 = 0.05;
+
+fn poor(outcome: &mut Outcome) {
+    let relative = outcome.quality.as_ref().map_or(0.0, |q| q.relative);
+    if relative > POOR {
+        outcome.warn(
+            "poor-fit",
+            format!(
+                "the curve leaves {} % of the readings' swing: check that the columns are the right ones and the rows \
+                 in the order they were taken, or use --degree 3",
+                rounded(100.0 * relative, 2)
+            ),
+        );
+    }
 }
 
 fn say(outcome: &mut Outcome, points: &[Point], options: Options) {

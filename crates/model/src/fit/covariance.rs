@@ -29,6 +29,14 @@ pub(super) fn covariance(
     variance: impl Fn(usize) -> Option<f64>,
 ) -> (Covariance, Vec<Undetermined>) {
     let n = indices.len();
+    if n == 0 {
+        // Every parameter ended at a bound.
+        let nothing = Covariance {
+            places: vec![None; count],
+            matrix: DMatrix::zeros(0, 0),
+        };
+        return (nothing, Vec::new());
+    }
     let norms: Vec<f64> = (0..n).map(|j| r.column(j).norm()).collect();
     let scaled = DMatrix::from_fn(n, n, |i, j| {
         if norms[j] > 0.0 {
