@@ -37,18 +37,32 @@ pub fn figure_5(decibel: f64, noise: &mut Noise) -> (Vec<f64>, Vec<f64>, f64) {
 
 #[test]
 fn intervals_of_decays_cover_the_truth() {
-    let mut noise = Noise(11);
     let natural = OMEGA.hypot(sigma());
-    let mut covered = Coverage::default();
-    for k in 0..240 {
-        let decibel = [60.0, 50.0, 40.0, 30.0, 20.0][k % 5];
-        let (t, y, rate_hz) = figure_5(decibel, &mut noise);
-        let found = ring(&t, &y, rate_hz);
-        assert_eq!(found.fit.poles.len(), 1, "at {decibel} dB");
-        covered.count(of(&found.outcome, "natural_frequency"), natural / TAU);
-        covered.count(of(&found.outcome, "damping_ratio"), sigma() / natural);
+    // As recorded, and at a lower rate.
+    for (band_hz, seed) in [(None, 11), (Some((100.0, 2000.0)), 19)] {
+        let mut noise = Noise(seed);
+        let mut covered = [Coverage::default(), Coverage::default()];
+        for k in 0..240 {
+            let decibel = [60.0, 50.0, 40.0, 30.0, 20.0][k % 5];
+            let (t, y, rate_hz) = figure_5(decibel, &mut noise);
+            let record = decay::Ringing {
+                name: "simulated",
+                times_s: &t,
+                rate_hz: Some(rate_hz),
+                values: &y,
+            };
+            let options = decay::Options {
+                band_hz,
+                ..Default::default()
+            };
+            let found = decay::identify(&[record], &options).unwrap();
+            assert_eq!(found.fit.poles.len(), 1, "at {decibel} dB");
+            covered[0].count(of(&found.outcome, "natural_frequency"), natural / TAU);
+            covered[1].count(of(&found.outcome, "damping_ratio"), sigma() / natural);
+        }
+        covered[0].check(&format!("decays, frequency, band {band_hz:?}"));
+        covered[1].check(&format!("decays, damping, band {band_hz:?}"));
     }
-    covered.check("decays");
 }
 
 /// Least standard deviations of frequency (Hz) and decay rate (1/s) that any unbiased estimator can have

@@ -36,24 +36,6 @@ pub(super) fn follow(
     told: &Told,
     outcome: &mut Outcome,
 ) -> Result<Vec<Entry>, Failure> {
-    let entry = |found: &Found, source: &str| -> Option<Entry> {
-        let key = match found.name.as_str() {
-            "inertia" => "inertia",
-            "damping" => "damping",
-            "stiffness" => "stiffness",
-            name if name.ends_with("natural_frequency") => "natural_frequency",
-            name if name.ends_with("damping_ratio") => "damping_ratio",
-            _ => return None,
-        };
-        Some(Entry {
-            section: "mechanics",
-            key,
-            value: found.value,
-            std: found.std,
-            unit: found.unit.clone(),
-            source: source.to_owned(),
-        })
-    };
     let modal: Vec<Entry> = told
         .modal
         .iter()
@@ -94,6 +76,26 @@ pub(super) fn follow(
     outcome.found.append(&mut found);
     outcome.correlated.extend(correlated);
     Ok(entries)
+}
+
+/// Entry of `[mechanics]` for a number that has a place there.
+fn entry(found: &Found, source: &str) -> Option<Entry> {
+    let key = match found.name.as_str() {
+        "inertia" => "inertia",
+        "damping" => "damping",
+        "stiffness" => "stiffness",
+        name if name.ends_with("natural_frequency") => "natural_frequency",
+        name if name.ends_with("damping_ratio") => "damping_ratio",
+        _ => return None,
+    };
+    Some(Entry {
+        section: "mechanics",
+        key,
+        value: found.value,
+        std: found.std,
+        unit: found.unit.clone(),
+        source: source.to_owned(),
+    })
 }
 
 fn not_anchored(ratios: &Ratios) -> &'static str {

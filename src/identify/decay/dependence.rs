@@ -86,6 +86,11 @@ pub(super) fn amplitude_dependence(
     let (Some(early), Some(late)) = halves else {
         return;
     };
+    compare_halves(outcome, &early, &late);
+}
+
+/// Says what differs between the halves by more than their uncertainties.
+fn compare_halves(outcome: &mut Outcome, early: &ModesFit, late: &ModesFit) {
     for (i, what, notable) in [(0, "decay rate", NOTABLE), (1, "frequency", 1e-4)] {
         let (Some(a), Some(b)) = (early.fit.std[i], late.fit.std[i]) else {
             continue;

@@ -7,6 +7,8 @@ mod modes;
 mod stretches;
 mod words;
 
+use torqcomp_dsp::decimate;
+
 use super::{Outcome, Quality, rms};
 use crate::failure::Failure;
 
@@ -62,13 +64,16 @@ const MOST_MODES: usize = 12;
 /// If nothing rings, or there is too little of it.
 pub fn identify(records: &[Ringing], options: &Options) -> Result<Evaluated, Failure> {
     let mut outcome = Outcome::default();
-    let (stretches, starts_s) = stretches::stretches(records, options, &mut outcome)?;
+    let (stretches, starts_s, slowed) = stretches::stretches(records, options, &mut outcome)?;
     let wanted = Wanted {
         count: options.modes,
         most: MOST_MODES,
         band_hz: options.band_hz.unwrap_or((0.0, f64::INFINITY)),
     };
-    let fit = modes::search(&stretches, &wanted)?;
+    let mut fit = modes::search(&stretches, &wanted)?;
+    if slowed {
+        fit.allow_for(decimate::NOISE);
+    }
     if fit.poles.is_empty() {
         return Err(Failure::failed(
             "nothing in the record rings: no decaying sine stands out of the noise; check the channel, \

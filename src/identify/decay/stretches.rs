@@ -9,7 +9,7 @@ use crate::identify::Outcome;
 use crate::report::short;
 
 /// Most samples of all stretches together that are fitted at once.
-const MOST_SAMPLES: usize = 40_000;
+const MOST_SAMPLES: usize = 20_000;
 
 /// Stretches beyond that number are left out.
 const MOST_STRETCHES: usize = 12;
@@ -20,12 +20,44 @@ const WORTH: f64 = 1e-6;
 /// Fewest samples of a record.
 const LEAST_SAMPLES: usize = 40;
 
-/// Cuts all records into stretches of free ringing and lowers their rate where nothing is lost.
+/// Cuts all records into stretches of free ringing and lowers their rate where nothing is lost; their starts,
+/// and whether a rate was lowered.
 pub(super) fn stretches(
     records: &[Ringing],
     options: &Options,
     outcome: &mut Outcome,
-) -> Result<(Vec<Stretch>, Vec<f64>), Failure> {
+) -> Result<(Vec<Stretch>, Vec<f64>, bool), Failure> {
+    let cut = cut(records, options, outcome)?;
+    let total: usize = cut.iter().map(|(_, stretch, _)| stretch.values.len()).sum();
+    let mut all = Vec::new();
+    let mut starts = Vec::new();
+    let mut slowed = is_low_passed(records, options);
+    for (start, stretch, rate_hz) in cut {
+        let share = MOST_SAMPLES * stretch.values.len() / total;
+        let factor = match (rate_hz, options.band_hz) {
+            (Some(rate), None) => factor(&stretch.values, rate, share),
+            _ => 1,
+        };
+        let (later, stretch) = slower(&stretch, factor)?;
+        slowed |= factor > 1;
+        if factor > 1 {
+            outcome.method.push(format!(
+                "the rate was lowered to one sample in {factor}: nothing rings above {} Hz",
+                short(decimate::PASS * rate_hz.unwrap_or(0.0) / factor as f64)
+            ));
+        }
+        starts.push(start + later);
+        all.push(stretch);
+    }
+    outcome.method.dedup();
+    Ok((all, starts, slowed))
+}
+
+/// A stretch, its start in s on the record's axis, and the record's rate.
+type Cut = (f64, Stretch, Option<f64>);
+
+/// All stretches at the rate they were recorded with.
+fn cut(records: &[Ringing], options: &Options, outcome: &mut Outcome) -> Result<Vec<Cut>, Failure> {
     let mut cut = Vec::new();
     for record in records {
         let (times, values) = prepared(record, options, outcome)?;
@@ -56,27 +88,7 @@ pub(super) fn stretches(
         );
         cut.truncate(MOST_STRETCHES);
     }
-    let total: usize = cut.iter().map(|(_, stretch, _)| stretch.values.len()).sum();
-    let mut all = Vec::new();
-    let mut starts = Vec::new();
-    for (start, stretch, rate_hz) in cut {
-        let share = MOST_SAMPLES * stretch.values.len() / total;
-        let factor = match (rate_hz, options.band_hz) {
-            (Some(rate), None) => factor(&stretch.values, rate, share),
-            _ => 1,
-        };
-        let (later, stretch) = slower(&stretch, factor)?;
-        if factor > 1 {
-            outcome.method.push(format!(
-                "the rate was lowered to one sample in {factor}: nothing rings above {} Hz",
-                short(decimate::PASS * rate_hz.unwrap_or(0.0) / factor as f64)
-            ));
-        }
-        starts.push(start + later);
-        all.push(stretch);
-    }
-    outcome.method.dedup();
-    Ok((all, starts))
+    Ok(cut)
 }
 
 /// The part of a record that is asked for, low-passed and slower if a band is given.
@@ -111,7 +123,7 @@ fn prepared(
     let (Some((_, highest)), Some(rate_hz)) = (options.band_hz, record.rate_hz) else {
         return Ok((whole.times_s, whole.values));
     };
-    let factor = ((decimate::PASS * rate_hz / highest).floor() as usize).max(1);
+    let factor = band_factor(rate_hz, highest);
     if factor > 1 {
         outcome.method.push(format!(
             "low-passed above {} Hz, one sample in {factor} kept",
@@ -124,6 +136,20 @@ fn prepared(
         times.take(few.samples.len()).copied().collect(),
         few.samples,
     ))
+}
+
+/// How many samples become one for a band.
+fn band_factor(rate_hz: f64, highest_hz: f64) -> usize {
+    ((decimate::PASS * rate_hz / highest_hz).floor() as usize).max(1)
+}
+
+/// Whether the band that is asked for takes a lower rate.
+fn is_low_passed(records: &[Ringing], options: &Options) -> bool {
+    let Some((_, highest_hz)) = options.band_hz else {
+        return false;
+    };
+    let mut rates = records.iter().filter_map(|r| r.rate_hz);
+    rates.any(|rate_hz| band_factor(rate_hz, highest_hz) > 1)
 }
 
 /// A stretch at a lower rate, and how much later it starts.

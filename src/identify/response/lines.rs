@@ -62,16 +62,16 @@ pub(super) fn data(
         .enumerate()
         .filter(|(i, _)| keep(*i))
         .map(|(_, b)| b);
-    let frf = Frf::of(chosen, Estimator::H1);
-    let powers = &frf.applied_power[lines.clone()];
+    let frf = Frf::between(chosen, Estimator::H1, lines.clone());
+    let powers = &frf.applied_power;
     let mean = powers.iter().sum::<f64>() / powers.len() as f64;
     Data {
         omega: lines
             .clone()
             .map(|k| TAU * k as f64 * set.step_hz)
             .collect(),
-        response: frf.response[lines.clone()].to_vec(),
         weight: powers.iter().map(|p| (p / mean).sqrt()).collect(),
+        response: frf.response,
         order: options.order,
         added_rate: set.added_rate,
         with_delay: options.with_delay,

@@ -108,7 +108,7 @@ pub fn identify(records: &[Driven], options: &Options) -> Result<Evaluated, Fail
     words::raw_error(&mut outcome, &set, &lines);
     words::levels(&mut outcome, &set, &lines);
     words::draw(&mut outcome, &h1, &lines, set.step_hz, &fitted, &held_out);
-    let part = |estimator| Frf::of(set.blocks.iter(), estimator).response[lines.clone()].to_vec();
+    let part = |estimator| Frf::between(set.blocks.iter(), estimator, lines.clone()).response;
     Ok(Evaluated {
         outcome,
         frequency_hz: lines.clone().map(|k| k as f64 * set.step_hz).collect(),

@@ -79,10 +79,16 @@ impl Data {
     /// What stands before the sum, and s.
     fn front(&self, omega: f64, delay_s: f64, scale: f64) -> (Complex64, Complex64) {
         let s = Complex64::new(0.0, omega / scale);
-        (
-            s.powi(self.order) * Complex64::from_polar(1.0, -omega * delay_s),
-            s,
-        )
+        let late = match delay_s == 0.0 {
+            true => Complex64::ONE,
+            false => Complex64::cis(-omega * delay_s),
+        };
+        let power = match self.order {
+            0 => Complex64::ONE,
+            1 => s,
+            order => s.powi(order),
+        };
+        (power * late, s)
     }
 
     /// 1/(s − p) and 1/(s − p*), with the window's rate in p.

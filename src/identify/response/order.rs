@@ -62,6 +62,26 @@ pub(super) fn order(
             )),
         };
     }
+    let errors = tried(set, lines, options, &folds)?;
+    let least = errors.iter().copied().fold(f64::INFINITY, f64::min);
+    let best = errors.iter().position(|e| *e <= SLACK * least).unwrap_or(0);
+    match options.modes {
+        Some(modes) => Ok((modes, errors)),
+        None if best == 0 => Err(Failure::failed(
+            "no mode explains data that were held out: the measured signal does not follow the applied one; check \
+             --applied, --measured and --band",
+        )),
+        None => Ok((best, errors)),
+    }
+}
+
+/// Error on held-out blocks with 0, 1, 2, … modes, until more do not help.
+fn tried(
+    set: &Set,
+    lines: &Lines,
+    options: &Options,
+    folds: &[Vec<usize>],
+) -> Result<Vec<f64>, Failure> {
     let most = options.modes.unwrap_or(MOST_MODES).min(lines.len() / 6);
     let training: Vec<Data> = folds
         .iter()
@@ -72,7 +92,7 @@ pub(super) fn order(
         .map(|d| d.fit(&[], Effort::Coarse))
         .collect::<Result<_, _>>()?;
     let error = |models: &[Modal]| -> f64 {
-        let each = models.iter().zip(&folds).flat_map(|(model, fold)| {
+        let each = models.iter().zip(folds).flat_map(|(model, fold)| {
             fold.iter()
                 .map(|i| frf::prediction_error(&model.response, &set.blocks[*i], lines.clone()))
         });
@@ -91,16 +111,7 @@ pub(super) fn order(
         since = if now < 0.99 * least { 0 } else { since + 1 };
         errors.push(now);
     }
-    let least = errors.iter().copied().fold(f64::INFINITY, f64::min);
-    let best = errors.iter().position(|e| *e <= SLACK * least).unwrap_or(0);
-    match options.modes {
-        Some(modes) => Ok((modes, errors)),
-        None if best == 0 => Err(Failure::failed(
-            "no mode explains data that were held out: the measured signal does not follow the applied one; check \
-             --applied, --measured and --band",
-        )),
-        None => Ok((best, errors)),
-    }
+    Ok(errors)
 }
 
 /// So many modes through all blocks, one after another.

@@ -99,7 +99,7 @@ pub(super) fn raw_error(outcome: &mut Outcome, set: &Set, lines: &Lines) {
         let others = (0..set.blocks.len())
             .filter(|i| !fold.contains(i))
             .map(|i| &set.blocks[i]);
-        let raw = Frf::of(others, Estimator::H1).response[lines.clone()].to_vec();
+        let raw = Frf::between(others, Estimator::H1, lines.clone()).response;
         sum += fold
             .iter()
             .map(|i| frf::prediction_error(&raw, &set.blocks[*i], lines.clone()))
@@ -123,6 +123,9 @@ pub(super) fn levels(outcome: &mut Outcome, set: &Set, lines: &Lines) {
         all.dedup();
         all
     };
+    if records.len() < 2 {
+        return;
+    }
     let of = |r: usize| {
         Frf::of(
             set.blocks
@@ -187,20 +190,7 @@ pub(super) fn draw(
     magnitude.y_log = true;
     magnitude.band = bounds(h1, lines, step_hz);
     outcome.charts.push(magnitude);
-    let model = unwrapped(&fitted.response);
-    let measured: Vec<f64> = part
-        .iter()
-        .zip(&fitted.response)
-        .zip(&model)
-        .map(|((h, m), turn)| turn + (h * m.conj()).arg().to_degrees())
-        .collect();
-    let phase = vec![
-        Series::line("H1", &hz, &measured),
-        Series::line("model", &hz, &model),
-    ];
-    outcome
-        .charts
-        .push(Chart::new("Phase", "frequency, Hz", "degrees", phase));
+    outcome.charts.push(phase(&hz, part, &fitted.response));
     let coherence = vec![Series::line("coherence", &hz, &h1.coherence[lines.clone()])];
     outcome
         .charts
@@ -214,6 +204,22 @@ pub(super) fn draw(
         "per cent",
         error,
     ));
+}
+
+/// Phase of the model without jumps, and of H1 beside it.
+fn phase(hz: &[f64], h1: &[Complex64], model: &[Complex64]) -> Chart {
+    let turns = unwrapped(model);
+    let measured: Vec<f64> = h1
+        .iter()
+        .zip(model)
+        .zip(&turns)
+        .map(|((h, m), turn)| turn + (h * m.conj()).arg().to_degrees())
+        .collect();
+    let both = vec![
+        Series::line("H1", hz, &measured),
+        Series::line("model", hz, &turns),
+    ];
+    Chart::new("Phase", "frequency, Hz", "degrees", both)
 }
 
 /// Twice the standard uncertainty to both sides of the magnitude: x, low, high.

@@ -115,6 +115,11 @@ pub(super) fn say(
             ),
         );
     }
+    impossible(outcome);
+}
+
+/// Says which numbers no body has.
+fn impossible(outcome: &mut Outcome) {
     let impossible: Vec<String> = outcome
         .found
         .iter()

@@ -146,8 +146,40 @@ fn outcome(
     largest: f64,
     units: &Units,
 ) -> Outcome {
+    let mut outcome = Outcome {
+        found: constants(fit, largest, units),
+        ..Outcome::default()
+    };
+    let left: Vec<f64> = match weights {
+        Some(weights) => fit
+            .residuals
+            .iter()
+            .zip(weights)
+            .map(|(r, w)| r / w)
+            .collect(),
+        None => fit.residuals.clone(),
+    };
+    let swing: Vec<f64> = points.iter().map(|p| p.reading - fit.values[0]).collect();
+    outcome.quality = Some(Quality {
+        rms: rms(&left),
+        unit: units.reading.clone(),
+        relative: rms(&left) / rms(&swing),
+    });
+    outcome.method.push(format!(
+        "{} regression of the reading on the load over {} points, loading and unloading together",
+        if weights.is_some() {
+            "weighted"
+        } else {
+            "plain"
+        },
+        points.len()
+    ));
+    outcome
+}
+
+/// Sensitivity, its inverse, zero, and the higher powers of the curve.
+fn constants(fit: &LinearFit, largest: f64, units: &Units) -> Vec<Found> {
     let (load, reading) = (&units.load, &units.reading);
-    let mut outcome = Outcome::default();
     let slope = fit.values[1] / largest;
     let slope_std = fit.std[1].map(|s| s / largest);
     // K = 1/S: u(K)/K = u(S)/S.
@@ -156,7 +188,7 @@ fn outcome(
         true => format!("{a}/({b})"),
         false => format!("{a}/{b}"),
     };
-    outcome.found = vec![
+    let mut found = vec![
         Found::new(
             constant_name(units),
             1.0 / slope,
@@ -170,7 +202,7 @@ fn outcome(
         if let Some(value) = fit.values.get(k) {
             let size = largest.powi(k as i32);
             let unit = format!("{reading}/({load})^{k}");
-            outcome.found.push(Found::new(
+            found.push(Found::new(
                 name,
                 value / size,
                 fit.std[k].map(|s| s / size),
@@ -178,31 +210,7 @@ fn outcome(
             ));
         }
     }
-    let left: Vec<f64> = match weights {
-        Some(weights) => fit
-            .residuals
-            .iter()
-            .zip(weights)
-            .map(|(r, w)| r / w)
-            .collect(),
-        None => fit.residuals.clone(),
-    };
-    let swing: Vec<f64> = points.iter().map(|p| p.reading - fit.values[0]).collect();
-    outcome.quality = Some(Quality {
-        rms: rms(&left),
-        unit: reading.clone(),
-        relative: rms(&left) / rms(&swing),
-    });
-    outcome.method.push(format!(
-        "{} regression of the reading on the load over {} points, loading and unloading together",
-        if weights.is_some() {
-            "weighted"
-        } else {
-            "plain"
-        },
-        points.len()
-    ));
-    outcome
+    found
 }
 
 /// Readings with the curve through them, and how far they are off.
