@@ -1,5 +1,6 @@
 //! `identify`: constants of the stand from records, with uncertainties.
 
+mod anchor;
 mod decay;
 mod response;
 mod runup;

@@ -2,11 +2,13 @@
 
 use torqcomp_model::Dimension;
 
+use super::anchor::{Ratios, Told, follow};
 use super::{deliver, must_be_uniform, read, whole};
 use crate::cli::identify::{Excitation, Measured, Response};
 use crate::commands::Outcome;
 use crate::failure::Failure;
-use crate::identify::response::{self, Driven, Options, identify};
+use crate::identify::anchored::Ringer;
+use crate::identify::response::{self, Driven, Evaluated, Options, identify};
 use crate::io::csv::NamedUnit;
 use crate::report::identify::Report;
 use crate::stand::update::Entry;
@@ -56,7 +58,7 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
             .as_ref()
             .map_or_else(String::new, |u| u.text.clone());
     }
-    let entries = entries(args, &evaluated.outcome)?;
+    let entries = entries(args, &mut evaluated)?;
     let inputs: Vec<&str> = args.inputs.iter().map(String::as_str).collect();
     let mut report = Report::new("response", &inputs, &evaluated.outcome, args.findings.units);
     report.samples = loaded.iter().map(|l| l.applied.len()).sum();
@@ -108,11 +110,10 @@ fn order(args: &Response, unit: Option<&NamedUnit>) -> i32 {
     }
 }
 
-fn entries(args: &Response, outcome: &crate::identify::Outcome) -> Result<Vec<Entry>, Failure> {
-    let pair = (
-        outcome.get("natural_frequency"),
-        outcome.get("damping_ratio"),
-    );
+/// Constants that follow from a single mode and the anchor, and the entries of the stand file.
+fn entries(args: &Response, evaluated: &mut Evaluated) -> Result<Vec<Entry>, Failure> {
+    let get = |name: &str| evaluated.outcome.get(name).cloned();
+    let pair = (get("natural_frequency"), get("damping_ratio"));
     let (Some(frequency), Some(ratio)) = pair else {
         return match args.findings.result.output {
             Some(_) => Err(Failure::failed(
@@ -121,17 +122,16 @@ fn entries(args: &Response, outcome: &crate::identify::Outcome) -> Result<Vec<En
             None => Ok(Vec::new()),
         };
     };
-    let source = format!("identify response: {}", args.inputs.join(", "));
-    let entry = |key: &'static str, found: &crate::identify::Found| Entry {
-        section: "mechanics",
-        key,
-        value: found.value,
-        std: found.std,
-        unit: found.unit.clone(),
-        source: source.clone(),
+    let pole = evaluated.modal.poles[0];
+    let told = Told {
+        mode: Ringer {
+            rate_per_s: pole.rate_per_s,
+            omega_rad_per_s: pole.omega_rad_per_s,
+            covariance: evaluated.spread[0],
+        },
+        ratios: Ratios::OverStiffness,
+        modal: [&frequency, &ratio],
+        source: format!("identify response: {}", args.inputs.join(", ")),
     };
-    Ok(vec![
-        entry("natural_frequency", frequency),
-        entry("damping_ratio", ratio),
-    ])
+    follow(&args.anchors, &args.findings, &told, &mut evaluated.outcome)
 }

@@ -56,6 +56,25 @@ pub fn run(args: &Runup) -> Result<Outcome, Failure> {
         half_window_s: args.window,
     };
     let outcome = identify(&run, &options)?;
+    let entries = entries(args, &outcome)?;
+    let mut report = Report::new("runup", &[&args.input], &outcome, args.findings.units);
+    report.samples = positions.len();
+    report.rate_hz = Some(motion.rate_hz);
+    deliver(&report, &args.findings, &[&args.input], &entries)
+}
+
+/// The inertia for the stand file.
+fn entries(args: &Runup, outcome: &crate::identify::Outcome) -> Result<Vec<Entry>, Failure> {
+    let negative = outcome.get("inertia").filter(|found| found.value <= 0.0);
+    if let (Some(found), Some(_)) = (negative, &args.findings.result.output) {
+        return Err(Failure::failed(format_args!(
+            "the inertia came out as {} kg m^2, which no body has, and is not written: check the sign of \"{}\" and \
+             \"{}\"",
+            crate::report::short(found.value),
+            args.motion,
+            args.torque
+        )));
+    }
     let source = format!("identify runup: {}", args.input);
     let entries: Vec<Entry> = outcome
         .get("inertia")
@@ -69,15 +88,12 @@ pub fn run(args: &Runup) -> Result<Outcome, Failure> {
         })
         .into_iter()
         .collect();
-    let mut report = Report::new("runup", &[&args.input], &outcome, args.findings.units);
-    report.samples = positions.len();
-    report.rate_hz = Some(motion.rate_hz);
     if entries.is_empty() && args.findings.result.output.is_some() {
         return Err(Failure::failed(
             "a mass has no place in a stand file; leave -o out, or record an angle and a torque",
         ));
     }
-    deliver(&report, &args.findings, &[&args.input], &entries)
+    Ok(entries)
 }
 
 /// What a unit says of the motion: its derivative, and whether it turns.

@@ -22,65 +22,11 @@ pub fn run(args: &Static) -> Result<Outcome, Failure> {
     // A table of loads has no time axis; a rate keeps it from being looked for.
     options.rate_hz = options.rate_hz.or(Some(1.0));
     let recording = read(&args.input, &options)?;
-    let (loads, load_unit) = column(
-        &recording,
-        &args.load,
-        args.load_unit.as_deref(),
-        "--load-unit",
-    )?;
-    let (readings, unit) = column(
-        &recording,
-        &args.reading,
-        args.reading_unit.as_deref(),
-        "--reading-unit",
-    )?;
-    let (load_factor, load_text) = load_of(args, &load_unit)?;
-    let (factor, text) = match unit.unit.dimension() {
-        VOLTAGE => (unit.unit.factor(), "V".to_owned()),
-        _ => (1.0, unit.text.clone()),
+    let (points, units) = points(args, &recording)?;
+    let options = Options {
+        degree: args.degree,
     };
-    let numbers = |name: &Option<String>| -> Result<Option<Vec<usize>>, Failure> {
-        let Some(name) = name else { return Ok(None) };
-        let channel = recording.channel(Some(name))?;
-        Ok(Some(ranks(&channel.samples)))
-    };
-    let loads: Vec<f64> = loads.iter().map(|v| v * load_factor).collect();
-    let series = numbers(&args.series)?.unwrap_or_else(|| series_of(&loads));
-    let positions = numbers(&args.position)?;
-    let stds = match &args.std {
-        Some(name) => Some(recording.channel(Some(name))?.samples.clone()),
-        None => None,
-    };
-    let points: Vec<Point> = (0..loads.len())
-        .map(|i| Point {
-            load: loads[i],
-            reading: readings[i] * factor,
-            std: stds.as_ref().map(|s| s[i] * factor),
-            series: series[i],
-            position: positions.as_ref().map_or(0, |p| p[i]),
-        })
-        .collect();
-    if let Some(i) = points
-        .iter()
-        .position(|p| p.std.is_some_and(|s| s.is_nan() || s <= 0.0))
-    {
-        return Err(Failure::failed(format_args!(
-            "row {} of {}: the standard uncertainty must be greater than 0",
-            i + 1,
-            args.input
-        )));
-    }
-    let units = Units {
-        load: load_text,
-        reading: text,
-    };
-    let found = identify(
-        &points,
-        Options {
-            degree: args.degree,
-        },
-        &units,
-    )?;
+    let found = identify(&points, options, &units)?;
     let entries = entries(args, &found.outcome);
     if entries.is_empty() && args.findings.result.output.is_some() {
         return Err(Failure::failed(
@@ -88,23 +34,72 @@ pub fn run(args: &Static) -> Result<Outcome, Failure> {
              torque and the reading in volts",
         ));
     }
-    let mut report = Report::new(
-        "static",
-        &[&args.input],
-        &found.outcome,
-        args.findings.units,
-    );
+    let inputs = [args.input.as_str()];
+    let mut report = Report::new("static", &inputs, &found.outcome, args.findings.units);
     report.samples = points.len();
-    report.terms = found
-        .terms
-        .iter()
-        .map(|t| Term {
-            name: t.name,
-            formula: t.formula,
-            percent: t.percent,
-        })
-        .collect();
-    deliver(&report, &args.findings, &[&args.input], &entries)
+    let term = |t: &crate::identify::static_load::Term| Term {
+        name: t.name,
+        formula: t.formula,
+        percent: t.percent,
+    };
+    report.terms = found.terms.iter().map(term).collect();
+    deliver(&report, &args.findings, &inputs, &entries)
+}
+
+/// Loads and readings in SI units, with what they are called.
+fn points(args: &Static, recording: &Recording) -> Result<(Vec<Point>, Units), Failure> {
+    let load_flag = args.load_unit.as_deref();
+    let (loads, load_unit) = column(recording, &args.load, load_flag, "--load-unit")?;
+    let flag = args.reading_unit.as_deref();
+    let (readings, unit) = column(recording, &args.reading, flag, "--reading-unit")?;
+    let is_effort = [TORQUE, FORCE].contains(&unit.unit.dimension());
+    if load_unit.unit.dimension() == VOLTAGE && is_effort {
+        return Err(Failure::usage(format_args!(
+            "--load \"{}\" is in {} and --reading \"{}\" in {}; the columns are swapped",
+            args.load, load_unit.text, args.reading, unit.text
+        )));
+    }
+    let (load_factor, load) = load_of(args, &load_unit)?;
+    let (factor, reading) = match unit.unit.dimension() {
+        VOLTAGE => (unit.unit.factor(), "V".to_owned()),
+        _ => (1.0, unit.text.clone()),
+    };
+    let loads: Vec<f64> = loads.iter().map(|v| v * load_factor).collect();
+    let series = numbers(recording, args.series.as_ref())?.unwrap_or_else(|| series_of(&loads));
+    let positions = numbers(recording, args.position.as_ref())?;
+    let stds = stds(args, recording)?;
+    let point = |i: usize| Point {
+        load: loads[i],
+        reading: readings[i] * factor,
+        std: stds.as_ref().map(|s| s[i] * factor),
+        series: series[i],
+        position: positions.as_ref().map_or(0, |p| p[i]),
+    };
+    let points = (0..loads.len()).map(point).collect();
+    Ok((points, Units { load, reading }))
+}
+
+/// Standard uncertainties of the readings as they stand in their column.
+fn stds(args: &Static, recording: &Recording) -> Result<Option<Vec<f64>>, Failure> {
+    let Some(name) = &args.std else {
+        return Ok(None);
+    };
+    let stds = recording.channel(Some(name))?.samples.clone();
+    match stds.iter().position(|s| s.is_nan() || *s <= 0.0) {
+        Some(i) => Err(Failure::failed(format_args!(
+            "row {} of {}: the standard uncertainty must be greater than 0",
+            i + 1,
+            args.input
+        ))),
+        None => Ok(Some(stds)),
+    }
+}
+
+/// A column's different values, numbered in the order they come.
+fn numbers(recording: &Recording, name: Option<&String>) -> Result<Option<Vec<usize>>, Failure> {
+    let Some(name) = name else { return Ok(None) };
+    let channel = recording.channel(Some(name))?;
+    Ok(Some(ranks(&channel.samples)))
 }
 
 fn column(
