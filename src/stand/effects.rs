@@ -129,7 +129,7 @@ impl Stand {
         self.effects
             .iter()
             .all(|declared| match declared.action().1 {
-                Action::Factor(factor) => factor(&mode, 0.0).norm() > 0.0,
+                Action::Factor(factor) => is_smooth_at_rest(&factor, &mode),
                 Action::Feedthrough(_) => true,
                 _ => false,
             })
