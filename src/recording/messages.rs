@@ -22,7 +22,12 @@ pub fn read(place: &Place, wanted: &[Option<&str>]) -> Result<Recording, Failure
     let mut recording = Recording {
         source: place.name(),
         format: "mcap",
-        ..super::empty()
+        dialect: String::new(),
+        details: Vec::new(),
+        channels: Vec::new(),
+        segments: Vec::new(),
+        warnings: Vec::new(),
+        lost: None,
     };
     let mut origin_ns = None;
     for signal in wanted {
@@ -54,7 +59,11 @@ fn one(
     let chosen = source.chosen().clone();
     let described = describe(&chosen);
     if !recording.dialect.contains(&described) {
-        let joint = if recording.dialect.is_empty() { "MCAP" } else { ";" };
+        let joint = if recording.dialect.is_empty() {
+            "MCAP"
+        } else {
+            ";"
+        };
         recording.dialect += &format!("{joint} {described}");
     }
     let summary = source.finish();
@@ -68,8 +77,13 @@ fn one(
 
 fn describe(chosen: &Chosen) -> String {
     let TimeUsed { choice, field, why } = &chosen.time;
-    let time = field.clone().unwrap_or_else(|| format!("{} time", choice.name()));
-    format!("{} {}, time: {time} ({why})", chosen.encoding, chosen.schema)
+    let time = field
+        .clone()
+        .unwrap_or_else(|| format!("{} time", choice.name()));
+    format!(
+        "{} {}, time: {time} ({why})",
+        chosen.encoding, chosen.schema
+    )
 }
 
 fn channel(

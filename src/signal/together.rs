@@ -85,7 +85,9 @@ impl Together {
         };
         let is_text = recording.format != "mcap";
         if is_given || is_one_axis(&chosen, is_text)? {
-            together.warnings.extend(chosen.iter().filter(|_| !is_given).find_map(irregular));
+            together
+                .warnings
+                .extend(chosen.iter().filter(|_| !is_given).find_map(irregular));
             let count = chosen.iter().map(|c| c.samples.len()).min().unwrap_or(0);
             let track = |c: &Selection| track(c, c.samples[..count].to_vec());
             together.tracks = chosen.iter().map(track).collect();
@@ -105,8 +107,14 @@ impl Together {
         if stamps.len() < chosen.len() {
             return Err(differ(chosen));
         }
-        let start_s = stamps.iter().map(|t| t[0]).fold(f64::NEG_INFINITY, f64::max);
-        let end_s = stamps.iter().map(|t| t[t.len() - 1]).fold(f64::INFINITY, f64::min);
+        let start_s = stamps
+            .iter()
+            .map(|t| t[0])
+            .fold(f64::NEG_INFINITY, f64::max);
+        let end_s = stamps
+            .iter()
+            .map(|t| t[t.len() - 1])
+            .fold(f64::INFINITY, f64::min);
         let count = ((end_s - start_s) * self.rate_hz + 1e-6).floor() + 1.0;
         if count.is_nan() || count < 2.0 {
             return Err(Failure::failed(format_args!(
@@ -130,8 +138,15 @@ impl Together {
             samples.truncate(count as usize);
             self.tracks.push(track(c, samples));
         }
-        let shortest = self.tracks.iter().map(|t| t.samples.len()).min().unwrap_or(0);
-        self.tracks.iter_mut().for_each(|t| t.samples.truncate(shortest));
+        let shortest = self
+            .tracks
+            .iter()
+            .map(|t| t.samples.len())
+            .min()
+            .unwrap_or(0);
+        self.tracks
+            .iter_mut()
+            .for_each(|t| t.samples.truncate(shortest));
         self.start_s = start_s;
         self.warnings.push(self.resampled(chosen, &worst));
         Ok(())

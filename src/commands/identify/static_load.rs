@@ -2,12 +2,12 @@
 
 use torqcomp_model::{Dimension, Kind};
 
-use super::{deliver, quantity, read, unit_of, whole};
+use super::{deliver, quantity, read, said, unit_of, whole};
 use crate::cli::identify::Static;
 use crate::commands::Outcome;
 use crate::failure::Failure;
 use crate::identify::static_load::{Options, Point, Units, identify, series_of};
-use crate::io::csv::NamedUnit;
+use crate::io::csv::{self, NamedUnit};
 use crate::recording::Recording;
 use crate::report::identify::{Report, Term};
 use crate::stand::update::Entry;
@@ -21,7 +21,22 @@ pub fn run(args: &Static) -> Result<Outcome, Failure> {
     let mut options = args.table.options(None, None);
     // A table of loads has no time axis; a rate keeps it from being looked for.
     options.rate_hz = options.rate_hz.or(Some(1.0));
-    let recording = read(&args.input, &options)?;
+    let names = [
+        Some(&args.load),
+        Some(&args.reading),
+        args.series.as_ref(),
+        args.position.as_ref(),
+        args.std.as_ref(),
+    ];
+    let wanted: Vec<csv::Options> = names
+        .into_iter()
+        .flatten()
+        .map(|name| csv::Options {
+            channel: Some(name.clone()),
+            ..options.clone()
+        })
+        .collect();
+    let recording = read(&args.input, &wanted)?;
     let (loads, load_unit) = column(
         &recording,
         &args.load,
@@ -51,6 +66,22 @@ pub fn run(args: &Static) -> Result<Outcome, Failure> {
         Some(name) => Some(recording.channel(Some(name))?.samples.clone()),
         None => None,
     };
+    let counts = [
+        Some(readings.len()),
+        positions.as_ref().map(Vec::len),
+        stds.as_ref().map(Vec::len),
+        Some(series.len()),
+    ];
+    if counts
+        .into_iter()
+        .flatten()
+        .any(|count| count != loads.len())
+    {
+        return Err(Failure::failed(format_args!(
+            "{}: the columns have different numbers of rows; each load needs a reading",
+            args.input
+        )));
+    }
     let points: Vec<Point> = (0..loads.len())
         .map(|i| Point {
             load: loads[i],
@@ -104,7 +135,11 @@ pub fn run(args: &Static) -> Result<Outcome, Failure> {
             percent: t.percent,
         })
         .collect();
-    deliver(&report, &args.findings, &[&args.input], &entries)
+    report
+        .warnings
+        .extend(said(&recording.warnings, recording.lost.as_ref()));
+    let is_lossy = recording.lost.is_some();
+    deliver(&report, &args.findings, &[&args.input], &entries, is_lossy)
 }
 
 fn column(
@@ -113,7 +148,7 @@ fn column(
     unit: Option<&str>,
     flag: &str,
 ) -> Result<(Vec<f64>, NamedUnit), Failure> {
-    let options = crate::io::csv::Options {
+    let options = csv::Options {
         channel: Some(name.to_owned()),
         unit: unit.map(str::to_owned),
         rate_hz: Some(1.0),

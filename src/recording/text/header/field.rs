@@ -29,10 +29,13 @@ fn unit_of(name: &str, unit: &str) -> Option<NamedUnit> {
 
 /// A unit without the name of its channel: `CH1:V`.
 pub(super) fn without_name<'a>(unit: &'a str, name: &str) -> &'a str {
-    let rest = unit
-        .strip_prefix(name)
-        .and_then(|rest| rest.strip_prefix(':'));
-    rest.map_or(unit, str::trim)
+    let Some((channel, rest)) = unit.split_once(':') else {
+        return unit;
+    };
+    let is_channel = channel == name
+        || channel.starts_with(|c: char| c.is_ascii_alphabetic())
+            && channel.ends_with(|c: char| c.is_ascii_digit());
+    if is_channel { rest.trim() } else { unit }
 }
 
 impl Field {

@@ -1,7 +1,9 @@
 //! Names and units out of keys and values above a table.
 
+use super::Row;
 use super::field::{Field, without_name};
-use crate::recording::text::keys::{Entry, Topic};
+use super::labelled::is_name_label;
+use crate::recording::text::keys::{Entry, Topic, topic};
 use crate::recording::text::units;
 
 /// Names out of a line such as `Source,CH1`, where no line above the table has them.
@@ -65,6 +67,47 @@ pub(super) fn fill_units(fields: &mut [Field], entries: &[Entry], used: &[bool])
             set_unit(field, if text == "S" { "s" } else { text });
         }
     }
+}
+
+/// Units, and the rate if it is the same for all, out of a list of the channels such as
+/// `Channel,Unit,Length,Increment` above `Force,N,300,0.001`.
+pub(super) fn fill_from_list(fields: &mut [Field], rows: &[Row]) -> Vec<Entry> {
+    let is_heading = |row: &Row| {
+        is_name_label(&row.cells[0])
+            && row
+                .cells
+                .iter()
+                .skip(1)
+                .any(|c| topic(c) == Some(Topic::Unit))
+    };
+    let Some(heading) = rows.iter().position(is_heading) else {
+        return Vec::new();
+    };
+    let labels = &rows[heading].cells;
+    let mut rates: Vec<Entry> = Vec::new();
+    for (row, after) in rows[heading + 1..].iter().zip(1..) {
+        let field = fields.iter_mut().find(|field| field.name == row.cells[0]);
+        let Some(field) = field.filter(|_| row.line == rows[heading].line + after) else {
+            break;
+        };
+        for (label, cell) in labels.iter().zip(&row.cells).skip(1) {
+            match topic(label) {
+                Some(Topic::Unit) => set_unit(field, cell),
+                Some(Topic::Rate | Topic::Interval) => rates.push(Entry {
+                    line: row.line,
+                    key: label.clone(),
+                    values: vec![cell.clone()],
+                }),
+                _ => {}
+            }
+        }
+    }
+    let said = |entry: &Entry| (entry.key.clone(), entry.values.clone());
+    let is_same = rates
+        .windows(2)
+        .all(|pair| said(&pair[0]) == said(&pair[1]));
+    rates.truncate(usize::from(is_same));
+    rates
 }
 
 fn set_unit(field: &mut Field, text: &str) {

@@ -3,9 +3,10 @@
 use super::Row;
 use super::field::Field;
 use crate::recording::text::keys::{self, Topic};
+use crate::recording::text::units;
 
 /// Whether a cell labels the row of names.
-fn is_name_label(cell: &str) -> bool {
+pub(super) fn is_name_label(cell: &str) -> bool {
     const LABELS: [&str; 20] = [
         "channeltitle",
         "channel title",
@@ -57,6 +58,13 @@ pub(super) fn labelled(rows: &[Row], used: &[bool]) -> Option<(Vec<Field>, usize
             .iter()
             .find(|row| keys::topic(&key(row)) == Some(topic))
     };
+    // Headings right above the data that begin with the time are better names.
+    let has_headings = rows.last().is_some_and(|last| {
+        last.line > names.line && last.cells.len() >= used.len() && is_headings(&last.cells)
+    });
+    if has_headings {
+        return None;
+    }
     let units = about(Topic::Unit).copied();
     // Without a row that says more, the label must stand above several columns.
     let is_alone = others.is_empty()
@@ -69,6 +77,15 @@ pub(super) fn labelled(rows: &[Row], used: &[bool]) -> Option<(Vec<Field>, usize
         false => fields_below(names, units, &others, used.len()),
     };
     Some((fields, names.line))
+}
+
+/// Whether cells are the name of time and names of channels: no key with values, no units.
+fn is_headings(cells: &[String]) -> bool {
+    let is_name = |cell: &String| {
+        !cell.is_empty() && units::read(cell).is_none() && keys::quantity(cell, b'.').is_none()
+    };
+    let time = Field::new(&cells[0], None);
+    time.is_named_time() && cells.len() > 1 && cells[1..].iter().all(is_name)
 }
 
 /// Whether most columns have a cell, none of which stands between a key and its value.

@@ -9,7 +9,7 @@ use super::head::{Head, Table};
 use super::keys::{self, Entry};
 use crate::io::csv::{Delimiter, Dialect};
 pub use field::Field;
-use fill::{fill_names, fill_units};
+use fill::{fill_from_list, fill_names, fill_units};
 use labelled::labelled;
 use positional::positional;
 
@@ -66,7 +66,8 @@ pub fn read(head: &Head, table: &Table, used: &[bool]) -> Header {
     }
     let found = positional(&rows, table, used);
     let mut fields = found.fields;
-    let entries = entries(&found.lines);
+    let mut entries = entries(&found.lines);
+    entries.extend(fill_from_list(&mut fields, &rows));
     if found.names.is_none() {
         fill_names(&mut fields, &entries, used);
     }

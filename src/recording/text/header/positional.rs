@@ -5,7 +5,8 @@ use super::field::Field;
 use crate::io::csv::NamedUnit;
 use crate::recording::text::cell::Cell;
 use crate::recording::text::head::Table;
-use crate::recording::text::{keys, units};
+use crate::recording::text::keys::{self, Topic};
+use crate::recording::text::units;
 
 /// Lines above a table among which its headings are looked for.
 const LINES_FOR_HEADINGS: usize = 10;
@@ -25,6 +26,7 @@ pub(super) fn positional(rows: &[Row], table: &Table, used: &[bool]) -> Position
         .iter()
         .filter(|row| is_heading(&row.cells, table, used))
         .filter(|row| !is_process_row(&row.cells) && !repeats_a_key(&row.cells))
+        .filter(|row| !is_key_with_values(&row.cells))
         .rev()
         .collect();
     if is_key_block(&fitting, used) {
@@ -161,6 +163,9 @@ fn is_heading(cells: &[String], table: &Table, used: &[bool]) -> bool {
         let last_is_there = cells.len() > *places.last().unwrap_or(&0);
         filled == places.len()
             || places.len() > 2 && filled + 1 >= places.len() && last_is_there
+            || is_units_with_gaps(cells)
+            // A column that counts often has no heading.
+            || cells.len() == 2 && filled == 1 && cells[0].is_empty()
             || places.len() > 5 && 10 * filled >= 7 * places.len()
     };
     let mut texts = 0;
@@ -192,10 +197,37 @@ fn is_key_block(fitting: &[&Row], used: &[bool]) -> bool {
             || units::is_index_name(cell)
     });
     let (key, values) = (&nearest.cells[0], &nearest.cells[1..]);
-    let is_known = keys::topic(key).is_some() && values.iter().all(|v| units::read(v).is_none());
+    let topic = keys::topic(key);
+    let is_known = topic.is_some_and(is_of_axis)
+        || topic.is_some() && values.iter().all(|v| units::read(v).is_none());
     // An empty line parts headings from keys.
     let in_block = fitting.len() > 2 && fitting[1].line + 1 == nearest.line;
     two && !is_time && !is_units(&nearest.cells) && (in_block || is_known)
+}
+
+/// Whether a topic is one of rates and units, which is said in no heading.
+fn is_of_axis(topic: Topic) -> bool {
+    !matches!(topic, Topic::Date | Topic::Name)
+}
+
+/// Whether cells are a key about the time axis and its values: `Time interval,0.01(ms),0.01(ms)`.
+fn is_key_with_values(cells: &[String]) -> bool {
+    let Some((key, values)) = cells.split_first() else {
+        return false;
+    };
+    let is_quantity = |v: &String| keys::quantity(v, b'.').is_some();
+    let mut filled = values.iter().filter(|v| !v.is_empty()).peekable();
+    keys::topic(key).is_some_and(is_of_axis) && filled.peek().is_some() && filled.all(is_quantity)
+}
+
+/// Whether cells are units, or nothing where a channel has none: `s,Nm,,`.
+fn is_units_with_gaps(cells: &[String]) -> bool {
+    let mut filled = cells.iter().filter(|cell| !cell.is_empty()).peekable();
+    let has_gap = cells.iter().any(String::is_empty);
+    cells.len() > 1
+        && has_gap
+        && filled.peek().is_some()
+        && filled.all(|cell| NamedUnit::parse(cell).is_some())
 }
 
 /// Whether cells are units: all of them, or some where others repeat, or most are in brackets.

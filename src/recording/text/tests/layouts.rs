@@ -120,3 +120,32 @@ fn a_list_of_results_is_no_recording() {
     );
     assert!(said.contains("list of results"), "{said}");
 }
+
+#[test]
+fn headings_that_begin_with_time_are_better_than_labels() {
+    let head = "Source,Scope 9314\nSample Interval,1e-8,s\nVertical Unit,V\nTime (s),Ampl (V)\n";
+    let found = read(&format!("{head}0e-8,0.5\n1e-8,0.6\n2e-8,0.7\n"));
+    check(&found, &[("Ampl", "V", 3)], Some(1e8));
+    let head = "NR_PT,3\nXUNIT,\"s\"\nXINCR,4.0e-9\nYUNIT,\"V\"\n\n";
+    let rows = rows(8, ",", &[&|i| format!("{:e}", i * 4e-9), &wave]);
+    let found = read(&format!("{head}{rows}"));
+    check(&found, &[("column 2", "V", 8)], Some(2.5e8));
+}
+
+#[test]
+fn units_with_gaps_and_lists_of_channels() {
+    let found = read("time,torque,state,count\ns,Nm,,\n0.0,1.5,1,5\n0.1,1.6,1,6\n0.2,1.7,0,9\n");
+    check(
+        &found,
+        &[("torque", "Nm", 3), ("state", "", 3), ("count", "", 3)],
+        Some(10.0),
+    );
+    let head = "Channel\tDatatype\tUnit\tLength\tIncrement\nForce\tDT_DOUBLE\tN\t3\t0.001\n\
+                Accel\tDT_DOUBLE\tg\t3\t0.001\n\nForce\tAccel\n";
+    let found = read(&format!("{head}1.5\t2.5\n1.6\t2.6\n1.7\t2.7\n"));
+    check(
+        &found,
+        &[("Force", "N", 3), ("Accel", "g", 3)],
+        Some(1000.0),
+    );
+}
