@@ -336,7 +336,11 @@ fn complete(report: &mut Report, run: &Run, scale: f64) {
         start_s: run.start_s,
         samples: run.samples,
     };
-    let wrong = excerpt::warnings(&run.excerpt, of);
+    let seen = match report.method {
+        "stream" => excerpt::of_stream(&run.excerpt, run.samples),
+        _ => &run.excerpt,
+    };
+    let wrong = excerpt::warnings(seen, of);
     report.warnings.extend(wrong);
     if run.traces.as_ref().is_some_and(Traces::is_empty) {
         let end_s = run.start_s + (run.samples - 1) as f64 / report.rate_hz;

@@ -3,8 +3,12 @@
 use crate::recording::Axis;
 use crate::report::Warning;
 
-/// Samples that are looked at of a record that goes by as a stream.
+/// Samples that are kept of a record that goes by as a stream.
 pub const OF_STREAM: usize = 1 << 15;
+/// Samples that are looked at of a stream so long that its time counts.
+const OF_LONG: usize = 1 << 12;
+/// Samples from which a stream is long.
+const LONG: usize = 1 << 21;
 /// Samples that are looked at of a record in memory.
 pub const OF_MEMORY: usize = 1 << 20;
 
@@ -23,6 +27,14 @@ pub struct Of<'a> {
     pub start_s: f64,
     /// Samples in all.
     pub samples: usize,
+}
+
+/// The part of what was kept of a stream that is looked at: to look at a sample takes longer than all else
+/// that is done with it.
+#[must_use]
+pub fn of_stream(kept: &[f64], samples: usize) -> &[f64] {
+    let most = if samples < LONG { OF_STREAM } else { OF_LONG };
+    &kept[..kept.len().min(most)]
 }
 
 /// The warnings of [`super::warnings`] about the first samples of a record; that it has more is said.

@@ -78,8 +78,8 @@ fn messages_at_other_moments_are_interpolated_and_that_is_said() {
     let record = recording(
         "mcap",
         vec![
-            channel("a", stamps(5.0, 0.2), wave),
-            channel("b", stamps(5.0103, 0.2), wave),
+            channel("a", stamps(5.0, 0.08), wave),
+            channel("b", stamps(5.0103, 0.08), wave),
         ],
     );
     let found = both(&record).unwrap();

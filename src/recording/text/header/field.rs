@@ -63,10 +63,14 @@ impl Field {
         } = units::heading(heading);
         let below = unit.and_then(|unit| unit_of(&name, unit));
         let below_text = unit.and_then(units::as_written);
-        // Under a name with a unit below, what looks like a unit at its end may be none, unless it is
-        // the same one.
-        let is_same = |own: &NamedUnit| below.as_ref().is_none_or(|b| own.unit == b.unit);
-        let own = own.filter(is_same);
+        // Under a name with a unit below, what looks like a unit at its end may be none, unless it
+        // stands in brackets and is the same one.
+        let is_plain = !heading.contains(['[', '(', '/']);
+        let is_own = |own: &NamedUnit| match &below {
+            Some(below) => !is_plain && own.unit == below.unit,
+            None => true,
+        };
+        let own = own.filter(is_own);
         let name = match &below {
             Some(_) if own.is_none() => heading.to_owned(),
             _ => name,

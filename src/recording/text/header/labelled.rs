@@ -125,8 +125,10 @@ fn fields_below(names: &Row, units: Option<&Row>, others: &[&Row], columns: usiz
                 .all(|row| repeats(row) || row.cells.len() <= place)
     };
     // The first column may have a heading of its own below: `Time [ms]`.
+    let is_heading = |row: &&&Row| row.cells[1..].iter().all(String::is_empty);
     let time = others
         .iter()
+        .filter(is_heading)
         .map(|row| Field::new(&row.cells[0], None))
         .find(|field| field.is_named_time() && field.has_time_unit())
         .unwrap_or_else(|| Field::new("time", None));

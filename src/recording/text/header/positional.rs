@@ -134,12 +134,13 @@ fn is_symbols_of(symbols: &Row, names: &Row) -> bool {
             .all(|(name, symbol)| is_name(name, symbol) || name == symbol)
 }
 
-/// Whether all cells say something of one key: `Rate: 50 Hz`, `Rate: 50 Hz`.
+/// Whether all cells give the same key a value: `Rate: 50 Hz`, `Rate: 50 Hz`.
 fn repeats_a_key(cells: &[String]) -> bool {
-    let mut keys = cells
-        .iter()
-        .filter(|cell| !cell.is_empty())
-        .map(|cell| cell.split_once([':', '=']).map(|(key, _)| key.trim()));
+    let key = |cell: &String| -> Option<String> {
+        let (key, value) = cell.split_once([':', '='])?;
+        keys::quantity(value, b'.').map(|_| key.trim().to_owned())
+    };
+    let mut keys = cells.iter().filter(|cell| !cell.is_empty()).map(key);
     let first = keys.next().flatten();
     first.is_some() && keys.clone().count() > 0 && keys.all(|key| key == first)
 }

@@ -149,3 +149,11 @@ fn units_with_gaps_and_lists_of_channels() {
         Some(1000.0),
     );
 }
+
+#[test]
+fn stamps_in_whole_milliseconds() {
+    let stamp = |row: f64| format!("{}", (row * 3.3).round());
+    let found = read(&format!("t_ms,u_V\n{}", rows(400, ",", &[&stamp, &wave])));
+    let rate_hz = found.channels[0].axis.rate_hz.unwrap();
+    assert!((rate_hz * 3.3e-3 - 1.0).abs() < 1e-4, "{rate_hz}");
+}
