@@ -159,10 +159,11 @@ pub struct Response {
     /// Recordings of one stand
     #[arg(value_name = "INPUT", required = true)]
     pub inputs: Vec<String>,
-    /// Column with what acted: hammer force, exciter force, known torque
+    /// Column with what acted: hammer force, exciter force, known torque; or the signal of an MCAP
+    /// file, as '/joint_states.effort[0]'
     #[arg(long, value_name = "NAME")]
     pub applied: String,
-    /// Column with what was measured
+    /// Column with what was measured, or the signal of an MCAP file
     #[arg(long, value_name = "NAME")]
     pub measured: String,
     /// What the measured channel is [default: by its unit]

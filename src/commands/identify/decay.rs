@@ -1,12 +1,13 @@
 //! `identify decay`.
 
 use super::anchor::{Ratios, Told, follow};
-use super::{deliver, read, uniform};
+use super::{deliver, read, said, uniform};
 use crate::cli::identify::Decay;
 use crate::commands::Outcome;
 use crate::failure::Failure;
 use crate::identify::anchored::Ringer;
 use crate::identify::decay::{Evaluated, Options, Ringing, identify};
+use crate::report::Warning;
 use crate::report::identify::{Law, Report};
 use crate::stand::update::Entry;
 
@@ -17,6 +18,8 @@ struct Loaded {
     rate_hz: Option<f64>,
     values: Vec<f64>,
     unit: String,
+    warnings: Vec<Warning>,
+    is_lossy: bool,
 }
 
 /// Runs the test.
@@ -58,13 +61,16 @@ pub fn run(args: &Decay) -> Result<Outcome, Failure> {
             criterion: l.criterion,
         })
         .collect();
-    deliver(&report, &args.findings, &inputs, &entries)
+    let warnings = loaded.iter().flat_map(|l| l.warnings.iter().cloned());
+    report.warnings.extend(warnings);
+    let is_lossy = loaded.iter().any(|l| l.is_lossy);
+    deliver(&report, &args.findings, &inputs, &entries, is_lossy)
 }
 
 /// Reads one record; samples that are not there are left out, as the fit needs no uniform steps.
 fn load(args: &Decay, input: &str) -> Result<Loaded, Failure> {
     let options = args.reading.options(args.channel.as_deref(), None);
-    let recording = read(input, &options)?;
+    let recording = read(input, std::slice::from_ref(&options))?;
     let selection = recording.select(&options)?;
     let count = selection.samples.len();
     let stamps = match (&selection.channel.axis.stamps_s, args.reading.rate) {
@@ -92,6 +98,8 @@ fn load(args: &Decay, input: &str) -> Result<Loaded, Failure> {
         rate_hz,
         values,
         unit: selection.unit.map_or_else(String::new, |u| u.text),
+        warnings: said(&recording.warnings, recording.lost.as_ref()),
+        is_lossy: recording.lost.is_some(),
     })
 }
 

@@ -3,13 +3,14 @@
 use torqcomp_model::Dimension;
 
 use super::anchor::{Ratios, Told, follow};
-use super::{deliver, must_be_uniform, read, whole};
+use super::{deliver, said, together};
 use crate::cli::identify::{Excitation, Measured, Response};
 use crate::commands::Outcome;
 use crate::failure::Failure;
 use crate::identify::anchored::Ringer;
 use crate::identify::response::{self, Driven, Evaluated, Options, identify};
 use crate::io::csv::NamedUnit;
+use crate::report::Warning;
 use crate::report::identify::Report;
 use crate::stand::update::Entry;
 
@@ -20,6 +21,8 @@ struct Loaded {
     applied: Vec<f64>,
     measured: Vec<f64>,
     unit: Option<NamedUnit>,
+    warnings: Vec<Warning>,
+    is_lossy: bool,
 }
 
 /// Runs the test.
@@ -68,24 +71,29 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
         .iter()
         .map(|e| Some(*e).filter(|e| e.is_finite()))
         .collect();
-    deliver(&report, &args.findings, &inputs, &entries)
+    let warnings = loaded.iter().flat_map(|l| l.warnings.iter().cloned());
+    report.warnings.extend(warnings);
+    let is_lossy = loaded.iter().any(|l| l.is_lossy);
+    deliver(&report, &args.findings, &inputs, &entries, is_lossy)
 }
 
 fn load(args: &Response, input: &str) -> Result<Loaded, Failure> {
-    let applied_options = args.reading.options(Some(&args.applied), None);
-    let recording = read(input, &applied_options)?;
-    let applied = recording.select(&applied_options)?;
-    let measured = recording.select(&args.reading.options(Some(&args.measured), None))?;
-    for channel in [&applied, &measured] {
-        whole(channel)?;
-        must_be_uniform(channel, args.reading.rate.is_some())?;
-    }
+    let wanted =
+        [&args.applied, &args.measured].map(|channel| args.reading.options(Some(channel), None));
+    let mut read = together(input, &wanted)?;
+    let (Some(measured), Some(applied)) = (read.tracks.pop(), read.tracks.pop()) else {
+        return Err(Failure::failed(format_args!(
+            "{input}: two channels are needed"
+        )));
+    };
     Ok(Loaded {
         name: input.to_owned(),
-        rate_hz: applied.rate_hz,
-        applied: applied.samples.to_vec(),
-        measured: measured.samples.to_vec(),
-        unit: measured.unit.clone(),
+        rate_hz: read.rate_hz,
+        applied: applied.samples,
+        measured: measured.samples,
+        unit: measured.unit,
+        warnings: said(&read.warnings, read.lost.as_ref()),
+        is_lossy: read.lost.is_some(),
     })
 }
 

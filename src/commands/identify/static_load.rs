@@ -2,12 +2,12 @@
 
 use torqcomp_model::{Dimension, Kind};
 
-use super::{deliver, quantity, read, unit_of, whole};
+use super::{deliver, quantity, read, said, unit_of, whole};
 use crate::cli::identify::Static;
 use crate::commands::Outcome;
 use crate::failure::Failure;
 use crate::identify::static_load::{Options, Point, Units, identify, series_of};
-use crate::io::csv::NamedUnit;
+use crate::io::csv::{self, NamedUnit};
 use crate::recording::Recording;
 use crate::report::identify::{Report, Term};
 use crate::stand::update::Entry;
@@ -21,7 +21,7 @@ pub fn run(args: &Static) -> Result<Outcome, Failure> {
     let mut options = args.table.options(None, None);
     // A table of loads has no time axis; a rate keeps it from being looked for.
     options.rate_hz = options.rate_hz.or(Some(1.0));
-    let recording = read(&args.input, &options)?;
+    let recording = read(&args.input, &wanted(args, &options))?;
     let (points, units) = points(args, &recording)?;
     let options = Options {
         degree: args.degree,
@@ -43,7 +43,26 @@ pub fn run(args: &Static) -> Result<Outcome, Failure> {
         percent: t.percent,
     };
     report.terms = found.terms.iter().map(term).collect();
-    deliver(&report, &args.findings, &inputs, &entries)
+    let warnings = said(&recording.warnings, recording.lost.as_ref());
+    report.warnings.extend(warnings);
+    let is_lossy = recording.lost.is_some();
+    deliver(&report, &args.findings, &inputs, &entries, is_lossy)
+}
+
+/// The columns that are read.
+fn wanted(args: &Static, options: &csv::Options) -> Vec<csv::Options> {
+    let names = [
+        Some(&args.load),
+        Some(&args.reading),
+        args.series.as_ref(),
+        args.position.as_ref(),
+        args.std.as_ref(),
+    ];
+    let one = |name: &String| csv::Options {
+        channel: Some(name.clone()),
+        ..options.clone()
+    };
+    names.into_iter().flatten().map(one).collect()
 }
 
 /// Loads and readings in SI units, with what they are called.
@@ -68,6 +87,22 @@ fn points(args: &Static, recording: &Recording) -> Result<(Vec<Point>, Units), F
     let series = numbers(recording, args.series.as_ref())?.unwrap_or_else(|| series_of(&loads));
     let positions = numbers(recording, args.position.as_ref())?;
     let stds = stds(args, recording)?;
+    let counts = [
+        Some(readings.len()),
+        positions.as_ref().map(Vec::len),
+        stds.as_ref().map(Vec::len),
+        Some(series.len()),
+    ];
+    if counts
+        .into_iter()
+        .flatten()
+        .any(|count| count != loads.len())
+    {
+        return Err(Failure::failed(format_args!(
+            "{}: the columns have different numbers of rows; each load needs a reading",
+            args.input
+        )));
+    }
     let point = |i: usize| Point {
         load: loads[i],
         reading: readings[i] * factor,
@@ -108,7 +143,7 @@ fn column(
     unit: Option<&str>,
     flag: &str,
 ) -> Result<(Vec<f64>, NamedUnit), Failure> {
-    let options = crate::io::csv::Options {
+    let options = csv::Options {
         channel: Some(name.to_owned()),
         unit: unit.map(str::to_owned),
         rate_hz: Some(1.0),
