@@ -130,7 +130,8 @@ fn add_lines(folder: &Folder, form: &Form) {
                 .enumerate()
                 .map(|(k, l)| l.amplitude * (TAU * l.frequency_hz * time_s + 0.7 * k as f64).sin())
                 .sum(),
-            Action::Course(_) => (2.0 * time_s).sin(),
+            // Less its mean over 0.6 s: a course has none.
+            Action::Course(_) => (2.0 * time_s).sin() - 0.531_4,
             _ => 0.0,
         }
     };
