@@ -392,7 +392,7 @@ pub struct Simulate {
     /// Stand file
     #[arg(long, value_name = "FILE")]
     pub stand: PathBuf,
-    /// Column with the applied quantity
+    /// Column with the applied quantity, or the signal of an MCAP file, as '/joint_states.effort[0]'
     #[arg(long, value_name = "COL")]
     pub applied: Option<String>,
     /// Column with the measured quantity: the motion then starts as it tells, instead of at rest
@@ -427,10 +427,10 @@ pub struct Diagnose {
     /// Record that is held out; may be given several times [default: the last 30 % of each training record]
     #[arg(long, value_name = "FILE")]
     pub holdout: Vec<String>,
-    /// Column with the applied quantity
+    /// Column with the applied quantity, or the signal of an MCAP file, as '/joint_states.effort[0]'
     #[arg(long, value_name = "COL")]
     pub applied: String,
-    /// Column with the measured quantity
+    /// Column with the measured quantity, or the signal of an MCAP file
     #[arg(long, value_name = "COL")]
     pub measured: String,
     /// Unit of the applied quantity, if its heading does not say

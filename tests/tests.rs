@@ -11,6 +11,7 @@ mod diagnose;
 mod harmonics;
 mod identify;
 mod inspect;
+mod messages;
 mod output;
 mod predict;
 mod refined;

@@ -113,6 +113,7 @@ fn figures(case: &Case, torque: &Torque) -> [f64; 3] {
 /// Median, least and largest.
 fn middle(values: &mut [f64]) -> String {
     values.sort_by(f64::total_cmp);
+    let values = &*values;
     match values {
         [] => "–".to_owned(),
         [one] => format!("{one:.2}"),

@@ -91,6 +91,17 @@ pub struct Findings {
     pub strict: bool,
 }
 
+/// One constant that is known otherwise; without one, that of the stand file.
+#[derive(Debug, Args)]
+pub struct Anchors {
+    /// Inertia, known otherwise: stiffness and damping then follow
+    #[arg(long, value_name = "QUANTITY", conflicts_with = "stiffness")]
+    pub inertia: Option<String>,
+    /// Stiffness, known otherwise: inertia and damping then follow
+    #[arg(long, value_name = "QUANTITY")]
+    pub stiffness: Option<String>,
+}
+
 /// Arguments of `identify decay`.
 #[derive(Debug, Args)]
 pub struct Decay {
@@ -109,12 +120,9 @@ pub struct Decay {
     /// Frequencies to look for modes at, in Hz
     #[arg(long, value_name = "FROM..TO", value_parser = range)]
     pub band: Option<(f64, f64)>,
-    /// Inertia, known otherwise: stiffness and damping then follow
-    #[arg(long, value_name = "QUANTITY", conflicts_with = "stiffness")]
-    pub inertia: Option<String>,
-    /// Stiffness, known otherwise: inertia and damping then follow
-    #[arg(long, value_name = "QUANTITY")]
-    pub stiffness: Option<String>,
+    /// What is known otherwise.
+    #[command(flatten)]
+    pub anchors: Anchors,
     /// How the table is read.
     #[command(flatten)]
     pub reading: Reading,
@@ -151,10 +159,11 @@ pub struct Response {
     /// Recordings of one stand
     #[arg(value_name = "INPUT", required = true)]
     pub inputs: Vec<String>,
-    /// Column with what acted: hammer force, exciter force, known torque
+    /// Column with what acted: hammer force, exciter force, known torque; or the signal of an MCAP
+    /// file, as '/joint_states.effort[0]'
     #[arg(long, value_name = "NAME")]
     pub applied: String,
-    /// Column with what was measured
+    /// Column with what was measured, or the signal of an MCAP file
     #[arg(long, value_name = "NAME")]
     pub measured: String,
     /// What the measured channel is [default: by its unit]
@@ -178,6 +187,9 @@ pub struct Response {
     /// Fit a delay of the measured channel too
     #[arg(long)]
     pub delay: bool,
+    /// What is known otherwise.
+    #[command(flatten)]
+    pub anchors: Anchors,
     /// How the table is read.
     #[command(flatten)]
     pub reading: Reading,

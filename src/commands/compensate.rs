@@ -19,6 +19,7 @@ use crate::cli::Compensate;
 use crate::failure::Failure;
 use crate::io::csv::Place;
 use crate::io::output::Output;
+use crate::quality::excerpt;
 use crate::report::compensate::{Ends, Gain, Noise, RecordNoise, Report, SCHEMA};
 use crate::report::svg::Traces;
 use crate::report::{self, Warning};
@@ -55,6 +56,8 @@ struct Run {
     extent: Ends,
     resampled: Option<resample::Resampled>,
     noise: Option<torqcomp_dsp::noise::RecordNoise>,
+    /// The first samples, converted, as they were recorded.
+    excerpt: Vec<f64>,
     traces: Option<Traces>,
     /// What the way back through effects that no filter describes found.
     refined: Option<refined::Found>,
@@ -148,6 +151,7 @@ pub fn run(args: &Compensate) -> Result<Outcome, Failure> {
     let mut sink = Sink::open(args, &plan, output)?;
     report.output_signal = sink.describe();
     let unit = plan.chain.applied.unit.clone();
+    let scale = 1.0 / plan.chain.applied.factor;
     let run = if plan.undo.is_some() {
         refined::run(args, plan, &mut sink)?
     } else if args.whole_record {
@@ -155,7 +159,7 @@ pub fn run(args: &Compensate) -> Result<Outcome, Failure> {
     } else {
         stream::run(args, plan, &mut sink)?
     };
-    complete(&mut report, &run);
+    complete(&mut report, &run, scale);
     // Whatever can fail comes before the first file takes its name.
     let mut plot = plot;
     if let (Some(plot), Some(traces)) = (&mut plot, &run.traces) {
@@ -291,7 +295,7 @@ fn describe(args: &Compensate, plan: &Plan, output: &str) -> Report {
 }
 
 /// Fills in what the run found.
-fn complete(report: &mut Report, run: &Run) {
+fn complete(report: &mut Report, run: &Run, scale: f64) {
     report.samples = run.samples;
     report.result = run.extent.clone();
     report.start_s = run.start_s;
@@ -324,6 +328,20 @@ fn complete(report: &mut Report, run: &Run) {
         ));
     }
     report.warnings.extend(warnings);
+    let of = excerpt::Of {
+        name: &report.channel,
+        unit: &report.unit,
+        scale,
+        rate_hz: report.rate_hz,
+        start_s: run.start_s,
+        samples: run.samples,
+    };
+    let seen = match report.method {
+        "stream" => excerpt::of_stream(&run.excerpt, run.samples),
+        _ => &run.excerpt,
+    };
+    let wrong = excerpt::warnings(seen, of);
+    report.warnings.extend(wrong);
     if run.traces.as_ref().is_some_and(Traces::is_empty) {
         let end_s = run.start_s + (run.samples - 1) as f64 / report.rate_hz;
         report.warnings.push(Warning::new(

@@ -8,6 +8,7 @@ use crate::cli::Harmonics;
 use crate::failure::Failure;
 use crate::io::csv::Place;
 use crate::io::output::Output;
+use crate::quality::excerpt;
 use crate::report::harmonics::{Component, Report, SCHEMA};
 use crate::report::{self, Warning};
 use crate::signal::{Record, Signal};
@@ -123,6 +124,17 @@ fn fit(
     report
         .warnings
         .extend(mains_warning(&report.components, duration_s));
+    let of = excerpt::Of {
+        name: &report.channel,
+        unit: &report.unit,
+        scale: printed,
+        rate_hz: record.rate_hz,
+        start_s: record.start_s,
+        samples: samples.len(),
+    };
+    let seen = &samples[..samples.len().min(excerpt::OF_MEMORY)];
+    let wrong = excerpt::warnings(seen, of);
+    report.warnings.extend(wrong);
     Ok(())
 }
 

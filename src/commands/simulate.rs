@@ -3,14 +3,14 @@
 use torqcomp_model::effects::Action;
 use torqcomp_model::simulate::{Fixed, Input, Model, State, substeps};
 
-use super::Outcome;
+use super::{Outcome, conclude};
 use crate::cli::Simulate;
 use crate::failure::Failure;
 use crate::io::csv::{Options, Place};
 use crate::io::digits;
 use crate::io::output::Output;
-use crate::recording;
 use crate::report;
+use crate::signal::Together;
 use crate::stand::{self, Given, Stand};
 
 /// Relative change of the result at which the step of integration is fine enough.
@@ -28,25 +28,17 @@ pub fn run(args: &Simulate) -> Result<Outcome, Failure> {
         rate_hz: args.rate,
         ..Options::default()
     };
-    let recording = recording::read(&Place::of(&args.input), &options)?;
-    let chosen = recording.select(&options)?;
+    let read = Together::read(&Place::of(&args.input), &[options])?;
+    let chosen = &read.tracks[0];
     let inputs = [args.input.as_ref(), args.stand.as_path()];
     let mut output = Output::open(args.result.output.as_deref(), args.result.force, &inputs)?;
     let (gain, factor) = scales(&stand, chosen.unit.as_ref().map(|u| u.unit.factor()))?;
     let applied: Vec<f64> = chosen.samples.iter().map(|u| u * factor.applied).collect();
-    if let Some(place) = applied.iter().position(|u| !u.is_finite()) {
-        return Err(Failure::failed(format_args!(
-            "{}: sample {} of \"{}\" holds no number; correct it or cut the record there",
-            recording.source,
-            place + 1,
-            chosen.channel.name
-        )));
-    }
     let model = model(&stand, gain)?;
-    let (simulated, steps) = refined(&model, &applied, chosen.rate_hz, chosen.start_s)?;
+    let (simulated, steps) = refined(&model, &applied, read.rate_hz, read.start_s)?;
     let mut text = String::from("time_s,measured\n");
     for (i, value) in simulated.iter().enumerate() {
-        let time_s = chosen.start_s + i as f64 / chosen.rate_hz;
+        let time_s = read.start_s + i as f64 / read.rate_hz;
         text.push_str(&digits::text(time_s, 12));
         text.push(',');
         let mut cell = Vec::new();
@@ -64,7 +56,7 @@ pub fn run(args: &Simulate) -> Result<Outcome, Failure> {
         report::say(&format!(
             "simulated {} samples at {} Hz from rest, {steps} steps a sample, with {}\n",
             simulated.len(),
-            report::short(chosen.rate_hz),
+            report::short(read.rate_hz),
             if stand.effects.is_empty() {
                 "no effects".to_owned()
             } else {
@@ -72,7 +64,8 @@ pub fn run(args: &Simulate) -> Result<Outcome, Failure> {
             }
         ));
     }
-    Ok(Outcome::Done)
+    let warnings: Vec<_> = read.lost.iter().chain(&read.warnings).cloned().collect();
+    Ok(conclude(&warnings, read.lost.is_some(), false))
 }
 
 fn names(stand: &Stand) -> String {

@@ -208,7 +208,7 @@ pub fn binned(traces: &[Trace], against: Against, of: impl Fn(&Trace) -> &[f64])
         .iter()
         .fold((f64::INFINITY, f64::NEG_INFINITY), limits);
     let width = (high - low) / BINS as f64;
-    if !(width > 0.0) {
+    if width.is_nan() || width <= 0.0 {
         return Vec::new();
     }
     let mut bins = vec![(0.0, 0.0, 0_usize); BINS];

@@ -1,5 +1,6 @@
 //! Constants of a stand from records of it: signals from `dsp`, fits from `model`, joined here.
 
+pub mod anchored;
 pub mod decay;
 pub mod response;
 pub mod runup;

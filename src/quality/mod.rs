@@ -4,6 +4,7 @@
 //! axes of a recording. `docs/inspect.md` lists the codes.
 
 pub mod copies;
+pub mod excerpt;
 pub mod samples;
 pub mod time;
 

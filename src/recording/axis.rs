@@ -2,8 +2,12 @@
 
 use std::sync::Arc;
 
+use torqcomp_dsp::quality::rounding::rounded;
+
 /// Largest deviation of a step from the usual one, as a fraction of it, in a record that has a rate.
 const USUAL: f64 = 0.25;
+/// Relative difference of the usual step from the mean one that leaves nothing to be asked.
+const SAME: f64 = 1e-3;
 /// Deviations among which steps are averaged where there are gaps.
 const CLOSE: [f64; 2] = [0.01, 0.05];
 
@@ -100,11 +104,23 @@ pub fn typical_step(stamps: &[f64]) -> Option<f64> {
     Some(sum / count as f64)
 }
 
+/// Usual step of stamps, or that of the straight line that they are but for being rounded: 3 and 4 ms
+/// by turns are a step of 3.5 ms.
+fn step_of(stamps_s: &[f64]) -> Option<f64> {
+    let step = typical_step(stamps_s)?;
+    let span = stamps_s.last()? - stamps_s.first()?;
+    let mean = span / (stamps_s.len() - 1) as f64;
+    if (step / mean - 1.0).abs() <= SAME {
+        return Some(step);
+    }
+    Some(rounded(stamps_s).map_or(step, |line| line.step_s))
+}
+
 impl Axis {
     /// An axis of stamps in seconds.
     #[must_use]
     pub fn of_stamps(heading: &str, stamps_s: Arc<Vec<f64>>) -> Self {
-        let step = typical_step(&stamps_s);
+        let step = step_of(&stamps_s);
         Self {
             rate_hz: step.map(|step| crate::io::csv::without_rounding(1.0 / step)),
             rate_from: step.map_or(RateFrom::None, |_| RateFrom::Stamps(heading.to_owned())),

@@ -4,8 +4,11 @@
 //! samples and stamps are as read, cells that hold no number are `NaN` and listed with their lines.
 
 mod axis;
+mod messages;
 mod select;
 pub mod text;
+
+use std::io::Read;
 
 use crate::failure::Failure;
 use crate::io::csv::{NamedUnit, Options, Place};
@@ -92,17 +95,49 @@ pub enum HoleKind {
 }
 
 /// Reads a recording of any format and dialect as a whole into memory: the text, and eight bytes for
-/// each number in it.
+/// each number in it. Of an MCAP file that is the signal that the options name as their channel, or the
+/// only one.
 ///
 /// # Errors
 /// If the file cannot be read, is no recording, or leaves open how it is to be read.
 pub fn read(place: &Place, options: &Options) -> Result<Recording, Failure> {
-    use std::io::Read;
+    read_channels(place, std::slice::from_ref(options))
+}
+
+/// The same, for several channels: all of a text, and of an MCAP file the signals that are named, such as
+/// `/joint_states.effort[0]`. How a text is read is told by the first of the options.
+///
+/// # Errors
+/// See [`read`].
+pub fn read_channels(place: &Place, wanted: &[Options]) -> Result<Recording, Failure> {
     let name = place.name();
+    let options = wanted.first().cloned().unwrap_or_default();
+    if place.is_mcap()? {
+        refuse_for_messages(&options)?;
+        let signals: Vec<Option<&str>> = wanted.iter().map(|o| o.channel.as_deref()).collect();
+        return messages::read(place, &signals);
+    }
     let mut bytes = Vec::new();
     place
         .open()?
         .read_to_end(&mut bytes)
         .map_err(|error| Failure::failed(format_args!("{name}: cannot be read: {error}")))?;
-    text::read(&name, bytes, options).map_err(|failure| failure.at(&name))
+    text::read(&name, bytes, &options).map_err(|failure| failure.at(&name))
+}
+
+/// Refuses what only tables have.
+fn refuse_for_messages(options: &Options) -> Result<(), Failure> {
+    let told = [
+        ("--time-column", options.time_column.is_some()),
+        ("--time-unit", options.time_unit.is_some()),
+        ("--delimiter", options.told.delimiter.is_some()),
+        ("--decimal", options.told.decimal.is_some()),
+    ];
+    match told.iter().find(|(_, is_told)| *is_told) {
+        Some((flag, _)) => Err(Failure::usage(format_args!(
+            "{flag} does not apply: the input is an MCAP file, whose messages have time stamps; choose \
+             a signal as /joint_states.effort[0]"
+        ))),
+        None => Ok(()),
+    }
 }

@@ -192,10 +192,13 @@ impl Chart {
     #[must_use]
     pub fn key(&self) -> String {
         let entry = |(k, series): (usize, &Series)| {
+            let colour = self.colour(k);
+            let mark = match series.dots {
+                true => format!("<circle class=\"s{colour}\" cx=\"14\" cy=\"4\" r=\"3.5\"/>"),
+                false => format!("<polyline class=\"line s{colour}\" points=\"0,4 28,4\"/>"),
+            };
             format!(
-                "<span><svg class=\"swatch\" viewBox=\"0 0 28 8\" aria-hidden=\"true\">\
-                 <polyline class=\"line s{}\" points=\"0,4 28,4\"/></svg> {}</span>",
-                self.colour(k),
+                "<span><svg class=\"swatch\" viewBox=\"0 0 28 8\" aria-hidden=\"true\">{mark}</svg> {}</span>",
                 escaped(&series.name)
             )
         };
@@ -217,7 +220,7 @@ fn draw(svg: &mut String, series: &Series, colour: usize, x: &Scale, y: &Scale) 
         for (px, py) in inside {
             let _ = write!(
                 svg,
-                "<circle class=\"s{colour}\" cx=\"{:.1}\" cy=\"{:.1}\" r=\"2.6\"/>",
+                "<circle class=\"s{colour}\" cx=\"{:.1}\" cy=\"{:.1}\" r=\"3.5\"/>",
                 across(x, *px),
                 up(y, *py)
             );

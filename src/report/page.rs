@@ -12,13 +12,14 @@ const STYLE: &str = "\
 @media print{:root{--ink:#000;--faint:#ccc;--paper:#fff;--mark:#000}section,figure,table{break-inside:avoid}}\
 *{box-sizing:border-box}body{margin:0 auto;padding:1.2rem;max-width:60rem;background:var(--paper);\
 color:var(--ink);font:15px/1.5 system-ui,sans-serif;overflow-wrap:anywhere}h1{font-size:1.5rem;margin:0 0 .3rem}\
-h2{font-size:1.1rem;margin:1.8rem 0 .5rem}p{margin:.4rem 0}.wide{overflow-x:auto}\
+h2{font-size:1.1rem;margin:1.8rem 0 .5rem;break-after:avoid}p{margin:.4rem 0}.wide{overflow-x:auto}\
 table{border-collapse:collapse;font-variant-numeric:tabular-nums}\
 th,td{padding:.25rem .8rem .25rem 0;text-align:right;border-bottom:1px solid var(--faint);white-space:nowrap}\
 th:first-child,td:first-child{text-align:left}\
 th.prose,td.prose{text-align:left;white-space:normal;min-width:15rem}.warn{border-left:3px solid var(--mark);padding-left:.7rem}\
 code{font-size:.9em}figure{margin:1rem 0}figcaption{font-weight:600;font-size:.95rem}\
-@media(max-width:480px){body{padding:.7rem;font-size:14px}svg text{font-size:16px!important}}";
+@media(max-width:480px){body{padding:.7rem;font-size:14px}svg text{font-size:16px!important}\
+th,td{padding-right:.45rem;font-size:13px}td:first-child,th:first-child{white-space:normal;hyphens:auto}}";
 
 /// Letters of the longest cell above which a column holds sentences.
 const PROSE: usize = 36;

@@ -7,6 +7,7 @@ mod options;
 mod record;
 mod recorded;
 mod sequence;
+pub mod together;
 
 use crate::io::csv::{Column, RowPlan, TimeAxis, TimeSource};
 use crate::io::mcap::TimeChoice;
@@ -17,6 +18,7 @@ pub use feed::{Batch, Fetch, RowSource};
 pub use options::{MessageOptions, Options};
 pub use record::Record;
 pub use sequence::{Sequence, Summary, TextRows};
+pub use together::Together;
 
 /// A channel of a recording, chosen and open for reading.
 pub struct Signal {

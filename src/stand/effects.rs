@@ -15,6 +15,8 @@ use crate::failure::Failure;
 
 /// Frequency, over the natural one, that is next to rest.
 const NEAR_REST: f64 = 1e-6;
+/// Step of a factor at rest, relative to the factor, that is none.
+const LARGEST_STEP: f64 = 1e-4;
 
 /// An effect that the stand file declares.
 #[derive(Debug, Clone)]
@@ -129,7 +131,7 @@ impl Stand {
         self.effects
             .iter()
             .all(|declared| match declared.action().1 {
-                Action::Factor(factor) => factor(&mode, 0.0).norm() > 0.0,
+                Action::Factor(factor) => is_smooth_at_rest(&factor, &mode),
                 Action::Feedthrough(_) => true,
                 _ => false,
             })
@@ -201,7 +203,9 @@ impl Stand {
 pub fn is_smooth_at_rest(factor: &Frequency, mode: &Mode) -> bool {
     let at_rest = factor(mode, 0.0);
     let near = factor(mode, NEAR_REST * mode.omega_rad_s);
-    at_rest.norm() > 0.0 && (near - at_rest).norm() < 1e-3 * at_rest.norm()
+    // Of both signs of frequency the constant is the same only if it is real.
+    let step = (near - at_rest).norm().max(near.im.abs());
+    at_rest.norm() > 0.0 && step < LARGEST_STEP * at_rest.norm()
 }
 
 fn along(action: &Action, mode: &Mode, omega_rad_s: f64, through: Complex64) -> Complex64 {

@@ -10,8 +10,9 @@ use torqcomp_model::effects::Line;
 const BESIDE: std::ops::RangeInclusive<u32> = 3..=20;
 /// Half waves above those of a course, over as many as it has, that tell how much of them is signal.
 const COURSE_BESIDE: usize = 2;
-/// Standard deviations of the noise within which the record's own amplitude agrees with that of the stand.
-const AGREEMENT: f64 = 4.0;
+/// Variance of the signal at a line, over the square of what the record's own amplitude differs by from that of the
+/// stand, that is thought possible.
+const AGREEMENT: f64 = 8.0;
 /// Samples after which a turning phasor is set right.
 const TURNS: usize = 4096;
 
@@ -34,8 +35,8 @@ pub struct FoundLine {
 ///
 /// With a phasor `P = A e^{jφ} + S`, a known amplitude `A`, an unknown phase and signal `S` of variance `σ²` beside it,
 /// the mean of `A e^{jφ}` is `A I₁(κ)/I₀(κ) e^{j arg P}`, `κ = 2 A |P|/σ²`. `σ²` is the largest
-/// power at the frequencies beside the line, since a comb may have one of its lines there; that of the noise alone if
-/// `|P|` agrees with `A` as no signal would have it.
+/// power at the frequencies beside the line, since a comb may have one of its lines there, or less if `|P|` agrees with
+/// `A` better than that.
 pub fn take_lines(
     samples: &mut [f64],
     rate_hz: f64,
@@ -67,8 +68,7 @@ pub fn take_lines(
                 .fold(0.0, f64::max);
             let phasor = at(line.frequency_hz);
             let off = phasor.norm() - line.amplitude;
-            let agrees = noise > 0.0 && off * off < AGREEMENT * AGREEMENT * noise;
-            let variance = if agrees { noise } else { signal.max(noise) };
+            let variance = signal.min(AGREEMENT * off * off + noise).max(noise);
             let share = if variance > 0.0 {
                 bessel_ratio(2.0 * line.amplitude * phasor.norm() / variance)
             } else {
@@ -138,7 +138,7 @@ fn bessel_ratio(kappa: f64) -> f64 {
 
 /// Takes a slow course of as many half waves off a record, its mean left; the rms of what was taken.
 ///
-/// Each half wave is shrunk by `1 − S/c²`, `S` being the mean square of the half waves just above, which are signal.
+/// Each half wave is shrunk by `1 − S/c²`, `S` being what the half waves just above have, which are signal.
 pub fn take_course(samples: &mut [f64], half_waves: usize) -> f64 {
     let count = samples.len() as f64;
     let wave = |k: usize, i: usize| (PI * k as f64 * (i as f64 + 0.5) / count).cos();
@@ -150,10 +150,12 @@ pub fn take_course(samples: &mut [f64], half_waves: usize) -> f64 {
             .sum();
         2.0 * sum / count
     };
-    let beside: f64 = (half_waves + 1..=(1 + COURSE_BESIDE) * half_waves)
+    let mut beside: Vec<f64> = (half_waves + 1..=(1 + COURSE_BESIDE) * half_waves)
         .map(|k| part(samples, k).powi(2))
-        .sum::<f64>()
-        / (COURSE_BESIDE * half_waves).max(1) as f64;
+        .collect();
+    beside.sort_by(f64::total_cmp);
+    // Lines of a comb are few: the middle one is beside them. The square of a normal number has a median of 0.455.
+    let beside = beside.get(beside.len() / 2).map_or(0.0, |b| b / 0.455);
     let mut square = 0.0;
     for k in 1..=half_waves {
         let own = part(samples, k);

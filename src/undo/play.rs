@@ -28,17 +28,17 @@ pub fn invert(samples: &mut [f64], gap: f64, noise_std: f64) -> Vec<usize> {
     };
     let mut direction = first.before;
     let mut next = turns.iter().peekable();
-    for i in 0..samples.len() {
+    for (i, sample) in samples.iter_mut().enumerate() {
         while next.peek().is_some_and(|turn| i > turn.to) {
             direction = -next.next().map_or(direction, |turn| turn.before);
         }
         match next.peek() {
             Some(turn) if i >= turn.from => {
                 let part = (i - turn.from) as f64 / (turn.to - turn.from).max(1) as f64;
-                samples[i] = turn.at + turn.before * gap * (1.0 - 2.0 * part * part);
+                *sample = turn.at + turn.before * gap * (1.0 - 2.0 * part * part);
                 bridged.push(i);
             }
-            _ => samples[i] += direction * gap,
+            _ => *sample += direction * gap,
         }
     }
     bridged

@@ -173,10 +173,9 @@ fn cubic(x: &mut [f64], from: usize, to: usize) {
         (a - x[from - 1]) * length,
         (x[(to + 1).min(x.len() - 1)] - b) * length,
     );
-    for i in from + 1..to {
-        let t = (i - from) as f64 / length;
+    for (i, x) in x[from + 1..to].iter_mut().enumerate() {
+        let t = (i + 1) as f64 / length;
         let (u, t2) = (1.0 - t, t * t);
-        x[i] =
-            u * u * ((1.0 + 2.0 * t) * a + t * slope_a) + t2 * ((3.0 - 2.0 * t) * b - u * slope_b);
+        *x = u * u * ((1.0 + 2.0 * t) * a + t * slope_a) + t2 * ((3.0 - 2.0 * t) * b - u * slope_b);
     }
 }

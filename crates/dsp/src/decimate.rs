@@ -14,6 +14,13 @@ const BETA: f64 = 7.9;
 /// Part of the new rate up to which the response is 1 within 2·10⁻⁴.
 pub const PASS: f64 = 0.2;
 
+/// Power of white noise that is left, over the power that noise of its density would have at the new
+/// rate: twice the corner over the new rate.
+///
+/// Noise that was white is not afterwards: it has nothing between the corner and half the rate, so that a
+/// fit over the samples sees less of it than lies where the signal is.
+pub const NOISE: f64 = 2.0 * CORNER;
+
 /// A record at a lower rate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Decimated {

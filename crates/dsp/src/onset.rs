@@ -14,7 +14,7 @@ const SIZE: f64 = 0.15;
 const BEFORE: usize = 4;
 
 /// The stretches of free ringing: each begins at the largest swing after a hit and ends before the
-/// next hit or at the end. A record that rings from its first sample on is one stretch.
+/// next hit or at the end. What rings from the first sample on is a stretch too.
 ///
 /// ```
 /// // Silence, then a decay from sample 500 on.
@@ -44,11 +44,18 @@ pub fn decays(samples: &[f64]) -> Vec<Range<usize>> {
             hits.push(i);
         }
     }
-    let starts: Vec<usize> = if hits.is_empty() {
-        vec![0]
-    } else {
-        hits.iter().map(|hit| hit * block).collect()
-    };
+    // What rings from the first sample on, and has died down when the first hit comes, is one more.
+    let rings_first = hits.first().is_none_or(|hit| {
+        let ended = swings[hit.saturating_sub(BEFORE)..*hit].iter();
+        *hit > BEFORE
+            && swings[0] > SIZE * largest
+            && swings[0] > RISE * ended.fold(floor, |m, s| m.max(*s))
+    });
+    let starts: Vec<usize> = rings_first
+        .then_some(0)
+        .into_iter()
+        .chain(hits.iter().map(|hit| hit * block))
+        .collect();
     let ends = starts[1..]
         .iter()
         .map(|s| s.saturating_sub(block))
@@ -117,6 +124,10 @@ mod tests {
         let found = decays(&record);
         assert_eq!((found.len(), found[0].clone()), (1, 0..1000));
         assert!(decays(&[1.0; 100]).is_empty() && decays(&[]).is_empty());
+        let record = ringing(&[0, 1700], 3000);
+        let found = decays(&record);
+        assert_eq!(found.len(), 2, "{found:?}");
+        assert!(found[0].start == 0 && found[0].end <= 1700, "{found:?}");
     }
 
     #[test]

@@ -45,6 +45,8 @@ pub struct Resampled {
 pub struct Resampler {
     step_s: f64,
     start_s: f64,
+    /// Whether the grid begins at the first stamp.
+    begins_at_first: bool,
     next: usize,
     points: VecDeque<(f64, f64)>,
     done: Resampled,
@@ -80,9 +82,36 @@ impl Resampler {
         Ok(Self {
             step_s,
             start_s: 0.0,
+            begins_at_first: true,
             next: 0,
             points: VecDeque::new(),
             done: Resampled::default(),
+        })
+    }
+
+    /// A resampler to a grid `start_s + k step_s` that begins at or after the first stamp, so that
+    /// several channels come onto one grid.
+    ///
+    /// # Errors
+    /// [`Error::NotPositive`] for a step that is not positive.
+    ///
+    /// ```
+    /// use torqcomp_dsp::resample::Resampler;
+    /// let mut out = Vec::new();
+    /// let mut resampler = Resampler::on_grid(0.5, 0.75)?;
+    /// for t in 0..20 {
+    ///     resampler.push(0.5 * f64::from(t), f64::from(t * t), &mut out)?;
+    /// }
+    /// resampler.finish(&mut out);
+    /// // t = 0.75 s lies between the second and the third sample: 1.5².
+    /// assert!((out[0] - 2.25).abs() < 1e-12 && out.len() == 18);
+    /// # Ok::<(), torqcomp_dsp::Error>(())
+    /// ```
+    pub fn on_grid(step_s: f64, start_s: f64) -> Result<Self, Error> {
+        Ok(Self {
+            start_s,
+            begins_at_first: false,
+            ..Self::new(step_s)?
         })
     }
 
@@ -96,7 +125,8 @@ impl Resampler {
         let index = self.done.samples_in;
         self.done.samples_in += 1;
         match self.points.back() {
-            None => self.start_s = time_s,
+            None if self.begins_at_first => self.start_s = time_s,
+            None => {}
             Some(&(last, _)) if time_s == last => {
                 self.done.repeated += 1;
                 return Ok(());

@@ -117,11 +117,21 @@ impl Window {
     /// window.
     #[must_use]
     pub fn noise(&self, i: usize, j: usize) -> f64 {
-        let sum: f64 = self.weights[i]
-            .iter()
-            .zip(&self.weights[j])
-            .map(|(a, b)| a * b)
-            .sum();
+        self.noise_apart(i, j, 0)
+    }
+
+    /// The same over two windows, that of order `j` so many samples later than that of order `i`.
+    ///
+    /// ```
+    /// let window = torqcomp_dsp::weak::Window::new(20, 100.0)?;
+    /// // Windows that do not overlap share no noise.
+    /// assert!(window.noise_apart(0, 0, 40).abs() < 1e-20 && window.noise_apart(0, 0, 41) == 0.0);
+    /// # Ok::<(), torqcomp_dsp::Error>(())
+    /// ```
+    #[must_use]
+    pub fn noise_apart(&self, i: usize, j: usize, samples: usize) -> f64 {
+        let early = self.weights[i].iter().skip(samples);
+        let sum: f64 = early.zip(&self.weights[j]).map(|(a, b)| a * b).sum();
         // The sign with which `at` takes the first derivative.
         if (i == 1) != (j == 1) { -sum } else { sum }
     }

@@ -9,6 +9,7 @@ use super::{Extent, Plan, Run};
 use crate::cli::Compensate;
 use crate::commands::convert;
 use crate::failure::Failure;
+use crate::quality::excerpt;
 use crate::report::compensate::{Effect, Line, LostSpan, Report};
 use crate::report::{Warning, rounded};
 use crate::signal::Record;
@@ -83,6 +84,11 @@ pub fn run(args: &Compensate, plan: Plan, sink: &mut Sink) -> Result<Run, Failur
         resampled: record.resampled,
         noise,
         summary: record.summary,
+        excerpt: {
+            let mut samples = record.samples;
+            samples.truncate(excerpt::OF_MEMORY);
+            samples
+        },
         traces,
     })
 }

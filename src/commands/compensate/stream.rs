@@ -16,6 +16,7 @@ use crate::failure::Failure;
 use crate::io::csv::{TimeAxis, TimeSource};
 use crate::io::text::Text;
 use crate::pipeline::{self, Stages};
+use crate::quality::excerpt;
 use crate::report::svg::Traces;
 use crate::signal::Batch;
 
@@ -122,8 +123,9 @@ pub fn run(args: &Compensate, plan: Plan, sink: &mut Sink) -> Result<Run, Failur
                 if let Some(part) = &job.extent {
                     extent.join(part);
                 }
-                // A record may be too short for a block of the noise estimate.
-                if short.len() < noise_block {
+                // For what is wrong with the record, and where it is too short for a block of the
+                // noise estimate.
+                if short.len() < excerpt::OF_STREAM {
                     short.extend_from_slice(steps.recorded(&job.window));
                 }
                 Ok(())
@@ -145,6 +147,7 @@ pub fn run(args: &Compensate, plan: Plan, sink: &mut Sink) -> Result<Run, Failur
     };
     Ok(Run {
         summary: sequence.finish(&mut fetch)?,
+        excerpt: short,
         samples: joiner.samples,
         start_s: steps.start_s,
         extent: extent.scaled(steps.scale),

@@ -10,6 +10,7 @@ use super::{Extent, Plan, Run};
 use crate::cli::Compensate;
 use crate::commands::convert;
 use crate::failure::Failure;
+use crate::quality::excerpt;
 use crate::signal::Record;
 
 /// Longest block of the noise estimate.
@@ -35,6 +36,11 @@ pub fn run(args: &Compensate, plan: Plan, sink: &mut Sink) -> Result<Run, Failur
         resampled: record.resampled,
         noise: density.and_then(|density| RecordNoise::of(&filter, &density)),
         summary: record.summary,
+        excerpt: {
+            let mut samples = record.samples;
+            samples.truncate(excerpt::OF_MEMORY);
+            samples
+        },
         traces,
         refined: None,
     })

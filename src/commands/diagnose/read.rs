@@ -9,8 +9,8 @@ use crate::cli::Diagnose;
 use crate::diagnose::{Begin, Case, Constants, Record, set_substeps};
 use crate::failure::Failure;
 use crate::io::csv::{NamedUnit, Options, Place};
-use crate::recording;
 use crate::report::Warning;
+use crate::signal::Together;
 use crate::stand::{Given, Stand};
 
 /// Part of a training record that is fitted where none is held out.
@@ -63,6 +63,8 @@ struct Pair {
     start_s: f64,
     applied_unit: Option<NamedUnit>,
     measured_unit: Option<NamedUnit>,
+    /// What should be known of the file.
+    warnings: Vec<Warning>,
 }
 
 /// Reads all records and says what is declared of them.
@@ -93,7 +95,11 @@ pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<Read, Failure> {
             fixed
         });
     let gain_is_declared = gain.is_some() && !has_static_gain(stand);
-    let mut warnings = Vec::new();
+    let mut warnings: Vec<Warning> = train
+        .iter()
+        .chain(&hold)
+        .flat_map(|pair| pair.warnings.iter().cloned())
+        .collect();
     let convert = |pairs: Vec<Pair>| -> Result<Vec<Record>, Failure> {
         pairs.into_iter().map(|p| record(p, stand, scale)).collect()
     };
@@ -139,40 +145,39 @@ fn pair(args: &Diagnose, file: &str) -> Result<Pair, Failure> {
         rate_hz: args.rate,
         ..Options::default()
     };
-    let applied = options(&args.applied, &args.applied_unit);
-    let measured = options(&args.measured, &args.measured_unit);
-    let recording = recording::read(&Place::of(file), &applied)?;
-    let u = recording.select(&applied)?;
-    let y = recording.select(&measured)?;
     if args.applied == args.measured {
         return Err(Failure::usage(
             "--applied and --measured name the same column",
         ));
     }
-    for (selection, name) in [(&u, &args.applied), (&y, &args.measured)] {
-        if let Some(place) = selection.samples.iter().position(|v| !v.is_finite()) {
-            return Err(Failure::failed(format_args!(
-                "{}: sample {} of \"{name}\" holds no number; correct it or cut the record there",
-                recording.source,
-                place + 1
-            )));
-        }
-    }
-    let count = u.samples.len().min(y.samples.len());
+    let wanted = [
+        options(&args.applied, &args.applied_unit),
+        options(&args.measured, &args.measured_unit),
+    ];
+    let read = Together::read(&Place::of(file), &wanted)?;
+    let mut tracks = read.tracks.into_iter();
+    let (Some(applied), Some(measured)) = (tracks.next(), tracks.next()) else {
+        return Err(Failure::failed(format_args!(
+            "{}: two channels are needed",
+            read.source
+        )));
+    };
+    let count = applied.samples.len();
     if count < FEWEST {
         return Err(Failure::failed(format_args!(
             "{}: {count} samples are too few; a diagnosis needs at least {FEWEST}, and ten periods of the stand",
-            recording.source
+            read.source
         )));
     }
     Ok(Pair {
-        source: recording.source.clone(),
-        applied: u.samples[..count].to_vec(),
-        measured: y.samples[..count].to_vec(),
-        rate_hz: u.rate_hz,
-        start_s: u.start_s,
-        applied_unit: u.unit.clone(),
-        measured_unit: y.unit.clone(),
+        source: read.source,
+        applied: applied.samples,
+        measured: measured.samples,
+        rate_hz: read.rate_hz,
+        start_s: read.start_s,
+        applied_unit: applied.unit,
+        measured_unit: measured.unit,
+        warnings: read.lost.into_iter().chain(read.warnings).collect(),
     })
 }
 

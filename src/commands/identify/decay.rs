@@ -1,13 +1,13 @@
 //! `identify decay`.
 
-use torqcomp_model::Kind;
-
-use super::{declared, deliver, quantity, read, stand_text, uniform};
+use super::anchor::{Ratios, Told, follow};
+use super::{deliver, read, said, uniform};
 use crate::cli::identify::Decay;
 use crate::commands::Outcome;
 use crate::failure::Failure;
-use crate::identify::Found;
+use crate::identify::anchored::Ringer;
 use crate::identify::decay::{Evaluated, Options, Ringing, identify};
+use crate::report::Warning;
 use crate::report::identify::{Law, Report};
 use crate::stand::update::Entry;
 
@@ -18,6 +18,8 @@ struct Loaded {
     rate_hz: Option<f64>,
     values: Vec<f64>,
     unit: String,
+    warnings: Vec<Warning>,
+    is_lossy: bool,
 }
 
 /// Runs the test.
@@ -59,13 +61,16 @@ pub fn run(args: &Decay) -> Result<Outcome, Failure> {
             criterion: l.criterion,
         })
         .collect();
-    deliver(&report, &args.findings, &inputs, &entries)
+    let warnings = loaded.iter().flat_map(|l| l.warnings.iter().cloned());
+    report.warnings.extend(warnings);
+    let is_lossy = loaded.iter().any(|l| l.is_lossy);
+    deliver(&report, &args.findings, &inputs, &entries, is_lossy)
 }
 
 /// Reads one record; samples that are not there are left out, as the fit needs no uniform steps.
 fn load(args: &Decay, input: &str) -> Result<Loaded, Failure> {
     let options = args.reading.options(args.channel.as_deref(), None);
-    let recording = read(input, &options)?;
+    let recording = read(input, std::slice::from_ref(&options))?;
     let selection = recording.select(&options)?;
     let count = selection.samples.len();
     let stamps = match (&selection.channel.axis.stamps_s, args.reading.rate) {
@@ -93,182 +98,47 @@ fn load(args: &Decay, input: &str) -> Result<Loaded, Failure> {
         rate_hz,
         values,
         unit: selection.unit.map_or_else(String::new, |u| u.text),
+        warnings: said(&recording.warnings, recording.lost.as_ref()),
+        is_lossy: recording.lost.is_some(),
     })
 }
 
-/// What is anchored by a declared value.
-enum Anchor {
-    Inertia(f64, Option<f64>),
-    Stiffness(f64, Option<f64>),
-    Nothing,
-}
-
-fn anchor(args: &Decay) -> Result<(Anchor, bool), Failure> {
-    if let Some(text) = &args.inertia {
-        return Ok((
-            Anchor::Inertia(quantity("--inertia", text, Kind::Inertia)?, None),
-            true,
-        ));
-    }
-    if let Some(text) = &args.stiffness {
-        let stiffness = quantity("--stiffness", text, Kind::AngularStiffness)?;
-        return Ok((Anchor::Stiffness(stiffness, None), true));
-    }
-    let stand = stand_text(&args.findings)?;
-    if let Some((value, std)) = declared(stand.as_ref(), "inertia", Kind::Inertia)? {
-        return Ok((Anchor::Inertia(value, std), false));
-    }
-    if let Some((value, std)) = declared(stand.as_ref(), "stiffness", Kind::AngularStiffness)? {
-        return Ok((Anchor::Stiffness(value, std), false));
-    }
-    Ok((Anchor::Nothing, false))
-}
-
-/// Constants that follow from the strongest mode and the anchor, (C18) and (C20), and the entries of
-/// the stand file.
+/// Constants that follow from the strongest mode and the anchor, and the entries of the stand file.
 fn entries(args: &Decay, evaluated: &mut Evaluated) -> Result<Vec<Entry>, Failure> {
-    let source = format!("identify decay: {}", args.inputs.join(", "));
-    let entry = |key: &'static str, found: &Found| Entry {
-        section: "mechanics",
-        key,
-        value: found.value,
-        std: found.std,
-        unit: found.unit.clone(),
-        source: source.clone(),
+    let outcome = &evaluated.outcome;
+    let main = |name: &str| {
+        let found = outcome.get(name);
+        found
+            .or_else(|| outcome.get(&format!("mode_1_{name}")))
+            .cloned()
     };
-    let (anchor, given) = anchor(args)?;
-    let (known, mut found) = match anchor {
-        Anchor::Nothing => {
-            evaluated.outcome.warn(
-                "not-anchored",
-                "a decay tells only ratios such as stiffness over inertia: give --inertia or --stiffness, or \
-                 a stand file that declares one, to have all three constants",
-            );
-            let outcome = &evaluated.outcome;
-            let main = |name: &str| {
-                outcome
-                    .get(name)
-                    .or_else(|| outcome.get(&format!("mode_1_{name}")))
-                    .cloned()
-            };
-            let both = (main("natural_frequency"), main("damping_ratio"));
-            let (Some(frequency), Some(ratio)) = both else {
-                return Ok(Vec::new());
-            };
-            return Ok(vec![
-                entry("natural_frequency", &frequency),
-                entry("damping_ratio", &ratio),
-            ]);
-        }
-        Anchor::Inertia(value, std) => (
-            Found::new("inertia", value, std, "kg m^2"),
-            from_inertia(evaluated, value, std),
-        ),
-        Anchor::Stiffness(value, std) => (
-            Found::new("stiffness", value, std, "N m/rad"),
-            from_stiffness(evaluated, value, std),
-        ),
+    let both = (main("natural_frequency"), main("damping_ratio"));
+    let (Some(frequency), Some(ratio)) = both else {
+        return Ok(Vec::new());
     };
-    if known.std.is_none() {
-        evaluated.outcome.warn(
-            "anchor-without-std",
-            format!(
-                "the {} has no standard uncertainty, so that those of the constants that follow leave it \
-                 out",
-                known.name
-            ),
-        );
+    let told = Told {
+        mode: strongest(evaluated),
+        ratios: Ratios::OverInertia,
+        modal: [&frequency, &ratio],
+        source: format!("identify decay: {}", args.inputs.join(", ")),
+    };
+    follow(&args.anchors, &args.findings, &told, &mut evaluated.outcome)
+}
+
+/// The strongest mode with the covariance of its poles.
+fn strongest(evaluated: &Evaluated) -> Ringer {
+    let fit = &evaluated.fit;
+    let main = fit.by_strength(evaluated.stretches.len())[0];
+    let covariance = |i: usize, j: usize| fit.fit.covariance.get(2 * main + i, 2 * main + j);
+    let all = || {
+        Some([
+            [covariance(0, 0)?, covariance(0, 1)?],
+            [covariance(1, 0)?, covariance(1, 1)?],
+        ])
+    };
+    Ringer {
+        rate_per_s: fit.poles[main].rate_per_s,
+        omega_rad_per_s: fit.poles[main].omega_rad_per_s,
+        covariance: all(),
     }
-    let mut entries = Vec::new();
-    if given {
-        let key = if known.name == "inertia" {
-            "inertia"
-        } else {
-            "stiffness"
-        };
-        let mut anchor = entry(key, &known);
-        anchor.source = "declared".to_owned();
-        entries.push(anchor);
-    }
-    for new in &found {
-        let key = match new.name.as_str() {
-            "inertia" => "inertia",
-            "damping" => "damping",
-            _ => "stiffness",
-        };
-        entries.push(entry(key, new));
-    }
-    evaluated.outcome.found.append(&mut found);
-    Ok(entries)
-}
-
-/// K = J (ω² + σ²), f = 2σJ.
-fn from_inertia(evaluated: &Evaluated, inertia: f64, std: Option<f64>) -> Vec<Found> {
-    let (sigma, omega) = strongest(evaluated);
-    let square = sigma * sigma + omega * omega;
-    let relative = std.map_or(0.0, |s| s / inertia);
-    let stiffness = inertia * square;
-    let damping = 2.0 * sigma * inertia;
-    let of_k = uncertainty(evaluated, 2.0 * sigma * inertia, 2.0 * omega * inertia);
-    let of_f = uncertainty(evaluated, 2.0 * inertia, 0.0);
-    vec![
-        Found::new(
-            "stiffness",
-            stiffness,
-            of_k.map(|u| u.hypot(relative * stiffness)),
-            "N m/rad",
-        ),
-        Found::new(
-            "damping",
-            damping,
-            of_f.map(|u| u.hypot(relative * damping)),
-            "N m s/rad",
-        ),
-    ]
-}
-
-/// J = K/(ω² + σ²), f = 2σJ.
-fn from_stiffness(evaluated: &Evaluated, stiffness: f64, std: Option<f64>) -> Vec<Found> {
-    let (sigma, omega) = strongest(evaluated);
-    let square = sigma * sigma + omega * omega;
-    let relative = std.map_or(0.0, |s| s / stiffness);
-    let inertia = stiffness / square;
-    let damping = 2.0 * sigma * inertia;
-    let by = -2.0 * inertia / square;
-    let of_j = uncertainty(evaluated, by * sigma, by * omega);
-    let of_f = uncertainty(
-        evaluated,
-        2.0 * inertia + 2.0 * sigma * by * sigma,
-        2.0 * sigma * by * omega,
-    );
-    vec![
-        Found::new(
-            "inertia",
-            inertia,
-            of_j.map(|u| u.hypot(relative * inertia)),
-            "kg m^2",
-        ),
-        Found::new(
-            "damping",
-            damping,
-            of_f.map(|u| u.hypot(relative * damping)),
-            "N m s/rad",
-        ),
-    ]
-}
-
-fn strongest(evaluated: &Evaluated) -> (f64, f64) {
-    let main = evaluated.fit.by_strength(evaluated.stretches.len())[0];
-    let pole = evaluated.fit.poles[main];
-    (pole.rate_per_s, pole.omega_rad_per_s)
-}
-
-/// Standard uncertainty of what depends so on σ and ω of the strongest mode.
-fn uncertainty(evaluated: &Evaluated, by_sigma: f64, by_omega: f64) -> Option<f64> {
-    let main = evaluated.fit.by_strength(evaluated.stretches.len())[0];
-    let fit = &evaluated.fit.fit;
-    let mut gradient = vec![0.0; fit.values.len()];
-    gradient[2 * main] = by_sigma;
-    gradient[2 * main + 1] = by_omega;
-    fit.covariance.std_of(&gradient)
 }

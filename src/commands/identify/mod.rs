@@ -1,5 +1,6 @@
 //! `identify`: constants of the stand from records, with uncertainties.
 
+mod anchor;
 mod decay;
 mod response;
 mod runup;
@@ -12,11 +13,14 @@ use torqcomp_model::Kind;
 use super::{Outcome, conclude};
 use crate::cli::identify::{Findings, Identify, Test};
 use crate::failure::Failure;
-use crate::io::csv::{NamedUnit, Place};
+use crate::io::csv::{NamedUnit, Options, Place};
 use crate::io::output;
 use crate::recording::{Recording, Selection};
 use crate::report;
+use crate::report::Warning;
 use crate::report::identify::Report;
+use crate::signal::Together;
+use crate::signal::together::uniform;
 use crate::stand::update::{self, Entry};
 
 /// Runs the verb.
@@ -61,6 +65,7 @@ fn deliver(
     findings: &Findings,
     inputs: &[&str],
     entries: &[Entry],
+    is_lossy: bool,
 ) -> Result<Outcome, Failure> {
     let result = &findings.result;
     let taken: Vec<&Path> = inputs.iter().map(Path::new).collect();
@@ -96,20 +101,43 @@ fn deliver(
         (false, _) => report.text(),
     };
     output::write_all(None, false, &[], &printed)?;
-    Ok(conclude(&report.warnings, false, findings.strict))
+    Ok(conclude(&report.warnings, is_lossy, findings.strict))
 }
 
-/// Reads one file.
-fn read(input: &str, options: &crate::io::csv::Options) -> Result<Recording, Failure> {
-    crate::recording::read(&Place::of(input), options)
+/// Reads one file: all of a text, the signals that are named of an MCAP file.
+fn read(input: &str, wanted: &[Options]) -> Result<Recording, Failure> {
+    crate::recording::read_channels(&Place::of(input), wanted)
+}
+
+/// Reads channels of one file that are to lie on one time axis. Stamps of a text must be uniform, those
+/// of messages never are and are brought onto a grid.
+fn together(input: &str, wanted: &[Options]) -> Result<Together, Failure> {
+    let recording = read(input, wanted)?;
+    if recording.format != "mcap" {
+        for options in wanted {
+            let selection = recording.select(options)?;
+            whole(&selection)?;
+            must_be_uniform(&selection, options.rate_hz.is_some())?;
+        }
+    }
+    Together::of(&recording, wanted)
+}
+
+/// What was lost of a file, and what else should be known of it.
+fn said(warnings: &[Warning], lost: Option<&Warning>) -> Vec<Warning> {
+    lost.into_iter().chain(warnings).cloned().collect()
 }
 
 /// The unit of a channel, or what to do to have one.
 fn unit_of(selection: &Selection, flag: &str) -> Result<NamedUnit, Failure> {
-    selection.unit.clone().ok_or_else(|| {
+    unit_or(selection.unit.as_ref(), &selection.channel.name, flag)
+}
+
+/// The unit of a channel of that name.
+fn unit_or(unit: Option<&NamedUnit>, name: &str, flag: &str) -> Result<NamedUnit, Failure> {
+    unit.cloned().ok_or_else(|| {
         Failure::failed(format_args!(
-            "the channel \"{}\" does not say its unit; give it with {flag}",
-            selection.channel.name
+            "the channel \"{name}\" does not say its unit; give it with {flag}"
         ))
     })
 }
@@ -129,18 +157,6 @@ fn whole(selection: &Selection) -> Result<(), Failure> {
             hole.line, selection.channel.name
         ))),
     }
-}
-
-/// Largest deviation of time stamps from a uniform grid that is none, in steps.
-const JITTER: f64 = 0.05;
-
-/// Whether stamps are as good as uniform.
-fn uniform(stamps_s: &[f64], rate_hz: f64) -> bool {
-    let first = stamps_s.first().copied().unwrap_or(0.0);
-    stamps_s
-        .iter()
-        .enumerate()
-        .all(|(i, t)| ((t - first) * rate_hz - i as f64).abs() < JITTER + 1e-6 * i as f64)
 }
 
 /// Refuses a channel whose stamps are not uniform.

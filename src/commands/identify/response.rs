@@ -2,12 +2,15 @@
 
 use torqcomp_model::Dimension;
 
-use super::{deliver, must_be_uniform, read, whole};
+use super::anchor::{Ratios, Told, follow};
+use super::{deliver, said, together};
 use crate::cli::identify::{Excitation, Measured, Response};
 use crate::commands::Outcome;
 use crate::failure::Failure;
-use crate::identify::response::{self, Driven, Options, identify};
+use crate::identify::anchored::Ringer;
+use crate::identify::response::{self, Driven, Evaluated, Options, identify};
 use crate::io::csv::NamedUnit;
+use crate::report::Warning;
 use crate::report::identify::Report;
 use crate::stand::update::Entry;
 
@@ -18,6 +21,8 @@ struct Loaded {
     applied: Vec<f64>,
     measured: Vec<f64>,
     unit: Option<NamedUnit>,
+    warnings: Vec<Warning>,
+    is_lossy: bool,
 }
 
 /// Runs the test.
@@ -56,7 +61,7 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
             .as_ref()
             .map_or_else(String::new, |u| u.text.clone());
     }
-    let entries = entries(args, &evaluated.outcome)?;
+    let entries = entries(args, &mut evaluated)?;
     let inputs: Vec<&str> = args.inputs.iter().map(String::as_str).collect();
     let mut report = Report::new("response", &inputs, &evaluated.outcome, args.findings.units);
     report.samples = loaded.iter().map(|l| l.applied.len()).sum();
@@ -66,24 +71,29 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
         .iter()
         .map(|e| Some(*e).filter(|e| e.is_finite()))
         .collect();
-    deliver(&report, &args.findings, &inputs, &entries)
+    let warnings = loaded.iter().flat_map(|l| l.warnings.iter().cloned());
+    report.warnings.extend(warnings);
+    let is_lossy = loaded.iter().any(|l| l.is_lossy);
+    deliver(&report, &args.findings, &inputs, &entries, is_lossy)
 }
 
 fn load(args: &Response, input: &str) -> Result<Loaded, Failure> {
-    let applied_options = args.reading.options(Some(&args.applied), None);
-    let recording = read(input, &applied_options)?;
-    let applied = recording.select(&applied_options)?;
-    let measured = recording.select(&args.reading.options(Some(&args.measured), None))?;
-    for channel in [&applied, &measured] {
-        whole(channel)?;
-        must_be_uniform(channel, args.reading.rate.is_some())?;
-    }
+    let wanted =
+        [&args.applied, &args.measured].map(|channel| args.reading.options(Some(channel), None));
+    let mut read = together(input, &wanted)?;
+    let (Some(measured), Some(applied)) = (read.tracks.pop(), read.tracks.pop()) else {
+        return Err(Failure::failed(format_args!(
+            "{input}: two channels are needed"
+        )));
+    };
     Ok(Loaded {
         name: input.to_owned(),
-        rate_hz: applied.rate_hz,
-        applied: applied.samples.to_vec(),
-        measured: measured.samples.to_vec(),
-        unit: measured.unit.clone(),
+        rate_hz: read.rate_hz,
+        applied: applied.samples,
+        measured: measured.samples,
+        unit: measured.unit,
+        warnings: said(&read.warnings, read.lost.as_ref()),
+        is_lossy: read.lost.is_some(),
     })
 }
 
@@ -108,11 +118,10 @@ fn order(args: &Response, unit: Option<&NamedUnit>) -> i32 {
     }
 }
 
-fn entries(args: &Response, outcome: &crate::identify::Outcome) -> Result<Vec<Entry>, Failure> {
-    let pair = (
-        outcome.get("natural_frequency"),
-        outcome.get("damping_ratio"),
-    );
+/// Constants that follow from a single mode and the anchor, and the entries of the stand file.
+fn entries(args: &Response, evaluated: &mut Evaluated) -> Result<Vec<Entry>, Failure> {
+    let get = |name: &str| evaluated.outcome.get(name).cloned();
+    let pair = (get("natural_frequency"), get("damping_ratio"));
     let (Some(frequency), Some(ratio)) = pair else {
         return match args.findings.result.output {
             Some(_) => Err(Failure::failed(
@@ -121,17 +130,16 @@ fn entries(args: &Response, outcome: &crate::identify::Outcome) -> Result<Vec<En
             None => Ok(Vec::new()),
         };
     };
-    let source = format!("identify response: {}", args.inputs.join(", "));
-    let entry = |key: &'static str, found: &crate::identify::Found| Entry {
-        section: "mechanics",
-        key,
-        value: found.value,
-        std: found.std,
-        unit: found.unit.clone(),
-        source: source.clone(),
+    let pole = evaluated.modal.poles[0];
+    let told = Told {
+        mode: Ringer {
+            rate_per_s: pole.rate_per_s,
+            omega_rad_per_s: pole.omega_rad_per_s,
+            covariance: evaluated.spread[0],
+        },
+        ratios: Ratios::OverStiffness,
+        modal: [&frequency, &ratio],
+        source: format!("identify response: {}", args.inputs.join(", ")),
     };
-    Ok(vec![
-        entry("natural_frequency", frequency),
-        entry("damping_ratio", ratio),
-    ])
+    follow(&args.anchors, &args.findings, &told, &mut evaluated.outcome)
 }

@@ -2,12 +2,13 @@
 
 use torqcomp_model::{Dimension, Kind, Unit};
 
-use super::{deliver, must_be_uniform, quantity, read, unit_of, whole};
+use super::{deliver, quantity, said, together, unit_or};
 use crate::cli::identify::Runup;
 use crate::commands::Outcome;
 use crate::failure::Failure;
 use crate::identify::runup::{Body, Motion, Options, Run, identify};
 use crate::report::identify::Report;
+use crate::signal::together::Track;
 use crate::stand::update::Entry;
 
 const TORQUE: Dimension = Dimension::new([1, 2, -2, 0, 0, 0]);
@@ -15,33 +16,27 @@ const FORCE: Dimension = Dimension::new([1, 1, -2, 0, 0, 0]);
 
 /// Runs the test.
 pub fn run(args: &Runup) -> Result<Outcome, Failure> {
-    let motion_options = args
-        .reading
-        .options(Some(&args.motion), args.motion_unit.as_deref());
-    let recording = read(&args.input, &motion_options)?;
-    let motion = recording.select(&motion_options)?;
-    let torque_options = args
-        .reading
-        .options(Some(&args.torque), args.torque_unit.as_deref());
-    let torque = recording.select(&torque_options)?;
-    for channel in [&motion, &torque] {
-        whole(channel)?;
-        must_be_uniform(channel, args.reading.rate.is_some())?;
-    }
-    let motion_unit = unit_of(&motion, "--motion-unit")?;
+    let wanted = [
+        (&args.motion, args.motion_unit.as_deref()),
+        (&args.torque, args.torque_unit.as_deref()),
+    ]
+    .map(|(channel, unit)| args.reading.options(Some(channel), unit));
+    let read = together(&args.input, &wanted)?;
+    let (motion, torque) = (&read.tracks[0], &read.tracks[1]);
+    let motion_unit = unit_or(motion.unit.as_ref(), &motion.name, "--motion-unit")?;
     let (kind, turning) = motion_of(motion_unit.unit.dimension()).ok_or_else(|| {
         Failure::failed(format_args!(
             "the motion \"{}\" is in \"{}\"; expected an angle, a length, or one per second or second \
              squared",
-            motion.channel.name, motion_unit.text
+            motion.name, motion_unit.text
         ))
     })?;
     let scaled =
         |samples: &[f64], factor: f64| samples.iter().map(|v| v * factor).collect::<Vec<f64>>();
-    let positions = scaled(motion.samples, motion_unit.unit.factor());
-    let efforts = scaled(torque.samples, effort_factor(args, &torque, turning)?);
+    let positions = scaled(&motion.samples, motion_unit.unit.factor());
+    let efforts = scaled(&torque.samples, effort_factor(args, torque, turning)?);
     let run = Run {
-        rate_hz: motion.rate_hz,
+        rate_hz: read.rate_hz,
         motion: &positions,
         kind,
         effort: &efforts,
@@ -56,6 +51,28 @@ pub fn run(args: &Runup) -> Result<Outcome, Failure> {
         half_window_s: args.window,
     };
     let outcome = identify(&run, &options)?;
+    let entries = entries(args, &outcome)?;
+    let mut report = Report::new("runup", &[&args.input], &outcome, args.findings.units);
+    report.samples = positions.len();
+    report.rate_hz = Some(read.rate_hz);
+    let warnings = said(&read.warnings, read.lost.as_ref());
+    report.warnings.extend(warnings);
+    let is_lossy = read.lost.is_some();
+    deliver(&report, &args.findings, &[&args.input], &entries, is_lossy)
+}
+
+/// The inertia for the stand file.
+fn entries(args: &Runup, outcome: &crate::identify::Outcome) -> Result<Vec<Entry>, Failure> {
+    let negative = outcome.get("inertia").filter(|found| found.value <= 0.0);
+    if let (Some(found), Some(_)) = (negative, &args.findings.result.output) {
+        return Err(Failure::failed(format_args!(
+            "the inertia came out as {} kg m^2, which no body has, and is not written: check the sign of \"{}\" and \
+             \"{}\"",
+            crate::report::short(found.value),
+            args.motion,
+            args.torque
+        )));
+    }
     let source = format!("identify runup: {}", args.input);
     let entries: Vec<Entry> = outcome
         .get("inertia")
@@ -69,15 +86,12 @@ pub fn run(args: &Runup) -> Result<Outcome, Failure> {
         })
         .into_iter()
         .collect();
-    let mut report = Report::new("runup", &[&args.input], &outcome, args.findings.units);
-    report.samples = positions.len();
-    report.rate_hz = Some(motion.rate_hz);
     if entries.is_empty() && args.findings.result.output.is_some() {
         return Err(Failure::failed(
             "a mass has no place in a stand file; leave -o out, or record an angle and a torque",
         ));
     }
-    deliver(&report, &args.findings, &[&args.input], &entries)
+    Ok(entries)
 }
 
 /// What a unit says of the motion: its derivative, and whether it turns.
@@ -96,15 +110,11 @@ fn motion_of(dimension: Dimension) -> Option<(Motion, bool)> {
 }
 
 /// SI units of torque (turning) or force (sliding) for one unit of the channel.
-fn effort_factor(
-    args: &Runup,
-    torque: &crate::recording::Selection,
-    turning: bool,
-) -> Result<f64, Failure> {
+fn effort_factor(args: &Runup, torque: &Track, turning: bool) -> Result<f64, Failure> {
     let (factor, dimension) = match &args.torque_factor {
         Some(text) => factor_of(text)?,
         None => {
-            let unit = unit_of(torque, "--torque-unit")?;
+            let unit = unit_or(torque.unit.as_ref(), &torque.name, "--torque-unit")?;
             (unit.unit.factor(), unit.unit.dimension())
         }
     };
@@ -120,7 +130,7 @@ fn effort_factor(
         )),
         (_, other, _) => Err(Failure::failed(format_args!(
             "the channel \"{}\" is no {} ({other}); give --torque-factor, such as \"35.15 N/V\"",
-            torque.channel.name,
+            torque.name,
             if turning { "torque" } else { "force" }
         ))),
     }

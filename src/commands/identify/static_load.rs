@@ -2,12 +2,12 @@
 
 use torqcomp_model::{Dimension, Kind};
 
-use super::{deliver, quantity, read, unit_of, whole};
+use super::{deliver, quantity, read, said, unit_of, whole};
 use crate::cli::identify::Static;
 use crate::commands::Outcome;
 use crate::failure::Failure;
 use crate::identify::static_load::{Options, Point, Units, identify, series_of};
-use crate::io::csv::NamedUnit;
+use crate::io::csv::{self, NamedUnit};
 use crate::recording::Recording;
 use crate::report::identify::{Report, Term};
 use crate::stand::update::Entry;
@@ -21,66 +21,12 @@ pub fn run(args: &Static) -> Result<Outcome, Failure> {
     let mut options = args.table.options(None, None);
     // A table of loads has no time axis; a rate keeps it from being looked for.
     options.rate_hz = options.rate_hz.or(Some(1.0));
-    let recording = read(&args.input, &options)?;
-    let (loads, load_unit) = column(
-        &recording,
-        &args.load,
-        args.load_unit.as_deref(),
-        "--load-unit",
-    )?;
-    let (readings, unit) = column(
-        &recording,
-        &args.reading,
-        args.reading_unit.as_deref(),
-        "--reading-unit",
-    )?;
-    let (load_factor, load_text) = load_of(args, &load_unit)?;
-    let (factor, text) = match unit.unit.dimension() {
-        VOLTAGE => (unit.unit.factor(), "V".to_owned()),
-        _ => (1.0, unit.text.clone()),
+    let recording = read(&args.input, &wanted(args, &options))?;
+    let (points, units) = points(args, &recording)?;
+    let options = Options {
+        degree: args.degree,
     };
-    let numbers = |name: &Option<String>| -> Result<Option<Vec<usize>>, Failure> {
-        let Some(name) = name else { return Ok(None) };
-        let channel = recording.channel(Some(name))?;
-        Ok(Some(ranks(&channel.samples)))
-    };
-    let loads: Vec<f64> = loads.iter().map(|v| v * load_factor).collect();
-    let series = numbers(&args.series)?.unwrap_or_else(|| series_of(&loads));
-    let positions = numbers(&args.position)?;
-    let stds = match &args.std {
-        Some(name) => Some(recording.channel(Some(name))?.samples.clone()),
-        None => None,
-    };
-    let points: Vec<Point> = (0..loads.len())
-        .map(|i| Point {
-            load: loads[i],
-            reading: readings[i] * factor,
-            std: stds.as_ref().map(|s| s[i] * factor),
-            series: series[i],
-            position: positions.as_ref().map_or(0, |p| p[i]),
-        })
-        .collect();
-    if let Some(i) = points
-        .iter()
-        .position(|p| p.std.is_some_and(|s| s.is_nan() || s <= 0.0))
-    {
-        return Err(Failure::failed(format_args!(
-            "row {} of {}: the standard uncertainty must be greater than 0",
-            i + 1,
-            args.input
-        )));
-    }
-    let units = Units {
-        load: load_text,
-        reading: text,
-    };
-    let found = identify(
-        &points,
-        Options {
-            degree: args.degree,
-        },
-        &units,
-    )?;
+    let found = identify(&points, options, &units)?;
     let entries = entries(args, &found.outcome);
     if entries.is_empty() && args.findings.result.output.is_some() {
         return Err(Failure::failed(
@@ -88,23 +34,107 @@ pub fn run(args: &Static) -> Result<Outcome, Failure> {
              torque and the reading in volts",
         ));
     }
-    let mut report = Report::new(
-        "static",
-        &[&args.input],
-        &found.outcome,
-        args.findings.units,
-    );
+    let inputs = [args.input.as_str()];
+    let mut report = Report::new("static", &inputs, &found.outcome, args.findings.units);
     report.samples = points.len();
-    report.terms = found
-        .terms
-        .iter()
-        .map(|t| Term {
-            name: t.name,
-            formula: t.formula,
-            percent: t.percent,
-        })
-        .collect();
-    deliver(&report, &args.findings, &[&args.input], &entries)
+    let term = |t: &crate::identify::static_load::Term| Term {
+        name: t.name,
+        formula: t.formula,
+        percent: t.percent,
+    };
+    report.terms = found.terms.iter().map(term).collect();
+    let warnings = said(&recording.warnings, recording.lost.as_ref());
+    report.warnings.extend(warnings);
+    let is_lossy = recording.lost.is_some();
+    deliver(&report, &args.findings, &inputs, &entries, is_lossy)
+}
+
+/// The columns that are read.
+fn wanted(args: &Static, options: &csv::Options) -> Vec<csv::Options> {
+    let names = [
+        Some(&args.load),
+        Some(&args.reading),
+        args.series.as_ref(),
+        args.position.as_ref(),
+        args.std.as_ref(),
+    ];
+    let one = |name: &String| csv::Options {
+        channel: Some(name.clone()),
+        ..options.clone()
+    };
+    names.into_iter().flatten().map(one).collect()
+}
+
+/// Loads and readings in SI units, with what they are called.
+fn points(args: &Static, recording: &Recording) -> Result<(Vec<Point>, Units), Failure> {
+    let load_flag = args.load_unit.as_deref();
+    let (loads, load_unit) = column(recording, &args.load, load_flag, "--load-unit")?;
+    let flag = args.reading_unit.as_deref();
+    let (readings, unit) = column(recording, &args.reading, flag, "--reading-unit")?;
+    let is_effort = [TORQUE, FORCE].contains(&unit.unit.dimension());
+    if load_unit.unit.dimension() == VOLTAGE && is_effort {
+        return Err(Failure::usage(format_args!(
+            "--load \"{}\" is in {} and --reading \"{}\" in {}; the columns are swapped",
+            args.load, load_unit.text, args.reading, unit.text
+        )));
+    }
+    let (load_factor, load) = load_of(args, &load_unit)?;
+    let (factor, reading) = match unit.unit.dimension() {
+        VOLTAGE => (unit.unit.factor(), "V".to_owned()),
+        _ => (1.0, unit.text.clone()),
+    };
+    let loads: Vec<f64> = loads.iter().map(|v| v * load_factor).collect();
+    let series = numbers(recording, args.series.as_ref())?.unwrap_or_else(|| series_of(&loads));
+    let positions = numbers(recording, args.position.as_ref())?;
+    let stds = stds(args, recording)?;
+    let counts = [
+        Some(readings.len()),
+        positions.as_ref().map(Vec::len),
+        stds.as_ref().map(Vec::len),
+        Some(series.len()),
+    ];
+    if counts
+        .into_iter()
+        .flatten()
+        .any(|count| count != loads.len())
+    {
+        return Err(Failure::failed(format_args!(
+            "{}: the columns have different numbers of rows; each load needs a reading",
+            args.input
+        )));
+    }
+    let point = |i: usize| Point {
+        load: loads[i],
+        reading: readings[i] * factor,
+        std: stds.as_ref().map(|s| s[i] * factor),
+        series: series[i],
+        position: positions.as_ref().map_or(0, |p| p[i]),
+    };
+    let points = (0..loads.len()).map(point).collect();
+    Ok((points, Units { load, reading }))
+}
+
+/// Standard uncertainties of the readings as they stand in their column.
+fn stds(args: &Static, recording: &Recording) -> Result<Option<Vec<f64>>, Failure> {
+    let Some(name) = &args.std else {
+        return Ok(None);
+    };
+    let stds = recording.channel(Some(name))?.samples.clone();
+    match stds.iter().position(|s| s.is_nan() || *s <= 0.0) {
+        Some(i) => Err(Failure::failed(format_args!(
+            "row {} of {}: the standard uncertainty must be greater than 0",
+            i + 1,
+            args.input
+        ))),
+        None => Ok(Some(stds)),
+    }
+}
+
+/// A column's different values, numbered in the order they come.
+fn numbers(recording: &Recording, name: Option<&String>) -> Result<Option<Vec<usize>>, Failure> {
+    let Some(name) = name else { return Ok(None) };
+    let channel = recording.channel(Some(name))?;
+    Ok(Some(ranks(&channel.samples)))
 }
 
 fn column(
@@ -113,7 +143,7 @@ fn column(
     unit: Option<&str>,
     flag: &str,
 ) -> Result<(Vec<f64>, NamedUnit), Failure> {
-    let options = crate::io::csv::Options {
+    let options = csv::Options {
         channel: Some(name.to_owned()),
         unit: unit.map(str::to_owned),
         rate_hz: Some(1.0),

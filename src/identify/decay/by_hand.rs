@@ -4,7 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use torqcomp_dsp::peaks;
 
-use super::modes::Stretch;
+use super::modes::{ModesFit, Stretch};
+use crate::identify::{Comparison, Found, Outcome};
 
 /// Peaks smaller than this part of the first are left out.
 const SMALLEST: f64 = 0.05;
@@ -89,4 +90,32 @@ pub fn half_power(stretch: &Stretch, offset: f64, omega: f64) -> Option<(f64, f6
         (1.4 * near).min(0.49 * rate_hz),
     )?;
     Some((peak.frequency_hz, 0.5 * peak.width_hz / peak.frequency_hz))
+}
+
+/// Puts both figures beside those of the fit.
+pub(super) fn compare(outcome: &mut Outcome, fit: &ModesFit, stretches: &[Stretch], main: usize) {
+    let pole = fit.poles[main];
+    let (offset, _) = fit.trend(0);
+    if let Some((frequency_hz, rate)) = log_decrement(&stretches[0], offset, pole.omega_rad_per_s) {
+        let natural = rate.hypot(TAU * frequency_hz);
+        outcome.comparisons.push(Comparison {
+            method: "logarithmic decrement of successive peaks".to_owned(),
+            found: vec![
+                Found::new("damped_frequency", frequency_hz, None, "Hz"),
+                Found::new("decay_rate", rate, None, "1/s"),
+                Found::new("damping_ratio", rate / natural, None, ""),
+            ],
+            quality: None,
+        });
+    }
+    if let Some((frequency_hz, ratio)) = half_power(&stretches[0], offset, pole.omega_rad_per_s) {
+        outcome.comparisons.push(Comparison {
+            method: "half-power width of the spectrum".to_owned(),
+            found: vec![
+                Found::new("natural_frequency", frequency_hz, None, "Hz"),
+                Found::new("damping_ratio", ratio, None, ""),
+            ],
+            quality: None,
+        });
+    }
 }

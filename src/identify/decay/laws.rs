@@ -11,7 +11,8 @@
 //! | viscous and dry | `A' = −σ A − s` |
 //! | viscous and quadratic | `A' = −σ A − β A²` |
 
-use torqcomp_model::fit::{Fit, FitError, Options, Parameter, minimize};
+use nalgebra::DMatrix;
+use torqcomp_model::fit::{Fit, FitError, Options, Parameter, WithJacobian, minimize};
 
 use super::modes::{Pole, Stretch};
 
@@ -89,6 +90,35 @@ pub fn envelope(start: f64, sigma: f64, dry: f64, quadratic: f64, time_s: f64) -
     linear.max(0.0)
 }
 
+/// Amplitude and its derivatives by A₀, σ, s and β: with E = e^{−σt}, r = (1 − E)/σ and D = 1 + βA₀r,
+/// `E/D²`, `−tA₀E/D − A₀²Eβr'/D² − sr'`, `−r` and `−A₀²Er/D²`; r' = (tE − r)/σ, tending to −t²/2.
+fn envelope_slopes([start, sigma, dry, quadratic]: [f64; 4], time_s: f64) -> (f64, [f64; 4]) {
+    let fall = (-sigma * time_s).exp();
+    let turn = sigma * time_s;
+    let (reach, bend) = if turn > 1e-4 {
+        let reach = -(-turn).exp_m1() / sigma;
+        (reach, (time_s * fall - reach) / sigma)
+    } else {
+        let reach = time_s * (1.0 - 0.5 * turn + turn * turn / 6.0);
+        (reach, time_s * time_s * (turn / 3.0 - 0.5))
+    };
+    let below = 1.0 + quadratic * start * reach;
+    let size = start * fall / below - dry * reach;
+    if size <= 0.0 {
+        return (0.0, [0.0; 4]);
+    }
+    let square = below * below;
+    let slopes = [
+        fall / square,
+        -time_s * start * fall / below
+            - start * start * fall * quadratic * bend / square
+            - dry * bend,
+        -reach,
+        -start * start * fall * reach / square,
+    ];
+    (size, slopes)
+}
+
 /// One law fitted to the data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LawFit {
@@ -109,6 +139,51 @@ pub struct LawFit {
 /// # Errors
 /// [`FitError`] if the fit cannot be made.
 pub fn fit(law: Law, stretch: &Stretch, pole: Pole, start: [f64; 4]) -> Result<LawFit, FitError> {
+    let parameters = parameters(law, stretch, pole, start);
+    let residuals = |p: &[f64], out: &mut Vec<f64>| {
+        let pairs = stretch.times_s.iter().zip(&stretch.values);
+        out.extend(pairs.map(|(t, y)| {
+            let size = envelope(p[0], p[5], p[6], p[7], *t);
+            size * (p[1] * t + p[2]).cos() + p[3] + p[4] * t - y
+        }));
+        Ok(())
+    };
+    let jacobian = |p: &[f64], out: &mut DMatrix<f64>| {
+        for (row, t) in stretch.times_s.iter().enumerate() {
+            let (size, slopes) = envelope_slopes([p[0], p[5], p[6], p[7]], *t);
+            let (sin, cos) = (p[1] * t + p[2]).sin_cos();
+            let [by_start, by_sigma, by_dry, by_quadratic] = slopes.map(|s| s * cos);
+            let all = [
+                by_start,
+                -size * t * sin,
+                -size * sin,
+                1.0,
+                *t,
+                by_sigma,
+                by_dry,
+                by_quadratic,
+            ];
+            for (column, value) in all.into_iter().enumerate() {
+                out[(row, column)] = value;
+            }
+        }
+        Ok(())
+    };
+    let problem = WithJacobian {
+        residuals,
+        jacobian,
+    };
+    let options = Options {
+        tolerance: 1e-9,
+        most_evaluations: 600,
+        ..Options::default()
+    };
+    let fit = minimize(&problem, &parameters, &options)?;
+    Ok(summed(law, &fit))
+}
+
+/// Amplitude, ω, phase, offset, drift, σ, s and β with their starts and bounds.
+fn parameters(law: Law, stretch: &Stretch, pole: Pole, start: [f64; 4]) -> [Parameter; 8] {
     let [a, b, offset, drift] = start;
     let amplitude = a.hypot(b).max(f64::MIN_POSITIVE);
     let phase = (-b).atan2(a);
@@ -123,7 +198,7 @@ pub fn fit(law: Law, stretch: &Stretch, pole: Pole, start: [f64; 4]) -> Result<L
     };
     let alone = !(has_viscous && (has_dry || has_quadratic));
     let share = if alone { 1.0 } else { 0.5 };
-    let parameters = [
+    [
         Parameter::new("amplitude", amplitude).at_least(0.0),
         Parameter::new("omega", pole.omega_rad_per_s),
         Parameter::new("phase", phase).scaled(1.0),
@@ -142,22 +217,7 @@ pub fn fit(law: Law, stretch: &Stretch, pole: Pole, start: [f64; 4]) -> Result<L
             rate / amplitude,
             "quadratic",
         ),
-    ];
-    let residuals = |p: &[f64], out: &mut Vec<f64>| {
-        let pairs = stretch.times_s.iter().zip(&stretch.values);
-        out.extend(pairs.map(|(t, y)| {
-            let size = envelope(p[0], p[5], p[6], p[7], *t);
-            size * (p[1] * t + p[2]).cos() + p[3] + p[4] * t - y
-        }));
-        Ok(())
-    };
-    let options = Options {
-        tolerance: 1e-9,
-        most_evaluations: 600,
-        ..Options::default()
-    };
-    let fit = minimize(&residuals, &parameters, &options)?;
-    Ok(summed(law, &fit))
+    ]
 }
 
 fn summed(law: Law, fit: &Fit) -> LawFit {
@@ -190,4 +250,29 @@ pub fn compare(stretch: &Stretch, pole: Pole, start: [f64; 4]) -> Result<Vec<Law
     }
     all.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
     Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slopes_are_those_of_small_changes() {
+        for p in [
+            [2.0, 30.0, 0.5, 3.0],
+            [2.0, 0.0, 0.5, 3.0],
+            [1.0, 1e-3, 0.1, 0.0],
+        ] {
+            let (size, slopes) = envelope_slopes(p, 0.04);
+            assert!((size - envelope(p[0], p[1], p[2], p[3], 0.04)).abs() < 1e-9);
+            for k in 0..4 {
+                let h = 1e-6;
+                let mut there = p;
+                there[k] += h;
+                let change = envelope(there[0], there[1], there[2], there[3], 0.04) - size;
+                let error = (change / h - slopes[k]).abs();
+                assert!(error < 1e-5 * (1.0 + slopes[k].abs()), "{p:?} {k}: {error}");
+            }
+        }
+    }
 }

@@ -220,6 +220,14 @@ fn sorted(fit: Fit, stretches: &[Stretch], modes: usize) -> ModesFit {
 }
 
 impl ModesFit {
+    /// Makes the uncertainties those of noise of which the residuals show only that part.
+    pub(super) fn allow_for(&mut self, shown: f64) {
+        self.fit.covariance = self.fit.covariance.clone().times(1.0 / shown);
+        for std in self.fit.std.iter_mut().flatten() {
+            *std /= shown.sqrt();
+        }
+    }
+
     /// Initial amplitude of a mode in a stretch.
     #[must_use]
     pub fn amplitude(&self, mode: usize, stretch: usize) -> f64 {

@@ -79,10 +79,16 @@ impl Data {
     /// What stands before the sum, and s.
     fn front(&self, omega: f64, delay_s: f64, scale: f64) -> (Complex64, Complex64) {
         let s = Complex64::new(0.0, omega / scale);
-        (
-            s.powi(self.order) * Complex64::from_polar(1.0, -omega * delay_s),
-            s,
-        )
+        let late = match delay_s == 0.0 {
+            true => Complex64::ONE,
+            false => Complex64::cis(-omega * delay_s),
+        };
+        let power = match self.order {
+            0 => Complex64::ONE,
+            1 => s,
+            order => s.powi(order),
+        };
+        (power * late, s)
     }
 
     /// 1/(s − p) and 1/(s − p*), with the window's rate in p.
@@ -119,20 +125,7 @@ impl Data {
     /// # Errors
     /// [`FitError`] if there are too few lines.
     pub fn fit(&self, starts: &[Pole], effort: Effort) -> Result<Modal, FitError> {
-        let (low, high) = (self.omega[0], self.omega[self.omega.len() - 1]);
-        let mut parameters = Vec::new();
-        for (k, pole) in starts.iter().enumerate() {
-            let rate = pole.rate_per_s.max(1e-9 * high);
-            parameters.push(Parameter::new(format!("rate {}", k + 1), rate).at_least(0.0));
-            let omega = pole.omega_rad_per_s.clamp(0.5 * low, 1.2 * high);
-            let omega = Parameter::new(format!("omega {}", k + 1), omega);
-            parameters.push(omega.at_least(0.4 * low).at_most(1.3 * high));
-        }
-        if self.with_delay {
-            let step = std::f64::consts::PI / high;
-            let delay = Parameter::new("delay", 0.0).scaled(step);
-            parameters.push(delay.at_least(-8.0 * step).at_most(8.0 * step));
-        }
+        let parameters = self.parameters(starts);
         let problem = Problem {
             data: self,
             modes: starts.len(),
@@ -169,6 +162,41 @@ impl Data {
             fit,
             scale,
         })
+    }
+
+    /// Poles and delay with their starts and bounds.
+    fn parameters(&self, starts: &[Pole]) -> Vec<Parameter> {
+        let (low, high) = (self.omega[0], self.omega[self.omega.len() - 1]);
+        let mut parameters = Vec::new();
+        for (k, pole) in starts.iter().enumerate() {
+            let rate = pole.rate_per_s.max(1e-9 * high);
+            parameters.push(Parameter::new(format!("rate {}", k + 1), rate).at_least(0.0));
+            let omega = pole.omega_rad_per_s.clamp(0.5 * low, 1.2 * high);
+            let omega = Parameter::new(format!("omega {}", k + 1), omega);
+            parameters.push(omega.at_least(0.4 * low).at_most(1.3 * high));
+        }
+        if self.with_delay {
+            let step = std::f64::consts::PI / high;
+            let delay = Parameter::new("delay", 0.0).scaled(step);
+            parameters.push(delay.at_least(-8.0 * step).at_most(8.0 * step));
+        }
+        parameters
+    }
+
+    /// Derivatives of the weighted model by poles and delay at a fit, real and imaginary parts one after
+    /// another, with what the linear numbers can make up for taken out.
+    ///
+    /// # Errors
+    /// [`FitError`] if there are too few lines.
+    pub fn slopes_at(&self, fitted: &Modal) -> Result<DMatrix<f64>, FitError> {
+        let problem = Problem {
+            data: self,
+            modes: fitted.poles.len(),
+        };
+        let values = fitted.fit.as_ref().map_or(&[][..], |f| &f.values);
+        let mut slopes = DMatrix::zeros(2 * self.omega.len(), values.len());
+        problem.jacobian(values, &mut slopes)?;
+        Ok(slopes)
     }
 
     /// A start for one more mode: the strongest line of what is left, not within `apart` (a part of the

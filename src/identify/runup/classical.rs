@@ -4,7 +4,9 @@ use nalgebra::DMatrix;
 use torqcomp_dsp::zero_phase::low_pass;
 use torqcomp_model::fit::linear;
 
-use super::{Directions, Motion, Run, comparison, names};
+use super::directions::Directions;
+use super::words::{comparison, names};
+use super::{Motion, Run};
 use crate::failure::Failure;
 use crate::identify::{Comparison, rms};
 
@@ -25,29 +27,12 @@ pub(super) fn identify(
     let rate = run.rate_hz;
     let corner_hz = (rate / half as f64).min(0.2 * rate);
     let smooth = |samples: &[f64]| low_pass(samples, rate, corner_hz, ORDER);
-    let filtered = smooth(run.motion)?;
-    let speed = match run.kind {
-        Motion::Position => differences(&filtered, rate),
-        _ => filtered,
-    };
-    let mut columns = vec![differences(&speed, rate)];
-    if split {
-        columns.push(speed.iter().map(|v| v.max(0.0)).collect());
-        columns.push(speed.iter().map(|v| v.min(0.0)).collect());
-    } else {
-        columns.push(speed.clone());
-    }
-    if directions.both() {
-        columns.push(smooth(
-            &speed.iter().map(|v| v.signum()).collect::<Vec<f64>>(),
-        )?);
-    }
-    columns.push(vec![1.0; speed.len()]);
+    let columns = columns(run, directions, split, &|samples| Ok(smooth(samples)?))?;
     let effort = smooth(run.effort)?;
     let step = (rate / (4.0 * corner_hz)).floor().max(1.0) as usize;
     // The ends of differences and filters are left out.
-    let edge = (2 * half).min(speed.len() / 10);
-    let rows: Vec<usize> = (edge..speed.len() - edge).step_by(step).collect();
+    let edge = (2 * half).min(effort.len() / 10);
+    let rows: Vec<usize> = (edge..effort.len() - edge).step_by(step).collect();
     let design = DMatrix::from_fn(rows.len(), columns.len(), |r, c| columns[c][rows[r]]);
     let right: Vec<f64> = rows.iter().map(|r| effort[*r]).collect();
     let fit = linear::solve(&design, &right, None, false)?;
@@ -67,6 +52,38 @@ pub(super) fn identify(
         &fit.std,
         quality,
     )))
+}
+
+/// A filter of samples.
+type Smooth<'a> = dyn Fn(&[f64]) -> Result<Vec<f64>, Failure> + 'a;
+
+/// Terms of the equation from filtered samples.
+fn columns(
+    run: &Run,
+    directions: &Directions,
+    split: bool,
+    smooth: &Smooth,
+) -> Result<Vec<Vec<f64>>, Failure> {
+    let rate = run.rate_hz;
+    let filtered = smooth(run.motion)?;
+    let speed = match run.kind {
+        Motion::Position => differences(&filtered, rate),
+        _ => filtered,
+    };
+    let mut columns = vec![differences(&speed, rate)];
+    if split {
+        columns.push(speed.iter().map(|v| v.max(0.0)).collect());
+        columns.push(speed.iter().map(|v| v.min(0.0)).collect());
+    } else {
+        columns.push(speed.clone());
+    }
+    if directions.both() {
+        columns.push(smooth(
+            &speed.iter().map(|v| v.signum()).collect::<Vec<f64>>(),
+        )?);
+    }
+    columns.push(vec![1.0; speed.len()]);
+    Ok(columns)
 }
 
 fn differences(samples: &[f64], rate_hz: f64) -> Vec<f64> {

@@ -1,8 +1,21 @@
-//! Least squares whose regressors carry noise of known covariance.
+//! Least squares whose regressors carry noise of known covariance, over rows that overlap.
 
 use nalgebra::{DMatrix, DVector};
 
+use super::scatter;
 use crate::failure::Failure;
+
+/// What is known of the errors of the rows.
+pub struct Errors<'a> {
+    /// Covariance of the errors of two columns in one row.
+    pub noise: &'a dyn Fn(usize, usize) -> f64,
+    /// Covariance between rows so far apart of errors of the right side, of variance 1 a sample.
+    pub torque: &'a dyn Fn(usize) -> f64,
+    /// The same of errors of the columns for these parameters.
+    pub motion: &'a dyn Fn(usize, &[f64]) -> f64,
+    /// Rows up to which they overlap.
+    pub overlap: usize,
+}
 
 /// A regression with the noise of its regressors taken out.
 #[derive(Debug, Clone)]
@@ -10,13 +23,14 @@ pub struct Corrected {
     /// The parameters.
     pub values: Vec<f64>,
     covariance: DMatrix<f64>,
-    /// Left side minus right side.
+    /// Left side minus right side, of all rows.
     pub residuals: Vec<f64>,
-    /// Right side.
-    pub right: Vec<f64>,
     columns: DMatrix<f64>,
+    right_norm: f64,
     /// Largest part of a column's power that is noise.
     pub noise_share: f64,
+    /// How much larger the standard uncertainties are than white noise would make them, at most.
+    pub coloured: f64,
 }
 
 impl Corrected {
@@ -37,79 +51,65 @@ impl Corrected {
             values.len(),
             values.iter().zip(&self.values).map(|(a, b)| a - b),
         );
-        let right: f64 = self.right.iter().map(|v| v * v).sum();
-        (&self.columns * change).norm() / right.sqrt()
+        (&self.columns * change).norm() / self.right_norm
     }
 }
 
-/// Solves `A x ≈ b` where `noise(i, j)` is the covariance of the errors of columns i and j in every
-/// row: `(AᵀA − n N) x = Aᵀb` (T. Söderström, Errors-in-variables methods in system identification,
-/// Automatica 43 (2007), 939, bias-compensating least squares).
-///
-/// The covariance allows for errors that differ from row to row and follow from one to the next (W. K.
-/// Newey, K. D. West, Econometrica 55 (1987), 703).
+/// Solves `A x ≈ b` over the chosen rows, where the errors of the columns have a known covariance N in
+/// every row: `(AᵀA − n N) x = Aᵀb` (T. Söderström, Errors-in-variables methods in system
+/// identification, Automatica 43 (2007), 939, bias-compensating least squares). Its covariance is
+/// that of [`scatter`].
 pub fn solve(
     columns: &[Vec<f64>],
-    right: Vec<f64>,
-    noise: impl Fn(usize, usize) -> f64,
+    right: &[f64],
+    chosen: &[bool],
+    errors: &Errors,
 ) -> Result<Corrected, Failure> {
-    let (rows, count) = (right.len(), columns.len());
-    let sizes: Vec<f64> = columns
-        .iter()
-        .map(|c| c.iter().map(|v| v * v).sum::<f64>().sqrt())
-        .collect();
+    let rows = chosen.iter().filter(|c| **c).count();
+    let (all, count) = (right.len(), columns.len());
+    // Rows that are left out stay as zeros, so that places in time are kept.
+    let kept = |r: usize, v: f64| if chosen[r] { v } else { 0.0 };
+    let a = DMatrix::from_fn(all, count, |r, c| kept(r, columns[c][r]));
+    let b = DVector::from_fn(all, |r, _| kept(r, right[r]));
+    let sizes: Vec<f64> = a.column_iter().map(|c| c.norm()).collect();
     if let Some(i) = sizes.iter().position(|s| *s == 0.0 || !s.is_finite()) {
         return Err(Failure::failed(format_args!(
             "term {} of the equation of motion is zero throughout; the record does not show it",
             i + 1
         )));
     }
-    let scaled = DMatrix::from_fn(rows, count, |r, c| columns[c][r] / sizes[c]);
+    let scaled = DMatrix::from_fn(all, count, |r, c| a[(r, c)] / sizes[c]);
     let part = DMatrix::from_fn(count, count, |i, j| {
-        rows as f64 * noise(i, j) / (sizes[i] * sizes[j])
+        rows as f64 * (errors.noise)(i, j) / (sizes[i] * sizes[j])
     });
     let noise_share = (0..count).map(|i| part[(i, i)]).fold(0.0, f64::max);
-    let normal = scaled.tr_mul(&scaled) - part;
-    let b = DVector::from_column_slice(&right);
-    let inverse = normal
+    let inverse = (scaled.tr_mul(&scaled) - part)
         .cholesky()
-        .ok_or_else(|| {
-            Failure::failed(
-                "the terms of the equation of motion cannot be told apart in this record: it needs \
-                 speeds and accelerations that vary, and less noise",
-            )
-        })?
+        .ok_or_else(cannot_be_told)?
         .inverse();
     let x = &inverse * scaled.tr_mul(&b);
-    let residuals = &scaled * &x - &b;
-    let meat = scores(&scaled, &residuals);
-    let small_sample = rows as f64 / (rows - count) as f64;
-    let covariance = &inverse * meat * &inverse * small_sample;
-    let unscaled = |i: usize, j: usize| covariance[(i, j)] / (sizes[i] * sizes[j]);
+    let values: Vec<f64> = x.iter().zip(&sizes).map(|(x, s)| x / s).collect();
+    let kept_residuals = &scaled * &x - &b;
+    let (covariance, coloured) =
+        scatter::covariance(&scaled, &inverse, &kept_residuals, &values, rows, errors);
+    let full = DMatrix::from_fn(all, count, |r, c| columns[c][r]);
+    let model = &full * DVector::from_column_slice(&values);
     Ok(Corrected {
-        values: x.iter().zip(&sizes).map(|(x, s)| x / s).collect(),
-        covariance: DMatrix::from_fn(count, count, unscaled),
-        residuals: residuals.as_slice().to_vec(),
-        columns: DMatrix::from_fn(rows, count, |r, c| columns[c][r]),
-        right,
+        covariance: DMatrix::from_fn(count, count, |i, j| {
+            covariance[(i, j)] / (sizes[i] * sizes[j])
+        }),
+        residuals: model.iter().zip(right).map(|(m, b)| m - b).collect(),
+        values,
+        columns: full,
+        right_norm: right.iter().map(|v| v * v).sum::<f64>().sqrt(),
         noise_share,
+        coloured,
     })
 }
 
-/// Covariance of Σ aᵢ rᵢ with Bartlett's weights over neighbouring rows.
-fn scores(a: &DMatrix<f64>, residuals: &DVector<f64>) -> DMatrix<f64> {
-    let (rows, count) = a.shape();
-    let scores = DMatrix::from_fn(rows, count, |r, c| a[(r, c)] * residuals[r]);
-    // Neighbouring windows overlap up to three strides.
-    let lags = (4.0 * (rows as f64 / 100.0).powf(2.0 / 9.0)).floor() as usize + 4;
-    let lags = lags.min(rows / 4);
-    let mut sum = scores.tr_mul(&scores);
-    for lag in 1..=lags {
-        let weight = 1.0 - lag as f64 / (lags + 1) as f64;
-        let ahead = scores.rows(lag, rows - lag);
-        let behind = scores.rows(0, rows - lag);
-        let cross = ahead.tr_mul(&behind);
-        sum += (&cross + cross.transpose()) * weight;
-    }
-    sum
+fn cannot_be_told() -> Failure {
+    Failure::failed(
+        "the terms of the equation of motion cannot be told apart in this record: it needs speeds and \
+         accelerations that vary, and less noise",
+    )
 }

@@ -8,7 +8,7 @@ mod names;
 mod scan;
 mod time;
 
-use std::io::Read;
+use std::io::{BufRead, Read};
 use std::path::PathBuf;
 
 use crate::failure::Failure;
@@ -76,6 +76,25 @@ impl Place {
             Self::Stdin => "standard input".to_owned(),
             Self::File(path) => path.display().to_string(),
         }
+    }
+
+    /// Whether it begins as an MCAP file does; of standard input nothing is taken.
+    ///
+    /// # Errors
+    /// If it cannot be opened.
+    pub fn is_mcap(&self) -> Result<bool, Failure> {
+        /// The first bytes of such a file that do not tell its version.
+        const START: &[u8] = b"\x89MCAP";
+        if *self == Self::Stdin {
+            let mut stdin = std::io::stdin().lock();
+            return Ok(stdin.fill_buf().unwrap_or_default().starts_with(START));
+        }
+        let mut first = Vec::new();
+        let read = self
+            .open()?
+            .take(START.len() as u64)
+            .read_to_end(&mut first);
+        Ok(read.is_ok() && first == START)
     }
 
     /// Opens it for reading.

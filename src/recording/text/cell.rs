@@ -40,6 +40,9 @@ impl Cell {
         {
             return Self::Number(if text.starts_with('-') { -value } else { value });
         }
+        if let Some(value) = fortran(text, decimal) {
+            return Self::Number(value);
+        }
         if let Some(value) = grouped(text, decimal) {
             return Self::Grouped(value);
         }
@@ -60,6 +63,20 @@ impl Cell {
     pub fn is_number(self) -> bool {
         matches!(self, Self::Number(_) | Self::Grouped(_))
     }
+}
+
+/// `1.5D-03`, as programs in Fortran write numbers of double precision.
+fn fortran(text: &str, decimal: u8) -> Option<f64> {
+    let (mantissa, exponent) = text.split_once(['D', 'd'])?;
+    let ends_in_digit = mantissa.ends_with(|c: char| c.is_ascii_digit() || c == '.');
+    let is_exponent = exponent
+        .trim_start_matches(['+', '-'])
+        .bytes()
+        .all(|b| b.is_ascii_digit());
+    if !ends_in_digit || !is_exponent {
+        return None;
+    }
+    number::cell(&format!("{mantissa}e{exponent}"), decimal)
 }
 
 /// Ways to say that there is no number, besides those of floating point: over range, no value.
@@ -162,6 +179,8 @@ mod tests {
     fn other_cells() {
         assert_eq!(Cell::read("1.5", b'.'), Cell::Number(1.5));
         assert_eq!(Cell::read("", b'.'), Cell::Empty);
+        assert_eq!(Cell::read("-1.5D-03", b'.'), Cell::Number(-0.0015));
+        assert_eq!(Cell::read("15D", b'.'), Cell::Text);
         for text in ["NaN", "-∞", "-1.#IND", "1e999", "N/A"] {
             assert_eq!(Cell::read(text, b'.'), Cell::NonFinite, "{text}");
         }

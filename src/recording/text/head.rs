@@ -13,6 +13,8 @@ const MOSTLY: f64 = 0.8;
 /// Most columns of text, as a part of all, in a table that is a recording.
 const TEXTS: f64 = 0.34;
 
+/// Most rows of a list of results.
+const FEW_RESULTS: usize = 50;
 /// Lines that a maker is told from.
 const FOR_NAMES: usize = 120;
 
@@ -361,6 +363,11 @@ fn refuse_listing(head: &Head, table: &Table) -> Result<(), Failure> {
                 .collect()
         })
         .collect();
+    let names: Vec<String> = head.lines[table.first..]
+        .iter()
+        .filter(|line| !is_skipped(&line.text))
+        .map(|line| table.dialect.cells(&line.text).swap_remove(0))
+        .collect();
     let texts = (0..table.width)
         .filter(|place| {
             let cells = rows.iter().filter_map(|row| row.get(*place));
@@ -372,6 +379,14 @@ fn refuse_listing(head: &Head, table: &Table) -> Result<(), Failure> {
             texts > data
         })
         .count();
+    if is_list_of_results(&rows, &names) {
+        return Err(Failure::failed(format_args!(
+            "the file is a list of results, not a recording: each of its {} rows from line {} on has a \
+             name of its own in the first column; expected rows of numbers, one row for each moment",
+            rows.len(),
+            head.number(table.first)
+        )));
+    }
     // One or two columns of remarks may stand beside a single signal.
     if texts > 2 && texts as f64 > TEXTS * table.width as f64 {
         return Err(Failure::failed(format_args!(
@@ -382,6 +397,21 @@ fn refuse_listing(head: &Head, table: &Table) -> Result<(), Failure> {
         )));
     }
     Ok(())
+}
+
+/// Whether a few rows have names in the first column, no two the same and none of them a time.
+fn is_list_of_results(rows: &[Vec<Cell>], names: &[String]) -> bool {
+    let is_name = |name: &&String| name.bytes().all(|byte| !byte.is_ascii_digit());
+    let distinct = || {
+        names
+            .iter()
+            .enumerate()
+            .all(|(place, name)| !names[..place].contains(name))
+    };
+    rows.len() <= FEW_RESULTS
+        && rows.iter().all(|row| row.first() == Some(&Cell::Text))
+        && names.iter().filter(is_name).count() == names.len()
+        && distinct()
 }
 
 fn no_table(head: &Head) -> String {

@@ -13,6 +13,7 @@ mod header;
 mod keys;
 mod makers;
 mod rows;
+mod sparse;
 mod table;
 mod units;
 
@@ -116,6 +117,7 @@ pub fn is_plain(head: &[u8], complete: bool, options: &Options) -> bool {
         .iter()
         .filter(|field| field.is_named_time())
         .count();
+    let is_thin = has_slow_column(&head, &table);
     let has_marks = head.lines[table.first..].iter().any(|line| {
         let cells = table.dialect.cells(&line.text);
         let read = |cell: &String| cell::Cell::read(cell, table.dialect.decimal);
@@ -126,12 +128,27 @@ pub fn is_plain(head: &[u8], complete: bool, options: &Options) -> bool {
     let first_row = head.number(table::first_row(&head, &table, &header));
     same_columns
         && !has_marks
+        && !is_thin
         && layout.dialect == table.dialect
         && (layout.data_line == first_row || begins_with_number(&layout, &text.bytes))
         && wanted
             .iter()
             .all(|kind| *kind == Some(rows::Wanted::Numbers))
         && times <= 1
+}
+
+/// Whether a column has a value in fewer than half of the first rows, but in some.
+fn has_slow_column(head: &Head, table: &head::Table) -> bool {
+    let mut filled = vec![0_usize; table.width];
+    let mut rows = 0;
+    for line in &head.lines[table.first..] {
+        let cells = table.dialect.cells(&line.text);
+        rows += 1;
+        for (count, cell) in filled.iter_mut().zip(&cells) {
+            *count += usize::from(!cell.is_empty());
+        }
+    }
+    filled.iter().any(|count| *count > 0 && 2 * count < rows)
 }
 
 /// Whether the first row that the quick reader sees begins as a row does: with something wrong behind

@@ -52,6 +52,13 @@ const SYNONYMS: [(&str, &str); 44] = [
     ("µe", "ustrain"),
 ];
 
+/// Units that no reckoning is done with, told from other words in round brackets all the same.
+const OTHERS: [&str; 34] = [
+    "W", "kW", "MW", "mW", "VA", "kVA", "var", "kvar", "J", "kJ", "Wh", "kWh", "Ah", "mAh", "dB",
+    "dBV", "dBm", "dBA", "counts", "cnt", "LSB", "digits", "inc", "ppm", "lx", "lm", "cd", "mol",
+    "T", "mT", "F", "Ohm", "kOhm", "F/s",
+];
+
 /// Words in the place of a unit that say there is none.
 const NO_UNITS: [&str; 12] = [
     "", "-", "--", "none", "(none)", "n/a", "without", "no unit", "keine", "ohne", "ts", "rn",
@@ -238,6 +245,7 @@ fn bracket(text: &str) -> Option<(String, &str)> {
                 && !inside.contains(odd)
                 || read(inside).is_some()
                 || inside == "S"
+                || OTHERS.contains(&inside)
                 || inside.len() <= 8 && inside.contains(['/', '%', '°', '²', '^', 'µ']);
             if looks_like_unit && !inside.is_empty() {
                 let rest = [text[..start].trim(), text[start + length + 1..].trim()];

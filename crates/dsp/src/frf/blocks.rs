@@ -20,45 +20,63 @@ pub enum Window {
 /// Spectra of an applied and a measured block of one length.
 #[must_use]
 pub fn transform(applied: &[f64], measured: &[f64], window: Window) -> Block {
-    Block {
-        applied: spectrum(applied, window),
-        measured: spectrum(measured, window),
-    }
+    Transform::new(applied.len(), window).block(applied, measured)
 }
 
-fn spectrum(samples: &[f64], window: Window) -> Vec<Complex64> {
-    let count = samples.len();
-    let mean = match window {
-        Window::Hann => samples.iter().sum::<f64>() / count.max(1) as f64,
-        _ => 0.0,
-    };
-    let weight = |i: usize| match window {
-        Window::None => 1.0,
-        Window::Hann => 0.5 - 0.5 * (std::f64::consts::TAU * i as f64 / count as f64).cos(),
-        Window::Exponential(tau) => (-(i as f64) / tau).exp(),
-    };
-    let mut weighted: Vec<f64> = samples
-        .iter()
-        .enumerate()
-        .map(|(i, v)| (v - mean) * weight(i))
-        .collect();
-    let plan = RealFftPlanner::new().plan_fft_forward(count);
-    let mut out = plan.make_output_vec();
-    plan.process(&mut weighted, &mut out)
-        .expect("buffers were made for this length");
-    out
+/// A transform of blocks of one length, with what does not change from block to block.
+struct Transform {
+    plan: std::sync::Arc<dyn realfft::RealToComplex<f64>>,
+    weights: Vec<f64>,
+    without_mean: bool,
+}
+
+impl Transform {
+    fn new(count: usize, window: Window) -> Self {
+        let weight = |i: usize| match window {
+            Window::None => 1.0,
+            Window::Hann => 0.5 - 0.5 * (std::f64::consts::TAU * i as f64 / count as f64).cos(),
+            Window::Exponential(tau) => (-(i as f64) / tau).exp(),
+        };
+        Self {
+            plan: RealFftPlanner::new().plan_fft_forward(count),
+            weights: (0..count).map(weight).collect(),
+            without_mean: window == Window::Hann,
+        }
+    }
+
+    fn block(&self, applied: &[f64], measured: &[f64]) -> Block {
+        Block {
+            applied: self.spectrum(applied),
+            measured: self.spectrum(measured),
+        }
+    }
+
+    fn spectrum(&self, samples: &[f64]) -> Vec<Complex64> {
+        let mean = match self.without_mean {
+            true => samples.iter().sum::<f64>() / samples.len().max(1) as f64,
+            false => 0.0,
+        };
+        let pairs = samples.iter().zip(&self.weights);
+        let mut weighted: Vec<f64> = pairs.map(|(v, w)| (v - mean) * w).collect();
+        let mut out = self.plan.make_output_vec();
+        self.plan
+            .process(&mut weighted, &mut out)
+            .expect("buffers were made for this length");
+        out
+    }
 }
 
 /// Half-overlapping Hann-weighted segments of that length.
 #[must_use]
 pub fn segments(applied: &[f64], measured: &[f64], length: usize) -> Vec<Block> {
     let count = applied.len().min(measured.len());
+    let transform = Transform::new(length, Window::Hann);
     (0..)
         .map(|k| k * (length / 2).max(1))
         .take_while(|from| from + length <= count)
         .map(|from| {
             let range = from..from + length;
-            transform(&applied[range.clone()], &measured[range], Window::Hann)
+            transform.block(&applied[range.clone()], &measured[range])
         })
         .collect()
 }

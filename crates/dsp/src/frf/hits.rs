@@ -38,11 +38,20 @@ impl fmt::Display for HitFault {
     }
 }
 
-/// Force of a hit over the largest one.
+/// Force of a hit over the largest one; what is weaker belongs to the hit before it.
 const STRONG: f64 = 0.3;
-/// Force of a second stroke over the first that makes a hit useless: the spectrum of the force then has
-/// deep notches. A weaker bounce is part of the recorded force and does no harm.
-const SECOND: f64 = 0.3;
+/// Force of a second stroke over the first from which on it is named: the spectrum of the force then
+/// has notches, and the response of the one is still there when the other begins.
+const SECOND: f64 = 0.05;
+/// The same over the standard deviation of the force at rest, which noise does not reach.
+const ABOVE_NOISE: f64 = 8.0;
+/// Part of its extreme within which a signal counts as standing there.
+const LEVEL: f64 = 0.01;
+/// Samples that stand at the extreme over those beyond half of it, in a row: 0.13 for half a sine and 0.12
+/// for a bell; more means that an amplifier could not follow.
+const STANDING: f64 = 0.3;
+/// Fewest samples to tell that from.
+const LEAST_STANDING: usize = 4;
 /// Samples in a row of one value that mean clipping.
 const FLAT: usize = 3;
 /// Samples kept before the force rises.
@@ -79,21 +88,15 @@ pub fn find_hits(force: &[f64], measured: &[f64], apart: usize) -> Vec<Hit> {
         i = end.max(i + 1);
     }
     let starts: Vec<usize> = peaks.iter().map(|p| start_of(&size, *p, largest)).collect();
+    let noise = spread(force, rest);
     let lengths = |k: usize| starts.get(k + 1).copied().unwrap_or(force.len()) - starts[k];
     let longest = (0..starts.len()).map(lengths).max().unwrap_or(0);
     (0..peaks.len())
         .map(|k| {
             let range = starts[k]..starts[k] + lengths(k);
-            let mut faults = Vec::new();
-            let pulse =
-                range.start..(peaks[k] + (peaks[k] - range.start).max(BEFORE) * 2).min(range.end);
-            if flat(&force[pulse], rest) {
-                faults.push(HitFault::ForceClipped);
-            }
-            if flat(&measured[range.clone()], median(&measured[range.clone()])) {
-                faults.push(HitFault::MeasuredClipped);
-            }
-            if doubled(&size, peaks[k], range.end) {
+            let mut faults = faults(force, measured, rest, peaks[k], range.clone());
+            let second = (SECOND * size(peaks[k])).max(ABOVE_NOISE * noise);
+            if doubled(&size, peaks[k], range.end, second) {
                 faults.push(HitFault::Doubled);
             }
             if range.len() < longest / 2 {
@@ -106,6 +109,27 @@ pub fn find_hits(force: &[f64], measured: &[f64], apart: usize) -> Vec<Hit> {
             }
         })
         .collect()
+}
+
+/// Signals of a hit that stand at their extremes.
+fn faults(
+    force: &[f64],
+    measured: &[f64],
+    rest: f64,
+    peak: usize,
+    range: Range<usize>,
+) -> Vec<HitFault> {
+    let mut faults = Vec::new();
+    let pulse = range.start..(peak + (peak - range.start).max(BEFORE) * 2).min(range.end);
+    if flat(&force[pulse.clone()], rest) || stands(&force[pulse], rest) {
+        faults.push(HitFault::ForceClipped);
+    }
+    let answer = &measured[range];
+    let middle = median(answer);
+    if flat(answer, middle) || stands(answer, middle) {
+        faults.push(HitFault::MeasuredClipped);
+    }
+    faults
 }
 
 /// Where the pulse with that peak begins.
@@ -133,11 +157,38 @@ fn flat(samples: &[f64], rest: f64) -> bool {
         })
 }
 
-/// Whether the force comes back after it had gone.
-fn doubled(size: &impl Fn(usize) -> f64, peak: usize, end: usize) -> bool {
-    let top = size(peak);
-    let gone = (peak..end).find(|i| size(*i) < 0.2 * SECOND * top);
-    gone.is_some_and(|gone| (gone..end).any(|i| size(i) > SECOND * top))
+/// Whether a signal stands near its largest or smallest value for longer than a pulse or a swing does:
+/// an amplifier that saturates before the converter leaves noise on its limit.
+fn stands(samples: &[f64], rest: f64) -> bool {
+    [1.0, -1.0].into_iter().any(|side| {
+        let size = |i: usize| side * (samples[i] - rest);
+        let Some(top) = (0..samples.len()).max_by(|a, b| size(*a).total_cmp(&size(*b))) else {
+            return false;
+        };
+        let run = |least: f64| {
+            let before = (0..top).rev().take_while(|i| size(*i) >= least).count();
+            let after = (top + 1..samples.len())
+                .take_while(|i| size(*i) >= least)
+                .count();
+            before + 1 + after
+        };
+        let extreme = size(top);
+        let standing = run((1.0 - LEVEL) * extreme);
+        let high = run(0.5 * extreme);
+        extreme > 0.0 && standing >= LEAST_STANDING && standing as f64 > STANDING * high as f64
+    })
+}
+
+/// Whether the force comes back to that size after it had gone.
+fn doubled(size: &impl Fn(usize) -> f64, peak: usize, end: usize, second: f64) -> bool {
+    let gone = (peak..end).find(|i| size(*i) < 0.5 * second);
+    gone.is_some_and(|gone| (gone..end).any(|i| size(i) > second))
+}
+
+/// Standard deviation of a signal that is mostly at rest, by the median of its distances.
+fn spread(samples: &[f64], rest: f64) -> f64 {
+    let distances: Vec<f64> = samples.iter().map(|v| (v - rest).abs()).collect();
+    median(&distances) / 0.674_489_75
 }
 
 fn median(samples: &[f64]) -> f64 {
@@ -184,5 +235,62 @@ mod tests {
             [HitFault::MeasuredClipped]
         );
         assert!(find_hits(&[0.0; 10], &[0.0; 10], 5).is_empty());
+    }
+
+    fn quiet(i: i32) -> f64 {
+        // Different at every sample and never more than 1.
+        (f64::from(i) * 12.9898).sin() * (f64::from(i) * 0.618).cos()
+    }
+
+    #[test]
+    fn weak_second_strokes_are_named_and_noise_is_not() {
+        let measured: Vec<f64> = (0..4000).map(quiet).collect();
+        for (second, noise, doubled) in [
+            (0.0, 0.01, false),
+            (2.5, 0.01, true),
+            (1.0, 0.01, true),
+            (0.6, 0.01, true),
+            // No more than the noise explains, and a ripple of 2 %.
+            (0.4, 0.2, false),
+            (0.2, 0.01, false),
+        ] {
+            let mut force: Vec<f64> = (0..4000).map(|i| noise * quiet(i)).collect();
+            pulse(500, 10.0, f64::INFINITY, &mut force);
+            pulse(900, second, f64::INFINITY, &mut force);
+            let hits = find_hits(&force, &measured, 1000);
+            assert_eq!(hits.len(), 1);
+            let got = hits[0].faults.contains(&HitFault::Doubled);
+            assert_eq!(got, doubled, "{second} after 10, noise {noise}");
+        }
+    }
+
+    #[test]
+    fn a_limit_with_noise_on_it_is_named() {
+        let swing = |limit: f64| -> Vec<f64> {
+            let one = |i: i32| {
+                let t = f64::from(i - 500).max(0.0);
+                let free = 10.0 * (-0.004 * t).exp() * (0.1 * t).sin();
+                free.clamp(-limit, limit) + 0.01 * quiet(i)
+            };
+            (0..4000).map(one).collect()
+        };
+        for (force_limit, swing_limit, want) in [
+            (f64::INFINITY, 50.0, vec![]),
+            (7.0, 50.0, vec![HitFault::ForceClipped]),
+            (f64::INFINITY, 6.0, vec![HitFault::MeasuredClipped]),
+            (
+                8.0,
+                7.0,
+                vec![HitFault::ForceClipped, HitFault::MeasuredClipped],
+            ),
+        ] {
+            let mut force: Vec<f64> = (0..4000).map(|i| 0.005 * quiet(3 * i)).collect();
+            pulse(500, 10.0, force_limit, &mut force);
+            let hits = find_hits(&force, &swing(swing_limit), 1000);
+            assert_eq!(
+                hits[0].faults, want,
+                "limits {force_limit} and {swing_limit}"
+            );
+        }
     }
 }

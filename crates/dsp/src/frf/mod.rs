@@ -62,14 +62,25 @@ impl Frf {
     /// ```
     #[must_use]
     pub fn of<'a>(blocks: impl Iterator<Item = &'a Block>, estimator: Estimator) -> Self {
+        Self::between(blocks, estimator, 0..usize::MAX)
+    }
+
+    /// The same at a part of the lines, of which the first is that of the range.
+    #[must_use]
+    pub fn between<'a>(
+        blocks: impl Iterator<Item = &'a Block>,
+        estimator: Estimator,
+        lines: std::ops::Range<usize>,
+    ) -> Self {
         let mut sums: Vec<(f64, f64, Complex64)> = Vec::new();
         let mut count = 0;
         for block in blocks {
-            sums.resize(block.applied.len(), (0.0, 0.0, Complex64::ZERO));
-            for (sum, (x, y)) in sums
-                .iter_mut()
-                .zip(block.applied.iter().zip(&block.measured))
-            {
+            let range = lines.start..lines.end.min(block.applied.len());
+            sums.resize(range.len(), (0.0, 0.0, Complex64::ZERO));
+            let pairs = block.applied[range.clone()]
+                .iter()
+                .zip(&block.measured[range]);
+            for (sum, (x, y)) in sums.iter_mut().zip(pairs) {
                 sum.0 += x.norm_sqr();
                 sum.1 += y.norm_sqr();
                 sum.2 += x.conj() * y;

@@ -96,3 +96,16 @@ fn direction(row: &DVector<f64>, norms: &[f64], indices: &[usize], sizes: &[f64]
         .collect();
     Undetermined { shares }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As where every parameter ends at a bound.
+    #[test]
+    fn no_column_has_no_covariance() {
+        let (found, undetermined) = covariance(&DMatrix::zeros(0, 0), &[], &[], 2, |_| Some(1.0));
+        assert_eq!((found.std(0), found.std(1)), (None, None));
+        assert!(undetermined.is_empty());
+    }
+}

@@ -46,6 +46,13 @@ impl Covariance {
         Some(self.matrix[(i?, j?)])
     }
 
+    /// The same times a factor, as where the noise is larger than the residuals show.
+    #[must_use]
+    pub fn times(mut self, factor: f64) -> Self {
+        self.matrix *= factor;
+        self
+    }
+
     /// Standard uncertainty of a parameter.
     #[must_use]
     pub fn std(&self, i: usize) -> Option<f64> {

@@ -10,6 +10,7 @@ use super::decode::Text;
 use super::head::Head;
 use super::header::Field;
 use super::rows::Column;
+use super::sparse;
 use super::table::Hints;
 use crate::failure::Failure;
 use crate::io::csv::Options;
@@ -56,7 +57,13 @@ pub fn recognise(head: &Head) -> Option<&'static Maker> {
 }
 
 /// A channel out of a column.
-pub fn channel(field: &Field, column: Column, mut axis: Axis, segment: Option<usize>) -> Channel {
+pub fn channel(
+    field: &Field,
+    mut column: Column,
+    mut axis: Axis,
+    segment: Option<usize>,
+) -> Channel {
+    sparse::thin(&mut column, &mut axis);
     if let Some(stamps) = &axis.stamps_s
         && stamps.len() > column.values.len()
     {

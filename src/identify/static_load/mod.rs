@@ -1,11 +1,14 @@
 //! Sensitivity and zero from known loads (Appendix C, IV), with the terms of the standards.
 
+mod terms;
+
 use nalgebra::DMatrix;
 use torqcomp_model::fit::linear::{self, LinearFit};
 
 use super::{Found, Outcome, Quality, rms};
 use crate::failure::Failure;
 use crate::report::chart::{Chart, Series};
+use crate::report::rounded;
 
 /// One reading under a known load.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,7 +41,7 @@ pub struct Units {
     pub reading: String,
 }
 
-/// A term of a calibration standard.
+/// A term of a calibration standard; the formulas are those of `terms`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Term {
     /// Name, such as `repeatability`.
@@ -106,6 +109,11 @@ pub fn identify(points: &[Point], options: Options, units: &Units) -> Result<Eva
             options.degree + 2
         )));
     }
+    if points.iter().all(|p| p.reading == points[0].reading) {
+        return Err(Failure::failed(
+            "the reading is the same under every load; check --reading and whether the bridge was supplied",
+        ));
+    }
     let design = DMatrix::from_fn(points.len(), options.degree + 1, |r, c| {
         (points[r].load / largest).powi(c as i32)
     });
@@ -118,8 +126,9 @@ pub fn identify(points: &[Point], options: Options, units: &Units) -> Result<Eva
         points: points.to_vec(),
         coefficients: scaled(&fit, largest),
     };
-    evaluated.terms = terms(points, &steps, &evaluated.coefficients, largest);
+    evaluated.terms = terms::terms(points, &steps, &evaluated.coefficients, largest);
     draw(&mut evaluated, units);
+    poor(&mut evaluated.outcome);
     say(&mut evaluated.outcome, points, options);
     Ok(evaluated)
 }
@@ -137,8 +146,40 @@ fn outcome(
     largest: f64,
     units: &Units,
 ) -> Outcome {
+    let mut outcome = Outcome {
+        found: constants(fit, largest, units),
+        ..Outcome::default()
+    };
+    let left: Vec<f64> = match weights {
+        Some(weights) => fit
+            .residuals
+            .iter()
+            .zip(weights)
+            .map(|(r, w)| r / w)
+            .collect(),
+        None => fit.residuals.clone(),
+    };
+    let swing: Vec<f64> = points.iter().map(|p| p.reading - fit.values[0]).collect();
+    outcome.quality = Some(Quality {
+        rms: rms(&left),
+        unit: units.reading.clone(),
+        relative: rms(&left) / rms(&swing),
+    });
+    outcome.method.push(format!(
+        "{} regression of the reading on the load over {} points, loading and unloading together",
+        if weights.is_some() {
+            "weighted"
+        } else {
+            "plain"
+        },
+        points.len()
+    ));
+    outcome
+}
+
+/// Sensitivity, its inverse, zero, and the higher powers of the curve.
+fn constants(fit: &LinearFit, largest: f64, units: &Units) -> Vec<Found> {
     let (load, reading) = (&units.load, &units.reading);
-    let mut outcome = Outcome::default();
     let slope = fit.values[1] / largest;
     let slope_std = fit.std[1].map(|s| s / largest);
     // K = 1/S: u(K)/K = u(S)/S.
@@ -147,7 +188,7 @@ fn outcome(
         true => format!("{a}/({b})"),
         false => format!("{a}/{b}"),
     };
-    outcome.found = vec![
+    let mut found = vec![
         Found::new(
             constant_name(units),
             1.0 / slope,
@@ -161,7 +202,7 @@ fn outcome(
         if let Some(value) = fit.values.get(k) {
             let size = largest.powi(k as i32);
             let unit = format!("{reading}/({load})^{k}");
-            outcome.found.push(Found::new(
+            found.push(Found::new(
                 name,
                 value / size,
                 fit.std[k].map(|s| s / size),
@@ -169,31 +210,7 @@ fn outcome(
             ));
         }
     }
-    let left: Vec<f64> = match weights {
-        Some(weights) => fit
-            .residuals
-            .iter()
-            .zip(weights)
-            .map(|(r, w)| r / w)
-            .collect(),
-        None => fit.residuals.clone(),
-    };
-    let swing: Vec<f64> = points.iter().map(|p| p.reading - fit.values[0]).collect();
-    outcome.quality = Some(Quality {
-        rms: rms(&left),
-        unit: reading.clone(),
-        relative: rms(&left) / rms(&swing),
-    });
-    outcome.method.push(format!(
-        "{} regression of the reading on the load over {} points, loading and unloading together",
-        if weights.is_some() {
-            "weighted"
-        } else {
-            "plain"
-        },
-        points.len()
-    ));
-    outcome
+    found
 }
 
 /// Readings with the curve through them, and how far they are off.
@@ -237,137 +254,21 @@ fn steps(points: &[Point], largest: f64) -> Vec<f64> {
     loads
 }
 
-/// Whether a point was reached by raising (in size) or lowering the load.
-fn rising(points: &[Point], i: usize) -> bool {
-    let before = (0..i).rev().find(|j| points[*j].series == points[i].series);
-    before.is_none_or(|j| points[i].load.abs() >= points[j].load.abs())
-}
+/// Part of the readings' swing that a calibration may leave.
+const POOR: f64 = 0.05;
 
-/// Largest values over all loads of the terms of ISO 376 and DIN 51309, in per cent.
-fn terms(points: &[Point], steps: &[f64], curve: &[f64], largest: f64) -> Vec<Term> {
-    let zero = zeros(points, largest);
-    let net = |i: usize| points[i].reading - zero[points[i].series].0.unwrap_or(curve[0]);
-    let at = |step: f64, up: bool, filter: &dyn Fn(&Point) -> bool| -> Vec<f64> {
-        (0..points.len())
-            .filter(|i| (points[*i].load - step).abs() <= SAME * largest)
-            .filter(|i| rising(points, *i) == up && filter(&points[*i]))
-            .map(net)
-            .collect()
-    };
-    let loaded: Vec<f64> = steps
-        .iter()
-        .copied()
-        .filter(|s| s.abs() > NONE * largest)
-        .collect();
-    let first = points[0].position;
-    let mut positions: Vec<usize> = points.iter().map(|p| p.position).collect();
-    positions.sort_unstable();
-    positions.dedup();
-    let spread = |values: &[f64]| -> Option<f64> {
-        (values.len() > 1).then(|| {
-            let (low, high) = ends(values);
-            100.0 * (high - low) / mean(values).abs()
-        })
-    };
-    let repeatability = worst(
-        loaded
-            .iter()
-            .map(|s| spread(&at(*s, true, &|p| p.position == first))),
-    );
-    let reproducibility = worst(loaded.iter().map(|s| {
-        let each: Vec<f64> = positions
-            .iter()
-            .map(|q| at(*s, true, &|p| p.position == *q))
-            .filter(|v| !v.is_empty())
-            .map(|v| mean(&v))
-            .collect();
-        spread(&each)
-    }));
-    let reversibility = worst(loaded.iter().map(|s| {
-        let (up, down) = (at(*s, true, &|_| true), at(*s, false, &|_| true));
-        (!up.is_empty() && !down.is_empty())
-            .then(|| 100.0 * (mean(&down) - mean(&up)).abs() / mean(&up).abs())
-    }));
-    let value = |load: f64| -> f64 {
-        curve
-            .iter()
-            .enumerate()
-            .skip(1)
-            .map(|(k, c)| c * load.powi(k as i32))
-            .sum()
-    };
-    let interpolation = worst(loaded.iter().map(|s| {
-        let up = at(*s, true, &|_| true);
-        (!up.is_empty()).then(|| 100.0 * (mean(&up) - value(*s)).abs() / value(*s).abs())
-    }));
-    let full = value(largest).abs();
-    let zero_return = worst(zero.iter().map(|(before, after)| match (before, after) {
-        (Some(before), Some(after)) => Some(100.0 * (after - before).abs() / full),
-        _ => None,
-    }));
-    let creep = creep(points, largest, full);
-    vec![
-        Term {
-            name: "repeatability",
-            formula: "ISO 376 b', DIN 51309 b': spread at one load, one mounting, over its mean",
-            percent: repeatability,
-        },
-        Term {
-            name: "reproducibility",
-            formula: "ISO 376 b, DIN 51309 b: spread at one load over mountings, over its mean",
-            percent: reproducibility,
-        },
-        Term {
-            name: "hysteresis",
-            formula: "ISO 376 v, DIN 51309 h (reversibility), VDI/VDE 2646: |unloading - loading| over loading",
-            percent: reversibility,
-        },
-        Term {
-            name: "interpolation error",
-            formula: "ISO 376 f_c, DIN 51309 f_a: |mean of loading - curve| over curve",
-            percent: interpolation,
-        },
-        Term {
-            name: "zero return",
-            formula: "ISO 376 f_0, DIN 51309 f_0: |zero after - zero before| over the largest deflection",
-            percent: zero_return,
-        },
-        Term {
-            name: "creep",
-            formula: "ISO 376 c: change at the largest load held, over the largest deflection",
-            percent: creep,
-        },
-    ]
-}
-
-/// Readings of the empty stand before and after each series.
-fn zeros(points: &[Point], largest: f64) -> Vec<(Option<f64>, Option<f64>)> {
-    let count = points.iter().map(|p| p.series).max().map_or(0, |m| m + 1);
-    (0..count)
-        .map(|series| {
-            let of: Vec<&Point> = points.iter().filter(|p| p.series == series).collect();
-            let empty = |p: &&&Point| p.load.abs() <= NONE * largest;
-            let before = of.first().filter(empty).map(|p| p.reading);
-            let after = (of.len() > 1)
-                .then(|| of.last().filter(empty).map(|p| p.reading))
-                .flatten();
-            (before, after)
-        })
-        .collect()
-}
-
-/// Readings one after another at the largest load: the first and the last.
-fn creep(points: &[Point], largest: f64, full: f64) -> Option<f64> {
-    let held = |p: &Point| (p.load.abs() - largest).abs() <= SAME * largest;
-    let mut worst = None;
-    for series in points.chunk_by(|a, b| a.series == b.series) {
-        let run: Vec<&Point> = series.iter().filter(|p| held(p)).collect();
-        if let [first, .., last] = run[..] {
-            let percent = 100.0 * (last.reading - first.reading).abs() / full;
-            worst = Some(percent.max(worst.unwrap_or(0.0)));
-        }
+fn poor(outcome: &mut Outcome) {
+    let relative = outcome.quality.as_ref().map_or(0.0, |q| q.relative);
+    if relative > POOR {
+        outcome.warn(
+            "poor-fit",
+            format!(
+                "the curve leaves {} % of the readings' swing: check that the columns are the right ones and the rows \
+                 in the order they were taken, or use --degree 3",
+                rounded(100.0 * relative, 2)
+            ),
+        );
     }
-    worst
 }
 
 fn say(outcome: &mut Outcome, points: &[Point], options: Options) {
@@ -378,7 +279,7 @@ fn say(outcome: &mut Outcome, points: &[Point], options: Options) {
             "the loads were applied once: how far the readings repeat is not known",
         );
     }
-    if !(0..points.len()).any(|i| !rising(points, i)) {
+    if (0..points.len()).all(|i| terms::rising(points, i)) {
         outcome.warn(
             "no-unloading",
             "there are no readings while unloading: hysteresis is not known",
@@ -390,25 +291,6 @@ fn say(outcome: &mut Outcome, points: &[Point], options: Options) {
             "the constants are the slope of the curve at no load; at large loads the curve is to be used",
         );
     }
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
-}
-
-fn ends(values: &[f64]) -> (f64, f64) {
-    values
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
-            (l.min(*v), h.max(*v))
-        })
-}
-
-/// The largest of those that are known.
-fn worst(values: impl Iterator<Item = Option<f64>>) -> Option<f64> {
-    values
-        .flatten()
-        .fold(None, |m: Option<f64>, v| Some(m.map_or(v, |m| m.max(v))))
 }
 
 #[cfg(test)]

@@ -1,0 +1,98 @@
+//! Records that no response can be read from, and channels that look swapped.
+
+use super::Driven;
+use super::Modal;
+use super::blocks::Set;
+use super::lines::Lines;
+use crate::failure::Failure;
+use crate::identify::Outcome;
+use crate::report::{rounded, short};
+use torqcomp_dsp::frf::{Estimator, Frf};
+
+/// Refuses records that differ in rate, have holes, or do not move.
+pub(super) fn records(records: &[Driven]) -> Result<(), Failure> {
+    let first = records
+        .first()
+        .ok_or_else(|| Failure::failed("there is no record"))?;
+    for record in records {
+        if (record.rate_hz / first.rate_hz - 1.0).abs() > 1e-6 {
+            return Err(Failure::failed(format_args!(
+                "{} has {} samples a second and {} has {}; records of one response must have one rate",
+                first.name,
+                short(first.rate_hz),
+                record.name,
+                short(record.rate_hz)
+            )));
+        }
+        let mut numbers = record.applied.iter().chain(record.measured);
+        if record.applied.len() != record.measured.len() || numbers.any(|v| !v.is_finite()) {
+            return Err(Failure::failed(format_args!(
+                "{}: both channels need a number in every row",
+                record.name
+            )));
+        }
+        for (what, samples) in [("applied", record.applied), ("measured", record.measured)] {
+            if samples.iter().all(|v| *v == samples[0]) {
+                return Err(Failure::failed(format_args!(
+                    "{}: the {what} channel does not change, so that there is no response; check --{what} and \
+                     whether the recorder was connected",
+                    record.name
+                )));
+            }
+        }
+        if record.applied == record.measured {
+            return Err(Failure::failed(format_args!(
+                "{}: the applied and the measured channel hold the same numbers; check --applied and --measured",
+                record.name
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Part of the lines whose phase leads that is said.
+const LEADING: f64 = 0.9;
+/// Imaginary part over the magnitude below which a line tells no side.
+const IN_PHASE: f64 = 0.02;
+
+/// What is measured lags what is applied: ω^−m j^−m H has its imaginary part below zero where one point is
+/// driven and measured. Where it leads nearly throughout, the channels are swapped or one has the
+/// wrong sign.
+pub(super) fn leads(set: &Set, lines: &Lines, order: i32) -> bool {
+    let h1 = Frf::of(set.blocks.iter(), Estimator::H1);
+    let turn = num_complex::Complex64::I.powi(-order);
+    let sides: Vec<bool> = lines
+        .clone()
+        .filter(|k| h1.coherence[*k] > 0.5)
+        .map(|k| h1.response[k] * turn)
+        .filter(|h| h.im.abs() > IN_PHASE * h.norm())
+        .map(|h| h.im > 0.0)
+        .collect();
+    let leading = sides.iter().filter(|s| **s).count();
+    sides.len() > 10 && leading as f64 > LEADING * sides.len() as f64
+}
+
+/// Text for a response that leads.
+pub(super) const LEADS: &str = "the measured signal leads the applied one at nearly all frequencies, which no driven stand does: the \
+     channels may be swapped (--applied is what acts, --measured what answers), or one has the wrong sign";
+
+/// Part of the measured signal that may be left.
+const POOR: f64 = 0.5;
+
+/// Says what makes the fit doubtful.
+pub(super) fn doubts(outcome: &mut Outcome, relative: f64, leads: bool, fitted: &Modal) {
+    if leads {
+        outcome.warn("leads", LEADS);
+    }
+    if relative > POOR {
+        outcome.warn(
+            "poor-fit",
+            format!(
+                "{} mode(s) leave {} % of the measured signal: what was applied does not explain it; look at the \
+                 coherence, and choose another --band",
+                fitted.poles.len(),
+                rounded(100.0 * relative, 2)
+            ),
+        );
+    }
+}

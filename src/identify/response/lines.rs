@@ -1,0 +1,79 @@
+//! Which lines of a response are fitted, and with which weights.
+
+use std::f64::consts::TAU;
+
+use torqcomp_dsp::frf::{Estimator, Frf};
+
+use super::blocks::Set;
+use super::{Data, Options};
+use crate::failure::Failure;
+use crate::report::short;
+
+/// Numbers of lines in a band.
+pub(super) type Lines = std::ops::Range<usize>;
+
+/// Power of the applied signal, over its largest, that excites.
+const EXCITES: f64 = 1e-3;
+
+/// The band that is asked for, or where the excitation has power.
+pub(super) fn band(set: &Set, options: &Options) -> Result<Lines, Failure> {
+    let lines = set.blocks[0].applied.len();
+    let frf = Frf::of(set.blocks.iter(), Estimator::H1);
+    let (from, to) = match options.band_hz {
+        Some((from, to)) => (
+            (from / set.step_hz).ceil() as usize,
+            (to / set.step_hz).floor() as usize + 1,
+        ),
+        None => {
+            let top = frf.applied_power[1..]
+                .iter()
+                .fold(0.0_f64, |m, p| m.max(*p));
+            let on = |k: &usize| frf.applied_power[*k] > EXCITES * top;
+            (
+                (1..lines).find(on).unwrap_or(1),
+                (1..lines).rev().find(on).unwrap_or(1) + 1,
+            )
+        }
+    };
+    let range = from.max(1)..to.min(lines - 1);
+    if range.len() < 12 {
+        return Err(Failure::failed(format_args!(
+            "the band holds {} lines {} Hz apart, too few to fit modes; widen --band or record longer",
+            range.len(),
+            short(set.step_hz)
+        )));
+    }
+    Ok(range)
+}
+
+/// Most lines that are fitted; more are thinned out evenly.
+pub(super) const MOST_LINES: usize = 6000;
+
+/// H1 over the blocks that are kept, a line's weight being the root of its applied power.
+pub(super) fn data(
+    set: &Set,
+    lines: &Lines,
+    options: &Options,
+    keep: &dyn Fn(usize) -> bool,
+) -> Data {
+    let chosen = set
+        .blocks
+        .iter()
+        .enumerate()
+        .filter(|(i, _)| keep(*i))
+        .map(|(_, b)| b);
+    let frf = Frf::between(chosen, Estimator::H1, lines.clone());
+    let powers = &frf.applied_power;
+    let mean = powers.iter().sum::<f64>() / powers.len() as f64;
+    Data {
+        omega: lines
+            .clone()
+            .map(|k| TAU * k as f64 * set.step_hz)
+            .collect(),
+        weight: powers.iter().map(|p| (p / mean).sqrt()).collect(),
+        response: frf.response,
+        order: options.order,
+        added_rate: set.added_rate,
+        with_delay: options.with_delay,
+    }
+}

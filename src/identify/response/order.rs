@@ -1,0 +1,130 @@
+//! How many modes the data pay for, tried on blocks held out.
+
+use torqcomp_dsp::frf;
+
+use super::blocks::Set;
+use super::lines::{Lines, MOST_LINES, data};
+use super::{Data, Effort, Modal, Options};
+use crate::failure::Failure;
+
+/// Modes closer than this part of their frequency are not looked for unless their number is given: a
+/// mode that is not quite linear leaves something beside its line.
+const APART: f64 = 0.03;
+
+/// Most modes tried.
+const MOST_MODES: usize = 24;
+
+/// Modes without gain after which no more are tried.
+const PATIENCE: usize = 3;
+
+/// Fewer modes are preferred if the error held out is no more than this much larger.
+const SLACK: f64 = 1.05;
+
+fn grow(data: &Data, so_far: &Modal, options: &Options) -> Result<Option<Modal>, Failure> {
+    let apart = if options.modes.is_some() { 0.0 } else { APART };
+    let Some(pole) = data.next_pole(so_far, apart) else {
+        return Ok(None);
+    };
+    let mut starts = so_far.poles.clone();
+    starts.push(pole);
+    Ok(Some(data.fit(&starts, Effort::Coarse)?))
+}
+
+/// Folds of the blocks: each is held out once.
+pub(super) fn folds(set: &Set) -> Vec<Vec<usize>> {
+    let count = set.blocks.len();
+    let folds = count.min(3);
+    // Neighbours in one fold, since segments overlap.
+    (0..folds)
+        .map(|f| (count * f / folds..count * (f + 1) / folds).collect())
+        .collect()
+}
+
+/// Number of modes by the error on held-out blocks, and that error for each number.
+pub(super) fn order(
+    set: &Set,
+    lines: &Lines,
+    options: &Options,
+) -> Result<(usize, Vec<f64>), Failure> {
+    let folds = folds(set);
+    if lines.len() > MOST_LINES {
+        return Err(Failure::failed(format_args!(
+            "{} lines lie in the band, more than {MOST_LINES}; narrow it with --band",
+            lines.len()
+        )));
+    }
+    if folds.len() < 2 {
+        return match options.modes {
+            Some(modes) => Ok((modes, vec![f64::NAN; modes + 1])),
+            None => Err(Failure::failed(
+                "a single block leaves nothing to try the number of modes on; give it with --modes, or record \
+                 more",
+            )),
+        };
+    }
+    let errors = tried(set, lines, options, &folds)?;
+    let least = errors.iter().copied().fold(f64::INFINITY, f64::min);
+    let best = errors.iter().position(|e| *e <= SLACK * least).unwrap_or(0);
+    match options.modes {
+        Some(modes) => Ok((modes, errors)),
+        None if best == 0 => Err(Failure::failed(
+            "no mode explains data that were held out: the measured signal does not follow the applied one; check \
+             --applied, --measured and --band",
+        )),
+        None => Ok((best, errors)),
+    }
+}
+
+/// Error on held-out blocks with 0, 1, 2, … modes, until more do not help.
+fn tried(
+    set: &Set,
+    lines: &Lines,
+    options: &Options,
+    folds: &[Vec<usize>],
+) -> Result<Vec<f64>, Failure> {
+    let most = options.modes.unwrap_or(MOST_MODES).min(lines.len() / 6);
+    let training: Vec<Data> = folds
+        .iter()
+        .map(|fold| data(set, lines, options, &|i| !fold.contains(&i)))
+        .collect();
+    let mut models: Vec<Modal> = training
+        .iter()
+        .map(|d| d.fit(&[], Effort::Coarse))
+        .collect::<Result<_, _>>()?;
+    let error = |models: &[Modal]| -> f64 {
+        let each = models.iter().zip(folds).flat_map(|(model, fold)| {
+            fold.iter()
+                .map(|i| frf::prediction_error(&model.response, &set.blocks[*i], lines.clone()))
+        });
+        each.sum::<f64>() / set.blocks.len() as f64
+    };
+    let mut errors = vec![error(&models)];
+    let mut since = 0;
+    while errors.len() <= most && (since < PATIENCE || options.modes.is_some()) {
+        for (model, data) in models.iter_mut().zip(&training) {
+            if let Some(next) = grow(data, model, options)? {
+                *model = next;
+            }
+        }
+        let least = errors.iter().copied().fold(f64::INFINITY, f64::min);
+        let now = error(&models);
+        since = if now < 0.99 * least { 0 } else { since + 1 };
+        errors.push(now);
+    }
+    Ok(errors)
+}
+
+/// So many modes through all blocks, one after another.
+pub(super) fn grown(
+    set: &Set,
+    lines: &Lines,
+    options: &Options,
+    count: usize,
+) -> Result<Modal, Failure> {
+    let data = data(set, lines, options, &|_| true);
+    let mut fitted = data.fit(&[], Effort::Coarse)?;
+    for _ in 0..count {
+        fitted = grow(&data, &fitted, options)?.unwrap_or(fitted);
+    }
+    Ok(data.fit(&fitted.poles, Effort::Fine)?)
+}

@@ -1,0 +1,154 @@
+//! Which way a body moves at each sample, and where that is not known.
+
+use torqcomp_dsp::weak::{Window, white_noise_variance};
+
+use super::turns::{Speeds, Turn};
+use super::{Motion, Run, SHORTEST_HALF};
+use crate::failure::Failure;
+
+/// Part of a record that goes one way before it counts as a direction.
+const DIRECTION: f64 = 0.02;
+
+/// Samples next to a doubtful stretch that smoothing may have moved across the turn.
+const NEAR: usize = 2;
+
+/// Speed at every sample and its direction.
+pub(in crate::identify) struct Directions {
+    /// Speed, if the motion tells it absolutely.
+    pub speed: Option<Vec<f64>>,
+    /// −1 to 1 at each sample: the sign of the speed over the sample's share of time, with a slope
+    /// where it drowns in noise.
+    pub sign: Vec<f64>,
+    /// Whether the body stands, turns round or moves too slowly to tell at a sample, or so near to it
+    /// that the smoothing of the speed cannot tell.
+    pub unsure: Vec<bool>,
+    forward: bool,
+    backward: bool,
+}
+
+impl Directions {
+    /// Directions in a run.
+    ///
+    /// # Errors
+    /// If the window of the speed cannot be made.
+    pub fn of(run: &Run) -> Result<Self, Failure> {
+        let count = run.motion.len();
+        if run.kind == Motion::Acceleration {
+            return Ok(Self {
+                speed: None,
+                sign: vec![1.0; count],
+                unsure: vec![false; count],
+                forward: true,
+                backward: false,
+            });
+        }
+        let half = SHORTEST_HALF.max(count / 2000).min(20);
+        let (speed, mut sign) = smoothed(run, half)?;
+        let share = |s: f64| sign.iter().filter(|v| **v == s).count() as f64 / count as f64;
+        let (forward, backward) = (share(1.0) > DIRECTION, share(-1.0) > DIRECTION);
+        let speeds = Speeds {
+            motion: run.motion,
+            is_position: run.kind == Motion::Position,
+            reach: 2 * half,
+        };
+        let doubtful = doubtful(&sign);
+        let mut unsure = vec![false; count];
+        for (from, to) in doubtful {
+            let (first, last) = (from.saturating_sub(half), (to + half).min(count - 1));
+            unsure[first..=last].fill(true);
+            // Where it goes the other way afterwards, it turned in between or stood.
+            let turns = from > 0 && to < count && sign[from - 1] * sign[to.min(count - 1)] < 0.0;
+            if turns && let Turn::At(place) = speeds.turn(from.saturating_sub(NEAR), to + NEAR) {
+                let way = sign[from - 1];
+                step(&mut sign, way, place, first, last);
+            }
+        }
+        Ok(Self {
+            unsure,
+            sign,
+            speed: Some(speed),
+            forward,
+            backward,
+        })
+    }
+
+    /// Whether the body moved both ways.
+    pub fn both(&self) -> bool {
+        self.forward && self.backward
+    }
+}
+
+/// Speed at every sample, and its sign with a slope where noise could have made it.
+fn smoothed(run: &Run, half: usize) -> Result<(Vec<f64>, Vec<f64>), Failure> {
+    let count = run.motion.len();
+    let order = run.kind.to_acceleration() - 1;
+    let window = Window::new(half, run.rate_hz)?;
+    let mut speed = window.slide(run.motion, order);
+    let (first, last) = (speed[0], speed[speed.len() - 1]);
+    speed.splice(0..0, vec![first; half]);
+    speed.resize(count, last);
+    let variance = white_noise_variance(run.motion).unwrap_or(0.0);
+    let noise = (variance * window.noise(order, order)).sqrt();
+    let largest = speed.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    let dead = (3.0 * noise).max(1e-9 * largest);
+    let sign = speed.iter().map(|v| (v / dead).clamp(-1.0, 1.0)).collect();
+    Ok((speed, sign))
+}
+
+/// Stretches without a certain direction: their first sample and the first one after them. Between
+/// two samples that go opposite ways the stretch is empty.
+fn doubtful(sign: &[f64]) -> Vec<(usize, usize)> {
+    let mut found = Vec::new();
+    let mut i = 0;
+    while i < sign.len() {
+        if sign[i].abs() < 1.0 {
+            let to = (i..sign.len()).find(|k| sign[*k].abs() == 1.0);
+            let to = to.unwrap_or(sign.len());
+            found.push((i, to));
+            i = to;
+        } else if i > 0 && sign[i] * sign[i - 1] == -1.0 {
+            found.push((i, i));
+        }
+        i += 1;
+    }
+    found
+}
+
+/// Writes a step from one way to the other at a place between two samples: averaged with the weights
+/// 1 − x and x of the neighbours, a of the interval being before the step, it adds
+/// a − a²/2 − (½ − a + a²/2) to the one and a²/2 − (½ − a²/2) to the other.
+fn step(sign: &mut [f64], way: f64, place: f64, from: usize, to: usize) {
+    for (i, s) in sign.iter_mut().enumerate().take(to + 1).skip(from) {
+        *s = if (i as f64) <= place { way } else { -way };
+    }
+    let before = place.floor() as usize;
+    if before + 1 < sign.len() {
+        let a = place - before as f64;
+        let early = 0.5 * a * a;
+        sign[before] = way * (0.5 + (a - early) - (0.5 - a + early));
+        sign[before + 1] = way * (early - (0.5 - early) - 0.5);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_turn_between_two_samples_is_placed_where_it_is() {
+        let mut sign = [1.0, 1.0, -1.0, -1.0];
+        // A quarter of the way from sample 1 to sample 2.
+        step(&mut sign, 1.0, 1.25, 0, 3);
+        // Sample 1: ½ + (¼ − 1/32) − (½ − ¼ + 1/32) = 0.4375; sample 2: 1/32 − (½ − 1/32) − ½.
+        assert_eq!(sign, [1.0, 0.4375, -0.9375, -1.0]);
+        // The area is that of the step: 1.25 to the left, 1.75 to the right, of three intervals.
+        assert!((sign[1] + sign[2] - (1.25 - 1.75)).abs() < 1e-15);
+    }
+
+    #[test]
+    fn turns_and_stops_are_doubtful() {
+        let signs = [1.0, 1.0, -1.0, -1.0, 0.0, 0.3, 1.0, 1.0, -0.5];
+        assert_eq!(doubtful(&signs), [(2, 2), (4, 6), (8, 9)]);
+        assert_eq!(doubtful(&[1.0; 5]), []);
+    }
+}

@@ -1,0 +1,231 @@
+//! The equation of motion averaged over windows: a row each window, a column each term.
+
+use torqcomp_dsp::weak::{Window, white_noise_variance};
+
+use super::directions::Directions;
+use super::regression::{Corrected, Errors, solve};
+use super::{LEAST_WINDOWS, Run, SHORTEST_HALF};
+use crate::failure::Failure;
+use crate::identify::rms;
+
+/// Residual over the root mean square of clean windows up to which another window follows the equation.
+const FOLLOWS: f64 = 3.0;
+
+/// Rows of the regression.
+pub(super) struct Rows {
+    /// Half of the window, in samples.
+    pub half: usize,
+    /// Samples from one window to the next.
+    pub stride: usize,
+    /// Terms of the equation, a value each window.
+    pub columns: Vec<Vec<f64>>,
+    /// Averaged torque or force.
+    pub right: Vec<f64>,
+    /// Windows in which the body goes one way throughout.
+    pub clean: Vec<bool>,
+    /// Order of the derivative of the motion that a column is, if its noise is known.
+    orders: Vec<Option<usize>>,
+    window: Window,
+    variance: f64,
+}
+
+/// A fit of the rows.
+pub(super) struct Fitted {
+    /// The parameters.
+    pub fit: Corrected,
+    /// All rows.
+    pub rows: Rows,
+    /// Rows that were fitted.
+    pub used: Vec<bool>,
+}
+
+impl Rows {
+    /// Averages over windows of that half-length.
+    ///
+    /// # Errors
+    /// If the record holds too few windows.
+    pub fn of(
+        run: &Run,
+        directions: &Directions,
+        half: usize,
+        split: bool,
+    ) -> Result<Self, Failure> {
+        let window = Window::new(half, run.rate_hz)?;
+        let stride = (half / 2).max(1);
+        let count = run.motion.len();
+        let centres: Vec<usize> = (half..count.saturating_sub(half)).step_by(stride).collect();
+        if centres.len() < LEAST_WINDOWS {
+            return Err(Failure::failed(format_args!(
+                "windows of ±{half} samples fit only {} times into the record; make them shorter",
+                centres.len()
+            )));
+        }
+        let column = |samples: &[f64], order: usize| -> Vec<f64> {
+            let average = |c: &usize| window.at(samples, *c, order);
+            centres.iter().map(average).collect()
+        };
+        let (columns, orders) = terms(run, directions, split, centres.len(), &column);
+        let sure = |c: &usize| !directions.unsure[c - half..=c + half].contains(&true);
+        Ok(Self {
+            half,
+            stride,
+            columns,
+            right: column(run.effort, 0),
+            clean: centres.iter().map(sure).collect(),
+            orders,
+            window: window.clone(),
+            variance: white_noise_variance(run.motion).unwrap_or(0.0),
+        })
+    }
+
+    /// Whether there are enough windows in which the body goes one way.
+    fn enough_clean(&self) -> bool {
+        let clean = self.clean.iter().filter(|c| **c).count();
+        clean >= LEAST_WINDOWS && 3 * clean >= self.clean.len()
+    }
+
+    /// The clean windows, and those others that follow the same equation as closely: at a stop dry friction
+    /// is whatever it takes to hold the body, which the equation does not say.
+    fn following(&self, fit: &Corrected) -> Vec<bool> {
+        let residual = |k: usize| fit.residuals[k];
+        let clean: Vec<f64> = (0..self.clean.len())
+            .filter(|k| self.clean[*k])
+            .map(residual)
+            .collect();
+        let most = FOLLOWS * rms(&clean);
+        (0..self.clean.len())
+            .map(|k| self.clean[k] || residual(k).abs() <= most)
+            .collect()
+    }
+
+    /// Covariance of white noise of the motion between two columns of one row.
+    fn noise(&self, i: usize, j: usize) -> f64 {
+        match (self.orders[i], self.orders[j]) {
+            (Some(a), Some(b)) => self.variance * self.window.noise(a, b),
+            _ => 0.0,
+        }
+    }
+
+    /// Covariance of the errors of two rows so many windows apart, for white noise of the torque of
+    /// variance 1.
+    fn torque_errors(&self, lag: usize) -> f64 {
+        self.window.noise_apart(0, 0, lag * self.stride)
+    }
+
+    /// The same for the noise of the motion, whose terms have those factors.
+    fn motion_errors(&self, lag: usize, factors: &[f64]) -> f64 {
+        let mut sum = 0.0;
+        for (i, a) in self.orders.iter().enumerate() {
+            for (j, b) in self.orders.iter().enumerate() {
+                if let (Some(a), Some(b)) = (a, b) {
+                    let both = self.window.noise_apart(*a, *b, lag * self.stride);
+                    sum += factors[i] * factors[j] * self.variance * both;
+                }
+            }
+        }
+        sum
+    }
+
+    /// Fits the rows.
+    ///
+    /// # Errors
+    /// If the terms cannot be told apart.
+    pub fn fit(self) -> Result<Fitted, Failure> {
+        let mut used = vec![true; self.clean.len()];
+        if self.enough_clean() && self.clean.contains(&false) {
+            // The clean windows alone may not tell all terms apart.
+            if let Ok(fit) = self.solve(&self.clean) {
+                used = self.following(&fit);
+            }
+        }
+        Ok(Fitted {
+            fit: self.solve(&used)?,
+            rows: self,
+            used,
+        })
+    }
+
+    fn solve(&self, used: &[bool]) -> Result<Corrected, Failure> {
+        let errors = Errors {
+            noise: &|i, j| self.noise(i, j),
+            torque: &|lag| self.torque_errors(lag),
+            motion: &|lag, factors| self.motion_errors(lag, factors),
+            overlap: 2 * self.half / self.stride,
+        };
+        solve(&self.columns, &self.right, used, &errors)
+    }
+}
+
+/// Terms of the equation of motion, and the order of the derivative that each is of the motion.
+fn terms(
+    run: &Run,
+    directions: &Directions,
+    split: bool,
+    rows: usize,
+    column: &dyn Fn(&[f64], usize) -> Vec<f64>,
+) -> (Vec<Vec<f64>>, Vec<Option<usize>>) {
+    let top = run.kind.to_acceleration();
+    let mut columns = vec![column(run.motion, top)];
+    let mut orders = vec![Some(top)];
+    match (&directions.speed, split) {
+        (Some(speed), true) => {
+            for keep in [|v: f64| v.max(0.0), |v: f64| v.min(0.0)] {
+                let part: Vec<f64> = speed.iter().map(|v| keep(*v)).collect();
+                columns.push(column(&part, 0));
+                orders.push(None);
+            }
+        }
+        (Some(_), false) => {
+            columns.push(column(run.motion, top - 1));
+            orders.push(Some(top - 1));
+        }
+        (None, _) => {
+            // Speed but for a constant, which the offset takes up.
+            columns.push(column(&integral(run.motion, run.rate_hz), 0));
+            orders.push(None);
+        }
+    }
+    if directions.both() {
+        columns.push(column(&directions.sign, 0));
+        orders.push(None);
+    }
+    columns.push(vec![1.0; rows]);
+    orders.push(None);
+    (columns, orders)
+}
+
+fn integral(samples: &[f64], rate_hz: f64) -> Vec<f64> {
+    let mut sum = 0.0;
+    let mut last = samples[0];
+    samples
+        .iter()
+        .map(|v| {
+            sum += 0.5 * (v + last) / rate_hz;
+            last = *v;
+            sum
+        })
+        .collect()
+}
+
+/// The first window from which the answer changes less than from those around it: shorter ones are
+/// noisy, longer ones average over what the equation does not hold for. Told with one viscous
+/// friction, whatever is asked for.
+pub(super) fn plateau(run: &Run, directions: &Directions) -> usize {
+    let longest = (run.motion.len() / (LEAST_WINDOWS / 2 + 2)).max(SHORTEST_HALF);
+    let mut tried: Vec<(usize, Corrected)> = Vec::new();
+    let mut half = SHORTEST_HALF;
+    while half <= longest {
+        let fitted = Rows::of(run, directions, half, false).and_then(Rows::fit);
+        if let Ok(fitted) = fitted {
+            tried.push((half, fitted.fit));
+        }
+        half = half * 3 / 2;
+    }
+    let changes: Vec<f64> = tried
+        .windows(2)
+        .map(|pair| pair[0].1.change_to(&pair[1].1.values))
+        .collect();
+    let first = changes.windows(2).position(|pair| pair[0] < pair[1]);
+    let best = first.unwrap_or(changes.len().saturating_sub(1));
+    tried.get(best).map_or(SHORTEST_HALF, |(half, _)| *half)
+}

@@ -1,0 +1,66 @@
+//! What is wrong with a record that a verb works on, told from as much of it as may be kept.
+
+use crate::recording::Axis;
+use crate::report::Warning;
+
+/// Samples that are kept of a record that goes by as a stream.
+pub const OF_STREAM: usize = 1 << 15;
+/// Samples that are looked at of a stream so long that its time counts.
+const OF_LONG: usize = 1 << 12;
+/// Samples from which a stream is long.
+const LONG: usize = 1 << 21;
+/// Samples that are looked at of a record in memory.
+pub const OF_MEMORY: usize = 1 << 20;
+
+/// The record that an excerpt is from.
+#[derive(Debug, Clone, Copy)]
+pub struct Of<'a> {
+    /// Name of the channel.
+    pub name: &'a str,
+    /// Unit in which its samples are said.
+    pub unit: &'a str,
+    /// That unit for each unit of the samples.
+    pub scale: f64,
+    /// Samples a second.
+    pub rate_hz: f64,
+    /// Time of the first sample.
+    pub start_s: f64,
+    /// Samples in all.
+    pub samples: usize,
+}
+
+/// The part of what was kept of a stream that is looked at: to look at a sample takes longer than all else
+/// that is done with it.
+#[must_use]
+pub fn of_stream(kept: &[f64], samples: usize) -> &[f64] {
+    let most = if samples < LONG { OF_STREAM } else { OF_LONG };
+    &kept[..kept.len().min(most)]
+}
+
+/// The warnings of [`super::warnings`] about the first samples of a record; that it has more is said.
+///
+/// ```
+/// use torqcomp::quality::excerpt::{Of, warnings};
+/// let of = Of { name: "bridge", unit: "V", scale: 1e3, rate_hz: 1000.0, start_s: 0.0, samples: 5000 };
+/// let samples: Vec<f64> = (0..1000).map(|i| (0.1 * f64::from(i)).sin().min(0.7) * 1e-3).collect();
+/// let found = warnings(&samples, of);
+/// assert_eq!(found[0].code, "clipped");
+/// assert!(found[0].message.ends_with("(the first 1000 of 5000 samples were looked at)"));
+/// ```
+#[must_use]
+pub fn warnings(samples: &[f64], of: Of) -> Vec<Warning> {
+    let scaled: Vec<f64> = samples.iter().map(|sample| sample * of.scale).collect();
+    let axis = Axis::of_header("rate", of.rate_hz, Some(of.start_s));
+    let mut found = super::warnings(of.name, of.unit, &scaled, &axis);
+    if samples.len() < of.samples {
+        let rest = format!(
+            " (the first {} of {} samples were looked at)",
+            samples.len(),
+            of.samples
+        );
+        found
+            .iter_mut()
+            .for_each(|warning| warning.message += &rest);
+    }
+    found
+}

@@ -1,0 +1,114 @@
+//! A column as its headings describe it.
+
+use crate::io::csv::NamedUnit;
+use crate::recording::text::units::{self, Heading};
+
+/// A column as its headings describe it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Field {
+    /// Its heading as written, or `column N`.
+    pub heading: String,
+    /// Its name without the unit.
+    pub name: String,
+    /// Its unit, if it is known.
+    pub unit: Option<NamedUnit>,
+    /// Its unit as written.
+    pub unit_text: Option<String>,
+    /// Whether the cells above it name the rows of the header: it holds the time of the columns that
+    /// follow, if it holds anything.
+    pub is_label: bool,
+}
+
+/// A unit, of time as well where a maker writes seconds as S.
+fn unit_of(name: &str, unit: &str) -> Option<NamedUnit> {
+    match unit.trim() {
+        "S" if units::is_time_name(name) || units::is_axis_name(name) => units::read("s"),
+        unit => units::read(unit),
+    }
+}
+
+/// A unit without the name of its channel: `CH1:V`.
+pub(super) fn without_name<'a>(unit: &'a str, name: &str) -> &'a str {
+    let Some((channel, rest)) = unit.split_once(':') else {
+        return unit;
+    };
+    let is_channel = channel == name
+        || channel.starts_with(|c: char| c.is_ascii_alphabetic())
+            && channel.ends_with(|c: char| c.is_ascii_digit());
+    if is_channel { rest.trim() } else { unit }
+}
+
+impl Field {
+    /// A column without a heading, its place counted from 0.
+    #[must_use]
+    pub fn unnamed(place: usize) -> Self {
+        let name = format!("column {}", place + 1);
+        Self {
+            heading: name.clone(),
+            name,
+            unit: None,
+            unit_text: None,
+            is_label: false,
+        }
+    }
+
+    /// A column with a heading, and with a unit in a row of its own.
+    #[must_use]
+    pub fn new(heading: &str, unit: Option<&str>) -> Self {
+        let heading = heading.trim().trim_matches('"').trim();
+        let Heading {
+            name,
+            unit: own,
+            unit_text,
+        } = units::heading(heading);
+        let below = unit.and_then(|unit| unit_of(&name, unit));
+        let below_text = unit.and_then(units::as_written);
+        // Under a name with a unit below, what looks like a unit at its end may be none, unless it
+        // stands in brackets and is the same one.
+        let is_plain = !heading.contains(['[', '(', '/']);
+        let is_own = |own: &NamedUnit| match &below {
+            Some(below) => !is_plain && own.unit == below.unit,
+            None => true,
+        };
+        let own = own.filter(is_own);
+        let name = match &below {
+            Some(_) if own.is_none() => heading.to_owned(),
+            _ => name,
+        };
+        let unit_text = unit_text.filter(|_| own.is_some() || below.is_none());
+        Self {
+            heading: heading.to_owned(),
+            name,
+            unit_text: unit_text
+                .or(below.as_ref().map(|u| u.text.clone()))
+                .or(below_text),
+            unit: own.or(below),
+            is_label: false,
+        }
+    }
+
+    /// A column whose heading is its name alone.
+    #[must_use]
+    pub fn with_unit(name: &str, unit: Option<&str>) -> Self {
+        let unit = unit.map(|unit| without_name(unit, name));
+        Self {
+            heading: name.to_owned(),
+            name: name.to_owned(),
+            unit: unit.and_then(|unit| unit_of(name, unit)),
+            unit_text: unit.and_then(units::as_written),
+            is_label: false,
+        }
+    }
+
+    /// Whether it is known to hold time, by its unit.
+    #[must_use]
+    pub fn has_time_unit(&self) -> bool {
+        self.unit.as_ref().is_some_and(units::is_time)
+    }
+
+    /// Whether its name is that of time.
+    #[must_use]
+    pub fn is_named_time(&self) -> bool {
+        units::is_time_name(&self.name) && (self.unit.is_none() || self.has_time_unit())
+    }
+}

@@ -1,0 +1,119 @@
+//! Names and units out of keys and values above a table.
+
+use super::Row;
+use super::field::{Field, without_name};
+use super::labelled::is_name_label;
+use crate::recording::text::keys::{Entry, Topic, topic};
+use crate::recording::text::units;
+
+/// Names out of a line such as `Source,CH1`, where no line above the table has them.
+pub(super) fn fill_names(fields: &mut [Field], entries: &[Entry], used: &[bool]) {
+    let places: Vec<usize> = (0..fields.len()).filter(|place| used[*place]).collect();
+    let about = entries
+        .iter()
+        .find(|entry| entry.topic() == Some(Topic::Name));
+    let Some(entry) = about else {
+        return;
+    };
+    // The key may be repeated for each channel.
+    let values: Vec<&String> = entry
+        .values
+        .iter()
+        .filter(|v| !v.is_empty() && **v != entry.key)
+        .collect();
+    if values.len() == places.len() {
+        for (place, name) in places.into_iter().zip(values) {
+            fields[place] = Field::new(name, None);
+        }
+    }
+}
+
+/// Units out of lines such as `Vertical Units,V,V`: one for each column, or one for all.
+pub(super) fn fill_units(fields: &mut [Field], entries: &[Entry], used: &[bool]) {
+    let signals: Vec<usize> = (0..fields.len())
+        .filter(|place| used[*place])
+        .filter(|place| {
+            let field = &fields[*place];
+            !field.is_named_time()
+                && !units::is_axis_name(&field.name)
+                && !units::is_index_name(&field.name)
+        })
+        .collect();
+    let about = |topic| {
+        entries
+            .iter()
+            .find(move |entry| entry.topic() == Some(topic))
+    };
+    if let Some(entry) = about(Topic::Unit) {
+        let values: Vec<&String> = entry
+            .values
+            .iter()
+            .filter(|value| !value.is_empty())
+            .collect();
+        for (rank, place) in signals.iter().enumerate() {
+            let text = match values.as_slice() {
+                [one] => one,
+                several if several.len() == signals.len() => several[rank],
+                _ => continue,
+            };
+            set_unit(&mut fields[*place], text);
+        }
+    }
+    if let Some(text) = about(Topic::AxisUnit).and_then(Entry::value) {
+        let axis = fields
+            .iter_mut()
+            .find(|field| field.is_named_time() || units::is_axis_name(&field.name));
+        if let Some(field) = axis {
+            set_unit(field, if text == "S" { "s" } else { text });
+        }
+    }
+}
+
+/// Units, and the rate if it is the same for all, out of a list of the channels such as
+/// `Channel,Unit,Length,Increment` above `Force,N,300,0.001`.
+pub(super) fn fill_from_list(fields: &mut [Field], rows: &[Row]) -> Vec<Entry> {
+    let is_heading = |row: &Row| {
+        is_name_label(&row.cells[0])
+            && row
+                .cells
+                .iter()
+                .skip(1)
+                .any(|c| topic(c) == Some(Topic::Unit))
+    };
+    let Some(heading) = rows.iter().position(is_heading) else {
+        return Vec::new();
+    };
+    let labels = &rows[heading].cells;
+    let mut rates: Vec<Entry> = Vec::new();
+    for (row, after) in rows[heading + 1..].iter().zip(1..) {
+        let field = fields.iter_mut().find(|field| field.name == row.cells[0]);
+        let Some(field) = field.filter(|_| row.line == rows[heading].line + after) else {
+            break;
+        };
+        for (label, cell) in labels.iter().zip(&row.cells).skip(1) {
+            match topic(label) {
+                Some(Topic::Unit) => set_unit(field, cell),
+                Some(Topic::Rate | Topic::Interval) => rates.push(Entry {
+                    line: row.line,
+                    key: label.clone(),
+                    values: vec![cell.clone()],
+                }),
+                _ => {}
+            }
+        }
+    }
+    let said = |entry: &Entry| (entry.key.clone(), entry.values.clone());
+    let is_same = rates
+        .windows(2)
+        .all(|pair| said(&pair[0]) == said(&pair[1]));
+    rates.truncate(usize::from(is_same));
+    rates
+}
+
+fn set_unit(field: &mut Field, text: &str) {
+    let text = without_name(text, &field.name);
+    if field.unit.is_none() && field.unit_text.is_none() {
+        field.unit = units::read(text);
+        field.unit_text = units::as_written(text);
+    }
+}

@@ -1,0 +1,163 @@
+//! Headers whose rows are labelled in the first column.
+
+use super::Row;
+use super::field::Field;
+use crate::recording::text::keys::{self, Topic};
+use crate::recording::text::units;
+
+/// Whether a cell labels the row of names.
+pub(super) fn is_name_label(cell: &str) -> bool {
+    const LABELS: [&str; 20] = [
+        "channeltitle",
+        "channel title",
+        "name",
+        "names",
+        "channel name",
+        "channel names",
+        "tracename",
+        "trace name",
+        "signal",
+        "signals",
+        "kanal",
+        "kanalname",
+        "channel",
+        "channels",
+        "source",
+        "label",
+        "labels",
+        "bezeichnung",
+        "signal name",
+        "messstelle",
+    ];
+    let cell = cell
+        .trim()
+        .trim_end_matches([':', '='])
+        .trim()
+        .to_lowercase();
+    LABELS.contains(&cell.as_str())
+}
+
+/// A header whose rows are labelled in the first column (and again above every further column of
+/// time): the columns, and the line of the names.
+pub(super) fn labelled(rows: &[Row], used: &[bool]) -> Option<(Vec<Field>, usize)> {
+    let names = rows
+        .iter()
+        .rev()
+        .filter(|row| is_wide(row, used.len()))
+        .find(|row| is_name_label(&row.cells[0]))?;
+    let block = block_around(rows, names.line);
+    let others: Vec<&Row> = rows
+        .iter()
+        .filter(|row| row.line != names.line && block.contains(&row.line))
+        .filter(|row| row.cells.len() > 1 && !row.cells[0].is_empty())
+        .filter(|row| row.cells.len() + 1 >= used.len())
+        .collect();
+    let about = |topic: Topic| {
+        let key = |row: &&&Row| row.cells[0].trim_end_matches([':', '=']).trim().to_owned();
+        others
+            .iter()
+            .find(|row| keys::topic(&key(row)) == Some(topic))
+    };
+    // Headings right above the data that begin with the time are better names.
+    let has_headings = rows.last().is_some_and(|last| {
+        last.line > names.line && last.cells.len() >= used.len() && is_headings(&last.cells)
+    });
+    if has_headings {
+        return None;
+    }
+    let units = about(Topic::Unit).copied();
+    // Without a row that says more, the label must stand above several columns.
+    let is_alone = others.is_empty()
+        || units.is_none() && about(Topic::Interval).is_none() && about(Topic::Rate).is_none();
+    if is_alone && names.cells[1..].iter().all(|cell| *cell != names.cells[0]) {
+        return None;
+    }
+    let fields = match is_beside_data(names, used) {
+        true => fields_beside(names, units, used.len()),
+        false => fields_below(names, units, &others, used.len()),
+    };
+    Some((fields, names.line))
+}
+
+/// Whether cells are the name of time and names of channels: no key with values, no units.
+fn is_headings(cells: &[String]) -> bool {
+    let is_name = |cell: &String| {
+        !cell.is_empty() && units::read(cell).is_none() && keys::quantity(cell, b'.').is_none()
+    };
+    let time = Field::new(&cells[0], None);
+    time.is_named_time() && cells.len() > 1 && cells[1..].iter().all(is_name)
+}
+
+/// Whether most columns have a cell, none of which stands between a key and its value.
+fn is_wide(row: &Row, columns: usize) -> bool {
+    let filled = row.cells.iter().filter(|cell| !cell.is_empty()).count();
+    row.cells.len() >= columns
+        && filled > 1
+        && 10 * filled >= 6 * columns
+        && !row.cells.iter().any(|cell| cell == ":" || cell == "=")
+}
+
+/// Whether the rows of data have no cell under the labels, so that the names begin one cell later.
+fn is_beside_data(names: &Row, used: &[bool]) -> bool {
+    let filled = names.cells.iter().filter(|cell| !cell.is_empty()).count();
+    filled == used.len() + 1 && names.cells.len() >= filled && used.iter().all(|used| *used)
+}
+
+fn cell<'a>(row: Option<&'a Row>, place: usize) -> Option<&'a str> {
+    row?.cells.get(place).map(String::as_str)
+}
+
+fn fields_beside(names: &Row, units: Option<&Row>, columns: usize) -> Vec<Field> {
+    (1..=columns)
+        .map(|place| match cell(units, place) {
+            Some(unit) => Field::with_unit(&names.cells[place], Some(unit)),
+            None => Field::new(&names.cells[place], None),
+        })
+        .collect()
+}
+
+fn fields_below(names: &Row, units: Option<&Row>, others: &[&Row], columns: usize) -> Vec<Field> {
+    let is_label = |place: usize| {
+        let repeats = |row: &Row| row.cells.get(place) == row.cells.first();
+        repeats(names)
+            && others
+                .iter()
+                .all(|row| repeats(row) || row.cells.len() <= place)
+    };
+    // The first column may have a heading of its own below: `Time [ms]`.
+    let is_heading = |row: &&&Row| row.cells[1..].iter().all(String::is_empty);
+    let time = others
+        .iter()
+        .filter(is_heading)
+        .map(|row| Field::new(&row.cells[0], None))
+        .find(|field| field.is_named_time() && field.has_time_unit())
+        .unwrap_or_else(|| Field::new("time", None));
+    let field = |place: usize| match cell(Some(names), place) {
+        _ if is_label(place) => Field {
+            is_label: true,
+            ..time.clone()
+        },
+        Some(name) if !name.is_empty() && units.is_some() => {
+            Field::with_unit(name, cell(units, place))
+        }
+        Some(name) if !name.is_empty() => Field::new(name, None),
+        _ => Field::unnamed(place),
+    };
+    (0..columns).map(field).collect()
+}
+
+/// The lines around one that no empty line parts from it.
+fn block_around(rows: &[Row], line: usize) -> std::ops::RangeInclusive<usize> {
+    let (mut first, mut last) = (line, line);
+    for row in rows {
+        if row.line == last + 1 {
+            last = row.line;
+        }
+    }
+    for row in rows.iter().rev() {
+        if row.line + 1 == first {
+            first = row.line;
+        }
+    }
+    first..=last
+}

@@ -1,0 +1,141 @@
+//! What the lines above a table say of its columns.
+
+mod field;
+mod fill;
+mod labelled;
+mod positional;
+
+use super::head::{Head, Table};
+use super::keys::{self, Entry};
+use crate::io::csv::{Delimiter, Dialect};
+pub use field::Field;
+use fill::{fill_from_list, fill_names, fill_units};
+use labelled::labelled;
+use positional::positional;
+
+/// The lines above a table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Header {
+    /// The columns.
+    pub fields: Vec<Field>,
+    /// The keys and values.
+    pub entries: Vec<Entry>,
+    /// Text of the line with the names.
+    pub names: Option<String>,
+}
+
+/// A line above the table, split.
+struct Row<'a> {
+    line: usize,
+    text: &'a str,
+    cells: Vec<String>,
+}
+
+/// Reads the lines above a table; `used` says which columns have data in the first rows.
+#[must_use]
+pub fn read(head: &Head, table: &Table, used: &[bool]) -> Header {
+    let rows: Vec<Row> = head.lines[..table.first]
+        .iter()
+        .enumerate()
+        .filter(|(_, line)| line.text.chars().any(char::is_alphanumeric))
+        .map(|(line, content)| Row {
+            line,
+            text: &content.text,
+            cells: split(&content.text, table, used),
+        })
+        .collect();
+    let entries = |without: &[usize]| -> Vec<Entry> {
+        rows.iter()
+            // `CH1V,CH2V,t0 =-5e-05, tInc = 1e-09,` names columns and says more.
+            .filter(|row| !without.contains(&row.line) || row.text.contains('='))
+            .flat_map(|row| keys::entries(head.number(row.line), row.text, table.dialect))
+            .collect()
+    };
+    let keyed = entries_below_keys(head, &rows);
+    let entries = |without: &[usize]| -> Vec<Entry> {
+        let mut all = entries(without);
+        all.extend(keyed.iter().cloned());
+        all
+    };
+    if let Some((fields, names)) = labelled(&rows, used) {
+        return Header {
+            fields,
+            entries: entries(&[names]),
+            names: Some(head.lines[names].text.clone()),
+        };
+    }
+    let found = positional(&rows, table, used);
+    let mut fields = found.fields;
+    let mut entries = entries(&found.lines);
+    entries.extend(fill_from_list(&mut fields, &rows));
+    if found.names.is_none() {
+        fill_names(&mut fields, &entries, used);
+    }
+    fill_units(&mut fields, &entries, used);
+    Header {
+        fields,
+        entries,
+        names: found.names.map(|line| head.lines[line].text.clone()),
+    }
+}
+
+/// Keys in a line of their own with their values in the next: `dt:` above `0.001`.
+fn entries_below_keys(head: &Head, rows: &[Row]) -> Vec<Entry> {
+    rows.windows(2)
+        .filter(|pair| pair[1].line == pair[0].line + 1)
+        .filter_map(|pair| {
+            let key = pair[0].text.trim().strip_suffix(':')?;
+            Some(Entry {
+                line: head.number(pair[0].line),
+                key: key.to_owned(),
+                values: pair[1].cells.clone(),
+            })
+        })
+        .collect()
+}
+
+/// Splits a line above the table as the table is split, or, if that does not give a cell for each
+/// column, by other marks that do.
+fn split(text: &str, table: &Table, used: &[bool]) -> Vec<String> {
+    let text = uncommented(text);
+    let cells = table.dialect.cells(text);
+    let count = |cells: &[String]| cells.iter().filter(|cell| !cell.is_empty()).count();
+    let wanted = used.iter().filter(|used| **used).count();
+    if count(&cells) >= wanted && cells.len() <= table.width + 1 || wanted < 2 {
+        return cells;
+    }
+    let others = [b'\t', b';', b',', b'|'];
+    let mut ways: Vec<Vec<String>> = others
+        .into_iter()
+        .filter(|mark| table.dialect.delimiter != Delimiter::Byte(*mark))
+        .filter(|mark| text.contains(char::from(*mark)))
+        .map(|mark| {
+            let delimiter = Delimiter::Byte(mark);
+            Dialect {
+                delimiter,
+                ..table.dialect
+            }
+            .cells(text)
+        })
+        .collect();
+    ways.push(
+        text.split("  ")
+            .map(str::trim)
+            .filter(|cell| !cell.is_empty())
+            .map(str::to_owned)
+            .collect(),
+    );
+    ways.into_iter()
+        .find(|way| way.len() == table.width)
+        .unwrap_or(cells)
+}
+
+/// Headings may stand in a comment: `# time_s,bridge_V`.
+fn uncommented(text: &str) -> &str {
+    let text = text.trim_start_matches('\u{feff}');
+    match text.trim_start().strip_prefix(['#', '%', '!']) {
+        Some(rest) => rest.trim_start_matches(['#', '%', '!']).trim_start(),
+        // CASSY heads its columns so.
+        None => text.strip_prefix("DEF=").unwrap_or(text),
+    }
+}

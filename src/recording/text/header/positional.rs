@@ -1,0 +1,318 @@
+//! Columns named by the rows nearest above the data.
+
+use super::Row;
+use super::field::Field;
+use crate::io::csv::NamedUnit;
+use crate::recording::text::cell::Cell;
+use crate::recording::text::head::Table;
+use crate::recording::text::keys::{self, Topic};
+use crate::recording::text::units;
+
+/// Lines above a table among which its headings are looked for.
+const LINES_FOR_HEADINGS: usize = 10;
+/// Longest heading of a lone column, in words.
+const WORDS: usize = 4;
+
+/// Columns named by the rows nearest above the data, and which lines those are.
+pub(super) struct Positional {
+    pub(super) fields: Vec<Field>,
+    pub(super) lines: Vec<usize>,
+    pub(super) names: Option<usize>,
+}
+
+pub(super) fn positional(rows: &[Row], table: &Table, used: &[bool]) -> Positional {
+    let near = rows.len().saturating_sub(LINES_FOR_HEADINGS);
+    let fitting: Vec<&Row> = rows[near..]
+        .iter()
+        .filter(|row| is_heading(&row.cells, table, used))
+        .filter(|row| !is_process_row(&row.cells) && !repeats_a_key(&row.cells))
+        .filter(|row| !is_key_with_values(&row.cells))
+        .rev()
+        .collect();
+    if is_key_block(&fitting, used) {
+        return Positional::unnamed(table.width);
+    }
+    let Some(found) = Headings::of(&fitting) else {
+        return Positional::unnamed(table.width);
+    };
+    let upper = upper_names(found.names, &fitting, used);
+    let mut lines = vec![found.names.line];
+    lines.extend(
+        [found.units, found.symbols, upper]
+            .iter()
+            .flatten()
+            .map(|row| row.line),
+    );
+    let fields = (0..table.width)
+        .map(|place| found.field(place, upper))
+        .collect();
+    Positional {
+        fields,
+        lines,
+        names: Some(found.names.line),
+    }
+}
+
+impl Positional {
+    fn unnamed(width: usize) -> Self {
+        Self {
+            fields: (0..width).map(Field::unnamed).collect(),
+            lines: Vec::new(),
+            names: None,
+        }
+    }
+}
+
+/// The rows above the data by what is in them.
+struct Headings<'a> {
+    names: &'a Row<'a>,
+    units: Option<&'a Row<'a>>,
+    /// The row of units, where it holds remarks besides.
+    remarks: Option<&'a Row<'a>>,
+    /// Short names between the names and their units.
+    symbols: Option<&'a Row<'a>>,
+}
+
+impl<'a> Headings<'a> {
+    /// From the rows that fit, the lowest first.
+    fn of(fitting: &[&'a Row<'a>]) -> Option<Self> {
+        let (names, units, remarks) = match fitting {
+            [] => return None,
+            [below, above, ..] if is_mixed(&below.cells, &above.cells) => {
+                (*above, Some(*below), Some(*below))
+            }
+            [below, above, ..] if is_units(&below.cells) => (*above, Some(*below), None),
+            [only, ..] if is_nothing_but_units(&only.cells) => (*only, Some(*only), None),
+            [names, ..] => (*names, None, None),
+        };
+        let above = fitting.get(2).copied();
+        let longer = above.filter(|above| units.is_some() && is_symbols_of(names, above));
+        Some(Self {
+            names: longer.unwrap_or(names),
+            units,
+            remarks,
+            symbols: longer.map(|_| names),
+        })
+    }
+
+    /// A column; `upper` tells columns of the same name apart.
+    fn field(&self, place: usize, upper: Option<&Row>) -> Field {
+        let Some(name) = filled(Some(self.names), place) else {
+            return Field::unnamed(place);
+        };
+        let below = filled(self.units, place);
+        let is_unit = below.is_some_and(|below| units::read(below).is_some());
+        let mut field = Field::new(name, below.filter(|_| self.remarks.is_none() || is_unit));
+        if let Some(remark) = filled(self.remarks, place).filter(|_| !is_unit) {
+            field.name = format!("{}: {remark}", field.name);
+        }
+        if let Some(upper) = filled(upper, place) {
+            field.name = format!("{upper} {}", field.name);
+        }
+        field
+    }
+}
+
+/// The text of a cell that has one.
+fn filled<'a>(row: Option<&'a Row>, place: usize) -> Option<&'a str> {
+    let cell = row?.cells.get(place)?;
+    (!cell.is_empty()).then_some(cell.as_str())
+}
+
+/// Whether a row holds the symbols of the names right above it: `t`, `F` below `Time`, `Force`.
+fn is_symbols_of(symbols: &Row, names: &Row) -> bool {
+    let is_name = |name: &String, symbol: &String| {
+        symbol.chars().count() <= 3 && name.chars().count() > symbol.chars().count()
+    };
+    names.line + 1 == symbols.line
+        && names.cells.len() == symbols.cells.len()
+        && names.cells.iter().any(|cell| units::is_time_name(cell))
+        && names
+            .cells
+            .iter()
+            .zip(&symbols.cells)
+            .all(|(name, symbol)| is_name(name, symbol) || name == symbol)
+}
+
+/// Whether all cells give the same key a value: `Rate: 50 Hz`, `Rate: 50 Hz`.
+fn repeats_a_key(cells: &[String]) -> bool {
+    let key = |cell: &String| -> Option<String> {
+        let (key, value) = cell.split_once([':', '='])?;
+        keys::quantity(value, b'.').map(|_| key.trim().to_owned())
+    };
+    let mut keys = cells.iter().filter(|cell| !cell.is_empty()).map(key);
+    let first = keys.next().flatten();
+    first.is_some() && keys.clone().count() > 0 && keys.all(|key| key == first)
+}
+
+/// Whether cells can be headings: one for (nearly) each column with data, and no numbers but those
+/// of channels after a text.
+fn is_heading(cells: &[String], table: &Table, used: &[bool]) -> bool {
+    let places: Vec<usize> = (0..used.len()).filter(|place| used[*place]).collect();
+    let filled = places
+        .iter()
+        .filter(|place| cells.get(**place).is_some_and(|cell| !cell.is_empty()))
+        .count();
+    let fits = if places.len() < 2 {
+        let words = |cell: &String| cell.split_whitespace().count();
+        filled == places.len()
+            && cells.iter().filter(|cell| !cell.is_empty()).count() == 1
+            && cells
+                .iter()
+                .all(|cell| words(cell) <= WORDS && !cell.contains(['=', ':']))
+    } else {
+        let last_is_there = cells.len() > *places.last().unwrap_or(&0);
+        filled == places.len()
+            || places.len() > 2 && filled + 1 >= places.len() && last_is_there
+            || is_units_with_gaps(cells)
+            // A column that counts often has no heading.
+            || cells.len() == 2 && filled == 1 && cells[0].is_empty()
+            || places.len() > 5 && 10 * filled >= 7 * places.len()
+    };
+    let mut texts = 0;
+    fits && cells.iter().filter(|cell| !cell.is_empty()).all(|cell| {
+        match Cell::read(cell, table.dialect.decimal) {
+            Cell::Text | Cell::NonFinite => {
+                texts += 1;
+                true
+            }
+            Cell::Number(value) => {
+                texts > 0 && value.fract() == 0.0 && (0.0..1000.0).contains(&value)
+            }
+            _ => false,
+        }
+    })
+}
+
+/// Rows of a key and a value each above a table of two columns are no headings.
+fn is_key_block(fitting: &[&Row], used: &[bool]) -> bool {
+    let two = used.iter().filter(|used| **used).count() == 2;
+    let Some(nearest) = fitting.first() else {
+        return false;
+    };
+    let is_time = nearest.cells.iter().any(|cell| {
+        let field = Field::new(cell, None);
+        field.is_named_time()
+            || field.has_time_unit()
+            || units::is_axis_name(cell)
+            || units::is_index_name(cell)
+    });
+    let (key, values) = (&nearest.cells[0], &nearest.cells[1..]);
+    let topic = keys::topic(key);
+    let is_known = topic.is_some_and(is_of_axis)
+        || topic.is_some() && values.iter().all(|v| units::read(v).is_none());
+    // An empty line parts headings from keys.
+    let in_block = fitting.len() > 2 && fitting[1].line + 1 == nearest.line;
+    two && !is_time && !is_units(&nearest.cells) && (in_block || is_known)
+}
+
+/// Whether a topic is one of rates and units, which is said in no heading.
+fn is_of_axis(topic: Topic) -> bool {
+    !matches!(topic, Topic::Date | Topic::Name)
+}
+
+/// Whether cells are a key about the time axis and its values: `Time interval,0.01(ms),0.01(ms)`.
+fn is_key_with_values(cells: &[String]) -> bool {
+    let Some((key, values)) = cells.split_first() else {
+        return false;
+    };
+    let is_quantity = |v: &String| keys::quantity(v, b'.').is_some();
+    let mut filled = values.iter().filter(|v| !v.is_empty()).peekable();
+    keys::topic(key).is_some_and(is_of_axis) && filled.peek().is_some() && filled.all(is_quantity)
+}
+
+/// Whether cells are units, or nothing where a channel has none: `s,Nm,,`.
+fn is_units_with_gaps(cells: &[String]) -> bool {
+    let mut filled = cells.iter().filter(|cell| !cell.is_empty()).peekable();
+    let has_gap = cells.iter().any(String::is_empty);
+    cells.len() > 1
+        && has_gap
+        && filled.peek().is_some()
+        && filled.all(|cell| NamedUnit::parse(cell).is_some())
+}
+
+/// Whether cells are units: all of them, or some where others repeat, or most are in brackets.
+fn is_units(cells: &[String]) -> bool {
+    let filled: Vec<&String> = cells.iter().filter(|cell| !cell.is_empty()).collect();
+    let known = filled
+        .iter()
+        .filter(|cell| units::read(cell).is_some())
+        .count();
+    let bracketed = filled
+        .iter()
+        .filter(|cell| units::is_bracketed(cell))
+        .count();
+    let like = filled
+        .iter()
+        .filter(|cell| {
+            units::read(cell).is_some()
+                || units::is_bracketed(cell)
+                || units::as_written(cell).is_none()
+        })
+        .count();
+    let repeats = filled
+        .iter()
+        .any(|cell| filled.iter().filter(|c| c == &cell).count() > 1);
+    known > 0 && (repeats || 2 * like > filled.len()) || bracketed > 0 && bracketed == filled.len()
+}
+
+/// Whether a lone line above the data names its columns by their units: `s,V`.
+fn is_nothing_but_units(cells: &[String]) -> bool {
+    let mut filled = cells.iter().filter(|cell| !cell.is_empty()).peekable();
+    filled.peek().is_some() && filled.all(|cell| NamedUnit::parse(cell).is_some())
+}
+
+/// Whether the first cell is a unit of time under the name of time, and the others are remarks:
+/// `ms,Servo motor speed,Torque` under `Time,Analog 1,Analog 2`.
+fn is_mixed(below: &[String], above: &[String]) -> bool {
+    let (Some(unit), Some(name)) = (below.first(), above.first()) else {
+        return false;
+    };
+    units::read(unit).is_some_and(|unit| units::is_time(&unit))
+        && units::is_time_name(name)
+        && below.len() > 1
+        && below[1..]
+            .iter()
+            .all(|cell| units::read(cell).is_none() && !units::is_bracketed(cell))
+        && below[1..]
+            .iter()
+            .any(|cell| units::as_written(cell).is_some_and(|c| c.len() > 3))
+}
+
+/// Rows under the units that say how values were formed: `Avg`, `Smp`.
+fn is_process_row(cells: &[String]) -> bool {
+    const WORDS: [&str; 14] = [
+        "avg", "smp", "max", "min", "std", "tot", "raw", "actual", "scaled", "sample", "mean",
+        "ts", "rn", "med",
+    ];
+    let mut filled = cells.iter().filter(|cell| !cell.is_empty()).peekable();
+    filled.peek().is_some() && filled.all(|cell| WORDS.contains(&cell.to_lowercase().as_str()))
+}
+
+/// A row above the names that tells columns of the same name apart: `CH 1`, `CH 2` above `Voltage`.
+fn upper_names<'a>(names: &Row, fitting: &[&'a Row<'a>], used: &[bool]) -> Option<&'a Row<'a>> {
+    let cells = |row: &Row| -> Vec<String> {
+        (1..used.len())
+            .filter_map(|place| row.cells.get(place).cloned())
+            .collect()
+    };
+    let is_distinct = |cells: &[String]| {
+        cells
+            .iter()
+            .enumerate()
+            .all(|(place, cell)| !cell.is_empty() && !cells[..place].contains(cell))
+    };
+    let own = cells(names);
+    if own.len() < 2 || is_distinct(&own) {
+        return None;
+    }
+    fitting
+        .iter()
+        .copied()
+        .filter(|row| row.line < names.line)
+        .find(|row| {
+            let cells = cells(row);
+            let is_text = |cell: &String| Cell::read(cell, b'.') == Cell::Text;
+            is_distinct(&cells) && cells.iter().all(is_text)
+        })
+}

@@ -1,0 +1,177 @@
+//! What the lines above a table say, as keys with values: rate, start, date, number of samples.
+
+mod values;
+mod words;
+
+use crate::io::csv::{Delimiter, Dialect};
+pub use values::{date_text, quantity, rate_hz, seconds};
+pub use words::topic;
+
+/// A line with a key and values.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Entry {
+    /// Number of the line in the file.
+    pub line: usize,
+    /// The key, without colon, equals sign and quotes.
+    pub key: String,
+    /// Cells after it, as many as there are, empty ones too.
+    pub values: Vec<String>,
+}
+
+/// What a key is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Topic {
+    /// Samples a second.
+    Rate,
+    /// Time between samples.
+    Interval,
+    /// Time of the first sample.
+    Start,
+    /// Date or time of day of the record.
+    Date,
+    /// Number of samples.
+    Count,
+    /// Unit of the channels.
+    Unit,
+    /// Unit of the horizontal axis.
+    AxisUnit,
+    /// Names of the channels.
+    Name,
+}
+
+impl Entry {
+    /// What its key is about.
+    #[must_use]
+    pub fn topic(&self) -> Option<Topic> {
+        topic(&self.key)
+    }
+
+    /// Its first value that says anything.
+    #[must_use]
+    pub fn value(&self) -> Option<&str> {
+        self.values
+            .iter()
+            .map(String::as_str)
+            .find(|v| !v.is_empty())
+    }
+}
+
+/// The entries of a line: one for its key and values, or one for each cell `key = value`.
+#[must_use]
+pub fn entries(line: usize, text: &str, dialect: Dialect) -> Vec<Entry> {
+    let text = text
+        .trim()
+        .trim_start_matches(['#', '%', '!', '*', ';', '/'])
+        .trim();
+    // `Abtastrate = 2,5 kHz` is one value, whatever the table's mark.
+    if let Some(entry) = one_cell(line, text).filter(is_quantity) {
+        return vec![entry];
+    }
+    let cells = split(text, dialect);
+    // `CH1V,CH2V,t0 =-5e-05, tInc = 1e-09,`: cells of their own.
+    let assignments: Vec<Entry> = cells
+        .iter()
+        .filter_map(|cell| {
+            let (key, value) = cell.split_once('=').or_else(|| cell.split_once(": "))?;
+            entry(line, key, vec![value.trim().to_owned()])
+        })
+        .collect();
+    if assignments
+        .iter()
+        .filter(|entry| entry.value().is_some())
+        .count()
+        > 0
+        && (assignments.len() > 1
+            || cells.iter().filter(|c| !c.is_empty()).count() == 1
+            || !cells[0].contains(['=', ':']))
+    {
+        return assignments;
+    }
+    match cells.split_first() {
+        Some((key, values)) if values.iter().any(|value| !value.is_empty()) => {
+            entry(line, key, values.to_vec()).into_iter().collect()
+        }
+        _ => one_cell(line, text).into_iter().collect(),
+    }
+}
+
+/// Whether the value is a number with or without a unit, and nothing else.
+fn is_quantity(entry: &Entry) -> bool {
+    let Some(text) = entry.value() else {
+        return false;
+    };
+    let is_unit = |c: char| c.is_alphabetic() || matches!(c, '/' | '%' | ' ' | '°' | '²');
+    text.starts_with(|c: char| c.is_ascii_digit() || c == '-' || c == '+')
+        && quantity(text, b'.').is_some_and(|(_, unit)| unit.chars().all(is_unit))
+}
+
+/// `Sampling Frequency - 5000`, `Date: 1.2.2024`, `T0 = 5`.
+fn one_cell(line: usize, text: &str) -> Option<Entry> {
+    let marks = ["=", ":", " - ", "\t"];
+    let (key, value) = marks.iter().find_map(|mark| {
+        let (key, value) = text.split_once(mark)?;
+        // A path is no key: C:\data\test.txt.
+        let is_path = *mark == ":" && (value.starts_with('\\') || value.starts_with('/'));
+        (!is_path && !value.trim().is_empty()).then_some((key, value))
+    })?;
+    entry(
+        line,
+        key,
+        vec![
+            value
+                .trim()
+                .trim_end_matches([':', ';', ','])
+                .trim()
+                .to_owned(),
+        ],
+    )
+}
+
+fn entry(line: usize, key: &str, values: Vec<String>) -> Option<Entry> {
+    let key = key
+        .trim()
+        .trim_matches('"')
+        .trim()
+        .trim_end_matches([':', '=', ' '])
+        .trim();
+    let has_letters = key.chars().any(char::is_alphabetic);
+    (has_letters && key.chars().count() <= 80).then(|| Entry {
+        line,
+        key: key.to_owned(),
+        values: values
+            .iter()
+            .map(|value| {
+                value
+                    .trim()
+                    .trim_matches('"')
+                    .trim_start_matches(':')
+                    .trim()
+                    .to_owned()
+            })
+            .collect(),
+    })
+}
+
+/// Cells of a line above a table: its marks may differ from those of the table.
+fn split(text: &str, dialect: Dialect) -> Vec<String> {
+    let table = match dialect.delimiter {
+        Delimiter::Byte(byte) => Some(byte),
+        Delimiter::Spaces | Delimiter::None => None,
+    };
+    let marks = [table, Some(b'\t'), Some(b';'), Some(b',')];
+    for mark in marks.into_iter().flatten() {
+        let is_decimal = table.is_none() && dialect.decimal == mark;
+        if text.contains(char::from(mark)) && !is_decimal {
+            let delimiter = Delimiter::Byte(mark);
+            return Dialect {
+                delimiter,
+                ..dialect
+            }
+            .cells(text);
+        }
+    }
+    vec![text.to_owned()]
+}
+
+#[cfg(test)]
+mod tests;

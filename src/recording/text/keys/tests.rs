@@ -1,0 +1,66 @@
+use super::*;
+
+const COMMA: Dialect = Dialect {
+    delimiter: Delimiter::Byte(b','),
+    decimal: b'.',
+};
+
+fn hz(text: &str) -> Option<f64> {
+    entries(1, text, COMMA)
+        .iter()
+        .find_map(|entry| rate_hz(entry, None, b'.'))
+}
+
+#[test]
+fn rates_and_intervals() {
+    for (text, value) in [
+        ("Sample rate: 1000 Hz", 1000.0),
+        ("# Sample rate: 800000Hz", 8e5),
+        ("Abtastrate = 2,5 kHz", 2500.0),
+        ("Sampling Frequency - 5000", 5000.0),
+        ("\"Sampling Frequency (Hz)=\",500000000,", 5e8),
+        ("Sampling time interval(ms),0.5", 2000.0),
+        ("Sample Interval,4e-07,s", 2.5e6),
+        ("Delta t\t0.001", 1000.0),
+        ("CH1V,CH2V,t0 =-5e-05, tInc = 1e-09,", 1e9),
+        ("Sampling rate [Hz]:\t5000.000000", 5000.0),
+        ("dt=20 ms", 50.0),
+        ("HResolution,1.00E-05", 1e5),
+        ("Sample Rate,1.00GSa/s", 1e9),
+        ("XInc:,5.0E-11", 2e10),
+        ("Resolution:1e-10:", 1e10),
+    ] {
+        let found = hz(text).expect(text);
+        assert!((found / value - 1.0).abs() < 1e-12, "{text}: {found}");
+    }
+    for text in [
+        "Max Sample Rate: 5 Hz",
+        "Trigger rate,5",
+        "Model,DS1052E",
+        "Sample rate: auto",
+    ] {
+        assert_eq!(hz(text), None, "{text}");
+    }
+}
+
+#[test]
+fn dates() {
+    let all = |lines: &[&str]| -> Vec<Entry> {
+        lines
+            .iter()
+            .flat_map(|line| entries(1, line, COMMA))
+            .collect()
+    };
+    assert_eq!(
+        date_text(&all(&["Date,2013/02/19", "Time,09:51:39.197"])).unwrap(),
+        "2013/02/19 09:51:39.197"
+    );
+    assert_eq!(
+        date_text(&all(&["T0 = 05.05.2014 15:24:43"])).unwrap(),
+        "05.05.2014 15:24:43"
+    );
+    assert_eq!(
+        date_text(&all(&["Timestamp,2020-03-16 17:04:51"])).unwrap(),
+        "2020-03-16 17:04:51"
+    );
+}

@@ -1,0 +1,185 @@
+//! What values mean: rates, intervals, seconds, dates.
+
+use super::{Entry, Topic};
+use crate::recording::text::cell::Cell;
+use crate::recording::text::clock::Clock;
+use crate::recording::text::units;
+
+/// A number with a unit: `1.00E+09 Sa/s`, `20ms`, `1,000 Hz`.
+#[must_use]
+pub fn quantity(text: &str, decimal: u8) -> Option<(f64, String)> {
+    let text = text.trim().trim_matches('"').trim();
+    let end = text
+        .char_indices()
+        .find(|(place, c)| {
+            let is_exponent = matches!(c, 'e' | 'E')
+                && text[place + 1..]
+                    .starts_with(|c: char| c.is_ascii_digit() || c == '-' || c == '+');
+            !(c.is_ascii_digit() || matches!(c, '.' | ',' | '-' | '+' | '\'') || is_exponent)
+        })
+        .map_or(text.len(), |(place, _)| place);
+    let number = text[..end].trim();
+    let other = if decimal == b'.' { b',' } else { b'.' };
+    let value = [decimal, other]
+        .into_iter()
+        .find_map(|mark| match Cell::read(number, mark) {
+            Cell::Number(value) | Cell::Grouped(value) => Some(value),
+            _ => None,
+        })?;
+    Some((value, text[end..].trim().to_owned()))
+}
+
+/// Rates and how many Hz they are.
+const RATES: [(&str, f64); 21] = [
+    ("hz", 1.0),
+    ("khz", 1e3),
+    ("mhz", 1e6),
+    ("ghz", 1e9),
+    ("s/s", 1.0),
+    ("sa/s", 1.0),
+    ("ks/s", 1e3),
+    ("ksa/s", 1e3),
+    ("ms/s", 1e6),
+    ("msa/s", 1e6),
+    ("gs/s", 1e9),
+    ("gsa/s", 1e9),
+    ("1/s", 1.0),
+    ("/s", 1.0),
+    ("sps", 1.0),
+    ("ksps", 1e3),
+    ("msps", 1e6),
+    ("samples/s", 1.0),
+    ("samples/sec", 1.0),
+    ("samples per second", 1.0),
+    ("samples/second", 1.0),
+];
+
+/// Hertz of a rate or an interval, whichever the unit says; `default_unit` where it says nothing.
+fn hertz(value: f64, unit: &str, is_interval: bool) -> Option<f64> {
+    let lower = unit
+        .trim_end_matches(['.', ':', ';', ','])
+        .trim()
+        .to_lowercase();
+    let rate = RATES.iter().find(|(word, _)| *word == lower);
+    if let Some((_, factor)) = rate {
+        return Some(value * factor).filter(|hz| *hz > 0.0);
+    }
+    let seconds = match lower.as_str() {
+        "" if is_interval => 1.0,
+        "" => return Some(value).filter(|hz| *hz > 0.0),
+        "ps" => 1e-12,
+        "ns" => 1e-9,
+        "us" | "\u{b5}s" | "\u{3bc}s" => 1e-6,
+        "ms" => 1e-3,
+        "s" => 1.0,
+        _ => {
+            let unit = units::read(unit)?;
+            units::is_time(&unit).then(|| unit.unit.factor())?
+        }
+    };
+    Some(1.0 / (value * seconds)).filter(|hz| hz.is_finite() && *hz > 0.0)
+}
+
+/// Rate in Hz that an entry gives for a place among its values (the first that is filled without).
+#[must_use]
+pub fn rate_hz(entry: &Entry, place: Option<usize>, decimal: u8) -> Option<f64> {
+    let is_interval = match entry.topic()? {
+        Topic::Rate => false,
+        Topic::Interval => true,
+        _ => return None,
+    };
+    let at = match place {
+        Some(place) => place,
+        None => entry.values.iter().position(|value| !value.is_empty())?,
+    };
+    let (value, own) = quantity(entry.values.get(at)?, decimal)?;
+    let in_key = in_brackets(&entry.key).unwrap_or_default();
+    // Sample Interval,4e-10,s
+    let next = entry
+        .values
+        .get(at + 1)
+        .filter(|v| quantity(v, decimal).is_none());
+    let unit = [Some(own.as_str()), Some(in_key), next.map(String::as_str)]
+        .into_iter()
+        .flatten()
+        .find(|unit| !unit.is_empty() && hertz(1.0, unit, is_interval).is_some())
+        .unwrap_or_default();
+    if unit.is_empty() && !own.is_empty() {
+        return None;
+    }
+    let hz = hertz(value, unit, is_interval)?;
+    // A shorter decimal where the reciprocal of an interval is one but for rounding.
+    Some(crate::io::csv::without_rounding(hz)).filter(|hz| hz.is_finite())
+}
+
+/// Seconds that an entry gives.
+#[must_use]
+pub fn seconds(entry: &Entry, place: Option<usize>, decimal: u8) -> Option<f64> {
+    let text = match place {
+        Some(place) => entry.values.get(place)?.as_str(),
+        None => entry.value()?,
+    };
+    let (value, own) = quantity(text, decimal)?;
+    let unit = if own.is_empty() {
+        in_brackets(&entry.key).unwrap_or_default()
+    } else {
+        &own
+    };
+    match unit {
+        "" => Some(value),
+        unit => {
+            let unit = units::read(unit).filter(units::is_time)?;
+            Some(value * unit.unit.factor())
+        }
+    }
+}
+
+fn in_brackets(text: &str) -> Option<&str> {
+    [('(', ')'), ('[', ']')]
+        .into_iter()
+        .find_map(|(open, close)| {
+            let start = text.find(open)?;
+            let length = text[start..].find(close)?;
+            Some(text[start + 1..start + length].trim())
+        })
+}
+
+/// Date and time of the record as the entries give them.
+#[must_use]
+pub fn date_text(entries: &[Entry]) -> Option<String> {
+    let (mut date, mut time) = (None, None);
+    for entry in entries {
+        let about = entry.key.to_lowercase();
+        let is_date = entry.topic() == Some(Topic::Date)
+            || ["date", "time", "datum", "zeit", "start", "t0"]
+                .iter()
+                .any(|w| about.contains(w));
+        if !is_date {
+            continue;
+        }
+        let joined = entry
+            .values
+            .iter()
+            .filter(|v| !v.is_empty())
+            .cloned()
+            .collect::<Vec<_>>();
+        for text in joined.iter().cloned().chain([joined.join(" ")]) {
+            match Clock::parse(&text) {
+                Some(Clock {
+                    day: Some(_),
+                    nanoseconds: Some(_),
+                }) => return Some(text),
+                Some(Clock { day: Some(_), .. }) => date = date.or(Some(text)),
+                Some(Clock {
+                    nanoseconds: Some(_),
+                    ..
+                }) => time = time.or(Some(text)),
+                _ => {}
+            }
+        }
+    }
+    match (date, time) {
+        (Some(date), Some(time)) => Some(format!("{date} {time}")),
+        (date, time) => date.or(time),
+    }
+}

@@ -1,0 +1,134 @@
+//! Columns that have a value in some rows only: channels slower than the others of their table.
+
+use std::sync::Arc;
+
+use super::rows::Column;
+use crate::recording::{Axis, HoleKind, RateFrom};
+
+/// Fewest values that tell a slow channel.
+const FEWEST: usize = 3;
+
+/// Takes the empty cells out of a column of which more than half are empty, and the stamps beside them
+/// out of its axis: what is left is a channel of its own, slower than the rows. Without stamps the
+/// values must lie evenly, and the rate is divided by the rows between them.
+pub fn thin(column: &mut Column, axis: &mut Axis) {
+    let filled = filled(column);
+    let is_sparse = filled.len() >= FEWEST && 2 * filled.len() <= column.values.len();
+    if !is_sparse {
+        return;
+    }
+    let every = spacing(&filled);
+    // A rate that the user gave is that of the rows.
+    let stamps = axis
+        .stamps_s
+        .as_ref()
+        .filter(|_| axis.rate_from != RateFrom::Given);
+    let thinned = match (stamps, every) {
+        (Some(stamps), _) => of_stamps(axis, stamps, &filled),
+        (None, Some(every)) => of_rate(axis, filled[0], every),
+        (None, None) => return,
+    };
+    let Some(thinned) = thinned else {
+        return;
+    };
+    column.values = filled.iter().map(|row| column.values[*row]).collect();
+    column.holes = Vec::new();
+    *axis = thinned;
+}
+
+/// Rows with a value, if all others are empty.
+fn filled(column: &Column) -> Vec<usize> {
+    if column.holes.iter().any(|hole| hole.what != HoleKind::Empty) {
+        return Vec::new();
+    }
+    let mut holes = column.holes.iter().map(|hole| hole.index).peekable();
+    (0..column.values.len())
+        .filter(|row| holes.next_if_eq(row).is_none())
+        .collect()
+}
+
+/// Rows from value to value, if that is always the same.
+fn spacing(filled: &[usize]) -> Option<usize> {
+    let every = filled[1] - filled[0];
+    let even = filled.windows(2).all(|pair| pair[1] - pair[0] == every);
+    even.then_some(every)
+}
+
+fn of_stamps(axis: &Axis, stamps: &[f64], filled: &[usize]) -> Option<Axis> {
+    let own: Option<Vec<f64>> = filled.iter().map(|row| stamps.get(*row).copied()).collect();
+    let heading = match &axis.rate_from {
+        RateFrom::Stamps(heading) => heading.clone(),
+        _ => "time".to_owned(),
+    };
+    Some(Axis {
+        start_text: axis.start_text.clone(),
+        assumed: axis.assumed.clone(),
+        ..Axis::of_stamps(&heading, Arc::new(own?))
+    })
+}
+
+fn of_rate(axis: &Axis, first: usize, every: usize) -> Option<Axis> {
+    let rows_hz = axis.rate_hz?;
+    Some(Axis {
+        rate_hz: Some(crate::io::csv::without_rounding(rows_hz / every as f64)),
+        start_s: axis.start_s.map(|start_s| start_s + first as f64 / rows_hz),
+        stamps_s: None,
+        ..axis.clone()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::Hole;
+
+    /// A value in each row that the function takes.
+    fn column(rows: usize, has: impl Fn(usize) -> bool) -> Column {
+        let empty = |row: usize| Hole {
+            index: row,
+            line: row + 2,
+            what: HoleKind::Empty,
+        };
+        let mut column = Column::default();
+        column.values = (0..rows)
+            .map(|row| if has(row) { row as f64 } else { f64::NAN })
+            .collect();
+        column.holes = (0..rows).filter(|row| !has(*row)).map(empty).collect();
+        column
+    }
+
+    #[test]
+    fn every_fourth_row() {
+        let mut slow = column(42, |row| row % 4 == 1);
+        let mut axis = Axis::of_header("rate", 100.0, Some(5.0));
+        thin(&mut slow, &mut axis);
+        assert_eq!(slow.values[..3], [1.0, 5.0, 9.0]);
+        assert!(slow.holes.is_empty());
+        assert_eq!((axis.rate_hz, axis.start_s), (Some(25.0), Some(5.01)));
+    }
+
+    #[test]
+    fn now_and_then_with_stamps() {
+        let rows = [0, 3, 10, 13, 20, 23, 29];
+        let mut slow = column(30, |row| rows.contains(&row));
+        let stamps = (0..30).map(|row| f64::from(row) * 0.5).collect();
+        let mut axis = Axis::of_stamps("t", Arc::new(stamps));
+        thin(&mut slow, &mut axis);
+        assert_eq!(slow.values.len(), rows.len());
+        assert_eq!(axis.stamps_s.unwrap()[..3], [0.0, 1.5, 5.0]);
+    }
+
+    #[test]
+    fn gaps_stay_gaps() {
+        let mut gappy = column(30, |row| row != 7 && row != 8);
+        let mut axis = Axis::of_header("rate", 100.0, None);
+        let (before, same) = (gappy.values.len(), axis.clone());
+        thin(&mut gappy, &mut axis);
+        assert_eq!((gappy.values.len(), gappy.holes.len()), (before, 2));
+        assert_eq!(axis, same);
+        // Uneven, and nothing says when they were taken.
+        let mut uneven = column(30, |row| [0, 3, 10, 13, 20].contains(&row));
+        thin(&mut uneven, &mut axis);
+        assert_eq!(uneven.values.len(), 30);
+    }
+}

@@ -1,0 +1,304 @@
+//! Channels of one file on one uniform time axis, for the verbs that need records as a whole.
+
+use std::sync::Arc;
+
+use torqcomp_dsp::resample::{Resampled, Resampler};
+
+use crate::failure::Failure;
+use crate::io::csv::{NamedUnit, Options, Place};
+use crate::recording::{self, Recording, Selection};
+use crate::report::{self, Warning};
+
+/// Largest distance of stamps from a uniform grid, or from those of another channel, that is none, in
+/// steps.
+const JITTER: f64 = 0.05;
+/// The same for each step of the record: the rounding of the rate.
+const DRIFT: f64 = 1e-6;
+/// Distance, in steps, from which a grid is not that of the stamps any more.
+const HALF: f64 = 0.5;
+/// Largest relative difference of rates that resampling may bridge.
+const SIMILAR: f64 = 0.05;
+/// Relative difference of rates that is none.
+const SAME_RATE: f64 = 1e-6;
+
+/// A channel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Track {
+    /// Its name.
+    pub name: String,
+    /// Its samples, in the unit of the file.
+    pub samples: Vec<f64>,
+    /// That unit, if it is known.
+    pub unit: Option<NamedUnit>,
+}
+
+/// Channels with a sample each at every moment.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Together {
+    /// Name of the file, for people.
+    pub source: String,
+    /// Samples a second.
+    pub rate_hz: f64,
+    /// Time of the first sample, in seconds.
+    pub start_s: f64,
+    /// The channels, in the order in which they were asked for.
+    pub tracks: Vec<Track>,
+    /// What should be known of the file and of how its channels were brought together.
+    pub warnings: Vec<Warning>,
+    /// What was lost of the file, if anything.
+    pub lost: Option<Warning>,
+}
+
+impl Together {
+    /// Reads the channels that the options name, out of a file of any format.
+    ///
+    /// # Errors
+    /// If one is not there, has no rate or holds no number somewhere, or if they do not lie on one time
+    /// axis and cannot be brought there.
+    pub fn read(place: &Place, wanted: &[Options]) -> Result<Self, Failure> {
+        let recording = recording::read_channels(place, wanted)?;
+        Self::of(&recording, wanted).map_err(|failure| failure.at(&recording.source))
+    }
+
+    /// The channels that the options name.
+    ///
+    /// # Errors
+    /// See [`Together::read`].
+    pub fn of(recording: &Recording, wanted: &[Options]) -> Result<Self, Failure> {
+        let mut chosen = Vec::new();
+        for options in wanted {
+            let selection = recording.select(options)?;
+            whole(&selection)?;
+            chosen.push(selection);
+        }
+        let Some(first) = chosen.first() else {
+            return Err(Failure::usage("no channel was asked for"));
+        };
+        let is_given = wanted.iter().any(|options| options.rate_hz.is_some());
+        let mut together = Self {
+            source: recording.source.clone(),
+            rate_hz: first.rate_hz,
+            start_s: first.start_s,
+            tracks: Vec::new(),
+            warnings: recording.warnings.clone(),
+            lost: recording.lost.clone(),
+        };
+        let is_text = recording.format != "mcap";
+        if is_given || is_one_axis(&chosen, is_text)? {
+            together
+                .warnings
+                .extend(chosen.iter().filter(|_| !is_given).find_map(irregular));
+            let count = chosen.iter().map(|c| c.samples.len()).min().unwrap_or(0);
+            let track = |c: &Selection| track(c, c.samples[..count].to_vec());
+            together.tracks = chosen.iter().map(track).collect();
+        } else {
+            together.resample(&chosen)?;
+        }
+        Ok(together)
+    }
+
+    /// Interpolates all channels on a grid with the step of the first one, over the time that all have.
+    fn resample(&mut self, chosen: &[Selection]) -> Result<(), Failure> {
+        let stamps: Vec<Arc<Vec<f64>>> = chosen
+            .iter()
+            .filter_map(|c| c.channel.axis.stamps_s.clone())
+            .filter(|stamps| !stamps.is_empty())
+            .collect();
+        if stamps.len() < chosen.len() {
+            return Err(differ(chosen));
+        }
+        let start_s = stamps
+            .iter()
+            .map(|t| t[0])
+            .fold(f64::NEG_INFINITY, f64::max);
+        let end_s = stamps
+            .iter()
+            .map(|t| t[t.len() - 1])
+            .fold(f64::INFINITY, f64::min);
+        let count = ((end_s - start_s) * self.rate_hz + 1e-6).floor() + 1.0;
+        if count.is_nan() || count < 2.0 {
+            return Err(Failure::failed(format_args!(
+                "{} were not recorded at the same time; choose channels of one record",
+                names(chosen)
+            )));
+        }
+        let mut worst = Resampled::default();
+        for (c, stamps) in chosen.iter().zip(&stamps) {
+            let mut resampler = Resampler::on_grid(1.0 / self.rate_hz, start_s)?;
+            let mut samples = Vec::new();
+            for (stamp, value) in stamps.iter().zip(c.samples) {
+                resampler.push(*stamp, *value, &mut samples)?;
+            }
+            let done = resampler.finish(&mut samples);
+            worst.gaps = worst.gaps.max(done.gaps);
+            worst.repeated = worst.repeated.max(done.repeated);
+            worst.bridged = worst.bridged.max(done.bridged);
+            worst.longest_step_s = worst.longest_step_s.max(done.longest_step_s);
+            worst.largest_jitter = worst.largest_jitter.max(done.largest_jitter);
+            samples.truncate(count as usize);
+            self.tracks.push(track(c, samples));
+        }
+        let shortest = self
+            .tracks
+            .iter()
+            .map(|t| t.samples.len())
+            .min()
+            .unwrap_or(0);
+        self.tracks
+            .iter_mut()
+            .for_each(|t| t.samples.truncate(shortest));
+        self.start_s = start_s;
+        self.warnings.push(self.resampled(chosen, &worst));
+        Ok(())
+    }
+
+    fn resampled(&self, chosen: &[Selection], done: &Resampled) -> Warning {
+        let several = chosen.len() > 1;
+        let mut message = format!(
+            "{} {} interpolated to {} Hz from {} s on, because the time stamps {} (jitter up to {} % of a \
+             step)",
+            names(chosen),
+            if several { "were" } else { "was" },
+            report::short(self.rate_hz),
+            report::short(self.start_s),
+            if several {
+                "are not uniform or not the same"
+            } else {
+                "are not uniform"
+            },
+            report::rounded(100.0 * done.largest_jitter, 2),
+        );
+        if done.gaps > 0 {
+            message += &format!(
+                "; {} gap(s), the longest of {} s, were bridged by straight lines: do not trust what is \
+                 found from them",
+                done.gaps,
+                report::rounded(done.longest_step_s, 4)
+            );
+        }
+        if done.repeated > 0 {
+            message += &format!("; {} repeated stamp(s) were left out", done.repeated);
+        }
+        Warning::new("resampled", message)
+    }
+}
+
+fn track(selection: &Selection, samples: Vec<f64>) -> Track {
+    Track {
+        name: selection.channel.name.clone(),
+        samples,
+        unit: selection.unit.clone(),
+    }
+}
+
+/// Refuses samples that are not there.
+fn whole(selection: &Selection) -> Result<(), Failure> {
+    let name = &selection.channel.name;
+    if let Some(hole) = selection.channel.holes.first() {
+        return Err(Failure::failed(format_args!(
+            "line {}: the channel \"{name}\" has no number there; remove the line or repair it",
+            hole.line
+        )));
+    }
+    match selection.samples.iter().position(|v| !v.is_finite()) {
+        None => Ok(()),
+        Some(place) => Err(Failure::failed(format_args!(
+            "sample {} of \"{name}\" is no finite number; repair it or cut the record there",
+            place + 1
+        ))),
+    }
+}
+
+/// Whether all channels have their samples at the same moments, a uniform step apart. Stamps in a text
+/// are rounded: interpolating between them would make noise out of that, so that of a text only the
+/// moments must be the same.
+///
+/// # Errors
+/// If their rates are too different to be brought together, or nothing says how they lie.
+fn is_one_axis(chosen: &[Selection], is_text: bool) -> Result<bool, Failure> {
+    let first = &chosen[0];
+    let stamps = |c: &Selection| c.channel.axis.stamps_s.clone();
+    let is_uniform = stamps(first).is_none_or(|stamps| uniform(&stamps, first.rate_hz));
+    let mut same = is_text || is_uniform;
+    for other in &chosen[1..] {
+        let rates = other.rate_hz / first.rate_hz - 1.0;
+        if rates.abs() > SIMILAR {
+            return Err(differ(chosen));
+        }
+        same &= match (stamps(first), stamps(other)) {
+            (Some(a), Some(b)) => Arc::ptr_eq(&a, &b) || is_same(&a, &b, first.rate_hz),
+            (None, None) => {
+                let apart_s = (other.start_s - first.start_s).abs();
+                if rates.abs() > SAME_RATE || apart_s * first.rate_hz > JITTER {
+                    return Err(differ(chosen));
+                }
+                true
+            }
+            _ => return Err(differ(chosen)),
+        };
+    }
+    Ok(same)
+}
+
+/// A warning if the stamps of a channel lie more than half a step from the grid of its rate.
+fn irregular(selection: &Selection) -> Option<Warning> {
+    let stamps = selection.channel.axis.stamps_s.as_ref()?;
+    let first = *stamps.first()?;
+    let off = |(i, t): (usize, &f64)| ((t - first) * selection.rate_hz - i as f64).abs();
+    let worst = stamps.iter().enumerate().map(off).fold(0.0, f64::max);
+    (worst > HALF).then(|| {
+        Warning::new(
+            "irregular-time-stamps",
+            format!(
+                "the time stamps of \"{}\" lie up to {} steps from a uniform {} Hz, which was assumed; \
+                 torqcomp extract --resample brings them onto a grid",
+                selection.channel.name,
+                report::rounded(worst, 3),
+                report::short(selection.rate_hz)
+            ),
+        )
+    })
+}
+
+/// Whether stamps are as good as uniform.
+#[must_use]
+pub fn uniform(stamps_s: &[f64], rate_hz: f64) -> bool {
+    let first = stamps_s.first().copied().unwrap_or(0.0);
+    stamps_s
+        .iter()
+        .enumerate()
+        .all(|(i, t)| ((t - first) * rate_hz - i as f64).abs() < JITTER + DRIFT * i as f64)
+}
+
+/// Whether stamps are as good as the same, as far as both go.
+fn is_same(a: &[f64], b: &[f64], rate_hz: f64) -> bool {
+    a.iter()
+        .zip(b)
+        .all(|(a, b)| ((a - b) * rate_hz).abs() < JITTER)
+}
+
+fn names(chosen: &[Selection]) -> String {
+    let names = chosen.iter().map(|c| format!("\"{}\"", c.channel.name));
+    crate::io::csv::list(names)
+}
+
+fn differ(chosen: &[Selection]) -> Failure {
+    let one = |c: &Selection| {
+        format!(
+            "\"{}\" has {} Hz from {} s on",
+            c.channel.name,
+            report::short(c.rate_hz),
+            report::short(c.start_s)
+        )
+    };
+    let all: Vec<String> = chosen.iter().map(one).collect();
+    Failure::failed(format_args!(
+        "the channels do not lie on one time axis: {}; record them at one rate, or bring one to the rate \
+         of the other with torqcomp extract --resample --rate HZ first",
+        all.join(", ")
+    ))
+}
+
+#[cfg(test)]
+#[path = "together_tests.rs"]
+mod tests;

@@ -1,0 +1,192 @@
+use super::*;
+use crate::recording::{Axis, Channel};
+
+fn channel(name: &str, axis: Axis, of: impl Fn(f64) -> f64) -> Channel {
+    let times: Vec<f64> = match &axis.stamps_s {
+        Some(stamps) => stamps.to_vec(),
+        None => (0..400)
+            .map(|i| f64::from(i) / axis.rate_hz.unwrap())
+            .collect(),
+    };
+    Channel {
+        name: name.to_owned(),
+        heading: name.to_owned(),
+        unit: None,
+        unit_text: None,
+        samples: times.into_iter().map(of).collect(),
+        holes: Vec::new(),
+        axis,
+        segment: None,
+    }
+}
+
+fn recording(format: &'static str, channels: Vec<Channel>) -> Recording {
+    Recording {
+        source: "record".to_owned(),
+        format,
+        dialect: String::new(),
+        details: Vec::new(),
+        channels,
+        segments: Vec::new(),
+        warnings: Vec::new(),
+        lost: None,
+    }
+}
+
+fn named(name: &str) -> Options {
+    Options {
+        channel: Some(name.to_owned()),
+        ..Options::default()
+    }
+}
+
+fn both(recording: &Recording) -> Result<Together, Failure> {
+    Together::of(recording, &[named("a"), named("b")])
+}
+
+/// Stamps a millisecond apart, each off by up to so much of that.
+fn stamps(first_s: f64, jitter: f64) -> Axis {
+    let off = |i: u32| jitter * (f64::from(i) * 2.4).sin();
+    let all = (0..400)
+        .map(|i| first_s + 1e-3 * (f64::from(i) + off(i)))
+        .collect();
+    Axis::of_stamps("t", Arc::new(all))
+}
+
+fn wave(time_s: f64) -> f64 {
+    (std::f64::consts::TAU * 12.0 * time_s).sin()
+}
+
+#[test]
+fn the_same_stamps_are_taken_as_they_are() {
+    let record = recording(
+        "mcap",
+        vec![
+            channel("a", stamps(5.0, 0.0), wave),
+            channel("b", stamps(5.0, 0.0), |t| t),
+        ],
+    );
+    let found = both(&record).unwrap();
+    assert_eq!(found.tracks[0].samples, record.channels[0].samples);
+    assert_eq!(found.tracks[1].samples, record.channels[1].samples);
+    assert!(found.warnings.is_empty());
+    assert!((found.start_s - 5.0).abs() < 1e-12 && (found.rate_hz - 1000.0).abs() < 1e-6);
+}
+
+#[test]
+fn messages_at_other_moments_are_interpolated_and_that_is_said() {
+    let record = recording(
+        "mcap",
+        vec![
+            channel("a", stamps(5.0, 0.08), wave),
+            channel("b", stamps(5.0103, 0.08), wave),
+        ],
+    );
+    let found = both(&record).unwrap();
+    assert_eq!(found.warnings[0].code, "resampled");
+    let [a, b] = [&found.tracks[0].samples, &found.tracks[1].samples];
+    assert!(a.len() == b.len() && a.len() > 380);
+    // Both channels hold the same wave, so that they must agree where they overlap.
+    for (i, (a, b)) in a.iter().zip(b).enumerate() {
+        let truth = wave(found.start_s + i as f64 / found.rate_hz);
+        assert!(
+            (a - truth).abs() < 2e-6 && (b - truth).abs() < 2e-6,
+            "{i}: {a} {b} {truth}"
+        );
+    }
+}
+
+#[test]
+fn rates_that_differ_are_refused() {
+    let slow = Axis::of_stamps(
+        "t",
+        Arc::new((0..100).map(|i| f64::from(i) * 4e-3).collect()),
+    );
+    for format in ["mcap", "csv"] {
+        let record = recording(
+            format,
+            vec![
+                channel("a", stamps(0.0, 0.0), wave),
+                channel("b", slow.clone(), wave),
+            ],
+        );
+        let said = both(&record).unwrap_err().to_string();
+        assert!(said.contains("\"b\" has 250 Hz"), "{said}");
+    }
+    let late = Axis::of_header("dt", 1000.0, Some(0.25));
+    let first = Axis::of_header("dt", 1000.0, Some(0.0));
+    let record = recording(
+        "csv",
+        vec![channel("a", first, wave), channel("b", late, wave)],
+    );
+    assert!(
+        both(&record)
+            .unwrap_err()
+            .to_string()
+            .contains("from 0.25 s on")
+    );
+}
+
+#[test]
+fn records_of_different_times_are_refused() {
+    let record = recording(
+        "mcap",
+        vec![
+            channel("a", stamps(0.0, 0.0), wave),
+            channel("b", stamps(90.0, 0.0), wave),
+        ],
+    );
+    let said = both(&record).unwrap_err().to_string();
+    assert!(said.contains("same time"), "{said}");
+}
+
+#[test]
+fn rounded_stamps_of_a_text_are_not_interpolated() {
+    let rounded = Axis::of_stamps(
+        "t",
+        Arc::new(
+            (0..400)
+                .map(|i| (f64::from(i) * 3.3).round() * 1e-3)
+                .collect(),
+        ),
+    );
+    let record = recording(
+        "csv",
+        vec![
+            channel("a", rounded.clone(), wave),
+            channel("b", rounded, wave),
+        ],
+    );
+    let found = both(&record).unwrap();
+    assert_eq!(found.tracks[0].samples, record.channels[0].samples);
+    assert!(found.warnings.is_empty(), "{:?}", found.warnings);
+    // A gap is another thing.
+    let mut gap: Vec<f64> = (0..400).map(|i| f64::from(i) * 1e-3).collect();
+    gap[200..].iter_mut().for_each(|t| *t += 0.02);
+    let gap = Axis::of_stamps("t", Arc::new(gap));
+    let record = recording(
+        "csv",
+        vec![channel("a", gap.clone(), wave), channel("b", gap, wave)],
+    );
+    assert_eq!(
+        both(&record).unwrap().warnings[0].code,
+        "irregular-time-stamps"
+    );
+}
+
+#[test]
+fn samples_that_are_no_numbers_are_refused() {
+    let record = recording(
+        "mcap",
+        vec![
+            channel("a", stamps(0.0, 0.0), wave),
+            channel("b", stamps(0.0, 0.0), |_| f64::NAN),
+        ],
+    );
+    assert!(
+        both(&record)
+            .unwrap_err()
+            .to_string()
+            .contains("sample 1 of \"b\"")
+    );
+}

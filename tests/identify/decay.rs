@@ -1,0 +1,240 @@
+//! Decays: how exact they are, how often the intervals hold the truth, modes and laws of damping.
+
+use nalgebra::DMatrix;
+use torqcomp::identify::decay;
+
+use super::{Coverage, Noise, TAU, of, times};
+use crate::util::assert_close;
+
+fn ring(times_s: &[f64], values: &[f64], rate_hz: f64) -> decay::Evaluated {
+    let record = decay::Ringing {
+        name: "simulated",
+        times_s,
+        rate_hz: Some(rate_hz),
+        values,
+    };
+    decay::identify(&[record], &decay::Options::default()).unwrap()
+}
+
+/// The stand of figure 5: 1.7 ms a cycle, from 2 to 0.5 in 5.3 ms.
+const OMEGA: f64 = TAU / 1.7e-3;
+
+fn sigma() -> f64 {
+    4.0_f64.ln() / 5.3e-3
+}
+
+/// A decay of that stand with an offset and noise so many decibels below its first amplitude.
+pub fn figure_5(decibel: f64, noise: &mut Noise) -> (Vec<f64>, Vec<f64>, f64) {
+    let rate_hz = 40_000.0;
+    let t = times(1200, rate_hz);
+    let size = 2.0 * 10_f64.powf(-decibel / 20.0);
+    let y = t
+        .iter()
+        .map(|t| 2.0 * (-sigma() * t).exp() * (OMEGA * t).cos() + 0.1 + size * noise.normal())
+        .collect();
+    (t, y, rate_hz)
+}
+
+#[test]
+fn intervals_of_decays_cover_the_truth() {
+    let natural = OMEGA.hypot(sigma());
+    // As recorded, and at a lower rate.
+    for (band_hz, seed) in [(None, 11), (Some((100.0, 2000.0)), 19)] {
+        let mut noise = Noise(seed);
+        let mut covered = [Coverage::default(), Coverage::default()];
+        for k in 0..240 {
+            let decibel = [60.0, 50.0, 40.0, 30.0, 20.0][k % 5];
+            let (t, y, rate_hz) = figure_5(decibel, &mut noise);
+            let record = decay::Ringing {
+                name: "simulated",
+                times_s: &t,
+                rate_hz: Some(rate_hz),
+                values: &y,
+            };
+            let options = decay::Options {
+                band_hz,
+                ..Default::default()
+            };
+            let found = decay::identify(&[record], &options).unwrap();
+            assert_eq!(found.fit.poles.len(), 1, "at {decibel} dB");
+            covered[0].count(of(&found.outcome, "natural_frequency"), natural / TAU);
+            covered[1].count(of(&found.outcome, "damping_ratio"), sigma() / natural);
+        }
+        covered[0].check(&format!("decays, frequency, band {band_hz:?}"));
+        covered[1].check(&format!("decays, damping, band {band_hz:?}"));
+    }
+}
+
+/// Least standard deviations of frequency (Hz) and decay rate (1/s) that any unbiased estimator can have
+/// (Cramér and Rao), from the sensitivities of Ae^{−σt}cos(ωt + φ) + c + dt to σ, ω, A, φ, c, d.
+fn least_std(t: &[f64], (amplitude, sigma, omega): (f64, f64, f64), std: f64) -> (f64, f64) {
+    let length = t[t.len() - 1];
+    let rows = DMatrix::from_fn(t.len(), 6, |i, j| {
+        let fall = amplitude * (-sigma * t[i]).exp();
+        let (sin, cos) = (omega * t[i]).sin_cos();
+        [
+            -t[i] * fall * cos,
+            -t[i] * fall * sin,
+            fall * cos,
+            -fall * sin,
+            1.0,
+            t[i] / length,
+        ][j]
+    });
+    let bound = rows.tr_mul(&rows).try_inverse().expect("regular") * std * std;
+    (bound[(1, 1)].sqrt() / TAU, bound[(0, 0)].sqrt())
+}
+
+/// A stand: σ in 1/s, ω in rad/s, samples a second, seconds, decays one after another.
+struct Stand {
+    sigma: f64,
+    omega: f64,
+    rate_hz: f64,
+    length_s: f64,
+    decays: u32,
+}
+
+impl Stand {
+    /// Decays of amplitude 2 with noise 40 dB below it.
+    fn record(&self, noise: &mut Noise) -> (Vec<f64>, Vec<f64>) {
+        let each = (self.length_s * self.rate_hz) as usize;
+        let t = times(each * self.decays as usize, self.rate_hz);
+        let one = |(i, _): (usize, &f64)| {
+            let t = (i % each) as f64 / self.rate_hz;
+            2.0 * (-self.sigma * t).exp() * (self.omega * t).cos() + 0.1 + 0.02 * noise.normal()
+        };
+        let y = t.iter().enumerate().map(one).collect();
+        (t, y)
+    }
+
+    /// Errors of frequency and damping ratio over the true ones, and of the bounds of both.
+    fn errors(&self, noise: &mut Noise) -> ([f64; 2], [f64; 2]) {
+        let (t, y) = self.record(noise);
+        let found = ring(&t, &y, self.rate_hz);
+        assert_eq!(found.stretches.len(), self.decays as usize);
+        let natural = self.omega.hypot(self.sigma);
+        let frequency = of(&found.outcome, "damped_frequency").value * TAU / self.omega - 1.0;
+        let ratio = of(&found.outcome, "damping_ratio").value * natural / self.sigma - 1.0;
+        // Each stretch begins where the fit lets it begin; decays add their information.
+        let (mut of_frequency, mut of_rate) = (0.0, 0.0);
+        for (start, stretch) in found.starts_s.iter().zip(&found.stretches) {
+            let late = start % self.length_s;
+            let amplitude = 2.0 * (-self.sigma * late).exp();
+            let truth = (amplitude, self.sigma, self.omega);
+            let (frequency, rate) = least_std(&stretch.times_s, truth, 0.02);
+            of_frequency += frequency.powi(-2);
+            of_rate += rate.powi(-2);
+        }
+        let bounds = [
+            of_frequency.powf(-0.5) * TAU / self.omega,
+            of_rate.powf(-0.5) / self.sigma,
+        ];
+        ([frequency, ratio], bounds)
+    }
+}
+
+/// Every record within 0.02 % of the frequency and 1 % of the damping ratio, and the spread no more
+/// than 1.3 times the bound. One decay of the stand of figure 5 at 40 kHz does not hold 0.02 %: its bound is
+/// 0.016 %, so that one record in five would miss it whatever is done; six hits at 50 kHz do.
+#[test]
+fn decays_are_as_exact_as_the_noise_allows() {
+    let of_thesis = Stand {
+        sigma: sigma(),
+        omega: OMEGA,
+        rate_hz: 50_000.0,
+        length_s: 0.016,
+        decays: 6,
+    };
+    let light = Stand {
+        sigma: 20.0,
+        omega: TAU * 590.0,
+        rate_hz: 20_000.0,
+        length_s: 0.12,
+        decays: 1,
+    };
+    for (stand, seed) in [(of_thesis, 12), (light, 18)] {
+        let mut noise = Noise(seed);
+        let mut squares = [0.0; 2];
+        let mut bounds = [0.0; 2];
+        let runs = 60;
+        for _ in 0..runs {
+            let (errors, least) = stand.errors(&mut noise);
+            assert!(
+                errors[0].abs() < 2e-4 && errors[1].abs() < 1e-2,
+                "{errors:?}"
+            );
+            for i in 0..2 {
+                squares[i] += errors[i].powi(2) / f64::from(runs);
+                bounds[i] += least[i] / f64::from(runs);
+            }
+        }
+        for i in 0..2 {
+            let ratio = squares[i].sqrt() / bounds[i];
+            println!("std {:.2e}, over the bound {ratio:.3}", squares[i].sqrt());
+            // 60 runs tell a standard deviation to 9 %.
+            assert!(ratio < 1.3, "{i}: {ratio} times the bound");
+        }
+    }
+}
+
+#[test]
+fn several_modes_and_hits_are_found() {
+    let mut noise = Noise(13);
+    let rate_hz = 20_000.0;
+    let t = times(12_000, rate_hz);
+    let hit = |t: f64, size: f64| {
+        if t < 0.0 {
+            return 0.0;
+        }
+        let one = (-80.0 * t).exp() * (TAU * 590.0 * t).sin();
+        size * (one + 0.4 * (-120.0 * t).exp() * (TAU * 1480.0 * t).sin())
+    };
+    let y: Vec<f64> = t
+        .iter()
+        .map(|t| hit(t - 0.02, 1.0) + hit(t - 0.3, 0.7) + 0.01 * t + 1e-3 * noise.normal())
+        .collect();
+    let found = ring(&t, &y, rate_hz);
+    assert_eq!((found.fit.poles.len(), found.stretches.len()), (2, 2));
+    for (name, want, within) in [
+        ("mode_1_damped_frequency", 590.0, 2e-4),
+        ("mode_1_decay_rate", 80.0, 1e-2),
+        ("mode_2_damped_frequency", 1480.0, 2e-4),
+        ("mode_2_decay_rate", 120.0, 2e-2),
+    ] {
+        assert_close(of(&found.outcome, name).value, want, within);
+    }
+}
+
+#[test]
+fn the_law_of_damping_is_told() {
+    let mut noise = Noise(14);
+    let rate_hz = 10_000.0;
+    let t = times(4000, rate_hz);
+    let mut law = |envelope: &dyn Fn(f64) -> f64| {
+        let y: Vec<f64> = t
+            .iter()
+            .map(|t| envelope(*t) * (TAU * 120.0 * t).cos() + 2e-3 * noise.normal())
+            .collect();
+        ring(&t, &y, rate_hz)
+    };
+    let dry = law(&|t| (1.0 - 3.0 * t).max(0.0));
+    assert_eq!(dry.laws[0].law, decay::Law::Dry);
+    assert!(dry.outcome.warnings.iter().any(|w| w.code == "not-viscous"));
+    let drag = law(&|t| 1.0 / (1.0 + 20.0 * t));
+    assert_eq!(drag.laws[0].law, decay::Law::Quadratic);
+    let viscous = law(&|t| (-12.0 * t).exp());
+    assert!(
+        !viscous
+            .outcome
+            .warnings
+            .iter()
+            .any(|w| w.code == "not-viscous")
+    );
+    let both = law(&|t| ((1.0 + 0.1) * (-6.0 * t).exp() - 0.1).max(0.0));
+    assert!(
+        both.outcome
+            .warnings
+            .iter()
+            .any(|w| w.code == "amplitude-dependent" || w.code == "not-viscous")
+    );
+}

@@ -1,0 +1,282 @@
+//! `identify` through the binary: reports, stand files, pages, refusals.
+
+use super::decay::figure_5;
+use super::{Noise, TAU, parameter};
+use crate::util::{Folder, assert_close};
+
+fn decay_file(folder: &Folder) {
+    let mut noise = Noise(17);
+    let (t, y, _) = figure_5(60.0, &mut noise);
+    let rows: String = t
+        .iter()
+        .zip(&y)
+        .map(|(t, y)| format!("{t},{y}\n"))
+        .collect();
+    folder.write("decay.csv", format!("time_s,gage_mV\n{rows}"));
+}
+
+/// C7 to C21 from figure 5's numbers and the inertia of the thesis, as in `thesis::mechanics`.
+#[test]
+fn figure_5_gives_the_constants_of_the_thesis() {
+    let folder = Folder::new();
+    decay_file(&folder);
+    let report = folder.json(&[
+        "identify",
+        "decay",
+        "decay.csv",
+        "--inertia",
+        "5.85e-3 slug ft^2",
+        "--units",
+        "us",
+        "--json",
+        "--stand",
+        "stand.toml",
+    ]);
+    assert_eq!(report["schema"], "torqcomp.identify/1");
+    for (name, want, unit) in [
+        ("damped_frequency", 588.235, "Hz"),
+        ("decay_rate", 261.56, "1/s"),
+        ("damping_ratio", 0.070593, ""),
+        ("natural_frequency", 589.707, "Hz"),
+        ("damping", 3.0603, "ft lbf s/rad"),
+        ("stiffness", 80_314.0, "ft lbf/rad"),
+    ] {
+        let (value, std, got) = parameter(&report, name);
+        assert_close(value, want, 1.5e-3);
+        assert_eq!(got, unit, "{name}");
+        assert!(std.is_some_and(|s| s > 0.0), "{name}");
+    }
+    assert_eq!(report["fit"]["unit"], "mV");
+}
+
+#[test]
+fn the_stand_file_is_updated_in_place() {
+    let folder = Folder::new();
+    decay_file(&folder);
+    let before = folder
+        .read("stand.toml")
+        .replace("[calibration]", "# weighed, not fitted\n[calibration]");
+    folder.write("stand.toml", &before);
+    folder
+        .run(&["identify", "decay", "decay.csv", "-o", "stand.toml"])
+        .says(0, &["anchor-without-std"]);
+    let after = folder.read("stand.toml");
+    assert!(
+        after.contains("inertia = \"5.85e-3 slug ft^2\"\n"),
+        "{after}"
+    );
+    assert!(
+        after.contains("# weighed, not fitted\n[calibration]"),
+        "{after}"
+    );
+    assert!(
+        after.contains("stiffness = { value = \"") && after.contains("std = \""),
+        "{after}"
+    );
+    assert!(
+        after.contains("source = \"identify decay: decay.csv\""),
+        "{after}"
+    );
+    // What is written is a stand file.
+    assert_eq!(folder.run(&["table", "--stand", "stand.toml"]).code, 0);
+    folder.write("other.toml", "a = 1\n");
+    folder
+        .run(&["identify", "decay", "decay.csv", "-o", "other.toml"])
+        .says(1, &["not a stand file"]);
+    assert_eq!(folder.read("other.toml"), "a = 1\n");
+}
+
+#[test]
+fn without_an_anchor_only_ratios_are_written() {
+    let folder = Folder::new();
+    decay_file(&folder);
+    folder
+        .run(&[
+            "identify",
+            "decay",
+            "decay.csv",
+            "-o",
+            "new.toml",
+            "--strict",
+        ])
+        .says(3, &["not-anchored", "--inertia"]);
+    let text = folder.read("new.toml");
+    assert!(
+        text.contains("natural_frequency") && text.contains("damping_ratio"),
+        "{text}"
+    );
+    assert!(!text.contains("stiffness"), "{text}");
+    assert_eq!(folder.run(&["table", "--stand", "new.toml"]).code, 0);
+}
+
+#[test]
+fn the_page_is_complete_in_itself() {
+    let folder = Folder::new();
+    decay_file(&folder);
+    let args = ["identify", "decay", "decay.csv", "--html", "page.html"];
+    assert_eq!(folder.run(&args).code, 0);
+    let page = folder.read("page.html");
+    for part in [
+        "<!DOCTYPE html>",
+        "natural frequency",
+        "Residual",
+        "<svg",
+        "prefers-color-scheme:dark",
+        "@media print",
+    ] {
+        assert!(page.contains(part), "{part}");
+    }
+    for outside in ["<script", "src=", "href=", "@import"] {
+        assert!(!page.contains(outside), "{outside}");
+    }
+    folder.run(&args).says(1, &["page.html exists", "--force"]);
+    let again = folder.run(&[
+        "identify",
+        "decay",
+        "decay.csv",
+        "--html",
+        "page.html",
+        "--force",
+    ]);
+    assert_eq!((again.code, folder.read("page.html")), (0, page));
+}
+
+#[test]
+fn what_cannot_be_identified_is_said() {
+    let folder = Folder::new();
+    decay_file(&folder);
+    let flat: String = (0..500)
+        .map(|i| format!("{},1\n", f64::from(i) * 1e-3))
+        .collect();
+    folder.write("flat.csv", format!("time_s,gage_V\n{flat}"));
+    folder
+        .run(&["identify", "decay", "flat.csv"])
+        .says(1, &["does not swing"]);
+    folder
+        .run(&["identify", "decay", "none.csv"])
+        .says(1, &["none.csv", "check the path"]);
+    folder.run(&["identify", "decay"]).says(2, &["INPUT"]);
+    let args = [
+        "identify",
+        "runup",
+        "decay.csv",
+        "--motion",
+        "gage",
+        "--torque",
+        "gage",
+    ];
+    folder.run(&args).says(1, &["mV", "expected an angle"]);
+    let args = ["identify", "decay", "decay.csv", "--inertia", "5"];
+    folder.run(&args).says(2, &["--inertia", "unit"]);
+}
+
+/// Noise up to half the rate and a file of it beside others, for what cannot be evaluated.
+fn table(folder: &Folder, name: &str, columns: &[(&str, Vec<f64>)]) {
+    let head: Vec<&str> = columns.iter().map(|c| c.0).collect();
+    let rows: String = (0..columns[0].1.len())
+        .map(|i| {
+            let cells: Vec<String> = columns.iter().map(|c| c.1[i].to_string()).collect();
+            format!("{},{}\n", f64::from(i as u32) * 1e-3, cells.join(","))
+        })
+        .collect();
+    folder.write(name, format!("time_s,{}\n{rows}", head.join(",")));
+}
+
+/// What was recorded of a filter of one mode at 60 Hz, by its recursion.
+fn ringing_filter(applied: &[f64]) -> Vec<f64> {
+    let (fall, turn) = (0.989_f64, (TAU * 0.06).cos());
+    let (mut last, mut before) = (0.0, 0.0);
+    applied
+        .iter()
+        .map(|x| {
+            let now = 2.0 * fall * turn * last - fall * fall * before + 0.05 * x;
+            before = last;
+            last = now;
+            now
+        })
+        .collect()
+}
+
+#[test]
+fn responses_of_nonsense_are_refused() {
+    let folder = Folder::new();
+    let mut noise = Noise(41);
+    let mut random = || (0..4000).map(|_| noise.normal()).collect::<Vec<f64>>();
+    let (x, unrelated) = (random(), random());
+    let y = ringing_filter(&x);
+    let heads = ["force_N m", "beam_N m"];
+    let both = |name: &str, a: &[f64], b: &[f64]| {
+        table(
+            &folder,
+            name,
+            &[(heads[0], a.to_vec()), (heads[1], b.to_vec())],
+        );
+    };
+    both("good.csv", &x, &y);
+    both("unrelated.csv", &x, &unrelated);
+    both("still.csv", &x, &[3.0; 4000]);
+    both("silent.csv", &[0.0; 4000], &y);
+    both("same.csv", &x, &x);
+    let run = |files: &[&str], applied: &str, measured: &str| {
+        let channels = ["--applied", applied, "--measured", measured];
+        folder.run(&[&["identify", "response"], files, &channels[..]].concat())
+    };
+    assert_eq!(run(&["good.csv"], "force", "beam").code, 0);
+    run(&["unrelated.csv"], "force", "beam")
+        .says(1, &["does not follow the applied one", "--band"]);
+    run(&["still.csv"], "force", "beam")
+        .says(1, &["still.csv", "measured channel does not change"]);
+    run(&["silent.csv"], "force", "beam").says(1, &["applied channel does not change"]);
+    run(&["same.csv"], "force", "beam").says(1, &["same numbers"]);
+    // Swapped: the answer would come before its cause.
+    let swapped = run(&["good.csv"], "beam", "force");
+    assert!(
+        swapped.stderr.contains("channels may be swapped"),
+        "{}",
+        swapped.stderr
+    );
+    // Another rate.
+    let slow = folder.read("good.csv").replace("0.001,", "0.0013,");
+    folder.write("odd.csv", slow);
+    run(&["odd.csv"], "force", "beam").says(1, &["not uniform", "--rate"]);
+}
+
+#[test]
+fn loads_and_runs_of_nonsense_are_refused() {
+    let folder = Folder::new();
+    let head = "weight_N m,bridge_V\n";
+    folder.write("flat.csv", format!("{head}0,1\n5,1\n10,1\n0,1\n"));
+    folder.write("wild.csv", format!("{head}0,1\n5,0.2\n10,7\n5,-3\n0,1\n"));
+    let loads = |file: &str, load: &str, reading: &str| {
+        folder.run(&[
+            "identify",
+            "static",
+            file,
+            "--load",
+            load,
+            "--reading",
+            reading,
+        ])
+    };
+    loads("flat.csv", "weight", "bridge").says(1, &["same under every load"]);
+    loads("wild.csv", "bridge", "weight").says(2, &["swapped"]);
+    loads("wild.csv", "weight", "bridge").says(0, &["poor-fit"]);
+    // An angle of the wrong sign.
+    let torque: Vec<f64> = (0..4000)
+        .map(|i| (TAU * 0.7e-3 * f64::from(i)).sin())
+        .collect();
+    let omega = TAU * 0.7;
+    let angle = torque.iter().map(|t| t / (omega * omega)).collect();
+    table(
+        &folder,
+        "run.csv",
+        &[("angle_rad", angle), ("torque_N m", torque)],
+    );
+    let args = [
+        "identify", "runup", "run.csv", "--motion", "angle", "--torque", "torque",
+    ];
+    folder.run(&args).says(0, &["impossible"]);
+    folder
+        .run(&[&args[..], &["-o", "new.toml"]].concat())
+        .says(1, &["inertia came out as -", "check the sign"]);
+}

@@ -1,0 +1,82 @@
+//! `identify` through the binary, and its estimators on simulated records. The records are made here,
+//! from closed forms or by small steps, with no code of the estimators.
+
+mod decay;
+mod files;
+mod response;
+mod runup;
+mod static_load;
+
+use serde_json::Value;
+use torqcomp::identify::{Found, Outcome};
+
+const TAU: f64 = std::f64::consts::TAU;
+
+/// Normal noise, the same on every run.
+struct Noise(u64);
+
+impl Noise {
+    fn uniform(&mut self) -> f64 {
+        // xorshift64*, S. Vigna.
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        ((self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
+    }
+
+    fn normal(&mut self) -> f64 {
+        (-2.0 * self.uniform().ln()).sqrt() * (TAU * self.uniform()).cos()
+    }
+}
+
+fn times(count: usize, rate_hz: f64) -> Vec<f64> {
+    (0..count).map(|i| i as f64 / rate_hz).collect()
+}
+
+fn of<'a>(outcome: &'a Outcome, name: &str) -> &'a Found {
+    outcome
+        .get(name)
+        .unwrap_or_else(|| panic!("{name} in {:?}", outcome.found))
+}
+
+/// Share of true values within 1.96 standard uncertainties.
+#[derive(Default)]
+struct Coverage {
+    inside: usize,
+    all: usize,
+}
+
+impl Coverage {
+    fn count(&mut self, found: &Found, truth: f64) {
+        let std = found
+            .std
+            .unwrap_or_else(|| panic!("{} has no uncertainty", found.name));
+        self.inside += usize::from((found.value - truth).abs() <= 1.96 * std);
+        self.all += 1;
+    }
+
+    fn check(&self, what: &str) {
+        let share = self.inside as f64 / self.all as f64;
+        println!("{what}: {} of {}", self.inside, self.all);
+        assert!(
+            (0.92..=0.98).contains(&share),
+            "{what}: {} of {}: {share}",
+            self.inside,
+            self.all
+        );
+    }
+}
+
+fn parameter(report: &Value, name: &str) -> (f64, Option<f64>, String) {
+    let all = report["parameters"].as_array().expect("parameters");
+    let found = all
+        .iter()
+        .find(|p| p["name"] == name)
+        .unwrap_or_else(|| panic!("{name} in {all:?}"));
+    let unit = found["unit"].as_str().expect("a unit").to_owned();
+    (
+        found["value"].as_f64().expect("a value"),
+        found["std"].as_f64(),
+        unit,
+    )
+}

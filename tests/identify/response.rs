@@ -1,0 +1,317 @@
+//! Responses: modes from noise, how exact they are and how often the intervals hold the truth.
+
+use nalgebra::DMatrix;
+use num_complex::Complex64;
+use realfft::RealFftPlanner;
+use serde_json::Value;
+use torqcomp::identify::response;
+
+use super::{Coverage, Noise, TAU, of, parameter};
+use crate::util::{Folder, assert_close};
+
+/// Noise up to 250 Hz and the answer: a part of a longer period, the response times the spectrum, so that
+/// nothing but the cut at both ends is approximate.
+fn driven(count: usize, noise: &mut Noise) -> (Vec<f64>, Vec<f64>) {
+    let length = (count * 3 / 2).next_power_of_two();
+    let step = RATE_HZ / length as f64;
+    let plan = RealFftPlanner::new().plan_fft_inverse(length);
+    let mut spectrum = vec![Complex64::ZERO; length / 2 + 1];
+    for line in &mut spectrum[1..(250.0 / step) as usize] {
+        *line = Complex64::new(noise.normal(), noise.normal());
+    }
+    let signal = |mut lines: Vec<Complex64>| {
+        let mut out = vec![0.0; length];
+        plan.process(&mut lines, &mut out).expect("lengths match");
+        out.truncate(count);
+        out
+    };
+    let answer = spectrum
+        .iter()
+        .enumerate()
+        .map(|(k, x)| x * response_at(TAU * step * k as f64, NATURAL, RATIO))
+        .collect();
+    (signal(spectrum), signal(answer))
+}
+
+#[test]
+fn a_mode_is_found_from_noise() {
+    let mut noise = Noise(16);
+    let (applied, shown) = driven(60_000, &mut noise);
+    let size = 0.01 * (shown.iter().map(|v| v * v).sum::<f64>() / shown.len() as f64).sqrt();
+    let measured: Vec<f64> = shown.iter().map(|v| v + size * noise.normal()).collect();
+    let record = response::Driven {
+        name: "n",
+        rate_hz: 1000.0,
+        applied: &applied,
+        measured: &measured,
+    };
+    let options = response::Options {
+        band_hz: Some((20.0, 150.0)),
+        ..Default::default()
+    };
+    let found = response::identify(&[record], &options).unwrap();
+    let outcome = &found.outcome;
+    let first = found
+        .modal
+        .poles
+        .iter()
+        .find(|p| (p.omega_rad_per_s / TAU - 60.0).abs() < 0.3);
+    let pole = first.unwrap_or_else(|| panic!("{:?}", outcome.found));
+    assert_close(pole.rate_per_s, 0.03 * TAU * 60.0, 0.05);
+}
+
+/// A stand of one mode at 60 Hz with a damping ratio of 0.03 and a gain of 1 at rest.
+const NATURAL: f64 = TAU * 60.0;
+const RATIO: f64 = 0.03;
+const RATE_HZ: f64 = 1000.0;
+
+/// H(jω) = ω_n²/(ω_n² − ω² + 2jζω_nω).
+fn response_at(omega: f64, natural: f64, ratio: f64) -> Complex64 {
+    natural * natural
+        / Complex64::new(
+            natural * natural - omega * omega,
+            2.0 * ratio * natural * omega,
+        )
+}
+
+/// Periods of a signal with lines up to 200 Hz of one size and random phases, and the steady answer.
+fn periods(length: usize, count: usize, noise: &mut Noise) -> (Vec<f64>, Vec<f64>) {
+    let step = RATE_HZ / length as f64;
+    let lines: Vec<(f64, f64)> = (1..(200.0 / step) as usize)
+        .map(|k| (TAU * step * k as f64, TAU * noise.uniform()))
+        .collect();
+    let one = |i: usize, shape: &dyn Fn(f64) -> Complex64| -> f64 {
+        let t = i as f64 / RATE_HZ;
+        let line = |(w, p): &(f64, f64)| (shape(*w) * Complex64::cis(w * t + p)).re;
+        lines.iter().map(line).sum()
+    };
+    let many = |shape: &dyn Fn(f64) -> Complex64| -> Vec<f64> {
+        let first: Vec<f64> = (0..length).map(|i| one(i, shape)).collect();
+        first.iter().copied().cycle().take(length * count).collect()
+    };
+    let applied = many(&|_| Complex64::ONE);
+    (applied, many(&|w| response_at(w, NATURAL, RATIO)))
+}
+
+/// Hits a second apart, bells of 3 ms to both sides, and the answer by Runge and Kutta's method in 32 steps
+/// a sample.
+fn hits(count: usize) -> (Vec<f64>, Vec<f64>) {
+    let force = |t: f64| (-0.5 * ((t - 0.05) / 0.003).powi(2)).exp();
+    let steps = 32;
+    let h = 1.0 / RATE_HZ / f64::from(steps);
+    let slope =
+        |t: f64, x: f64, v: f64| NATURAL * NATURAL * (force(t) - x) - 2.0 * RATIO * NATURAL * v;
+    let (mut x, mut v) = (0.0_f64, 0.0_f64);
+    let (mut applied, mut shown) = (Vec::new(), Vec::new());
+    for i in 0..1000 {
+        applied.push(force(f64::from(i) / RATE_HZ));
+        shown.push(x);
+        for k in 0..steps {
+            let t = (f64::from(i) + f64::from(k) / f64::from(steps)) / RATE_HZ;
+            let a = slope(t, x, v);
+            let b = slope(t + h / 2.0, x + h / 2.0 * v, v + h / 2.0 * a);
+            let c = slope(
+                t + h / 2.0,
+                x + h / 2.0 * (v + h / 2.0 * a),
+                v + h / 2.0 * b,
+            );
+            let d = slope(t + h, x + h * (v + h / 2.0 * b), v + h * c);
+            x += h * v + h * h / 6.0 * (a + b + c);
+            v += h / 6.0 * (a + 2.0 * b + 2.0 * c + d);
+        }
+    }
+    let many = |one: &[f64]| one.iter().copied().cycle().take(1000 * count).collect();
+    (many(&applied), many(&shown))
+}
+
+/// The measured signal with noise so many decibels below it.
+fn noisy(shown: &[f64], decibel: f64, noise: &mut Noise) -> (Vec<f64>, f64) {
+    let mean = shown.iter().map(|v| v * v).sum::<f64>() / shown.len() as f64;
+    let size = 10_f64.powf(-decibel / 20.0) * mean.sqrt();
+    (
+        shown.iter().map(|v| v + size * noise.normal()).collect(),
+        size,
+    )
+}
+
+fn one_mode(applied: &[f64], measured: &[f64], how: response::Excitation) -> response::Evaluated {
+    let record = response::Driven {
+        name: "simulated",
+        rate_hz: RATE_HZ,
+        applied,
+        measured,
+    };
+    let options = response::Options {
+        excitation: Some(how),
+        band_hz: Some((20.0, 150.0)),
+        modes: Some(1),
+        ..Default::default()
+    };
+    response::identify(&[record], &options).unwrap()
+}
+
+/// How many of 240 records hold the true frequency and damping ratio, 20 to 60 dB.
+fn coverage_of(how: response::Excitation, seed: u64) -> [Coverage; 2] {
+    let mut noise = Noise(seed);
+    let mut covered = [Coverage::default(), Coverage::default()];
+    let struck = hits(6);
+    for k in 0..240 {
+        let (applied, shown) = match how {
+            response::Excitation::Impact => struck.clone(),
+            response::Excitation::Periodic => periods(500, 7, &mut noise),
+            response::Excitation::Random => driven(20_000, &mut noise),
+        };
+        let (measured, _) = noisy(&shown, [20.0, 30.0, 40.0, 50.0, 60.0][k % 5], &mut noise);
+        let found = one_mode(&applied, &measured, how);
+        let truth = [NATURAL / TAU, RATIO];
+        for ((name, truth), coverage) in ["natural_frequency", "damping_ratio"]
+            .iter()
+            .zip(truth)
+            .zip(&mut covered)
+        {
+            coverage.count(of(&found.outcome, name), truth);
+        }
+    }
+    covered
+}
+
+#[test]
+fn intervals_of_responses_cover_the_truth() {
+    use response::Excitation::{Impact, Periodic, Random};
+    let all = std::thread::scope(|scope| {
+        let one = |(how, seed)| scope.spawn(move || coverage_of(how, seed));
+        let handles = [(Impact, 21), (Periodic, 22), (Random, 23)].map(one);
+        handles.map(|h| h.join().expect("the records are evaluated"))
+    });
+    for (covered, how) in all.iter().zip([Impact, Periodic, Random]) {
+        covered[0].check(&format!("{how:?}, frequency"));
+        covered[1].check(&format!("{how:?}, damping"));
+    }
+}
+
+/// Least standard deviations of ω_n and ζ, relative, from lines of one block with applied spectrum
+/// `applied`, noise of that power a line and `blocks` blocks. Unknown besides: gain and phase of the mode,
+/// a constant, and a term 1/ω² for what lies outside the band, as in the model that is fitted.
+fn least_std(lines: &[(f64, f64)], noise_power: f64, blocks: f64) -> [f64; 2] {
+    let columns = |omega: f64| {
+        let h = response_at(omega, NATURAL, RATIO);
+        let small = 1e-6;
+        let by_natural = (response_at(omega, NATURAL * (1.0 + small), RATIO) - h) / small;
+        let by_ratio = (response_at(omega, NATURAL, RATIO * (1.0 + small)) - h) / small;
+        // The residue's real and imaginary part: a gain, and a gain in quadrature that goes with ω.
+        let turned = h * Complex64::new(0.0, omega / NATURAL);
+        let far = Complex64::new((NATURAL / omega).powi(2), 0.0);
+        [by_natural, by_ratio, h, turned, Complex64::ONE, far]
+    };
+    let mut information = DMatrix::<f64>::zeros(6, 6);
+    for (omega, applied_power) in lines {
+        let row = columns(*omega);
+        for i in 0..6 {
+            for j in 0..6 {
+                // Real and imaginary part each have half the noise's power.
+                let both = (row[i].conj() * row[j]).re;
+                information[(i, j)] += 2.0 * blocks * applied_power * both / noise_power;
+            }
+        }
+    }
+    let bound = information.try_inverse().expect("regular");
+    [bound[(0, 0)].sqrt(), bound[(1, 1)].sqrt()]
+}
+
+/// At 40 dB every record is within 0.02 % of the frequency and 1 % of the damping ratio, and the
+/// spread no more than 1.3 times the bound.
+#[test]
+fn responses_are_as_exact_as_the_noise_allows() {
+    let mut noise = Noise(24);
+    let (length, used) = (1000, 8);
+    let (applied, shown) = periods(length, used + 1, &mut noise);
+    let runs = 120;
+    let mut squares = [0.0; 2];
+    let mut size = 0.0;
+    for _ in 0..runs {
+        let (measured, std) = noisy(&shown, 40.0, &mut noise);
+        size = std;
+        let found = one_mode(&applied, &measured, response::Excitation::Periodic);
+        let frequency = of(&found.outcome, "natural_frequency").value * TAU / NATURAL - 1.0;
+        let ratio = of(&found.outcome, "damping_ratio").value / RATIO - 1.0;
+        assert!(
+            frequency.abs() < 2e-4 && ratio.abs() < 1e-2,
+            "{frequency} {ratio}"
+        );
+        squares[0] += frequency.powi(2) / f64::from(runs);
+        squares[1] += ratio.powi(2) / f64::from(runs);
+    }
+    // A line of size 1 has the spectrum n/2, white noise n·s².
+    let n = length as f64;
+    let lines: Vec<(f64, f64)> = (20..=150)
+        .map(|k| (TAU * f64::from(k) * RATE_HZ / n, (n / 2.0).powi(2)))
+        .collect();
+    let least = least_std(&lines, n * size * size, used as f64);
+    for i in 0..2 {
+        let ratio = squares[i].sqrt() / least[i];
+        println!("std {:.2e}, over the bound {ratio:.3}", squares[i].sqrt());
+        assert!(ratio < 1.3, "{i}: {ratio} times the bound");
+    }
+}
+
+/// Torque in, torque out tells f/K and J/K; the stiffness of the stand file makes constants of them.
+#[test]
+fn constants_follow_from_a_declared_stiffness_with_its_uncertainty() {
+    let folder = Folder::new();
+    let mut noise = Noise(25);
+    let (applied, shown) = periods(500, 7, &mut noise);
+    let (measured, _) = noisy(&shown, 40.0, &mut noise);
+    let rows: String = (0..applied.len())
+        .map(|i| format!("{},{},{}\n", i as f64 / RATE_HZ, applied[i], measured[i]))
+        .collect();
+    folder.write("sweep.csv", format!("time_s,applied_N m,beam_N m\n{rows}"));
+    let stand = "schema = \"torqcomp.stand/1\"\n[mechanics]\n\
+                 stiffness = { value = \"5000 N m/rad\", std = \"50 N m/rad\" }\n";
+    folder.write("declared.toml", stand);
+    let args = [
+        "identify",
+        "response",
+        "sweep.csv",
+        "--applied",
+        "applied",
+        "--measured",
+        "beam",
+        "--modes",
+        "1",
+        "--band",
+        "20..150",
+        "--json",
+    ];
+    let bare = folder.json(&args);
+    let codes = |report: &Value| report["warnings"].to_string();
+    assert!(codes(&bare).contains("not-anchored"), "{}", codes(&bare));
+    let names = bare["parameters"].to_string();
+    assert!(
+        !names.contains("\"stiffness\"") && !names.contains("\"inertia\""),
+        "{names}"
+    );
+    let (ratio, ratio_std, unit) = parameter(&bare, "inertia_over_stiffness");
+    assert_close(ratio, NATURAL.powi(-2), 1e-3);
+    assert!(unit == "s^2" && ratio_std.is_some_and(|s| s < 1e-3 * ratio));
+    assert_close(
+        parameter(&bare, "damping_over_stiffness").0,
+        2.0 * RATIO / NATURAL,
+        1e-2,
+    );
+    let report = folder.json(&[&args[..], &["--stand", "declared.toml"]].concat());
+    let (inertia, std, _) = parameter(&report, "inertia");
+    assert_close(inertia, 5000.0 / NATURAL.powi(2), 1e-3);
+    // The anchor's 1 % and the record's own part.
+    assert!(
+        (0.0099..0.0102).contains(&(std.unwrap() / inertia)),
+        "{std:?}"
+    );
+    let (damping, std, _) = parameter(&report, "damping");
+    assert_close(damping, 5000.0 * 2.0 * RATIO / NATURAL, 1e-2);
+    assert!(std.unwrap() / damping > 0.0099);
+    let pairs = report["correlations"].to_string();
+    assert!(
+        pairs.contains("inertia") && pairs.contains("stiffness"),
+        "{pairs}"
+    );
+}

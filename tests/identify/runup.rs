@@ -1,0 +1,205 @@
+//! Run-ups: how often the intervals hold the truth. The records follow from closed forms.
+
+use torqcomp::identify::runup;
+
+use super::{Coverage, Noise, TAU, of};
+use crate::util::assert_close;
+
+/// A body with viscous and dry friction: `J v' + f v + F sgn v + C = T`.
+struct Body {
+    inertia: f64,
+    viscous: f64,
+    dry: f64,
+    offset: f64,
+}
+
+const BODY: Body = Body {
+    inertia: 0.25,
+    viscous: 0.4,
+    dry: 0.6,
+    offset: 0.15,
+};
+
+/// Sines that drive it: size in N m, angular frequency in rad/s, phase.
+type Drive = [(f64, f64, f64); 2];
+
+/// A stretch in which the body goes one way, or stands (way 0).
+#[derive(Clone, Copy)]
+struct Stretch {
+    start: f64,
+    way: f64,
+    speed: f64,
+    angle: f64,
+}
+
+impl Body {
+    fn torque(drive: &Drive, t: f64) -> f64 {
+        drive.iter().map(|(a, w, p)| a * (w * t + p).sin()).sum()
+    }
+
+    /// Speed of the steady part and its integral.
+    fn steady(&self, drive: &Drive, way: f64, t: f64) -> (f64, f64) {
+        let level = -(self.offset + self.dry * way) / self.viscous;
+        drive.iter().fold((level, level * t), |(v, x), (a, w, p)| {
+            let below = self.viscous.powi(2) + (self.inertia * w).powi(2);
+            let (sin, cos) = (w * t + p).sin_cos();
+            (
+                v + a * (self.viscous * sin - self.inertia * w * cos) / below,
+                x - a * (self.viscous * cos / w + self.inertia * sin) / below,
+            )
+        })
+    }
+
+    /// Speed and angle at a time of a stretch.
+    fn at(&self, drive: &Drive, s: &Stretch, t: f64) -> (f64, f64) {
+        if s.way == 0.0 {
+            return (0.0, s.angle);
+        }
+        let rate = self.viscous / self.inertia;
+        let (v0, x0) = self.steady(drive, s.way, s.start);
+        let (v, x) = self.steady(drive, s.way, t);
+        let rest = s.speed - v0;
+        let fall = (-rate * (t - s.start)).exp();
+        (
+            v + rest * fall,
+            s.angle + x - x0 + rest * (1.0 - fall) / rate,
+        )
+    }
+
+    /// Angles at those times, from rest.
+    fn angles(&self, drive: &Drive, times: &[f64]) -> Vec<f64> {
+        let free = |t: f64| Self::torque(drive, t) - self.offset;
+        let leaves = |t: f64| {
+            let way = free(t).signum();
+            if free(t).abs() > self.dry { way } else { 0.0 }
+        };
+        let mut now = Stretch {
+            start: 0.0,
+            way: leaves(0.0),
+            speed: 0.0,
+            angle: 0.0,
+        };
+        let mut before = 0.0;
+        let mut angles = Vec::with_capacity(times.len());
+        for t in times {
+            // Small steps to see a change of way, halved until the moment is exact.
+            while before < *t {
+                let to = (before + 1e-4).min(*t);
+                let over = |t: f64| match now.way {
+                    0.0 => free(t).abs() > self.dry,
+                    way => self.at(drive, &now, t).0 * way < 0.0,
+                };
+                if !over(to) {
+                    before = to;
+                    continue;
+                }
+                let (mut low, mut high) = (before, to);
+                for _ in 0..60 {
+                    let middle = 0.5 * (low + high);
+                    if over(middle) {
+                        high = middle;
+                    } else {
+                        low = middle;
+                    }
+                }
+                let angle = self.at(drive, &now, high).1;
+                now = Stretch {
+                    start: high,
+                    way: leaves(high),
+                    speed: 0.0,
+                    angle,
+                };
+                before = high + 1e-9;
+            }
+            angles.push(self.at(drive, &now, *t).1);
+        }
+        angles
+    }
+}
+
+/// Angle and torque at 1 kHz for 4 s, noise on the torque so many decibels below it.
+fn record(decibel: f64, noise: &mut Noise) -> (Vec<f64>, Vec<f64>) {
+    let drive = [
+        (3.0, TAU * 0.7, TAU * noise.uniform()),
+        (1.5, TAU * 1.9, TAU * noise.uniform()),
+    ];
+    let times = super::times(4000, 1000.0);
+    let size = 10_f64.powf(-decibel / 20.0) * (0.5_f64 * (9.0 + 2.25)).sqrt();
+    let torques = times
+        .iter()
+        .map(|t| Body::torque(&drive, *t) + size * noise.normal())
+        .collect();
+    (BODY.angles(&drive, &times), torques)
+}
+
+fn turning<'a>(angles: &'a [f64], torques: &'a [f64]) -> runup::Run<'a> {
+    runup::Run {
+        rate_hz: 1000.0,
+        motion: angles,
+        kind: runup::Motion::Position,
+        effort: torques,
+        body: runup::Body::Turning,
+    }
+}
+
+const NAMES: [&str; 4] = ["inertia", "viscous_friction", "dry_friction", "offset"];
+const TRUTH: [f64; 4] = [BODY.inertia, BODY.viscous, BODY.dry, BODY.offset];
+
+/// How many of so many runs hold the truth of each parameter.
+fn coverage_at(decibel: f64, seed: u64, runs: usize) -> [Coverage; 4] {
+    let mut noise = Noise(seed);
+    let mut covered = [0; 4].map(|_| Coverage::default());
+    for _ in 0..runs {
+        let (angles, torques) = record(decibel, &mut noise);
+        let run = turning(&angles, &torques);
+        let found = runup::identify(&run, &runup::Options::default()).unwrap();
+        for ((name, truth), coverage) in NAMES.iter().zip(TRUTH).zip(&mut covered) {
+            coverage.count(of(&found, name), truth);
+        }
+        assert_close(of(&found, "inertia").value, BODY.inertia, 0.05);
+    }
+    covered
+}
+
+#[test]
+fn intervals_of_run_ups_cover_the_truth() {
+    let all = std::thread::scope(|scope| {
+        let one = |(decibel, seed)| scope.spawn(move || coverage_at(decibel, seed, 300));
+        let handles = [(20.0, 15), (40.0, 16), (60.0, 17)].map(one);
+        handles.map(|h| h.join().expect("the runs are evaluated"))
+    });
+    for (covered, decibel) in all.iter().zip([20, 40, 60]) {
+        for (name, coverage) in NAMES.iter().zip(covered) {
+            coverage.check(&format!("{name} at {decibel} dB"));
+        }
+    }
+}
+
+#[test]
+fn a_run_in_one_direction_does_not_invent_a_dry_friction() {
+    let speed: Vec<f64> = (0..2000)
+        .map(|i| 50.0 * (1.0 - (-1e-3 * f64::from(i)).exp()))
+        .collect();
+    // 2 N m = J·50 e^{−t} + f·50(1 − e^{−t}) + C with J = f = 0.03, C = 0.5.
+    let torque = vec![2.0; 2000];
+    let run = runup::Run {
+        rate_hz: 1000.0,
+        motion: &speed,
+        kind: runup::Motion::Speed,
+        effort: &torque,
+        body: runup::Body::Turning,
+    };
+    let found = runup::identify(&run, &runup::Options::default());
+    // Constant torque and an exponential speed satisfy θ'' + θ' = 50 throughout: only J/f follows.
+    match found {
+        Ok(found) => {
+            assert!(found.get("dry_friction").is_none(), "{:?}", found.found);
+            assert!(found.warnings.iter().any(|w| w.code == "one-direction"));
+            assert!(!found.correlated.is_empty(), "{found:?}");
+        }
+        Err(error) => assert!(
+            error.to_string().contains("cannot be told apart"),
+            "{error}"
+        ),
+    }
+}
