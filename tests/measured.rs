@@ -2,6 +2,8 @@
 //!
 //! They are not part of the project. Where the folder is missing, the tests are reported as ignored.
 
+#[path = "measured/closing.rs"]
+mod closing;
 #[path = "measured/inspect.rs"]
 mod inspect;
 #[path = "measured/mcap_files.rs"]
@@ -47,6 +49,15 @@ fn main() {
         test("thrust_balance_is_refused_and_resampled", thrust_balance),
         test("silverbox_volts_to_volts", silverbox),
         test("emps_mass_and_friction_are_found", emps),
+        test("silverbox_lacks_a_cubic_spring", closing::silverbox),
+        test("boucwen_lacks_hysteresis", closing::bouc_wen),
+        test("f16_depends_on_amplitude", closing::f16),
+        test("emps_is_sent_to_runup", closing::emps),
+        test("swapped_channels_are_refused", closing::swapped),
+        test(
+            "torque_transducer_order_60_may_be_mains",
+            closing::order_or_mains,
+        ),
         test("hammer_modes_are_found", hammer),
         test("frequencies_of_ringing_beams_are_found", ringing),
         test("recordings_hold_what_was_counted", recordings::all),

@@ -206,8 +206,10 @@ pub fn run<'a>(
             break;
         }
         after = candidate::refine_step(next, &mut records);
+        // Where little is explained, or so little is left that no second effect could be named, none is looked for.
+        let explained = share(&before, &before, &after, floor);
         if !remains(&after, &dependence(&after, &records), floor)
-            || share(&before, &before, &after, floor) < NAMED
+            || !(NAMED..1.0 - SECOND).contains(&explained)
         {
             break;
         }

@@ -1,0 +1,27 @@
+#!/usr/bin/env bash
+# Time of a whole diagnosis of two records of 32,000 samples beside that of one candidate fitted with SciPy.
+#
+# usage: benches/peer/diagnose.sh [EFFECT]      (default cubic-stiffness)
+#
+# environment: PYTHON, a Python with the packages of requirements.txt [python3]; CARGO_TARGET_DIR as cargo takes it
+set -euo pipefail
+
+here=$(cd "$(dirname "$0")" && pwd)
+root=$(cd "$here/../.." && pwd)
+effect=${1:-cubic-stiffness}
+python=${PYTHON:-python3}
+target=${CARGO_TARGET_DIR:-$root/target}
+data=$(mktemp -d)
+trap 'rm -rf "$data"' EXIT
+
+cd "$root"
+cargo build --release --bin torqcomp --example blind
+"$target/release/examples/blind" make "$data" --per-effect 1 --only "$effect" >"$data/log"
+cd "$data/$effect/000"
+echo "cores: $(nproc)"
+echo "torqcomp diagnose, all candidates:"
+TIMEFORMAT='%R s on the wall, %U s of the processors'
+time "$target/release/torqcomp" diagnose --stand stand.toml --train train.csv --holdout holdout.csv \
+    --applied applied_n_m --measured measured_n_m --quiet | head -12
+echo "SciPy least_squares, cubic stiffness alone:"
+"$python" "$here/diagnose.py" train.csv holdout.csv
