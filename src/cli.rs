@@ -407,6 +407,9 @@ pub struct Simulate {
     /// Column with the time stamps
     #[arg(long, value_name = "NAME")]
     pub time_column: Option<String>,
+    /// Unit of the time stamps, if their heading does not say: s, ms, us, min
+    #[arg(long, value_name = "UNIT")]
+    pub time_unit: Option<String>,
     /// Significant digits of the result, 1 to 15, or "shortest" for as many as bring back every bit
     #[arg(long, value_name = "N", default_value = "12", value_parser = digits)]
     pub digits: Digits,
@@ -445,6 +448,9 @@ pub struct Diagnose {
     /// Column with the time stamps
     #[arg(long, value_name = "NAME")]
     pub time_column: Option<String>,
+    /// Unit of the time stamps, if their heading does not say: s, ms, us, min
+    #[arg(long, value_name = "UNIT")]
+    pub time_unit: Option<String>,
     /// Write a page for a browser: models beside the records, residuals, candidates
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,

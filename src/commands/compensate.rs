@@ -328,19 +328,7 @@ fn complete(report: &mut Report, run: &Run, scale: f64) {
         ));
     }
     report.warnings.extend(warnings);
-    let of = excerpt::Of {
-        name: &report.channel,
-        unit: &report.unit,
-        scale,
-        rate_hz: report.rate_hz,
-        start_s: run.start_s,
-        samples: run.samples,
-    };
-    let seen = match report.method {
-        "stream" => excerpt::of_stream(&run.excerpt, run.samples),
-        _ => &run.excerpt,
-    };
-    let wrong = excerpt::warnings(seen, of);
+    let wrong = wrong(report, run, scale);
     report.warnings.extend(wrong);
     if run.traces.as_ref().is_some_and(Traces::is_empty) {
         let end_s = run.start_s + (run.samples - 1) as f64 / report.rate_hz;
@@ -369,6 +357,23 @@ fn complete(report: &mut Report, run: &Run, scale: f64) {
             ),
         ));
     }
+}
+
+/// What is wrong with the record.
+fn wrong(report: &Report, run: &Run, scale: f64) -> Vec<Warning> {
+    let of = excerpt::Of {
+        name: &report.channel,
+        unit: &report.unit,
+        scale,
+        rate_hz: report.rate_hz,
+        start_s: run.start_s,
+        samples: run.samples,
+    };
+    let seen = match report.method {
+        "stream" => excerpt::of_stream(&run.excerpt, run.samples),
+        _ => &run.excerpt,
+    };
+    excerpt::warnings(seen, of)
 }
 
 fn noise_warnings(noise: &torqcomp_dsp::noise::RecordNoise, report: &Report) -> Vec<Warning> {

@@ -124,6 +124,14 @@ fn fit(
     report
         .warnings
         .extend(mains_warning(&report.components, duration_s));
+    let wrong = wrong(record, printed, report);
+    report.warnings.extend(wrong);
+    Ok(())
+}
+
+/// What is wrong with the record.
+fn wrong(record: &Record, printed: f64, report: &Report) -> Vec<Warning> {
+    let samples = &record.samples;
     let of = excerpt::Of {
         name: &report.channel,
         unit: &report.unit,
@@ -132,10 +140,7 @@ fn fit(
         start_s: record.start_s,
         samples: samples.len(),
     };
-    let seen = &samples[..samples.len().min(excerpt::OF_MEMORY)];
-    let wrong = excerpt::warnings(seen, of);
-    report.warnings.extend(wrong);
-    Ok(())
+    excerpt::warnings(&samples[..samples.len().min(excerpt::OF_MEMORY)], of)
 }
 
 /// Orders below half the sampling rate; those above are said.

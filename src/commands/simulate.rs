@@ -25,6 +25,7 @@ pub fn run(args: &Simulate) -> Result<Outcome, Failure> {
         channel: args.applied.clone(),
         unit: args.unit.clone(),
         time_column: args.time_column.clone(),
+        time_unit: args.time_unit.clone(),
         rate_hz: args.rate,
         ..Options::default()
     };

@@ -129,12 +129,7 @@ impl Together {
             for (stamp, value) in stamps.iter().zip(c.samples) {
                 resampler.push(*stamp, *value, &mut samples)?;
             }
-            let done = resampler.finish(&mut samples);
-            worst.gaps = worst.gaps.max(done.gaps);
-            worst.repeated = worst.repeated.max(done.repeated);
-            worst.bridged = worst.bridged.max(done.bridged);
-            worst.longest_step_s = worst.longest_step_s.max(done.longest_step_s);
-            worst.largest_jitter = worst.largest_jitter.max(done.largest_jitter);
+            note_worst(&mut worst, &resampler.finish(&mut samples));
             samples.truncate(count as usize);
             self.tracks.push(track(c, samples));
         }
@@ -181,6 +176,14 @@ impl Together {
         }
         Warning::new("resampled", message)
     }
+}
+
+/// Keeps the worst of what resampling met with.
+fn note_worst(worst: &mut Resampled, done: &Resampled) {
+    worst.gaps = worst.gaps.max(done.gaps);
+    worst.repeated = worst.repeated.max(done.repeated);
+    worst.longest_step_s = worst.longest_step_s.max(done.longest_step_s);
+    worst.largest_jitter = worst.largest_jitter.max(done.largest_jitter);
 }
 
 fn track(selection: &Selection, samples: Vec<f64>) -> Track {

@@ -142,6 +142,7 @@ fn pair(args: &Diagnose, file: &str) -> Result<Pair, Failure> {
         channel: Some(channel.to_owned()),
         unit: unit.clone(),
         time_column: args.time_column.clone(),
+        time_unit: args.time_unit.clone(),
         rate_hz: args.rate,
         ..Options::default()
     };

@@ -103,38 +103,38 @@ pub fn is_plain(head: &[u8], complete: bool, options: &Options) -> bool {
     let used: Vec<bool> = wanted.iter().map(Option::is_some).collect();
     let header = header::read(&head, &table, &used);
     let same_columns = layout.columns.len() == header.fields.len()
-        && layout
-            .columns
-            .iter()
-            .zip(&header.fields)
-            .all(|(column, field)| {
-                column.heading == field.heading
-                    && column.name == field.name
-                    && column.unit == field.unit
-            });
+        && layout.columns.iter().zip(&header.fields).all(is_same);
     let times = header
         .fields
         .iter()
         .filter(|field| field.is_named_time())
         .count();
-    let is_thin = has_slow_column(&head, &table);
-    let has_marks = head.lines[table.first..].iter().any(|line| {
-        let cells = table.dialect.cells(&line.text);
-        let read = |cell: &String| cell::Cell::read(cell, table.dialect.decimal);
-        cells
-            .iter()
-            .any(|cell| matches!(read(cell), cell::Cell::Grouped(_)))
-    });
     let first_row = head.number(table::first_row(&head, &table, &header));
     same_columns
-        && !has_marks
-        && !is_thin
+        && !has_marks(&head, &table)
+        && !has_slow_column(&head, &table)
         && layout.dialect == table.dialect
         && (layout.data_line == first_row || begins_with_number(&layout, &text.bytes))
         && wanted
             .iter()
             .all(|kind| *kind == Some(rows::Wanted::Numbers))
         && times <= 1
+}
+
+/// Whether both readers take a column for the same.
+fn is_same((column, field): (&csv::Column, &header::Field)) -> bool {
+    column.heading == field.heading && column.name == field.name && column.unit == field.unit
+}
+
+/// Whether numbers have marks between their thousands.
+fn has_marks(head: &Head, table: &head::Table) -> bool {
+    head.lines[table.first..].iter().any(|line| {
+        let cells = table.dialect.cells(&line.text);
+        let read = |cell: &String| cell::Cell::read(cell, table.dialect.decimal);
+        cells
+            .iter()
+            .any(|cell| matches!(read(cell), cell::Cell::Grouped(_)))
+    })
 }
 
 /// Whether a column has a value in fewer than half of the first rows, but in some.

@@ -270,54 +270,75 @@ pub fn is_time(unit: &NamedUnit) -> bool {
     unit.unit.dimension() == Dimension::new([0, 0, 1, 0, 0, 0])
 }
 
+/// Words that stand for time.
+const TIMES: [&str; 43] = [
+    "ms",
+    "msec",
+    "millisecond",
+    "milliseconds",
+    "millisekunden",
+    "us",
+    "usec",
+    "microsecond",
+    "microseconds",
+    "mikrosekunden",
+    "nanoseconds",
+    "subsec",
+    "sec",
+    "t",
+    "time",
+    "times",
+    "zeit",
+    "uhrzeit",
+    "zeitstempel",
+    "messzeit",
+    "timestamp",
+    "datum",
+    "date",
+    "datetime",
+    "elapsed",
+    "seconds",
+    "secs",
+    "second",
+    "sekunden",
+    "sekunde",
+    "millis",
+    "micros",
+    "tijd",
+    "temps",
+    "tiempo",
+    "tempo",
+    "reltime",
+    "abstime",
+    "systemtime",
+    "epoch",
+    "utc",
+    "clock",
+    "laufzeit",
+];
+/// Words before those that stand for time.
+const QUALIFIED: [&str; 16] = [
+    "rel",
+    "abs",
+    "elapsed",
+    "relative",
+    "absolute",
+    "test",
+    "sample",
+    "run",
+    "latest",
+    "total",
+    "local",
+    "system",
+    "ros",
+    "log",
+    "measurement",
+    "x",
+];
+
 /// Whether a name stands for time, or for the axis that is time in a recorder's export.
 #[must_use]
 pub fn is_time_name(name: &str) -> bool {
-    const WORDS: [&str; 43] = [
-        "ms",
-        "msec",
-        "millisecond",
-        "milliseconds",
-        "millisekunden",
-        "us",
-        "usec",
-        "microsecond",
-        "microseconds",
-        "mikrosekunden",
-        "nanoseconds",
-        "subsec",
-        "sec",
-        "t",
-        "time",
-        "times",
-        "zeit",
-        "uhrzeit",
-        "zeitstempel",
-        "messzeit",
-        "timestamp",
-        "datum",
-        "date",
-        "datetime",
-        "elapsed",
-        "seconds",
-        "secs",
-        "second",
-        "sekunden",
-        "sekunde",
-        "millis",
-        "micros",
-        "tijd",
-        "temps",
-        "tiempo",
-        "tempo",
-        "reltime",
-        "abstime",
-        "systemtime",
-        "epoch",
-        "utc",
-        "clock",
-        "laufzeit",
-    ];
     let lower = name.to_lowercase();
     let words: Vec<&str> = lower
         .split(|c: char| !c.is_alphanumeric() && c != '%')
@@ -329,7 +350,7 @@ pub fn is_time_name(name: &str) -> bool {
             .trim_end_matches(|c: char| c.is_ascii_digit());
         let is_compound = (stem.ends_with("zeit") || stem.ends_with("time"))
             && !["lifetime", "risetime", "deadtime", "totzeit", "overtime"].contains(&stem);
-        WORDS.contains(&stem) || is_compound
+        TIMES.contains(&stem) || is_compound
     };
     match words.as_slice() {
         [] => false,
@@ -337,26 +358,8 @@ pub fn is_time_name(name: &str) -> bool {
         // "elapsed time", "rel_time", "time stamp", "Date/Time", "Time 1 - default sample rate".
         [first, .., last] => {
             let first_is = is(first) && *first != "t" && *first != "second";
-            let qualified = [
-                "rel",
-                "abs",
-                "elapsed",
-                "relative",
-                "absolute",
-                "test",
-                "sample",
-                "run",
-                "latest",
-                "total",
-                "local",
-                "system",
-                "ros",
-                "log",
-                "measurement",
-                "x",
-            ];
             first_is && !["constant", "delay", "konstante"].contains(last)
-                || qualified.contains(first) && is(last)
+                || QUALIFIED.contains(first) && is(last)
         }
     }
 }
