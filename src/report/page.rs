@@ -19,7 +19,8 @@ th:first-child,td:first-child{text-align:left}\
 th.prose,td.prose{text-align:left;white-space:normal;min-width:15rem}.warn{border-left:3px solid var(--mark);padding-left:.7rem}\
 code{font-size:.9em}figure{margin:1rem 0}figcaption{font-weight:600;font-size:.95rem}\
 @media(max-width:480px){body{padding:.7rem;font-size:14px}svg text{font-size:16px!important}\
-th,td{padding-right:.45rem;font-size:13px}td:first-child,th:first-child{white-space:normal;hyphens:auto}}";
+th,td{padding-right:.45rem;font-size:13px;overflow-wrap:normal}\
+td:first-child,th:first-child{white-space:normal}th.prose,td.prose{min-width:9rem}}";
 
 /// Letters of the longest cell above which a column holds sentences.
 const PROSE: usize = 36;

@@ -69,6 +69,7 @@ pub fn identify(records: &[Ringing], options: &Options) -> Result<Evaluated, Fai
         count: options.modes,
         most: MOST_MODES,
         band_hz: options.band_hz.unwrap_or((0.0, f64::INFINITY)),
+        worth: if slowed { decimate::NOISE } else { 1.0 },
     };
     let mut fit = modes::search(&stretches, &wanted)?;
     if slowed {

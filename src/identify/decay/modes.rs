@@ -53,6 +53,8 @@ pub struct Wanted {
     pub most: usize,
     /// Lowest and highest frequency in Hz.
     pub band_hz: (f64, f64),
+    /// Part of the samples that are worth as much as samples with white noise.
+    pub worth: f64,
 }
 
 /// Lines closer than this part of their frequency are not taken for two modes unasked: a frequency or a
@@ -283,7 +285,7 @@ pub fn search(stretches: &[Stretch], wanted: &Wanted) -> Result<ModesFit, FitErr
         let mut starts = best.poles.clone();
         starts.push(pole);
         let next = fit(stretches, &starts)?;
-        let pays = next.criterion < best.criterion - 10.0
+        let pays = gain(&best, &next, wanted.worth) > 10.0
             && next.fit.sum_of_squares < 0.98 * best.fit.sum_of_squares
             && physical(&next, stretches);
         if wanted.count.is_none() {
@@ -298,6 +300,13 @@ pub fn search(stretches: &[Stretch], wanted: &Wanted) -> Result<ModesFit, FitErr
         best = next;
     }
     Ok(best)
+}
+
+/// By how much the criterion falls from one fit to another if only that part of the samples counts.
+fn gain(before: &ModesFit, after: &ModesFit, worth: f64) -> f64 {
+    let n = before.fit.residuals.len() as f64;
+    let more = (after.fit.values.len() - before.fit.values.len()) as f64;
+    worth * n * (before.fit.sum_of_squares / after.fit.sum_of_squares).ln() - more * n.ln()
 }
 
 /// Frequency in Hz of two modes that lie close together, if any do.

@@ -105,6 +105,9 @@ fn good_hits(
         let hits = frf::find_hits(record.applied, record.measured, apart);
         for (k, hit) in hits.into_iter().enumerate() {
             if hit.faults.is_empty() {
+                if let Some(part) = hit.second {
+                    outcome.warn("second-stroke", second_stroke(record, k, part));
+                }
                 good.push((r, hit.range));
                 continue;
             }
@@ -130,6 +133,16 @@ fn good_hits(
         outcome.warn("hit-left-out", message);
     }
     Ok(good)
+}
+
+fn second_stroke(record: &Driven, k: usize, part: f64) -> String {
+    format!(
+        "{}, hit {}: the hammer struck again with {} % of the force; both strokes are in the force, so that the hit \
+         is used, but a clean one is better",
+        record.name,
+        k + 1,
+        rounded(100.0 * part, 2)
+    )
 }
 
 /// An exponential window, if a response still rings at its end.

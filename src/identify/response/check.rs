@@ -7,7 +7,7 @@ use super::lines::Lines;
 use crate::failure::Failure;
 use crate::identify::Outcome;
 use crate::report::{rounded, short};
-use torqcomp_dsp::frf::{Estimator, Frf};
+use torqcomp_dsp::frf::{Estimator, Frf, Window};
 
 /// Refuses records that differ in rate, have holes, or do not move.
 pub(super) fn records(records: &[Driven]) -> Result<(), Failure> {
@@ -75,6 +75,34 @@ pub(super) fn leads(set: &Set, lines: &Lines, order: i32) -> bool {
 /// Text for a response that leads.
 pub(super) const LEADS: &str = "the measured signal leads the applied one at nearly all frequencies, which no driven stand does: the \
      channels may be swapped (--applied is what acts, --measured what answers), or one has the wrong sign";
+
+/// Widening of a resonance by Hann's window, over its width, that is said.
+const WIDER: f64 = 0.01;
+
+/// Says where Hann's window widens a resonance. Smoothing by the squared window is multiplying what rings by its
+/// autocorrelation, 1 − (2πt/L)²/6 for short times; over a decay time 1/σ the damping grows by about twice
+/// that, `(2π/σL)²/3`.
+pub(super) fn leakage(outcome: &mut Outcome, set: &Set, fitted: &Modal) {
+    if set.window != Window::Hann {
+        return;
+    }
+    let length_s = 1.0 / set.step_hz;
+    for pole in &fitted.poles {
+        let wider = (std::f64::consts::TAU / (pole.rate_per_s * length_s)).powi(2) / 3.0;
+        if wider > WIDER {
+            outcome.warn(
+                "leakage",
+                format!(
+                    "the mode at {} Hz is narrow for segments of {} s: its damping comes out too large by some {} %, \
+                     which its uncertainty does not hold; make segments longer with --segment",
+                    rounded(pole.omega_rad_per_s / std::f64::consts::TAU, 5),
+                    short(length_s),
+                    rounded(100.0 * wider, 1)
+                ),
+            );
+        }
+    }
+}
 
 /// Part of the measured signal that may be left.
 const POOR: f64 = 0.5;

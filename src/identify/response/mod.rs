@@ -100,6 +100,7 @@ pub fn identify(records: &[Driven], options: &Options) -> Result<Evaluated, Fail
     words::name_modes(&mut outcome, &fitted, &spread);
     let quality = quality(&set, &lines, &fitted);
     check::doubts(&mut outcome, quality.relative, leads, &fitted);
+    check::leakage(&mut outcome, &set, &fitted);
     outcome.quality = Some(quality);
     say_method(&mut outcome, &set, &lines, options, &fitted);
     let held = held_out.get(fitted.poles.len()).copied();

@@ -101,17 +101,36 @@ fn tried(
     let mut errors = vec![error(&models)];
     let mut since = 0;
     while errors.len() <= most && (since < PATIENCE || options.modes.is_some()) {
-        for (model, data) in models.iter_mut().zip(&training) {
-            if let Some(next) = grow(data, model, options)? {
-                *model = next;
-            }
-        }
+        models = each_grown(&training, &models, options)?;
         let least = errors.iter().copied().fold(f64::INFINITY, f64::min);
         let now = error(&models);
         since = if now < 0.99 * least { 0 } else { since + 1 };
         errors.push(now);
     }
     Ok(errors)
+}
+
+/// One more mode in each model, each on a thread of its own: none knows of the others.
+fn each_grown(
+    training: &[Data],
+    models: &[Modal],
+    options: &Options,
+) -> Result<Vec<Modal>, Failure> {
+    std::thread::scope(|scope| {
+        let handles: Vec<_> = training
+            .iter()
+            .zip(models)
+            .map(|(data, model)| scope.spawn(move || grow(data, model, options)))
+            .collect();
+        handles
+            .into_iter()
+            .zip(models)
+            .map(|(handle, model)| {
+                let grown = handle.join().expect("a fit does not panic")?;
+                Ok(grown.unwrap_or_else(|| model.clone()))
+            })
+            .collect()
+    })
 }
 
 /// So many modes through all blocks, one after another.

@@ -13,9 +13,16 @@
 //! System Identification, 2nd ed., 2012, 2.6 and 9; J. S. Bendat, A. G. Piersol, Random Data, 4th ed.,
 //! 2010, 9.2.)
 //!
-//! Beside it, groups of blocks are left out in turn (B. Efron, The Jackknife, 1982, 3), which also sees
-//! what differs from hit to hit. Few groups tell it badly, so it counts only where it is larger than
-//! chance allows.
+//! Beside it, from what each block for itself would change:
+//!
+//! ```text
+//! Cov p = (JᵀJ)⁻¹ Σ_b u_b u_bᵀ (JᵀJ)⁻¹ n/(n − 1),   u_b = Re Σ_k J̄_k w_k X̄_kb (Y_kb − H1_k X_kb)/S_k
+//! ```
+//!
+//! (the jackknife for small changes: B. Efron, The Jackknife, 1982, 6.3; segments that overlap are taken
+//! with their neighbours). It needs no picture of the noise, sees leakage and what differs from hit to
+//! hit, but is badly known from few blocks. So it counts alone from [`MANY`] blocks on, and before that where
+//! it is larger than chance allows.
 
 use nalgebra::DMatrix;
 use num_complex::Complex64;
@@ -24,16 +31,17 @@ use torqcomp_dsp::frf::Window;
 
 use super::blocks::Set;
 use super::lines::{Lines, data};
-use super::{Data, Effort, Modal, Options};
+use super::{Data, Modal, Options};
 use crate::failure::Failure;
-use crate::identify::decay::Pole;
 
 /// Covariance of σ and ω of each mode.
 pub(super) type Spread = Vec<Option<[[f64; 2]; 2]>>;
 
-/// Groups that are left out in turn, at most.
-const MOST_GROUPS: usize = 8;
-/// Chance with which groups that differ by noise alone are taken to differ by more.
+/// Blocks from which on their scatter alone tells the uncertainty.
+const MANY: usize = 20;
+/// Fewest blocks to tell anything from.
+const FEW: usize = 3;
+/// Chance with which blocks that differ by noise alone are taken to differ by more.
 const CHANCE: f64 = 0.05;
 /// Lines apart beyond which errors are taken as independent.
 const REACH: usize = 40;
@@ -47,7 +55,7 @@ const SHARED: f64 = 1.0 / 6.0;
 /// Covariance of the poles.
 ///
 /// # Errors
-/// If a part of the blocks cannot be fitted.
+/// If the derivatives cannot be taken.
 pub(super) fn of_poles(
     set: &Set,
     lines: &Lines,
@@ -55,57 +63,130 @@ pub(super) fn of_poles(
     fitted: &Modal,
 ) -> Result<Spread, Failure> {
     let whole = data(set, lines, options, &|_| true);
-    let mut spread = from_noise(set, lines, &whole, fitted)?;
-    let groups = set.blocks.len().min(MOST_GROUPS);
-    if groups < 3 {
-        return Ok(spread);
+    let Some(solved) = Solved::of(&whole, fitted)? else {
+        return Ok(vec![None; fitted.poles.len()]);
+    };
+    let noise = from_noise(set, lines, &whole, fitted, &solved);
+    let blocks = set.blocks.len();
+    if blocks < FEW {
+        return Ok(solved.of_modes(&noise));
     }
-    let left_out = jackknife(set, lines, options, fitted, groups)?;
-    let freedom = (groups - 1) as f64;
+    let scattered = from_blocks(set, lines, &whole, &solved);
+    if blocks >= MANY {
+        return Ok(solved.of_modes(&scattered));
+    }
+    let freedom = (blocks - 1) as f64;
     let by_chance = ChiSquared::new(freedom)
         .map(|d| d.inverse_cdf(1.0 - CHANCE) / freedom)
         .unwrap_or(1.0);
-    for (mode, other) in spread.iter_mut().zip(&left_out) {
-        let Some(covariance) = mode else { continue };
-        let factor = |i: usize| {
-            let ratio = other[i] / covariance[i][i];
-            if ratio > by_chance { ratio.sqrt() } else { 1.0 }
-        };
-        let factors = [factor(0), factor(1)];
-        for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-            covariance[i][j] *= factors[i] * factors[j];
-        }
-    }
-    Ok(spread)
+    let factors: Vec<f64> = (0..noise.nrows())
+        .map(|i| scattered[(i, i)] / noise[(i, i)])
+        .map(|ratio| if ratio > by_chance { ratio.sqrt() } else { 1.0 })
+        .collect();
+    let joined = DMatrix::from_fn(noise.nrows(), noise.ncols(), |i, j| {
+        noise[(i, j)] * factors[i] * factors[j]
+    });
+    Ok(solved.of_modes(&joined))
 }
 
-/// From the size of the residuals and the window.
-fn from_noise(set: &Set, lines: &Lines, data: &Data, fitted: &Modal) -> Result<Spread, Failure> {
-    let modes = fitted.poles.len();
-    let Some(fit) = &fitted.fit else {
-        return Ok(Vec::new());
-    };
-    let free: Vec<usize> = (0..fit.values.len())
-        .filter(|i| !fit.at_bound[*i])
+/// The fit as a linear one around its end.
+struct Solved {
+    /// Parameters that are not at a bound.
+    free: Vec<usize>,
+    /// J of those.
+    slopes: DMatrix<f64>,
+    /// (JᵀJ)⁻¹.
+    inverse: DMatrix<f64>,
+    modes: usize,
+}
+
+impl Solved {
+    fn of(data: &Data, fitted: &Modal) -> Result<Option<Self>, Failure> {
+        let Some(fit) = &fitted.fit else {
+            return Ok(None);
+        };
+        let free: Vec<usize> = (0..fit.values.len())
+            .filter(|i| !fit.at_bound[*i])
+            .collect();
+        let slopes = data.slopes_at(fitted)?.select_columns(&free);
+        let inverse = slopes.tr_mul(&slopes).try_inverse();
+        Ok(inverse.map(|inverse| Self {
+            free,
+            slopes,
+            inverse,
+            modes: fitted.poles.len(),
+        }))
+    }
+
+    fn slope(&self, k: usize, p: usize) -> Complex64 {
+        Complex64::new(self.slopes[(2 * k, p)], self.slopes[(2 * k + 1, p)])
+    }
+
+    /// The parts of a covariance that belong to each mode.
+    fn of_modes(&self, covariance: &DMatrix<f64>) -> Spread {
+        let place = |i: usize| self.free.iter().position(|f| *f == i);
+        let one = |k: usize| {
+            let places = [place(2 * k)?, place(2 * k + 1)?];
+            Some(places.map(|i| places.map(|j| covariance[(i, j)])))
+        };
+        (0..self.modes).map(one).collect()
+    }
+}
+
+/// From what each block would change.
+fn from_blocks(set: &Set, lines: &Lines, data: &Data, solved: &Solved) -> DMatrix<f64> {
+    let (count, columns) = (lines.len(), solved.free.len());
+    let h1 = &data.response;
+    let power: Vec<f64> = lines
+        .clone()
+        .map(|k| set.blocks.iter().map(|b| b.applied[k].norm_sqr()).sum())
         .collect();
-    let slopes = data.slopes_at(fitted)?.select_columns(&free);
-    let Some(inverse) = slopes.tr_mul(&slopes).try_inverse() else {
-        return Ok(vec![None; modes]);
-    };
+    let scores = DMatrix::from_fn(set.blocks.len(), columns, |b, p| {
+        let block = &set.blocks[b];
+        (0..count)
+            .filter(|k| power[*k] > 0.0)
+            .map(|k| {
+                let (x, y) = (
+                    block.applied[lines.start + k],
+                    block.measured[lines.start + k],
+                );
+                let error = x.conj() * (y - h1[k] * x) * (data.weight[k] / power[k]);
+                (solved.slope(k, p).conj() * error).re
+            })
+            .sum()
+    });
+    let blocks = set.blocks.len();
+    let mut sum = scores.tr_mul(&scores);
+    if set.window == Window::Hann {
+        let both = scores
+            .rows(1, blocks - 1)
+            .tr_mul(&scores.rows(0, blocks - 1));
+        // Bartlett's weight keeps variances above zero.
+        sum += (&both + both.transpose()) * 0.5;
+    }
+    let freedom = blocks as f64 / (blocks - 1) as f64;
+    &solved.inverse * sum * &solved.inverse * freedom
+}
+
+/// From the size of the errors and the window.
+fn from_noise(
+    set: &Set,
+    lines: &Lines,
+    data: &Data,
+    fitted: &Modal,
+    solved: &Solved,
+) -> DMatrix<f64> {
+    let squares = fitted.fit.as_ref().map_or(0.0, |f| f.sum_of_squares);
     let top = data.weight.iter().copied().fold(0.0, f64::max);
     let heard = data.weight.iter().filter(|w| **w > SILENT * top).count();
-    let linear = 2 * modes + 2;
-    let freedom = (2 * heard).saturating_sub(free.len() + linear).max(1);
-    let power = 2.0 * fit.sum_of_squares / freedom as f64;
+    let linear = 2 * solved.modes + 2;
+    let freedom = (2 * heard)
+        .saturating_sub(solved.free.len() + linear)
+        .max(1);
+    let power = 2.0 * squares / freedom as f64;
     let sizes = error_sizes(set, lines, &data.weight, power, heard);
-    let middle = gathered(set, lines, &slopes, &sizes) * 0.5;
-    let covariance = &inverse * middle * &inverse;
-    let place = |i: usize| free.iter().position(|f| *f == i);
-    let one = |k: usize| {
-        let places = [place(2 * k)?, place(2 * k + 1)?];
-        Some(places.map(|i| places.map(|j| covariance[(i, j)])))
-    };
-    Ok((0..modes).map(one).collect())
+    let middle = gathered(set, lines, solved, &sizes) * 0.5;
+    &solved.inverse * middle * &solved.inverse
 }
 
 /// s_k of each line; `power` is that of the residuals, over the lines that are heard.
@@ -161,9 +242,9 @@ fn variance(set: &Set, line: usize) -> f64 {
 }
 
 /// Re(J̄ᵀ Γ J).
-fn gathered(set: &Set, lines: &Lines, slopes: &DMatrix<f64>, sizes: &[f64]) -> DMatrix<f64> {
-    let (count, columns) = (lines.len(), slopes.ncols());
-    let slope = |k: usize, p: usize| Complex64::new(slopes[(2 * k, p)], slopes[(2 * k + 1, p)]);
+fn gathered(set: &Set, lines: &Lines, solved: &Solved, sizes: &[f64]) -> DMatrix<f64> {
+    let (count, columns) = (lines.len(), solved.free.len());
+    let slope = |k: usize, p: usize| solved.slope(k, p);
     let length = 2 * (set.blocks[0].applied.len() - 1);
     let reach = match set.window {
         Window::None => 0,
@@ -217,37 +298,6 @@ fn together(window: Window, lag: usize, length: usize) -> Complex64 {
         }
         _ => Complex64::ZERO,
     }
-}
-
-/// Variances of σ and ω of each mode.
-fn jackknife(
-    set: &Set,
-    lines: &Lines,
-    options: &Options,
-    fitted: &Modal,
-    groups: usize,
-) -> Result<Vec<[f64; 2]>, Failure> {
-    let count = set.blocks.len();
-    let mut each: Vec<Vec<Pole>> = Vec::new();
-    for g in 0..groups {
-        let out = count * g / groups..count * (g + 1) / groups;
-        let part = data(set, lines, options, &|i| !out.contains(&i));
-        each.push(part.fit(&fitted.poles, Effort::Coarse)?.poles);
-    }
-    let n = groups as f64;
-    let variance = |pick: fn(&Pole) -> f64, k: usize| {
-        let mean = each.iter().map(|p| pick(&p[k])).sum::<f64>() / n;
-        let sum: f64 = each.iter().map(|p| (pick(&p[k]) - mean).powi(2)).sum();
-        (n - 1.0) / n * sum
-    };
-    Ok((0..fitted.poles.len())
-        .map(|k| {
-            [
-                variance(|p| p.rate_per_s, k),
-                variance(|p| p.omega_rad_per_s, k),
-            ]
-        })
-        .collect())
 }
 
 #[cfg(test)]

@@ -102,6 +102,8 @@ pub struct Options {
     pub half_window_s: Option<f64>,
 }
 
+/// Growth of an uncertainty by colour that is said.
+const COLOURED: f64 = 1.3;
 /// Fewest windows that fit into a record.
 const LEAST_WINDOWS: usize = 12;
 /// Half of the shortest window tried, in samples.
@@ -126,7 +128,7 @@ pub fn identify(run: &Run, options: &Options) -> Result<Outcome, Failure> {
         ..Outcome::default()
     };
     outcome.method.push(method(run, &fitted));
-    if fitted.fit.coloured > 1.0 {
+    if fitted.fit.coloured > COLOURED {
         outcome.method.push(format!(
             "what is left is not white noise, so the equation lacks something: the uncertainties are taken from \
              how it hangs together, up to {} times those of noise",

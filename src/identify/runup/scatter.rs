@@ -8,14 +8,11 @@
 //! the windows' shape says how rows that overlap hang together; only the size of the noise comes from
 //! the residuals. *Coloured*: from the residuals themselves (W. K. Newey, K. D. West, Econometrica 55
 //! (1987), 703), which also sees what the equation lacks. The coloured one is scattered, and too small
-//! on average: it counts where it is clearly the larger one.
+//! on average: it counts where it is the larger one.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::regression::Errors;
-
-/// Ratio of the coloured to the white standard uncertainty from which the coloured one counts.
-const CLEARLY: f64 = 1.1;
 
 /// Covariance of the (scaled) parameters, and the largest factor by which colour made an uncertainty
 /// larger.
@@ -39,7 +36,7 @@ pub fn covariance(
     let coloured = inverse * scores(a, residuals, rows, errors.overlap) * inverse * freedom;
     let factors: Vec<f64> = (0..count)
         .map(|i| (coloured[(i, i)] / white[(i, i)]).sqrt())
-        .map(|ratio| if ratio > CLEARLY { ratio } else { 1.0 })
+        .map(|ratio| ratio.max(1.0))
         .collect();
     let largest = factors.iter().copied().fold(1.0, f64::max);
     let joined = DMatrix::from_fn(count, count, |i, j| white[(i, j)] * factors[i] * factors[j]);

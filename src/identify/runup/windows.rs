@@ -1,5 +1,6 @@
 //! The equation of motion averaged over windows: a row each window, a column each term.
 
+use statrs::distribution::{ContinuousCDF, Normal};
 use torqcomp_dsp::weak::{Window, white_noise_variance};
 
 use super::directions::Directions;
@@ -7,9 +8,6 @@ use super::regression::{Corrected, Errors, solve};
 use super::{LEAST_WINDOWS, Run, SHORTEST_HALF};
 use crate::failure::Failure;
 use crate::identify::rms;
-
-/// Residual over the root mean square of clean windows up to which another window follows the equation.
-const FOLLOWS: f64 = 3.0;
 
 /// Rows of the regression.
 pub(super) struct Rows {
@@ -92,7 +90,7 @@ impl Rows {
             .filter(|k| self.clean[*k])
             .map(residual)
             .collect();
-        let most = FOLLOWS * rms(&clean);
+        let most = chauvenet(self.clean.len()) * rms(&clean);
         (0..self.clean.len())
             .map(|k| self.clean[k] || residual(k).abs() <= most)
             .collect()
@@ -154,6 +152,12 @@ impl Rows {
         };
         solve(&self.columns, &self.right, used, &errors)
     }
+}
+
+/// Standard deviations beyond which half of one normal value in so many is expected (W. Chauvenet, A Manual
+/// of Spherical and Practical Astronomy, 1863, II, 558): 3 for 185, 3.5 for 1100.
+fn chauvenet(count: usize) -> f64 {
+    Normal::standard().inverse_cdf(1.0 - 0.25 / count.max(1) as f64)
 }
 
 /// Terms of the equation of motion, and the order of the derivative that each is of the motion.
