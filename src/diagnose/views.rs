@@ -262,9 +262,7 @@ mod tests {
     use super::*;
 
     fn trace(count: usize, before: impl Fn(usize) -> f64) -> Trace {
-        let applied: Vec<f64> = (0..count)
-            .map(|i| if (i * 7919) % 1009 > 504 { 1.0 } else { -1.0 })
-            .collect();
+        let applied: Vec<f64> = (0..count).map(|i| (0.013 * (i * i) as f64).sin()).collect();
         Trace {
             source: "a.csv".to_owned(),
             start_s: 1.0,
@@ -307,6 +305,8 @@ mod tests {
         let mut one = trace(4000, |_| 0.0);
         one.measured = (0..4000).map(|i| (0.01 * i as f64).sin()).collect();
         one.before = one.measured.iter().map(|y| y * y * y).collect();
+        one.measured = one.measured.iter().map(|y| 1.0 + y).collect();
+        one.after = vec![0.0; 4000];
         for [x, mean, _] in binned(&[one], Against::Displacement, |t| &t.before) {
             assert!((mean - x.powi(3)).abs() < 0.04, "{x}: {mean}");
         }
