@@ -192,6 +192,7 @@ fn open_plot(path: &Path, args: &Compensate, inputs: &[&Path]) -> Result<Output,
 
 fn plan(args: &Compensate) -> Result<Plan, Failure> {
     let stand = stand::read(&args.stand)?;
+    stand.mechanics()?;
     let place = Place::of(&args.record.input);
     let signal = Signal::open(&place, &args.record.options())?;
     let chain = stand.chain(

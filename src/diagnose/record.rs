@@ -41,12 +41,18 @@ pub struct Nuisance {
     mix: Vec<Vec<f64>>,
     /// Place of the raw columns of the free motion, if they are in it.
     motion: Option<usize>,
+    /// Whether enough of the free motion is left in the range to tell how it began.
+    sees_start: bool,
     /// Place of the raw column of a constant load.
     shift: Option<usize>,
     /// Place of the first raw column of the lines.
     lines: usize,
 }
 
+/// Time constants before the range after which nothing is left of the motion at a record's start.
+const NOTHING_LEFT: f64 = 12.0;
+/// Time constants up to which the range tells that motion: beyond, noise would be multiplied by more than `e³` on its way back to the start.
+const START_SEEN: f64 = 3.0;
 /// Part of a column that must be left after the others are taken out of it.
 const LEFT: f64 = 1e-6;
 
@@ -68,8 +74,9 @@ impl Record {
         let rate_hz = self.input.rate_hz();
         let decay = mode.damping_ratio * mode.omega_rad_s / rate_hz * self.range.start as f64;
         // After many time constants nothing is left of it.
-        if decay < 12.0 {
+        if decay < NOTHING_LEFT {
             nuisance.motion = Some(1);
+            nuisance.sees_start = decay < START_SEEN;
             let model = torqcomp_model::simulate::Model {
                 mode: *mode,
                 gain: 1.0,
@@ -120,7 +127,7 @@ impl Record {
 pub struct Taken {
     /// The constant.
     pub offset: f64,
-    /// Displacement, and speed over `ω₀`, at the start of the record.
+    /// Displacement, and speed over `ω₀`, at the start of the record, where the range still tells them.
     pub motion: Option<[f64; 2]>,
     /// The constant load's displacement.
     pub shift: Option<f64>,
@@ -136,6 +143,7 @@ impl Nuisance {
             columns: Vec::new(),
             mix: Vec::new(),
             motion: None,
+            sees_start: false,
             shift: None,
             lines: 0,
         }
@@ -202,7 +210,10 @@ impl Nuisance {
         }
         Taken {
             offset: raw[0],
-            motion: self.motion.map(|k| [raw[k], raw[k + 1]]),
+            motion: self
+                .motion
+                .filter(|_| self.sees_start)
+                .map(|k| [raw[k], raw[k + 1]]),
             shift: self.shift.map(|k| raw[k]),
             lines: raw[self.lines..]
                 .chunks_exact(2)

@@ -20,24 +20,35 @@ const SWAPPED: f64 = 0.5;
 /// may be of two stands.
 const APART: f64 = 0.5;
 
-/// Refuses records that are too short or have their channels swapped.
+/// Refuses records that have their channels swapped or are too short.
 ///
 /// # Errors
 /// If they are.
 pub fn check(case: &Case, frame: &Frame, found: Constants) -> Result<(), Failure> {
-    let longest = case.train.iter().max_by_key(|r| r.count());
-    if let Some(record) = longest {
-        let duration_s = record.count() as f64 / record.input.rate_hz();
-        let periods = duration_s * found.natural_hz;
-        if periods < FEWEST_PERIODS {
-            return Err(Failure::failed(format_args!(
-                "{}: {duration_s:.4} s are {periods:.1} periods of the {:.4} Hz that fit best, and a diagnosis needs at \
-                 least {FEWEST_PERIODS} in a training record; record for longer, or, for a stand that turns freely, use \
-                 \"identify runup\"",
-                record.source, found.natural_hz
-            )));
-        }
+    // Swapped channels fit any frequency, which may make them look too short.
+    refuse_swapped(case, frame, found)?;
+    let Some((record, duration_s)) = longest(case) else {
+        return Ok(());
+    };
+    let periods = duration_s * found.natural_hz;
+    if periods >= FEWEST_PERIODS {
+        return Ok(());
     }
+    Err(Failure::failed(format_args!(
+        "{}: {duration_s:.4} s are {periods:.1} periods of the {:.4} Hz that fit best, and a diagnosis needs at \
+         least {FEWEST_PERIODS} in a training record; record for longer, or, for a stand that turns freely, use \
+         \"identify runup\"",
+        record.source, found.natural_hz
+    )))
+}
+
+/// The longest training record and its duration in s.
+fn longest(case: &Case) -> Option<(&Record, f64)> {
+    let longest = case.train.iter().max_by_key(|r| r.count())?;
+    Some((longest, longest.count() as f64 / longest.input.rate_hz()))
+}
+
+fn refuse_swapped(case: &Case, frame: &Frame, found: Constants) -> Result<(), Failure> {
     let as_given = left(frame, found, &case.train);
     if as_given < LEAVES_MUCH {
         return Ok(());
@@ -52,17 +63,18 @@ pub fn check(case: &Case, frame: &Frame, found: Constants) -> Result<(), Failure
     let Ok(constants) = fit_plain(&mut other, case.declared, &swapped) else {
         return Ok(());
     };
+    let periods = longest(case).map_or(0.0, |(_, duration_s)| duration_s * constants.natural_hz);
     let the_other_way = left(&other, constants, &swapped);
-    if the_other_way < SWAPPED * as_given {
-        return Err(Failure::failed(format_args!(
-            "{}: the channels look swapped: a stand from --applied to --measured leaves {:.0} % of the record, one the other \
-             way round {:.0} %; exchange the two",
-            case.train[0].source,
-            100.0 * as_given,
-            100.0 * the_other_way
-        )));
+    if periods < FEWEST_PERIODS || the_other_way >= SWAPPED * as_given {
+        return Ok(());
     }
-    Ok(())
+    Err(Failure::failed(format_args!(
+        "{}: the channels look swapped: a stand from --applied to --measured leaves {:.0} % of the record, one the other \
+         way round {:.0} %; exchange the two",
+        case.train[0].source,
+        100.0 * as_given,
+        100.0 * the_other_way
+    )))
 }
 
 fn swap(record: &Record) -> Record {

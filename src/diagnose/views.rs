@@ -303,7 +303,9 @@ mod tests {
     #[test]
     fn bins_show_what_a_residual_follows_from() {
         let mut one = trace(4000, |_| 0.0);
-        one.measured = (0..4000).map(|i| (0.01 * i as f64).sin()).collect();
+        // Whole periods, so that the mean is zero.
+        let turn = std::f64::consts::TAU * 6.0 / 4000.0;
+        one.measured = (0..4000).map(|i| (turn * f64::from(i)).sin()).collect();
         one.before = one.measured.iter().map(|y| y * y * y).collect();
         one.measured = one.measured.iter().map(|y| 1.0 + y).collect();
         one.after = vec![0.0; 4000];

@@ -138,16 +138,17 @@ mod tests {
         let speed = fine.refined(&lines, |f| Complex64::new(0.0, std::f64::consts::TAU * f));
         let again = fine.samples(&fine.spectrum_of_fine(&refined));
         let omega = std::f64::consts::TAU * 331.7;
+        // What the fading of a margin of 128 samples leaves; those in use are longer.
         for i in margin * factor..(length - margin) * factor {
             let time_s = i as f64 / (rate_hz * factor as f64);
-            assert!((refined[i] - at(time_s)).abs() < 1e-6, "{i}");
+            assert!((refined[i] - at(time_s)).abs() < 1e-5, "{i}");
             assert!(
                 (speed[i] / omega - (omega * time_s).cos()).abs() < 1e-5,
                 "{i}"
             );
         }
         for i in margin..length - margin {
-            assert!((again[i] - window[i]).abs() < 1e-6, "{i}");
+            assert!((again[i] - window[i]).abs() < 1e-5, "{i}");
         }
     }
 }
