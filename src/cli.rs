@@ -99,7 +99,7 @@ pub struct Record {
         long,
         value_name = "PATH",
         conflicts_with = "topic",
-        help = "Topic and field in one, as '/joint_states.effort[0]'"
+        help = "Topic and field in one, as '/joint_states.effort[name=motor]'"
     )]
     pub signal: Option<String>,
     /// Time of messages that counts [default: their own stamp if they have one, else log]
@@ -392,7 +392,7 @@ pub struct Simulate {
     /// Stand file
     #[arg(long, value_name = "FILE")]
     pub stand: PathBuf,
-    /// Column with the applied quantity, or the signal of an MCAP file, as '/joint_states.effort[0]'
+    /// Column with the applied quantity, or the signal of an MCAP file, as '/joint_states.effort[name=motor]'
     #[arg(long, value_name = "COL")]
     pub applied: Option<String>,
     /// Column with the measured quantity: the motion then starts as it tells, instead of at rest
@@ -430,7 +430,7 @@ pub struct Diagnose {
     /// Record that is held out; may be given several times [default: the last 30 % of each training record]
     #[arg(long, value_name = "FILE")]
     pub holdout: Vec<String>,
-    /// Column with the applied quantity, or the signal of an MCAP file, as '/joint_states.effort[0]'
+    /// Column with the applied quantity, or the signal of an MCAP file, as '/joint_states.effort[name=motor]'
     #[arg(long, value_name = "COL")]
     pub applied: String,
     /// Column with the measured quantity, or the signal of an MCAP file

@@ -160,7 +160,7 @@ pub struct Response {
     #[arg(value_name = "INPUT", required = true)]
     pub inputs: Vec<String>,
     /// Column with what acted: hammer force, exciter force, known torque; or the signal of an MCAP
-    /// file, as '/joint_states.effort[0]'
+    /// file, as '/joint_states.effort[name=motor]'
     #[arg(long, value_name = "NAME")]
     pub applied: String,
     /// Column with what was measured, or the signal of an MCAP file

@@ -2,7 +2,7 @@
 //!
 //! Every link of `simulate` is taken back in reverse order: disturbances, the recorder's range, the chain, the gage,
 //! the linear dynamics, and last the stand itself, whose torques are evaluated along the motion
-//! ([`motion`]). Beyond the band nothing is added.
+//! (`motion`). Beyond the band nothing is added.
 
 mod curve;
 mod disturbance;
