@@ -27,7 +27,7 @@ async function streamed(name) {
   return counts;
 }
 
-/** Messages on each topic, found by the index, and whether their log times rise. */
+/** Messages on each topic, found by the index, and whether their log times rise; nothing of a file without chunks, which has none. */
 async function indexed(name) {
   const file = await open(name);
   const readable = {
@@ -40,6 +40,10 @@ async function indexed(name) {
     },
   };
   const reader = await McapIndexedReader.Initialize({ readable, decompressHandlers });
+  if (reader.chunkIndexes.length === 0) {
+    await file.close();
+    return undefined;
+  }
   const counts = new Map();
   let last = 0n;
   for await (const message of reader.readMessages()) {
@@ -55,8 +59,8 @@ async function indexed(name) {
 const text = (counts) => JSON.stringify([...counts].sort());
 for (const name of process.argv.slice(2)) {
   const [a, b] = [await streamed(name), await indexed(name)];
-  if (a.size === 0 || text(a) !== text(b)) {
+  if (a.size === 0 || (b !== undefined && text(a) !== text(b))) {
     throw new Error(`${name}: the stream holds ${text(a)}, the index leads to ${text(b)}`);
   }
-  console.log(`${name}: ${text(a)}`);
+  console.log(`${name}: ${text(a)}${b === undefined ? " (no chunks, no index)" : ""}`);
 }
