@@ -136,3 +136,26 @@ fn threads_do_not_change_a_byte() {
     assert_eq!(one.stdout, three.stdout);
     assert!(one.stdout.contains("\"gain-error\""));
 }
+
+#[test]
+fn spikes_are_neither_noise_nor_an_effect() {
+    let case = make(7, "none", 1).expect("the catalogue has it");
+    let folder = folder(&case);
+    for name in ["train.csv", "holdout.csv"] {
+        let text = folder.read(name);
+        let spiked = text.lines().enumerate().map(|(row, line)| {
+            if row % 613 != 300 {
+                return line.to_owned() + "\n";
+            }
+            let (head, measured) = line.rsplit_once(',').expect("three columns");
+            let measured: f64 = measured.parse().expect("a number");
+            format!("{head},{:.8}\n", measured + 40.0 * noise_rms(&case))
+        });
+        folder.write(name, spiked.collect::<String>());
+    }
+    let report = folder.json(&diagnose(&["--json"]));
+    assert_eq!(report["verdict"], "unexplained");
+    assert_eq!(report["effects"], serde_json::json!([]));
+    let described = report["residual"]["described"].as_str().expect("a text");
+    assert!(described.contains("spikes"), "{described}");
+}

@@ -3,7 +3,8 @@
 #
 # usage: benches/peer/diagnose.sh [EFFECT]      (default cubic-stiffness)
 #
-# environment: PYTHON, a Python with the packages of requirements.txt [python3]; CARGO_TARGET_DIR as cargo takes it
+# environment: PYTHON [python3], a Python that has numpy and scipy or can make an environment that has;
+# PEER_CACHE, the folder of that environment [peer, in cargo's target folder]; CARGO_TARGET_DIR as cargo takes it
 set -euo pipefail
 
 here=$(cd "$(dirname "$0")" && pwd)
@@ -11,6 +12,12 @@ root=$(cd "$here/../.." && pwd)
 effect=${1:-cubic-stiffness}
 python=${PYTHON:-python3}
 target=${CARGO_TARGET_DIR:-$root/target}
+venv=${PEER_CACHE:-$target/peer}/venv
+if ! "$python" -c 'import numpy, scipy' 2>/dev/null; then
+    [[ -x $venv/bin/python ]] || "$python" -m venv "$venv"
+    "$venv/bin/python" -m pip install --quiet --disable-pip-version-check -r "$here/requirements.txt"
+    python=$venv/bin/python
+fi
 data=$(mktemp -d)
 trap 'rm -rf "$data"' EXIT
 

@@ -303,6 +303,10 @@ fn dependence(judged: &Judged, records: &Records) -> Dependence {
 /// decides; a level from out of band may be too low for coloured noise, so that there the residual must also
 /// follow from input or motion, or lie far above it.
 fn remains(judged: &Judged, dependence: &Dependence, floor: Option<Floor>) -> bool {
+    if dependence.has_spikes() {
+        // Spikes raise a floor that is measured without a model as well.
+        return true;
+    }
     let structured = dependence.structure().is_some();
     let Some(floor) = floor else {
         return structured;

@@ -320,6 +320,12 @@ impl Rendered<'_> {
                 parts.push("independent of input and motion as far as the tests see".to_owned())
             }
         }
+        if tests.has_spikes() {
+            parts.push(format!(
+                "{:.0} % of its power lies in a hundredth of its samples: spikes",
+                100.0 * tests.in_largest_hundredth
+            ));
+        }
         parts.extend(self.grows_with_level());
         for line in &self.diagnosis.lines {
             parts.push(format!("a line at {} Hz", rounded(line.frequency_hz, 5)));
