@@ -61,7 +61,8 @@ pub(super) static EFFECT: Effect = Effect {
         Form {
             name: "ac-coupled",
             place: Place::Chain,
-            parameters: &[Parameter::frequency("corner", 1e-6, 3.0).fading()],
+            // Below, a record of a thousand periods shows no corner but a slope, which is a drift.
+            parameters: &[Parameter::frequency("corner", 1e-4, 3.0).fading()],
             starts: &[&[0.003], &[0.05], &[0.3]],
             build: |p| {
                 let corner = TAU * p[0];
