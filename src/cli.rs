@@ -1,6 +1,9 @@
 //! The command line.
 
+pub mod diagnose;
 pub mod identify;
+pub mod reading;
+pub mod simulate;
 
 use std::path::PathBuf;
 
@@ -11,6 +14,10 @@ use crate::io::csv::{self, Delimiter, Told};
 use crate::io::digits::Digits;
 use crate::io::mcap::{Selection, TimeChoice};
 use crate::signal::{self, MessageOptions};
+
+pub use diagnose::Diagnose;
+pub use reading::{Reading, TimeAxis};
+pub use simulate::Simulate;
 
 /// True torque from the records of a reaction-torque stand.
 ///
@@ -337,21 +344,9 @@ pub struct Inspect {
     /// The result.
     #[command(flatten)]
     pub result: Result,
-    /// Column with the time stamps
-    #[arg(long, value_name = "NAME")]
-    pub time_column: Option<String>,
-    /// Unit of the time stamps, if their heading does not say: s, ms, us, min
-    #[arg(long, value_name = "UNIT")]
-    pub time_unit: Option<String>,
-    /// Sampling rate, where there are no time stamps or they are wrong
-    #[arg(long, value_name = "HZ", value_parser = positive_frequency)]
-    pub rate: Option<f64>,
-    /// What separates the cells: , ; | tab space none
-    #[arg(long, value_name = "MARK", value_parser = delimiter)]
-    pub delimiter: Option<Delimiter>,
-    /// Decimal mark: . or ,
-    #[arg(long, value_name = "MARK", value_parser = decimal)]
-    pub decimal: Option<u8>,
+    /// How the files are read.
+    #[command(flatten)]
+    pub reading: Reading,
     /// Draw the channels into an SVG file
     #[arg(long, value_name = "FILE")]
     pub plot: Option<PathBuf>,
@@ -361,117 +356,6 @@ pub struct Inspect {
     /// End with code 3 if there are warnings
     #[arg(long)]
     pub strict: bool,
-}
-
-impl Inspect {
-    /// The options that the readers take.
-    #[must_use]
-    pub fn options(&self) -> csv::Options {
-        csv::Options {
-            time_column: self.time_column.clone(),
-            time_unit: self.time_unit.clone(),
-            rate_hz: self.rate,
-            told: Told {
-                delimiter: self.delimiter,
-                decimal: self.decimal,
-            },
-            ..csv::Options::default()
-        }
-    }
-}
-
-/// Arguments of `simulate`.
-#[derive(Debug, Args)]
-pub struct Simulate {
-    /// Recording with the applied quantity, or - for standard input
-    #[arg(value_name = "INPUT")]
-    pub input: String,
-    /// The result.
-    #[command(flatten)]
-    pub result: Result,
-    /// Stand file
-    #[arg(long, value_name = "FILE")]
-    pub stand: PathBuf,
-    /// Column with the applied quantity, or the signal of an MCAP file, as '/joint_states.effort[name=motor]'
-    #[arg(long, value_name = "COL")]
-    pub applied: Option<String>,
-    /// Column with the measured quantity: the motion then starts as it tells, instead of at rest
-    #[arg(long, value_name = "COL")]
-    pub start_from: Option<String>,
-    /// Unit of the applied quantity, if its heading does not say
-    #[arg(long, value_name = "UNIT")]
-    pub unit: Option<String>,
-    /// Sampling rate, where there are no time stamps or they are wrong
-    #[arg(long, value_name = "HZ", value_parser = positive_frequency)]
-    pub rate: Option<f64>,
-    /// Column with the time stamps
-    #[arg(long, value_name = "NAME")]
-    pub time_column: Option<String>,
-    /// Unit of the time stamps, if their heading does not say: s, ms, us, min
-    #[arg(long, value_name = "UNIT")]
-    pub time_unit: Option<String>,
-    /// Significant digits of the result, 1 to 15, or "shortest" for as many as bring back every bit
-    #[arg(long, value_name = "N", default_value = "12", value_parser = digits)]
-    pub digits: Digits,
-    /// Say nothing on standard error but warnings
-    #[arg(short, long)]
-    pub quiet: bool,
-}
-
-/// Arguments of `diagnose`.
-#[derive(Debug, Args)]
-pub struct Diagnose {
-    /// Stand file; without it a plain second-order stand is fitted
-    #[arg(long, value_name = "FILE")]
-    pub stand: Option<PathBuf>,
-    /// Record to fit; may be given several times
-    #[arg(long, value_name = "FILE", required = true)]
-    pub train: Vec<String>,
-    /// Record that is held out; may be given several times [default: the last 30 % of each training record]
-    #[arg(long, value_name = "FILE")]
-    pub holdout: Vec<String>,
-    /// Column with the applied quantity, or the signal of an MCAP file, as '/joint_states.effort[name=motor]'
-    #[arg(long, value_name = "COL")]
-    pub applied: String,
-    /// Column with the measured quantity, or the signal of an MCAP file
-    #[arg(long, value_name = "COL")]
-    pub measured: String,
-    /// Unit of the applied quantity, if its heading does not say
-    #[arg(long, value_name = "UNIT")]
-    pub applied_unit: Option<String>,
-    /// Unit of the measured quantity, if its heading does not say
-    #[arg(long, value_name = "UNIT")]
-    pub measured_unit: Option<String>,
-    /// Sampling rate, where there are no time stamps or they are wrong
-    #[arg(long, value_name = "HZ", value_parser = positive_frequency)]
-    pub rate: Option<f64>,
-    /// Column with the time stamps
-    #[arg(long, value_name = "NAME")]
-    pub time_column: Option<String>,
-    /// Unit of the time stamps, if their heading does not say: s, ms, us, min
-    #[arg(long, value_name = "UNIT")]
-    pub time_unit: Option<String>,
-    /// Write a page for a browser: models beside the records, residuals, candidates
-    #[arg(long, value_name = "FILE")]
-    pub html: Option<PathBuf>,
-    /// Stand file to write, refined, for simulate and compensate
-    #[arg(short, long, value_name = "OUT")]
-    pub output: Option<String>,
-    /// Replace outputs that exist
-    #[arg(long)]
-    pub force: bool,
-    /// Print JSON instead of text
-    #[arg(long)]
-    pub json: bool,
-    /// End with code 3 if there are warnings
-    #[arg(long)]
-    pub strict: bool,
-    /// Threads to use [default: one for each core, at most 8]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
-    pub threads: Option<u16>,
-    /// Say nothing on standard error but warnings
-    #[arg(short, long)]
-    pub quiet: bool,
 }
 
 /// Orders of a fundamental, rising.

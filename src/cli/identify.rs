@@ -4,8 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
 
-use super::{Result, Units, decimal, delimiter, positive_frequency, range};
-use crate::io::csv::{Delimiter, Options, Told};
+use super::{Reading, Result, Units, range};
 
 /// Arguments of `identify`.
 #[derive(Debug, Args)]
@@ -26,46 +25,6 @@ pub enum Test {
     Runup(Runup),
     /// Sensitivity and zero from known loads
     Static(Static),
-}
-
-/// How tables are read, whatever their channels.
-#[derive(Debug, Args)]
-pub struct Reading {
-    /// Column with the time stamps
-    #[arg(long, value_name = "NAME")]
-    pub time_column: Option<String>,
-    /// Unit of the time stamps, if their heading does not say: s, ms, us, min
-    #[arg(long, value_name = "UNIT")]
-    pub time_unit: Option<String>,
-    /// Sampling rate, where there are no time stamps or they are wrong
-    #[arg(long, value_name = "HZ", value_parser = positive_frequency)]
-    pub rate: Option<f64>,
-    /// What separates the cells: , ; | tab space none
-    #[arg(long, value_name = "MARK", value_parser = delimiter)]
-    pub delimiter: Option<Delimiter>,
-    /// Decimal mark: . or ,
-    #[arg(long, value_name = "MARK", value_parser = decimal)]
-    pub decimal: Option<u8>,
-}
-
-impl Reading {
-    /// The options for one channel.
-    #[must_use]
-    pub fn options(&self, channel: Option<&str>, unit: Option<&str>) -> Options {
-        Options {
-            channel: channel.map(str::to_owned),
-            unit: unit.map(str::to_owned),
-            time_column: self.time_column.clone(),
-            time_unit: self.time_unit.clone(),
-            rate_hz: self.rate,
-            resample: false,
-            any_steps: false,
-            told: Told {
-                delimiter: self.delimiter,
-                decimal: self.decimal,
-            },
-        }
-    }
 }
 
 /// Where the findings go: the stand file of `-o` is written, or updated if it is there.

@@ -35,11 +35,7 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
         None => None,
     };
     let page = match &args.html {
-        Some(place) => Some(Output::open(
-            Some(&place.display().to_string()),
-            args.force,
-            &files,
-        )?),
+        Some(place) => Some(Output::open(Some(place), args.force, &files)?),
         None => None,
     };
     let mut output = Output::open(None, args.force, &files)?;

@@ -6,7 +6,7 @@ use torqcomp_model::simulate::{Fixed, Input, Model, State, substeps};
 use super::{Outcome, conclude};
 use crate::cli::Simulate;
 use crate::failure::Failure;
-use crate::io::csv::{Options, Place};
+use crate::io::csv::Place;
 use crate::io::digits;
 use crate::io::output::Output;
 use crate::report;
@@ -21,14 +21,9 @@ const MOST_SUBSTEPS: usize = 256;
 /// Runs the verb.
 pub fn run(args: &Simulate) -> Result<Outcome, Failure> {
     let stand = stand::read(&args.stand)?;
-    let options = Options {
-        channel: args.applied.clone(),
-        unit: args.unit.clone(),
-        time_column: args.time_column.clone(),
-        time_unit: args.time_unit.clone(),
-        rate_hz: args.rate,
-        ..Options::default()
-    };
+    let options = args
+        .axis
+        .options(args.applied.as_deref(), args.unit.as_deref());
     let read = Together::read(&Place::of(&args.input), &[options])?;
     let chosen = &read.tracks[0];
     let inputs = [args.input.as_ref(), args.stand.as_path()];

@@ -104,14 +104,23 @@ fn autocorrelation(values: &[f64], lags: usize) -> Vec<f64> {
         .collect()
 }
 
-/// The portmanteau of Box and Pierce over the first lags.
-fn whiteness(sights: &[Sight], total: usize) -> (bool, Option<f64>) {
-    let mut sums = vec![0.0; LAGS + 1];
-    for sight in sights {
-        for (sum, r) in sums.iter_mut().zip(autocorrelation(sight.residual, LAGS)) {
+/// Sums of products at lags from 0, of several residuals together.
+pub(super) fn autocorrelations<'a>(
+    residuals: impl Iterator<Item = &'a [f64]>,
+    lags: usize,
+) -> Vec<f64> {
+    let mut sums = vec![0.0; lags + 1];
+    for residual in residuals {
+        for (sum, r) in sums.iter_mut().zip(autocorrelation(residual, lags)) {
             *sum += r;
         }
     }
+    sums
+}
+
+/// The portmanteau of Box and Pierce over the first lags.
+fn whiteness(sights: &[Sight], total: usize) -> (bool, Option<f64>) {
+    let sums = autocorrelations(sights.iter().map(|s| s.residual), LAGS);
     if sums[0] <= 0.0 {
         return (true, None);
     }

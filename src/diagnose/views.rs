@@ -1,6 +1,7 @@
 //! What a person looks at to judge a diagnosis: records beside both models, and residuals in time, in frequency and
 //! against the motion.
 
+use super::dependence::autocorrelations;
 use super::record::{Record, dot};
 use super::spectra::{Pieces, pieces};
 
@@ -170,13 +171,7 @@ pub fn autocorrelation(
     let shortest = traces.iter().map(|t| t.measured.len()).min().unwrap_or(0);
     let lags = lags.min(shortest.saturating_sub(1));
     let total: usize = traces.iter().map(|t| t.measured.len()).sum();
-    let mut sums = vec![0.0; lags + 1];
-    for trace in traces {
-        let r = of(trace);
-        for (lag, sum) in sums.iter_mut().enumerate() {
-            *sum += dot(&r[lag..], &r[..r.len() - lag]);
-        }
-    }
+    let sums = autocorrelations(traces.iter().map(of), lags);
     let whole = sums[0].max(f64::MIN_POSITIVE);
     let shares = sums.iter().map(|s| s / whole).collect();
     (shares, 2.576 / (total.max(1) as f64).sqrt())

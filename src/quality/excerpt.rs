@@ -43,6 +43,13 @@ pub fn of_stream(kept: &[f64], samples: usize) -> &[f64] {
     &kept[..kept.len().min((samples / SHARE).clamp(FEWEST, OF_STREAM))]
 }
 
+/// The part of a record in memory that is looked at.
+#[must_use]
+pub fn of_memory(mut samples: Vec<f64>) -> Vec<f64> {
+    samples.truncate(OF_MEMORY);
+    samples
+}
+
 /// The warnings of [`super::warnings`] about the first samples of a record; that it has more is said.
 ///
 /// ```

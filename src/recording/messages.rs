@@ -19,16 +19,7 @@ pub fn read(place: &Place, wanted: &[Option<&str>]) -> Result<Recording, Failure
              not allow; give the name of the file",
         ));
     }
-    let mut recording = Recording {
-        source: place.name(),
-        format: "mcap",
-        dialect: String::new(),
-        details: Vec::new(),
-        channels: Vec::new(),
-        segments: Vec::new(),
-        warnings: Vec::new(),
-        lost: None,
-    };
+    let mut recording = Recording::empty("mcap", place.name());
     let mut origin_ns = None;
     for signal in wanted {
         let read = one(place, *signal, &mut origin_ns, &mut recording)?;

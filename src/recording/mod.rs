@@ -38,6 +38,23 @@ pub struct Recording {
     pub lost: Option<Warning>,
 }
 
+impl Recording {
+    /// Nothing yet, of a format.
+    #[must_use]
+    pub fn empty(format: &'static str, source: String) -> Self {
+        Self {
+            source,
+            format,
+            dialect: String::new(),
+            details: Vec::new(),
+            channels: Vec::new(),
+            segments: Vec::new(),
+            warnings: Vec::new(),
+            lost: None,
+        }
+    }
+}
+
 /// A part of a file that was recorded on its own: after a trigger, or after a pause.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Segment {

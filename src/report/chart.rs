@@ -4,6 +4,7 @@
 use std::fmt::Write;
 
 use super::rounded;
+use super::svg::mark_step;
 
 /// Size of a chart and its margins, in user units.
 const WIDTH: f64 = 720.0;
@@ -321,13 +322,7 @@ impl Scale {
         }
         let value = |place: f64| if self.log { 10_f64.powf(place) } else { place };
         let (low, high) = (value(self.low), value(self.high));
-        let rough = (high - low) / 6.0;
-        let power = 10_f64.powf(rough.log10().floor());
-        let steps = [1.0, 2.0, 5.0, 10.0].map(|f| f * power);
-        let step = steps
-            .into_iter()
-            .find(|s| *s >= rough)
-            .unwrap_or(10.0 * power);
+        let step = mark_step(high - low, 6.0);
         let (first, last) = ((low / step).ceil() as i64, (high / step).floor() as i64);
         (first..=last).map(|i| i as f64 * step).collect()
     }

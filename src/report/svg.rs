@@ -196,13 +196,7 @@ impl Axis {
             let half = 0.5_f64.max(1e-6 * low.abs());
             (low - half, low + half)
         };
-        let rough = (high - low) / count;
-        let power = 10_f64.powf(rough.log10().floor());
-        let step = [1.0, 2.0, 5.0, 10.0]
-            .into_iter()
-            .map(|f| f * power)
-            .find(|step| *step >= rough)
-            .unwrap_or(10.0 * power);
+        let step = mark_step(high - low, count);
         Self { low, high, step }
     }
 
@@ -218,6 +212,17 @@ impl Axis {
         let step = self.step;
         (0..=(last - first).max(0.0) as usize).map(move |i| (first + i as f64) * step)
     }
+}
+
+/// Distance of the marks of an axis, at most about as many as `count`: 1, 2 or 5 times a power of ten.
+pub(super) fn mark_step(range: f64, count: f64) -> f64 {
+    let rough = range / count;
+    let power = 10_f64.powf(rough.log10().floor());
+    [1.0, 2.0, 5.0, 10.0]
+        .into_iter()
+        .map(|f| f * power)
+        .find(|step| *step >= rough)
+        .unwrap_or(10.0 * power)
 }
 
 fn frame(svg: &mut String, time: &Axis, value: &Axis, unit: &str) {

@@ -36,11 +36,7 @@ pub fn run(args: &Compensate, plan: Plan, sink: &mut Sink) -> Result<Run, Failur
         resampled: record.resampled,
         noise: density.and_then(|density| RecordNoise::of(&filter, &density)),
         summary: record.summary,
-        excerpt: {
-            let mut samples = record.samples;
-            samples.truncate(excerpt::OF_MEMORY);
-            samples
-        },
+        excerpt: excerpt::of_memory(record.samples),
         traces,
         refined: None,
     })

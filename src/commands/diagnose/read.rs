@@ -8,7 +8,7 @@ use torqcomp_model::simulate::{Input, substeps};
 use crate::cli::Diagnose;
 use crate::diagnose::{Begin, Case, Constants, Record, set_substeps};
 use crate::failure::Failure;
-use crate::io::csv::{NamedUnit, Options, Place};
+use crate::io::csv::{NamedUnit, Place};
 use crate::report::Warning;
 use crate::signal::Together;
 use crate::stand::{Given, Stand};
@@ -138,23 +138,16 @@ pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<Read, Failure> {
 }
 
 fn pair(args: &Diagnose, file: &str) -> Result<Pair, Failure> {
-    let options = |channel: &str, unit: &Option<String>| Options {
-        channel: Some(channel.to_owned()),
-        unit: unit.clone(),
-        time_column: args.time_column.clone(),
-        time_unit: args.time_unit.clone(),
-        rate_hz: args.rate,
-        ..Options::default()
-    };
     if args.applied == args.measured {
         return Err(Failure::usage(
             "--applied and --measured name the same column",
         ));
     }
     let wanted = [
-        options(&args.applied, &args.applied_unit),
-        options(&args.measured, &args.measured_unit),
-    ];
+        (&args.applied, &args.applied_unit),
+        (&args.measured, &args.measured_unit),
+    ]
+    .map(|(channel, unit)| args.axis.options(Some(channel), unit.as_deref()));
     let read = Together::read(&Place::of(file), &wanted)?;
     let mut tracks = read.tracks.into_iter();
     let (Some(applied), Some(measured)) = (tracks.next(), tracks.next()) else {

@@ -280,20 +280,26 @@ impl Rendered<'_> {
             frequency_hz: l.frequency_hz,
             amplitude: l.amplitude / self.units.printed,
         });
-        let before = self.rms(&d.before);
-        let train_size = d.before.fitted.structure.frame.rulers.rms / self.units.printed;
         Residual {
             white: tests.white,
             independent_of_input: tests.independent_of_input,
             described: self.described(&tests),
             tests,
             lines: lines.collect(),
-            levels: Levels {
-                train_applied_rms: self.levels[0],
-                holdout_applied_rms: self.levels[1],
-                train_relative: before.train_rms / train_size,
-                holdout_relative: before.holdout_relative,
-            },
+            levels: self.levels_reached(),
+        }
+    }
+
+    /// Levels of excitation, and how well the plain stand does at each.
+    fn levels_reached(&self) -> Levels {
+        let before = self.rms(&self.diagnosis.before);
+        let frame = self.diagnosis.before.fitted.structure.frame;
+        let train_size = frame.rulers.rms / self.units.printed;
+        Levels {
+            train_applied_rms: self.levels[0],
+            holdout_applied_rms: self.levels[1],
+            train_relative: before.train_rms / train_size,
+            holdout_relative: before.holdout_relative,
         }
     }
 
@@ -335,10 +341,8 @@ impl Rendered<'_> {
 
     /// Whether the plain stand does worse on one set of records than on the other, which is excited less or more.
     fn grows_with_level(&self) -> Option<String> {
-        let d = self.diagnosis;
-        let size = d.before.fitted.structure.frame.rulers.rms / self.units.printed;
-        let before = self.rms(&d.before);
-        let relative = [before.train_rms / size, before.holdout_relative];
+        let levels = self.levels_reached();
+        let relative = [levels.train_relative, levels.holdout_relative];
         let level = self.levels[1] / self.levels[0];
         let error = relative[1] / relative[0];
         let differ = |ratio: f64, factor: f64| ratio.ln().abs() > factor.ln();

@@ -73,7 +73,7 @@ fn load(args: &Decay, input: &str) -> Result<Loaded, Failure> {
     let recording = read(input, std::slice::from_ref(&options))?;
     let selection = recording.select(&options)?;
     let count = selection.samples.len();
-    let stamps = match (&selection.channel.axis.stamps_s, args.reading.rate) {
+    let stamps = match (&selection.channel.axis.stamps_s, args.reading.axis.rate) {
         (Some(stamps), None) => stamps.to_vec(),
         _ => {
             let (start, rate) = (selection.start_s, selection.rate_hz);

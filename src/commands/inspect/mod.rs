@@ -35,7 +35,7 @@ pub fn run(args: &Inspect) -> Result<Outcome, Failure> {
     let read: Vec<Result<Content, Failure>> = args
         .files
         .iter()
-        .map(|file| content::read(&Place::of(file), &args.options()))
+        .map(|file| content::read(&Place::of(file), &args.reading.options(None, None)))
         .collect();
     if let [Err(failure)] = read.as_slice() {
         return Err(failure.clone());

@@ -19,7 +19,7 @@ mod units;
 
 use super::{Recording, Segment};
 use crate::failure::Failure;
-use crate::io::csv::{self, Dialect, Options};
+use crate::io::csv::{self, Options};
 
 pub use clock::Clock;
 use decode::Text;
@@ -219,10 +219,10 @@ fn one_line(text: &[u8], options: &Options) -> Option<Vec<u8>> {
 /// Puts tables together as the segments of a recording.
 fn recording_of(parts: Vec<table::Part>) -> Recording {
     let several = parts.len() > 1;
-    let mut recording = empty();
+    let mut recording = Recording::empty("csv", String::new());
     for (place, part) in parts.into_iter().enumerate() {
         if place == 0 {
-            recording.dialect = describe(part.dialect);
+            recording.dialect = part.dialect.describe();
             recording.details = details(&part.entries);
         }
         if several {
@@ -240,23 +240,6 @@ fn recording_of(parts: Vec<table::Part>) -> Recording {
         recording.lost = recording.lost.or(part.lost);
     }
     recording
-}
-
-fn empty() -> Recording {
-    Recording {
-        source: String::new(),
-        format: "csv",
-        dialect: String::new(),
-        details: Vec::new(),
-        channels: Vec::new(),
-        segments: Vec::new(),
-        warnings: Vec::new(),
-        lost: None,
-    }
-}
-
-fn describe(dialect: Dialect) -> String {
-    dialect.describe()
 }
 
 /// Keys and values for people.

@@ -12,7 +12,6 @@ use crate::recording::text::decode::Text;
 use crate::recording::text::header::Field;
 use crate::recording::text::rows::{self, Column, Wanted};
 use crate::recording::text::table::Hints;
-use crate::recording::text::{describe, empty};
 use crate::recording::{Axis, Channel, RateFrom, Recording, Segment};
 use crate::report::Warning;
 
@@ -64,8 +63,8 @@ fn read(text: &Text, options: &Options) -> Result<Recording, Failure> {
         number: 1,
     };
     let file = file_header(&mut lines, options);
-    let mut recording = empty();
-    recording.dialect = describe(file.dialect);
+    let mut recording = Recording::empty("csv", String::new());
+    recording.dialect = file.dialect.describe();
     recording.details.clone_from(&file.details);
     while lines.skip_to("Channels") {
         let place = recording.segments.len();

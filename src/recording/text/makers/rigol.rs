@@ -6,12 +6,12 @@ use super::{Maker, channel};
 use crate::failure::Failure;
 use crate::io::csv::{Delimiter, Dialect, Options, without_rounding};
 use crate::io::number;
+use crate::recording::text::FOR_MAKER;
 use crate::recording::text::decode::Text;
 use crate::recording::text::head::Head;
 use crate::recording::text::header::Field;
 use crate::recording::text::rows::{self, Wanted};
 use crate::recording::text::table::Hints;
-use crate::recording::text::{FOR_MAKER, describe, empty};
 use crate::recording::{Axis, RateFrom, Recording};
 
 const HINTS: Hints = Hints {
@@ -78,8 +78,8 @@ fn read(text: &Text, options: &Options) -> Result<Recording, Failure> {
     };
     let wanted = vec![Wanted::Numbers; start.width];
     let read = rows::read(&text.bytes, first.offset, 3, DIALECT, &wanted, &|_| false)?;
-    let mut recording = empty();
-    recording.dialect = describe(DIALECT);
+    let mut recording = Recording::empty("csv", String::new());
+    recording.dialect = DIALECT.describe();
     let mut axis = Axis::of_header(
         "Increment",
         without_rounding(1.0 / start.step_s),

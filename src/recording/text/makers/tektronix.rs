@@ -13,7 +13,7 @@ use crate::recording::text::header::Field;
 use crate::recording::text::keys::{self, Entry, Topic};
 use crate::recording::text::rows::{self, Wanted};
 use crate::recording::text::table::Hints;
-use crate::recording::text::{FOR_MAKER, describe, details, empty, units};
+use crate::recording::text::{FOR_MAKER, details, units};
 use crate::recording::{Axis, RateFrom, Recording};
 use crate::report::Warning;
 
@@ -98,8 +98,8 @@ fn read(text: &Text, options: &Options) -> Result<Recording, Failure> {
         wanted[place + 4] = Wanted::Numbers;
     }
     let read = rows::read(&text.bytes, 0, 1, dialect, &wanted, &|_| false)?;
-    let mut recording = empty();
-    recording.dialect = describe(dialect);
+    let mut recording = Recording::empty("csv", String::new());
+    recording.dialect = dialect.describe();
     for place in blocks {
         let entries = entries(&head, dialect, place);
         let column = read.columns[place + 4].clone();

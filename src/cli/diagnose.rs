@@ -1,0 +1,57 @@
+//! The command line of `diagnose`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::TimeAxis;
+
+/// Arguments of `diagnose`.
+#[derive(Debug, Args)]
+pub struct Diagnose {
+    /// Stand file; without it a plain second-order stand is fitted
+    #[arg(long, value_name = "FILE")]
+    pub stand: Option<PathBuf>,
+    /// Record to fit; may be given several times
+    #[arg(long, value_name = "FILE", required = true)]
+    pub train: Vec<String>,
+    /// Record that is held out; may be given several times [default: the last 30 % of each training record]
+    #[arg(long, value_name = "FILE")]
+    pub holdout: Vec<String>,
+    /// Column with the applied quantity, or the signal of an MCAP file, as '/joint_states.effort[name=motor]'
+    #[arg(long, value_name = "COL")]
+    pub applied: String,
+    /// Column with the measured quantity, or the signal of an MCAP file
+    #[arg(long, value_name = "COL")]
+    pub measured: String,
+    /// Unit of the applied quantity, if its heading does not say
+    #[arg(long, value_name = "UNIT")]
+    pub applied_unit: Option<String>,
+    /// Unit of the measured quantity, if its heading does not say
+    #[arg(long, value_name = "UNIT")]
+    pub measured_unit: Option<String>,
+    /// The time axis.
+    #[command(flatten)]
+    pub axis: TimeAxis,
+    /// Write a page for a browser: models beside the records, residuals, candidates
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<String>,
+    /// Stand file to write, refined, for simulate and compensate
+    #[arg(short, long, value_name = "OUT")]
+    pub output: Option<String>,
+    /// Replace outputs that exist
+    #[arg(long)]
+    pub force: bool,
+    /// Print JSON instead of text
+    #[arg(long)]
+    pub json: bool,
+    /// End with code 3 if there are warnings
+    #[arg(long)]
+    pub strict: bool,
+    /// Threads to use [default: one for each core, at most 8]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub threads: Option<u16>,
+    /// Say nothing on standard error but warnings
+    #[arg(short, long)]
+    pub quiet: bool,
+}
