@@ -137,25 +137,50 @@ fn threads_do_not_change_a_byte() {
     assert!(one.stdout.contains("\"gain-error\""));
 }
 
-#[test]
-fn spikes_are_neither_noise_nor_an_effect() {
-    let case = make(7, "none", 1).expect("the catalogue has it");
-    let folder = folder(&case);
+/// A complete stand's records, each measured sample changed by a function of the row, and what is said of them.
+fn changed(case: &Case, change: impl Fn(usize, f64) -> f64) -> serde_json::Value {
+    let folder = folder(case);
     for name in ["train.csv", "holdout.csv"] {
         let text = folder.read(name);
-        let spiked = text.lines().enumerate().map(|(row, line)| {
-            if row % 613 != 300 {
-                return line.to_owned() + "\n";
-            }
+        let rows = text.lines().enumerate().map(|(row, line)| {
             let (head, measured) = line.rsplit_once(',').expect("three columns");
-            let measured: f64 = measured.parse().expect("a number");
-            format!("{head},{:.8}\n", measured + 40.0 * noise_rms(&case))
+            match measured.parse() {
+                Ok(measured) => format!("{head},{:.8}\n", change(row, measured)),
+                Err(_) => line.to_owned() + "\n",
+            }
         });
-        folder.write(name, spiked.collect::<String>());
+        folder.write(name, rows.collect::<String>());
     }
-    let report = folder.json(&diagnose(&["--json"]));
+    folder.json(&diagnose(&["--json"]))
+}
+
+/// Whether an answer claims no effect, and says what there is.
+fn is_unexplained(report: &serde_json::Value, says: &str) {
     assert_eq!(report["verdict"], "unexplained");
     assert_eq!(report["effects"], serde_json::json!([]));
     let described = report["residual"]["described"].as_str().expect("a text");
-    assert!(described.contains("spikes"), "{described}");
+    assert!(described.contains(says), "{described}");
+}
+
+#[test]
+fn spikes_are_neither_noise_nor_an_effect() {
+    let case = make(7, "none", 1).expect("the catalogue has it");
+    let height = 40.0 * noise_rms(&case);
+    let report = changed(&case, |row, y| {
+        y + if row % 613 == 300 { height } else { 0.0 }
+    });
+    is_unexplained(&report, "spikes");
+}
+
+#[test]
+fn a_gain_that_swings_or_trembles_is_neither_noise_nor_an_effect() {
+    let case = make(7, "none", 1).expect("the catalogue has it");
+    // 1 % at 7 Hz.
+    let swings = |row: usize| 0.01 * (0.0022 * row as f64).sin();
+    let report = changed(&case, |row, y| y * (1.0 + swings(row)));
+    is_unexplained(&report, "constants that change over the record");
+    // 1 % from sample to sample: the fractions of a multiple of the golden ratio are even between 0 and 1.
+    let trembles = |row: usize| 0.035 * ((row as f64 * 0.618_033_988_75).fract() - 0.5);
+    let report = changed(&case, |row, y| y * (1.0 + trembles(row)));
+    is_unexplained(&report, "the size of the signal from moment to moment");
 }

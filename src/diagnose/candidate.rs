@@ -9,8 +9,8 @@ use super::blocks::{Comparison, compare};
 use super::fit::{Fitted, Residual, difference, fit, look};
 use super::record::{Nuisance, Record, dot};
 use super::spectra::Peak;
-use super::starts;
-use super::structure::{Choice, Waves};
+use super::starts::{self, Trial};
+use super::structure::{Choice, Structure, Waves};
 
 /// The records of a diagnosis.
 pub struct Records {
@@ -23,6 +23,12 @@ pub struct Records {
 }
 
 impl Records {
+    /// Steps of integration from sample to sample.
+    #[must_use]
+    pub fn substeps(&self) -> usize {
+        self.train[0].input.substeps()
+    }
+
     /// Gives all records that many steps of integration from sample to sample.
     pub fn set_substeps(&mut self, substeps: usize) {
         set_substeps(self.train.iter_mut().chain(&mut self.hold), substeps);
@@ -48,38 +54,53 @@ pub fn set_substeps<'r>(records: impl Iterator<Item = &'r mut Record>, substeps:
 
 /// Error of the integration over the rms of the held-out residual, above which the step is halved.
 const STEP_ERROR: f64 = 0.1;
-/// Most steps from sample to sample.
-const MOST_SUBSTEPS: usize = 128;
+/// Most steps, over those that the stand without effects takes: a listed effect is settled with one to four of them, a
+/// law that bends itself to something else (a hard stop, say) with none.
+const FINEST: usize = 8;
 /// Rounds of a fit with a finer step.
 const FINER_ROUNDS: usize = 6;
 
-/// Halves the step of integration, and fits again, until its error no longer matters.
+/// Halves the step of integration, and fits again, until its error no longer matters; says whether it came to that.
+/// `coarse` is the step of the stand without effects.
 #[must_use]
-pub fn refine_step<'a>(mut judged: Judged<'a>, records: &mut Records) -> Judged<'a> {
+pub fn refine_step<'a>(
+    mut judged: Judged<'a>,
+    records: &mut Records,
+    coarse: usize,
+) -> (Judged<'a>, bool) {
     while judged.fitted.integrates() {
-        let substeps = records.train[0].input.substeps();
+        let substeps = records.substeps();
         let Some(change) = step_change(&judged.fitted, &records.train[0]) else {
-            break;
+            return (judged, false);
         };
-        if change <= STEP_ERROR * judged.hold_rms() || 2 * substeps > MOST_SUBSTEPS {
+        if change <= STEP_ERROR * judged.hold_rms() {
             break;
+        }
+        if 2 * substeps > FINEST * coarse {
+            return (judged, false);
         }
         records.set_substeps(2 * substeps);
-        let training = begun(&records.train, &judged.fitted);
-        let structure = judged.fitted.structure.clone();
-        let again = fit(
-            structure,
-            &judged.fitted.values,
-            &training,
-            &records.reference,
-            FINER_ROUNDS,
-        );
-        match again.ok().and_then(|fitted| judge(fitted, records)) {
+        match again(&judged, records) {
             Some(finer) => judged = finer,
-            None => break,
+            None => return (judged, false),
         }
     }
-    judged
+    (judged, true)
+}
+
+/// The same model fitted again, with the step that the records have now.
+fn again<'a>(judged: &Judged<'a>, records: &Records) -> Option<Judged<'a>> {
+    let fitted = &judged.fitted;
+    let training = begun(&records.train, fitted);
+    let (structure, values) = (fitted.structure.clone(), &fitted.values);
+    let found = fit(
+        structure,
+        values,
+        &training,
+        &records.reference,
+        FINER_ROUNDS,
+    );
+    judge(found.ok()?, records)
 }
 
 /// Rms by which a record changes with half the step.
@@ -269,23 +290,33 @@ pub fn judge<'a>(fitted: Fitted<'a>, records: &Records) -> Option<Judged<'a>> {
     })
 }
 
-/// A first look at one effect in one form: very few rounds from each of its best starts.
+/// The best starts of one effect in one form, each run once.
+#[must_use]
+pub fn begin(base: &Base, choice: Choice, peaks: &[Peak], records: &Records) -> Vec<Trial> {
+    let structure = with(base, choice);
+    starts::best(base, &structure, starts::own(choice, peaks), records)
+}
+
+fn with<'a>(base: &Base<'a>, choice: Choice) -> Structure<'a> {
+    let mut structure = base.judged.fitted.structure.clone();
+    structure.choices.push(choice);
+    structure
+}
+
+/// A first look at one effect in one form: very few rounds from each of its starts.
 #[must_use]
 pub fn first_look<'a>(
     base: &Base<'a>,
     choice: Choice,
-    peaks: &[Peak],
+    from: &[Trial],
     records: &Records,
 ) -> Vec<Fitted<'a>> {
-    let fitted = &base.judged.fitted;
-    let mut structure = fitted.structure.clone();
-    structure.choices.push(choice);
-    let from = starts::best(base, &structure, starts::own(choice, peaks), records);
-    let training = begun(&records.train, fitted);
+    let structure = with(base, choice);
+    let training = begun(&records.train, &base.judged.fitted);
     let each = from.iter().map(|start| {
         look(
             structure.clone(),
-            start,
+            &start.values,
             &training,
             &records.reference,
             FIRST_ROUNDS,

@@ -2,9 +2,11 @@
 
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+use torqcomp_model::effects::Mode;
 
 use super::record::dot;
 use super::spectra::coherent_share;
+use super::steady;
 
 /// Lags of the tests of whiteness and of independence from the input.
 const LAGS: usize = 25;
@@ -17,6 +19,12 @@ const SPIKES: f64 = 0.5;
 const STRUCTURE: f64 = 0.04;
 /// Standard deviations above none at which a share counts as found.
 const SIGNIFICANT: f64 = 4.0;
+/// Share of a residual's power from which on it counts as unsteady.
+const UNSTEADY: f64 = 0.2;
+/// The same for a zero that wanders.
+const WANDERING: f64 = 0.05;
+/// Standard deviations above none for that.
+const CLEARLY: f64 = 6.0;
 
 /// A share of the residual's power that follows from something.
 #[derive(Debug, Clone, Serialize)]
@@ -44,6 +52,12 @@ pub struct Dependence {
     pub in_largest_hundredth: f64,
     /// Shares of its power that follow from the input or the motion.
     pub shares: Vec<Share>,
+    /// Share of its power that other constants in each stretch of the record take out.
+    pub changing_constants: Share,
+    /// Share of its power that goes with the square of the signal from sample to sample.
+    pub with_signal: Share,
+    /// Share of its power that lies at the lowest frequencies, above what noise leaves there.
+    pub wandering_zero: Share,
 }
 
 /// One record's residual with what it may depend on.
@@ -72,9 +86,24 @@ impl Dependence {
         self.in_largest_hundredth > SPIKES
     }
 
-    /// Tests residuals of records.
+    /// Whether stand, chain or noise change over the record, in a way that differences of periods show as noise.
     #[must_use]
-    pub fn of(sights: &[Sight]) -> Self {
+    pub fn unsteady(&self) -> Option<&Share> {
+        // The particular first: constants that change also make a residual that goes with the signal.
+        let least = [
+            (&self.changing_constants, UNSTEADY),
+            (&self.wandering_zero, WANDERING),
+            (&self.with_signal, UNSTEADY),
+        ];
+        least
+            .into_iter()
+            .find(|(s, least)| s.share > *least && s.significance > CLEARLY)
+            .map(|(s, _)| s)
+    }
+
+    /// Tests residuals of records of a stand with that mode.
+    #[must_use]
+    pub fn of(sights: &[Sight], mode: &Mode, rate_hz: f64) -> Self {
         let total: usize = sights.iter().map(|s| s.residual.len()).sum();
         let (white, whiteness_ratio) = whiteness(sights, total);
         let (independent_of_input, largest_lag) = input_independence(sights, total);
@@ -85,7 +114,27 @@ impl Dependence {
             largest_lag,
             in_largest_hundredth: in_largest_hundredth(sights),
             shares: shares(sights),
+            changing_constants: share_of(
+                "constants that change over the record",
+                steady::changing_constants(sights, mode, rate_hz),
+            ),
+            with_signal: share_of(
+                "the size of the signal from moment to moment",
+                steady::with_signal(sights),
+            ),
+            wandering_zero: share_of(
+                "a zero that wanders or jumps",
+                steady::wandering_zero(sights),
+            ),
         }
+    }
+}
+
+fn share_of(of: &'static str, found: steady::Beyond) -> Share {
+    Share {
+        of,
+        share: found.share,
+        significance: found.significance,
     }
 }
 

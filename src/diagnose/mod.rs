@@ -11,6 +11,7 @@ mod refuse;
 mod search;
 mod spectra;
 mod starts;
+mod steady;
 mod structure;
 mod views;
 
@@ -92,6 +93,8 @@ pub struct Diagnosis<'a> {
     pub dependence: Dependence,
     /// Lines that stand out of the residual after.
     pub lines: Vec<Peak>,
+    /// Whether the integration's own error stays below what is left.
+    pub settled: bool,
     /// How it ended.
     pub verdict: Verdict,
 }
@@ -192,6 +195,8 @@ pub fn run<'a>(
 
     let mut after = before.clone();
     let mut rounds = Vec::new();
+    let coarse = records.substeps();
+    let mut settled = true;
     for _ in 0..MOST_EFFECTS {
         let base = Base::of(after.clone(), &records);
         let tried = search::try_all(&base, &records, threads, progress);
@@ -205,10 +210,12 @@ pub fn run<'a>(
             refuse_second(&mut rounds);
             break;
         }
-        after = candidate::refine_step(next, &mut records);
-        // Where little is explained, or so little is left that no second effect could be named, none is looked for.
+        (after, settled) = candidate::refine_step(next, &mut records, coarse);
+        // Where little is explained, or so little is left that no second effect could be named, none is looked for; nor
+        // beside a law that no step of the integration settles.
         let explained = share(&before, &before, &after, floor);
-        if !remains(&after, &dependence(&after, &records), floor)
+        if !settled
+            || !remains(&after, &dependence(&after, &records), floor)
             || !(NAMED..1.0 - SECOND).contains(&explained)
         {
             break;
@@ -227,6 +234,7 @@ pub fn run<'a>(
         floor,
         dependence_before,
         dependence,
+        settled,
         verdict: Verdict::NothingMissing,
     };
     diagnosis.conclude();
@@ -296,7 +304,9 @@ fn dependence(judged: &Judged, records: &Records) -> Dependence {
             modelled: &residual.modelled,
         })
         .collect();
-    Dependence::of(&sights)
+    let fitted = &judged.fitted;
+    let (mode, _) = fitted.structure.mode(&fitted.values);
+    Dependence::of(&sights, &mode, records.hold[0].input.rate_hz())
 }
 
 /// Whether something above the noise is left. Where the noise itself was seen, in the differences of periods, its level
@@ -350,9 +360,14 @@ impl Diagnosis<'_> {
     }
 
     fn conclude(&mut self) {
-        let left = remains(&self.after, &self.dependence, self.floor);
+        // What changes over a record raises a floor that is taken from differences of its periods, too. It is not a
+        // reason to look for a second effect: none of the list does that.
+        let open = |judged: &Judged, dependence: &Dependence| {
+            remains(judged, dependence, self.floor) || dependence.unsteady().is_some()
+        };
+        let left = !self.settled || open(&self.after, &self.dependence);
         if self.effects().is_empty() {
-            let missing = remains(&self.before, &self.dependence_before, self.floor);
+            let missing = open(&self.before, &self.dependence_before);
             self.verdict = if missing {
                 Verdict::Unexplained
             } else {

@@ -5,7 +5,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use torqcomp_model::effects::{EFFECTS, Effect};
 
-use super::candidate::{Base, Judged, Records, choices, finish, first_look, judge, second_look};
+use super::candidate::{
+    Base, Judged, Records, begin, choices, finish, first_look, judge, second_look,
+};
 use super::fit::Fitted;
 use super::spectra::{Peak, lines};
 use super::structure::Choice;
@@ -43,6 +45,8 @@ const LEAST_SHARE: f64 = 0.005;
 const LEAST_SIGNIFICANCE: f64 = 3.0;
 /// Significance up to which one effect counts as no better than another.
 const WITHIN_CHANCE: f64 = 2.33;
+/// Forms that get a first look, by what their starts leave; beside an effect, where each look costs more.
+const MOST_LOOKS: [usize; 2] = [usize::MAX, 12];
 /// Gain of a first look, over the largest of all, from which on a second one follows; beside an effect that is accepted
 /// already, where each look costs more and finds less.
 const FOLLOWED_UP: [f64; 2] = [0.03, 0.1];
@@ -51,7 +55,7 @@ const PROMISING: f64 = 0.5;
 /// Least such gain in variances of the residual: what does not pay for a parameter is not taken on.
 const PAYS: f64 = 5.0;
 /// Forms that are fitted to the end at most, ties aside; and beside an effect.
-const MOST_FITS: [usize; 2] = [12, 6];
+const MOST_FITS: [usize; 2] = [12, 4];
 /// Difference of the criterion on all records that counts as none.
 const SAME: f64 = 4.0;
 /// Lines of the residual's spectrum that may be that of a shaft.
@@ -129,7 +133,8 @@ pub fn try_all<'a>(
     tried
 }
 
-/// The best fit of each form, judged: all get a first look, those that lower the training error a second one, and those
+/// The best fit of each form, judged: those whose starts leave least get a first look (all of them, unless there is an
+/// effect already), those that lower the training error a second one, and those
 /// that lower it nearly most a fit to the end. How much work that is depends on the records alone, not on the clock.
 fn fit_all<'a>(
     base: &Base<'a>,
@@ -141,14 +146,31 @@ fn fit_all<'a>(
 ) -> Vec<Option<Judged<'a>>> {
     let whole = base.judged.fitted.train_sum;
     let variance = base.judged.train_rms().powi(2);
+    let later = usize::from(!base.judged.fitted.structure.choices.is_empty());
+    let started = parallel(jobs.len(), threads, |k| {
+        begin(base, jobs[k], peaks, records)
+    });
+    let left = |k: usize| {
+        started[k]
+            .iter()
+            .map(|t| t.left)
+            .fold(f64::INFINITY, f64::min)
+    };
+    let mut looked: Vec<usize> = (0..jobs.len()).collect();
+    looked.sort_by(|a, b| left(*a).total_cmp(&left(*b)));
+    looked.truncate(MOST_LOOKS[later]);
     let done = AtomicUsize::new(0);
     let first = parallel(jobs.len(), threads, |k| {
-        let found = first_look(base, jobs[k], peaks, records);
+        let from = if looked.contains(&k) {
+            started[k].as_slice()
+        } else {
+            &[]
+        };
+        let found = first_look(base, jobs[k], from, records);
         progress(done.fetch_add(1, Ordering::Relaxed) + 1, jobs.len());
         found
     });
     let most = first.iter().flatten().map(|f| whole - f.train_sum);
-    let later = usize::from(!base.judged.fitted.structure.choices.is_empty());
     let least = FOLLOWED_UP[later] * most.fold(0.0, f64::max);
     let second = parallel(jobs.len(), threads, |k| {
         let looks = first[k].iter().map(|look| {

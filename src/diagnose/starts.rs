@@ -28,10 +28,11 @@ pub fn own(choice: Choice, peaks: &[Peak]) -> Vec<Vec<f64>> {
 }
 
 /// What a start leaves of the training residual, with what a change of the base's own parameters can do left in.
-struct Trial {
-    values: Vec<f64>,
+pub struct Trial {
+    /// Values of all parameters.
+    pub values: Vec<f64>,
     /// Sum of squares that is left.
-    left: f64,
+    pub left: f64,
     /// Fall of the sum of squares with the right size of what the start adds, to first order.
     fall: f64,
     /// That size.
@@ -45,7 +46,7 @@ pub fn best(
     structure: &Structure,
     own: Vec<Vec<f64>>,
     records: &Records,
-) -> Vec<Vec<f64>> {
+) -> Vec<Trial> {
     let Some(choice) = structure.choices.last() else {
         return Vec::new();
     };
@@ -85,11 +86,7 @@ pub fn best(
         trials.extend(sized);
     }
     trials.sort_by(|(_, a), (_, b)| a.left.total_cmp(&b.left));
-    trials
-        .into_iter()
-        .take(FITTED)
-        .map(|(_, t)| t.values)
-        .collect()
+    trials.into_iter().take(FITTED).map(|(_, t)| t).collect()
 }
 
 /// Takes the stiffness that an effect adds off the plain stand, so that the whole is as stiff as before.

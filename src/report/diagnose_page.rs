@@ -343,7 +343,13 @@ impl Report {
             "share of its power",
             "standard deviations above none",
         ]);
-        let rows = self.residual.tests.shares.iter().map(share);
+        let tests = &self.residual.tests;
+        let unsteady = [
+            &tests.changing_constants,
+            &tests.with_signal,
+            &tests.wandering_zero,
+        ];
+        let rows = tests.shares.iter().chain(unsteady).map(share);
         page.table(&std::iter::once(head).chain(rows).collect::<Vec<_>>());
         page.heading("Next experiment");
         page.text(

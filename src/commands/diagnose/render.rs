@@ -332,6 +332,20 @@ impl Rendered<'_> {
                 100.0 * tests.in_largest_hundredth
             ));
         }
+        if let Some(share) = tests.unsteady() {
+            parts.push(format!(
+                "{:.0} % of its power goes with {}: it passes for noise where periods are compared",
+                100.0 * share.share.min(1.0),
+                share.of
+            ));
+        }
+        if !self.diagnosis.settled && !self.diagnosis.effects().is_empty() {
+            parts.push(
+                "the law found switches so fast that the step of the integration is a part of the error, and no second effect was \
+                 looked for"
+                    .to_owned(),
+            );
+        }
         parts.extend(self.grows_with_level());
         for line in &self.diagnosis.lines {
             parts.push(format!("a line at {} Hz", rounded(line.frequency_hz, 5)));
@@ -371,6 +385,13 @@ impl Rendered<'_> {
                 Verdict::PartlyExplained | Verdict::Unexplained
             )
         {
+            if self.diagnosis.dependence.unsteady().is_some() {
+                return Some(
+                    "the same record twice, cold and after an hour of running, and at half the level: do the constants or the \
+                     noise differ?"
+                        .to_owned(),
+                );
+            }
             let follows = self.diagnosis.dependence.structure().map(|share| share.of);
             if let Some(of) = follows.filter(|of| *of != "the input") {
                 let record = if of.contains("displacement") {
