@@ -74,7 +74,7 @@ pub fn read_at(
     let used: Vec<bool> = wanted.iter().map(|kind| kind.is_some()).collect();
     let mut header = header::read(head, table, &used);
     let first = first_row(head, table, &header);
-    let wanted: Vec<Wanted> = wanted
+    let wanted: Vec<Wanted> = wanted_from(head, table, first)
         .into_iter()
         .map(|kind| kind.unwrap_or(Wanted::Numbers))
         .collect();
@@ -117,6 +117,10 @@ pub fn read_at(
 
 /// What each column holds in the first rows; `None` if nothing.
 pub fn wanted(head: &Head, table: &Table) -> Vec<Option<Wanted>> {
+    wanted_from(head, table, table.first)
+}
+
+fn wanted_from(head: &Head, table: &Table, first: usize) -> Vec<Option<Wanted>> {
     #[derive(Clone, Copy, Default)]
     struct Counts {
         numbers: usize,
@@ -125,7 +129,7 @@ pub fn wanted(head: &Head, table: &Table) -> Vec<Option<Wanted>> {
         texts: usize,
     }
     let mut counts = vec![Counts::default(); table.width];
-    let rows = head.lines[table.first..]
+    let rows = head.lines[first..]
         .iter()
         .filter(|line| !is_skipped(&line.text))
         .take(SAMPLE);
