@@ -26,59 +26,60 @@ pub fn read(place: &Place) -> Result<Content, Failure> {
 /// The same, keeping so many samples of all numbers together.
 fn read_most(place: &Place, most: u64) -> Result<Content, Failure> {
     let inventory = Inventory::scan(place)?;
-    let mut recording = Recording {
-        source: inventory.file.clone(),
-        format: "mcap",
-        dialect: dialect(&inventory),
-        details: details(&inventory),
-        channels: Vec::new(),
-        segments: Vec::new(),
-        warnings: inventory.warnings.clone(),
-        lost: None,
+    let mut content = Content {
+        recording: Recording {
+            dialect: dialect(&inventory),
+            details: details(&inventory),
+            warnings: inventory.warnings.clone(),
+            ..Recording::empty("mcap", inventory.file.clone())
+        },
+        wholes: Vec::new(),
+        listed: Vec::new(),
+        inventory: None,
     };
-    let mut listed = Vec::new();
     let mut budget = Budget::of(place, &inventory, most);
-    let mut wholes = Vec::new();
     let mut left_out = 0;
     for topic in &inventory.channels {
         let numbers: Vec<&LeafReport> = topic.leaves.iter().filter(|l| !l.is_stamp).collect();
         if numbers.is_empty() {
-            listed.push(entry(topic, None));
+            content.listed.push(entry(topic, None));
         }
         for number in numbers {
             let share = budget.share(topic.messages);
-            match share.map(|most| samples(place, topic, number, most)) {
-                Some(Ok((channel, whole, summary))) => {
-                    recording.channels.push(channel);
-                    wholes.push(whole);
-                    let of_file = &inventory.warnings;
-                    add_warnings(&mut recording.warnings, summary.warnings, of_file);
-                }
+            let read = share.map(|most| samples(place, topic, number, most));
+            left_out += usize::from(read.is_none() && topic.messages > 0);
+            match read {
+                Some(Ok(read)) => add(&mut content, read, &inventory.warnings),
                 // Lists that are empty at first, and the like: the warnings tell what is damaged.
-                Some(Err(_)) => listed.push(entry(topic, Some(number))),
-                None => {
-                    left_out += usize::from(topic.messages > 0);
-                    listed.push(entry(topic, Some(number)));
-                }
+                _ => content.listed.push(entry(topic, Some(number))),
             }
         }
     }
-    if left_out > 0 {
-        recording.warnings.push(Warning::new(
-            "samples-not-read",
-            format!(
-                "the samples of {left_out} number(s) were not looked at: together they are too many, \
-                 or the file can be read once only"
-            ),
-        ));
-    }
-    recording.warnings.extend(whole::warning(&wholes));
-    Ok(Content {
-        recording,
-        wholes,
-        listed,
-        inventory: Some(inventory),
-    })
+    let said = &mut content.recording.warnings;
+    said.extend((left_out > 0).then(|| not_read(left_out)));
+    said.extend(whole::warning(&content.wholes));
+    content.inventory = Some(inventory);
+    Ok(content)
+}
+
+/// A number that was read.
+type Read = (Channel, Option<Whole>, Summary);
+
+/// Adds a number that was read.
+fn add(content: &mut Content, (channel, whole, summary): Read, of_file: &[Warning]) {
+    content.recording.channels.push(channel);
+    content.wholes.push(whole);
+    add_warnings(&mut content.recording.warnings, summary.warnings, of_file);
+}
+
+fn not_read(left_out: usize) -> Warning {
+    Warning::new(
+        "samples-not-read",
+        format!(
+            "the samples of {left_out} number(s) were not looked at: together they are too many, or the \
+             file can be read once only"
+        ),
+    )
 }
 
 /// What may still be read.
@@ -121,7 +122,7 @@ fn samples(
     topic: &ChannelReport,
     number: &LeafReport,
     most: usize,
-) -> Result<(Channel, Option<Whole>, Summary), Failure> {
+) -> Result<Read, Failure> {
     let selection = Selection {
         topic: Some(topic.topic.clone()),
         field: Some(first_item(&number.path)),

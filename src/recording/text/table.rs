@@ -96,23 +96,25 @@ pub fn read_at(
         options,
     }
     .find()?;
-    let mut warnings = odd_lines(&rows);
-    warnings.extend(assumptions(&axes));
-    let longest = rows.columns.iter().map(|column| column.values.len()).max();
-    warnings.extend(count_differs(
-        &header.entries,
-        longest.unwrap_or(0),
-        table.dialect,
-    ));
     Ok(Part {
         end: rows.end,
         next_line: number + rows.lines,
+        warnings: warnings(&header, &rows, &axes, table.dialect),
         channels: channels(&header, rows, &axes),
         dialect: table.dialect,
         entries: header.entries,
-        warnings,
         lost,
     })
+}
+
+/// What should be known of a table.
+fn warnings(header: &Header, rows: &Rows, axes: &Axes, dialect: Dialect) -> Vec<Warning> {
+    let longest = rows.columns.iter().map(|column| column.values.len()).max();
+    let differs = count_differs(&header.entries, longest.unwrap_or(0), dialect);
+    let mut warnings = odd_lines(rows);
+    warnings.extend(assumptions(axes));
+    warnings.extend(differs);
+    warnings
 }
 
 /// What each column holds in the first rows; `None` if nothing.
