@@ -44,10 +44,32 @@ impl Text {
     pub fn seconds(&mut self, nanoseconds: i64) {
         const PER_SECOND: u64 = 1_000_000_000;
         let magnitude = nanoseconds.unsigned_abs();
-        let sign = if nanoseconds < 0 { "-" } else { "" };
-        let (whole, part) = (magnitude / PER_SECOND, magnitude % PER_SECOND);
-        let text = format!("{sign}{whole}.{part:09}");
-        self.copy(text.as_bytes(), 0, text.len());
+        let (mut whole, mut part) = (magnitude / PER_SECOND, magnitude % PER_SECOND);
+        // From the last digit to the first: nine after the point, at least one before it.
+        let mut text = [b'0'; SHORT];
+        let mut first = SHORT;
+        let mut put = |byte: u8| {
+            first -= 1;
+            text[first] = byte;
+        };
+        for _ in 0..9 {
+            put(b'0' + (part % 10) as u8);
+            part /= 10;
+        }
+        put(b'.');
+        loop {
+            put(b'0' + (whole % 10) as u8);
+            whole /= 10;
+            if whole == 0 {
+                break;
+            }
+        }
+        if nanoseconds < 0 {
+            put(b'-');
+        }
+        let length = SHORT - first;
+        text.copy_within(first.., 0);
+        self.copy(&text, 0, length);
     }
 
     /// Appends a number that was taken apart.

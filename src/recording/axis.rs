@@ -121,9 +121,12 @@ impl Axis {
     #[must_use]
     pub fn of_stamps(heading: &str, stamps_s: Arc<Vec<f64>>) -> Self {
         let step = step_of(&stamps_s);
+        let rate_hz = step
+            .map(|step| crate::io::csv::without_rounding(1.0 / step))
+            .filter(|hz| hz.is_finite() && *hz > 0.0);
         Self {
-            rate_hz: step.map(|step| crate::io::csv::without_rounding(1.0 / step)),
-            rate_from: step.map_or(RateFrom::None, |_| RateFrom::Stamps(heading.to_owned())),
+            rate_hz,
+            rate_from: rate_hz.map_or(RateFrom::None, |_| RateFrom::Stamps(heading.to_owned())),
             start_s: stamps_s.first().copied().filter(|t| t.is_finite()),
             stamps_s: Some(stamps_s),
             ..Self::default()

@@ -5,10 +5,9 @@
 
 mod axis;
 mod messages;
+mod part;
 mod select;
 pub mod text;
-
-use std::io::Read;
 
 use crate::failure::Failure;
 use crate::io::csv::{NamedUnit, Options, Place};
@@ -134,12 +133,21 @@ pub fn read_channels(place: &Place, wanted: &[Options]) -> Result<Recording, Fai
         let signals: Vec<Option<&str>> = wanted.iter().map(|o| o.channel.as_deref()).collect();
         return messages::read(place, &signals);
     }
-    let mut bytes = Vec::new();
-    place
-        .open()?
-        .read_to_end(&mut bytes)
-        .map_err(|error| Failure::failed(format_args!("{name}: cannot be read: {error}")))?;
+    let (bytes, _) = part::first(place, u64::MAX)?;
     text::read(&name, bytes, &options).map_err(|failure| failure.at(&name))
+}
+
+/// Reads a text as [`read`] does, but no more than so many bytes of it, in whole lines; what was left out
+/// is among the warnings.
+///
+/// # Errors
+/// See [`read`].
+pub fn read_first(place: &Place, options: &Options, most: u64) -> Result<Recording, Failure> {
+    let name = place.name();
+    let (bytes, left_out) = part::first(place, most)?;
+    let mut recording = text::read(&name, bytes, options).map_err(|failure| failure.at(&name))?;
+    recording.warnings.extend(left_out);
+    Ok(recording)
 }
 
 /// Refuses what only tables have.

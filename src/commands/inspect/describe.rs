@@ -54,7 +54,11 @@ pub fn file(content: &Content) -> File {
         channels: described
             .map(|(i, (channel, found))| {
                 let time = time_of(i).map(|place| &times[place]);
-                describe(channel, found, time)
+                let described = describe(channel, found, time);
+                match content.wholes.get(i).copied().flatten() {
+                    Some(whole) => whole.describe(described),
+                    None => described,
+                }
             })
             .chain(content.listed.iter().cloned())
             .collect(),

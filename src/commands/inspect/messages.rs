@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::content::Content;
+use super::whole::{self, Kept, Stamps, Whole};
 use crate::failure::Failure;
 use crate::io::csv::{NamedUnit, Place};
 use crate::io::mcap::inventory::{ChannelReport, LeafReport};
@@ -10,8 +11,8 @@ use crate::io::mcap::{Inventory, Options, Selection, Source, Summary};
 use crate::recording::{Axis, Channel, RateFrom, Recording, typical_step};
 use crate::report::{Warning, inspect};
 
-/// Samples that are read at most, of all numbers together: eight bytes each, and as many for stamps.
-const MOST_SAMPLES: u64 = 20_000_000;
+/// Samples that are kept at most, of all numbers together: eight bytes each, and as many for stamps.
+const MOST_SAMPLES: u64 = 1 << 22;
 /// Bytes of the file that are gone through at most: the file is read once for each number.
 const MOST_BYTES: u64 = 4_000_000_000;
 /// Numbers that are read at most.
@@ -19,56 +20,66 @@ const MOST_NUMBERS: u64 = 64;
 
 /// Lists a file and reads the numbers in it, as far as they are not too many.
 pub fn read(place: &Place) -> Result<Content, Failure> {
+    read_most(place, MOST_SAMPLES)
+}
+
+/// The same, keeping so many samples of all numbers together.
+fn read_most(place: &Place, most: u64) -> Result<Content, Failure> {
     let inventory = Inventory::scan(place)?;
-    let mut recording = Recording {
-        source: inventory.file.clone(),
-        format: "mcap",
-        dialect: dialect(&inventory),
-        details: details(&inventory),
-        channels: Vec::new(),
-        segments: Vec::new(),
-        warnings: inventory.warnings.clone(),
-        lost: None,
+    let mut content = Content {
+        recording: Recording {
+            dialect: dialect(&inventory),
+            details: details(&inventory),
+            warnings: inventory.warnings.clone(),
+            ..Recording::empty("mcap", inventory.file.clone())
+        },
+        wholes: Vec::new(),
+        listed: Vec::new(),
+        inventory: None,
     };
-    let mut listed = Vec::new();
-    let mut budget = Budget::of(place);
+    let mut budget = Budget::of(place, &inventory, most);
     let mut left_out = 0;
     for topic in &inventory.channels {
         let numbers: Vec<&LeafReport> = topic.leaves.iter().filter(|l| !l.is_stamp).collect();
         if numbers.is_empty() {
-            listed.push(entry(topic, None));
+            content.listed.push(entry(topic, None));
         }
         for number in numbers {
-            let is_affordable = topic.messages > 0 && budget.takes(topic.messages);
-            match is_affordable.then(|| samples(place, topic, number)) {
-                Some(Ok((channel, summary))) => {
-                    recording.channels.push(channel);
-                    let of_file = &inventory.warnings;
-                    add_warnings(&mut recording.warnings, summary.warnings, of_file);
-                }
+            let share = budget.share(topic.messages);
+            let read = share.map(|most| samples(place, topic, number, most));
+            left_out += usize::from(read.is_none() && topic.messages > 0);
+            match read {
+                Some(Ok(read)) => add(&mut content, read, &inventory.warnings),
                 // Lists that are empty at first, and the like: the warnings tell what is damaged.
-                Some(Err(_)) => listed.push(entry(topic, Some(number))),
-                None => {
-                    left_out += usize::from(topic.messages > 0);
-                    listed.push(entry(topic, Some(number)));
-                }
+                _ => content.listed.push(entry(topic, Some(number))),
             }
         }
     }
-    if left_out > 0 {
-        recording.warnings.push(Warning::new(
-            "samples-not-read",
-            format!(
-                "the samples of {left_out} number(s) were not looked at: together they are too many, \
-                 or the file can be read once only"
-            ),
-        ));
-    }
-    Ok(Content {
-        recording,
-        listed,
-        inventory: Some(inventory),
-    })
+    let said = &mut content.recording.warnings;
+    said.extend((left_out > 0).then(|| not_read(left_out)));
+    said.extend(whole::warning(&content.wholes));
+    content.inventory = Some(inventory);
+    Ok(content)
+}
+
+/// A number that was read.
+type Read = (Channel, Option<Whole>, Summary);
+
+/// Adds a number that was read.
+fn add(content: &mut Content, (channel, whole, summary): Read, of_file: &[Warning]) {
+    content.recording.channels.push(channel);
+    content.wholes.push(whole);
+    add_warnings(&mut content.recording.warnings, summary.warnings, of_file);
+}
+
+fn not_read(left_out: usize) -> Warning {
+    Warning::new(
+        "samples-not-read",
+        format!(
+            "the samples of {left_out} number(s) were not looked at: together they are too many, or the \
+             file can be read once only"
+        ),
+    )
 }
 
 /// What may still be read.
@@ -78,34 +89,40 @@ struct Budget {
 }
 
 impl Budget {
-    fn of(place: &Place) -> Self {
+    fn of(place: &Place, inventory: &Inventory, samples: u64) -> Self {
         let length = match place {
             Place::Stdin => None,
             Place::File(path) => std::fs::metadata(path).ok().map(|meta| meta.len()),
         };
+        let topics = inventory.channels.iter().filter(|topic| topic.messages > 0);
+        let numbers = topics.flat_map(|topic| topic.leaves.iter().filter(|leaf| !leaf.is_stamp));
+        let passes = length.map_or(0, |length| (MOST_BYTES / length.max(1)).min(MOST_NUMBERS));
         Self {
-            numbers: length.map_or(0, |length| (MOST_BYTES / length.max(1)).min(MOST_NUMBERS)),
-            samples: MOST_SAMPLES,
+            numbers: passes.min(numbers.count() as u64),
+            samples,
         }
     }
 
-    /// Whether a number with that many messages may be read; if so, it is counted.
-    fn takes(&mut self, messages: u64) -> bool {
-        if self.numbers == 0 || messages > self.samples {
-            return false;
+    /// Samples that are kept of a number with that many messages: all, or its equal part of what is
+    /// left. `None` if it is not to be read.
+    fn share(&mut self, messages: u64) -> Option<usize> {
+        let equal = self.samples.checked_div(self.numbers)?;
+        if messages == 0 {
+            return None;
         }
         self.numbers -= 1;
-        self.samples -= messages;
-        true
+        self.samples -= equal.min(messages);
+        usize::try_from(equal).ok()
     }
 }
 
-/// Reads one number of a topic.
+/// Reads one number of a topic and keeps so many samples, and what all of them come to if there are more.
 fn samples(
     place: &Place,
     topic: &ChannelReport,
     number: &LeafReport,
-) -> Result<(Channel, Summary), Failure> {
+    most: usize,
+) -> Result<Read, Failure> {
     let selection = Selection {
         topic: Some(topic.topic.clone()),
         field: Some(first_item(&number.path)),
@@ -113,16 +130,16 @@ fn samples(
     };
     let mut source = Source::open(place, &selection, &Options::default())?;
     let (mut times_ns, mut values) = (Vec::new(), Vec::new());
-    let (mut stamps_ns, mut samples) = (Vec::new(), Vec::new());
+    let mut kept = Kept::new(most);
     while source.next(&mut times_ns, &mut values)? {
-        stamps_ns.append(&mut times_ns);
-        samples.append(&mut values);
+        kept.add(&times_ns, &values);
     }
+    let (stamps, samples, whole) = kept.finish();
     let chosen = source.chosen();
     let unit = chosen.unit.as_ref().map(|found| found.unit.clone());
     let time = &chosen.time;
     let axis = axis(
-        &stamps_ns,
+        stamps,
         match &time.field {
             Some(field) => format!("{} time, {field}", time.choice.name()),
             None => format!("{} time", time.choice.name()),
@@ -138,21 +155,19 @@ fn samples(
         axis,
         segment: None,
     };
-    Ok((channel, source.finish()))
+    Ok((channel, whole, source.finish()))
 }
 
-/// Stamps from the first on: seconds since 1970 would cost them their last digits.
-fn axis(stamps_ns: &[i64], words: String) -> Axis {
-    let first = stamps_ns.first().copied();
-    let from_first = |t: &i64| t.saturating_sub(first.unwrap_or(0)) as f64 * 1e-9;
-    let stamps_s: Vec<f64> = stamps_ns.iter().map(from_first).collect();
-    let step = typical_step(&stamps_s);
+/// An axis of stamps that are counted from the first: seconds since 1970 would cost them their last
+/// digits.
+fn axis(stamps: Stamps, words: String) -> Axis {
+    let step = typical_step(&stamps.from_first_s);
     Axis {
         rate_hz: step.map(|step| 1.0 / step),
         rate_from: step.map_or(RateFrom::None, |_| RateFrom::Stamps(words)),
-        start_s: first.map(|t| t as f64 * 1e-9),
-        start_text: first.and_then(date_and_time),
-        stamps_s: Some(Arc::new(stamps_s)),
+        start_s: stamps.first_ns.map(|t| t as f64 * 1e-9),
+        start_text: stamps.first_ns.and_then(date_and_time),
+        stamps_s: Some(Arc::new(stamps.from_first_s)),
         ..Axis::default()
     }
 }
@@ -283,6 +298,39 @@ fn date_and_time(ns: i64) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::io::mcap::testing;
+
+    /// What is kept does not grow with the file: a short topic, a long and a longer one.
+    #[test]
+    fn long_topics_share_what_may_be_kept() {
+        let mut file = testing::File::new(testing::options(None));
+        let topics = [(1, "/a", 10_u32), (2, "/b", 1000), (3, "/c", 5000)];
+        for (id, topic, messages) in topics {
+            file.channel(
+                id,
+                topic,
+                "cdr+ros2msg",
+                ("std_msgs/msg/Float64", b"float64 data"),
+            );
+            for i in 0..messages {
+                let time_ns = 1_000_000_000 + 1_000_000 * u64::from(i);
+                file.message(id, time_ns, &testing::float64(f64::from(i % 100)));
+            }
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("long.mcap");
+        std::fs::write(&path, file.finish()).unwrap();
+        let content = read_most(&Place::File(path), 610).unwrap();
+        let kept = content.recording.channels.iter().map(|c| c.samples.len());
+        assert_eq!(kept.collect::<Vec<_>>(), [10, 300, 300]);
+        let all = content.wholes.iter().map(|whole| whole.map(|w| w.samples));
+        assert_eq!(all.collect::<Vec<_>>(), [None, Some(1000), Some(5000)]);
+        let longest = content.wholes[2].unwrap();
+        assert_eq!(longest.range, Some((0.0, 99.0)));
+        assert!((longest.mean.unwrap() - 49.5).abs() < 1e-12);
+        assert!((longest.duration_s - 4.999).abs() < 1e-9);
+        assert_eq!(content.recording.warnings[0].code, "first-samples-only");
+    }
 
     #[test]
     fn dates_are_those_of_the_calendar() {
@@ -305,7 +353,9 @@ mod tests {
     fn stamps_keep_their_nanoseconds() {
         let start = 1_700_000_000_000_000_001_i64;
         let stamps: Vec<i64> = (0..100).map(|i| start + 20_000 * i).collect();
-        let axis = axis(&stamps, "log time".to_owned());
+        let mut kept = Kept::new(1000);
+        kept.add(&stamps, &[0.0; 100]);
+        let axis = axis(kept.finish().0, "log time".to_owned());
         assert!((axis.rate_hz.unwrap() - 50_000.0).abs() < 1e-6);
         assert_eq!(axis.start_text.unwrap(), "2023-11-14T22:13:20.000000001Z");
     }

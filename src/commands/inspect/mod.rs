@@ -5,6 +5,7 @@ mod describe;
 mod messages;
 mod plot;
 mod same;
+mod whole;
 
 use std::path::{Path, PathBuf};
 

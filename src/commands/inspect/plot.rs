@@ -53,6 +53,11 @@ pub fn svg(recordings: &[&Recording], report: &Report) -> String {
 
 fn panel<'a>(channel: &'a Channel, found: &inspect::Channel, name: String) -> Panel<'a> {
     let axis = &channel.axis;
+    let drawn = channel.samples.len();
+    let name = match found.samples > drawn {
+        true => format!("{name} (the first {drawn} of {} samples)", found.samples),
+        false => name,
+    };
     let times = match (&axis.stamps_s, axis.rate_hz) {
         (Some(stamps), _) => Times::Stamps(stamps),
         (None, Some(rate_hz)) => Times::Uniform {

@@ -30,7 +30,7 @@ pub mod selection;
 pub mod source;
 pub mod summary;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
 pub mod time;
 pub mod units;
 pub mod writer;

@@ -98,40 +98,11 @@ impl Tally {
         conflicts: u64,
     ) -> Summary {
         let mut warnings = losses(frames, self.last_ns);
+        warnings.extend(self.left_out(chosen, blocks));
+        warnings.extend(out_of_order(&chosen.topic, sorter));
         let mut say = |code, message: String| warnings.push(Warning::new(code, message));
-        let topic = &chosen.topic;
-        if let Some(said) = self.unreadable.say("messages could not be read") {
-            say("mcap-unreadable", format!("{topic}: {said}"));
-        }
-        let what = format!("messages have no {}", chosen.field);
-        if let Some(said) = self.without_item.say(&what) {
-            say("mcap-without-item", format!("{topic}: {said}"));
-        }
-        if self.without_time + self.broken + blocks.without_spacing > 0 {
-            let message = format!(
-                "{topic}: {} messages without a usable time, {} without a usable spacing of their \
-                 samples and {} cut short were left out",
-                self.without_time, blocks.without_spacing, self.broken
-            );
-            say("mcap-skipped", message);
-        }
-        if sorter.out_of_order > 0 {
-            let message = format!(
-                "{topic}: {} samples came after a later one and were put in order",
-                sorter.out_of_order - sorter.too_late
-            );
-            say("mcap-out-of-order", message);
-        }
-        if sorter.too_late > 0 {
-            let message = format!(
-                "{topic}: {} samples came more than {WINDOW} samples late and were left out; sort \
-                 the file by time first",
-                sorter.too_late
-            );
-            say("mcap-too-late", message);
-        }
         for said in clock.warnings() {
-            say("mcap-clock", format!("{topic}: {said}"));
+            say("mcap-clock", format!("{}: {said}", chosen.topic));
         }
         if conflicts > 0 {
             let message = format!(
@@ -155,6 +126,29 @@ impl Tally {
             warnings,
         }
     }
+
+    /// What is said of messages that gave no sample.
+    fn left_out(&self, chosen: &Chosen, blocks: &Blocks) -> Vec<Warning> {
+        let mut warnings = Vec::new();
+        let mut say = |code, message: String| warnings.push(Warning::new(code, message));
+        let topic = &chosen.topic;
+        if let Some(said) = self.unreadable.say("messages could not be read") {
+            say("mcap-unreadable", format!("{topic}: {said}"));
+        }
+        let what = format!("messages have no {}", chosen.field);
+        if let Some(said) = self.without_item.say(&what) {
+            say("mcap-without-item", format!("{topic}: {said}"));
+        }
+        if self.without_time + self.broken + blocks.without_spacing > 0 {
+            let message = format!(
+                "{topic}: {} messages without a usable time, {} without a usable spacing of their \
+                 samples and {} cut short were left out",
+                self.without_time, blocks.without_spacing, self.broken
+            );
+            say("mcap-skipped", message);
+        }
+        warnings
+    }
 }
 
 /// A warning for each loss of the file.
@@ -175,6 +169,28 @@ pub fn losses(frames: &Frames, last_ns: Option<i64>) -> Vec<Warning> {
     if more > 0 {
         let message = format!("{}: {more} more losses of this kind", frames.name());
         warnings.push(Warning::new("mcap-more-losses", message));
+    }
+    warnings
+}
+
+/// What is said of samples that came after later ones.
+fn out_of_order(topic: &str, sorter: &Sorter) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    let mut say = |code, message: String| warnings.push(Warning::new(code, message));
+    if sorter.out_of_order > 0 {
+        let message = format!(
+            "{topic}: {} samples came after a later one and were put in order",
+            sorter.out_of_order - sorter.too_late
+        );
+        say("mcap-out-of-order", message);
+    }
+    if sorter.too_late > 0 {
+        let message = format!(
+            "{topic}: {} samples came more than {WINDOW} samples late and were left out; sort \
+                 the file by time first",
+            sorter.too_late
+        );
+        say("mcap-too-late", message);
     }
     warnings
 }

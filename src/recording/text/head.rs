@@ -179,6 +179,8 @@ struct Shape {
     width: usize,
     /// Numbers with marks between thousands.
     grouped: usize,
+    /// Whether its first cell is a text.
+    is_named: bool,
 }
 
 /// A row without texts.
@@ -199,17 +201,23 @@ fn shape(line: &str, dialect: Dialect, good: fn(usize, usize, usize) -> bool) ->
         return None;
     }
     let (mut numbers, mut texts, mut data, mut grouped, mut width) = (0, 0, 0, 0, 0);
+    let mut is_named = false;
     for (place, text) in dialect.cells(line).iter().enumerate() {
         let cell = Cell::read(text, dialect.decimal);
         numbers += usize::from(cell.is_number());
         texts += usize::from(cell == Cell::Text);
+        is_named |= place == 0 && cell == Cell::Text;
         data += usize::from(cell.is_datum());
         grouped += usize::from(matches!(cell, Cell::Grouped(_)));
         if cell != Cell::Empty {
             width = place + 1;
         }
     }
-    good(numbers, texts, data).then_some(Shape { width, grouped })
+    good(numbers, texts, data).then_some(Shape {
+        width,
+        grouped,
+        is_named,
+    })
 }
 
 /// A table under one dialect, and how much it explains.
@@ -255,6 +263,9 @@ fn first_row(shapes: &[(usize, Option<Shape>)]) -> Option<usize> {
         rows_after[place] = rows_after[place + 1] + usize::from(shapes[place].1.is_some());
     }
     let usual = usual_width(shapes)?;
+    let rows = shapes.iter().filter_map(|(_, shape)| *shape);
+    let named = rows.clone().filter(|shape| shape.is_named).count();
+    let are_named = 2 * named > rows.count();
     let is_first = |place: &usize| {
         let Some(shape) = shapes[*place].1 else {
             return false;
@@ -264,7 +275,8 @@ fn first_row(shapes: &[(usize, Option<Shape>)]) -> Option<usize> {
         // A line of numbers below a key of its own, with text after it, is no row.
         let is_alone = place + 1 < shapes.len() && next.is_none();
         let fits = shape.width == usual || next.is_none_or(|next| next.width == shape.width);
-        mostly && fits && !is_alone
+        // A key with values above rows of numbers is none of them.
+        mostly && fits && !is_alone && shape.is_named == are_named
     };
     (0..shapes.len()).find(is_first)
 }
@@ -305,7 +317,8 @@ fn unambiguous<'a>(head: &Head, found: &'a [Found], best: &'a Found) -> Result<&
         return Ok(best);
     }
     let shown: String = text.chars().take(60).collect();
-    // 0,5 between cells or as a decimal mark; headings with as many cells settle it.
+    // 0,5 between cells or as a decimal mark; headings with as many cells settle it, or a comma that
+    // nothing follows in any row.
     let separator = found
         .iter()
         .find(|f| f.table.dialect.delimiter == comma && f.rows == best.rows);
@@ -313,7 +326,9 @@ fn unambiguous<'a>(head: &Head, found: &'a [Found], best: &'a Found) -> Result<&
         f.table.dialect.decimal == b',' && f.table.dialect.delimiter != comma && f.rows == best.rows
     });
     if let (Some(separator), Some(_)) = (separator, decimal) {
-        if separator.table.width > 1 && has_heading(head, &separator.table) {
+        if separator.table.width > 1 && has_heading(head, &separator.table)
+            || ends_in_commas(head, &separator.table)
+        {
             return Ok(separator);
         }
         return Err(Failure::failed(format_args!(
@@ -335,6 +350,14 @@ fn unambiguous<'a>(head: &Head, found: &'a [Found], best: &'a Found) -> Result<&
         )));
     }
     Ok(best)
+}
+
+/// Whether every row ends in a comma.
+fn ends_in_commas(head: &Head, table: &Table) -> bool {
+    head.lines[table.first..]
+        .iter()
+        .filter(|line| !is_skipped(&line.text))
+        .all(|line| line.text.trim_end().ends_with(','))
 }
 
 /// Whether a line above the table splits into as many texts as the table has columns.

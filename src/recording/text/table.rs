@@ -74,7 +74,7 @@ pub fn read_at(
     let used: Vec<bool> = wanted.iter().map(|kind| kind.is_some()).collect();
     let mut header = header::read(head, table, &used);
     let first = first_row(head, table, &header);
-    let wanted: Vec<Wanted> = wanted
+    let wanted: Vec<Wanted> = wanted_from(head, table, first)
         .into_iter()
         .map(|kind| kind.unwrap_or(Wanted::Numbers))
         .collect();
@@ -96,27 +96,33 @@ pub fn read_at(
         options,
     }
     .find()?;
-    let mut warnings = odd_lines(&rows);
-    warnings.extend(assumptions(&axes));
-    let longest = rows.columns.iter().map(|column| column.values.len()).max();
-    warnings.extend(count_differs(
-        &header.entries,
-        longest.unwrap_or(0),
-        table.dialect,
-    ));
     Ok(Part {
         end: rows.end,
         next_line: number + rows.lines,
+        warnings: warnings(&header, &rows, &axes, table.dialect),
         channels: channels(&header, rows, &axes),
         dialect: table.dialect,
         entries: header.entries,
-        warnings,
         lost,
     })
 }
 
+/// What should be known of a table.
+fn warnings(header: &Header, rows: &Rows, axes: &Axes, dialect: Dialect) -> Vec<Warning> {
+    let longest = rows.columns.iter().map(|column| column.values.len()).max();
+    let differs = count_differs(&header.entries, longest.unwrap_or(0), dialect);
+    let mut warnings = odd_lines(rows);
+    warnings.extend(assumptions(axes));
+    warnings.extend(differs);
+    warnings
+}
+
 /// What each column holds in the first rows; `None` if nothing.
 pub fn wanted(head: &Head, table: &Table) -> Vec<Option<Wanted>> {
+    wanted_from(head, table, table.first)
+}
+
+fn wanted_from(head: &Head, table: &Table, first: usize) -> Vec<Option<Wanted>> {
     #[derive(Clone, Copy, Default)]
     struct Counts {
         numbers: usize,
@@ -125,7 +131,7 @@ pub fn wanted(head: &Head, table: &Table) -> Vec<Option<Wanted>> {
         texts: usize,
     }
     let mut counts = vec![Counts::default(); table.width];
-    let rows = head.lines[table.first..]
+    let rows = head.lines[first..]
         .iter()
         .filter(|line| !is_skipped(&line.text))
         .take(SAMPLE);

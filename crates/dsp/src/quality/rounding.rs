@@ -22,7 +22,7 @@ const HALF: f64 = 0.6;
 /// Rounding or truncation of a uniform axis leaves at most `q/2` on either side of the line. `q` is
 /// the power of ten that all stamps are multiples of, since stamps are rounded when they are
 /// written as text. Jitter below `q/2` cannot be told from rounding; it is then just as harmless.
-/// Random jitter passes only if it stays within the quantum everywhere, so a clock that wanders by
+/// Stamps that fall are none of a rounded axis. Random jitter passes only if it stays within the quantum everywhere, so a clock that wanders by
 /// more than the last digit it is written with is never taken for rounded.
 ///
 /// ```
@@ -35,7 +35,8 @@ const HALF: f64 = 0.6;
 #[must_use]
 pub fn rounded(stamps_s: &[f64]) -> Option<Rounded> {
     let count = stamps_s.len();
-    if count < FEWEST || stamps_s.iter().any(|t| !t.is_finite()) {
+    let falls = stamps_s.windows(2).any(|pair| pair[1] < pair[0]);
+    if count < FEWEST || falls || stamps_s.iter().any(|t| !t.is_finite()) {
         return None;
     }
     let mean_i = 0.5 * (count - 1) as f64;
@@ -82,6 +83,9 @@ mod tests {
             .map(|(i, n)| ((1e-3 * i as f64 + 2e-4 * n) * 1e6).round() * 1e-6)
             .collect();
         assert_eq!(rounded(&jitter), None);
+        // A time that begins anew with each block of two.
+        let anew: Vec<f64> = (0..100).map(|i| 1e-5 * f64::from(i % 2)).collect();
+        assert_eq!(rounded(&anew), None);
     }
 
     #[test]

@@ -98,6 +98,7 @@ impl<'a> Walk<'a> {
                 let count = u32::try_from(count).unwrap_or(u32::MAX);
                 self.forward(run.repeat(count).length_from(self.at));
             }
+            (Item::Text, _) => self.skip_texts(count)?,
             (item, _) => {
                 // Each of them has a length of its own, so bytes run out before the count does.
                 for _ in 0..count {
@@ -105,6 +106,25 @@ impl<'a> Walk<'a> {
                 }
             }
         }
+        Ok(())
+    }
+
+    /// Goes over texts one behind the other.
+    fn skip_texts(&mut self, count: usize) -> Result<(), Damage> {
+        let (data, is_big) = (self.data, self.is_big);
+        let align = 4.min(usize::from(self.plan.rules.largest_align));
+        let mut at = self.at;
+        for _ in 0..count {
+            let start = at.checked_next_multiple_of(align).ok_or(Damage::Short)?;
+            let bytes = data.get(start..).and_then(|rest| rest.first_chunk());
+            let bytes: [u8; 4] = *bytes.ok_or(Damage::Short)?;
+            let length = match is_big {
+                true => u32::from_be_bytes(bytes),
+                false => u32::from_le_bytes(bytes),
+            };
+            at = (start + 4).saturating_add(length as usize);
+        }
+        self.at = at;
         Ok(())
     }
 
@@ -179,6 +199,7 @@ impl<'a> Walk<'a> {
         Ok(())
     }
 
+    #[inline]
     fn count(&mut self) -> Result<usize, Damage> {
         let bytes = self.take::<4>()?;
         Ok(if self.is_big {
@@ -189,6 +210,7 @@ impl<'a> Walk<'a> {
     }
 
     /// The bytes of a number, behind its padding.
+    #[inline]
     fn take<const N: usize>(&mut self) -> Result<[u8; N], Damage> {
         let align = N.min(usize::from(self.plan.rules.largest_align));
         let start = self

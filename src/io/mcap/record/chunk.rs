@@ -108,6 +108,14 @@ pub fn unpack(head: &ChunkHead, packed: &[u8], records: &mut Vec<u8>) -> Result<
         return Err(ChunkError::TooLarge(head.size));
     }
     unpack_bytes(head, packed, records)?;
+    check(head, records)
+}
+
+/// Checks length and CRC of the records of a chunk.
+///
+/// # Errors
+/// [`ChunkError`] if one of them is wrong.
+pub fn check(head: &ChunkHead, records: &[u8]) -> Result<(), ChunkError> {
     let found = records.len() as u64;
     if found != head.size {
         let told = head.size;

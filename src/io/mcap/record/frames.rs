@@ -140,6 +140,9 @@ pub struct Frames {
     input: Input,
     /// Unpacked records of the current chunk.
     chunk: Vec<u8>,
+    /// Where they lie in the window instead, of a chunk that is not compressed.
+    plain: Option<Range<usize>>,
+    /// How far they have been delivered.
     chunk_at: usize,
     chunk_offset: u64,
     /// Bytes of the last frame in the file, passed over when the next is asked for.
@@ -174,6 +177,7 @@ impl Frames {
             name,
             input,
             chunk: Vec::new(),
+            plain: None,
             chunk_at: 0,
             chunk_offset: 0,
             held: 0,
@@ -243,7 +247,12 @@ impl Frames {
     }
 
     fn next_in_chunk(&mut self) -> Option<Frame> {
-        let rest = &self.chunk[self.chunk_at..];
+        let (holder, bytes, first) = match &self.plain {
+            Some(place) => (Holder::Window, self.input.at(place.clone()), place.start),
+            None => (Holder::Chunk, self.chunk.as_slice(), 0),
+        };
+        let all = bytes.len();
+        let rest = &bytes[self.chunk_at..];
         if rest.is_empty() {
             return None;
         }
@@ -256,7 +265,7 @@ impl Frames {
                 let at = self.chunk_offset;
                 self.lose(Loss::Overrun { at });
             }
-            self.chunk_at = self.chunk.len();
+            self.chunk_at = all;
             return None;
         };
         let start = self.chunk_at + RECORD_HEAD;
@@ -266,8 +275,8 @@ impl Frames {
             offset: self.chunk_offset,
             is_front: false,
             is_in_chunk: true,
-            holder: Holder::Chunk,
-            body: start..self.chunk_at,
+            holder,
+            body: first + start..first + self.chunk_at,
         })
     }
 
@@ -331,8 +340,10 @@ impl Frames {
     fn unpack(&mut self, offset: u64, is_whole: bool) {
         let mut records = std::mem::take(&mut self.chunk);
         records.clear();
+        self.plain = None;
         let body = &self.input.window()[RECORD_HEAD..self.held.max(RECORD_HEAD)];
         let head = ChunkHead::read(body);
+        let front = self.held - head.as_ref().map_or(0, |(_, rest)| rest.len());
         let span_ns = head.as_ref().map(|(head, _)| (head.start_ns, head.end_ns));
         if let Some((head, _)) = &head {
             let count = self.compressions.entry(head.compression.clone());
@@ -342,13 +353,17 @@ impl Frames {
             count.unpacked = count.unpacked.saturating_add(head.size);
         }
         if is_whole {
-            if let Err(why) = unpack_whole(head, &mut records) {
-                records.clear();
-                self.lose(Loss::Chunk {
-                    at: offset,
-                    why,
-                    span_ns,
-                });
+            match unpack_whole(head, &mut records) {
+                Ok(None) => {}
+                Ok(Some(length)) => self.plain = Some(self.input.place(front, length)),
+                Err(why) => {
+                    records.clear();
+                    self.lose(Loss::Chunk {
+                        at: offset,
+                        why,
+                        span_ns,
+                    });
+                }
             }
         } else {
             if let Some((head, packed)) = head {
@@ -370,6 +385,7 @@ impl Frames {
             return Ok(self.truncated(offset, "within an attachment"));
         }
         // The front is kept beside the window, as the rest is passed over.
+        self.plain = None;
         self.chunk.clear();
         self.chunk
             .extend_from_slice(&self.input.window()[RECORD_HEAD..there]);
@@ -411,7 +427,12 @@ impl Frames {
     }
 }
 
-fn unpack_whole(head: Option<(ChunkHead, &[u8])>, records: &mut Vec<u8>) -> Result<(), ChunkError> {
+/// Unpacks a chunk and checks it. Of one that is not compressed nothing is copied: the length of its
+/// records is given.
+fn unpack_whole(
+    head: Option<(ChunkHead, &[u8])>,
+    records: &mut Vec<u8>,
+) -> Result<Option<usize>, ChunkError> {
     let (head, rest) = head.ok_or(ChunkError::Head)?;
     let packed = usize::try_from(head.packed_size)
         .ok()
@@ -420,7 +441,12 @@ fn unpack_whole(head: Option<(ChunkHead, &[u8])>, records: &mut Vec<u8>) -> Resu
             told: head.packed_size,
             found: rest.len() as u64,
         })?;
-    chunk::unpack(&head, packed, records)
+    if head.compression.is_empty() {
+        chunk::check(&head, packed)?;
+        return Ok(Some(packed.len()));
+    }
+    chunk::unpack(&head, packed, records)?;
+    Ok(None)
 }
 
 fn record_head(bytes: &[u8]) -> Option<(u8, u64)> {

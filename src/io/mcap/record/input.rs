@@ -52,7 +52,9 @@ impl Input {
                 // Doubling keeps the work proportional to the bytes there are.
                 self.buffer.resize((2 * self.end).max(PIECE), 0);
             }
-            match self.stream.read(&mut self.buffer[self.end..]) {
+            // What is read beyond the wish must be moved to the front later on.
+            let until = self.buffer.len().min(self.end + PIECE);
+            match self.stream.read(&mut self.buffer[self.end..until]) {
                 Ok(0) => return Ok(self.end - self.start),
                 Ok(read) => self.end += read,
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}

@@ -6,6 +6,8 @@ mod stamps;
 
 use std::sync::Arc;
 
+use torqcomp_dsp::quality::rounding::rounded;
+
 use super::header::Field;
 use super::keys::{self, Entry};
 use super::rows::Column;
@@ -18,6 +20,8 @@ use groups::{Group, groups};
 const SAME: f64 = 0.02;
 /// Relative difference of the two that is nothing but the rounding of the stamps.
 const ROUNDED: f64 = 1e-6;
+/// Most that rounding moves the last stamp against the first, in steps of their last digit.
+const QUANTA: f64 = 1.2;
 
 /// What a column is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -87,7 +91,9 @@ impl Sources<'_> {
                 roles[*place] = Role::Time;
             }
             let axis = self.axis(&group, named.assumed.as_deref())?;
-            for place in &group.channels {
+            // The time of columns without numbers is no channel.
+            let is_channel = |place: &&usize| !self.fields[**place].is_label;
+            for place in group.channels.iter().filter(is_channel) {
                 roles[*place] = Role::Channel(axes.len());
                 axes.push(self.with_own_rate(axis.clone(), *place));
             }
@@ -139,7 +145,12 @@ impl Sources<'_> {
         let repeats = stamps.windows(2).filter(|pair| pair[0] == pair[1]).count();
         let coarse = axis.rate_hz.is_none() || 10 * repeats > stamps.len();
         let difference = (mean_hz / hz - 1.0).abs();
-        if coarse && difference < SAME || difference < ROUNDED {
+        let is_rounding = difference < SAME
+            && rounded(stamps).is_some_and(|line| {
+                let ahead_s = (last - first) * difference;
+                ahead_s <= QUANTA * line.quantum_s
+            });
+        if coarse && difference < SAME || difference < ROUNDED || is_rounding {
             axis.rate_hz = Some(hz);
             axis.rate_from = RateFrom::Header(words);
         }
@@ -160,15 +171,20 @@ impl Sources<'_> {
 
     /// Rate in the head for a column (or for all), and the words that give it.
     fn header_rate(&self, place: Option<usize>) -> Option<(String, f64)> {
-        self.entries.iter().find_map(|entry| {
-            let filled = entry.values.iter().filter(|v| !v.is_empty()).count();
-            let own = place
-                .and_then(|place| place.checked_sub(1))
-                .filter(|_| filled > 1)
-                .and_then(|value| keys::rate_hz(entry, Some(value), self.decimal));
-            let hz = own.or_else(|| keys::rate_hz(entry, None, self.decimal))?;
-            Some((entry.key.clone(), hz))
-        })
+        // The frequency of a signal may stand above the rate.
+        let is_vague = |entry: &&Entry| keys::is_vague(&entry.key);
+        let clear = self.entries.iter().filter(|entry| !is_vague(entry));
+        clear
+            .chain(self.entries.iter().filter(is_vague))
+            .find_map(|entry| {
+                let filled = entry.values.iter().filter(|v| !v.is_empty()).count();
+                let own = place
+                    .and_then(|place| place.checked_sub(1))
+                    .filter(|_| filled > 1)
+                    .and_then(|value| keys::rate_hz(entry, Some(value), self.decimal));
+                let hz = own.or_else(|| keys::rate_hz(entry, None, self.decimal))?;
+                Some((entry.key.clone(), hz))
+            })
     }
 
     fn header_start(&self) -> Option<f64> {

@@ -98,8 +98,10 @@ impl Sources<'_> {
             "column {} has no heading but rises steadily: it was taken for the time",
             first + 1
         );
+        // Each channel may have the same time before it.
+        let is_same = |place: &usize| self.columns[*place].values == *values;
         TimePlaces {
-            times: vec![first],
+            times: used.iter().copied().filter(is_same).collect(),
             assumed: Some(assumed).filter(|_| !self.is_of_header_rate(first)),
         }
     }
@@ -124,8 +126,10 @@ impl Sources<'_> {
     /// Whether a column only counts the samples.
     pub(super) fn is_index(&self, place: usize, used: &[usize]) -> bool {
         let field = &self.fields[place];
-        let is_named = units::is_index_name(&field.name) || field.is_label;
         let is_first = used.first() == Some(&place);
+        // `NO.` may stand in the row of units.
+        let is_numbered = is_first && field.unit_text.as_deref().is_some_and(units::is_index_name);
+        let is_named = units::is_index_name(&field.name) || field.is_label || is_numbered;
         // Without a heading it counts where the others have one, or where the head gives the rate.
         let may_count = || {
             units::is_axis_name(&field.name)

@@ -55,7 +55,8 @@ impl Field {
     /// A column with a heading, and with a unit in a row of its own.
     #[must_use]
     pub fn new(heading: &str, unit: Option<&str>) -> Self {
-        let heading = heading.trim().trim_matches('"').trim();
+        let unquoted = heading.replace('"', "");
+        let heading = unquoted.trim();
         let Heading {
             name,
             unit: own,

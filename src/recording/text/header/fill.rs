@@ -52,8 +52,12 @@ pub(super) fn fill_units(fields: &mut [Field], entries: &[Entry], used: &[bool])
             .collect();
         for (rank, place) in signals.iter().enumerate() {
             let text = match values.as_slice() {
-                [one] => one,
-                several if several.len() == signals.len() => several[rank],
+                [one] => one.as_str(),
+                several if several.len() == signals.len() => several[rank].as_str(),
+                // One above each column, where the key stands above the time.
+                _ if entry.values.len() + 1 == fields.len() && *place > 0 => {
+                    above(&entry.values, fields, *place)
+                }
                 _ => continue,
             };
             set_unit(&mut fields[*place], text);
@@ -66,6 +70,17 @@ pub(super) fn fill_units(fields: &mut [Field], entries: &[Entry], used: &[bool])
         if let Some(field) = axis {
             set_unit(field, if text == "S" { "s" } else { text });
         }
+    }
+}
+
+/// What stands above a column, or above the one before it of which this is another sight: `CH1 Peak
+/// Detect` after `CH1`.
+fn above<'a>(values: &'a [String], fields: &[Field], place: usize) -> &'a str {
+    let own = values[place - 1].as_str();
+    let is_of_before = place > 1 && fields[place].name.starts_with(&fields[place - 1].name);
+    match own {
+        "" if is_of_before => &values[place - 2],
+        own => own,
     }
 }
 

@@ -69,7 +69,8 @@ pub(super) fn labelled(rows: &[Row], used: &[bool]) -> Option<(Vec<Field>, usize
     // Without a row that says more, the label must stand above several columns.
     let is_alone = others.is_empty()
         || units.is_none() && about(Topic::Interval).is_none() && about(Topic::Rate).is_none();
-    if is_alone && names.cells[1..].iter().all(|cell| *cell != names.cells[0]) {
+    let is_repeated = names.cells[1..].iter().any(|cell| *cell == names.cells[0]);
+    if is_alone && !is_repeated && !is_last_and_apart(rows, names.line) {
         return None;
     }
     let fields = match is_beside_data(names, used) {
@@ -79,13 +80,24 @@ pub(super) fn labelled(rows: &[Row], used: &[bool]) -> Option<(Vec<Field>, usize
     Some((fields, names.line))
 }
 
+/// Whether a line is the last above the data, and an empty one parts it from what is above: no key
+/// among others.
+fn is_last_and_apart(rows: &[Row], line: usize) -> bool {
+    let [.., above, last] = rows else {
+        return false;
+    };
+    last.line == line && above.line + 1 < line
+}
+
 /// Whether cells are the name of time and names of channels: no key with values, no units.
 fn is_headings(cells: &[String]) -> bool {
     let is_name = |cell: &String| {
         !cell.is_empty() && units::read(cell).is_none() && keys::quantity(cell, b'.').is_none()
     };
     let time = Field::new(&cells[0], None);
-    time.is_named_time() && cells.len() > 1 && cells[1..].iter().all(is_name)
+    (time.is_named_time() || units::is_index_name(&cells[0]))
+        && cells.len() > 1
+        && cells[1..].iter().all(is_name)
 }
 
 /// Whether most columns have a cell, none of which stands between a key and its value.

@@ -57,10 +57,12 @@ pub fn read(head: &Head, table: &Table, used: &[bool]) -> Header {
         all.extend(keyed.iter().cloned());
         all
     };
-    if let Some((fields, names)) = labelled(&rows, used) {
+    if let Some((mut fields, names)) = labelled(&rows, used) {
+        let entries = entries(&[names]);
+        fill_units(&mut fields, &entries, used);
         return Header {
             fields,
-            entries: entries(&[names]),
+            entries,
             names: Some(head.lines[names].text.clone()),
         };
     }
@@ -125,9 +127,23 @@ fn split(text: &str, table: &Table, used: &[bool]) -> Vec<String> {
             .map(str::to_owned)
             .collect(),
     );
+    if !text.contains(['\t', ';', ',']) {
+        ways.push(at_quotes(text));
+    }
     ways.into_iter()
         .find(|way| way.len() == table.width)
         .unwrap_or(cells)
+}
+
+/// Headings that begin with a name in quotes each: `"Zeit" t / s "Drehmoment" M / Nm`.
+fn at_quotes(text: &str) -> Vec<String> {
+    let opening = text.match_indices('"').step_by(2).map(|(place, _)| place);
+    let mut starts: Vec<usize> = opening.collect();
+    starts.push(text.len());
+    starts
+        .windows(2)
+        .map(|pair| text[pair[0]..pair[1]].trim().to_owned())
+        .collect()
 }
 
 /// Headings may stand in a comment: `# time_s,bridge_V`.
@@ -136,6 +152,12 @@ fn uncommented(text: &str) -> &str {
     match text.trim_start().strip_prefix(['#', '%', '!']) {
         Some(rest) => rest.trim_start_matches(['#', '%', '!']).trim_start(),
         // CASSY heads its columns so.
-        None => text.strip_prefix("DEF=").unwrap_or(text),
+        None => after_definition(text).unwrap_or(text),
     }
+}
+
+/// What follows `DEF=`, with or without spaces around the mark.
+pub(super) fn after_definition(text: &str) -> Option<&str> {
+    let rest = text.trim_start().strip_prefix("DEF")?;
+    Some(rest.trim_start().strip_prefix('=')?.trim_start_matches(' '))
 }

@@ -26,7 +26,7 @@ pub(super) fn positional(rows: &[Row], table: &Table, used: &[bool]) -> Position
         .iter()
         .filter(|row| is_heading(&row.cells, table, used))
         .filter(|row| !is_process_row(&row.cells) && !repeats_a_key(&row.cells))
-        .filter(|row| !is_key_with_values(&row.cells))
+        .filter(|row| !is_key_with_values(&row.cells) && !is_list_of_quantities(&row.cells))
         .rev()
         .collect();
     if is_key_block(&fitting, used) {
@@ -81,7 +81,9 @@ impl<'a> Headings<'a> {
             [below, above, ..] if is_mixed(&below.cells, &above.cells) => {
                 (*above, Some(*below), Some(*below))
             }
-            [below, above, ..] if is_units(&below.cells) => (*above, Some(*below), None),
+            [below, above, ..] if is_units(&below.cells) || is_units_under(below, above) => {
+                (*above, Some(*below), None)
+            }
             [only, ..] if is_nothing_but_units(&only.cells) => (*only, Some(*only), None),
             [names, ..] => (*names, None, None),
         };
@@ -219,6 +221,57 @@ fn is_key_with_values(cells: &[String]) -> bool {
     let is_quantity = |v: &String| keys::quantity(v, b'.').is_some();
     let mut filled = values.iter().filter(|v| !v.is_empty()).peekable();
     keys::topic(key).is_some_and(is_of_axis) && filled.peek().is_some() && filled.all(is_quantity)
+}
+
+/// Whether cells are a key and what was measured on each channel: `Period:,T=1.000mS,T=?` or
+/// `Vpp,3.2V,?`.
+fn is_list_of_quantities(cells: &[String]) -> bool {
+    let mut filled = cells.iter().filter(|cell| !cell.is_empty());
+    let Some(key) = filled.next() else {
+        return false;
+    };
+    let values: Vec<&String> = filled.collect();
+    let is_marked = |cell: &String| cell.ends_with([':', '=']);
+    let value_of = |cell: &str| {
+        cell.split_once('=')
+            .map_or(cell, |(_, value)| value)
+            .to_owned()
+    };
+    let is_quantity = |cell: &&&String| {
+        let value = value_of(cell);
+        value.starts_with(|c: char| c.is_ascii_digit() || c == '-')
+            && keys::quantity(&value, b'.').is_some_and(|(_, unit)| is_unit_or_rate(&unit))
+    };
+    let is_unknown = |cell: &&&String| value_of(cell).chars().all(|c| !c.is_alphanumeric());
+    let quantities = values.iter().filter(is_quantity).count();
+    let unknown = values.iter().filter(is_unknown).count();
+    is_marked(key) && values.iter().any(|cell| !is_marked(cell))
+        || quantities > 0 && quantities + unknown == values.len()
+}
+
+/// Whether a text is a unit, in capitals perhaps: `KHz`, `mS`.
+fn is_unit_or_rate(text: &str) -> bool {
+    let lower = text.to_lowercase();
+    units::read(text).is_some() || units::read(&lower).is_some() || lower.ends_with("hz")
+}
+
+/// Whether a row under the names of columns holds their units beside words that it repeats: `NO.`,
+/// `Time`, `ms`, `V`, `N` under `Number`, `Time`, `ms`, `CH1`, `CH2`.
+fn is_units_under(below: &Row, above: &Row) -> bool {
+    let pairs = || below.cells.iter().zip(&above.cells);
+    let repeats_unit = pairs().any(|(below, above)| below == above && units::read(below).is_some());
+    let says_more = |(below, above): &(&String, &String)| {
+        below != above
+            && !below.is_empty()
+            && !units::is_time_name(below)
+            && !units::is_index_name(below)
+    };
+    let new: Vec<&String> = pairs().filter(says_more).map(|(below, _)| below).collect();
+    let like = |cell: &&&String| units::read(cell).is_some() || units::is_bracketed(cell);
+    repeats_unit
+        && below.line == above.line + 1
+        && !new.is_empty()
+        && 2 * new.iter().filter(like).count() >= new.len()
 }
 
 /// Whether cells are units, or nothing where a channel has none: `s,Nm,,`.

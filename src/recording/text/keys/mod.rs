@@ -5,7 +5,7 @@ mod words;
 
 use crate::io::csv::{Delimiter, Dialect};
 pub use values::{date_text, quantity, rate_hz, seconds};
-pub use words::topic;
+pub use words::{is_vague, topic};
 
 /// A line with a key and values.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,7 +3,7 @@
 use super::Topic;
 
 /// Keys that are about something exactly, in lower case without brackets.
-const EXACT: [(&str, Topic); 82] = [
+const EXACT: [(&str, Topic); 84] = [
     ("horizontalleft", Topic::Start),
     ("horizontalresolutionpp", Topic::Interval),
     ("horz_units", Topic::AxisUnit),
@@ -26,6 +26,8 @@ const EXACT: [(&str, Topic); 82] = [
     ("sampling", Topic::Rate),
     ("dt", Topic::Interval),
     ("delta", Topic::Interval),
+    ("x-delta", Topic::Interval),
+    ("xdelta", Topic::Interval),
     ("δt", Topic::Interval),
     ("increment", Topic::Interval),
     ("interval", Topic::Interval),
@@ -177,6 +179,13 @@ const NOT: [&str; 9] = [
     "display",
     "vertical scale",
 ];
+
+/// Whether a key that can be about the rate is more often about the signal.
+#[must_use]
+pub fn is_vague(key: &str) -> bool {
+    const WORDS: [&str; 4] = ["frequency", "period", "resolution", "step"];
+    WORDS.contains(&without_brackets(&key.to_lowercase()))
+}
 
 /// What a key is about.
 #[must_use]

@@ -2,6 +2,7 @@
 
 use super::Maker;
 use crate::recording::text::head::Head;
+use crate::recording::text::header::after_definition;
 use crate::recording::text::table::Hints;
 
 const PLAIN: Hints = Hints {
@@ -107,6 +108,6 @@ pub const ALL: &[Maker] = &[
         head.starts(0, "Time [s]\t") && head.lines[0].text.trim_end().ends_with("h)")
     }),
     plain("CASSY Lab", |head| {
-        head.starts(0, "MIN=") && head.any(|line| line.starts_with("DEF="))
+        head.starts(0, "MIN") && head.any(|line| after_definition(line).is_some())
     }),
 ];

@@ -4,6 +4,7 @@ mod layouts;
 mod makers;
 mod others;
 mod plain;
+mod variants;
 mod wrong;
 
 use crate::io::csv::Options;
