@@ -6,9 +6,10 @@ mod lines;
 mod modal;
 mod order;
 mod scatter;
+mod whole;
 mod words;
 
-use torqcomp_dsp::frf::{self, Estimator, Frf};
+use torqcomp_dsp::frf::{self, Estimator, Frf, Window};
 
 use super::{Found, Outcome, Quality};
 use crate::failure::Failure;
@@ -16,6 +17,7 @@ use crate::report::{rounded, short};
 use blocks::Set;
 use lines::Lines;
 pub use modal::{Data, Effort, Modal};
+use scatter::Spread;
 
 /// How the stand was excited.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -95,12 +97,19 @@ pub fn identify(records: &[Driven], options: &Options) -> Result<Evaluated, Fail
             failure
         }
     })?;
-    let fitted = order::grown(&set, &lines, options, best)?;
-    let spread = scatter::of_poles(&set, &lines, options, &fitted)?;
+    let averaged = order::grown(&set, &lines, options, best)?;
+    let Settled {
+        modal: fitted,
+        spread,
+        relative,
+    } = settle(records, &set, &lines, options, averaged, &mut outcome)?;
     words::name_modes(&mut outcome, &fitted, &spread);
-    let quality = quality(&set, &lines, &fitted);
+    let quality = Quality {
+        rms: words::output_rms(&set, &lines) * relative,
+        unit: String::new(),
+        relative,
+    };
     check::doubts(&mut outcome, quality.relative, leads, &fitted);
-    check::leakage(&mut outcome, &set, &fitted);
     outcome.quality = Some(quality);
     say_method(&mut outcome, &set, &lines, options, &fitted);
     let held = held_out.get(fitted.poles.len()).copied();
@@ -126,15 +135,47 @@ pub fn identify(records: &[Driven], options: &Options) -> Result<Evaluated, Fail
     })
 }
 
-/// What the model leaves of the measured signal, over all blocks.
-fn quality(set: &Set, lines: &Lines, fitted: &Modal) -> Quality {
-    let error = |b| frf::prediction_error(&fitted.response, b, lines.clone());
-    let relative = set.blocks.iter().map(error).sum::<f64>() / set.blocks.len() as f64;
-    Quality {
-        rms: words::output_rms(set, lines) * relative,
-        unit: String::new(),
-        relative,
+/// Modes with what is known of them.
+struct Settled {
+    modal: Modal,
+    spread: Spread,
+    /// What is left of the measured signal, over its size.
+    relative: f64,
+}
+
+/// The final numbers: where a window makes resonances wider, from the whole records without one.
+fn settle(
+    records: &[Driven],
+    set: &Set,
+    lines: &Lines,
+    options: &Options,
+    averaged: Modal,
+    outcome: &mut Outcome,
+) -> Result<Settled, Failure> {
+    if set.window == Window::Hann {
+        let shape = lines::data(set, lines, options, &|_| true);
+        if let Some(whole) = whole::refine(records, &shape, &averaged) {
+            outcome.method.push(
+                "constants from the whole records without a window, what their ends do to the spectrum being part \
+                 of the model"
+                    .to_owned(),
+            );
+            return Ok(whole);
+        }
+        check::leakage(outcome, set, &averaged);
     }
+    let spread = scatter::of_poles(set, lines, options, &averaged)?;
+    Ok(Settled {
+        relative: left_of_blocks(set, lines, &averaged),
+        modal: averaged,
+        spread,
+    })
+}
+
+/// What the model leaves of the measured signal, over all blocks.
+fn left_of_blocks(set: &Set, lines: &Lines, fitted: &Modal) -> f64 {
+    let error = |b| frf::prediction_error(&fitted.response, b, lines.clone());
+    set.blocks.iter().map(error).sum::<f64>() / set.blocks.len() as f64
 }
 
 fn say_method(outcome: &mut Outcome, set: &Set, lines: &Lines, options: &Options, fitted: &Modal) {
@@ -165,9 +206,7 @@ fn say_others(outcome: &mut Outcome, options: &Options, fitted: &Modal, held: Op
         outcome.found.push(gain);
     }
     if options.with_delay {
-        let place = 2 * fitted.poles.len();
-        let std = fitted.fit.as_ref().and_then(|f| f.std[place]);
-        let delay = Found::new("delay", fitted.delay_s, std, "s");
+        let delay = Found::new("delay", fitted.delay_s, fitted.delay_std_s, "s");
         outcome.found.push(delay);
     }
 }

@@ -50,7 +50,9 @@ pub struct Modal {
     pub delay_s: f64,
     /// Linear numbers: real and imaginary part of each residue, then c₁ and c₂.
     linear: Vec<f64>,
-    /// The fit of poles and delay.
+    /// Standard uncertainty of τ in s, if it was fitted and the data tell it.
+    pub delay_std_s: Option<f64>,
+    /// The fit of poles and delay to the averaged response.
     pub fit: Option<Fit>,
     /// Model at each line.
     pub response: Vec<Complex64>,
@@ -58,7 +60,8 @@ pub struct Modal {
 }
 
 impl Data {
-    fn scale(&self) -> f64 {
+    /// What frequencies are divided by, in rad/s.
+    pub(super) fn scale(&self) -> f64 {
         self.omega[self.omega.len() / 2]
     }
 
@@ -77,7 +80,7 @@ impl Data {
     }
 
     /// What stands before the sum, and s.
-    fn front(&self, omega: f64, delay_s: f64, scale: f64) -> (Complex64, Complex64) {
+    pub(super) fn front(&self, omega: f64, delay_s: f64, scale: f64) -> (Complex64, Complex64) {
         let s = Complex64::new(0.0, omega / scale);
         let late = match delay_s == 0.0 {
             true => Complex64::ONE,
@@ -92,7 +95,7 @@ impl Data {
     }
 
     /// 1/(s − p) and 1/(s − p*), with the window's rate in p.
-    fn fractions(&self, s: Complex64, pole: Pole, scale: f64) -> (Complex64, Complex64) {
+    pub(super) fn fractions(&self, s: Complex64, pole: Pole, scale: f64) -> (Complex64, Complex64) {
         let p = Complex64::new(-(pole.rate_per_s + self.added_rate), pole.omega_rad_per_s) / scale;
         (1.0 / (s - p), 1.0 / (s - p.conj()))
     }
@@ -148,20 +151,35 @@ impl Data {
             || (Vec::new(), 0.0),
             |f| (problem.poles(&f.values), problem.delay(&f.values)),
         );
-        let solved = self.solve(&poles, delay_s)?;
+        let linear = self.solve(&poles, delay_s)?.values;
+        let delay_std_s = fit.as_ref().filter(|_| self.with_delay);
+        let delay_std_s = delay_std_s.and_then(|f| f.std[2 * poles.len()]);
+        let modal = self.modal_of(&poles, (delay_s, delay_std_s), &linear);
+        Ok(Modal { fit, ..modal })
+    }
+
+    /// A modal model of these numbers: the delay with its standard uncertainty, real and imaginary part of each
+    /// residue, c₁ and c₂.
+    pub(super) fn modal_of(
+        &self,
+        poles: &[Pole],
+        delay_s: (f64, Option<f64>),
+        linear: &[f64],
+    ) -> Modal {
         let scale = self.scale();
         let model = |omega: &f64| -> Complex64 {
-            let columns = self.columns(*omega, &poles, delay_s, scale);
-            columns.iter().zip(&solved.values).map(|(c, v)| c * v).sum()
+            let columns = self.columns(*omega, poles, delay_s.0, scale);
+            columns.iter().zip(linear).map(|(c, v)| c * v).sum()
         };
-        Ok(Modal {
+        Modal {
             response: self.omega.iter().map(model).collect(),
-            poles,
-            delay_s,
-            linear: solved.values,
-            fit,
+            poles: poles.to_vec(),
+            delay_s: delay_s.0,
+            delay_std_s: delay_s.1,
+            linear: linear.to_vec(),
+            fit: None,
             scale,
-        })
+        }
     }
 
     /// Poles and delay with their starts and bounds.
@@ -348,6 +366,11 @@ impl Residuals for Problem<'_> {
 }
 
 impl Modal {
+    /// Real and imaginary part of each residue, then c₁ and c₂.
+    pub(super) fn linear(&self) -> &[f64] {
+        &self.linear
+    }
+
     /// Size of the residue of a mode: how strongly it takes part.
     #[must_use]
     pub fn strength(&self, k: usize) -> f64 {
