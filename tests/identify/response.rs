@@ -220,13 +220,16 @@ fn least_std(lines: &[(f64, f64)], noise_power: f64, blocks: f64) -> [f64; 2] {
     [bound[(0, 0)].sqrt(), bound[(1, 1)].sqrt()]
 }
 
+/// What is applied and what is measured.
+type Channels = (Vec<f64>, Vec<f64>);
+
 /// Errors of the frequency and damping ratio of so many records at 40 dB: each within 0.02 % and 1 %.
 /// Returned as squares on average, relative.
 fn squares_at_40_decibels(
     how: response::Excitation,
     runs: usize,
     noise: &mut Noise,
-    record: &mut dyn FnMut(&mut Noise) -> (Vec<f64>, Vec<f64>),
+    record: &mut dyn FnMut(&mut Noise) -> Channels,
 ) -> [f64; 2] {
     let mut squares = [0.0; 2];
     for _ in 0..runs {

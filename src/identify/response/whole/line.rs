@@ -193,3 +193,74 @@ impl Solved {
             .then(|| self.covariance[(at, at)].sqrt())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shape(order: i32) -> Data {
+        Data {
+            omega: vec![100.0, 150.0, 200.0],
+            response: vec![Complex64::ONE; 3],
+            weight: vec![1.0; 3],
+            order,
+            added_rate: 0.0,
+            with_delay: true,
+        }
+    }
+
+    fn pole(rate_per_s: f64, omega_rad_per_s: f64) -> Pole {
+        Pole {
+            rate_per_s,
+            omega_rad_per_s,
+        }
+    }
+
+    /// Every derivative against a difference of what is left.
+    #[test]
+    fn derivatives_are_those_of_the_equation() {
+        let spectra = Spectra {
+            omega: vec![137.0],
+            applied: vec![Complex64::new(0.7, -1.9)],
+            measured: vec![Complex64::new(2.0, 0.4)],
+            weight: vec![3.0],
+        };
+        for order in 0..3 {
+            let shape = shape(order);
+            let layout = Layout::of(&shape, 2, (100.0, 200.0));
+            let number = |i: usize| ((i * i + 3) as f64 * 0.7).sin();
+            let state = State {
+                poles: vec![pole(4.0, 130.0), pole(9.0, 180.0)],
+                delay_s: 2e-3,
+                linear: (0..6).map(number).collect(),
+                transients: vec![(9..9 + layout.own()).map(number).collect()],
+            };
+            let mut filled = vec![Complex64::ZERO; layout.columns() + 1];
+            layout.fill(&spectra, &state, 0, 0, &mut filled);
+            let left = layout.left(&spectra, &state, 0, 0);
+            assert!((filled[layout.columns()] - 3.0 * left).norm() < 1e-12);
+            for (i, slope) in filled[..layout.columns()].iter().enumerate() {
+                let h = if i == layout.own() + 4 { 1e-8 } else { 1e-5 };
+                let at = |h: f64| layout.left(&spectra, &stepped(&layout, &state, i, h), 0, 0);
+                let want = -3.0 * (at(h) - at(-h)) / (2.0 * h);
+                let off = (slope - want).norm() / want.norm();
+                assert!(off < 1e-6, "order {order}, number {i}: {slope} {want}");
+            }
+        }
+    }
+
+    /// The numbers after a step of one of them.
+    fn stepped(layout: &Layout, state: &State, i: usize, by: f64) -> State {
+        let (own, shared) = (layout.own(), layout.shared());
+        let mut solved = Solved {
+            step: nalgebra::DVector::zeros(shared),
+            own: vec![nalgebra::DVector::zeros(own)],
+            covariance: nalgebra::DMatrix::zeros(shared, shared),
+        };
+        match i < own {
+            true => solved.own[0][i] = by,
+            false => solved.step[i - own] = by,
+        }
+        solved.moved(layout, state, 1.0)
+    }
+}
