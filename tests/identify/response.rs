@@ -370,3 +370,116 @@ fn constants_follow_from_a_declared_stiffness_with_its_uncertainty() {
         "{pairs}"
     );
 }
+
+/// Torque in, motion out tells J, f and K, whatever the units and the excitation; the stand file gets them.
+#[test]
+fn all_constants_follow_from_a_torque_and_the_motion_it_makes() {
+    let folder = Folder::new();
+    let (inertia, stiffness) = (0.02, 0.02 * NATURAL * NATURAL);
+    let damping = 2.0 * RATIO * NATURAL * inertia;
+    let mut noise = Noise(27);
+    let (applied, shown) = driven(20_000, &mut noise);
+    let (measured, _) = noisy(&shown, 40.0, &mut noise);
+    // Angles in degrees and torques in pound feet; a gain of 1 at rest is one rad for K.
+    let rows: String = (0..applied.len())
+        .map(|i| {
+            let degrees = (measured[i] / stiffness).to_degrees();
+            let pound_feet = applied[i] / 1.355_817_948_331_400_4;
+            format!("{},{pound_feet},{degrees}\n", i as f64 / RATE_HZ)
+        })
+        .collect();
+    folder.write(
+        "noise.csv",
+        format!("time_s,motor_ft lbf,shaft_deg\n{rows}"),
+    );
+    let stand = "schema = \"torqcomp.stand/1\"\n# kept\n[mechanics]\nstiffness = \"1 N m/rad\"\n";
+    folder.write("stand.toml", stand);
+    let args = [
+        "identify",
+        "response",
+        "noise.csv",
+        "--applied",
+        "motor",
+        "--measured",
+        "shaft",
+        "--modes",
+        "1",
+        "--band",
+        "20..150",
+        "--json",
+        "-o",
+        "stand.toml",
+    ];
+    let report = folder.json(&args);
+    let warnings = report["warnings"].to_string();
+    assert!(
+        !warnings.contains("anchor") && !warnings.contains("turned"),
+        "{warnings}"
+    );
+    for (name, truth) in [
+        ("inertia", inertia),
+        ("damping", damping),
+        ("stiffness", stiffness),
+    ] {
+        let (value, std, _) = parameter(&report, name);
+        let std = std.expect("the data tell it");
+        assert_close(value, truth, 2e-3);
+        assert!(
+            (value - truth).abs() < 3.5 * std && std < 2e-3 * truth,
+            "{name}: {value} ± {std}"
+        );
+    }
+    let written = folder.read("stand.toml");
+    assert!(
+        written.contains("# kept") && written.contains("inertia"),
+        "{written}"
+    );
+    assert!(!written.contains("\"1 N m/rad\""), "{written}");
+    // A motion against the torque is refused.
+    let turned: String = rows
+        .lines()
+        .map(|row| {
+            let (front, angle) = row.rsplit_once(',').expect("three columns");
+            match angle.strip_prefix('-') {
+                Some(angle) => format!("{front},{angle}\n"),
+                None => format!("{front},-{angle}\n"),
+            }
+        })
+        .collect();
+    folder.write(
+        "against.csv",
+        format!("time_s,motor_ft lbf,shaft_deg\n{turned}"),
+    );
+    let mut args = args;
+    args[2] = "against.csv";
+    folder.run(&args).says(1, &["wrong sign"]);
+}
+
+/// Intervals of J, f and K, for every way to excite.
+#[test]
+fn intervals_of_constants_cover_the_truth() {
+    use response::Excitation::{Impact, Periodic, Random};
+    let mut covered = [0; 3].map(|_| Coverage::default());
+    let mut noise = Noise(28);
+    let struck = hits(6);
+    for k in 0..240 {
+        let how = [Impact, Periodic, Random][k % 3];
+        let (applied, shown) = match how {
+            Impact => struck.clone(),
+            Periodic => periods(500, 7, &mut noise),
+            Random => driven(8_000, &mut noise),
+        };
+        let decibel = [20.0, 30.0, 40.0, 50.0, 60.0][k / 3 % 5];
+        let (measured, _) = noisy(&shown, decibel, &mut noise);
+        let answer = one_mode(&applied, &measured, how).single.expect("a mode");
+        // A gain of 1 at rest: K = 1.
+        let truth = [NATURAL.powi(-2), 2.0 * RATIO / NATURAL, 1.0];
+        let (found, _) = answer.constants();
+        for ((found, truth), coverage) in found.iter().zip(truth).zip(&mut covered) {
+            coverage.count(found, truth);
+        }
+    }
+    for (coverage, name) in covered.iter().zip(["inertia", "damping", "stiffness"]) {
+        coverage.check(name);
+    }
+}

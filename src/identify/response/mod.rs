@@ -2,6 +2,7 @@
 
 mod blocks;
 mod check;
+mod inverse;
 mod lines;
 mod modal;
 mod order;
@@ -11,13 +12,14 @@ mod words;
 
 use torqcomp_dsp::frf::{self, Estimator, Frf, Window};
 
+use super::plain::Answer;
 use super::{Found, Outcome, Quality};
 use crate::failure::Failure;
 use crate::report::{rounded, short};
 use blocks::Set;
 use lines::Lines;
 pub use modal::{Data, Effort, Modal};
-use scatter::Spread;
+use scatter::{OfMode, Spread};
 
 /// How the stand was excited.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -79,6 +81,8 @@ pub struct Evaluated {
     pub held_out: Vec<f64>,
     /// Covariance of σ (1/s) and ω (rad/s) of each mode, if the data tell it.
     pub spread: Vec<Option<[[f64; 2]; 2]>>,
+    /// The mode with its residue, if there is a single one.
+    pub single: Option<Answer>,
 }
 
 /// Evaluates records of one stand.
@@ -101,6 +105,7 @@ pub fn identify(records: &[Driven], options: &Options) -> Result<Evaluated, Fail
     let Settled {
         modal: fitted,
         spread,
+        of_mode,
         relative,
     } = settle(records, &set, &lines, options, averaged, &mut outcome)?;
     words::name_modes(&mut outcome, &fitted, &spread);
@@ -129,9 +134,27 @@ pub fn identify(records: &[Driven], options: &Options) -> Result<Evaluated, Fail
             applied_power: h1.applied_power[lines.clone()].to_vec(),
             blocks: h1.blocks,
         },
+        single: answer(&fitted, of_mode),
         modal: fitted,
         held_out,
         spread,
+    })
+}
+
+/// A single mode with its residue.
+fn answer(modal: &Modal, of_mode: Option<OfMode>) -> Option<Answer> {
+    let [pole] = modal.poles[..] else {
+        return None;
+    };
+    let (residue, unit) = modal.residue(0);
+    let sizes = [1.0, 1.0, unit, unit];
+    let scaled =
+        |c: OfMode| std::array::from_fn(|i| std::array::from_fn(|j| c[i][j] * sizes[i] * sizes[j]));
+    Some(Answer {
+        rate_per_s: pole.rate_per_s,
+        omega_rad_per_s: pole.omega_rad_per_s,
+        residue,
+        covariance: of_mode.map(scaled),
     })
 }
 
@@ -139,6 +162,8 @@ pub fn identify(records: &[Driven], options: &Options) -> Result<Evaluated, Fail
 struct Settled {
     modal: Modal,
     spread: Spread,
+    /// Covariance of σ, ω and the residue of a single mode.
+    of_mode: Option<OfMode>,
     /// What is left of the measured signal, over its size.
     relative: f64,
 }
@@ -164,11 +189,12 @@ fn settle(
         }
         check::leakage(outcome, set, &averaged);
     }
-    let spread = scatter::of_poles(set, lines, options, &averaged)?;
+    let (spread, of_mode) = scatter::of_poles(set, lines, options, &averaged)?;
     Ok(Settled {
         relative: left_of_blocks(set, lines, &averaged),
         modal: averaged,
         spread,
+        of_mode,
     })
 }
 

@@ -57,6 +57,7 @@ pub struct Modal {
     /// Model at each line.
     pub response: Vec<Complex64>,
     scale: f64,
+    order: i32,
 }
 
 impl Data {
@@ -179,6 +180,7 @@ impl Data {
             linear: linear.to_vec(),
             fit: None,
             scale,
+            order: self.order,
         }
     }
 
@@ -201,19 +203,19 @@ impl Data {
         parameters
     }
 
-    /// Derivatives of the weighted model by poles and delay at a fit, real and imaginary parts one after
-    /// another, with what the linear numbers can make up for taken out.
+    /// Derivatives of the weighted model by poles and delay at a fit, then by so many of the linear numbers, real and
+    /// imaginary parts one after another, with what the other linear numbers can make up for taken out.
     ///
     /// # Errors
     /// [`FitError`] if there are too few lines.
-    pub fn slopes_at(&self, fitted: &Modal) -> Result<DMatrix<f64>, FitError> {
+    pub fn slopes_at(&self, fitted: &Modal, linear: usize) -> Result<DMatrix<f64>, FitError> {
         let problem = Problem {
             data: self,
             modes: fitted.poles.len(),
         };
         let values = fitted.fit.as_ref().map_or(&[][..], |f| &f.values);
-        let mut slopes = DMatrix::zeros(2 * self.omega.len(), values.len());
-        problem.jacobian(values, &mut slopes)?;
+        let mut slopes = DMatrix::zeros(2 * self.omega.len(), values.len() + linear);
+        problem.tangent(values, linear, &mut slopes)?;
         Ok(slopes)
     }
 
@@ -323,32 +325,35 @@ impl Residuals for Problem<'_> {
         true
     }
 
-    /// The slopes with what the linear numbers can make up for taken out (L. Kaufman, BIT 15 (1975), 49).
     fn jacobian(&self, p: &[f64], out: &mut DMatrix<f64>) -> Result<(), FitError> {
+        self.tangent(p, 0, out)
+    }
+}
+
+impl Problem<'_> {
+    /// The slopes and the first `kept` columns of the linear numbers, with what the other linear numbers can make up
+    /// for taken out (L. Kaufman, BIT 15 (1975), 49).
+    fn tangent(&self, p: &[f64], kept: usize, out: &mut DMatrix<f64>) -> Result<(), FitError> {
         let (poles, delay_s) = (self.poles(p), self.delay(p));
         let linear = self.data.solve(&poles, delay_s)?.values;
         let lines = self.data.omega.len();
         let scale = self.data.scale();
-        let mut design = DMatrix::zeros(2 * lines, linear.len());
+        let mut design = DMatrix::zeros(2 * lines, linear.len() - kept);
         for (i, omega) in self.data.omega.iter().enumerate() {
             let w = self.data.weight[i];
             let put = |to: &mut DMatrix<f64>, j: usize, value: Complex64| {
                 to[(2 * i, j)] = w * value.re;
                 to[(2 * i + 1, j)] = w * value.im;
             };
-            for (j, value) in self
-                .data
-                .columns(*omega, &poles, delay_s, scale)
-                .into_iter()
-                .enumerate()
-            {
-                put(&mut design, j, value);
+            let columns = self.data.columns(*omega, &poles, delay_s, scale);
+            for (j, value) in columns.into_iter().enumerate() {
+                match j.checked_sub(kept) {
+                    Some(j) => put(&mut design, j, value),
+                    None => put(out, p.len() + j, value),
+                }
             }
-            for (j, value) in self
-                .slopes(*omega, &poles, delay_s, &linear)
-                .into_iter()
-                .enumerate()
-            {
+            let slopes = self.slopes(*omega, &poles, delay_s, &linear);
+            for (j, value) in slopes.into_iter().enumerate() {
                 put(out, j, value);
             }
         }
@@ -371,6 +376,14 @@ impl Modal {
         &self.linear
     }
 
+    /// R of a mode, in the units of the response times s^(m−1), and what a linear number of it counts in these units.
+    #[must_use]
+    pub fn residue(&self, k: usize) -> (Complex64, f64) {
+        let unit = self.scale.powi(1 - self.order);
+        let residue = Complex64::new(self.linear[2 * k], self.linear[2 * k + 1]);
+        (residue * unit, unit)
+    }
+
     /// Size of the residue of a mode: how strongly it takes part.
     #[must_use]
     pub fn strength(&self, k: usize) -> f64 {
@@ -388,5 +401,39 @@ impl Modal {
         };
         let modes: f64 = self.poles.iter().enumerate().map(one).sum();
         modes + self.linear[self.linear.len() - 2]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 1/(2 (s + 3)² + 2·500²) and its derivatives: R = −j/(2·500·2).
+    #[test]
+    fn a_residue_does_not_depend_on_what_is_measured() {
+        let omega: Vec<f64> = (300..700).map(f64::from).collect();
+        let pole = Pole {
+            rate_per_s: 3.0,
+            omega_rad_per_s: 500.0,
+        };
+        let square = pole.rate_per_s.powi(2) + pole.omega_rad_per_s.powi(2);
+        for order in 0..3 {
+            let response = |w: &f64| {
+                let s = Complex64::new(0.0, *w);
+                s.powi(order) / (2.0 * (s * s + 6.0 * s + square))
+            };
+            let data = Data {
+                response: omega.iter().map(response).collect(),
+                weight: vec![1.0; omega.len()],
+                omega: omega.clone(),
+                order,
+                added_rate: 0.0,
+                with_delay: false,
+            };
+            let fitted = data.fit(&[pole], Effort::Fine).unwrap();
+            let (residue, _) = fitted.residue(0);
+            let want = Complex64::new(0.0, -0.25 / pole.omega_rad_per_s);
+            assert!((residue - want).norm() < 1e-6 * want.norm(), "{residue}");
+        }
     }
 }

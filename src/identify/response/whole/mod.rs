@@ -71,6 +71,7 @@ pub(super) fn refine(records: &[Driven], shape: &Data, start: &Modal) -> Option<
     Some(Settled {
         relative: left_over(&layout, &all, &state),
         spread: solved.of_modes(layout.modes),
+        of_mode: solved.of_mode(&layout),
         modal: shape.modal_of(
             &state.poles,
             (state.delay_s, solved.delay_std(&layout)),

@@ -5,7 +5,8 @@ use num_complex::Complex64;
 
 use super::Spectra;
 use super::line::{Layout, State};
-use crate::identify::response::scatter::Spread;
+use crate::identify::response::inverse::invert;
+use crate::identify::response::scatter::{OfMode, Spread};
 
 /// Lines that are multiplied at once.
 const AT_ONCE: usize = 256;
@@ -95,6 +96,13 @@ impl Solved {
         (0..layout.searched()).map(one).fold(0.0, f64::max)
     }
 
+    /// Covariance of σ, ω and the residue of a single mode.
+    pub fn of_mode(&self, layout: &Layout) -> Option<OfMode> {
+        let residue = layout.searched();
+        let places = [0, 1, residue, residue + 1];
+        (layout.modes == 1).then(|| places.map(|i| places.map(|j| self.covariance[(i, j)])))
+    }
+
     /// Covariance of σ and ω of each mode.
     pub fn of_modes(&self, modes: usize) -> Spread {
         let part = |k: usize| {
@@ -102,41 +110,5 @@ impl Solved {
             Some([[of(0, 0), of(0, 1)], [of(1, 0), of(1, 1)]])
         };
         (0..modes).map(part).collect()
-    }
-}
-
-/// Inverse of a matrix that is symmetric and positive, its diagonal brought to 1 and so much added to it.
-fn invert(matrix: &DMatrix<f64>, added: f64) -> Option<DMatrix<f64>> {
-    let sizes: Vec<f64> = matrix.diagonal().iter().map(|d| d.sqrt()).collect();
-    let mut scaled = matrix.clone();
-    for i in 0..sizes.len() {
-        for j in 0..sizes.len() {
-            scaled[(i, j)] /= sizes[i] * sizes[j];
-        }
-        scaled[(i, i)] += added;
-    }
-    let mut inverse = scaled.cholesky()?.inverse();
-    for i in 0..sizes.len() {
-        for j in 0..sizes.len() {
-            inverse[(i, j)] /= sizes[i] * sizes[j];
-        }
-    }
-    Some(inverse)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn matrices_of_uneven_sizes_are_inverted() {
-        // [[4e12, 2], [2, 4e-12]] has the determinant 12.
-        let matrix = DMatrix::from_row_slice(2, 2, &[4e12, 2.0, 2.0, 4e-12]);
-        let want = DMatrix::from_row_slice(2, 2, &[4e-12, -2.0, -2.0, 4e12]) / 12.0;
-        let got = invert(&matrix, 0.0).unwrap();
-        let off = |i: usize| (got[i] / want[i] - 1.0).abs();
-        assert!((0..4).all(|i| off(i) < 1e-12), "{got}");
-        let singular = DMatrix::from_element(2, 2, 1.0);
-        assert!(invert(&singular, 0.0).is_none_or(|m| m[(0, 0)] > 1e12));
     }
 }
