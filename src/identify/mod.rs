@@ -2,6 +2,7 @@
 
 pub mod anchored;
 pub mod decay;
+pub mod plain;
 pub mod response;
 pub mod runup;
 pub mod static_load;

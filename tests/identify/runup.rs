@@ -161,24 +161,20 @@ fn coverage_at(decibel: f64, seed: u64, runs: usize) -> [Coverage; 4] {
     covered
 }
 
+/// Each parameter at each level of noise: where the noise is least, a turn of the body that is placed a hundredth of
+/// a sample wrong would show.
 #[test]
 fn intervals_of_run_ups_cover_the_truth() {
+    let levels = [(20.0, 15), (40.0, 16), (60.0, 17)];
     let all = std::thread::scope(|scope| {
         let one = |(decibel, seed)| scope.spawn(move || coverage_at(decibel, seed, 300));
-        let handles = [(20.0, 15), (40.0, 16), (60.0, 17)].map(one);
+        let handles = levels.map(one);
         handles.map(|h| h.join().expect("the runs are evaluated"))
     });
-    for (k, name) in NAMES.iter().enumerate() {
-        let mut over_all = Coverage::default();
-        for (covered, decibel) in all.iter().zip([20, 40, 60]) {
-            let Coverage { inside, all } = covered[k];
-            println!("{name} at {decibel} dB: {inside} of {all}");
-            // 300 records tell a share to 1.3 %.
-            assert!(inside * 100 >= all * 91, "{name} at {decibel} dB");
-            over_all.inside += inside;
-            over_all.all += all;
+    for (covered, (decibel, _)) in all.iter().zip(levels) {
+        for (coverage, name) in covered.iter().zip(NAMES) {
+            coverage.check(&format!("{name} at {decibel} dB"));
         }
-        over_all.check(name);
     }
 }
 

@@ -79,7 +79,7 @@ pub(super) fn follow(
 }
 
 /// Entry of `[mechanics]` for a number that has a place there.
-fn entry(found: &Found, source: &str) -> Option<Entry> {
+pub(super) fn entry(found: &Found, source: &str) -> Option<Entry> {
     let key = match found.name.as_str() {
         "inertia" => "inertia",
         "damping" => "damping",

@@ -2,6 +2,7 @@
 
 mod anchor;
 mod decay;
+mod plain;
 mod response;
 mod runup;
 mod static_load;

@@ -3,7 +3,7 @@
 use torqcomp_model::Dimension;
 
 use super::anchor::{Ratios, Told, follow};
-use super::{deliver, said, together};
+use super::{deliver, plain, said, together};
 use crate::cli::identify::{Excitation, Measured, Response};
 use crate::commands::Outcome;
 use crate::failure::Failure;
@@ -20,6 +20,7 @@ struct Loaded {
     rate_hz: f64,
     applied: Vec<f64>,
     measured: Vec<f64>,
+    applied_unit: Option<NamedUnit>,
     unit: Option<NamedUnit>,
     warnings: Vec<Warning>,
     is_lossy: bool,
@@ -61,7 +62,7 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
             .as_ref()
             .map_or_else(String::new, |u| u.text.clone());
     }
-    let entries = entries(args, &mut evaluated)?;
+    let entries = entries(args, rad_per_n_m(&loaded, options.order)?, &mut evaluated)?;
     let inputs: Vec<&str> = args.inputs.iter().map(String::as_str).collect();
     let mut report = Report::new("response", &inputs, &evaluated.outcome, args.findings.units);
     report.samples = loaded.iter().map(|l| l.applied.len()).sum();
@@ -91,6 +92,7 @@ fn load(args: &Response, input: &str) -> Result<Loaded, Failure> {
         rate_hz: read.rate_hz,
         applied: applied.samples,
         measured: measured.samples,
+        applied_unit: applied.unit,
         unit: measured.unit,
         warnings: said(&read.warnings, read.lost.as_ref()),
         is_lossy: read.lost.is_some(),
@@ -106,11 +108,8 @@ fn order(args: &Response, unit: Option<&NamedUnit>) -> i32 {
         None => {
             let is = |seconds: i32| {
                 unit.is_some_and(|u| {
-                    [
-                        Dimension::new([0, 1, seconds, 0, 0, 0]),
-                        Dimension::new([0, 0, seconds, 0, 0, 1]),
-                    ]
-                    .contains(&u.unit.dimension())
+                    [Dimension::new([0, 1, seconds, 0, 0, 0]), turning(seconds)]
+                        .contains(&u.unit.dimension())
                 })
             };
             if is(-2) { 2 } else { i32::from(is(-1)) }
@@ -118,8 +117,40 @@ fn order(args: &Response, unit: Option<&NamedUnit>) -> i32 {
     }
 }
 
-/// Constants that follow from a single mode and the anchor, and the entries of the stand file.
-fn entries(args: &Response, evaluated: &mut Evaluated) -> Result<Vec<Entry>, Failure> {
+const TORQUE: Dimension = Dimension::new([1, 2, -2, 0, 0, 0]);
+
+/// An angle times seconds to that power.
+fn turning(seconds: i32) -> Dimension {
+    Dimension::new([0, 0, seconds, 0, 0, 1])
+}
+
+/// Radians (per second, per second squared) over newton metres of one unit measured over one applied, if the one is
+/// a motion and the other a torque.
+fn rad_per_n_m(loaded: &[Loaded], order: i32) -> Result<Option<f64>, Failure> {
+    let of = |record: &Loaded| {
+        let (measured, applied) = (
+            record.unit.as_ref()?.unit,
+            record.applied_unit.as_ref()?.unit,
+        );
+        let known = measured.dimension() == turning(-order) && applied.dimension() == TORQUE;
+        known.then(|| measured.factor() / applied.factor())
+    };
+    let first = of(&loaded[0]);
+    match loaded.iter().find(|l| of(l) != first) {
+        None => Ok(first),
+        Some(other) => Err(Failure::failed(format_args!(
+            "{} and {} have their channels in different units; records of one response must have the same",
+            loaded[0].name, other.name
+        ))),
+    }
+}
+
+/// Constants that follow from a single mode, and an anchor where they need one, and the entries of the stand file.
+fn entries(
+    args: &Response,
+    rad_per_n_m: Option<f64>,
+    evaluated: &mut Evaluated,
+) -> Result<Vec<Entry>, Failure> {
     let get = |name: &str| evaluated.outcome.get(name).cloned();
     let pair = (get("natural_frequency"), get("damping_ratio"));
     let (Some(frequency), Some(ratio)) = pair else {
@@ -130,6 +161,11 @@ fn entries(args: &Response, evaluated: &mut Evaluated) -> Result<Vec<Entry>, Fai
             None => Ok(Vec::new()),
         };
     };
+    let source = format!("identify response: {}", args.inputs.join(", "));
+    if let (Some(size), Some(answer)) = (rad_per_n_m, evaluated.single) {
+        let (answer, outcome) = (answer.scaled(size), &mut evaluated.outcome);
+        return plain::follow(&args.anchors, &args.findings, &answer, &source, outcome);
+    }
     let pole = evaluated.modal.poles[0];
     let told = Told {
         mode: Ringer {
@@ -139,7 +175,7 @@ fn entries(args: &Response, evaluated: &mut Evaluated) -> Result<Vec<Entry>, Fai
         },
         ratios: Ratios::OverStiffness,
         modal: [&frequency, &ratio],
-        source: format!("identify response: {}", args.inputs.join(", ")),
+        source,
     };
     follow(&args.anchors, &args.findings, &told, &mut evaluated.outcome)
 }

@@ -2,20 +2,24 @@
 
 mod blocks;
 mod check;
+mod inverse;
 mod lines;
 mod modal;
 mod order;
 mod scatter;
+mod whole;
 mod words;
 
-use torqcomp_dsp::frf::{self, Estimator, Frf};
+use torqcomp_dsp::frf::{self, Estimator, Frf, Window};
 
+use super::plain::Answer;
 use super::{Found, Outcome, Quality};
 use crate::failure::Failure;
 use crate::report::{rounded, short};
 use blocks::Set;
 use lines::Lines;
 pub use modal::{Data, Effort, Modal};
+use scatter::{OfMode, Spread};
 
 /// How the stand was excited.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -77,6 +81,8 @@ pub struct Evaluated {
     pub held_out: Vec<f64>,
     /// Covariance of σ (1/s) and ω (rad/s) of each mode, if the data tell it.
     pub spread: Vec<Option<[[f64; 2]; 2]>>,
+    /// The mode with its residue, if there is a single one.
+    pub single: Option<Answer>,
 }
 
 /// Evaluates records of one stand.
@@ -95,12 +101,20 @@ pub fn identify(records: &[Driven], options: &Options) -> Result<Evaluated, Fail
             failure
         }
     })?;
-    let fitted = order::grown(&set, &lines, options, best)?;
-    let spread = scatter::of_poles(&set, &lines, options, &fitted)?;
+    let averaged = order::grown(&set, &lines, options, best)?;
+    let Settled {
+        modal: fitted,
+        spread,
+        of_mode,
+        relative,
+    } = settle(records, &set, &lines, options, averaged, &mut outcome)?;
     words::name_modes(&mut outcome, &fitted, &spread);
-    let quality = quality(&set, &lines, &fitted);
+    let quality = Quality {
+        rms: words::output_rms(&set, &lines) * relative,
+        unit: String::new(),
+        relative,
+    };
     check::doubts(&mut outcome, quality.relative, leads, &fitted);
-    check::leakage(&mut outcome, &set, &fitted);
     outcome.quality = Some(quality);
     say_method(&mut outcome, &set, &lines, options, &fitted);
     let held = held_out.get(fitted.poles.len()).copied();
@@ -120,21 +134,74 @@ pub fn identify(records: &[Driven], options: &Options) -> Result<Evaluated, Fail
             applied_power: h1.applied_power[lines.clone()].to_vec(),
             blocks: h1.blocks,
         },
+        single: answer(&fitted, of_mode),
         modal: fitted,
         held_out,
         spread,
     })
 }
 
-/// What the model leaves of the measured signal, over all blocks.
-fn quality(set: &Set, lines: &Lines, fitted: &Modal) -> Quality {
-    let error = |b| frf::prediction_error(&fitted.response, b, lines.clone());
-    let relative = set.blocks.iter().map(error).sum::<f64>() / set.blocks.len() as f64;
-    Quality {
-        rms: words::output_rms(set, lines) * relative,
-        unit: String::new(),
-        relative,
+/// A single mode with its residue.
+fn answer(modal: &Modal, of_mode: Option<OfMode>) -> Option<Answer> {
+    let [pole] = modal.poles[..] else {
+        return None;
+    };
+    let (residue, unit) = modal.residue(0);
+    let sizes = [1.0, 1.0, unit, unit];
+    let scaled =
+        |c: OfMode| std::array::from_fn(|i| std::array::from_fn(|j| c[i][j] * sizes[i] * sizes[j]));
+    Some(Answer {
+        rate_per_s: pole.rate_per_s,
+        omega_rad_per_s: pole.omega_rad_per_s,
+        residue,
+        covariance: of_mode.map(scaled),
+    })
+}
+
+/// Modes with what is known of them.
+struct Settled {
+    modal: Modal,
+    spread: Spread,
+    /// Covariance of σ, ω and the residue of a single mode.
+    of_mode: Option<OfMode>,
+    /// What is left of the measured signal, over its size.
+    relative: f64,
+}
+
+/// The final numbers: where a window makes resonances wider, from the whole records without one.
+fn settle(
+    records: &[Driven],
+    set: &Set,
+    lines: &Lines,
+    options: &Options,
+    averaged: Modal,
+    outcome: &mut Outcome,
+) -> Result<Settled, Failure> {
+    if set.window == Window::Hann {
+        let shape = lines::data(set, lines, options, &|_| true);
+        if let Some(whole) = whole::refine(records, &shape, &averaged) {
+            outcome.method.push(
+                "constants from the whole records without a window, what their ends do to the spectrum being part \
+                 of the model"
+                    .to_owned(),
+            );
+            return Ok(whole);
+        }
+        check::leakage(outcome, set, &averaged);
     }
+    let (spread, of_mode) = scatter::of_poles(set, lines, options, &averaged)?;
+    Ok(Settled {
+        relative: left_of_blocks(set, lines, &averaged),
+        modal: averaged,
+        spread,
+        of_mode,
+    })
+}
+
+/// What the model leaves of the measured signal, over all blocks.
+fn left_of_blocks(set: &Set, lines: &Lines, fitted: &Modal) -> f64 {
+    let error = |b| frf::prediction_error(&fitted.response, b, lines.clone());
+    set.blocks.iter().map(error).sum::<f64>() / set.blocks.len() as f64
 }
 
 fn say_method(outcome: &mut Outcome, set: &Set, lines: &Lines, options: &Options, fitted: &Modal) {
@@ -165,9 +232,7 @@ fn say_others(outcome: &mut Outcome, options: &Options, fitted: &Modal, held: Op
         outcome.found.push(gain);
     }
     if options.with_delay {
-        let place = 2 * fitted.poles.len();
-        let std = fitted.fit.as_ref().and_then(|f| f.std[place]);
-        let delay = Found::new("delay", fitted.delay_s, std, "s");
+        let delay = Found::new("delay", fitted.delay_s, fitted.delay_std_s, "s");
         outcome.found.push(delay);
     }
 }

@@ -50,15 +50,19 @@ pub struct Modal {
     pub delay_s: f64,
     /// Linear numbers: real and imaginary part of each residue, then c₁ and c₂.
     linear: Vec<f64>,
-    /// The fit of poles and delay.
+    /// Standard uncertainty of τ in s, if it was fitted and the data tell it.
+    pub delay_std_s: Option<f64>,
+    /// The fit of poles and delay to the averaged response.
     pub fit: Option<Fit>,
     /// Model at each line.
     pub response: Vec<Complex64>,
     scale: f64,
+    order: i32,
 }
 
 impl Data {
-    fn scale(&self) -> f64 {
+    /// What frequencies are divided by, in rad/s.
+    pub(super) fn scale(&self) -> f64 {
         self.omega[self.omega.len() / 2]
     }
 
@@ -77,7 +81,7 @@ impl Data {
     }
 
     /// What stands before the sum, and s.
-    fn front(&self, omega: f64, delay_s: f64, scale: f64) -> (Complex64, Complex64) {
+    pub(super) fn front(&self, omega: f64, delay_s: f64, scale: f64) -> (Complex64, Complex64) {
         let s = Complex64::new(0.0, omega / scale);
         let late = match delay_s == 0.0 {
             true => Complex64::ONE,
@@ -92,7 +96,7 @@ impl Data {
     }
 
     /// 1/(s − p) and 1/(s − p*), with the window's rate in p.
-    fn fractions(&self, s: Complex64, pole: Pole, scale: f64) -> (Complex64, Complex64) {
+    pub(super) fn fractions(&self, s: Complex64, pole: Pole, scale: f64) -> (Complex64, Complex64) {
         let p = Complex64::new(-(pole.rate_per_s + self.added_rate), pole.omega_rad_per_s) / scale;
         (1.0 / (s - p), 1.0 / (s - p.conj()))
     }
@@ -148,20 +152,36 @@ impl Data {
             || (Vec::new(), 0.0),
             |f| (problem.poles(&f.values), problem.delay(&f.values)),
         );
-        let solved = self.solve(&poles, delay_s)?;
+        let linear = self.solve(&poles, delay_s)?.values;
+        let delay_std_s = fit.as_ref().filter(|_| self.with_delay);
+        let delay_std_s = delay_std_s.and_then(|f| f.std[2 * poles.len()]);
+        let modal = self.modal_of(&poles, (delay_s, delay_std_s), &linear);
+        Ok(Modal { fit, ..modal })
+    }
+
+    /// A modal model of these numbers: the delay with its standard uncertainty, real and imaginary part of each
+    /// residue, c₁ and c₂.
+    pub(super) fn modal_of(
+        &self,
+        poles: &[Pole],
+        delay_s: (f64, Option<f64>),
+        linear: &[f64],
+    ) -> Modal {
         let scale = self.scale();
         let model = |omega: &f64| -> Complex64 {
-            let columns = self.columns(*omega, &poles, delay_s, scale);
-            columns.iter().zip(&solved.values).map(|(c, v)| c * v).sum()
+            let columns = self.columns(*omega, poles, delay_s.0, scale);
+            columns.iter().zip(linear).map(|(c, v)| c * v).sum()
         };
-        Ok(Modal {
+        Modal {
             response: self.omega.iter().map(model).collect(),
-            poles,
-            delay_s,
-            linear: solved.values,
-            fit,
+            poles: poles.to_vec(),
+            delay_s: delay_s.0,
+            delay_std_s: delay_s.1,
+            linear: linear.to_vec(),
+            fit: None,
             scale,
-        })
+            order: self.order,
+        }
     }
 
     /// Poles and delay with their starts and bounds.
@@ -183,19 +203,19 @@ impl Data {
         parameters
     }
 
-    /// Derivatives of the weighted model by poles and delay at a fit, real and imaginary parts one after
-    /// another, with what the linear numbers can make up for taken out.
+    /// Derivatives of the weighted model by poles and delay at a fit, then by so many of the linear numbers, real and
+    /// imaginary parts one after another, with what the other linear numbers can make up for taken out.
     ///
     /// # Errors
     /// [`FitError`] if there are too few lines.
-    pub fn slopes_at(&self, fitted: &Modal) -> Result<DMatrix<f64>, FitError> {
+    pub fn slopes_at(&self, fitted: &Modal, linear: usize) -> Result<DMatrix<f64>, FitError> {
         let problem = Problem {
             data: self,
             modes: fitted.poles.len(),
         };
         let values = fitted.fit.as_ref().map_or(&[][..], |f| &f.values);
-        let mut slopes = DMatrix::zeros(2 * self.omega.len(), values.len());
-        problem.jacobian(values, &mut slopes)?;
+        let mut slopes = DMatrix::zeros(2 * self.omega.len(), values.len() + linear);
+        problem.tangent(values, linear, &mut slopes)?;
         Ok(slopes)
     }
 
@@ -305,32 +325,35 @@ impl Residuals for Problem<'_> {
         true
     }
 
-    /// The slopes with what the linear numbers can make up for taken out (L. Kaufman, BIT 15 (1975), 49).
     fn jacobian(&self, p: &[f64], out: &mut DMatrix<f64>) -> Result<(), FitError> {
+        self.tangent(p, 0, out)
+    }
+}
+
+impl Problem<'_> {
+    /// The slopes and the first `kept` columns of the linear numbers, with what the other linear numbers can make up
+    /// for taken out (L. Kaufman, BIT 15 (1975), 49).
+    fn tangent(&self, p: &[f64], kept: usize, out: &mut DMatrix<f64>) -> Result<(), FitError> {
         let (poles, delay_s) = (self.poles(p), self.delay(p));
         let linear = self.data.solve(&poles, delay_s)?.values;
         let lines = self.data.omega.len();
         let scale = self.data.scale();
-        let mut design = DMatrix::zeros(2 * lines, linear.len());
+        let mut design = DMatrix::zeros(2 * lines, linear.len() - kept);
         for (i, omega) in self.data.omega.iter().enumerate() {
             let w = self.data.weight[i];
             let put = |to: &mut DMatrix<f64>, j: usize, value: Complex64| {
                 to[(2 * i, j)] = w * value.re;
                 to[(2 * i + 1, j)] = w * value.im;
             };
-            for (j, value) in self
-                .data
-                .columns(*omega, &poles, delay_s, scale)
-                .into_iter()
-                .enumerate()
-            {
-                put(&mut design, j, value);
+            let columns = self.data.columns(*omega, &poles, delay_s, scale);
+            for (j, value) in columns.into_iter().enumerate() {
+                match j.checked_sub(kept) {
+                    Some(j) => put(&mut design, j, value),
+                    None => put(out, p.len() + j, value),
+                }
             }
-            for (j, value) in self
-                .slopes(*omega, &poles, delay_s, &linear)
-                .into_iter()
-                .enumerate()
-            {
+            let slopes = self.slopes(*omega, &poles, delay_s, &linear);
+            for (j, value) in slopes.into_iter().enumerate() {
                 put(out, j, value);
             }
         }
@@ -348,6 +371,19 @@ impl Residuals for Problem<'_> {
 }
 
 impl Modal {
+    /// Real and imaginary part of each residue, then c₁ and c₂.
+    pub(super) fn linear(&self) -> &[f64] {
+        &self.linear
+    }
+
+    /// R of a mode, in the units of the response times s^(m−1), and what a linear number of it counts in these units.
+    #[must_use]
+    pub fn residue(&self, k: usize) -> (Complex64, f64) {
+        let unit = self.scale.powi(1 - self.order);
+        let residue = Complex64::new(self.linear[2 * k], self.linear[2 * k + 1]);
+        (residue * unit, unit)
+    }
+
     /// Size of the residue of a mode: how strongly it takes part.
     #[must_use]
     pub fn strength(&self, k: usize) -> f64 {
@@ -365,5 +401,39 @@ impl Modal {
         };
         let modes: f64 = self.poles.iter().enumerate().map(one).sum();
         modes + self.linear[self.linear.len() - 2]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 1/(2 (s + 3)² + 2·500²) and its derivatives: R = −j/(2·500·2).
+    #[test]
+    fn a_residue_does_not_depend_on_what_is_measured() {
+        let omega: Vec<f64> = (300..700).map(f64::from).collect();
+        let pole = Pole {
+            rate_per_s: 3.0,
+            omega_rad_per_s: 500.0,
+        };
+        let square = pole.rate_per_s.powi(2) + pole.omega_rad_per_s.powi(2);
+        for order in 0..3 {
+            let response = |w: &f64| {
+                let s = Complex64::new(0.0, *w);
+                s.powi(order) / (2.0 * (s * s + 6.0 * s + square))
+            };
+            let data = Data {
+                response: omega.iter().map(response).collect(),
+                weight: vec![1.0; omega.len()],
+                omega: omega.clone(),
+                order,
+                added_rate: 0.0,
+                with_delay: false,
+            };
+            let fitted = data.fit(&[pole], Effort::Fine).unwrap();
+            let (residue, _) = fitted.residue(0);
+            let want = Complex64::new(0.0, -0.25 / pole.omega_rad_per_s);
+            assert!((residue - want).norm() < 1e-6 * want.norm(), "{residue}");
+        }
     }
 }

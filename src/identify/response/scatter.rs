@@ -30,12 +30,15 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use torqcomp_dsp::frf::Window;
 
 use super::blocks::Set;
+use super::inverse::invert;
 use super::lines::{Lines, data};
 use super::{Data, Modal, Options};
 use crate::failure::Failure;
 
 /// Covariance of σ and ω of each mode.
 pub(super) type Spread = Vec<Option<[[f64; 2]; 2]>>;
+/// Covariance of σ, ω and the residue's real and imaginary linear number.
+pub(super) type OfMode = [[f64; 4]; 4];
 
 /// Blocks from which on their scatter alone tells the uncertainty.
 const MANY: usize = 20;
@@ -52,7 +55,7 @@ const NEIGHBOURS: usize = 5;
 /// Part of the noise's amplitude that half-overlapping Hann-weighted segments share.
 const SHARED: f64 = 1.0 / 6.0;
 
-/// Covariance of the poles.
+/// Covariance of the poles, and that of a single mode with its residue.
 ///
 /// # Errors
 /// If the derivatives cannot be taken.
@@ -61,19 +64,32 @@ pub(super) fn of_poles(
     lines: &Lines,
     options: &Options,
     fitted: &Modal,
-) -> Result<Spread, Failure> {
+) -> Result<(Spread, Option<OfMode>), Failure> {
     let whole = data(set, lines, options, &|_| true);
-    let Some(solved) = Solved::of(&whole, fitted)? else {
-        return Ok(vec![None; fitted.poles.len()]);
-    };
-    let noise = from_noise(set, lines, &whole, fitted, &solved);
+    Ok(match Solved::of(&whole, fitted)? {
+        Some(solved) => {
+            let covariance = covariance(set, lines, &whole, fitted, &solved);
+            (solved.of_modes(&covariance), solved.of_mode(&covariance))
+        }
+        None => (vec![None; fitted.poles.len()], None),
+    })
+}
+
+fn covariance(
+    set: &Set,
+    lines: &Lines,
+    whole: &Data,
+    fitted: &Modal,
+    solved: &Solved,
+) -> DMatrix<f64> {
+    let noise = from_noise(set, lines, whole, fitted, solved);
     let blocks = set.blocks.len();
     if blocks < FEW {
-        return Ok(solved.of_modes(&noise));
+        return noise;
     }
-    let scattered = from_blocks(set, lines, &whole, &solved);
+    let scattered = from_blocks(set, lines, whole, solved);
     if blocks >= MANY {
-        return Ok(solved.of_modes(&scattered));
+        return scattered;
     }
     let freedom = (blocks - 1) as f64;
     let by_chance = ChiSquared::new(freedom)
@@ -83,16 +99,17 @@ pub(super) fn of_poles(
         .map(|i| scattered[(i, i)] / noise[(i, i)])
         .map(|ratio| if ratio > by_chance { ratio.sqrt() } else { 1.0 })
         .collect();
-    let joined = DMatrix::from_fn(noise.nrows(), noise.ncols(), |i, j| {
+    DMatrix::from_fn(noise.nrows(), noise.ncols(), |i, j| {
         noise[(i, j)] * factors[i] * factors[j]
-    });
-    Ok(solved.of_modes(&joined))
+    })
 }
 
 /// The fit as a linear one around its end.
 struct Solved {
-    /// Parameters that are not at a bound.
+    /// Parameters that are not at a bound; behind the searched ones the residue of a single mode.
     free: Vec<usize>,
+    /// Number of the searched parameters.
+    searched: usize,
     /// J of those.
     slopes: DMatrix<f64>,
     /// (JᵀJ)⁻¹.
@@ -105,13 +122,16 @@ impl Solved {
         let Some(fit) = &fitted.fit else {
             return Ok(None);
         };
-        let free: Vec<usize> = (0..fit.values.len())
-            .filter(|i| !fit.at_bound[*i])
+        let searched = fit.values.len();
+        let residue = if fitted.poles.len() == 1 { 2 } else { 0 };
+        let free: Vec<usize> = (0..searched + residue)
+            .filter(|i| fit.at_bound.get(*i) != Some(&true))
             .collect();
-        let slopes = data.slopes_at(fitted)?.select_columns(&free);
-        let inverse = slopes.tr_mul(&slopes).try_inverse();
+        let slopes = data.slopes_at(fitted, residue)?.select_columns(&free);
+        let inverse = invert(&slopes.tr_mul(&slopes), 0.0);
         Ok(inverse.map(|inverse| Self {
             free,
+            searched,
             slopes,
             inverse,
             modes: fitted.poles.len(),
@@ -122,11 +142,25 @@ impl Solved {
         Complex64::new(self.slopes[(2 * k, p)], self.slopes[(2 * k + 1, p)])
     }
 
+    /// Column of a parameter, if it is free.
+    fn place(&self, i: usize) -> Option<usize> {
+        self.free.iter().position(|f| *f == i)
+    }
+
+    /// The part of a covariance that belongs to a single mode and its residue.
+    fn of_mode(&self, covariance: &DMatrix<f64>) -> Option<OfMode> {
+        let residue = self.searched;
+        let places = [0, 1, residue, residue + 1].map(|i| self.place(i));
+        let [Some(a), Some(b), Some(c), Some(d)] = places else {
+            return None;
+        };
+        Some([a, b, c, d].map(|i| [a, b, c, d].map(|j| covariance[(i, j)])))
+    }
+
     /// The parts of a covariance that belong to each mode.
     fn of_modes(&self, covariance: &DMatrix<f64>) -> Spread {
-        let place = |i: usize| self.free.iter().position(|f| *f == i);
         let one = |k: usize| {
-            let places = [place(2 * k)?, place(2 * k + 1)?];
+            let places = [self.place(2 * k)?, self.place(2 * k + 1)?];
             Some(places.map(|i| places.map(|j| covariance[(i, j)])))
         };
         (0..self.modes).map(one).collect()
@@ -180,9 +214,8 @@ fn from_noise(
     let top = data.weight.iter().copied().fold(0.0, f64::max);
     let heard = data.weight.iter().filter(|w| **w > SILENT * top).count();
     let linear = 2 * solved.modes + 2;
-    let freedom = (2 * heard)
-        .saturating_sub(solved.free.len() + linear)
-        .max(1);
+    let searched = solved.free.iter().filter(|i| **i < solved.searched).count();
+    let freedom = (2 * heard).saturating_sub(searched + linear).max(1);
     let power = 2.0 * squares / freedom as f64;
     let sizes = error_sizes(set, lines, &data.weight, power, heard);
     let middle = gathered(set, lines, solved, &sizes) * 0.5;

@@ -158,10 +158,7 @@ fn method(run: &Run, fitted: &Fitted) -> String {
     let all = fitted.used.len();
     let used = fitted.used.iter().filter(|u| **u).count();
     let which = if used < all {
-        format!(
-            "{used} of {all} windows; in the others the body turns round or stands and does not follow the \
-             equation"
-        )
+        format!("{used} of {all} windows; in the others the body turns round or stands")
     } else {
         format!("{all} windows")
     };

@@ -5,7 +5,7 @@ use torqcomp_dsp::weak::{Window, white_noise_variance};
 
 use super::directions::Directions;
 use super::regression::{Corrected, Errors, solve};
-use super::{LEAST_WINDOWS, Run, SHORTEST_HALF};
+use super::{COLOURED, LEAST_WINDOWS, Run, SHORTEST_HALF};
 use crate::failure::Failure;
 use crate::identify::rms;
 
@@ -82,9 +82,15 @@ impl Rows {
         clean >= LEAST_WINDOWS && 3 * clean >= self.clean.len()
     }
 
-    /// The clean windows, and those others that follow the same equation as closely: at a stop dry friction
-    /// is whatever it takes to hold the body, which the equation does not say.
+    /// The clean windows. Where noise is not all that they leave, also those others that follow the same
+    /// equation as closely: at a stop dry friction is whatever it takes to hold the body, which the equation does
+    /// not say. A turn is placed to a few hundredths of a sample at best, which may be more than the noise: such
+    /// windows would move the answer further than the noise's uncertainty says, but no further than what it is
+    /// grown by where the equation lacks something anyhow.
     fn following(&self, fit: &Corrected) -> Vec<bool> {
+        if fit.coloured <= COLOURED {
+            return self.clean.clone();
+        }
         let residual = |k: usize| fit.residuals[k];
         let clean: Vec<f64> = (0..self.clean.len())
             .filter(|k| self.clean[*k])

@@ -1,0 +1,266 @@
+//! The equation of one line, and its derivatives by all numbers that are looked for.
+
+use num_complex::Complex64;
+
+use super::super::{Data, Modal};
+use super::Spectra;
+use super::normal::Solved;
+use crate::identify::decay::Pole;
+
+/// Degree of the smooth part of the transient.
+const DEGREE: usize = 3;
+
+/// Which number stands where: first those of a record's transient (residues, then the smooth part, real and
+/// imaginary one after another), then those of all records (σ and ω of each mode, the delay, the linear
+/// numbers of the response), then what is left.
+pub(super) struct Layout<'a> {
+    shape: &'a Data,
+    /// Number of modes.
+    pub modes: usize,
+    band_rad_per_s: (f64, f64),
+}
+
+/// All numbers.
+#[derive(Clone)]
+pub(super) struct State {
+    /// Modes.
+    pub poles: Vec<Pole>,
+    /// Delay in s.
+    pub delay_s: f64,
+    /// Residues, c₁ and c₂ of the response.
+    pub linear: Vec<f64>,
+    /// Numbers of each record's transient.
+    pub transients: Vec<Vec<f64>>,
+}
+
+impl State {
+    /// The averaged response, and no transients.
+    pub fn start(layout: &Layout, modal: &Modal, records: usize) -> Self {
+        Self {
+            poles: modal.poles.clone(),
+            delay_s: modal.delay_s,
+            linear: modal.linear().to_vec(),
+            transients: vec![vec![0.0; layout.own()]; records],
+        }
+    }
+}
+
+impl<'a> Layout<'a> {
+    pub fn of(shape: &'a Data, modes: usize, band_rad_per_s: (f64, f64)) -> Self {
+        Self {
+            shape,
+            modes,
+            band_rad_per_s,
+        }
+    }
+
+    /// Numbers of a record's transient.
+    pub fn own(&self) -> usize {
+        2 * self.modes + 2 * (DEGREE + 1)
+    }
+
+    /// Numbers of poles and delay.
+    pub fn searched(&self) -> usize {
+        2 * self.modes + usize::from(self.shape.with_delay)
+    }
+
+    /// Numbers of all records.
+    pub fn shared(&self) -> usize {
+        self.searched() + 2 * self.modes + 2
+    }
+
+    /// All numbers that a record tells.
+    pub fn columns(&self) -> usize {
+        self.own() + self.shared()
+    }
+
+    /// Legendre's polynomials at a place in the band.
+    fn smooth(&self, omega: f64) -> [f64; DEGREE + 1] {
+        let (low, high) = self.band_rad_per_s;
+        let x = (2.0 * omega - low - high) / (high - low);
+        let mut all = [1.0; DEGREE + 1];
+        all[1] = x;
+        for l in 1..DEGREE {
+            let n = l as f64;
+            all[l + 1] = ((2.0 * n + 1.0) * x * all[l] - n * all[l - 1]) / (n + 1.0);
+        }
+        all
+    }
+
+    /// What the equation leaves of a line.
+    pub fn left(&self, spectra: &Spectra, state: &State, record: usize, k: usize) -> Complex64 {
+        let omega = spectra.omega[k];
+        let scale = self.shape.scale();
+        let (front, s) = self.shape.front(omega, state.delay_s, scale);
+        let (linear, own) = (&state.linear, &state.transients[record]);
+        let far = 2 * self.modes;
+        let mut response = linear[far] + linear[far + 1] / (s * s);
+        let mut transient = Complex64::ZERO;
+        for (l, p) in self.smooth(omega).iter().enumerate() {
+            transient += Complex64::new(own[far + 2 * l], own[far + 2 * l + 1]) * p;
+        }
+        for (j, pole) in state.poles.iter().enumerate() {
+            let (near, mirrored) = self.shape.fractions(s, *pole, scale);
+            let of = |v: &[f64]| {
+                let residue = Complex64::new(v[2 * j], v[2 * j + 1]);
+                residue * near + residue.conj() * mirrored
+            };
+            response += of(linear);
+            transient += of(own);
+        }
+        spectra.measured[k] - front * response * spectra.applied[k] - transient
+    }
+
+    /// Weighted derivatives of the model at a line, then what it leaves: real and imaginary parts.
+    pub fn fill(
+        &self,
+        spectra: &Spectra,
+        state: &State,
+        record: usize,
+        k: usize,
+        out: &mut [Complex64],
+    ) {
+        let omega = spectra.omega[k];
+        let scale = self.shape.scale();
+        let (front, s) = self.shape.front(omega, state.delay_s, scale);
+        let front = front * spectra.applied[k];
+        let (linear, own) = (&state.linear, &state.transients[record]);
+        let (n, searched) = (2 * self.modes, self.own());
+        let from = searched + self.searched();
+        let far = front / (s * s);
+        let mut driven = front * linear[n] + far * linear[n + 1];
+        let mut transient = Complex64::ZERO;
+        for (j, pole) in state.poles.iter().enumerate() {
+            let (near, mirrored) = self.shape.fractions(s, *pole, scale);
+            let (even, odd) = (near + mirrored, Complex64::I * (near - mirrored));
+            let (a, b) = (2 * j, 2 * j + 1);
+            (out[a], out[b]) = (even, odd);
+            (out[from + a], out[from + b]) = (front * even, front * odd);
+            driven += out[from + a] * linear[a] + out[from + b] * linear[b];
+            transient += even * own[a] + odd * own[b];
+            // Both the response and the transient move with the pole: dp = (−dσ + j dω)/scale.
+            let residue = |v: &[f64]| Complex64::new(v[a], v[b]);
+            let (r, t) = (residue(linear), residue(own));
+            let of_near = (front * r + t) * (near * near) / scale;
+            let of_mirrored = (front * r.conj() + t.conj()) * (mirrored * mirrored) / scale;
+            out[searched + a] = -(of_near + of_mirrored);
+            out[searched + b] = Complex64::I * (of_near - of_mirrored);
+        }
+        for (l, p) in self.smooth(omega).iter().enumerate() {
+            let (a, b) = (n + 2 * l, n + 2 * l + 1);
+            (out[a], out[b]) = (Complex64::new(*p, 0.0), Complex64::new(0.0, *p));
+            transient += Complex64::new(own[a], own[b]) * p;
+        }
+        if self.shape.with_delay {
+            out[searched + n] = Complex64::new(0.0, -omega) * driven;
+        }
+        (out[from + n], out[from + n + 1]) = (front, far);
+        out[self.columns()] = spectra.measured[k] - driven - transient;
+        out.iter_mut().for_each(|v| *v *= spectra.weight[k]);
+    }
+}
+
+impl Solved {
+    /// The numbers after a part of the step.
+    pub fn moved(&self, layout: &Layout, state: &State, part: f64) -> State {
+        let mut next = state.clone();
+        let n = 2 * layout.modes;
+        for (j, pole) in next.poles.iter_mut().enumerate() {
+            pole.rate_per_s += part * self.step[2 * j];
+            pole.omega_rad_per_s += part * self.step[2 * j + 1];
+        }
+        if layout.shape.with_delay {
+            next.delay_s += part * self.step[n];
+        }
+        let from = layout.searched();
+        for (number, step) in next.linear.iter_mut().zip(&self.step.as_slice()[from..]) {
+            *number += part * step;
+        }
+        for (own, steps) in next.transients.iter_mut().zip(&self.own) {
+            for (number, step) in own.iter_mut().zip(steps.iter()) {
+                *number += part * step;
+            }
+        }
+        next
+    }
+
+    /// Standard uncertainty of the delay, if there is one.
+    pub fn delay_std(&self, layout: &Layout) -> Option<f64> {
+        let at = 2 * layout.modes;
+        layout
+            .shape
+            .with_delay
+            .then(|| self.covariance[(at, at)].sqrt())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shape(order: i32) -> Data {
+        Data {
+            omega: vec![100.0, 150.0, 200.0],
+            response: vec![Complex64::ONE; 3],
+            weight: vec![1.0; 3],
+            order,
+            added_rate: 0.0,
+            with_delay: true,
+        }
+    }
+
+    fn pole(rate_per_s: f64, omega_rad_per_s: f64) -> Pole {
+        Pole {
+            rate_per_s,
+            omega_rad_per_s,
+        }
+    }
+
+    /// Every derivative against a difference of what is left.
+    #[test]
+    fn derivatives_are_those_of_the_equation() {
+        let spectra = Spectra {
+            omega: vec![137.0],
+            applied: vec![Complex64::new(0.7, -1.9)],
+            measured: vec![Complex64::new(2.0, 0.4)],
+            weight: vec![3.0],
+        };
+        for order in 0..3 {
+            let shape = shape(order);
+            let layout = Layout::of(&shape, 2, (100.0, 200.0));
+            let number = |i: usize| ((i * i + 3) as f64 * 0.7).sin();
+            let state = State {
+                poles: vec![pole(4.0, 130.0), pole(9.0, 180.0)],
+                delay_s: 2e-3,
+                linear: (0..6).map(number).collect(),
+                transients: vec![(9..9 + layout.own()).map(number).collect()],
+            };
+            let mut filled = vec![Complex64::ZERO; layout.columns() + 1];
+            layout.fill(&spectra, &state, 0, 0, &mut filled);
+            let left = layout.left(&spectra, &state, 0, 0);
+            assert!((filled[layout.columns()] - 3.0 * left).norm() < 1e-12);
+            for (i, slope) in filled[..layout.columns()].iter().enumerate() {
+                let h = if i == layout.own() + 4 { 1e-8 } else { 1e-5 };
+                let at = |h: f64| layout.left(&spectra, &stepped(&layout, &state, i, h), 0, 0);
+                let want = -3.0 * (at(h) - at(-h)) / (2.0 * h);
+                let off = (slope - want).norm() / want.norm();
+                assert!(off < 1e-6, "order {order}, number {i}: {slope} {want}");
+            }
+        }
+    }
+
+    /// The numbers after a step of one of them.
+    fn stepped(layout: &Layout, state: &State, i: usize, by: f64) -> State {
+        let (own, shared) = (layout.own(), layout.shared());
+        let mut solved = Solved {
+            step: nalgebra::DVector::zeros(shared),
+            own: vec![nalgebra::DVector::zeros(own)],
+            covariance: nalgebra::DMatrix::zeros(shared, shared),
+        };
+        match i < own {
+            true => solved.own[0][i] = by,
+            false => solved.step[i - own] = by,
+        }
+        solved.moved(layout, state, 1.0)
+    }
+}

@@ -1,0 +1,191 @@
+//! The final fit of noise-driven records: leakage is part of the model.
+//!
+//! ```text
+//! Y(k) = H(jω_k) U(k) + T(k) + E(k),   T(k) = Σ r/(jω_k − p) + r*/(jω_k − p*) + Σ_l t_l P_l(x_k)
+//! ```
+//!
+//! Y, U: discrete Fourier transforms of a whole record without a window; H: the response, with its modes at p;
+//! T: what the record's two ends make of what went before and comes after, a sum of the same modes with
+//! residues r of their own, and a smooth part in Legendre's polynomials P_l of the place x_k in the band, for the
+//! modes outside it and the samples in between; E: noise of the measured signal, its lines independent, with a
+//! variance that changes slowly from line to line. The equation is exact for whatever acts, so that no
+//! resonance is widened, however short the record. (R. Pintelon, J. Schoukens, G. Vandersteen, Frequency domain
+//! system identification using arbitrary signals, IEEE Trans. Automatic Control 42 (1997), 1717;
+//! Pintelon & Schoukens, System Identification, 2nd ed., 2012, 6.3.2 and 9.)
+//!
+//! Least squares weighted with the noise, which makes it the maximum-likelihood estimate: steps of Gauss and
+//! Newton in all numbers at once, from the fit of the averaged response. The variance of the noise is that of what
+//! is left, smoothed over neighbouring lines; the covariance is the inverse of the information.
+
+mod line;
+mod normal;
+
+use num_complex::Complex64;
+use torqcomp_dsp::frf::{Block, Window, transform};
+
+use super::{Data, Driven, Modal, Settled};
+use crate::identify::decay::Pole;
+use line::{Layout, State};
+use normal::{Gram, Solved};
+
+/// The lines of a record in the band.
+struct Spectra {
+    omega: Vec<f64>,
+    applied: Vec<Complex64>,
+    measured: Vec<Complex64>,
+    /// One over the standard deviation of the real and of the imaginary part of the noise.
+    weight: Vec<f64>,
+}
+
+/// Most steps before and after the noise is known.
+const MOST_STEPS: usize = 12;
+/// Times a step is halved.
+const HALVINGS: usize = 8;
+/// Step over the standard uncertainty that counts as none.
+const AT_REST: f64 = 0.01;
+/// Part of the lines over which the noise is smoothed, to both sides, and fewest and most of them.
+const SMOOTHED: f64 = 0.04;
+const NEIGHBOURS: (usize, usize) = (20, 400);
+/// Lines for each number that is looked for.
+const LEAST_LINES: usize = 2;
+
+/// Fits whole records from a fit of their averaged response; none if that does not come to an end, or if there are
+/// too few lines.
+pub(super) fn refine(records: &[Driven], shape: &Data, start: &Modal) -> Option<Settled> {
+    let band_rad_per_s = (shape.omega[0], shape.omega[shape.omega.len() - 1]);
+    let mut all: Vec<Spectra> = records
+        .iter()
+        .map(|r| Spectra::of(r, band_rad_per_s))
+        .collect();
+    let layout = Layout::of(shape, start.poles.len(), band_rad_per_s);
+    let enough = |s: &Spectra| s.omega.len() >= LEAST_LINES * layout.columns();
+    if start.poles.is_empty() || !all.iter().all(enough) {
+        return None;
+    }
+    let state = State::start(&layout, start, all.len());
+    let (state, _) = descend(&layout, &all, state)?;
+    for (record, spectra) in all.iter_mut().enumerate() {
+        spectra.learn_noise(&layout, &state, record);
+    }
+    let (state, solved) = descend(&layout, &all, state)?;
+    Some(Settled {
+        relative: left_over(&layout, &all, &state),
+        spread: solved.of_modes(layout.modes),
+        of_mode: solved.of_mode(&layout),
+        modal: shape.modal_of(
+            &state.poles,
+            (state.delay_s, solved.delay_std(&layout)),
+            &state.linear,
+        ),
+    })
+}
+
+impl Spectra {
+    fn of(record: &Driven, band_rad_per_s: (f64, f64)) -> Self {
+        let count = easily_transformed(record.applied.len());
+        let Block { applied, measured } = transform(
+            &record.applied[..count],
+            &record.measured[..count],
+            Window::None,
+        );
+        let step = std::f64::consts::TAU * record.rate_hz / count as f64;
+        let close = 1e-9 * band_rad_per_s.1;
+        let from = ((band_rad_per_s.0 - close) / step).ceil() as usize;
+        let to = ((band_rad_per_s.1 + close) / step).floor() as usize;
+        let lines = from.max(1)..(to + 1).min(applied.len());
+        Self {
+            omega: lines.clone().map(|k| step * k as f64).collect(),
+            weight: vec![1.0; lines.len()],
+            applied: applied[lines.clone()].to_vec(),
+            measured: measured[lines].to_vec(),
+        }
+    }
+
+    /// Weights from what a fit leaves, which is less than the noise by what the fit takes up.
+    fn learn_noise(&mut self, layout: &Layout, state: &State, record: usize) {
+        let count = self.omega.len();
+        let taken = layout.columns() as f64 / (2 * count) as f64;
+        let mut sums = vec![0.0; count + 1];
+        for k in 0..count {
+            let left = layout.left(self, state, record, k).norm_sqr();
+            sums[k + 1] = sums[k] + left;
+        }
+        let reach = ((SMOOTHED * count as f64) as usize).clamp(NEIGHBOURS.0, NEIGHBOURS.1);
+        for (k, weight) in self.weight.iter_mut().enumerate() {
+            let (from, to) = (k.saturating_sub(reach), (k + reach + 1).min(count));
+            let power = (sums[to] - sums[from]) / (to - from) as f64 / (1.0 - taken);
+            *weight = (2.0 / power.max(f64::MIN_POSITIVE)).sqrt();
+        }
+    }
+}
+
+/// Root of the power that is left over that of the measured signal, all lines and records together.
+fn left_over(layout: &Layout, all: &[Spectra], state: &State) -> f64 {
+    let (mut left, mut whole) = (0.0, 0.0);
+    for (record, spectra) in all.iter().enumerate() {
+        for k in 0..spectra.omega.len() {
+            left += layout.left(spectra, state, record, k).norm_sqr();
+            whole += spectra.measured[k].norm_sqr();
+        }
+    }
+    (left / whole).sqrt()
+}
+
+/// Steps of Gauss and Newton until they are small beside the uncertainty; none if they do not lead down.
+fn descend(layout: &Layout, all: &[Spectra], start: State) -> Option<(State, Solved)> {
+    let lines: usize = all.iter().map(|s| s.omega.len()).sum();
+    let numbers = layout.own() * all.len() + layout.shared();
+    let freedom = (2 * lines - numbers) as f64;
+    let mut state = start;
+    let mut grams = Gram::all(layout, all, &state);
+    for _ in 0..MOST_STEPS {
+        let solved = Solved::of(layout, &grams)?;
+        let cost = Gram::cost(&grams);
+        if solved.largest_step(layout, cost / freedom) < AT_REST {
+            return Some((solved.moved(layout, &state, 1.0), solved));
+        }
+        let lower = (0..HALVINGS).find_map(|halvings| {
+            let next = solved.moved(layout, &state, 0.5_f64.powi(halvings as i32));
+            let possible = next.poles.iter().all(possible);
+            let grams = possible.then(|| Gram::all(layout, all, &next))?;
+            (Gram::cost(&grams) <= cost).then_some((next, grams))
+        });
+        (state, grams) = lower?;
+    }
+    None
+}
+
+fn possible(pole: &Pole) -> bool {
+    pole.rate_per_s > 0.0 && pole.omega_rad_per_s > 0.0
+}
+
+/// The largest number up to this one whose factors are 2, 3, 5 and 7: its transform takes the least time, and no
+/// more than a few samples in a hundred are lost.
+fn easily_transformed(count: usize) -> usize {
+    let easy = |n: &usize| {
+        let rest = [2, 3, 5, 7].iter().fold(*n, |mut n, factor| {
+            while n % factor == 0 {
+                n /= factor;
+            }
+            n
+        });
+        rest == 1
+    };
+    (1..=count).rev().find(easy).unwrap_or(count)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn easy_numbers_are_found_and_near() {
+        // 1009 is prime; 1008 = 2⁴·3²·7.
+        assert_eq!(easily_transformed(1009), 1008);
+        assert_eq!(easily_transformed(1_000_000), 1_000_000);
+        for count in 1000..20_000 {
+            let easy = easily_transformed(count);
+            assert!(easy * 100 > count * 95, "{count}: {easy}");
+        }
+    }
+}
