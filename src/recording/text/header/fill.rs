@@ -63,7 +63,14 @@ pub(super) fn fill_units(fields: &mut [Field], entries: &[Entry], used: &[bool])
             set_unit(&mut fields[*place], text);
         }
     }
-    if let Some(text) = about(Topic::AxisUnit).and_then(Entry::value) {
+}
+
+/// The unit of the horizontal axis out of a line such as `Horizontal Units,s`.
+pub(super) fn fill_axis_unit(fields: &mut [Field], entries: &[Entry]) {
+    let entry = entries
+        .iter()
+        .find(|entry| entry.topic() == Some(Topic::AxisUnit));
+    if let Some(text) = entry.and_then(Entry::value) {
         let axis = fields
             .iter_mut()
             .find(|field| field.is_named_time() || units::is_axis_name(&field.name));

@@ -9,7 +9,7 @@ use super::head::{Head, Table};
 use super::keys::{self, Entry};
 use crate::io::csv::{Delimiter, Dialect};
 pub use field::Field;
-use fill::{fill_from_list, fill_names, fill_units};
+use fill::{fill_axis_unit, fill_from_list, fill_names, fill_units};
 use labelled::labelled;
 use positional::positional;
 
@@ -59,6 +59,7 @@ pub fn read(head: &Head, table: &Table, used: &[bool]) -> Header {
     };
     if let Some((mut fields, names)) = labelled(&rows, used) {
         let entries = entries(&[names]);
+        // Beside labels, the unit of the axis may be that of the picture: the rate tells the one of the time.
         fill_units(&mut fields, &entries, used);
         return Header {
             fields,
@@ -74,6 +75,7 @@ pub fn read(head: &Head, table: &Table, used: &[bool]) -> Header {
         fill_names(&mut fields, &entries, used);
     }
     fill_units(&mut fields, &entries, used);
+    fill_axis_unit(&mut fields, &entries);
     Header {
         fields,
         entries,

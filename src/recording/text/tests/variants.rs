@@ -195,3 +195,13 @@ fn labview_blocks_whose_time_begins_anew() {
     let found = read(&text);
     check(&found, &[("U", "Volts", 18)], Some(1e5));
 }
+
+#[test]
+fn siglent_with_the_unit_of_the_picture() {
+    let head = "Record Length,Analog:9\nSample Interval,CH1:0.0000020000000\nVertical Units,CH1:V,,,\n\
+                Horizontal Units,us,,,\nHorizontal Scale,20000.0,,,\nModel Number,SDS1202X-E,,,\n\
+                Source,CH1\nSecond,Volt\n";
+    let time = |row: f64| format!(" {:.11}", row * 2e-6);
+    let found = read(&format!("{head}{}", rows(9, ",", &[&time, &wave])));
+    check(&found, &[("CH1", "V", 9)], Some(5e5));
+}
