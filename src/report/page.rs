@@ -11,7 +11,7 @@ const STYLE: &str = "\
 @media(prefers-color-scheme:dark){:root{--ink:#e4e4e4;--faint:#3d3d3d;--paper:#171717;--mark:#f0b66a}}\
 @media print{:root{--ink:#000;--faint:#ccc;--paper:#fff;--mark:#000}section,figure,table{break-inside:avoid}}\
 *{box-sizing:border-box}body{margin:0 auto;padding:1.2rem;max-width:60rem;background:var(--paper);\
-color:var(--ink);font:15px/1.5 system-ui,sans-serif;overflow-wrap:anywhere}h1{font-size:1.5rem;margin:0 0 .3rem}\
+color:var(--ink);font:15px/1.5 system-ui,sans-serif;overflow-wrap:anywhere}h1{font-size:1.5rem;margin:0 0 .3rem;break-after:avoid}\
 h2{font-size:1.1rem;margin:1.8rem 0 .5rem;break-after:avoid}p{margin:.4rem 0}.wide{overflow-x:auto}\
 table{border-collapse:collapse;font-variant-numeric:tabular-nums}\
 th,td{padding:.25rem .8rem .25rem 0;text-align:right;border-bottom:1px solid var(--faint);white-space:nowrap}\

@@ -101,13 +101,12 @@ pub fn identify(records: &[Driven], options: &Options) -> Result<Evaluated, Fail
             failure
         }
     })?;
-    let averaged = order::grown(&set, &lines, options, best)?;
     let Settled {
         modal: fitted,
         spread,
         of_mode,
         relative,
-    } = settle(records, &set, &lines, options, averaged, &mut outcome)?;
+    } = settle(records, &set, &lines, options, best, &mut outcome)?;
     words::name_modes(&mut outcome, &fitted, &spread);
     let quality = Quality {
         rms: words::output_rms(&set, &lines) * relative,
@@ -118,7 +117,7 @@ pub fn identify(records: &[Driven], options: &Options) -> Result<Evaluated, Fail
     outcome.quality = Some(quality);
     say_method(&mut outcome, &set, &lines, options, &fitted);
     let held = held_out.get(fitted.poles.len()).copied();
-    say_others(&mut outcome, options, &fitted, held);
+    say_others(&mut outcome, &set, options, &fitted, held);
     let h1 = Frf::of(set.blocks.iter(), Estimator::H1);
     words::raw_error(&mut outcome, &set, &lines);
     words::levels(&mut outcome, &set, &lines);
@@ -174,22 +173,24 @@ fn settle(
     set: &Set,
     lines: &Lines,
     options: &Options,
-    averaged: Modal,
+    modes: usize,
     outcome: &mut Outcome,
 ) -> Result<Settled, Failure> {
-    if set.window == Window::Hann {
-        let shape = lines::data(set, lines, options, &|_| true);
-        if let Some(whole) = whole::refine(records, &shape, &averaged) {
-            outcome.method.push(
-                "constants from the whole records without a window, what their ends do to the spectrum being part \
-                 of the model"
-                    .to_owned(),
-            );
-            return Ok(whole);
-        }
-        check::leakage(outcome, set, &averaged);
+    let data = lines::data(set, lines, options, &|_| true);
+    let coarse = order::grown(&data, options, modes)?;
+    if set.window == Window::Hann
+        && let Some(whole) = whole::refine(records, &data, &coarse)
+    {
+        outcome.method.push(
+            "constants from the whole records without a window, what their ends do to the spectrum being part \
+             of the model"
+                .to_owned(),
+        );
+        return Ok(whole);
     }
-    let (spread, of_mode) = scatter::of_poles(set, lines, options, &averaged)?;
+    let averaged = data.fit(&coarse.poles, Effort::Fine)?;
+    check::leakage(outcome, set, &averaged);
+    let (spread, of_mode) = scatter::of_poles(set, lines, &data, &averaged)?;
     Ok(Settled {
         relative: left_of_blocks(set, lines, &averaged),
         modal: averaged,
@@ -218,10 +219,20 @@ fn say_method(outcome: &mut Outcome, set: &Set, lines: &Lines, options: &Options
 }
 
 /// Error on data held out, gain at rest and delay.
-fn say_others(outcome: &mut Outcome, options: &Options, fitted: &Modal, held: Option<f64>) {
+fn say_others(
+    outcome: &mut Outcome,
+    set: &Set,
+    options: &Options,
+    fitted: &Modal,
+    held: Option<f64>,
+) {
     if let Some(held) = held.filter(|h| h.is_finite()) {
+        let with = match set.window {
+            Window::Hann => ", with what the segments' ends spread",
+            _ => "",
+        };
         outcome.method.push(format!(
-            "on data held out the model leaves {} % of the measured signal",
+            "on data held out the model leaves {} % of the measured signal{with}",
             rounded(100.0 * held, 3)
         ));
         let percent = Found::new("held_out_error", 100.0 * held, None, "%");

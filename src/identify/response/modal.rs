@@ -66,10 +66,11 @@ impl Data {
         self.omega[self.omega.len() / 2]
     }
 
-    /// The columns at a frequency.
-    fn columns(&self, omega: f64, poles: &[Pole], delay_s: f64, scale: f64) -> Vec<Complex64> {
+    /// The columns at a frequency, instead of what `all` held.
+    fn columns(&self, omega: f64, poles: &[Pole], delay_s: f64, all: &mut Vec<Complex64>) {
+        let scale = self.scale();
         let (front, s) = self.front(omega, delay_s, scale);
-        let mut all = Vec::with_capacity(2 * poles.len() + 2);
+        all.clear();
         for pole in poles {
             let (near, far) = self.fractions(s, *pole, scale);
             all.push(front * (near + far));
@@ -77,7 +78,6 @@ impl Data {
         }
         all.push(front);
         all.push(front / (s * s));
-        all
     }
 
     /// What stands before the sum, and s.
@@ -103,18 +103,15 @@ impl Data {
 
     /// Linear numbers for given poles, and weighted residuals, real and imaginary one after another.
     fn solve(&self, poles: &[Pole], delay_s: f64) -> Result<linear::LinearFit, FitError> {
-        let scale = self.scale();
         let count = 2 * poles.len() + 2;
         let lines = self.omega.len();
         let mut design = DMatrix::zeros(2 * lines, count);
         let mut right = vec![0.0; 2 * lines];
+        let mut columns = Vec::with_capacity(count);
         for (i, omega) in self.omega.iter().enumerate() {
             let w = self.weight[i];
-            for (j, value) in self
-                .columns(*omega, poles, delay_s, scale)
-                .into_iter()
-                .enumerate()
-            {
+            self.columns(*omega, poles, delay_s, &mut columns);
+            for (j, value) in columns.iter().enumerate() {
                 design[(2 * i, j)] = w * value.re;
                 design[(2 * i + 1, j)] = w * value.im;
             }
@@ -167,9 +164,9 @@ impl Data {
         delay_s: (f64, Option<f64>),
         linear: &[f64],
     ) -> Modal {
-        let scale = self.scale();
+        let mut columns = Vec::new();
         let model = |omega: &f64| -> Complex64 {
-            let columns = self.columns(*omega, poles, delay_s.0, scale);
+            self.columns(*omega, poles, delay_s.0, &mut columns);
             columns.iter().zip(linear).map(|(c, v)| c * v).sum()
         };
         Modal {
@@ -179,7 +176,7 @@ impl Data {
             delay_std_s: delay_s.1,
             linear: linear.to_vec(),
             fit: None,
-            scale,
+            scale: self.scale(),
             order: self.order,
         }
     }
@@ -291,11 +288,18 @@ impl Problem<'_> {
         }
     }
 
-    /// Derivatives of the model with the linear numbers held, by σ and ω of each mode and the delay.
-    fn slopes(&self, omega: f64, poles: &[Pole], delay_s: f64, linear: &[f64]) -> Vec<Complex64> {
+    /// Derivatives of the model with the linear numbers held, by σ and ω of each mode and the delay, instead of
+    /// what `all` held; the columns at this frequency are known.
+    fn slopes(
+        &self,
+        omega: f64,
+        (poles, delay_s): (&[Pole], f64),
+        (columns, linear): (&[Complex64], &[f64]),
+        all: &mut Vec<Complex64>,
+    ) {
         let scale = self.data.scale();
         let (front, s) = self.data.front(omega, delay_s, scale);
-        let mut all = Vec::with_capacity(2 * poles.len() + 1);
+        all.clear();
         for (k, pole) in poles.iter().enumerate() {
             let (near, far) = self.data.fractions(s, *pole, scale);
             let residue = Complex64::new(linear[2 * k], linear[2 * k + 1]);
@@ -307,11 +311,9 @@ impl Problem<'_> {
             all.push(front * Complex64::I * (a - b));
         }
         if self.data.with_delay {
-            let columns = self.data.columns(omega, poles, delay_s, scale);
             let model: Complex64 = columns.iter().zip(linear).map(|(c, v)| c * v).sum();
             all.push(Complex64::new(0.0, -omega) * model);
         }
-        all
     }
 }
 
@@ -337,23 +339,24 @@ impl Problem<'_> {
         let (poles, delay_s) = (self.poles(p), self.delay(p));
         let linear = self.data.solve(&poles, delay_s)?.values;
         let lines = self.data.omega.len();
-        let scale = self.data.scale();
         let mut design = DMatrix::zeros(2 * lines, linear.len() - kept);
+        let (mut columns, mut slopes) = (Vec::new(), Vec::new());
         for (i, omega) in self.data.omega.iter().enumerate() {
             let w = self.data.weight[i];
-            let put = |to: &mut DMatrix<f64>, j: usize, value: Complex64| {
+            let put = |to: &mut DMatrix<f64>, j: usize, value: &Complex64| {
                 to[(2 * i, j)] = w * value.re;
                 to[(2 * i + 1, j)] = w * value.im;
             };
-            let columns = self.data.columns(*omega, &poles, delay_s, scale);
-            for (j, value) in columns.into_iter().enumerate() {
+            self.data.columns(*omega, &poles, delay_s, &mut columns);
+            for (j, value) in columns.iter().enumerate() {
                 match j.checked_sub(kept) {
                     Some(j) => put(&mut design, j, value),
                     None => put(out, p.len() + j, value),
                 }
             }
-            let slopes = self.slopes(*omega, &poles, delay_s, &linear);
-            for (j, value) in slopes.into_iter().enumerate() {
+            let (at, of) = ((&poles[..], delay_s), (&columns[..], &linear[..]));
+            self.slopes(*omega, at, of, &mut slopes);
+            for (j, value) in slopes.iter().enumerate() {
                 put(out, j, value);
             }
         }

@@ -1,6 +1,6 @@
 //! How many modes the data pay for, tried on blocks held out.
 
-use torqcomp_dsp::frf;
+use torqcomp_dsp::frf::{self, Estimator, Frf};
 
 use super::blocks::Set;
 use super::lines::{Lines, MOST_LINES, data};
@@ -100,7 +100,11 @@ fn tried(
     };
     let mut errors = vec![error(&models)];
     let mut since = 0;
-    while errors.len() <= most && (since < PATIENCE || options.modes.is_some()) {
+    let floor = floor(set, lines);
+    // Whatever more modes did, this number would be chosen: none comes below the floor.
+    let settled = |errors: &[f64]| errors.iter().any(|e| *e <= SLACK * floor);
+    while errors.len() <= most && (options.modes.is_some() || since < PATIENCE && !settled(&errors))
+    {
         models = each_grown(&training, &models, options)?;
         let least = errors.iter().copied().fold(f64::INFINITY, f64::min);
         let now = error(&models);
@@ -108,6 +112,13 @@ fn tried(
         errors.push(now);
     }
     Ok(errors)
+}
+
+/// Error of the response that leaves least of all blocks, with a number of its own for every line.
+fn floor(set: &Set, lines: &Lines) -> f64 {
+    let raw = Frf::between(set.blocks.iter(), Estimator::H1, lines.clone()).response;
+    let error = |block| frf::prediction_error(&raw, block, lines.clone());
+    set.blocks.iter().map(error).sum::<f64>() / set.blocks.len() as f64
 }
 
 /// One more mode in each model, each on a thread of its own: none knows of the others.
@@ -133,17 +144,11 @@ fn each_grown(
     })
 }
 
-/// So many modes through all blocks, one after another.
-pub(super) fn grown(
-    set: &Set,
-    lines: &Lines,
-    options: &Options,
-    count: usize,
-) -> Result<Modal, Failure> {
-    let data = data(set, lines, options, &|_| true);
+/// So many modes through all blocks, one after another, and not to the end yet.
+pub(super) fn grown(data: &Data, options: &Options, count: usize) -> Result<Modal, Failure> {
     let mut fitted = data.fit(&[], Effort::Coarse)?;
     for _ in 0..count {
-        fitted = grow(&data, &fitted, options)?.unwrap_or(fitted);
+        fitted = grow(data, &fitted, options)?.unwrap_or(fitted);
     }
-    Ok(data.fit(&fitted.poles, Effort::Fine)?)
+    Ok(fitted)
 }

@@ -31,8 +31,8 @@ use torqcomp_dsp::frf::Window;
 
 use super::blocks::Set;
 use super::inverse::invert;
-use super::lines::{Lines, data};
-use super::{Data, Modal, Options};
+use super::lines::Lines;
+use super::{Data, Modal};
 use crate::failure::Failure;
 
 /// Covariance of σ and ω of each mode.
@@ -62,13 +62,12 @@ const SHARED: f64 = 1.0 / 6.0;
 pub(super) fn of_poles(
     set: &Set,
     lines: &Lines,
-    options: &Options,
+    whole: &Data,
     fitted: &Modal,
 ) -> Result<(Spread, Option<OfMode>), Failure> {
-    let whole = data(set, lines, options, &|_| true);
-    Ok(match Solved::of(&whole, fitted)? {
+    Ok(match Solved::of(whole, fitted)? {
         Some(solved) => {
-            let covariance = covariance(set, lines, &whole, fitted, &solved);
+            let covariance = covariance(set, lines, whole, fitted, &solved);
             (solved.of_modes(&covariance), solved.of_mode(&covariance))
         }
         None => (vec![None; fitted.poles.len()], None),

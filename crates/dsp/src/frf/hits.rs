@@ -71,26 +71,7 @@ pub fn find_hits(force: &[f64], measured: &[f64], apart: usize) -> Vec<Hit> {
     if largest == 0.0 {
         return Vec::new();
     }
-    let mut peaks: Vec<usize> = Vec::new();
-    let mut i = 0;
-    while i < force.len() {
-        if size(i) < STRONG * largest {
-            i += 1;
-            continue;
-        }
-        // The whole pulse, until the force has nearly gone.
-        let end = (i..force.len())
-            .find(|k| size(*k) < 0.05 * largest)
-            .unwrap_or(force.len());
-        let top = (i..end)
-            .max_by(|a, b| size(*a).total_cmp(&size(*b)))
-            .unwrap_or(i);
-        match peaks.last() {
-            Some(last) if top - last < apart => {}
-            _ => peaks.push(top),
-        }
-        i = end.max(i + 1);
-    }
+    let peaks = peaks(&size, force.len(), largest, apart);
     let starts: Vec<usize> = peaks.iter().map(|p| start_of(&size, *p, largest)).collect();
     let noise = spread(force, rest);
     let lengths = |k: usize| starts.get(k + 1).copied().unwrap_or(force.len()) - starts[k];
@@ -115,6 +96,32 @@ pub fn find_hits(force: &[f64], measured: &[f64], apart: usize) -> Vec<Hit> {
             }
         })
         .collect()
+}
+
+/// Where the force is largest in each pulse of so many samples; one that comes within `apart` samples of another
+/// belongs to it.
+fn peaks(size: &dyn Fn(usize) -> f64, count: usize, largest: f64, apart: usize) -> Vec<usize> {
+    let mut peaks: Vec<usize> = Vec::new();
+    let mut i = 0;
+    while i < count {
+        if size(i) < STRONG * largest {
+            i += 1;
+            continue;
+        }
+        // The whole pulse, until the force has nearly gone.
+        let end = (i..count)
+            .find(|k| size(*k) < 0.05 * largest)
+            .unwrap_or(count);
+        let top = (i..end)
+            .max_by(|a, b| size(*a).total_cmp(&size(*b)))
+            .unwrap_or(i);
+        match peaks.last() {
+            Some(last) if top - last < apart => {}
+            _ => peaks.push(top),
+        }
+        i = end.max(i + 1);
+    }
+    peaks
 }
 
 /// Signals of a hit that stand at their extremes.

@@ -41,8 +41,9 @@ struct Spectra {
 const MOST_STEPS: usize = 12;
 /// Times a step is halved.
 const HALVINGS: usize = 8;
-/// Step over the standard uncertainty that counts as none.
-const AT_REST: f64 = 0.01;
+/// Largest next step over its standard uncertainty that is taken without looking for another one, while the noise is
+/// not known and when it is: a step leaves a small part of itself to be done.
+const LAST_STEP: (f64, f64) = (1.0, 0.1);
 /// Part of the lines over which the noise is smoothed, to both sides, and fewest and most of them.
 const SMOOTHED: f64 = 0.04;
 const NEIGHBOURS: (usize, usize) = (20, 400);
@@ -63,11 +64,11 @@ pub(super) fn refine(records: &[Driven], shape: &Data, start: &Modal) -> Option<
         return None;
     }
     let state = State::start(&layout, start, all.len());
-    let (state, _) = descend(&layout, &all, state)?;
+    let (state, _) = descend(&layout, &all, state, LAST_STEP.0)?;
     for (record, spectra) in all.iter_mut().enumerate() {
         spectra.learn_noise(&layout, &state, record);
     }
-    let (state, solved) = descend(&layout, &all, state)?;
+    let (state, solved) = descend(&layout, &all, state, LAST_STEP.1)?;
     Some(Settled {
         relative: left_over(&layout, &all, &state),
         spread: solved.of_modes(layout.modes),
@@ -131,8 +132,13 @@ fn left_over(layout: &Layout, all: &[Spectra], state: &State) -> f64 {
     (left / whole).sqrt()
 }
 
-/// Steps of Gauss and Newton until they are small beside the uncertainty; none if they do not lead down.
-fn descend(layout: &Layout, all: &[Spectra], start: State) -> Option<(State, Solved)> {
+/// Steps of Gauss and Newton until one is small beside the uncertainty, which is the last; none if they do not lead down.
+fn descend(
+    layout: &Layout,
+    all: &[Spectra],
+    start: State,
+    last_step: f64,
+) -> Option<(State, Solved)> {
     let lines: usize = all.iter().map(|s| s.omega.len()).sum();
     let numbers = layout.own() * all.len() + layout.shared();
     let freedom = (2 * lines - numbers) as f64;
@@ -141,7 +147,7 @@ fn descend(layout: &Layout, all: &[Spectra], start: State) -> Option<(State, Sol
     for _ in 0..MOST_STEPS {
         let solved = Solved::of(layout, &grams)?;
         let cost = Gram::cost(&grams);
-        if solved.largest_step(layout, cost / freedom) < AT_REST {
+        if solved.largest_step(layout, cost / freedom) < last_step {
             return Some((solved.moved(layout, &state, 1.0), solved));
         }
         let lower = (0..HALVINGS).find_map(|halvings| {

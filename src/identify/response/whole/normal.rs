@@ -1,6 +1,6 @@
 //! Normal equations over all lines, each record's transient taken out.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DMatrixView, DVector, Dyn};
 use num_complex::Complex64;
 
 use super::Spectra;
@@ -10,6 +10,9 @@ use crate::identify::response::scatter::{OfMode, Spread};
 
 /// Lines that are multiplied at once.
 const AT_ONCE: usize = 256;
+
+/// Numbers seen as a matrix in any order.
+type View<'a> = DMatrixView<'a, f64, Dyn, Dyn>;
 
 /// Products of the columns of a record, what is left being the last one.
 pub(super) struct Gram(DMatrix<f64>);
@@ -25,20 +28,23 @@ impl Gram {
         let rows = layout.columns() + 1;
         let mut sum = DMatrix::zeros(rows, rows);
         let mut line = vec![Complex64::ZERO; rows];
-        let mut values = DMatrix::zeros(rows, 2 * AT_ONCE);
+        let mut values = vec![0.0; 2 * AT_ONCE * rows];
         let count = spectra.omega.len();
         for first in (0..count).step_by(AT_ONCE) {
             let last = (first + AT_ONCE).min(count);
             for k in first..last {
                 layout.fill(spectra, state, record, k, &mut line);
-                let at = 2 * (k - first);
-                for (i, value) in line.iter().enumerate() {
-                    values[(i, at)] = value.re;
-                    values[(i, at + 1)] = value.im;
+                let at = 2 * (k - first) * rows;
+                let (real, imaginary) = values[at..at + 2 * rows].split_at_mut(rows);
+                let weight = spectra.weight[k];
+                for ((value, re), im) in line.iter().zip(real).zip(imaginary) {
+                    (*re, *im) = (weight * value.re, weight * value.im);
                 }
             }
-            let part = values.columns(0, 2 * (last - first));
-            sum.gemm(1.0, &part, &part.transpose(), 1.0);
+            let count = 2 * (last - first);
+            let part = DMatrixView::from_slice(&values, rows, count);
+            let across = View::from_slice_with_strides(&values, count, rows, rows, 1);
+            sum.gemm(1.0, &part, &across, 1.0);
         }
         Self(sum)
     }
