@@ -9,6 +9,8 @@
 //! that only poles and delay are searched for (G. H. Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973),
 //! 413, variable projection).
 
+use std::sync::Mutex;
+
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 use torqcomp_model::fit::{Fit, FitError, Options, Parameter, Residuals, linear, minimize};
@@ -130,6 +132,7 @@ impl Data {
         let problem = Problem {
             data: self,
             modes: starts.len(),
+            solved: Mutex::default(),
         };
         let fit = if parameters.is_empty() {
             None
@@ -209,6 +212,7 @@ impl Data {
         let problem = Problem {
             data: self,
             modes: fitted.poles.len(),
+            solved: Mutex::default(),
         };
         let values = fitted.fit.as_ref().map_or(&[][..], |f| &f.values);
         let mut slopes = DMatrix::zeros(2 * self.omega.len(), values.len() + linear);
@@ -268,6 +272,8 @@ impl Data {
 struct Problem<'a> {
     data: &'a Data,
     modes: usize,
+    /// Poles and delay that were solved for last, and the linear numbers: derivatives are taken there.
+    solved: Mutex<(Vec<f64>, Vec<f64>)>,
 }
 
 impl Problem<'_> {
@@ -319,7 +325,11 @@ impl Problem<'_> {
 
 impl Residuals for Problem<'_> {
     fn residuals(&self, p: &[f64], out: &mut Vec<f64>) -> Result<(), FitError> {
-        out.extend(self.data.solve(&self.poles(p), self.delay(p))?.residuals);
+        let solved = self.data.solve(&self.poles(p), self.delay(p))?;
+        if let Ok(mut last) = self.solved.lock() {
+            *last = (p.to_vec(), solved.values);
+        }
+        out.extend(solved.residuals);
         Ok(())
     }
 
@@ -333,11 +343,19 @@ impl Residuals for Problem<'_> {
 }
 
 impl Problem<'_> {
+    /// The linear numbers for these poles and this delay.
+    fn linear(&self, p: &[f64]) -> Result<Vec<f64>, FitError> {
+        match self.solved.lock() {
+            Ok(last) if last.0 == p => Ok(last.1.clone()),
+            _ => Ok(self.data.solve(&self.poles(p), self.delay(p))?.values),
+        }
+    }
+
     /// The slopes and the first `kept` columns of the linear numbers, with what the other linear numbers can make up
     /// for taken out (L. Kaufman, BIT 15 (1975), 49).
     fn tangent(&self, p: &[f64], kept: usize, out: &mut DMatrix<f64>) -> Result<(), FitError> {
         let (poles, delay_s) = (self.poles(p), self.delay(p));
-        let linear = self.data.solve(&poles, delay_s)?.values;
+        let linear = self.linear(p)?;
         let lines = self.data.omega.len();
         let mut design = DMatrix::zeros(2 * lines, linear.len() - kept);
         let (mut columns, mut slopes) = (Vec::new(), Vec::new());

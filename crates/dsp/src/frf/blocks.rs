@@ -26,6 +26,7 @@ pub fn transform(applied: &[f64], measured: &[f64], window: Window) -> Block {
 /// A transform of blocks of one length, with what does not change from block to block.
 struct Transform {
     plan: std::sync::Arc<dyn realfft::RealToComplex<f64>>,
+    /// None for no window.
     weights: Vec<f64>,
     without_mean: bool,
 }
@@ -39,7 +40,10 @@ impl Transform {
         };
         Self {
             plan: RealFftPlanner::new().plan_fft_forward(count),
-            weights: (0..count).map(weight).collect(),
+            weights: match window {
+                Window::None => Vec::new(),
+                _ => (0..count).map(weight).collect(),
+            },
             without_mean: window == Window::Hann,
         }
     }
@@ -57,7 +61,10 @@ impl Transform {
             false => 0.0,
         };
         let pairs = samples.iter().zip(&self.weights);
-        let mut weighted: Vec<f64> = pairs.map(|(v, w)| (v - mean) * w).collect();
+        let mut weighted: Vec<f64> = match self.weights.is_empty() {
+            true => samples.to_vec(),
+            false => pairs.map(|(v, w)| (v - mean) * w).collect(),
+        };
         let mut out = self.plan.make_output_vec();
         self.plan
             .process(&mut weighted, &mut out)

@@ -49,6 +49,10 @@ const SMOOTHED: f64 = 0.04;
 const NEIGHBOURS: (usize, usize) = (20, 400);
 /// Lines for each number that is looked for.
 const LEAST_LINES: usize = 2;
+/// Lines for each number with which the search begins.
+const ENOUGH: usize = 500;
+/// Lines in half the width of a mode with which the search begins.
+const WITHIN: f64 = 25.0;
 
 /// Fits whole records from a fit of their averaged response; none if that does not come to an end, or if there are
 /// too few lines.
@@ -64,7 +68,8 @@ pub(super) fn refine(records: &[Driven], shape: &Data, start: &Modal) -> Option<
         return None;
     }
     let state = State::start(&layout, start, all.len());
-    let (state, _) = descend(&layout, &all, state, LAST_STEP.0)?;
+    let some: Vec<Spectra> = all.iter().map(|s| s.thinned(&layout, &state)).collect();
+    let (state, _) = descend(&layout, &some, state, LAST_STEP.0)?;
     for (record, spectra) in all.iter_mut().enumerate() {
         spectra.learn_noise(&layout, &state, record);
     }
@@ -99,6 +104,23 @@ impl Spectra {
             weight: vec![1.0; lines.len()],
             applied: applied[lines.clone()].to_vec(),
             measured: measured[lines].to_vec(),
+        }
+    }
+
+    /// Lines that are enough to come near, also within the narrowest mode.
+    fn thinned(&self, layout: &Layout, state: &State) -> Self {
+        let rates = state.poles.iter().map(|p| p.rate_per_s);
+        let narrowest = rates.fold(f64::INFINITY, f64::min) / (self.omega[1] - self.omega[0]);
+        let step = self.omega.len() / (ENOUGH * layout.columns());
+        let step = step.min((narrowest / WITHIN) as usize).max(1);
+        fn some<T: Copy>(all: &[T], step: usize) -> Vec<T> {
+            all.iter().step_by(step).copied().collect()
+        }
+        Self {
+            omega: some(&self.omega, step),
+            applied: some(&self.applied, step),
+            measured: some(&self.measured, step),
+            weight: some(&self.weight, step),
         }
     }
 
