@@ -6,6 +6,7 @@ pub mod diagnose;
 pub mod failure;
 pub mod identify;
 pub mod io;
+mod parallel;
 pub mod pipeline;
 pub mod quality;
 pub mod recording;

@@ -26,7 +26,7 @@ pub use floor::Floor;
 pub use plain::Constants;
 pub use record::{Begin, Record, dot};
 pub use refuse::{apart, check};
-pub use search::{Status, Tried, parallel};
+pub use search::{Status, Tried};
 pub use spectra::{Peak, lines};
 pub use structure::{Choice, Frame, Structure};
 pub use views::{Against, Trace, autocorrelation, binned, density, response};

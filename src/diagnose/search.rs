@@ -1,6 +1,5 @@
 //! The search: every effect put to the model, the best taken if it helps beyond chance.
 
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use torqcomp_model::effects::{EFFECTS, Effect};
@@ -11,6 +10,7 @@ use super::candidate::{
 use super::fit::Fitted;
 use super::spectra::{Peak, lines};
 use super::structure::Choice;
+use crate::parallel::parallel;
 
 /// What became of an effect that was tried.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,30 +62,6 @@ const SAME: f64 = 4.0;
 const PEAKS: usize = 3;
 /// Prominence of a line over the spectrum around it.
 const PROMINENT: f64 = 12.0;
-
-/// Runs jobs on all threads; results in the order of the jobs.
-pub fn parallel<T: Send>(count: usize, threads: usize, run: impl Fn(usize) -> T + Sync) -> Vec<T> {
-    let next = AtomicUsize::new(0);
-    let results: Vec<Mutex<Option<T>>> = (0..count).map(|_| Mutex::new(None)).collect();
-    std::thread::scope(|scope| {
-        for _ in 0..threads.max(1) {
-            scope.spawn(|| {
-                loop {
-                    let job = next.fetch_add(1, Ordering::Relaxed);
-                    if job >= count {
-                        break;
-                    }
-                    let result = run(job);
-                    *results[job].lock().unwrap_or_else(|e| e.into_inner()) = Some(result);
-                }
-            });
-        }
-    });
-    results
-        .into_iter()
-        .filter_map(|slot| slot.into_inner().unwrap_or_else(|e| e.into_inner()))
-        .collect()
-}
 
 /// Puts every effect to a base model and says which one, if any, is accepted: the first of the result then.
 pub fn try_all<'a>(

@@ -20,8 +20,6 @@ use crate::quality::excerpt;
 use crate::report::svg::Traces;
 use crate::signal::Batch;
 
-/// Threads that are worth starting: reading and writing stay serial.
-const MOST_THREADS: usize = 8;
 /// Jobs under way beside those that the threads hold.
 const SPARE_JOBS: usize = 2;
 
@@ -163,7 +161,7 @@ pub fn run(args: &Compensate, plan: Plan, sink: &mut Sink) -> Result<Run, Failur
 fn threads(args: &Compensate) -> usize {
     match args.threads {
         Some(threads) => usize::from(threads),
-        None => std::thread::available_parallelism().map_or(1, |n| n.get().min(MOST_THREADS)),
+        None => crate::parallel::threads(),
     }
 }
 

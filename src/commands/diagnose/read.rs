@@ -118,10 +118,9 @@ pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<Read, Failure> {
             "no record was held out: the last 30 % of each training record stand in for one",
         ));
     }
-    let threads = args.threads.map_or_else(
-        || std::thread::available_parallelism().map_or(1, |n| n.get().min(8)),
-        usize::from,
-    );
+    let threads = args
+        .threads
+        .map_or_else(crate::parallel::threads, usize::from);
     let case = Case {
         train,
         hold,

@@ -1,11 +1,11 @@
 //! A recording as a report: what each channel is, and what is wrong with it.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use torqcomp_dsp::quality::clipping::Clipping;
 
 use super::content::Content;
+use crate::parallel::{parallel, threads};
 use crate::quality::{self, Findings, TimeFindings, copies, labels, unit_of};
 use crate::recording::{Axis, Channel, Recording};
 use crate::report::Warning;
@@ -131,32 +131,11 @@ fn whose(names: &[String], all: bool) -> String {
     }
 }
 
-/// Looks at all channels, several at once. The result does not depend on how many.
+/// Looks at all channels, several at once.
 fn examine(channels: &[Channel]) -> Vec<Findings> {
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let next = AtomicUsize::new(0);
-    let work = || {
-        let mut done = Vec::new();
-        loop {
-            let i = next.fetch_add(1, Ordering::Relaxed);
-            let Some(channel) = channels.get(i) else {
-                return done;
-            };
-            done.push((i, Findings::of(&channel.samples, channel.axis.rate_hz)));
-        }
-    };
-    let mut all: Vec<(usize, Findings)> = std::thread::scope(|scope| {
-        let workers: Vec<_> = (1..threads.min(channels.len()))
-            .map(|_| scope.spawn(work))
-            .collect();
-        let mut all = work();
-        for worker in workers {
-            all.extend(worker.join().expect("looking at samples does not panic"));
-        }
-        all
-    });
-    all.sort_by_key(|(i, _)| *i);
-    all.into_iter().map(|(_, found)| found).collect()
+    parallel(channels.len(), threads(), |i| {
+        Findings::of(&channels[i].samples, channels[i].axis.rate_hz)
+    })
 }
 
 /// Channels with the same fault from which on it is said once for all of them.

@@ -94,7 +94,8 @@ pub fn identify(records: &[Driven], options: &Options) -> Result<Evaluated, Fail
     let set = blocks::blocks(records, options, &mut outcome)?;
     let lines = lines::band(&set, options)?;
     let leads = check::leads(&set, &lines, options.order);
-    let (best, held_out) = order::order(&set, &lines, options).map_err(|failure| {
+    let data = lines::data(&set, &lines, options, &|_| true);
+    let (coarse, held_out) = order::order(&set, &lines, options, &data).map_err(|failure| {
         if leads {
             Failure::failed(check::LEADS)
         } else {
@@ -106,7 +107,7 @@ pub fn identify(records: &[Driven], options: &Options) -> Result<Evaluated, Fail
         spread,
         of_mode,
         relative,
-    } = settle(records, &set, &lines, options, best, &mut outcome)?;
+    } = settle(records, &set, &lines, &data, &coarse, &mut outcome)?;
     words::name_modes(&mut outcome, &fitted, &spread);
     let quality = Quality {
         rms: words::output_rms(&set, &lines) * relative,
@@ -172,14 +173,12 @@ fn settle(
     records: &[Driven],
     set: &Set,
     lines: &Lines,
-    options: &Options,
-    modes: usize,
+    data: &Data,
+    coarse: &Modal,
     outcome: &mut Outcome,
 ) -> Result<Settled, Failure> {
-    let data = lines::data(set, lines, options, &|_| true);
-    let coarse = order::grown(&data, options, modes)?;
     if set.window == Window::Hann
-        && let Some(whole) = whole::refine(records, &data, &coarse)
+        && let Some(whole) = whole::refine(records, data, coarse)
     {
         outcome.method.push(
             "constants from the whole records without a window, what their ends do to the spectrum being part \
@@ -190,7 +189,7 @@ fn settle(
     }
     let averaged = data.fit(&coarse.poles, Effort::Fine)?;
     check::leakage(outcome, set, &averaged);
-    let (spread, of_mode) = scatter::of_poles(set, lines, &data, &averaged)?;
+    let (spread, of_mode) = scatter::of_poles(set, lines, data, &averaged)?;
     Ok(Settled {
         relative: left_of_blocks(set, lines, &averaged),
         modal: averaged,

@@ -40,12 +40,14 @@ pub(super) fn folds(set: &Set) -> Vec<Vec<usize>> {
         .collect()
 }
 
-/// Number of modes by the error on held-out blocks, and that error for each number.
+/// Modes through all blocks, not to the end yet, and the error on held-out blocks for 0, 1, 2, … modes, which chooses
+/// their number; if that is given, the error for it alone.
 pub(super) fn order(
     set: &Set,
     lines: &Lines,
     options: &Options,
-) -> Result<(usize, Vec<f64>), Failure> {
+    data: &Data,
+) -> Result<(Modal, Vec<f64>), Failure> {
     let folds = folds(set);
     if lines.len() > MOST_LINES {
         return Err(Failure::failed(format_args!(
@@ -53,26 +55,62 @@ pub(super) fn order(
             lines.len()
         )));
     }
+    if let Some(modes) = options.modes {
+        let all = grown(data, options, modes)?;
+        let mut errors = vec![f64::NAN; all.poles.len() + 1];
+        if folds.len() > 1 {
+            errors[all.poles.len()] = of_given(set, lines, options, &folds, &all)?;
+        }
+        return Ok((all, errors));
+    }
     if folds.len() < 2 {
-        return match options.modes {
-            Some(modes) => Ok((modes, vec![f64::NAN; modes + 1])),
-            None => Err(Failure::failed(
-                "a single block leaves nothing to try the number of modes on; give it with --modes, or record \
-                 more",
-            )),
-        };
+        return Err(Failure::failed(
+            "a single block leaves nothing to try the number of modes on; give it with --modes, or record \
+             more",
+        ));
     }
     let errors = tried(set, lines, options, &folds)?;
     let least = errors.iter().copied().fold(f64::INFINITY, f64::min);
     let best = errors.iter().position(|e| *e <= SLACK * least).unwrap_or(0);
-    match options.modes {
-        Some(modes) => Ok((modes, errors)),
-        None if best == 0 => Err(Failure::failed(
+    if best == 0 {
+        return Err(Failure::failed(
             "no mode explains data that were held out: the measured signal does not follow the applied one; check \
              --applied, --measured and --band",
-        )),
-        None => Ok((best, errors)),
+        ));
     }
+    Ok((grown(data, options, best)?, errors))
+}
+
+/// Data of each fold: all blocks but those held out.
+fn training(set: &Set, lines: &Lines, options: &Options, folds: &[Vec<usize>]) -> Vec<Data> {
+    folds
+        .iter()
+        .map(|fold| data(set, lines, options, &|i| !fold.contains(&i)))
+        .collect()
+}
+
+/// Error of models on the blocks that each has not seen.
+fn held_out(set: &Set, lines: &Lines, folds: &[Vec<usize>], models: &[Modal]) -> f64 {
+    let each = models.iter().zip(folds).flat_map(|(model, fold)| {
+        fold.iter()
+            .map(|i| frf::prediction_error(&model.response, &set.blocks[*i], lines.clone()))
+    });
+    each.sum::<f64>() / set.blocks.len() as f64
+}
+
+/// Error on held-out blocks with the modes of all blocks, fitted without those.
+fn of_given(
+    set: &Set,
+    lines: &Lines,
+    options: &Options,
+    folds: &[Vec<usize>],
+    all: &Modal,
+) -> Result<f64, Failure> {
+    let training = training(set, lines, options, folds);
+    let models = side_by_side(&training, |data, _| {
+        Ok(data.fit(&all.poles, Effort::Coarse)?)
+    })?;
+    Ok(held_out(set, lines, folds, &models))
 }
 
 /// Error on held-out blocks with 0, 1, 2, … modes, until more do not help.
@@ -82,30 +120,23 @@ fn tried(
     options: &Options,
     folds: &[Vec<usize>],
 ) -> Result<Vec<f64>, Failure> {
-    let most = options.modes.unwrap_or(MOST_MODES).min(lines.len() / 6);
-    let training: Vec<Data> = folds
-        .iter()
-        .map(|fold| data(set, lines, options, &|i| !fold.contains(&i)))
-        .collect();
+    let most = MOST_MODES.min(lines.len() / 6);
+    let training = training(set, lines, options, folds);
     let mut models: Vec<Modal> = training
         .iter()
         .map(|d| d.fit(&[], Effort::Coarse))
         .collect::<Result<_, _>>()?;
-    let error = |models: &[Modal]| -> f64 {
-        let each = models.iter().zip(folds).flat_map(|(model, fold)| {
-            fold.iter()
-                .map(|i| frf::prediction_error(&model.response, &set.blocks[*i], lines.clone()))
-        });
-        each.sum::<f64>() / set.blocks.len() as f64
-    };
+    let error = |models: &[Modal]| held_out(set, lines, folds, models);
     let mut errors = vec![error(&models)];
     let mut since = 0;
     let floor = floor(set, lines);
     // Whatever more modes did, this number would be chosen: none comes below the floor.
     let settled = |errors: &[f64]| errors.iter().any(|e| *e <= SLACK * floor);
-    while errors.len() <= most && (options.modes.is_some() || since < PATIENCE && !settled(&errors))
-    {
-        models = each_grown(&training, &models, options)?;
+    while errors.len() <= most && since < PATIENCE && !settled(&errors) {
+        models = side_by_side(&training, |data, fold| {
+            let grown = grow(data, &models[fold], options)?;
+            Ok(grown.unwrap_or_else(|| models[fold].clone()))
+        })?;
         let least = errors.iter().copied().fold(f64::INFINITY, f64::min);
         let now = error(&models);
         since = if now < 0.99 * least { 0 } else { since + 1 };
@@ -121,31 +152,27 @@ fn floor(set: &Set, lines: &Lines) -> f64 {
     set.blocks.iter().map(error).sum::<f64>() / set.blocks.len() as f64
 }
 
-/// One more mode in each model, each on a thread of its own: none knows of the others.
-fn each_grown(
+/// A model of each fold, each on a thread of its own: none knows of the others.
+fn side_by_side(
     training: &[Data],
-    models: &[Modal],
-    options: &Options,
+    fit: impl Fn(&Data, usize) -> Result<Modal, Failure> + Sync,
 ) -> Result<Vec<Modal>, Failure> {
+    let fit = &fit;
     std::thread::scope(|scope| {
         let handles: Vec<_> = training
             .iter()
-            .zip(models)
-            .map(|(data, model)| scope.spawn(move || grow(data, model, options)))
+            .enumerate()
+            .map(|(fold, data)| scope.spawn(move || fit(data, fold)))
             .collect();
         handles
             .into_iter()
-            .zip(models)
-            .map(|(handle, model)| {
-                let grown = handle.join().expect("a fit does not panic")?;
-                Ok(grown.unwrap_or_else(|| model.clone()))
-            })
+            .map(|handle| handle.join().expect("a fit does not panic"))
             .collect()
     })
 }
 
 /// So many modes through all blocks, one after another, and not to the end yet.
-pub(super) fn grown(data: &Data, options: &Options, count: usize) -> Result<Modal, Failure> {
+fn grown(data: &Data, options: &Options, count: usize) -> Result<Modal, Failure> {
     let mut fitted = data.fit(&[], Effort::Coarse)?;
     for _ in 0..count {
         fitted = grow(data, &fitted, options)?.unwrap_or(fitted);

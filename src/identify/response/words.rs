@@ -166,7 +166,8 @@ pub(super) fn levels(outcome: &mut Outcome, set: &Set, lines: &Lines) {
     }
 }
 
-/// Response with its bounds and the model, phase, coherence, and the error against the number of modes.
+/// Response with its bounds and the model, phase, coherence, and the error against the number of modes where that was
+/// looked for.
 pub(super) fn draw(
     outcome: &mut Outcome,
     h1: &Frf,
@@ -195,6 +196,9 @@ pub(super) fn draw(
     outcome
         .charts
         .push(Chart::new("Coherence", "frequency, Hz", "", coherence));
+    if held_out.iter().filter(|e| e.is_finite()).count() < 2 {
+        return;
+    }
     let counts: Vec<f64> = (0..held_out.len()).map(|n| n as f64).collect();
     let percent: Vec<f64> = held_out.iter().map(|e| 100.0 * e).collect();
     let error = vec![Series::dots("on data held out", &counts, &percent)];

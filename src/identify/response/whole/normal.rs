@@ -1,5 +1,7 @@
 //! Normal equations over all lines, each record's transient taken out.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DMatrixView, DVector, Dyn};
 use num_complex::Complex64;
 
@@ -7,9 +9,12 @@ use super::Spectra;
 use super::line::{Layout, State};
 use crate::identify::response::inverse::invert;
 use crate::identify::response::scatter::{OfMode, Spread};
+use crate::parallel::{parallel, threads};
 
 /// Lines that are multiplied at once.
 const AT_ONCE: usize = 256;
+/// Lines of a part that a thread takes; the parts are added in their order, whoever made them.
+const PART: usize = 64 * AT_ONCE;
 
 /// Numbers seen as a matrix in any order.
 type View<'a> = DMatrixView<'a, f64, Dyn, Dyn>;
@@ -25,13 +30,32 @@ impl Gram {
     }
 
     fn of(layout: &Layout, spectra: &Spectra, state: &State, record: usize) -> Self {
+        let count = spectra.omega.len();
+        let part = |k: usize| k * PART..((k + 1) * PART).min(count);
+        let parts = parallel(count.div_ceil(PART), threads(), |k| {
+            Self::of_lines(layout, spectra, state, record, part(k))
+        });
+        let rows = layout.columns() + 1;
+        Self(
+            parts
+                .iter()
+                .fold(DMatrix::zeros(rows, rows), |sum, p| sum + p),
+        )
+    }
+
+    fn of_lines(
+        layout: &Layout,
+        spectra: &Spectra,
+        state: &State,
+        record: usize,
+        lines: Range<usize>,
+    ) -> DMatrix<f64> {
         let rows = layout.columns() + 1;
         let mut sum = DMatrix::zeros(rows, rows);
         let mut line = vec![Complex64::ZERO; rows];
         let mut values = vec![0.0; 2 * AT_ONCE * rows];
-        let count = spectra.omega.len();
-        for first in (0..count).step_by(AT_ONCE) {
-            let last = (first + AT_ONCE).min(count);
+        for first in lines.clone().step_by(AT_ONCE) {
+            let last = (first + AT_ONCE).min(lines.end);
             for k in first..last {
                 layout.fill(spectra, state, record, k, &mut line);
                 let at = 2 * (k - first) * rows;
@@ -46,7 +70,7 @@ impl Gram {
             let across = View::from_slice_with_strides(&values, count, rows, rows, 1);
             sum.gemm(1.0, &part, &across, 1.0);
         }
-        Self(sum)
+        sum
     }
 
     /// Sum of the squares of what is left.
