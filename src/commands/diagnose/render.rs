@@ -322,6 +322,8 @@ impl Rendered<'_> {
                 100.0 * share.share,
                 share.of
             )),
+            // What changes over a record follows from the motion in each stretch of it.
+            None if tests.unsteady().is_some() => {}
             None => {
                 parts.push("independent of input and motion as far as the tests see".to_owned())
             }
