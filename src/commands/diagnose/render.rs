@@ -335,10 +335,15 @@ impl Rendered<'_> {
             ));
         }
         if let Some(share) = tests.unsteady() {
+            let of_periods = self.diagnosis.floor.is_some_and(|f| f.from == "periods");
             parts.push(format!(
-                "{:.0} % of its power goes with {}: it passes for noise where periods are compared",
+                "{:.0} % of its power goes with {}{}",
                 100.0 * share.share.min(1.0),
-                share.of
+                share.of,
+                match of_periods {
+                    true => ": it passes for noise where periods are compared",
+                    false => "",
+                }
             ));
         }
         if !self.diagnosis.settled && !self.diagnosis.effects().is_empty() {
