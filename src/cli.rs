@@ -10,13 +10,13 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use torqcomp_model::{Kind, UnitSystem};
 
-use crate::io::csv::{self, Delimiter, Told};
+use crate::io::csv::{self, Delimiter};
 use crate::io::digits::Digits;
 use crate::io::mcap::{Selection, TimeChoice};
 use crate::signal::{self, MessageOptions};
 
 pub use diagnose::Diagnose;
-pub use reading::{Reading, TimeAxis};
+pub use reading::{Marks, Reading, TimeAxis};
 pub use simulate::Simulate;
 
 /// True torque from the records of a reaction-torque stand.
@@ -134,12 +134,9 @@ pub struct Record {
     /// Interpolate where the time stamps are not uniform, instead of refusing
     #[arg(long)]
     pub resample: bool,
-    /// What separates the cells: , ; | tab space none
-    #[arg(long, value_name = "MARK", value_parser = delimiter)]
-    pub delimiter: Option<Delimiter>,
-    /// Decimal mark: . or ,
-    #[arg(long, value_name = "MARK", value_parser = decimal)]
-    pub decimal: Option<u8>,
+    /// The marks.
+    #[command(flatten)]
+    pub marks: Marks,
 }
 
 impl Record {
@@ -155,10 +152,7 @@ impl Record {
                 rate_hz: self.rate,
                 resample: self.resample,
                 any_steps: false,
-                told: Told {
-                    delimiter: self.delimiter,
-                    decimal: self.decimal,
-                },
+                told: self.marks.told(),
             },
             messages: MessageOptions {
                 selection: Selection {
@@ -182,6 +176,26 @@ pub struct Result {
     /// Replace the output if it exists
     #[arg(long)]
     pub force: bool,
+}
+
+/// How a verb works on.
+#[derive(Debug, Args)]
+pub struct Work {
+    /// Threads to use [default: one for each core, at most 8]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub threads: Option<u16>,
+    /// Say nothing on standard error but warnings
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+impl Work {
+    /// Threads to use.
+    #[must_use]
+    pub fn thread_count(&self) -> usize {
+        self.threads
+            .map_or_else(crate::parallel::threads, usize::from)
+    }
 }
 
 /// Arguments of `compensate`.
@@ -229,12 +243,9 @@ pub struct Compensate {
     /// End with code 3 if there are warnings
     #[arg(long)]
     pub strict: bool,
-    /// Threads to use [default: one for each core, at most 8]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
-    pub threads: Option<u16>,
-    /// Say nothing on standard error but warnings
-    #[arg(short, long)]
-    pub quiet: bool,
+    /// How it works.
+    #[command(flatten)]
+    pub work: Work,
 }
 
 /// Arguments of `extract`.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::TimeAxis;
+use super::{TimeAxis, Work};
 
 /// Arguments of `diagnose`.
 #[derive(Debug, Args)]
@@ -48,10 +48,7 @@ pub struct Diagnose {
     /// End with code 3 if there are warnings
     #[arg(long)]
     pub strict: bool,
-    /// Threads to use [default: one for each core, at most 8]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
-    pub threads: Option<u16>,
-    /// Say nothing on standard error but warnings
-    #[arg(short, long)]
-    pub quiet: bool,
+    /// How it works.
+    #[command(flatten)]
+    pub work: Work,
 }

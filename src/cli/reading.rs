@@ -34,12 +34,9 @@ impl TimeAxis {
     }
 }
 
-/// How tables are read, whatever their channels.
+/// Marks of a table, where the file is not to tell them.
 #[derive(Debug, Args)]
-pub struct Reading {
-    /// The time axis.
-    #[command(flatten)]
-    pub axis: TimeAxis,
+pub struct Marks {
     /// What separates the cells: , ; | tab space none
     #[arg(long, value_name = "MARK", value_parser = delimiter)]
     pub delimiter: Option<Delimiter>,
@@ -48,15 +45,34 @@ pub struct Reading {
     pub decimal: Option<u8>,
 }
 
+impl Marks {
+    /// What is told about a table.
+    #[must_use]
+    pub fn told(&self) -> Told {
+        Told {
+            delimiter: self.delimiter,
+            decimal: self.decimal,
+        }
+    }
+}
+
+/// How tables are read, whatever their channels.
+#[derive(Debug, Args)]
+pub struct Reading {
+    /// The time axis.
+    #[command(flatten)]
+    pub axis: TimeAxis,
+    /// The marks.
+    #[command(flatten)]
+    pub marks: Marks,
+}
+
 impl Reading {
     /// The options for one channel.
     #[must_use]
     pub fn options(&self, channel: Option<&str>, unit: Option<&str>) -> Options {
         Options {
-            told: Told {
-                delimiter: self.delimiter,
-                decimal: self.decimal,
-            },
+            told: self.marks.told(),
             ..self.axis.options(channel, unit)
         }
     }

@@ -170,7 +170,7 @@ pub fn run(args: &Compensate) -> Result<Outcome, Failure> {
     }
     sink.finish(args, &report)?;
     plot.map_or(Ok(()), Output::finish)?;
-    if !args.quiet {
+    if !args.work.quiet {
         report::say(&report.text());
     }
     Ok(conclude(

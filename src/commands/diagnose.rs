@@ -44,7 +44,7 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
     diagnose::check(&read.case, &frame, found)?;
     read.refine(&found);
     let levels = read.levels();
-    let shown = !args.quiet && std::io::stderr().is_terminal();
+    let shown = !args.work.quiet && std::io::stderr().is_terminal();
     let progress = |done: usize, of: usize| {
         if shown {
             report::say(&format!(

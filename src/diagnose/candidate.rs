@@ -6,6 +6,7 @@ use torqcomp_model::effects::{Effect, Mode};
 use torqcomp_model::simulate::Input;
 
 use super::blocks::{Comparison, compare};
+use super::columns::Columns;
 use super::fit::{Fitted, Residual, difference, fit, look};
 use super::record::{Nuisance, Record, dot};
 use super::spectra::Peak;
@@ -132,7 +133,7 @@ pub struct Base<'a> {
     /// The model.
     pub judged: Judged<'a>,
     /// For each training record, the changes of its record with each parameter.
-    pub slopes: Vec<Nuisance>,
+    pub slopes: Vec<Columns>,
     /// For each training record, what belongs to it.
     pub cleared: Vec<Nuisance>,
 }
@@ -157,7 +158,7 @@ impl<'a> Base<'a> {
                 nuisance.clear(&mut residual);
                 Some(residual)
             };
-            let mut own = Nuisance::none();
+            let mut own = Columns::default();
             if let Some(here) = at(&fitted.values) {
                 for k in 0..fitted.values.len() {
                     let mut values = fitted.values.clone();

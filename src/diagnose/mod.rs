@@ -2,12 +2,14 @@
 
 mod blocks;
 mod candidate;
+mod columns;
 mod dependence;
 mod fit;
 mod floor;
 mod plain;
 mod record;
 mod refuse;
+mod rivals;
 mod search;
 mod spectra;
 mod starts;
@@ -26,6 +28,7 @@ pub use floor::Floor;
 pub use plain::Constants;
 pub use record::{Begin, Record, dot};
 pub use refuse::{apart, check};
+pub use rivals::Rival;
 pub use search::{Status, Tried};
 pub use spectra::{Peak, lines};
 pub use structure::{Choice, Frame, Structure};
@@ -85,6 +88,8 @@ pub struct Diagnosis<'a> {
     pub after: Judged<'a>,
     /// The effects tried, the accepted one first; one list for each effect that was looked for.
     pub rounds: Vec<Vec<Tried<'a>>>,
+    /// A law that is not among the effects and explains more than each of them, in the round that was the last.
+    pub suspected: Option<Rival<'a>>,
     /// The noise.
     pub floor: Option<Floor>,
     /// What the residual before depends on.
@@ -105,6 +110,8 @@ const AT_FLOOR: f64 = 1.1;
 const FAR_ABOVE: f64 = 1.5;
 /// Part of what is missing that an effect must explain to be named.
 const NAMED: f64 = 0.5;
+/// Error over a noise floor that was seen, from which on that part is known well enough to ask for it.
+const CLEARLY_ABOVE: f64 = 1.05;
 /// Part of what is missing at first that a second effect must explain to be named.
 const SECOND: f64 = 0.02;
 /// Effects that are added at most.
@@ -197,12 +204,20 @@ pub fn run<'a>(
     let mut rounds = Vec::new();
     let coarse = records.substeps();
     let mut settled = true;
+    let mut suspected = None;
     for _ in 0..MOST_EFFECTS {
         let base = Base::of(after.clone(), &records);
         let tried = search::try_all(&base, &records, threads, progress);
         let accepted = tried.first().filter(|t| t.status == Status::Accepted);
         let next = accepted.and_then(|t| t.judged.clone());
         rounds.push(tried);
+        if next.is_some() || remains(&after, &dependence(&after, &records), floor) {
+            suspected = rivals::best(&base, next.as_ref(), floor, &records, threads);
+        }
+        if let Some(rival) = &suspected {
+            stand_back(&mut rounds, rival);
+            break;
+        }
         let Some(next) = next else { break };
         if !after.fitted.structure.choices.is_empty()
             && share(&before, &after, &next, floor) < SECOND
@@ -231,6 +246,7 @@ pub fn run<'a>(
         before,
         after,
         rounds,
+        suspected,
         floor,
         dependence_before,
         dependence,
@@ -273,6 +289,18 @@ fn refuse_second(rounds: &mut [Vec<Tried>]) {
                 "it explains less than {:.0} % of what was missing at first: too little to be named beside the first effect",
                 100.0 * SECOND
             );
+        }
+    }
+}
+
+/// The effects of the last round that a law beside the list explains better are not named.
+fn stand_back(rounds: &mut [Vec<Tried>], rival: &Rival) {
+    for one in rounds.last_mut().into_iter().flatten() {
+        if one.status != Status::Rejected
+            && let Some(judged) = &one.judged
+        {
+            one.status = Status::Rejected;
+            one.why = rival.instead(judged);
         }
     }
 }
@@ -365,9 +393,9 @@ impl Diagnosis<'_> {
         let open = |judged: &Judged, dependence: &Dependence| {
             remains(judged, dependence, self.floor) || dependence.unsteady().is_some()
         };
-        let left = !self.settled || open(&self.after, &self.dependence);
+        let left = !self.settled || self.suspected.is_some() || open(&self.after, &self.dependence);
         if self.effects().is_empty() {
-            let missing = open(&self.before, &self.dependence_before);
+            let missing = self.suspected.is_some() || open(&self.before, &self.dependence_before);
             self.verdict = if missing {
                 Verdict::Unexplained
             } else {
@@ -375,13 +403,16 @@ impl Diagnosis<'_> {
             };
             return;
         }
-        if !left {
-            self.verdict = Verdict::Explained;
-            return;
-        }
         let explained = share(&self.before, &self.before, &self.after, self.floor);
-        if explained >= NAMED {
-            self.verdict = Verdict::PartlyExplained;
+        let known = |floor: Floor| {
+            floor.from == "periods" && self.before.hold_rms() > CLEARLY_ABOVE * floor.rms
+        };
+        if explained >= NAMED || !left && !self.floor.is_some_and(known) {
+            self.verdict = if left {
+                Verdict::PartlyExplained
+            } else {
+                Verdict::Explained
+            };
             return;
         }
         self.verdict = Verdict::Unexplained;

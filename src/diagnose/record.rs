@@ -6,6 +6,7 @@ use std::sync::Arc;
 use torqcomp_model::effects::Mode;
 use torqcomp_model::simulate::{Input, State};
 
+use super::columns::Columns;
 use super::structure::Waves;
 
 /// How a record begins.
@@ -32,20 +33,17 @@ pub struct Record {
     pub begin: Begin,
 }
 
-/// What belongs to a record and not to the stand: columns that its residual is cleared of.
+/// What belongs to a record and not to the stand, and is taken out of its residual.
+#[derive(Default)]
 pub struct Nuisance {
-    /// Orthonormal columns over the record's range.
-    columns: Vec<Vec<f64>>,
-    /// The same columns before, each a combination of the orthonormal ones:
-    /// `raw_k = Σ_j mix[k][j] column_j`.
-    mix: Vec<Vec<f64>>,
-    /// Place of the raw columns of the free motion, if they are in it.
+    columns: Columns,
+    /// Place of the columns of the free motion, if they are in it.
     motion: Option<usize>,
     /// Whether enough of the free motion is left in the range to tell how it began.
     sees_start: bool,
-    /// Place of the raw column of a constant load.
+    /// Place of the column of a constant load.
     shift: Option<usize>,
-    /// Place of the first raw column of the lines.
+    /// Place of the first column of the lines.
     lines: usize,
 }
 
@@ -53,8 +51,6 @@ pub struct Nuisance {
 const NOTHING_LEFT: f64 = 12.0;
 /// Time constants up to which the range tells that motion: beyond, noise would be multiplied by more than `e³` on its way back to the start.
 const START_SEEN: f64 = 3.0;
-/// Part of a column that must be left after the others are taken out of it.
-const LEFT: f64 = 1e-6;
 
 impl Record {
     /// Samples of the range.
@@ -69,8 +65,8 @@ impl Record {
     /// `shift` is what a constant load does to the record, where that is more than a constant.
     #[must_use]
     pub fn nuisance(&self, mode: &Mode, waves: &Waves, shift: Option<Vec<f64>>) -> Nuisance {
-        let mut nuisance = Nuisance::none();
-        nuisance.push(vec![1.0; self.count()]);
+        let mut nuisance = Nuisance::default();
+        nuisance.columns.push(vec![1.0; self.count()]);
         let rate_hz = self.input.rate_hz();
         let decay = mode.damping_ratio * mode.omega_rad_s / rate_hz * self.range.start as f64;
         // After many time constants nothing is left of it.
@@ -85,17 +81,17 @@ impl Record {
                 actions: Vec::new(),
             };
             for column in model.free_motion(rate_hz, self.range.end) {
-                nuisance.push(column[self.range.clone()].to_vec());
+                nuisance.columns.push(column[self.range.clone()].to_vec());
             }
         }
         if let Some(column) = shift {
-            nuisance.shift = Some(nuisance.mix.len());
-            nuisance.push(column);
+            nuisance.shift = Some(nuisance.columns.count());
+            nuisance.columns.push(column);
         }
         let count = self.count() as f64;
         for wave in 1..=waves.course {
             let turn = std::f64::consts::PI * wave as f64 / count;
-            nuisance.push(
+            nuisance.columns.push(
                 (0..self.count())
                     .map(|i| (turn * (i as f64 + 0.5)).cos())
                     .collect(),
@@ -103,20 +99,20 @@ impl Record {
         }
         for rate_per_s in &waves.fades_per_s {
             let step = rate_per_s / rate_hz;
-            nuisance.push(
+            nuisance.columns.push(
                 (0..self.count())
                     .map(|i| (-step * i as f64).exp())
                     .collect(),
             );
         }
-        nuisance.lines = nuisance.mix.len();
+        nuisance.lines = nuisance.columns.count();
         for frequency_hz in &waves.lines_hz {
             let turn = std::f64::consts::TAU * frequency_hz / rate_hz;
             // A turning phasor, set right now and then.
             let wave =
                 |part: fn(f64) -> f64| self.range.clone().map(|i| part(turn * i as f64)).collect();
-            nuisance.push(wave(f64::cos));
-            nuisance.push(wave(f64::sin));
+            nuisance.columns.push(wave(f64::cos));
+            nuisance.columns.push(wave(f64::sin));
         }
         nuisance
     }
@@ -136,78 +132,14 @@ pub struct Taken {
 }
 
 impl Nuisance {
-    /// No columns.
-    #[must_use]
-    pub fn none() -> Self {
-        Self {
-            columns: Vec::new(),
-            mix: Vec::new(),
-            motion: None,
-            sees_start: false,
-            shift: None,
-            lines: 0,
-        }
-    }
-
-    /// Adds a column: orthogonalised twice, as once is not enough for nearly dependent ones.
-    pub fn push(&mut self, mut column: Vec<f64>) {
-        let size = dot(&column, &column).sqrt();
-        let mut mix = vec![0.0; self.columns.len()];
-        for _ in 0..2 {
-            for (share, other) in mix.iter_mut().zip(&self.columns) {
-                let part = dot(&column, other);
-                *share += part;
-                column
-                    .iter_mut()
-                    .zip(other)
-                    .for_each(|(c, o)| *c -= part * o);
-            }
-        }
-        let left = dot(&column, &column).sqrt();
-        if left > LEFT * size && left > 0.0 {
-            column.iter_mut().for_each(|c| *c /= left);
-            self.columns.push(column);
-            mix.push(left);
-        }
-        self.mix.push(mix);
-    }
-
-    /// Clears a residual of all columns.
+    /// Clears a residual.
     pub fn clear(&self, residual: &mut [f64]) {
-        let _ = self.take(residual);
+        self.columns.clear(residual);
     }
 
-    fn take(&self, residual: &mut [f64]) -> Vec<f64> {
-        let mut parts = Vec::with_capacity(self.columns.len());
-        for column in &self.columns {
-            let part = dot(residual, column);
-            residual
-                .iter_mut()
-                .zip(column)
-                .for_each(|(r, c)| *r -= part * c);
-            parts.push(part);
-        }
-        parts
-    }
-
-    /// Clears a residual and tells the coefficients of the raw columns.
+    /// Clears a residual and tells what was in it.
     pub fn fit(&self, residual: &mut [f64]) -> Taken {
-        let parts = self.take(residual);
-        // mix is triangular: solved from the last column on. Dependent columns get no share.
-        let mut rest = parts;
-        let mut raw = vec![0.0; self.mix.len()];
-        let mut place = rest.len();
-        for k in (0..self.mix.len()).rev() {
-            let row = &self.mix[k];
-            if row.len() != place || place == 0 {
-                continue;
-            }
-            place -= 1;
-            raw[k] = rest[place] / row[place];
-            for (r, share) in rest.iter_mut().zip(row).take(place) {
-                *r -= raw[k] * share;
-            }
-        }
+        let raw = self.columns.fit(residual);
         Taken {
             offset: raw[0],
             motion: self

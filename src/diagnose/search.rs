@@ -112,7 +112,7 @@ pub fn try_all<'a>(
 /// The best fit of each form, judged: those whose starts leave least get a first look (all of them, unless there is an
 /// effect already), those that lower the training error a second one, and those
 /// that lower it nearly most a fit to the end. How much work that is depends on the records alone, not on the clock.
-fn fit_all<'a>(
+pub(super) fn fit_all<'a>(
     base: &Base<'a>,
     jobs: &[Choice],
     peaks: &[Peak],
@@ -230,7 +230,7 @@ fn decide<'a>(base: &Base<'a>, tried: &mut [Tried<'a>]) {
 }
 
 /// Why an effect is not accepted, as far as it alone tells.
-fn refusal(judged: &Judged, before: &Judged) -> Option<String> {
+pub(super) fn refusal(judged: &Judged, before: &Judged) -> Option<String> {
     let comparison = judged.against(before);
     let (gain, variance) = (comparison.gain(), judged.hold_rms().powi(2));
     let total = before.hold_rms().powi(2) * before.held_out().len() as f64;

@@ -9,6 +9,7 @@ use num_complex::Complex64;
 use realfft::RealFftPlanner;
 use torqcomp_model::effects::Mode;
 
+use super::columns::Columns;
 use super::dependence::Sight;
 use super::record::dot;
 
@@ -48,33 +49,31 @@ pub fn changing_constants(sights: &[Sight], mode: &Mode, rate_hz: f64) -> Beyond
             let slopes = slopes(sight.modelled, mode, rate_hz);
             let mut residual = sight.residual.to_vec();
             // What other constants for the whole record take out does not change over it.
-            for q in orthonormal(slopes.each_ref().map(|s| s.as_slice())) {
-                let along = dot(&q, &residual);
-                residual
-                    .iter_mut()
-                    .zip(&q)
-                    .for_each(|(r, q)| *r -= along * q);
-            }
+            slopes
+                .iter()
+                .cloned()
+                .collect::<Columns>()
+                .clear(&mut residual);
             (residual, slopes)
         })
         .collect();
     let decay_samples = rate_hz / (mode.damping_ratio * mode.omega_rad_s).max(1e-12);
     let shortest = SHORTEST[0].max(SHORTEST[1] * decay_samples).ceil() as usize;
-    let of = |stretches: usize| {
-        let mut explained = vec![0.0; TURNS + 1];
+    let of = |count: usize| {
+        let mut sums = vec![0.0; TURNS + 1];
         let mut total = 0.0;
         for (residual, slopes) in &records {
-            let length = (residual.len() / stretches).max(shortest);
+            let length = (residual.len() / count).max(shortest);
             if residual.len() < FEWEST * length {
                 return Beyond::default();
             }
             total += dot(residual, residual);
-            let bases = bases(slopes, length);
-            for (turn, sum) in explained.iter_mut().enumerate() {
-                *sum += in_bases(&bases, &turned(residual, turn), length);
+            let stretches = stretches(slopes, length);
+            for (turn, sum) in sums.iter_mut().enumerate() {
+                *sum += explained(&stretches, &turned(residual, turn), length);
             }
         }
-        beyond(&explained, total)
+        beyond(&sums, total)
     };
     let found = STRETCHES.into_iter().map(of);
     found
@@ -208,39 +207,18 @@ fn slopes(modelled: &[f64], mode: &Mode, rate_hz: f64) -> [Vec<f64>; 3] {
     [own, frequency, damping]
 }
 
-/// The directions of a few columns, each at right angles to those before; none for a column that adds nothing.
-fn orthonormal(columns: [&[f64]; 3]) -> Vec<Vec<f64>> {
-    let mut found: Vec<Vec<f64>> = Vec::new();
-    for column in columns {
-        let size = dot(column, column);
-        let mut own = column.to_vec();
-        for q in &found {
-            let along = dot(q, &own);
-            own.iter_mut().zip(q).for_each(|(x, q)| *x -= along * q);
-        }
-        let left = dot(&own, &own);
-        if left > 1e-12 * size {
-            let scale = left.sqrt().recip();
-            own.iter_mut().for_each(|x| *x *= scale);
-            found.push(own);
-        }
-    }
-    found
+/// The slopes in each stretch.
+fn stretches(slopes: &[Vec<f64>; 3], length: usize) -> Vec<Columns> {
+    let of = |k: usize| {
+        let part = |slope: &Vec<f64>| slope[k * length..(k + 1) * length].to_vec();
+        slopes.iter().map(part).collect()
+    };
+    (0..slopes[0].len() / length).map(of).collect()
 }
 
-/// The directions in each stretch.
-fn bases(slopes: &[Vec<f64>; 3], length: usize) -> Vec<Vec<Vec<f64>>> {
-    let stretches = slopes[0].len() / length;
-    (0..stretches)
-        .map(|k| orthonormal(slopes.each_ref().map(|s| &s[k * length..(k + 1) * length])))
-        .collect()
-}
-
-fn in_bases(bases: &[Vec<Vec<f64>>], residual: &[f64], length: usize) -> f64 {
-    let stretches = residual.chunks_exact(length).zip(bases);
-    stretches
-        .flat_map(|(piece, basis)| basis.iter().map(|q| dot(q, piece).powi(2)))
-        .sum()
+fn explained(stretches: &[Columns], residual: &[f64], length: usize) -> f64 {
+    let pieces = residual.chunks_exact(length).zip(stretches);
+    pieces.map(|(piece, slopes)| slopes.explained(piece)).sum()
 }
 
 #[cfg(test)]

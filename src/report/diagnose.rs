@@ -31,6 +31,8 @@ pub struct Report {
     pub constants: Vec<Constant>,
     /// Effects that were tried, in the order of their held-out error.
     pub candidates: Vec<Candidate>,
+    /// A law that is not among the effects and leaves less than each of them; it is named and not added.
+    pub suspected: Option<Suspected>,
     /// What is left.
     pub residual: Residual,
     /// What to record next.
@@ -107,6 +109,41 @@ pub struct Candidate {
     pub why: String,
 }
 
+/// A law beside the list of effects.
+#[derive(Debug, Serialize)]
+pub struct Suspected {
+    /// Its name.
+    pub law: &'static str,
+    /// Its equation.
+    pub equation: &'static str,
+    /// The effects that were in the model already.
+    pub with: Vec<&'static str>,
+    /// Rms on the training records.
+    pub train_rms: f64,
+    /// Rms on the held-out records.
+    pub holdout_rms: f64,
+    /// Its parameters.
+    pub parameters: Vec<Parameter>,
+}
+
+impl Suspected {
+    /// In words, errors in the unit of the report.
+    #[must_use]
+    pub fn described(&self) -> String {
+        let with = if self.with.is_empty() {
+            String::new()
+        } else {
+            format!(" beside {}", self.with.join(" and "))
+        };
+        format!(
+            "{} ({}){with}, which would leave {} of the held-out records; it is not among the effects that are added",
+            self.law,
+            self.equation,
+            rounded(self.holdout_rms, 4)
+        )
+    }
+}
+
 /// A parameter of an effect.
 #[derive(Debug, Serialize)]
 pub struct Parameter {
@@ -174,6 +211,9 @@ impl Report {
         text.push_str(&self.constants());
         text.push('\n');
         text.push_str(&self.candidates());
+        if let Some(suspected) = &self.suspected {
+            text.push_str(&format!("\nsuspected: {}\n", suspected.described()));
+        }
         text.push_str(&format!("\nleft: {}\n", self.residual.described));
         if let Some(next) = &self.next_experiment {
             text.push_str(&format!("next experiment: {next}\n"));

@@ -327,6 +327,9 @@ impl Report {
 
     fn what_remains(&self, page: &mut Page) {
         page.heading("What remains");
+        if let Some(suspected) = &self.suspected {
+            page.text(&format!("Suspected: {}.", suspected.described()));
+        }
         page.text(&format!(
             "Of the held-out residual: {}.",
             self.residual.described

@@ -82,7 +82,7 @@ pub fn run(args: &Compensate, plan: Plan, sink: &mut Sink) -> Result<Run, Failur
     let mut extent = Extent::NONE;
     let mut traces = args.plot.as_ref().map(|_| Traces::new(args.plot_range));
     let mut short = Vec::new();
-    let threads = threads(args);
+    let threads = args.work.thread_count();
     let mut convolvers: Vec<BlockConvolver> = (1..threads).map(|_| first.another()).collect();
     convolvers.push(first);
 
@@ -156,13 +156,6 @@ pub fn run(args: &Compensate, plan: Plan, sink: &mut Sink) -> Result<Run, Failur
         traces,
         refined: None,
     })
-}
-
-fn threads(args: &Compensate) -> usize {
-    match args.threads {
-        Some(threads) => usize::from(threads),
-        None => crate::parallel::threads(),
-    }
 }
 
 /// Puts the pieces together into windows, in order.

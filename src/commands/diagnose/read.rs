@@ -118,16 +118,13 @@ pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<Read, Failure> {
             "no record was held out: the last 30 % of each training record stand in for one",
         ));
     }
-    let threads = args
-        .threads
-        .map_or_else(crate::parallel::threads, usize::from);
     let case = Case {
         train,
         hold,
         declared,
         gain_is_declared,
         recorder,
-        threads,
+        threads: args.work.thread_count(),
     };
     Ok(Read {
         case,

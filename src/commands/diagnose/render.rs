@@ -5,7 +5,7 @@ use crate::diagnose::{Constants, Dependence, Diagnosis, Judged, Status, Trace, T
 use crate::failure::Failure;
 use crate::io::digits;
 use crate::report::diagnose::{
-    Candidate, Constant, Error, Levels, Line, Parameter, Report, Residual, Rms, SCHEMA,
+    Candidate, Constant, Error, Levels, Line, Parameter, Report, Residual, Rms, SCHEMA, Suspected,
 };
 use crate::report::diagnose_page::Sights;
 use crate::report::{Warning, rounded};
@@ -61,6 +61,7 @@ impl Rendered<'_> {
             },
             constants: self.constants(),
             candidates: self.candidates(),
+            suspected: self.suspected(),
             residual: self.residual(),
             next_experiment: self.next_experiment(),
             warnings: [self.warnings.clone(), self.left_open()].concat(),
@@ -229,6 +230,18 @@ impl Rendered<'_> {
         }
     }
 
+    fn suspected(&self) -> Option<Suspected> {
+        let rival = self.diagnosis.suspected.as_ref()?;
+        Some(Suspected {
+            law: rival.law.name,
+            equation: rival.law.equation,
+            with: self.diagnosis.effects(),
+            train_rms: rival.judged.train_rms() / self.units.printed,
+            holdout_rms: rival.judged.hold_rms() / self.units.printed,
+            parameters: self.parameters(&rival.judged).pop().unwrap_or_default(),
+        })
+    }
+
     /// Parameters of each effect of a model.
     fn parameters(&self, judged: &Judged) -> Vec<Vec<Parameter>> {
         let fitted = &judged.fitted;
@@ -379,6 +392,9 @@ impl Rendered<'_> {
     }
 
     fn next_experiment(&self) -> Option<String> {
+        if let Some(rival) = &self.diagnosis.suspected {
+            return Some(rival.law.experiment.to_owned());
+        }
         let rounds = &self.diagnosis.rounds;
         let mut asked: Vec<&str> = rounds
             .iter()

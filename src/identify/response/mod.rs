@@ -147,15 +147,13 @@ fn answer(modal: &Modal, of_mode: Option<OfMode>) -> Option<Answer> {
         return None;
     };
     let (residue, unit) = modal.residue(0);
-    let sizes = [1.0, 1.0, unit, unit];
-    let scaled =
-        |c: OfMode| std::array::from_fn(|i| std::array::from_fn(|j| c[i][j] * sizes[i] * sizes[j]));
-    Some(Answer {
+    let as_fitted = Answer {
         rate_per_s: pole.rate_per_s,
         omega_rad_per_s: pole.omega_rad_per_s,
-        residue,
-        covariance: of_mode.map(scaled),
-    })
+        residue: residue / unit,
+        covariance: of_mode,
+    };
+    Some(as_fitted.scaled(unit))
 }
 
 /// Modes with what is known of them.

@@ -129,7 +129,7 @@ mod tests {
 
     #[test]
     fn a_sine_is_the_same_between_its_samples_and_back() {
-        let (length, margin, factor, rate_hz) = (1024, 128, 4, 1000.0);
+        let (length, margin, factor, rate_hz) = (4096, 1024, 4, 1000.0);
         let fine = Fine::new(length, margin, factor, rate_hz);
         let at = |time_s: f64| (std::f64::consts::TAU * 331.7 * time_s).sin();
         let window: Vec<f64> = (0..length).map(|i| at(i as f64 / rate_hz)).collect();
@@ -138,17 +138,16 @@ mod tests {
         let speed = fine.refined(&lines, |f| Complex64::new(0.0, std::f64::consts::TAU * f));
         let again = fine.samples(&fine.spectrum_of_fine(&refined));
         let omega = std::f64::consts::TAU * 331.7;
-        // What the fading of a margin of 128 samples leaves; those in use are longer.
         for i in margin * factor..(length - margin) * factor {
             let time_s = i as f64 / (rate_hz * factor as f64);
-            assert!((refined[i] - at(time_s)).abs() < 1e-5, "{i}");
+            assert!((refined[i] - at(time_s)).abs() < 1e-6, "{i}");
             assert!(
                 (speed[i] / omega - (omega * time_s).cos()).abs() < 1e-5,
                 "{i}"
             );
         }
         for i in margin..length - margin {
-            assert!((again[i] - window[i]).abs() < 1e-5, "{i}");
+            assert!((again[i] - window[i]).abs() < 1e-6, "{i}");
         }
     }
 }

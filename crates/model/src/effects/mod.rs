@@ -12,9 +12,12 @@
 //!
 //! Of one effect there can be several forms, as the same name stands for different equations in
 //! different texts.
+//!
+//! [`RIVALS`] are laws that stand beside the list, so that none of it is named in their place.
 
 mod action;
 mod parameter;
+mod rivals;
 
 mod backlash;
 mod bouc_wen_hysteresis;
@@ -36,6 +39,7 @@ mod time_delay;
 
 pub use action::{Action, Clock, Frequency, Line, Memory, Mode, Torque, Transform};
 pub use parameter::{Parameter, Ruler, Rulers, Unit};
+pub use rivals::RIVALS;
 
 /// All effects.
 pub const EFFECTS: &[&Effect] = &[

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::{Input, Model, State};
-use crate::effects::{Action, Effect, Mode, Place};
+use crate::effects::{Action, Effect, Mode, Place, RIVALS};
 
 const RATE_HZ: f64 = 20_000.0;
 const COUNT: usize = 2000;
@@ -30,7 +30,17 @@ fn input(substeps: usize) -> Input {
 }
 
 fn model(effect: &str, form: &str, values: &[f64]) -> Model {
-    let form = Effect::named(effect).unwrap().form(Some(form)).unwrap();
+    with(Effect::named(effect).unwrap(), form, values)
+}
+
+/// A law beside the list.
+fn rival(law: &str, form: &str, values: &[f64]) -> Model {
+    let found = RIVALS.iter().find(|rival| rival.name == law);
+    with(found.unwrap(), form, values)
+}
+
+fn with(effect: &Effect, form: &str, values: &[f64]) -> Model {
+    let form = effect.form(Some(form)).unwrap();
     Model {
         mode: MODE,
         gain: 1.0,
@@ -153,6 +163,28 @@ fn quadratic_damping() {
         1e-4,
         6e-6,
     );
+}
+
+#[test]
+fn laws_beside_the_list() {
+    let w2 = MODE.omega_rad_s.powi(2);
+    let against = |model: &Model, torque: fn([f64; 3]) -> f64, at_four: f64, at_sixteen: f64| {
+        let truth = oracle(|t, s| [s[1], linear(t, s) - w2 * torque(s), 0.0]);
+        converges(model, &truth, at_four, at_sixteen);
+    };
+    let model = rival("quintic-stiffness", "beside", &[2e-3]);
+    against(&model, |s| 2e-3 * s[0].powi(5), 2e-4, 1e-5);
+    let model = rival("cubic-damping", "cube", &[1e-12]);
+    against(&model, |s| 1e-12 * s[1].powi(3), 2e-4, 1e-5);
+    let model = rival("squeezed-damping", "square", &[2e-5]);
+    against(&model, |s| 2e-5 * s[0] * s[0] * s[1], 2e-4, 1e-5);
+    let model = rival("end-stop", "both", &[0.8, 1.5]);
+    let stop = |s: [f64; 3]| 0.8 * (s[0] - s[0].clamp(-1.5, 1.5));
+    against(&model, stop, 2e-3, 3e-4);
+    let model = rival("end-stop", "above", &[0.5, 1.2]);
+    against(&model, |s| 0.5 * (s[0] - 1.2).max(0.0), 2e-3, 3e-4);
+    let model = rival("end-stop", "below", &[0.5, 1.2]);
+    against(&model, |s| 0.5 * (s[0] + 1.2).min(0.0), 2e-3, 3e-4);
 }
 
 #[test]

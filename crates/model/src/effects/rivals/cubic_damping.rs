@@ -1,0 +1,39 @@
+//! Damping that grows with the cube of the speed.
+//!
+//! `n = d x'³`. B. Ravindra, A. K. Mallik, *Performance of non-linear vibration isolators under harmonic
+//! excitation*, J. Sound Vib. 170 (1994), 325. **Valid where viscous and quadratic parts are told apart by level.**
+//! Mistaken for `quadratic-damping`.
+//!
+//! Integration: for a fixed `x`, `x' = v/√(1 + 2 ω₀² d v² t)` exactly.
+
+use crate::effects::{Action, Effect, Form, Memory, Parameter, Place, Torque};
+
+pub(super) static EFFECT: Effect = Effect {
+    name: "cubic-damping",
+    equation: "n = d x'^3",
+    source: "B. Ravindra, A. K. Mallik, J. Sound Vib. 170 (1994), 325",
+    validity: "where viscous and quadratic parts are told apart by level",
+    mistaken_for: &["quadratic-damping"],
+    experiment: "free decays from three amplitudes, or the response at three levels",
+    forms: &[Form {
+        name: "cube",
+        place: Place::Stand,
+        parameters: &[Parameter::motion("coefficient", -2, 3, 0.0, 20.0)],
+        starts: &[&[0.01]],
+        build: |p| Action::beside(Cube { coefficient: p[0] }),
+    }],
+};
+
+struct Cube {
+    coefficient: f64,
+}
+
+impl Torque for Cube {
+    fn value(&self, _: &mut Memory, _: f64, speed: f64) -> f64 {
+        self.coefficient * speed.powi(3)
+    }
+
+    fn kick(&self, _: &mut Memory, _: f64, speed: f64, _: f64, impulse: f64) -> f64 {
+        speed / (1.0 + 2.0 * impulse * self.coefficient * speed * speed).sqrt()
+    }
+}

@@ -1,0 +1,93 @@
+//! A stop that the beam hits: beyond a displacement something else carries too.
+//!
+//! `n = k (x − clamp(x, −g, g))`, or beyond `g` to one side only. S. W. Shaw, P. J. Holmes, *A periodically forced
+//! piecewise linear oscillator*, J. Sound Vib. 90 (1983), 129. **Valid without impact losses.** Mistaken for
+//! `cubic-stiffness`, `saturation` and `bouc-wen-hysteresis`.
+
+use crate::effects::{Action, Effect, Form, Memory, Parameter, Place, Ruler, Torque};
+
+const GAP: Parameter = Parameter::motion("gap", 1, 0, 0.05, 2.0).by(Ruler::Peak);
+const UPPER: Parameter = Parameter::motion("gap", 1, 0, -1.0, 2.0).by(Ruler::Peak);
+const STIFFNESS: Parameter = Parameter::number("stiffness_ratio", 0.0, 1e4);
+const STARTS: &[&[f64]] = &[&[0.3, 0.5], &[0.5, 0.7], &[1.0, 0.85]];
+const TO_ONE_SIDE: &[&[f64]] = &[&[0.1, 0.05], &[0.3, 0.5], &[1.0, 0.8]];
+
+pub(super) static EFFECT: Effect = Effect {
+    name: "end-stop",
+    equation: "n = k (x - clamp(x, -g, g))",
+    source: "S. W. Shaw, P. J. Holmes, J. Sound Vib. 90 (1983), 129",
+    validity: "without impact losses",
+    mistaken_for: &["cubic-stiffness", "saturation", "bouc-wen-hysteresis"],
+    experiment: "a slow load and unload to both sides, past the displacement at which the stop sets in, and the response \
+                 at a level that does not reach it",
+    forms: &[
+        Form {
+            name: "both",
+            place: Place::Stand,
+            parameters: &[STIFFNESS, GAP],
+            starts: STARTS,
+            build: |p| Action::beside(Stop::both(p)),
+        },
+        Form {
+            name: "both-shown",
+            place: Place::Stand,
+            parameters: &[STIFFNESS, GAP],
+            starts: STARTS,
+            build: |p| Action::shown(Stop::both(p)),
+        },
+        Form {
+            name: "above",
+            place: Place::Stand,
+            parameters: &[STIFFNESS, UPPER],
+            starts: TO_ONE_SIDE,
+            build: |p| Action::beside(Stop::above(p)),
+        },
+        Form {
+            name: "below",
+            place: Place::Stand,
+            parameters: &[STIFFNESS, UPPER],
+            starts: TO_ONE_SIDE,
+            build: |p| Action::beside(Stop::below(p)),
+        },
+    ],
+};
+
+struct Stop {
+    stiffness: f64,
+    lower: f64,
+    upper: f64,
+}
+
+impl Stop {
+    fn both(p: &[f64]) -> Self {
+        Self {
+            stiffness: p[0],
+            lower: -p[1],
+            upper: p[1],
+        }
+    }
+
+    fn above(p: &[f64]) -> Self {
+        Self {
+            lower: f64::NEG_INFINITY,
+            ..Self::both(p)
+        }
+    }
+
+    fn below(p: &[f64]) -> Self {
+        Self {
+            upper: f64::INFINITY,
+            ..Self::both(p)
+        }
+    }
+}
+
+impl Torque for Stop {
+    fn value(&self, _: &mut Memory, x: f64, _: f64) -> f64 {
+        self.stiffness * (x - x.clamp(self.lower, self.upper))
+    }
+
+    fn has_zero(&self) -> bool {
+        true
+    }
+}

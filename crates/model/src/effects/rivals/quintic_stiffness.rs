@@ -1,0 +1,48 @@
+//! Stiffness that sets in with a higher power than the cube.
+//!
+//! `n = c x⁵`. I. Kovacic, M. J. Brennan (eds.), *The Duffing Equation* (2011), 1. **Valid where the cubic part is
+//! small.** Mistaken for `cubic-stiffness` and, through what four parameters can do, `bouc-wen-hysteresis`.
+
+use crate::effects::{Action, Effect, Form, Memory, Parameter, Place, Torque};
+
+const COEFFICIENT: &[Parameter] = &[Parameter::motion("coefficient", -4, 0, -0.02, 100.0)];
+const STARTS: &[&[f64]] = &[&[1e-3], &[-3e-4]];
+
+pub(super) static EFFECT: Effect = Effect {
+    name: "quintic-stiffness",
+    equation: "n = c x^5",
+    source: "I. Kovacic, M. J. Brennan (eds.), The Duffing Equation (2011), 1",
+    validity: "where the cubic part is small",
+    mistaken_for: &["cubic-stiffness", "bouc-wen-hysteresis"],
+    experiment: "a slow load and unload up to the largest load, and the response at three levels",
+    forms: &[
+        Form {
+            name: "beside",
+            place: Place::Stand,
+            parameters: COEFFICIENT,
+            starts: STARTS,
+            build: |p| Action::beside(Quintic { coefficient: p[0] }),
+        },
+        Form {
+            name: "shown",
+            place: Place::Stand,
+            parameters: COEFFICIENT,
+            starts: STARTS,
+            build: |p| Action::shown(Quintic { coefficient: p[0] }),
+        },
+    ],
+};
+
+struct Quintic {
+    coefficient: f64,
+}
+
+impl Torque for Quintic {
+    fn value(&self, _: &mut Memory, x: f64, _: f64) -> f64 {
+        self.coefficient * x.powi(5)
+    }
+
+    fn has_zero(&self) -> bool {
+        true
+    }
+}
