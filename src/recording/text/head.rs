@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use encoding_rs::WINDOWS_1252;
+
 use super::cell::Cell;
 use crate::failure::Failure;
 use crate::io::csv::{Delimiter, Dialect, Told, dialects, is_skipped};
@@ -13,6 +15,10 @@ const MOSTLY: f64 = 0.8;
 /// Most columns of text, as a part of all, in a table that is a recording.
 const TEXTS: f64 = 0.34;
 
+/// Rows that a list is told by.
+const LISTED: usize = 200;
+/// Most states of a switch.
+const STATES: usize = 3;
 /// Most rows of a list of results.
 const FEW_RESULTS: usize = 50;
 /// Lines that a maker is told from.
@@ -51,12 +57,16 @@ pub struct Table {
     pub has_texts: bool,
 }
 
-/// UTF-8, or else the Latin-1 of older recorders, in which any byte is a character.
+/// UTF-8, or else the Windows-1252 of older recorders (Latin-1 with quotation marks and dashes), in
+/// which any byte is a character.
 #[must_use]
 pub fn decode(bytes: &[u8]) -> String {
     match std::str::from_utf8(bytes) {
         Ok(text) => text.to_owned(),
-        Err(_) => bytes.iter().map(|byte| char::from(*byte)).collect(),
+        Err(_) => WINDOWS_1252
+            .decode_without_bom_handling(bytes)
+            .0
+            .into_owned(),
     }
 }
 
@@ -374,35 +384,17 @@ fn has_heading(head: &Head, table: &Table) -> bool {
 
 /// Refuses a list of settings or results: most of its columns hold texts.
 fn refuse_listing(head: &Head, table: &Table) -> Result<(), Failure> {
-    let rows: Vec<Vec<Cell>> = head.lines[table.first..]
+    let rows = first_cells(head, table);
+    let read: Vec<Vec<Cell>> = rows
         .iter()
-        .filter(|line| !is_skipped(&line.text))
-        .take(200)
-        .map(|line| {
-            let cells = table.dialect.cells(&line.text);
-            cells
-                .iter()
-                .map(|c| Cell::read(c, table.dialect.decimal))
+        .map(|row| {
+            row.iter()
+                .map(|cell| Cell::read(cell, table.dialect.decimal))
                 .collect()
         })
         .collect();
-    let names: Vec<String> = head.lines[table.first..]
-        .iter()
-        .filter(|line| !is_skipped(&line.text))
-        .map(|line| table.dialect.cells(&line.text).swap_remove(0))
-        .collect();
-    let texts = (0..table.width)
-        .filter(|place| {
-            let cells = rows.iter().filter_map(|row| row.get(*place));
-            let (mut texts, mut data) = (0, 0);
-            for cell in cells {
-                texts += usize::from(*cell == Cell::Text);
-                data += usize::from(cell.is_datum());
-            }
-            texts > data
-        })
-        .count();
-    if is_list_of_results(&rows, &names) {
+    let names: Vec<String> = rows.iter().filter_map(|row| row.first().cloned()).collect();
+    if is_list_of_results(&read, &names) {
         return Err(Failure::failed(format_args!(
             "the file is a list of results, not a recording: each of its {} rows from line {} on has a \
              name of its own in the first column; expected rows of numbers, one row for each moment",
@@ -410,6 +402,11 @@ fn refuse_listing(head: &Head, table: &Table) -> Result<(), Failure> {
             head.number(table.first)
         )));
     }
+    // Beside the time of each row, states such as those of alarms say nothing against a recording.
+    let has_time = (0..table.width).any(|place| is_clock(&read, place));
+    let texts = (0..table.width)
+        .filter(|place| is_text(&read, *place) && !(has_time && is_state(&rows, *place)))
+        .count();
     // One or two columns of remarks may stand beside a single signal.
     if texts > 2 && texts as f64 > TEXTS * table.width as f64 {
         return Err(Failure::failed(format_args!(
@@ -420,6 +417,42 @@ fn refuse_listing(head: &Head, table: &Table) -> Result<(), Failure> {
         )));
     }
     Ok(())
+}
+
+/// The cells of the first rows.
+fn first_cells(head: &Head, table: &Table) -> Vec<Vec<String>> {
+    head.lines[table.first..]
+        .iter()
+        .filter(|line| !is_skipped(&line.text))
+        .take(LISTED)
+        .map(|line| table.dialect.cells(&line.text))
+        .collect()
+}
+
+/// Whether a column holds more texts than data.
+fn is_text(rows: &[Vec<Cell>], place: usize) -> bool {
+    let (mut texts, mut data) = (0, 0);
+    for cell in rows.iter().filter_map(|row| row.get(place)) {
+        texts += usize::from(*cell == Cell::Text);
+        data += usize::from(cell.is_datum());
+    }
+    texts > data
+}
+
+/// Whether a column holds nothing but dates and times.
+fn is_clock(rows: &[Vec<Cell>], place: usize) -> bool {
+    rows.len() > 1
+        && rows
+            .iter()
+            .all(|row| matches!(row.get(place), Some(Cell::Clock(_))))
+}
+
+/// Whether a column holds few different texts, as switches and alarms do.
+fn is_state(rows: &[Vec<String>], place: usize) -> bool {
+    let mut states: Vec<&String> = rows.iter().filter_map(|row| row.get(place)).collect();
+    states.sort_unstable();
+    states.dedup();
+    states.len() <= STATES
 }
 
 /// Whether a few rows have names in the first column, no two the same and none of them a time.

@@ -24,6 +24,7 @@ use crate::io::csv::{self, Options};
 pub use clock::Clock;
 use decode::Text;
 use head::Head;
+pub(crate) use head::decode as decode_line;
 use keys::Entry;
 use table::Hints;
 

@@ -53,10 +53,10 @@ const SYNONYMS: [(&str, &str); 44] = [
 ];
 
 /// Units that no reckoning is done with, told from other words in round brackets all the same.
-const OTHERS: [&str; 34] = [
-    "W", "kW", "MW", "mW", "VA", "kVA", "var", "kvar", "J", "kJ", "Wh", "kWh", "Ah", "mAh", "dB",
-    "dBV", "dBm", "dBA", "counts", "cnt", "LSB", "digits", "inc", "ppm", "lx", "lm", "cd", "mol",
-    "T", "mT", "F", "Ohm", "kOhm", "F/s",
+const OTHERS: [&str; 35] = [
+    "C", "W", "kW", "MW", "mW", "VA", "kVA", "var", "kvar", "J", "kJ", "Wh", "kWh", "Ah", "mAh",
+    "dB", "dBV", "dBm", "dBA", "counts", "cnt", "LSB", "digits", "inc", "ppm", "lx", "lm", "cd",
+    "mol", "T", "mT", "F", "Ohm", "kOhm", "F/s",
 ];
 
 /// Words in the place of a unit that say there is none.
@@ -271,7 +271,11 @@ pub fn is_time(unit: &NamedUnit) -> bool {
 }
 
 /// Words that stand for time.
-const TIMES: [&str; 43] = [
+const TIMES: [&str; 47] = [
+    "時間",
+    "時刻",
+    "日時",
+    "日付",
     "ms",
     "msec",
     "millisecond",
@@ -377,9 +381,13 @@ pub fn is_axis_name(name: &str) -> bool {
 /// Whether a name stands for a number that counts samples.
 #[must_use]
 pub fn is_index_name(name: &str) -> bool {
-    const NAMES: [&str; 34] = [
+    const NAMES: [&str; 38] = [
+        "番号",
         "x",
         "#",
+        "nummer",
+        "store no.",
+        "sweep #",
         "n",
         "i",
         "nr",
@@ -414,7 +422,11 @@ pub fn is_index_name(name: &str) -> bool {
         "datapoint",
     ];
     let name = name.trim().trim_matches('"').to_lowercase();
-    NAMES.contains(&name.as_str())
+    // Nummer n, Index i
+    let with_symbol = name
+        .strip_suffix(['n', 'i'])
+        .and_then(|name| name.strip_suffix(' '));
+    NAMES.contains(&name.as_str()) || with_symbol.is_some_and(|name| NAMES.contains(&name))
 }
 
 #[cfg(test)]

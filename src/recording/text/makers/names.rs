@@ -78,9 +78,6 @@ pub const ALL: &[Maker] = &[
                 line.starts_with("SignalResolution:") || line.starts_with("HardwareXStart:")
             })
     }),
-    plain("GW Instek", |head| {
-        head.any(|line| line.starts_with("IntpDistance"))
-    }),
     plain("Siglent", |head| {
         head.any(|line| line.starts_with("Model Number,SDS"))
     }),

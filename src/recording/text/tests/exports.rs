@@ -1,0 +1,136 @@
+//! Layouts of exports in which something stands where another maker writes something else.
+
+use super::*;
+
+#[test]
+fn lecroy_says_when_its_only_segment_began() {
+    let head = "LECROYHDO9404,30152,Waveform\nSegments,1,SegmentSize,6\n\
+                Segment,TrigTime,TimeSinceSegment1\n#1,28-Dec-2020 13:34:10,0     \nTime,Ampl\n";
+    let body = rows(6, ",", &[&step(1e-3, 3), &wave]);
+    let text = format!("{head}{body}");
+    let with_comma = text.replace(',', ";").replace('.', ",");
+    let marks = [",", ";", "\t", " "].map(|mark| text.replace(',', mark));
+    for text in marks.iter().chain([&with_comma]) {
+        let found = read(text);
+        check(&found, &[("Ampl", "", 6)], Some(1000.0));
+        let start = found.channels[0].axis.start_text.as_deref();
+        assert_eq!(start, Some("28-Dec-2020 13:34:10"), "{text}");
+    }
+    // Two arrays over one time, under the line of the triggers.
+    let head = head.replace("Time,Ampl", "Time,Ampl,Ampl");
+    let found = read(&format!(
+        "{head}{}",
+        rows(6, ",", &[&step(1e-3, 3), &wave, &wave])
+    ));
+    check(&found, &[("Ampl", "", 6), ("Ampl", "", 6)], Some(1000.0));
+}
+
+#[test]
+fn dates_in_english_words() {
+    let head = "Name\tscope\nStarttime of export\t132959733843760000\tMonday, 2 May 2022\t15:56:24.376\n\n\
+                Name\tfast\nSampleTime[ms]\t1\n\n";
+    let found = read(&format!("{head}{}", rows(6, "\t", &[&step(1.0, 0), &wave])));
+    let start = found.channels[0].axis.start_text.as_deref();
+    assert_eq!(start, Some("Monday, 2 May 2022 15:56:24.376"));
+    let head = "Date:\tWednesday, May 12, 2021\nTime:\t10:11:12\nSampling rate [Hz]:\t1000\n\
+                Time\tFx\ns\tN\n";
+    let found = read(&format!(
+        "{head}{}",
+        rows(6, "\t", &[&step(1e-3, 3), &wave])
+    ));
+    let start = found.channels[0].axis.start_text.as_deref();
+    assert_eq!(start, Some("Wednesday, May 12, 2021 10:11:12"));
+}
+
+#[test]
+fn values_for_each_channel_in_one_cell() {
+    let head = "Record Length,Analog:5\nSample Interval,CH1:1.0E-03 CH2:1.0E-03\n\
+                Vertical Units,CH1:V CH2:A\nHorizontal Units,S\nModel Number,SDS2000\nSource,CH1,CH2\n";
+    let body = rows(5, ",", &[&step(1e-3, 3), &wave, &wave]);
+    let found = read(&format!("{head}Second,Volt,Ampere\n{body}"));
+    check(
+        &found,
+        &[("CH1", "Volt", 5), ("CH2", "Ampere", 5)],
+        Some(1000.0),
+    );
+    assert_eq!(found.channels[0].axis.assumed, None);
+    let found = read(&format!("{head}{body}"));
+    check(&found, &[("CH1", "V", 5), ("CH2", "A", 5)], Some(1000.0));
+    // Nothing but the line above the data says the units.
+    let head = "Source,CH1,CH2\nSample Interval,1e-3,1e-3\nSecond,Volt,Volt\n";
+    let found = read(&format!("{head}{body}"));
+    check(
+        &found,
+        &[("CH1", "Volt", 5), ("CH2", "Volt", 5)],
+        Some(1000.0),
+    );
+}
+
+#[test]
+fn rows_between_units_and_data() {
+    let body = rows(
+        5,
+        "\t",
+        &[&comma(step(0.02, 2)), &comma(wave), &comma(wave)],
+    );
+    let units = "Zeit  1 - Standardmessrate\tKraft\tWeg\ns\tkN\tmm\n";
+    for between in [
+        "Double\tDouble\tDouble\n",
+        "SampleRate: 50 Hz\tSampleRate: 50 Hz\tSampleRate: 50 Hz\nMX840\tMX840\tMX840\n",
+        "MX840 (SN 1)\tMX840 (SN 1)\tMX840 (SN 2)\nKanal 1\tKanal 2\tKanal 3\n",
+    ] {
+        let found = read(&format!("{units}{between}{body}"));
+        check(&found, &[("Kraft", "kN", 5), ("Weg", "mm", 5)], Some(50.0));
+    }
+}
+
+#[test]
+fn alarms_beside_the_channels() {
+    let head = "Number,Date&Time,ms,CH1,CH2,Alarm1-10,Alarm11-20,AlarmOut\n\
+                NO.,Time,ms,V,degC,A1234567890,A1234567890,A1234\n";
+    let body: String = (0..6)
+        .map(|row| {
+            let (seconds, ms) = (12 + row / 2, row % 2 * 500);
+            format!(
+                "{},2021-05-12 10:11:{seconds},{ms},+0.5,+25.0,LLLL,LLHL,LL\n",
+                row + 1
+            )
+        })
+        .collect();
+    let found = read(&format!("{head}{body}"));
+    check(&found, &[("CH1", "V", 6), ("CH2", "degC", 6)], Some(2.0));
+    // The same states without any time are a list.
+    let settings = "Ch,Gain,Filter,Coupling,Mode,Range\n1,10,On,DC,Diff,5\n2,10,On,AC,Diff,5\n\
+                    3,20,Off,DC,Diff,5\n";
+    assert!(failure(settings).contains("settings"));
+}
+
+#[test]
+fn units_of_loggers_and_of_remarks() {
+    let text = "Scan,Time,101 (C),102 (VDC)\n1,4/21/2026 13:39:54:460,25.0,1.5\n\
+                2,4/21/2026 13:39:54:960,25.1,1.6\n3,4/21/2026 13:39:55:460,25.2,1.7\n";
+    check(
+        &read(text),
+        &[("101", "C", 3), ("102", "VDC", 3)],
+        Some(2.0),
+    );
+    let text = "Time,Analog 1,Analog 2\nms,Motor speed [r/min],Torque [%]\n0.0,1.5,2.5\n0.5,1.6,2.5\n1.0,1.7,2.5\n";
+    check(
+        &read(text),
+        &[
+            ("Analog 1: Motor speed", "r/min", 3),
+            ("Analog 2: Torque", "%", 3),
+        ],
+        Some(2000.0),
+    );
+}
+
+#[test]
+fn numbers_in_place_of_time() {
+    let text = "MIN=1\t-1\nMAX=10\t1\nSCALE=1\t1\nDEC=0\t3\nDEF=\"Nummer\" n\t\"Spannung\" U / V\n\
+                1\t0,5\n2\t0,25\n3\t0,5\n4\t0,75\n";
+    check(&read(text), &[("Spannung U", "V", 4)], None);
+    let text = "Store No.,Date,Time,Millisecond,U-E1\n1,2021/05/12,10:11:12,0,1.5\n\
+                2,2021/05/12,10:11:12,500,1.6\n3,2021/05/12,10:11:13,0,1.7\n4,2021/05/12,10:11:13,500,1.7\n";
+    check(&read(text), &[("U-E1", "", 4)], Some(2.0));
+}
