@@ -95,6 +95,9 @@ impl Head {
                 });
             }
             offset += piece.len();
+            if lines.last().is_some_and(|line| is_end(&line.text)) {
+                break;
+            }
         }
         Self {
             lines,
@@ -169,7 +172,8 @@ pub fn find_in(head: &Head, told: &Told) -> Result<Table, Failure> {
         .filter_map(|dialect| Found::of(head, *dialect, strict_row))
         .collect();
     if let Some(best) = best(&strict) {
-        return Ok(unambiguous(head, &strict, best)?.table.clone());
+        let table = unambiguous(head, &strict, best)?.table.clone();
+        return Ok(below_numbering(head, table));
     }
     let lenient: Vec<Found> = all
         .iter()
@@ -180,6 +184,37 @@ pub fn find_in(head: &Head, told: &Told) -> Result<Table, Failure> {
     };
     refuse_listing(head, &best.table)?;
     Ok(best.table.clone())
+}
+
+/// The table without a first row that numbers the columns, `1,2,3`, from which time would fall back.
+fn below_numbering(head: &Head, mut table: Table) -> Table {
+    let mut rows = (table.first..head.lines.len())
+        .filter(|line| !is_skipped(&head.lines[*line].text))
+        .map(|line| (line, table.dialect.cells(&head.lines[line].text)));
+    let (Some((_, numbers)), Some((next, cells))) = (rows.next(), rows.next()) else {
+        return table;
+    };
+    let first = cells
+        .first()
+        .map(|cell| Cell::read(cell, table.dialect.decimal));
+    let falls = matches!(first, Some(Cell::Number(value)) if value < 1.0);
+    if table.width > 1 && numbers.len() >= table.width && is_numbering(&numbers) && falls {
+        table.first = next;
+    }
+    table
+}
+
+/// Whether cells number the columns: `1,2,3`.
+#[must_use]
+pub fn is_numbering(cells: &[String]) -> bool {
+    let mut numbered = cells.iter().zip(1_usize..);
+    cells.len() > 1 && numbered.all(|(cell, number)| *cell == number.to_string())
+}
+
+/// Whether a line says that the data end; what follows are lists of another kind.
+#[must_use]
+pub fn is_end(line: &str) -> bool {
+    line.trim_end() == "EOF"
 }
 
 /// What a line is as a row.

@@ -159,6 +159,15 @@ pub fn heading(text: &str) -> Heading {
     {
         return Heading::new(name.to_owned(), read(unit), None);
     }
+    // Temp, °C (LGR S/N: 1, SEN S/N: 2)
+    if let Some((front, _)) = text
+        .strip_suffix(')')
+        .and_then(|text| text.split_once(" ("))
+        && let Some((name, unit)) = front.rsplit_once(", ")
+        && let Some(unit) = read(unit)
+    {
+        return Heading::new(name.trim().to_owned(), Some(unit), None);
+    }
     for mark in [" in ", " / ", "/", ", "] {
         if let Some((name, unit)) = text.rsplit_once(mark)
             && read(text).is_none()
@@ -381,7 +390,8 @@ pub fn is_axis_name(name: &str) -> bool {
 /// Whether a name stands for a number that counts samples.
 #[must_use]
 pub fn is_index_name(name: &str) -> bool {
-    const NAMES: [&str; 38] = [
+    const NAMES: [&str; 39] = [
+        "frame",
         "番号",
         "x",
         "#",
@@ -446,6 +456,7 @@ mod tests {
             ("U/V", "U", Some("V"), true),
             ("\"Zeit\" t / s", "Zeit t", Some("s"), true),
             ("Kraft, N", "Kraft", Some("N"), true),
+            ("Temp, °C (S/N: 1, S/N: 2)", "Temp", Some("°C"), true),
             ("Time (s) Run #1", "Time Run #1", Some("s"), true),
             ("Flow [l/min]", "Flow", Some("l/min"), false),
             ("Force (Trigger)", "Force (Trigger)", None, false),

@@ -54,6 +54,48 @@ impl Sources<'_> {
         Ok(Some(best))
     }
 
+    /// Whether a column holds the time from one sample to the next, as `INTERVAL` of data loggers.
+    pub(super) fn is_steps(&self, place: usize) -> bool {
+        const NAMES: [&str; 4] = [
+            "interval",
+            "intervall",
+            "obtaining interval",
+            "interval time",
+        ];
+        let (field, values) = (&self.fields[place], &self.columns[place].values);
+        let usual = values.get(1).copied().unwrap_or(f64::NAN);
+        let same = values.iter().filter(|value| **value == usual).count();
+        NAMES.contains(&field.name.to_lowercase().as_str())
+            && !self.is_clock(place)
+            && self.fields.len() > 1
+            && 2 * same > values.len()
+            && values.iter().all(|value| *value >= 0.0)
+    }
+
+    /// Stamps as the sum of the times from sample to sample, where their unit is known.
+    pub(super) fn stamps_of_steps(&self) -> Option<Stamps> {
+        let place = (0..self.fields.len()).find(|place| self.is_steps(*place))?;
+        let unit = self.fields[place]
+            .unit
+            .as_ref()
+            .filter(|unit| units::is_time(unit))?;
+        let mut sum = 0.0;
+        let stamps_s = self.columns[place]
+            .values
+            .iter()
+            .enumerate()
+            .map(|(row, step)| {
+                sum += if row == 0 { 0.0 } else { *step };
+                sum * unit.unit.factor()
+            });
+        Some(Stamps {
+            heading: self.fields[place].heading.clone(),
+            stamps_s: stamps_s.collect(),
+            start_text: None,
+            assumed: None,
+        })
+    }
+
     fn clock_stamps(
         &self,
         place: usize,

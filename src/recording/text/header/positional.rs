@@ -43,14 +43,30 @@ pub(super) fn positional(rows: &[Row], table: &Table, used: &[bool]) -> Position
             .flatten()
             .map(|row| row.line),
     );
+    let repeated = fitting
+        .iter()
+        .find(|row| row.line + 1 == found.names.line)
+        .copied();
     let fields = (0..table.width)
-        .map(|place| found.field(place, upper))
+        .map(|place| with_unit_above(found.field(place, upper), filled(repeated, place)))
         .collect();
     Positional {
         fields,
         lines,
         names: Some(found.names.line),
     }
+}
+
+/// A column with the unit that stands beside its name in the row above the names, as that of
+/// `INTERVAL` below `INTERVAL[us]`.
+fn with_unit_above(mut field: Field, above: Option<&str>) -> Field {
+    let above = above.map(|above| Field::new(above, None));
+    if let Some(above) = above.filter(|above| above.name == field.name)
+        && field.unit_text.is_none()
+    {
+        (field.unit, field.unit_text) = (above.unit, above.unit_text);
+    }
+    field
 }
 
 impl Positional {
@@ -114,7 +130,7 @@ impl<'a> Headings<'a> {
                 (field.unit, field.unit_text) = (remark.unit, remark.unit_text);
             }
         }
-        if let Some(upper) = filled(upper, place) {
+        if let Some(upper) = filled(upper, place).filter(|_| place > 0) {
             field.name = format!("{upper} {}", field.name);
         }
         field
@@ -392,6 +408,12 @@ fn is_process_row(cells: &[String]) -> bool {
     !filled.is_empty() && (is_process || filled.iter().all(|cell| is_type(cell)))
 }
 
+/// Whether a row counts the channels that its cells are about: `Channel Data`, `CH 1`, `CH 2`.
+fn is_of_channels(row: &Row) -> bool {
+    let counts = |cell: &String| cell.ends_with(|c: char| c.is_ascii_digit());
+    row.cells.len() > 1 && row.cells[1..].iter().all(counts)
+}
+
 /// A row above the names that tells columns of the same name apart: `CH 1`, `CH 2` above `Voltage`.
 fn upper_names<'a>(names: &Row, fitting: &[&'a Row<'a>], used: &[bool]) -> Option<&'a Row<'a>> {
     let cells = |row: &Row| -> Vec<String> {
@@ -412,7 +434,7 @@ fn upper_names<'a>(names: &Row, fitting: &[&'a Row<'a>], used: &[bool]) -> Optio
     fitting
         .iter()
         .copied()
-        .filter(|row| row.line + 1 == names.line)
+        .filter(|row| row.line + 1 == names.line || row.line < names.line && is_of_channels(row))
         .find(|row| {
             let cells = cells(row);
             let is_text = |cell: &String| Cell::read(cell, b'.') == Cell::Text;

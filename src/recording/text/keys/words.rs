@@ -3,7 +3,14 @@
 use super::Topic;
 
 /// Keys that are about something exactly, in lower case without brackets.
-const EXACT: [(&str, Topic); 88] = [
+const EXACT: [(&str, Topic); 95] = [
+    ("x zero", Topic::Start),
+    ("x at 0%", Topic::Start),
+    ("x interval", Topic::Interval),
+    ("x resolution", Topic::Interval),
+    ("x unit", Topic::AxisUnit),
+    ("x size", Topic::Count),
+    ("nr of points", Topic::Count),
     ("開始時刻", Topic::Start),
     ("日付", Topic::Date),
     ("日時", Topic::Date),

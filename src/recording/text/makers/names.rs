@@ -26,6 +26,7 @@ pub const ALL: &[Maker] = &[
         is: |head| {
             head.any(|line| line.starts_with("Starttime of export"))
                 || head.any(|line| line.starts_with("SymbolComment"))
+                || head.any(|line| line.starts_with("SampleTime[ms]"))
         },
         hints: Hints {
             time_unit: Some("ms"),

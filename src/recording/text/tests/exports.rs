@@ -134,3 +134,85 @@ fn numbers_in_place_of_time() {
                 2,2021/05/12,10:11:12,500,1.6\n3,2021/05/12,10:11:13,0,1.7\n4,2021/05/12,10:11:13,500,1.7\n";
     check(&read(text), &[("U-E1", "", 4)], Some(2.0));
 }
+
+#[test]
+fn the_time_from_row_to_row() {
+    let types = "INTERVAL[us],INDEX,SHORT[DEC.0],FLOAT[1.6]\nINTERVAL,INDEX,D100,D102\n";
+    let body: String = (0..6)
+        .map(|row| {
+            format!(
+                "{},{},{},0.5\n",
+                if row == 0 { 0 } else { 500 },
+                row + 1,
+                row * 7
+            )
+        })
+        .collect();
+    let found = read(&format!("[LOGGING],CPU_1,2,3,4\n{types}{body}"));
+    check(&found, &[("D100", "", 6), ("D102", "", 6)], Some(2000.0));
+    // Beside the date and time of each row it says nothing new.
+    let types = "DATETIME[YYYY/MM/DD hh:mm:ss.s],INTERVAL[ns],INDEX,TRIGGER[*],SHORT[DEC.0]\n\
+                 TIME,INTERVAL,INDEX,TRIGGER,Speed\n";
+    let body: String = (0..6)
+        .map(|row| {
+            format!(
+                "2021/05/12 10:11:12.{row},100000000,{},,{}\n",
+                row + 1,
+                row * 7
+            )
+        })
+        .collect();
+    let found = read(&format!("[LOGGING],CPU_1,2,3,4\n{types}{body}"));
+    check(&found, &[("Speed", "", 6)], Some(10.0));
+    // An interval that changes from row to row is a signal.
+    let found = read("t [s],interval [ms]\n0,800\n1,812\n2,795\n3,803\n");
+    check(&found, &[("interval", "ms", 4)], Some(1.0));
+}
+
+#[test]
+fn a_row_that_numbers_the_columns() {
+    let head = "\"Time\",\"Torque\",\"Speed\"\n\"s\",\"Nm\",\"rpm\"\n\"1\",\"2\",\"3\"\n\n";
+    let body = rows(5, ",", &[&step(0.05, 2), &wave, &wave]);
+    let found = read(&format!("{head}{body}"));
+    check(
+        &found,
+        &[("Torque", "Nm", 5), ("Speed", "rpm", 5)],
+        Some(20.0),
+    );
+    // The same as a row of data.
+    let found = read("n,a,b\n1,2,3\n2,5,6\n3,8,4\n");
+    check(&found, &[("a", "", 3), ("b", "", 3)], None);
+}
+
+#[test]
+fn lists_after_the_end_of_the_data() {
+    let head = "Name\tscope\nStartRecord\t128783093223690000\tDonnerstag, 5. Februar 2009\t13:08:42\n\n\
+                Name\tfast\tName\tslow\nPort\t801\tPort\t801\nSampleTime[ms]\t1\tSampleTime[ms]\t2\n";
+    let body = "0\t1,5\t0\t5\n1\t1,6\t2\t6\n2\t1,7\n3\t1,8\nEOF\n";
+    let events = "\nTriggerevents\nName\tTime\nTG1\t132959733843760000\n1\t2\t3\t4\n5\t6\t7\t8\n";
+    let found = read(&format!("{head}{body}{events}"));
+    let told: Vec<_> = found
+        .channels
+        .iter()
+        .map(|c| (c.name.as_str(), c.samples.len(), c.axis.rate_hz))
+        .collect();
+    assert_eq!(told, [("fast", 4, Some(1000.0)), ("slow", 2, Some(500.0))]);
+    assert!(found.dialect.contains("TwinCAT"), "{}", found.dialect);
+    assert!(found.warnings.is_empty(), "{:?}", found.warnings);
+}
+
+#[test]
+fn labview_without_the_header_of_the_file() {
+    let text = "Channels\t3\t\t\t\nSamples\t3\t3\t3\t\nDate\t2024/05/02\t2024/05/02\t2024/05/02\t\n\
+                Time\t10:00:00.5\t10:00:00.5\t10:00:00.5\t\nY_Unit_Label\tVolts\t\tN\t\n\
+                X_Dimension\tTime\tTime\tTime\t\nX0\t0.0\t0.0\t0.0\t\nDelta_X\t0.001\t0.001\t0.001\t\n\
+                ***End_of_Header***\t\t\t\t\nX_Value\tA\tB\tC\tComment\n0.0\t1\t2\t3\n0.001\t2\t3\t4\n0.002\t3\t4\t5\n";
+    let found = read(text);
+    // A channel without a unit does not shift those of the others.
+    check(
+        &found,
+        &[("A", "Volts", 3), ("B", "", 3), ("C", "N", 3)],
+        Some(1000.0),
+    );
+    assert!(found.dialect.contains("LVM"), "{}", found.dialect);
+}
