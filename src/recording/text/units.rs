@@ -280,7 +280,11 @@ pub fn is_time(unit: &NamedUnit) -> bool {
 }
 
 /// Words that stand for time.
-const TIMES: [&str; 47] = [
+const TIMES: [&str; 51] = [
+    "heure",
+    "horodatage",
+    "durée",
+    "hora",
     "時間",
     "時刻",
     "日時",

@@ -194,6 +194,9 @@ impl Sources<'_> {
         if let Some(seconds) = epoch_unit(first) {
             return Ok(Some((seconds, None)));
         }
+        if is_spreadsheet_date(&field.name, values) {
+            return Ok(Some((86_400.0, None)));
+        }
         if let Some(unit) = self.default_time_unit.and_then(units::read) {
             return Ok(Some((unit.unit.factor(), None)));
         }
@@ -220,6 +223,19 @@ fn epoch_unit(first: f64) -> Option<f64> {
         v if (1e17..2e17).contains(&v) => Some(1e-7),
         _ => None,
     }
+}
+
+/// Whether a column holds dates as spreadsheets count them, in days since the end of 1899: between 1970
+/// and 2100, under a name that speaks of a date.
+fn is_spreadsheet_date(name: &str, values: &[f64]) -> bool {
+    let name = name.to_lowercase();
+    let is_date = ["date", "datum", "日付", "日時"]
+        .iter()
+        .any(|word| name.contains(word));
+    is_date
+        && values
+            .iter()
+            .all(|value| (25_569.0..73_051.0).contains(value))
 }
 
 fn rises(values: &[f64]) -> bool {

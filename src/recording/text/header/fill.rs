@@ -73,7 +73,7 @@ fn of_channels(value: &str) -> Vec<&str> {
         let channel = part.split_once(':').map_or("", |(channel, _)| channel);
         channel.ends_with(|c: char| c.is_ascii_digit())
     };
-    if parts.len() > 1 && parts.iter().all(|part| is_of_channel(part)) {
+    if parts.len() > 1 && parts.iter().all(is_of_channel) {
         parts
     } else {
         vec![value]

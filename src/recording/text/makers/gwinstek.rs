@@ -35,7 +35,9 @@ fn read(text: &Text, options: &Options) -> Result<Recording, Failure> {
     let (mut scaled, mut bare) = (Vec::new(), Vec::new());
     for (place, channel) in recording.channels.iter_mut().enumerate() {
         let said = |key: &str| of_channel(&details, key, place);
-        if said("Mode") != Some("Fast") || !is_whole(channel) {
+        // Older ones know no modes.
+        let is_fast = said("Mode").is_none_or(|mode| mode == "Fast");
+        if !is_fast || !is_whole(channel) {
             continue;
         }
         match volts_per_step(&said) {
@@ -87,12 +89,13 @@ fn of_channel<'a>(details: &'a [(String, String)], key: &str, place: usize) -> O
     values.nth(place)
 }
 
-/// Volts (or amperes) of a step, where the head leaves no doubt: the trace is not shifted, because the
-/// steps count from the middle of the screen, and the probe does not divide.
+/// Volts (or amperes) of a step, where the head leaves no doubt: the trace is not shifted (whether the
+/// steps count from the middle of the screen or from the zero of the trace is told differently), and no
+/// probe divides.
 fn volts_per_step<'a>(said: &impl Fn(&str) -> Option<&'a str>) -> Option<f64> {
     let number = |key: &str| keys::quantity(said(key)?, b'.').map(|(value, _)| value);
     let scale = number("Vertical Scale").filter(|scale| *scale > 0.0)?;
     let is_centred = number("Vertical Position") == Some(0.0);
     let probe = number("Probe Ratio").or_else(|| number("Probe"));
-    (is_centred && probe == Some(1.0)).then_some(scale / STEPS)
+    (is_centred && probe.is_none_or(|probe| probe == 1.0)).then_some(scale / STEPS)
 }

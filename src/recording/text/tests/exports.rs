@@ -179,6 +179,15 @@ fn a_row_that_numbers_the_columns() {
         &[("Torque", "Nm", 5), ("Speed", "rpm", 5)],
         Some(20.0),
     );
+    let quoted = body
+        .lines()
+        .map(|line| format!("\"{}\"\n", line.replace(',', "\",\"")));
+    let found = read(&format!("{head}{}", quoted.collect::<String>()));
+    check(
+        &found,
+        &[("Torque", "Nm", 5), ("Speed", "rpm", 5)],
+        Some(20.0),
+    );
     // The same as a row of data.
     let found = read("n,a,b\n1,2,3\n2,5,6\n3,8,4\n");
     check(&found, &[("a", "", 3), ("b", "", 3)], None);
@@ -215,4 +224,47 @@ fn labview_without_the_header_of_the_file() {
         Some(1000.0),
     );
     assert!(found.dialect.contains("LVM"), "{}", found.dialect);
+}
+
+#[test]
+fn loggers_beyond_their_range() {
+    let head = "\"Model\",\"GL980\"\n\"Trigger Time\",\"'2026/06/01 17:01:39\"\n\n\"Data\"\n\
+                \"NO.\",\"Time\",\"us\",\"CH1\",\"CH2\",\"CH3\",\"Logic1-4\",\"Alarm1-10\",\"AlarmOut\"\n\
+                \"\",\"\",\"\",\"V\",\"V\",\"degC\",\"\",\"\",\"\"\n";
+    let body: String = (0..6)
+        .map(|row| {
+            let beyond = if row == 3 { "+++++++" } else { "+0.512" };
+            format!(
+                "{},2026/06/01 17:01:39,{},+1.234,{beyond},BURNOUT,LLLL,LLLLLLLLLL,LLLL\n",
+                row + 1,
+                row * 100_000
+            )
+        })
+        .collect();
+    let found = read(&format!("{head}{body}"));
+    let three = [("CH1", "V", 6), ("CH2", "V", 6), ("CH3", "degC", 6)];
+    check(&found, &three, Some(10.0));
+    assert_eq!(found.channels[1].holes.len(), 1);
+    assert_eq!(found.channels[2].holes.len(), 6);
+    let start = found.channels[0].axis.start_text.as_deref();
+    assert_eq!(start, Some("2026/06/01 17:01:39"));
+}
+
+#[test]
+fn dates_of_spreadsheets_and_in_french() {
+    let body: String = (0..8)
+        .map(|row| {
+            format!(
+                "{};2{row},5\n",
+                format!("{:.12}", 46_296.375 + f64::from(row) * 10.0 / 86_400.0).replace('.', ",")
+            )
+        })
+        .collect();
+    let found = read(&format!("Date/Time;T enceinte\n;°C\n{body}"));
+    check(&found, &[("T enceinte", "°C", 8)], Some(0.1));
+    let text = "Heure;T;H\n;°C;%\n10:00:00;20,5;40\n10:00:10;20,6;41\n10:00:20;20,7;42\n";
+    check(&read(text), &[("T", "°C", 3), ("H", "%", 3)], Some(0.1));
+    let text = "Instrument,nanodac\n\nDate/Time,Four Z1,Messages\n,degC,\n01/10/2026 09:00:00,25.1,\n\
+                01/10/2026 09:00:01,25.2,Alarm 1 on\n01/10/2026 09:00:02,25.3,\n";
+    check(&read(text), &[("Four Z1", "degC", 3)], Some(1.0));
 }

@@ -78,6 +78,13 @@ fn gw_instek_in_steps_of_the_screen() {
         check(&found, &[("CH1", "", 4)], Some(1e6));
         assert_eq!(found.channels[0].samples[0], 25.0);
     }
+    // An older one, without modes and probes.
+    let older = head("1X", "0.00E+00")
+        .replace("Probe,1X\n", "")
+        .replace("Mode,Fast\n", "");
+    let found = read(&older);
+    check(&found, &[("CH1", "V", 4)], Some(1e6));
+    assert_eq!(found.channels[0].samples, [2.0, -4.0, 0.08, 0.0]);
     // Two channels, their keys again above each, an empty column after each.
     let head = "Format,1.0B,Format,1.0B,\nMemory Length,4,Memory Length,4,\nSource,CH1,Source,CH2,\n\
                 Vertical Units,V,Vertical Units,A,\nProbe Ratio,1.0,Probe Ratio,1.0,\n\
