@@ -5,12 +5,14 @@
 //! numbers and `axes` finds the time.
 
 mod axes;
+mod axis_names;
 mod cell;
 mod clock;
 mod decode;
 mod head;
 mod header;
 mod keys;
+mod listing;
 mod makers;
 mod rows;
 mod sparse;

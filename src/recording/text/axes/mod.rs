@@ -132,8 +132,10 @@ impl Sources<'_> {
             axis.rate_from = RateFrom::Given;
             axis.assumed = None;
         }
-        if axis.start_text.is_none() {
-            axis.start_text = keys::date_text(self.entries);
+        // Date and time in words are better than a count of ticks.
+        let is_count = |text: &String| text.bytes().all(|byte| byte.is_ascii_digit());
+        if axis.start_text.as_ref().is_none_or(is_count) {
+            axis.start_text = keys::date_text(self.entries).or(axis.start_text);
         }
         Ok(axis)
     }

@@ -32,6 +32,11 @@ fn dates_in_english_words() {
     let found = read(&format!("{head}{}", rows(6, "\t", &[&step(1.0, 0), &wave])));
     let start = found.channels[0].axis.start_text.as_deref();
     assert_eq!(start, Some("Monday, 2 May 2022 15:56:24.376"));
+    let ticks = |row: f64| format!("{}", 132_959_733_843_760_000_i64 + row as i64 * 10_000);
+    let found = read(&format!("{head}{}", rows(6, "\t", &[&ticks, &wave])));
+    check(&found, &[("fast", "", 6)], Some(1000.0));
+    let start = found.channels[0].axis.start_text.as_deref();
+    assert_eq!(start, Some("Monday, 2 May 2022 15:56:24.376"));
     let head = "Date:\tWednesday, May 12, 2021\nTime:\t10:11:12\nSampling rate [Hz]:\t1000\n\
                 Time\tFx\ns\tN\n";
     let found = read(&format!(
