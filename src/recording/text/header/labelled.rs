@@ -8,7 +8,10 @@ use crate::recording::text::units;
 
 /// Whether a cell labels the row of names.
 pub(super) fn is_name_label(cell: &str) -> bool {
-    const LABELS: [&str; 20] = [
+    const LABELS: [&str; 23] = [
+        "tag",
+        "tag name",
+        "tag no.",
         "channeltitle",
         "channel title",
         "name",

@@ -290,7 +290,9 @@ fn is_list_of_quantities(cells: &[String]) -> bool {
     let is_quantity = |cell: &&&String| {
         let value = value_of(cell);
         value.starts_with(|c: char| c.is_ascii_digit() || c == '-')
-            && keys::quantity(&value, b'.').is_some_and(|(_, unit)| is_unit_or_rate(&unit))
+            && keys::quantity(&value, b'.')
+                // 1 (V) is the name of a channel.
+                .is_some_and(|(_, unit)| !units::is_bracketed(&unit) && is_unit_or_rate(&unit))
     };
     let is_unknown = |cell: &&&String| value_of(cell).chars().all(|c| !c.is_alphanumeric());
     let quantities = values.iter().filter(is_quantity).count();

@@ -273,3 +273,23 @@ fn dates_of_spreadsheets_and_in_french() {
                 01/10/2026 09:00:01,25.2,Alarm 1 on\n01/10/2026 09:00:02,25.3,\n";
     check(&read(text), &[("Four Z1", "degC", 3)], Some(1.0));
 }
+
+#[test]
+fn channels_that_have_numbers_for_names() {
+    let body = rows(5, ",", &[&step(1e-3, 3), &wave, &wave]);
+    let found = read(&format!("Time (s),1 (V),2 (A)\n{body}"));
+    check(&found, &[("1", "V", 5), ("2", "A", 5)], Some(1000.0));
+    let head = "\"Model\",\"GX20\"\n\"Scan interval\",\"500ms\"\n\"Ch\",\"0001\",\"0002\"\n\
+                \"Tag\",\"Torque\",\"Temp\"\n\"Unit\",\"Nm\",\"C\"\n";
+    let body: String = (0..6)
+        .map(|row| {
+            format!(
+                "2021/05/12 10:11:1{}.{},1.5,20.{row}\n",
+                row / 2,
+                row % 2 * 5
+            )
+        })
+        .collect();
+    let found = read(&format!("{head}{body}"));
+    check(&found, &[("Torque", "Nm", 6), ("Temp", "C", 6)], Some(2.0));
+}
