@@ -23,14 +23,7 @@ pub fn file(content: &Content) -> File {
     let findings = examine(channels);
     let labels = labels(channels);
 
-    let mut warnings: Vec<Said> = recording
-        .lost
-        .iter()
-        .chain(&recording.warnings)
-        // What is said of each channel below need not be said of the file.
-        .filter(|warning| warning.code != "non-finite")
-        .map(|warning| said(warning.clone(), Vec::new()))
-        .collect();
+    let mut warnings = of_file(recording);
     for ((axis, members), found) in axes.iter().zip(&times) {
         let names: Vec<String> = members.iter().map(|i| labels[*i].clone()).collect();
         let all = members.len() == channels.len();
@@ -67,6 +60,18 @@ pub fn file(content: &Content) -> File {
             || content.inventory.as_ref().is_some_and(|i| i.is_lossy),
         mcap: content.inventory.clone(),
     }
+}
+
+/// What is wrong with the file as a whole.
+fn of_file(recording: &Recording) -> Vec<Said> {
+    recording
+        .lost
+        .iter()
+        .chain(&recording.warnings)
+        // What is said of each channel need not be said of the file.
+        .filter(|warning| warning.code != "non-finite")
+        .map(|warning| said(warning.clone(), Vec::new()))
+        .collect()
 }
 
 /// A warning with the names of the channels that it is about.

@@ -242,13 +242,9 @@ impl Lines {
     }
 }
 
-/// UTF-8, or else the Latin-1 of older recorders, in which any byte is a character.
+/// UTF-8, or else the Windows-1252 of older recorders.
 fn decode(bytes: &[u8]) -> String {
-    let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
-    match std::str::from_utf8(bytes) {
-        Ok(text) => text.to_owned(),
-        Err(_) => bytes.iter().map(|byte| char::from(*byte)).collect(),
-    }
+    crate::recording::text::decode_line(bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes))
 }
 
 /// Rows of numbers, most of them of one width.

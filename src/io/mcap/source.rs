@@ -54,6 +54,49 @@ pub struct Chosen {
     pub spacing: Spacing,
 }
 
+impl Chosen {
+    /// A number of a topic, before the time is chosen; `stamp` is the field of the time stamp.
+    fn of(channel: &Channel, route: &Route, stamp: Option<String>, spacing: Spacing) -> Self {
+        Self {
+            topic: channel.record.topic.clone(),
+            schema: channel.schema_name().to_owned(),
+            encoding: channel.record.message_encoding.clone(),
+            field: route.text.clone(),
+            number: route.number.name(),
+            unit: units::find(route, &channel.record.metadata),
+            time: TimeUsed {
+                choice: TimeChoice::Log,
+                field: stamp,
+                why: String::new(),
+            },
+            spacing,
+        }
+    }
+}
+
+/// The time that counts, and why: as told, or what the messages carry in a field.
+fn choice_of_time(
+    told: Option<TimeChoice>,
+    field: Option<&str>,
+    is_set: bool,
+) -> (TimeChoice, String) {
+    match (told, field) {
+        (Some(choice), _) => (choice, "as asked".to_owned()),
+        (None, Some(_)) if is_set => (
+            TimeChoice::Header,
+            "the messages carry their own time stamp".to_owned(),
+        ),
+        (None, Some(field)) => (
+            TimeChoice::Log,
+            format!("the field {field} is not set in the first messages"),
+        ),
+        (None, None) => (
+            TimeChoice::Log,
+            "the messages carry no time stamp of their own".to_owned(),
+        ),
+    }
+}
+
 /// A signal that is open for reading.
 pub struct Source {
     frames: Frames,
@@ -119,20 +162,7 @@ impl Source {
             stamp,
             spacing: spacing.hops().cloned(),
         };
-        let chosen = Chosen {
-            topic: topic.clone(),
-            schema: channel.schema_name().to_owned(),
-            encoding: channel.record.message_encoding.clone(),
-            field: route.text.clone(),
-            number: route.number.name(),
-            unit: units::find(&route, &channel.record.metadata),
-            time: TimeUsed {
-                choice: TimeChoice::Log,
-                field,
-                why: String::new(),
-            },
-            spacing: spacing.clone(),
-        };
+        let chosen = Chosen::of(&channel, &route, field, spacing.clone());
         let mut source = Self {
             decoder: Decoder::new(encoding, &schema, targets),
             frames,
@@ -318,30 +348,16 @@ impl Source {
                 read.ok().and_then(|()| self.reading.stamp_ns())
             })
             .collect();
+        if told == Some(TimeChoice::Header) && field.is_none() {
+            return Err(Failure::failed(format_args!(
+                "{}: topic {}: its messages have no time stamp (header.stamp, stamp or timestamp); \
+                 use --time log or --time publish",
+                self.frames.name(),
+                self.chosen.topic
+            )));
+        }
         let is_set = stamps.iter().flatten().any(|stamp| *stamp != 0);
-        let (choice, why) = match (told, &field) {
-            (Some(TimeChoice::Header), None) => {
-                return Err(Failure::failed(format_args!(
-                    "{}: topic {}: its messages have no time stamp (header.stamp, stamp or \
-                     timestamp); use --time log or --time publish",
-                    self.frames.name(),
-                    self.chosen.topic
-                )));
-            }
-            (Some(choice), _) => (choice, "as asked".to_owned()),
-            (None, Some(_)) if is_set => {
-                let why = "the messages carry their own time stamp";
-                (TimeChoice::Header, why.to_owned())
-            }
-            (None, Some(field)) => (
-                TimeChoice::Log,
-                format!("the field {field} is not set in the first messages"),
-            ),
-            (None, None) => {
-                let why = "the messages carry no time stamp of their own";
-                (TimeChoice::Log, why.to_owned())
-            }
-        };
+        let (choice, why) = choice_of_time(told, field.as_deref(), is_set);
         self.log_offset_ns = self.first.front().map_or(0, |message| {
             let log_ns = i64::try_from(message.log_time_ns).ok();
             let time_ns = match choice {

@@ -81,7 +81,10 @@ fn fortran(text: &str, decimal: u8) -> Option<f64> {
 
 /// Ways to say that there is no number, besides those of floating point: over range, no value.
 fn is_non_finite(text: &str) -> bool {
-    const WORDS: [&str; 16] = [
+    const WORDS: [&str; 19] = [
+        "burnout",
+        "open",
+        "overrange",
         "∞",
         "-∞",
         "+∞",
@@ -104,6 +107,13 @@ fn is_non_finite(text: &str) -> bool {
         || text.to_ascii_lowercase().starts_with("1.#")
         || WORDS.contains(&text.to_lowercase().as_str())
         || exceeds(text)
+        || is_over_range(text)
+}
+
+/// `+++++++` and `-------`, as Graphtec writes what lies beyond the range.
+fn is_over_range(text: &str) -> bool {
+    let all = |sign: u8| text.len() > 3 && text.bytes().all(|byte| byte == sign);
+    all(b'+') || all(b'-')
 }
 
 /// A number too large for an `f64`, such as 1e999.
@@ -181,7 +191,9 @@ mod tests {
         assert_eq!(Cell::read("", b'.'), Cell::Empty);
         assert_eq!(Cell::read("-1.5D-03", b'.'), Cell::Number(-0.0015));
         assert_eq!(Cell::read("15D", b'.'), Cell::Text);
-        for text in ["NaN", "-∞", "-1.#IND", "1e999", "N/A"] {
+        for text in [
+            "NaN", "-∞", "-1.#IND", "1e999", "N/A", "BURNOUT", "+++++++", "-------",
+        ] {
             assert_eq!(Cell::read(text, b'.'), Cell::NonFinite, "{text}");
         }
         assert!(matches!(Cell::read("12:00:01", b'.'), Cell::Clock(_)));

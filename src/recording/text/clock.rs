@@ -38,7 +38,7 @@ impl Clock {
     pub fn parse(text: &str) -> Option<Self> {
         let text = text.trim();
         // The shortest is 1:02:03, the longest has a date, 19 decimals and a zone.
-        if !(6..=60).contains(&text.len()) || !text.contains([':', '-', '.', '/']) {
+        if !(6..=60).contains(&text.len()) || !may_be_clock(text) {
             return None;
         }
         if let Some(nanoseconds) = time_of_day(text) {
@@ -70,6 +70,13 @@ impl Clock {
     pub fn total(self) -> i64 {
         i64::from(self.day.unwrap_or(0)) * DAY + self.nanoseconds.unwrap_or(0)
     }
+}
+
+/// Whether a text has a mark of dates or times in it, or ends in a year, as `2 May 2022` does.
+fn may_be_clock(text: &str) -> bool {
+    let is_year = |word: &str| word.len() == 4 && word.bytes().all(|b| b.is_ascii_digit());
+    text.contains([':', '-', '.', '/'])
+        || text.rsplit_once(' ').is_some_and(|(_, last)| is_year(last))
 }
 
 /// `h:mm:ss`, with decimals after `.`, `,` or `:`, with AM or PM, with a zone; `mm:ss.f`.
@@ -145,8 +152,8 @@ fn date(text: &str) -> Option<i32> {
         Some((weekday, rest)) if weekday.chars().all(char::is_alphabetic) => rest,
         _ => text,
     };
-    // 2. Mai 2022, but 2.5.2022 and 2. 5. 2022 as well.
-    let spaced = text.replace(". ", " ");
+    // 2. Mai 2022, but 2.5.2022 and 2. 5. 2022 as well; May 2, 2022.
+    let spaced = text.replace(". ", " ").replace(", ", " ");
     let text = spaced.as_str();
     let mark = text.chars().find(|c| matches!(c, '-' | '/' | '.' | ' '))?;
     let mut parts = text.split(mark).map(str::trim).filter(|p| !p.is_empty());
@@ -240,6 +247,10 @@ mod tests {
             "02-May-2022",
             "2. Mai 2022",
             "Montag, 2. Mai 2022",
+            "Monday, 2 May 2022",
+            "2 MAY 2022",
+            "Monday, May 2, 2022",
+            "May 2, 2022",
         ] {
             assert_eq!(Clock::parse(text).expect(text).day, Some(19_114), "{text}");
         }
@@ -280,6 +291,8 @@ mod tests {
             "V2.5.1999x",
             "0.00.0",
             "191179-001",
+            "Model 54 2022",
+            "Run 12 of 2022",
         ] {
             assert_eq!(Clock::parse(text), None, "{text}");
         }

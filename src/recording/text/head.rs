@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use encoding_rs::WINDOWS_1252;
+
 use super::cell::Cell;
 use crate::failure::Failure;
 use crate::io::csv::{Delimiter, Dialect, Told, dialects, is_skipped};
@@ -10,11 +12,7 @@ use crate::io::csv::{Delimiter, Dialect, Told, dialects, is_skipped};
 const HEADS: [usize; 4] = [1 << 15, 1 << 17, 1 << 20, 1 << 23];
 /// Part of the lines from the first row on that must be rows.
 const MOSTLY: f64 = 0.8;
-/// Most columns of text, as a part of all, in a table that is a recording.
-const TEXTS: f64 = 0.34;
 
-/// Most rows of a list of results.
-const FEW_RESULTS: usize = 50;
 /// Lines that a maker is told from.
 const FOR_NAMES: usize = 120;
 
@@ -51,12 +49,16 @@ pub struct Table {
     pub has_texts: bool,
 }
 
-/// UTF-8, or else the Latin-1 of older recorders, in which any byte is a character.
+/// UTF-8, or else the Windows-1252 of older recorders (Latin-1 with quotation marks and dashes), in
+/// which any byte is a character.
 #[must_use]
 pub fn decode(bytes: &[u8]) -> String {
     match std::str::from_utf8(bytes) {
         Ok(text) => text.to_owned(),
-        Err(_) => bytes.iter().map(|byte| char::from(*byte)).collect(),
+        Err(_) => WINDOWS_1252
+            .decode_without_bom_handling(bytes)
+            .0
+            .into_owned(),
     }
 }
 
@@ -85,6 +87,9 @@ impl Head {
                 });
             }
             offset += piece.len();
+            if lines.last().is_some_and(|line| is_end(&line.text)) {
+                break;
+            }
         }
         Self {
             lines,
@@ -159,7 +164,8 @@ pub fn find_in(head: &Head, told: &Told) -> Result<Table, Failure> {
         .filter_map(|dialect| Found::of(head, *dialect, strict_row))
         .collect();
     if let Some(best) = best(&strict) {
-        return Ok(unambiguous(head, &strict, best)?.table.clone());
+        let table = unambiguous(head, &strict, best)?.table.clone();
+        return Ok(below_numbering(head, table));
     }
     let lenient: Vec<Found> = all
         .iter()
@@ -168,8 +174,39 @@ pub fn find_in(head: &Head, told: &Told) -> Result<Table, Failure> {
     let Some(best) = best(&lenient) else {
         return Err(Failure::failed(no_table(head)));
     };
-    refuse_listing(head, &best.table)?;
+    super::listing::refuse(head, &best.table)?;
     Ok(best.table.clone())
+}
+
+/// The table without a first row that numbers the columns, `1,2,3`, from which time would fall back.
+fn below_numbering(head: &Head, mut table: Table) -> Table {
+    let mut rows = (table.first..head.lines.len())
+        .filter(|line| !is_skipped(&head.lines[*line].text))
+        .map(|line| (line, table.dialect.cells(&head.lines[line].text)));
+    let (Some((_, numbers)), Some((next, cells))) = (rows.next(), rows.next()) else {
+        return table;
+    };
+    let first = cells
+        .first()
+        .map(|cell| Cell::read(cell, table.dialect.decimal));
+    let falls = matches!(first, Some(Cell::Number(value)) if value < 1.0);
+    if table.width > 1 && numbers.len() >= table.width && is_numbering(&numbers) && falls {
+        table.first = next;
+    }
+    table
+}
+
+/// Whether cells number the columns: `1,2,3`.
+#[must_use]
+pub fn is_numbering(cells: &[String]) -> bool {
+    let mut numbered = cells.iter().zip(1_usize..);
+    cells.len() > 1 && numbered.all(|(cell, number)| *cell == number.to_string())
+}
+
+/// Whether a line says that the data end; what follows are lists of another kind.
+#[must_use]
+pub fn is_end(line: &str) -> bool {
+    line.trim_end() == "EOF"
 }
 
 /// What a line is as a row.
@@ -370,71 +407,6 @@ fn has_heading(head: &Head, table: &Table) -> bool {
                 .iter()
                 .all(|cell| Cell::read(cell, table.dialect.decimal) == Cell::Text)
     })
-}
-
-/// Refuses a list of settings or results: most of its columns hold texts.
-fn refuse_listing(head: &Head, table: &Table) -> Result<(), Failure> {
-    let rows: Vec<Vec<Cell>> = head.lines[table.first..]
-        .iter()
-        .filter(|line| !is_skipped(&line.text))
-        .take(200)
-        .map(|line| {
-            let cells = table.dialect.cells(&line.text);
-            cells
-                .iter()
-                .map(|c| Cell::read(c, table.dialect.decimal))
-                .collect()
-        })
-        .collect();
-    let names: Vec<String> = head.lines[table.first..]
-        .iter()
-        .filter(|line| !is_skipped(&line.text))
-        .map(|line| table.dialect.cells(&line.text).swap_remove(0))
-        .collect();
-    let texts = (0..table.width)
-        .filter(|place| {
-            let cells = rows.iter().filter_map(|row| row.get(*place));
-            let (mut texts, mut data) = (0, 0);
-            for cell in cells {
-                texts += usize::from(*cell == Cell::Text);
-                data += usize::from(cell.is_datum());
-            }
-            texts > data
-        })
-        .count();
-    if is_list_of_results(&rows, &names) {
-        return Err(Failure::failed(format_args!(
-            "the file is a list of results, not a recording: each of its {} rows from line {} on has a \
-             name of its own in the first column; expected rows of numbers, one row for each moment",
-            rows.len(),
-            head.number(table.first)
-        )));
-    }
-    // One or two columns of remarks may stand beside a single signal.
-    if texts > 2 && texts as f64 > TEXTS * table.width as f64 {
-        return Err(Failure::failed(format_args!(
-            "the file is a list of settings or results, not a recording: {texts} of the {} columns \
-             from line {} on hold texts; expected rows of numbers, one row for each moment",
-            table.width,
-            head.number(table.first)
-        )));
-    }
-    Ok(())
-}
-
-/// Whether a few rows have names in the first column, no two the same and none of them a time.
-fn is_list_of_results(rows: &[Vec<Cell>], names: &[String]) -> bool {
-    let is_name = |name: &&String| name.bytes().all(|byte| !byte.is_ascii_digit());
-    let distinct = || {
-        names
-            .iter()
-            .enumerate()
-            .all(|(place, name)| !names[..place].contains(name))
-    };
-    rows.len() <= FEW_RESULTS
-        && rows.iter().all(|row| row.first() == Some(&Cell::Text))
-        && names.iter().filter(is_name).count() == names.len()
-        && distinct()
 }
 
 fn no_table(head: &Head) -> String {

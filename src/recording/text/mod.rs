@@ -5,12 +5,14 @@
 //! numbers and `axes` finds the time.
 
 mod axes;
+mod axis_names;
 mod cell;
 mod clock;
 mod decode;
 mod head;
 mod header;
 mod keys;
+mod listing;
 mod makers;
 mod rows;
 mod sparse;
@@ -24,6 +26,7 @@ use crate::io::csv::{self, Options};
 pub use clock::Clock;
 use decode::Text;
 use head::Head;
+pub(crate) use head::decode as decode_line;
 use keys::Entry;
 use table::Hints;
 
@@ -177,7 +180,9 @@ fn general(text: &Text, hints: Hints, options: &Options) -> Result<Recording, Fa
             Err(_) if !parts.is_empty() => break,
             Err(failure) => return Err(failure),
         };
-        let is_last = part.end >= text.bytes.len() || part.end <= from;
+        let is_last = part.end >= text.bytes.len()
+            || part.end <= from
+            || head::is_end(&head::decode(line_at(&text.bytes, part.end)));
         (from, number) = (part.end, part.next_line);
         parts.push(part);
         if is_last {
@@ -191,6 +196,12 @@ fn general(text: &Text, hints: Hints, options: &Options) -> Result<Recording, Fa
         }
     }
     Ok(recording_of(parts))
+}
+
+/// The line that begins at an offset.
+fn line_at(text: &[u8], offset: usize) -> &[u8] {
+    let rest = &text[offset..];
+    &rest[..memchr::memchr(b'\n', rest).unwrap_or(rest.len())]
 }
 
 /// The numbers of a text that is one line of them, each in a line of its own: some oscilloscopes write

@@ -79,7 +79,7 @@ pub fn read_at(
         .map(|kind| kind.unwrap_or(Wanted::Numbers))
         .collect();
     let names = header.names.clone();
-    let is_next = |line: &str| stop(line) || names.as_deref() == Some(line);
+    let is_next = |line: &str| stop(line) || head::is_end(line) || names.as_deref() == Some(line);
     let offset = head.lines[first].offset;
     let number = head.number(first);
     let mut rows = rows::read(text, offset, number, table.dialect, &wanted, &is_next)?;
@@ -191,6 +191,7 @@ pub fn first_row(head: &Head, table: &Table, header: &Header) -> usize {
                 && read.len() >= table.width
                 && !cells[0].is_empty()
                 && read[0] != Cell::Text
+                && !head::is_numbering(&cells)
         })
         .last()
         .unwrap_or(table.first)

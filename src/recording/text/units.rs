@@ -4,6 +4,8 @@ use torqcomp_model::{Dimension, Unit};
 
 use crate::io::csv::NamedUnit;
 
+pub use super::axis_names::{is_axis_name, is_index_name, is_time_name};
+
 /// Other ways to write a unit, in lower case, and how torqcomp writes it.
 const SYNONYMS: [(&str, &str); 44] = [
     ("sekunde", "s"),
@@ -53,10 +55,10 @@ const SYNONYMS: [(&str, &str); 44] = [
 ];
 
 /// Units that no reckoning is done with, told from other words in round brackets all the same.
-const OTHERS: [&str; 34] = [
-    "W", "kW", "MW", "mW", "VA", "kVA", "var", "kvar", "J", "kJ", "Wh", "kWh", "Ah", "mAh", "dB",
-    "dBV", "dBm", "dBA", "counts", "cnt", "LSB", "digits", "inc", "ppm", "lx", "lm", "cd", "mol",
-    "T", "mT", "F", "Ohm", "kOhm", "F/s",
+const OTHERS: [&str; 35] = [
+    "C", "W", "kW", "MW", "mW", "VA", "kVA", "var", "kvar", "J", "kJ", "Wh", "kWh", "Ah", "mAh",
+    "dB", "dBV", "dBm", "dBA", "counts", "cnt", "LSB", "digits", "inc", "ppm", "lx", "lm", "cd",
+    "mol", "T", "mT", "F", "Ohm", "kOhm", "F/s",
 ];
 
 /// Words in the place of a unit that say there is none.
@@ -159,7 +161,16 @@ pub fn heading(text: &str) -> Heading {
     {
         return Heading::new(name.to_owned(), read(unit), None);
     }
-    for mark in [" in ", " / ", "/", ", "] {
+    // Temp, °C (LGR S/N: 1, SEN S/N: 2)
+    if let Some((front, _)) = text
+        .strip_suffix(')')
+        .and_then(|text| text.split_once(" ("))
+        && let Some((name, unit)) = front.rsplit_once(", ")
+        && let Some(unit) = read(unit)
+    {
+        return Heading::new(name.trim().to_owned(), Some(unit), None);
+    }
+    for mark in [" in ", " / ", "/", ", ", ";"] {
         if let Some((name, unit)) = text.rsplit_once(mark)
             && read(text).is_none()
             && !name.trim().is_empty()
@@ -270,153 +281,6 @@ pub fn is_time(unit: &NamedUnit) -> bool {
     unit.unit.dimension() == Dimension::new([0, 0, 1, 0, 0, 0])
 }
 
-/// Words that stand for time.
-const TIMES: [&str; 43] = [
-    "ms",
-    "msec",
-    "millisecond",
-    "milliseconds",
-    "millisekunden",
-    "us",
-    "usec",
-    "microsecond",
-    "microseconds",
-    "mikrosekunden",
-    "nanoseconds",
-    "subsec",
-    "sec",
-    "t",
-    "time",
-    "times",
-    "zeit",
-    "uhrzeit",
-    "zeitstempel",
-    "messzeit",
-    "timestamp",
-    "datum",
-    "date",
-    "datetime",
-    "elapsed",
-    "seconds",
-    "secs",
-    "second",
-    "sekunden",
-    "sekunde",
-    "millis",
-    "micros",
-    "tijd",
-    "temps",
-    "tiempo",
-    "tempo",
-    "reltime",
-    "abstime",
-    "systemtime",
-    "epoch",
-    "utc",
-    "clock",
-    "laufzeit",
-];
-/// Words before those that stand for time.
-const QUALIFIED: [&str; 16] = [
-    "rel",
-    "abs",
-    "elapsed",
-    "relative",
-    "absolute",
-    "test",
-    "sample",
-    "run",
-    "latest",
-    "total",
-    "local",
-    "system",
-    "ros",
-    "log",
-    "measurement",
-    "x",
-];
-
-/// Whether a name stands for time, or for the axis that is time in a recorder's export.
-#[must_use]
-pub fn is_time_name(name: &str) -> bool {
-    let lower = name.to_lowercase();
-    let words: Vec<&str> = lower
-        .split(|c: char| !c.is_alphanumeric() && c != '%')
-        .filter(|word| !word.is_empty())
-        .collect();
-    let is = |word: &str| {
-        let stem = word
-            .trim_start_matches('%')
-            .trim_end_matches(|c: char| c.is_ascii_digit());
-        let is_compound = (stem.ends_with("zeit") || stem.ends_with("time"))
-            && !["lifetime", "risetime", "deadtime", "totzeit", "overtime"].contains(&stem);
-        TIMES.contains(&stem) || is_compound
-    };
-    match words.as_slice() {
-        [] => false,
-        [one] => is(one),
-        // "elapsed time", "rel_time", "time stamp", "Date/Time", "Time 1 - default sample rate".
-        [first, .., last] => {
-            let first_is = is(first) && *first != "t" && *first != "second";
-            first_is && !["constant", "delay", "konstante"].contains(last)
-                || QUALIFIED.contains(first) && is(last)
-        }
-    }
-}
-
-/// Whether a name stands for the horizontal axis, which is time unless the file says otherwise.
-#[must_use]
-pub fn is_axis_name(name: &str) -> bool {
-    const NAMES: [&str; 12] = [
-        "x", "x-axis", "x_axis", "xaxis", "x axis", "x-achse", "x_value", "x value", "x values",
-        "x-value", "x-wert", "abscissa",
-    ];
-    NAMES.contains(&name.trim().to_lowercase().as_str())
-}
-
-/// Whether a name stands for a number that counts samples.
-#[must_use]
-pub fn is_index_name(name: &str) -> bool {
-    const NAMES: [&str; 34] = [
-        "x",
-        "#",
-        "n",
-        "i",
-        "nr",
-        "nr.",
-        "no",
-        "no.",
-        "index",
-        "idx",
-        "sample",
-        "samples",
-        "scan",
-        "sequence",
-        "seq",
-        "point",
-        "points",
-        "record",
-        "row",
-        "count",
-        "counter",
-        "messpunkt",
-        "messwert",
-        "punkt",
-        "zeile",
-        "lfd. nr.",
-        "sample number",
-        "sample no.",
-        "sample no",
-        "sample #",
-        "sample nr.",
-        "sample index",
-        "number",
-        "datapoint",
-    ];
-    let name = name.trim().trim_matches('"').to_lowercase();
-    NAMES.contains(&name.as_str())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -434,6 +298,13 @@ mod tests {
             ("U/V", "U", Some("V"), true),
             ("\"Zeit\" t / s", "Zeit t", Some("s"), true),
             ("Kraft, N", "Kraft", Some("N"), true),
+            (
+                "Channel 2;Group 1;°C",
+                "Channel 2;Group 1",
+                Some("°C"),
+                true,
+            ),
+            ("Temp, °C (S/N: 1, S/N: 2)", "Temp", Some("°C"), true),
             ("Time (s) Run #1", "Time Run #1", Some("s"), true),
             ("Flow [l/min]", "Flow", Some("l/min"), false),
             ("Force (Trigger)", "Force (Trigger)", None, false),
@@ -451,37 +322,6 @@ mod tests {
     fn every_synonym_leads_to_a_unit() {
         for (_, unit) in SYNONYMS {
             assert!(Unit::parse(unit).is_ok(), "{unit}");
-        }
-    }
-
-    #[test]
-    fn names_of_time() {
-        for name in [
-            "t",
-            "Time",
-            "Zeit",
-            "Elapsed Time",
-            "Time Stamp",
-            "Zeit  1 - Standardmessrate",
-            "TIMESTAMP",
-            "Date/Time",
-            "Time1",
-            "rel_time",
-            "%time",
-            "Uhrzeit",
-            "Time 1",
-        ] {
-            assert!(is_time_name(name), "{name}");
-        }
-        for name in [
-            "temperature",
-            "Torque",
-            "Timer setting",
-            "t_ambient",
-            "Time constant",
-            "X",
-        ] {
-            assert!(!is_time_name(name), "{name}");
         }
     }
 }

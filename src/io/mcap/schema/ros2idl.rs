@@ -193,7 +193,6 @@ impl<'a> Parser<'a, '_> {
             return Err(self.error("lists are nested too deeply"));
         }
         let first = self.next()?;
-        let number = |number| Ok(Written::Kind(Kind::Number(number)));
         match first {
             "sequence" => {
                 self.expect("<")?;
@@ -213,34 +212,47 @@ impl<'a> Parser<'a, '_> {
                 let [narrow, wide] = text.map(Written::Kind);
                 Ok(if first == "string" { narrow } else { wide })
             }
-            "boolean" => number(Number::Bool),
-            "octet" | "uint8" | "char" => number(Number::U8),
-            "int8" => number(Number::I8),
-            "short" | "int16" => number(Number::I16),
-            "uint16" => number(Number::U16),
-            "int32" => number(Number::I32),
-            "uint32" => number(Number::U32),
-            "int64" => number(Number::I64),
-            "uint64" => number(Number::U64),
-            "float" => number(Number::F32),
-            "double" => number(Number::F64),
-            "long" if self.skip("long") => number(Number::I64),
-            "long" if self.skip("double") => Err(self.error("\"long double\" is not supported")),
-            "long" => number(Number::I32),
-            "unsigned" => match self.next()? {
-                "short" => number(Number::U16),
-                "long" if self.skip("long") => number(Number::U64),
-                "long" => number(Number::U32),
-                other => Err(self.error(format_args!("\"unsigned {other}\" is no type"))),
-            },
             "wchar" | "map" | "any" | "fixed" | "union" => {
                 Err(self.error(format_args!("\"{first}\" is not supported")))
             }
-            name => {
-                let line = self.line();
-                Ok(Written::Named(name.to_owned(), self.scope.clone(), line))
-            }
+            name => match self.number(name)? {
+                Some(number) => Ok(Written::Kind(Kind::Number(number))),
+                None => {
+                    let line = self.line();
+                    Ok(Written::Named(name.to_owned(), self.scope.clone(), line))
+                }
+            },
         }
+    }
+
+    /// The number that a word is the type of, with the words that belong to it; `None` if it is a name.
+    fn number(&mut self, first: &str) -> Result<Option<Number>, SchemaError> {
+        let number = match first {
+            "boolean" => Number::Bool,
+            "octet" | "uint8" | "char" => Number::U8,
+            "int8" => Number::I8,
+            "short" | "int16" => Number::I16,
+            "uint16" => Number::U16,
+            "int32" => Number::I32,
+            "uint32" => Number::U32,
+            "int64" => Number::I64,
+            "uint64" => Number::U64,
+            "float" => Number::F32,
+            "double" => Number::F64,
+            "long" if self.skip("long") => Number::I64,
+            "long" if self.skip("double") => {
+                return Err(self.error("\"long double\" is not supported"));
+            }
+            "long" => Number::I32,
+            "unsigned" => match self.next()? {
+                "short" => Number::U16,
+                "long" if self.skip("long") => Number::U64,
+                "long" => Number::U32,
+                other => return Err(self.error(format_args!("\"unsigned {other}\" is no type"))),
+            },
+            _ => return Ok(None),
+        };
+        Ok(Some(number))
     }
 
     /// Dimensions behind a name, the last varies fastest.

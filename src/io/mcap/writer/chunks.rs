@@ -67,16 +67,8 @@ impl Chunk {
             return Ok(());
         };
         let packed = pack(compression, &self.records.0)?;
-        let logs = || self.places.values().flatten().map(|(log, _)| *log);
-        let span_ns = (logs().min().unwrap_or(0), logs().max().unwrap_or(0));
-        let mut front = Body::default();
-        front
-            .u64(span_ns.0)
-            .u64(span_ns.1)
-            .u64(self.records.0.len() as u64)
-            .u32(crc32fast::hash(&self.records.0))
-            .bytes(compression.as_bytes())
-            .u64(packed.len() as u64);
+        let span_ns = self.span_ns();
+        let front = self.front(span_ns, compression, packed.len());
         let offset = sink.offset();
         let length = (front.0.len() + packed.len()) as u64;
         sink.write(&[op::CHUNK])?;
@@ -92,6 +84,34 @@ impl Chunk {
             unpacked: self.records.0.len() as u64,
             ..ChunkEntry::default()
         };
+        self.write_places(sink, &mut entry)?;
+        index.chunks.push(entry);
+        self.records.0.clear();
+        self.places.clear();
+        Ok(())
+    }
+
+    /// Log times of the earliest and the latest message.
+    fn span_ns(&self) -> (u64, u64) {
+        let logs = || self.places.values().flatten().map(|(log, _)| *log);
+        (logs().min().unwrap_or(0), logs().max().unwrap_or(0))
+    }
+
+    /// What stands before the packed records.
+    fn front(&self, span_ns: (u64, u64), compression: &str, packed: usize) -> Body {
+        let mut front = Body::default();
+        front
+            .u64(span_ns.0)
+            .u64(span_ns.1)
+            .u64(self.records.0.len() as u64)
+            .u32(crc32fast::hash(&self.records.0))
+            .bytes(compression.as_bytes())
+            .u64(packed as u64);
+        front
+    }
+
+    /// An index of the messages for each channel, and where it is.
+    fn write_places<W: Write>(&self, sink: &mut Sink<W>, entry: &mut ChunkEntry) -> io::Result<()> {
         let indexes = sink.offset();
         for (channel, places) in &self.places {
             entry.index_offsets.insert(*channel, sink.offset());
@@ -104,9 +124,6 @@ impl Chunk {
             sink.record(op::MESSAGE_INDEX, &body.0)?;
         }
         entry.index_length = sink.offset() - indexes;
-        index.chunks.push(entry);
-        self.records.0.clear();
-        self.places.clear();
         Ok(())
     }
 }

@@ -198,62 +198,52 @@ fn varint(mut number: u64, out: &mut Vec<u8>) {
 /// `message Torque { google.protobuf.Timestamp timestamp = 1; string name = 2;
 /// double torque_n_m = 3; }`, with what it needs.
 fn descriptor() -> Vec<u8> {
-    let field = |name: &str, number, kind: Type, type_name: Option<&str>| FieldDescriptorProto {
+    let stamp_file = "google/protobuf/timestamp.proto";
+    let stamp_type = Some(".google.protobuf.Timestamp");
+    let stamp = vec![
+        field("seconds", 1, Type::Int64, None),
+        field("nanos", 2, Type::Int32, None),
+    ];
+    let torque = vec![
+        field("timestamp", 1, Type::Message, stamp_type),
+        field("name", 2, Type::String, None),
+        field("torque_n_m", 3, Type::Double, None),
+    ];
+    let mut files = vec![
+        file(stamp_file, "google.protobuf", "Timestamp", stamp),
+        file("torqcomp/torque.proto", "torqcomp", "Torque", torque),
+    ];
+    files[1].dependency.push(stamp_file.to_owned());
+    FileDescriptorSet { file: files }.encode_to_vec()
+}
+
+fn field(name: &str, number: i32, kind: Type, type_name: Option<&str>) -> FieldDescriptorProto {
+    FieldDescriptorProto {
         name: Some(name.to_owned()),
         number: Some(number),
         r#type: Some(kind as i32),
         label: Some(Label::Optional as i32),
         type_name: type_name.map(str::to_owned),
         ..Default::default()
-    };
-    let file = |name: &str, package: &str, needs: Vec<String>, message, fields| {
-        let message = DescriptorProto {
-            name: Some(message),
+    }
+}
+
+/// A file with one message.
+fn file(
+    name: &str,
+    package: &str,
+    message: &str,
+    fields: Vec<FieldDescriptorProto>,
+) -> FileDescriptorProto {
+    FileDescriptorProto {
+        name: Some(name.to_owned()),
+        package: Some(package.to_owned()),
+        message_type: vec![DescriptorProto {
+            name: Some(message.to_owned()),
             field: fields,
             ..Default::default()
-        };
-        FileDescriptorProto {
-            name: Some(name.to_owned()),
-            package: Some(package.to_owned()),
-            dependency: needs,
-            message_type: vec![message],
-            syntax: Some("proto3".to_owned()),
-            ..Default::default()
-        }
-    };
-    let stamp_file = "google/protobuf/timestamp.proto";
-    let stamp = vec![
-        field("seconds", 1, Type::Int64, None),
-        field("nanos", 2, Type::Int32, None),
-    ];
-    let torque = vec![
-        field(
-            "timestamp",
-            1,
-            Type::Message,
-            Some(".google.protobuf.Timestamp"),
-        ),
-        field("name", 2, Type::String, None),
-        field("torque_n_m", 3, Type::Double, None),
-    ];
-    let needs = vec![stamp_file.to_owned()];
-    let set = FileDescriptorSet {
-        file: vec![
-            file(
-                stamp_file,
-                "google.protobuf",
-                Vec::new(),
-                "Timestamp".to_owned(),
-                stamp,
-            ),
-            file(
-                "torqcomp/torque.proto",
-                "torqcomp",
-                needs,
-                "Torque".to_owned(),
-                torque,
-            ),
-        ],
-    };
-    set.encode_to_vec()
+        }],
+        syntax: Some("proto3".to_owned()),
+        ..Default::default()
+    }
 }

@@ -71,6 +71,11 @@ impl Sources<'_> {
         let has_data = |place: &usize| !self.columns[*place].values.is_empty();
         let used: Vec<usize> = (0..count).filter(has_data).collect();
         let mut roles = vec![Role::Nothing; count];
+        let steps: Vec<usize> = used.iter().copied().filter(|p| self.is_steps(*p)).collect();
+        for place in &steps {
+            roles[*place] = Role::Time;
+        }
+        let used: Vec<usize> = used.into_iter().filter(|p| !steps.contains(p)).collect();
         let named = self.time_places(&used)?;
         let index: Vec<usize> = used
             .iter()
@@ -104,7 +109,8 @@ impl Sources<'_> {
     /// The axis of a group.
     fn axis(&self, group: &Group, assumed: Option<&str>) -> Result<Axis, Failure> {
         let header = self.header_rate(group.channels.first().or(group.times.first()).copied());
-        let mut axis = match self.stamps(group, header.as_ref().map(|(_, hz)| *hz))? {
+        let stamps = self.stamps(group, header.as_ref().map(|(_, hz)| *hz))?;
+        let mut axis = match stamps.or_else(|| self.stamps_of_steps()) {
             Some(found) => {
                 let mut axis = Axis::of_stamps(&found.heading, Arc::new(found.stamps_s));
                 axis.assumed = match (assumed, found.assumed) {
@@ -126,8 +132,10 @@ impl Sources<'_> {
             axis.rate_from = RateFrom::Given;
             axis.assumed = None;
         }
-        if axis.start_text.is_none() {
-            axis.start_text = keys::date_text(self.entries);
+        // Date and time in words are better than a count of ticks.
+        let is_count = |text: &String| text.bytes().all(|byte| byte.is_ascii_digit());
+        if axis.start_text.as_ref().is_none_or(is_count) {
+            axis.start_text = keys::date_text(self.entries).or(axis.start_text);
         }
         Ok(axis)
     }

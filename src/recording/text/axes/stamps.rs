@@ -54,6 +54,48 @@ impl Sources<'_> {
         Ok(Some(best))
     }
 
+    /// Whether a column holds the time from one sample to the next, as `INTERVAL` of data loggers.
+    pub(super) fn is_steps(&self, place: usize) -> bool {
+        const NAMES: [&str; 4] = [
+            "interval",
+            "intervall",
+            "obtaining interval",
+            "interval time",
+        ];
+        let (field, values) = (&self.fields[place], &self.columns[place].values);
+        let usual = values.get(1).copied().unwrap_or(f64::NAN);
+        let same = values.iter().filter(|value| **value == usual).count();
+        NAMES.contains(&field.name.to_lowercase().as_str())
+            && !self.is_clock(place)
+            && self.fields.len() > 1
+            && 2 * same > values.len()
+            && values.iter().all(|value| *value >= 0.0)
+    }
+
+    /// Stamps as the sum of the times from sample to sample, where their unit is known.
+    pub(super) fn stamps_of_steps(&self) -> Option<Stamps> {
+        let place = (0..self.fields.len()).find(|place| self.is_steps(*place))?;
+        let unit = self.fields[place]
+            .unit
+            .as_ref()
+            .filter(|unit| units::is_time(unit))?;
+        let mut sum = 0.0;
+        let stamps_s = self.columns[place]
+            .values
+            .iter()
+            .enumerate()
+            .map(|(row, step)| {
+                sum += if row == 0 { 0.0 } else { *step };
+                sum * unit.unit.factor()
+            });
+        Some(Stamps {
+            heading: self.fields[place].heading.clone(),
+            stamps_s: stamps_s.collect(),
+            start_text: None,
+            assumed: None,
+        })
+    }
+
     fn clock_stamps(
         &self,
         place: usize,
@@ -152,6 +194,9 @@ impl Sources<'_> {
         if let Some(seconds) = epoch_unit(first) {
             return Ok(Some((seconds, None)));
         }
+        if is_spreadsheet_date(&field.name, values) {
+            return Ok(Some((86_400.0, None)));
+        }
         if let Some(unit) = self.default_time_unit.and_then(units::read) {
             return Ok(Some((unit.unit.factor(), None)));
         }
@@ -178,6 +223,19 @@ fn epoch_unit(first: f64) -> Option<f64> {
         v if (1e17..2e17).contains(&v) => Some(1e-7),
         _ => None,
     }
+}
+
+/// Whether a column holds dates as spreadsheets count them, in days since the end of 1899: between 1970
+/// and 2100, under a name that speaks of a date.
+fn is_spreadsheet_date(name: &str, values: &[f64]) -> bool {
+    let name = name.to_lowercase();
+    let is_date = ["date", "datum", "日付", "日時"]
+        .iter()
+        .any(|word| name.contains(word));
+    is_date
+        && values
+            .iter()
+            .all(|value| (25_569.0..73_051.0).contains(value))
 }
 
 fn rises(values: &[f64]) -> bool {

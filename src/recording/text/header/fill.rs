@@ -45,15 +45,16 @@ pub(super) fn fill_units(fields: &mut [Field], entries: &[Entry], used: &[bool])
             .find(move |entry| entry.topic() == Some(topic))
     };
     if let Some(entry) = about(Topic::Unit) {
-        let values: Vec<&String> = entry
+        let values: Vec<&str> = entry
             .values
             .iter()
             .filter(|value| !value.is_empty())
+            .flat_map(|value| of_channels(value))
             .collect();
         for (rank, place) in signals.iter().enumerate() {
             let text = match values.as_slice() {
-                [one] => one.as_str(),
-                several if several.len() == signals.len() => several[rank].as_str(),
+                [one] => one,
+                several if several.len() == signals.len() => several[rank],
                 // One above each column, where the key stands above the time.
                 _ if entry.values.len() + 1 == fields.len() && *place > 0 => {
                     above(&entry.values, fields, *place)
@@ -62,6 +63,20 @@ pub(super) fn fill_units(fields: &mut [Field], entries: &[Entry], used: &[bool])
             };
             set_unit(&mut fields[*place], text);
         }
+    }
+}
+
+/// What a value says of each channel, `CH1:V CH2:A`, or the value as it is.
+fn of_channels(value: &str) -> Vec<&str> {
+    let parts: Vec<&str> = value.split_whitespace().collect();
+    let is_of_channel = |part: &&str| {
+        let channel = part.split_once(':').map_or("", |(channel, _)| channel);
+        channel.ends_with(|c: char| c.is_ascii_digit())
+    };
+    if parts.len() > 1 && parts.iter().all(is_of_channel) {
+        parts
+    } else {
+        vec![value]
     }
 }
 

@@ -2,12 +2,16 @@
 
 use super::Row;
 use super::field::Field;
+use super::positional::is_nothing_but_units;
 use crate::recording::text::keys::{self, Topic};
 use crate::recording::text::units;
 
 /// Whether a cell labels the row of names.
 pub(super) fn is_name_label(cell: &str) -> bool {
-    const LABELS: [&str; 20] = [
+    const LABELS: [&str; 23] = [
+        "tag",
+        "tag name",
+        "tag no.",
         "channeltitle",
         "channel title",
         "name",
@@ -65,7 +69,10 @@ pub(super) fn labelled(rows: &[Row], used: &[bool]) -> Option<(Vec<Field>, usize
     if has_headings {
         return None;
     }
-    let units = about(Topic::Unit).copied();
+    let named = names.cells.iter().filter(|cell| !cell.is_empty()).count();
+    let units = about(Topic::Unit)
+        .copied()
+        .filter(|row| row.cells.len() >= named);
     // Without a row that says more, the label must stand above several columns.
     let is_alone = others.is_empty()
         || units.is_none() && about(Topic::Interval).is_none() && about(Topic::Rate).is_none();
@@ -73,9 +80,13 @@ pub(super) fn labelled(rows: &[Row], used: &[bool]) -> Option<(Vec<Field>, usize
     if is_alone && !is_repeated && !is_last_and_apart(rows, names.line) {
         return None;
     }
+    // Second,Volt right above the data.
+    let under = rows
+        .last()
+        .filter(|last| last.line > names.line && is_nothing_but_units(&last.cells));
     let fields = match is_beside_data(names, used) {
         true => fields_beside(names, units, used.len()),
-        false => fields_below(names, units, &others, used.len()),
+        false => fields_below(names, units, under, &others, used),
     };
     Some((fields, names.line))
 }
@@ -128,13 +139,27 @@ fn fields_beside(names: &Row, units: Option<&Row>, columns: usize) -> Vec<Field>
         .collect()
 }
 
-fn fields_below(names: &Row, units: Option<&Row>, others: &[&Row], columns: usize) -> Vec<Field> {
+/// Columns under their names. `under` are units right above the data, if there are any.
+fn fields_below(
+    names: &Row,
+    units: Option<&Row>,
+    under: Option<&Row>,
+    others: &[&Row],
+    used: &[bool],
+) -> Vec<Field> {
     let is_label = |place: usize| {
         let repeats = |row: &Row| row.cells.get(place) == row.cells.first();
         repeats(names)
             && others
                 .iter()
                 .all(|row| repeats(row) || row.cells.len() <= place)
+    };
+    // The values of each channel may stand under the labels, and nothing under the names.
+    let shifts = |place: usize| {
+        let columns = used.iter().enumerate().filter(|(_, used)| **used);
+        columns.clone().count() > 0 && columns.clone().all(|(place, _)| is_label(place)) && {
+            !used.get(place + 1).copied().unwrap_or(false)
+        }
     };
     // The first column may have a heading of its own below: `Time [ms]`.
     let is_heading = |row: &&&Row| row.cells[1..].iter().all(String::is_empty);
@@ -143,19 +168,27 @@ fn fields_below(names: &Row, units: Option<&Row>, others: &[&Row], columns: usiz
         .filter(is_heading)
         .map(|row| Field::new(&row.cells[0], None))
         .find(|field| field.is_named_time() && field.has_time_unit())
-        .unwrap_or_else(|| Field::new("time", None));
-    let field = |place: usize| match cell(Some(names), place) {
-        _ if is_label(place) => Field {
-            is_label: true,
-            ..time.clone()
-        },
-        Some(name) if !name.is_empty() && units.is_some() => {
-            Field::with_unit(name, cell(units, place))
+        .unwrap_or_else(|| Field::new("time", cell(under, 0)));
+    let named = |place: usize| match cell(Some(names), place) {
+        Some(name) if !name.is_empty() && units.or(under).is_some() => {
+            Field::with_unit(name, cell(units.or(under), place))
         }
         Some(name) if !name.is_empty() => Field::new(name, None),
         _ => Field::unnamed(place),
     };
-    (0..columns).map(field).collect()
+    let field = |place: usize| {
+        if !is_label(place) {
+            return named(place);
+        }
+        if shifts(place) {
+            return named(place + 1);
+        }
+        Field {
+            is_label: true,
+            ..time.clone()
+        }
+    };
+    (0..used.len()).map(field).collect()
 }
 
 /// The lines around one that no empty line parts from it.

@@ -1,7 +1,7 @@
 //! Columns named by the rows nearest above the data.
 
-use super::Row;
 use super::field::Field;
+use super::{Row, after_definition};
 use crate::io::csv::NamedUnit;
 use crate::recording::text::cell::Cell;
 use crate::recording::text::head::Table;
@@ -43,14 +43,30 @@ pub(super) fn positional(rows: &[Row], table: &Table, used: &[bool]) -> Position
             .flatten()
             .map(|row| row.line),
     );
+    let repeated = fitting
+        .iter()
+        .find(|row| row.line + 1 == found.names.line)
+        .copied();
     let fields = (0..table.width)
-        .map(|place| found.field(place, upper))
+        .map(|place| with_unit_above(found.field(place, upper), filled(repeated, place)))
         .collect();
     Positional {
         fields,
         lines,
         names: Some(found.names.line),
     }
+}
+
+/// A column with the unit that stands beside its name in the row above the names, as that of
+/// `INTERVAL` below `INTERVAL[us]`.
+fn with_unit_above(mut field: Field, above: Option<&str>) -> Field {
+    let above = above.map(|above| Field::new(above, None));
+    if let Some(above) = above.filter(|above| above.name == field.name)
+        && field.unit_text.is_none()
+    {
+        (field.unit, field.unit_text) = (above.unit, above.unit_text);
+    }
+    field
 }
 
 impl Positional {
@@ -76,6 +92,7 @@ struct Headings<'a> {
 impl<'a> Headings<'a> {
     /// From the rows that fit, the lowest first.
     fn of(fitting: &[&'a Row<'a>]) -> Option<Self> {
+        let fitting = above_remarks(fitting);
         let (names, units, remarks) = match fitting {
             [] => return None,
             [below, above, ..] if is_mixed(&below.cells, &above.cells) => {
@@ -106,12 +123,41 @@ impl<'a> Headings<'a> {
         let is_unit = below.is_some_and(|below| units::read(below).is_some());
         let mut field = Field::new(name, below.filter(|_| self.remarks.is_none() || is_unit));
         if let Some(remark) = filled(self.remarks, place).filter(|_| !is_unit) {
-            field.name = format!("{}: {remark}", field.name);
+            // The unit may follow: Analog 1 above Servo motor speed [r/min].
+            let remark = Field::new(remark, None);
+            field.name = format!("{}: {}", field.name, remark.name);
+            if field.unit_text.is_none() {
+                (field.unit, field.unit_text) = (remark.unit, remark.unit_text);
+            }
         }
-        if let Some(upper) = filled(upper, place) {
+        if let Some(upper) = filled(upper, place).filter(|_| place > 0) {
             field.name = format!("{upper} {}", field.name);
         }
         field
+    }
+}
+
+/// The rows from those on that name time above its unit, where they stand above rows of other kinds:
+/// `Time,Force` and `s,N` above the names of devices or of their inputs.
+fn above_remarks<'a, 'b>(fitting: &'b [&'a Row<'a>]) -> &'b [&'a Row<'a>] {
+    let is_time_above_unit = |pair: &[&Row]| {
+        let (below, above) = (pair[0], pair[1]);
+        let is_time = |(name, unit): (&String, &String)| {
+            units::is_time_name(name) && units::read(unit).is_some_and(|unit| units::is_time(&unit))
+        };
+        above.line + 1 == below.line
+            && is_units(&below.cells)
+            && above.cells.iter().zip(&below.cells).any(is_time)
+    };
+    let is_settled = |row: &Row| {
+        row.cells.iter().any(|cell| {
+            let field = Field::new(cell, None);
+            field.is_named_time() || field.has_time_unit()
+        })
+    };
+    match fitting.windows(2).position(is_time_above_unit) {
+        Some(place) if !fitting[..place].iter().any(|row| is_settled(row)) => &fitting[place..],
+        _ => fitting,
     }
 }
 
@@ -192,6 +238,10 @@ fn is_key_block(fitting: &[&Row], used: &[bool]) -> bool {
     let Some(nearest) = fitting.first() else {
         return false;
     };
+    // CASSY marks the line of the names.
+    if after_definition(nearest.text).is_some() {
+        return false;
+    }
     let is_time = nearest.cells.iter().any(|cell| {
         let field = Field::new(cell, None);
         field.is_named_time()
@@ -240,7 +290,9 @@ fn is_list_of_quantities(cells: &[String]) -> bool {
     let is_quantity = |cell: &&&String| {
         let value = value_of(cell);
         value.starts_with(|c: char| c.is_ascii_digit() || c == '-')
-            && keys::quantity(&value, b'.').is_some_and(|(_, unit)| is_unit_or_rate(&unit))
+            && keys::quantity(&value, b'.')
+                // 1 (V) is the name of a channel.
+                .is_some_and(|(_, unit)| !units::is_bracketed(&unit) && is_unit_or_rate(&unit))
     };
     let is_unknown = |cell: &&&String| value_of(cell).chars().all(|c| !c.is_alphanumeric());
     let quantities = values.iter().filter(is_quantity).count();
@@ -310,7 +362,7 @@ fn is_units(cells: &[String]) -> bool {
 }
 
 /// Whether a lone line above the data names its columns by their units: `s,V`.
-fn is_nothing_but_units(cells: &[String]) -> bool {
+pub(super) fn is_nothing_but_units(cells: &[String]) -> bool {
     let mut filled = cells.iter().filter(|cell| !cell.is_empty()).peekable();
     filled.peek().is_some() && filled.all(|cell| NamedUnit::parse(cell).is_some())
 }
@@ -332,14 +384,36 @@ fn is_mixed(below: &[String], above: &[String]) -> bool {
             .any(|cell| units::as_written(cell).is_some_and(|c| c.len() > 3))
 }
 
-/// Rows under the units that say how values were formed: `Avg`, `Smp`.
+/// Rows under the units that say how values were formed, `Avg`, `Smp`, or as what they are stored,
+/// `Double`, `REAL32`.
 fn is_process_row(cells: &[String]) -> bool {
     const WORDS: [&str; 14] = [
         "avg", "smp", "max", "min", "std", "tot", "raw", "actual", "scaled", "sample", "mean",
         "ts", "rn", "med",
     ];
-    let mut filled = cells.iter().filter(|cell| !cell.is_empty()).peekable();
-    filled.peek().is_some() && filled.all(|cell| WORDS.contains(&cell.to_lowercase().as_str()))
+    const TYPES: [&str; 14] = [
+        "double", "float", "single", "int", "integer", "uint", "real", "lreal", "bool", "boolean",
+        "string", "text", "numeric", "datetime",
+    ];
+    let is_type = |cell: &str| {
+        let stem = cell
+            .trim_start_matches("dt_")
+            .trim_end_matches(|c: char| c.is_ascii_digit());
+        TYPES.contains(&stem)
+    };
+    let filled: Vec<String> = cells
+        .iter()
+        .filter(|cell| !cell.is_empty())
+        .map(|cell| cell.to_lowercase())
+        .collect();
+    let is_process = filled.iter().all(|cell| WORDS.contains(&cell.as_str()));
+    !filled.is_empty() && (is_process || filled.iter().all(|cell| is_type(cell)))
+}
+
+/// Whether a row counts the channels that its cells are about: `Channel Data`, `CH 1`, `CH 2`.
+fn is_of_channels(row: &Row) -> bool {
+    let counts = |cell: &String| cell.ends_with(|c: char| c.is_ascii_digit());
+    row.cells.len() > 1 && row.cells[1..].iter().all(counts)
 }
 
 /// A row above the names that tells columns of the same name apart: `CH 1`, `CH 2` above `Voltage`.
@@ -362,7 +436,7 @@ fn upper_names<'a>(names: &Row, fitting: &[&'a Row<'a>], used: &[bool]) -> Optio
     fitting
         .iter()
         .copied()
-        .filter(|row| row.line < names.line)
+        .filter(|row| row.line + 1 == names.line || row.line < names.line && is_of_channels(row))
         .find(|row| {
             let cells = cells(row);
             let is_text = |cell: &String| Cell::read(cell, b'.') == Cell::Text;

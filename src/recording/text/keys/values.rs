@@ -92,7 +92,7 @@ pub fn rate_hz(entry: &Entry, place: Option<usize>, decimal: u8) -> Option<f64> 
         Some(place) => place,
         None => entry.values.iter().position(|value| !value.is_empty())?,
     };
-    let (value, own) = quantity(entry.values.get(at)?, decimal)?;
+    let (value, own) = quantity(of_first_channel(entry.values.get(at)?), decimal)?;
     let in_key = in_brackets(&entry.key).unwrap_or_default();
     // Sample Interval,4e-10,s
     let next = entry
@@ -110,6 +110,16 @@ pub fn rate_hz(entry: &Entry, place: Option<usize>, decimal: u8) -> Option<f64> 
     let hz = hertz(value, unit, is_interval)?;
     // A shorter decimal where the reciprocal of an interval is one but for rounding.
     Some(crate::io::csv::without_rounding(hz)).filter(|hz| hz.is_finite())
+}
+
+/// The first of values that are given for each channel, `CH1:1.0E-06 CH2:1.0E-06`, or the value as
+/// it is.
+fn of_first_channel(value: &str) -> &str {
+    let first = value.split_whitespace().next().unwrap_or_default();
+    match first.split_once(':') {
+        Some((channel, value)) if channel.ends_with(|c: char| c.is_ascii_digit()) => value,
+        _ => value,
+    }
 }
 
 /// Seconds that an entry gives.

@@ -3,7 +3,18 @@
 use super::Topic;
 
 /// Keys that are about something exactly, in lower case without brackets.
-const EXACT: [(&str, Topic); 84] = [
+const EXACT: [(&str, Topic); 95] = [
+    ("x zero", Topic::Start),
+    ("x at 0%", Topic::Start),
+    ("x interval", Topic::Interval),
+    ("x resolution", Topic::Interval),
+    ("x unit", Topic::AxisUnit),
+    ("x size", Topic::Count),
+    ("nr of points", Topic::Count),
+    ("開始時刻", Topic::Start),
+    ("日付", Topic::Date),
+    ("日時", Topic::Date),
+    ("時刻", Topic::Date),
     ("horizontalleft", Topic::Start),
     ("horizontalresolutionpp", Topic::Interval),
     ("horz_units", Topic::AxisUnit),
@@ -91,7 +102,13 @@ const EXACT: [(&str, Topic); 84] = [
 ];
 
 /// Words within keys, in the order in which they are looked for.
-const WITHIN: [(&str, Topic); 73] = [
+const WITHIN: [(&str, Topic); 79] = [
+    ("測定間隔", Topic::Interval),
+    ("サンプリング周期", Topic::Interval),
+    ("サンプリング間隔", Topic::Interval),
+    ("サンプリング時間", Topic::Interval),
+    ("測定点数", Topic::Count),
+    ("データ数", Topic::Count),
     ("axis delta", Topic::Interval),
     ("sample rate", Topic::Rate),
     ("samplerate", Topic::Rate),

@@ -65,18 +65,47 @@ fn read(text: &Text, options: &Options) -> Result<Recording, Failure> {
             recording.channels.extend(parts);
         }
         recording.segments = segments.list;
+    } else if let Some(start) = segments
+        .list
+        .first()
+        .and_then(|one| one.start_text.as_ref())
+    {
+        for channel in &mut recording.channels {
+            channel.axis.start_text = Some(start.clone());
+        }
     }
     Ok(recording)
 }
 
+/// The cells of a line above the table: between commas, semicolons, tabs or spaces, the date and the
+/// time of a trigger being one cell.
+fn cells(text: &str) -> Vec<String> {
+    let text = text.trim();
+    if let Some(mark) = [',', ';', '\t']
+        .into_iter()
+        .find(|mark| text.contains(*mark))
+    {
+        return text
+            .split(mark)
+            .map(|cell| cell.trim().to_owned())
+            .collect();
+    }
+    let words: Vec<&str> = text.split_whitespace().collect();
+    match words.as_slice() {
+        [number, date @ .., seconds] if number.starts_with('#') && !date.is_empty() => {
+            vec![(*number).to_owned(), date.join(" "), (*seconds).to_owned()]
+        }
+        [] => vec![String::new()],
+        words => words.iter().map(|word| (*word).to_owned()).collect(),
+    }
+}
+
 /// `Segments,N,SegmentSize,M` and the lines `#1,date time,seconds` below it.
 fn segments(head: &Head) -> Option<Segments> {
-    let cells =
-        |text: &str| -> Vec<String> { text.split(',').map(|c| c.trim().to_owned()).collect() };
     let place = head
         .lines
         .iter()
-        .position(|line| line.text.starts_with("Segments,"))?;
+        .position(|line| cells(&line.text)[0] == "Segments")?;
     let first = cells(&head.lines[place].text);
     let (count, size): (usize, usize) = (first.get(1)?.parse().ok()?, first.get(3)?.parse().ok()?);
     if count == 0 || size == 0 || count.checked_mul(size).is_none() {

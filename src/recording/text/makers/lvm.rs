@@ -20,7 +20,11 @@ const END: &str = "***End_of_Header***";
 /// The rule.
 pub const ALL: &[Maker] = &[Maker {
     name: "LabVIEW LVM",
-    is: |head| head.starts(0, "LabVIEW Measurement"),
+    is: |head| {
+        // The header of the file may be cut off.
+        let is_segment = || head.starts(0, "Channels") && head.any(|line| line.starts_with(END));
+        head.starts(0, "LabVIEW Measurement") || is_segment()
+    },
     hints: Hints {
         time_unit: Some("s"),
         unit: None,
@@ -68,7 +72,7 @@ fn read(text: &Text, options: &Options) -> Result<Recording, Failure> {
     recording.details.clone_from(&file.details);
     while lines.skip_to("Channels") {
         let place = recording.segments.len();
-        let header = segment_header(&mut lines, file.dialect);
+        let header = segment_header(&mut lines, &file);
         let names = lines.next().unwrap_or_default();
         let mut segment = Segment {
             name: format!("segment {}", place + 1),
@@ -154,8 +158,13 @@ fn file_header(lines: &mut Cursor, options: &Options) -> File {
     let mut decimal = None;
     let mut stamps = Stamps::No;
     let mut details = Vec::new();
+    let start = (lines.at, lines.number);
     while let Some(line) = lines.next() {
         if line.starts_with(END) {
+            break;
+        }
+        if line.starts_with("Channels") {
+            (lines.at, lines.number) = start;
             break;
         }
         let Some((key, value)) = line.split_once(['\t', ',', ';']) else {
@@ -190,16 +199,20 @@ fn file_header(lines: &mut Cursor, options: &Options) -> File {
     }
 }
 
-fn segment_header(lines: &mut Cursor, dialect: Dialect) -> Header {
+fn segment_header(lines: &mut Cursor, file: &File) -> Header {
     let mut header = Header::default();
     while let Some(line) = lines.next() {
         if line.starts_with(END) {
             break;
         }
-        let mut cells = dialect.cells(&line).into_iter();
+        let mut cells = file.dialect.cells(&line).into_iter();
         let key = cells.next().unwrap_or_default();
-        // With a column of times for each channel, the values stand above the channels alone.
-        let values: Vec<String> = cells.filter(|cell| !cell.is_empty()).collect();
+        // With a column of times for each channel, the values stand above the channels alone;
+        // otherwise an empty cell is that of a channel without a value.
+        let values: Vec<String> = match file.stamps {
+            Stamps::Multi => cells.filter(|cell| !cell.is_empty()).collect(),
+            Stamps::No | Stamps::One => cells.collect(),
+        };
         match key.as_str() {
             "Channels" => {
                 header.channels = values.first().and_then(|v| v.parse().ok()).unwrap_or(0);
@@ -217,11 +230,17 @@ fn segment_header(lines: &mut Cursor, dialect: Dialect) -> Header {
     header
 }
 
+/// The value of a channel, if there is one.
+fn of(values: &[String], place: usize) -> Option<&str> {
+    let value = values.get(place).map(String::as_str);
+    value.filter(|value| !value.is_empty())
+}
+
 /// Date and time of a channel.
 fn joined(dates: &[String], times: &[String], place: usize) -> Option<String> {
-    match (dates.get(place), times.get(place)) {
+    match (of(dates, place), of(times, place)) {
         (Some(date), Some(time)) => Some(format!("{date} {time}")),
-        (date, time) => date.or(time).cloned(),
+        (date, time) => date.or(time).map(str::to_owned),
     }
 }
 
@@ -234,21 +253,50 @@ fn segment_channels(
     recording: &mut Recording,
 ) -> Result<Vec<Channel>, Failure> {
     let names = file.dialect.cells(names);
-    // Names may go beyond the channels that the header counts, but for the comments.
+    let count = count(file, header, &names);
+    let columns = columns(lines, file, count)?;
+    let segment = recording.segments.len();
+    let mut channels = Vec::new();
+    for place in 0..count {
+        let (time, value) = match file.stamps {
+            Stamps::Multi => (2 * place, 2 * place + 1),
+            Stamps::No | Stamps::One => (0, 1 + place),
+        };
+        let unit = of(&header.units, place);
+        let field = of(&names, value).map_or_else(
+            || Field::new(&format!("channel {}", place + 1), unit),
+            |heading| Field::new(heading, unit),
+        );
+        let axis = axis(file, header, place, &columns[time], options);
+        let column = columns[value].clone();
+        if let Some(missing) = missing(header, place, &field, &column) {
+            recording.lost = recording.lost.take().or(Some(missing));
+        }
+        channels.push(channel(&field, column, axis, Some(segment)));
+    }
+    Ok(channels)
+}
+
+/// Number of channels: names may go beyond those that the header counts, but for the comments.
+fn count(file: &File, header: &Header, names: &[String]) -> usize {
     let named = names
         .iter()
         .skip(1)
         .filter(|name| !name.is_empty() && *name != "Comment")
         .count();
-    let count = match file.stamps {
+    match file.stamps {
         Stamps::Multi if named > 1 => header.channels.max(1).min(named),
         _ => header.channels.max(1).min(named.max(1)),
-    };
-    // A remark stands in the column after the last channel.
+    }
+}
+
+/// Reads the columns of a segment.
+fn columns(lines: &mut Cursor, file: &File, count: usize) -> Result<Vec<Column>, Failure> {
     let mut wanted = match file.stamps {
         Stamps::Multi => vec![Wanted::Numbers; 2 * count],
         Stamps::No | Stamps::One => vec![Wanted::Numbers; 1 + count],
     };
+    // A remark stands in the column after the last channel.
     wanted.push(Wanted::Nothing);
     let is_next = |line: &str| line.starts_with("Channels") || line.starts_with("***");
     let read = rows::read(
@@ -261,43 +309,21 @@ fn segment_channels(
     )?;
     lines.at = read.end;
     lines.number += read.lines;
-    let segment = recording.segments.len();
-    let mut channels = Vec::new();
-    for place in 0..count {
-        let (time, value) = match file.stamps {
-            Stamps::Multi => (2 * place, 2 * place + 1),
-            Stamps::No | Stamps::One => (0, 1 + place),
-        };
-        let heading = names.get(value).filter(|name| !name.is_empty());
-        let unit = header.units.get(place).map(String::as_str);
-        let field = heading.map_or_else(
-            || Field::new(&format!("channel {}", place + 1), unit),
-            |h| Field::new(h, unit),
-        );
-        let axis = axis(file, header, place, &read.columns[time], options);
-        let column = read.columns[value].clone();
-        if let Some(missing) = missing(header, place, &field, &column) {
-            recording.lost = recording.lost.take().or(Some(missing));
-        }
-        channels.push(channel(&field, column, axis, Some(segment)));
-    }
-    Ok(channels)
+    Ok(read.columns)
 }
 
 fn axis(file: &File, header: &Header, place: usize, times: &Column, options: &Options) -> Axis {
     let number = |values: &[String]| {
         // Where one value stands for all channels, it is the first.
-        let text = values.get(place).or(values.first())?;
+        let text = of(values, place).or_else(|| of(values, 0))?;
         number::cell(text, file.dialect.decimal)
     };
     let start_s = number(&header.starts);
     let header_hz = number(&header.steps)
         .filter(|step| *step > 0.0)
         .map(|step| without_rounding(1.0 / step));
-    let is_time = header
-        .dimensions
-        .get(place)
-        .is_none_or(|dimension| dimension.starts_with("Time"));
+    let is_time =
+        of(&header.dimensions, place).is_none_or(|dimension| dimension.starts_with("Time"));
     let mut axis = if file.stamps != Stamps::No || !times.values.is_empty() {
         Axis::of_stamps("X_Value", Arc::new(times.values.clone()))
     } else if is_time {
@@ -317,7 +343,7 @@ fn axis(file: &File, header: &Header, place: usize, times: &Column, options: &Op
 
 /// A warning if the header announces more samples than there are.
 fn missing(header: &Header, place: usize, field: &Field, column: &Column) -> Option<Warning> {
-    let said: usize = header.samples.get(place)?.parse().ok()?;
+    let said: usize = of(&header.samples, place)?.parse().ok()?;
     (said > column.values.len()).then(|| {
         Warning::new(
             "samples-missing",

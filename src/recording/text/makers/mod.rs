@@ -16,6 +16,7 @@ use crate::failure::Failure;
 use crate::io::csv::Options;
 use crate::recording::{Axis, Channel, Recording};
 
+mod gwinstek;
 mod lecroy;
 mod lvm;
 mod names;
@@ -43,6 +44,7 @@ pub const MAKERS: &[&[Maker]] = &[
     lecroy::ALL,
     tektronix::ALL,
     rigol::ALL,
+    gwinstek::ALL,
     names::ALL,
 ];
 

@@ -26,6 +26,7 @@ pub const ALL: &[Maker] = &[
         is: |head| {
             head.any(|line| line.starts_with("Starttime of export"))
                 || head.any(|line| line.starts_with("SymbolComment"))
+                || head.any(|line| line.starts_with("SampleTime[ms]"))
         },
         hints: Hints {
             time_unit: Some("ms"),
@@ -77,9 +78,6 @@ pub const ALL: &[Maker] = &[
             || head.any(|line| {
                 line.starts_with("SignalResolution:") || line.starts_with("HardwareXStart:")
             })
-    }),
-    plain("GW Instek", |head| {
-        head.any(|line| line.starts_with("IntpDistance"))
     }),
     plain("Siglent", |head| {
         head.any(|line| line.starts_with("Model Number,SDS"))

@@ -1,5 +1,6 @@
 //! Samples of every dialect, written from what is known of the formats.
 
+mod exports;
 mod layouts;
 mod makers;
 mod others;

@@ -54,8 +54,48 @@ fn whole_numbers_with_a_comma_at_the_end_of_each_line() {
                 Horizontal Units,s\nSampling Period,1.00E-06\nFirmware,V1.13\nTime, \nMode,Fast\n\
                 Waveform Data,\n";
     let found = read(&format!("{head}-23,\n-23,\n34,\n35,\n"));
-    check(&found, &[("CH1", "V", 4)], Some(1e6));
+    // Steps of the screen, and no scale to turn them into volts.
+    check(&found, &[("CH1", "", 4)], Some(1e6));
     assert_eq!(found.channels[0].samples, [-23.0, -23.0, 34.0, 35.0]);
+    assert_eq!(found.warnings[0].code, "screen-steps");
+}
+
+#[test]
+fn gw_instek_in_steps_of_the_screen() {
+    let head = |probe: &str, position: &str| {
+        format!(
+            "Memory Length,4\nSource,CH1\nProbe,{probe}\nVertical Units,V\nVertical Scale,2.00E+00\n\
+             Vertical Position,{position}\nHorizontal Units,s\nSampling Period,1.00E-06\nMode,Fast\n\
+             Waveform Data,\n25,\n-50,\n1,\n0,\n"
+        )
+    };
+    let found = read(&head("1X", "0.00E+00"));
+    check(&found, &[("CH1", "V", 4)], Some(1e6));
+    assert_eq!(found.channels[0].samples, [2.0, -4.0, 0.08, 0.0]);
+    assert_eq!(found.warnings[0].code, "screen-steps");
+    for text in [head("10X", "0.00E+00"), head("1X", "1.50E+00")] {
+        let found = read(&text);
+        check(&found, &[("CH1", "", 4)], Some(1e6));
+        assert_eq!(found.channels[0].samples[0], 25.0);
+    }
+    // An older one, without modes and probes.
+    let older = head("1X", "0.00E+00")
+        .replace("Probe,1X\n", "")
+        .replace("Mode,Fast\n", "");
+    let found = read(&older);
+    check(&found, &[("CH1", "V", 4)], Some(1e6));
+    assert_eq!(found.channels[0].samples, [2.0, -4.0, 0.08, 0.0]);
+    // Two channels, their keys again above each, an empty column after each.
+    let head = "Format,1.0B,Format,1.0B,\nMemory Length,4,Memory Length,4,\nSource,CH1,Source,CH2,\n\
+                Vertical Units,V,Vertical Units,A,\nProbe Ratio,1.0,Probe Ratio,1.0,\n\
+                Vertical Scale,5.0E+00,Vertical Scale,1.0E-01,\n\
+                Vertical Position,0.0,Vertical Position,0.0,\nHorizontal Units,S,Horizontal Units,S,\n\
+                Sampling Period,5.0E-05,Sampling Period,5.0E-05,\nMode,Fast,Mode,Fast,\n\
+                Waveform Data,,Waveform Data,,\n";
+    let found = read(&format!("{head}25,,5,\n-25,,10,\n0,,15,\n5,,-25,\n"));
+    check(&found, &[("CH1", "V", 4), ("CH2", "A", 4)], Some(2e4));
+    assert_eq!(found.channels[0].samples, [5.0, -5.0, 0.0, 1.0]);
+    assert!((found.channels[1].samples[3] + 0.1).abs() < 1e-15);
 }
 
 #[test]

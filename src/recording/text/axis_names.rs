@@ -1,0 +1,201 @@
+//! Names of columns that hold time, the horizontal axis, or the number of the sample.
+
+/// Words that stand for time.
+const TIMES: [&str; 51] = [
+    "heure",
+    "horodatage",
+    "durée",
+    "hora",
+    "時間",
+    "時刻",
+    "日時",
+    "日付",
+    "ms",
+    "msec",
+    "millisecond",
+    "milliseconds",
+    "millisekunden",
+    "us",
+    "usec",
+    "microsecond",
+    "microseconds",
+    "mikrosekunden",
+    "nanoseconds",
+    "subsec",
+    "sec",
+    "t",
+    "time",
+    "times",
+    "zeit",
+    "uhrzeit",
+    "zeitstempel",
+    "messzeit",
+    "timestamp",
+    "datum",
+    "date",
+    "datetime",
+    "elapsed",
+    "seconds",
+    "secs",
+    "second",
+    "sekunden",
+    "sekunde",
+    "millis",
+    "micros",
+    "tijd",
+    "temps",
+    "tiempo",
+    "tempo",
+    "reltime",
+    "abstime",
+    "systemtime",
+    "epoch",
+    "utc",
+    "clock",
+    "laufzeit",
+];
+/// Words before those that stand for time.
+const QUALIFIED: [&str; 16] = [
+    "rel",
+    "abs",
+    "elapsed",
+    "relative",
+    "absolute",
+    "test",
+    "sample",
+    "run",
+    "latest",
+    "total",
+    "local",
+    "system",
+    "ros",
+    "log",
+    "measurement",
+    "x",
+];
+
+/// Whether a name stands for time, or for the axis that is time in a recorder's export.
+#[must_use]
+pub fn is_time_name(name: &str) -> bool {
+    let lower = name.to_lowercase();
+    let words: Vec<&str> = lower
+        .split(|c: char| !c.is_alphanumeric() && c != '%')
+        .filter(|word| !word.is_empty())
+        .collect();
+    let is = |word: &str| {
+        let stem = word
+            .trim_start_matches('%')
+            .trim_end_matches(|c: char| c.is_ascii_digit());
+        let is_compound = (stem.ends_with("zeit") || stem.ends_with("time"))
+            && !["lifetime", "risetime", "deadtime", "totzeit", "overtime"].contains(&stem);
+        TIMES.contains(&stem) || is_compound
+    };
+    match words.as_slice() {
+        [] => false,
+        [one] => is(one),
+        // "elapsed time", "rel_time", "time stamp", "Date/Time", "Time 1 - default sample rate".
+        [first, .., last] => {
+            let first_is = is(first) && *first != "t" && *first != "second";
+            first_is && !["constant", "delay", "konstante"].contains(last)
+                || QUALIFIED.contains(first) && is(last)
+        }
+    }
+}
+
+/// Whether a name stands for the horizontal axis, which is time unless the file says otherwise.
+#[must_use]
+pub fn is_axis_name(name: &str) -> bool {
+    const NAMES: [&str; 12] = [
+        "x", "x-axis", "x_axis", "xaxis", "x axis", "x-achse", "x_value", "x value", "x values",
+        "x-value", "x-wert", "abscissa",
+    ];
+    NAMES.contains(&name.trim().to_lowercase().as_str())
+}
+
+/// Whether a name stands for a number that counts samples.
+#[must_use]
+pub fn is_index_name(name: &str) -> bool {
+    const NAMES: [&str; 39] = [
+        "frame",
+        "番号",
+        "x",
+        "#",
+        "nummer",
+        "store no.",
+        "sweep #",
+        "n",
+        "i",
+        "nr",
+        "nr.",
+        "no",
+        "no.",
+        "index",
+        "idx",
+        "sample",
+        "samples",
+        "scan",
+        "sequence",
+        "seq",
+        "point",
+        "points",
+        "record",
+        "row",
+        "count",
+        "counter",
+        "messpunkt",
+        "messwert",
+        "punkt",
+        "zeile",
+        "lfd. nr.",
+        "sample number",
+        "sample no.",
+        "sample no",
+        "sample #",
+        "sample nr.",
+        "sample index",
+        "number",
+        "datapoint",
+    ];
+    let name = name.trim().trim_matches('"').to_lowercase();
+    // Nummer n, Index i
+    let with_symbol = name
+        .strip_suffix(['n', 'i'])
+        .and_then(|name| name.strip_suffix(' '));
+    NAMES.contains(&name.as_str()) || with_symbol.is_some_and(|name| NAMES.contains(&name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_time() {
+        for name in [
+            "t",
+            "Time",
+            "Zeit",
+            "Elapsed Time",
+            "Time Stamp",
+            "Zeit  1 - Standardmessrate",
+            "TIMESTAMP",
+            "Date/Time",
+            "Time1",
+            "rel_time",
+            "%time",
+            "Uhrzeit",
+            "Time 1",
+        ] {
+            assert!(is_time_name(name), "{name}");
+        }
+        for name in [
+            "temperature",
+            "Torque",
+            "Timer setting",
+            "t_ambient",
+            "Time constant",
+            "X",
+        ] {
+            assert!(!is_time_name(name), "{name}");
+        }
+    }
+}

@@ -1,0 +1,106 @@
+//! Lists of settings and of results, which look like tables and are no recordings.
+
+use super::cell::Cell;
+use super::head::{Head, Table};
+use crate::failure::Failure;
+use crate::io::csv::is_skipped;
+
+/// Most columns of text, as a part of all, in a table that is a recording.
+const TEXTS: f64 = 0.34;
+/// Rows that a list is told by.
+const LISTED: usize = 200;
+/// Most states of a switch.
+const STATES: usize = 3;
+/// Most rows of a list of results.
+const FEW_RESULTS: usize = 50;
+
+/// Refuses a list of settings or results: most of its columns hold texts.
+///
+/// # Errors
+/// If it is one.
+pub fn refuse(head: &Head, table: &Table) -> Result<(), Failure> {
+    let rows = first_cells(head, table);
+    let read: Vec<Vec<Cell>> = rows
+        .iter()
+        .map(|row| {
+            row.iter()
+                .map(|cell| Cell::read(cell, table.dialect.decimal))
+                .collect()
+        })
+        .collect();
+    let names: Vec<String> = rows.iter().filter_map(|row| row.first().cloned()).collect();
+    if is_list_of_results(&read, &names) {
+        return Err(Failure::failed(format_args!(
+            "the file is a list of results, not a recording: each of its {} rows from line {} on has a \
+             name of its own in the first column; expected rows of numbers, one row for each moment",
+            rows.len(),
+            head.number(table.first)
+        )));
+    }
+    // Beside the time of each row, states such as those of alarms say nothing against a recording.
+    let has_time = (0..table.width).any(|place| is_clock(&read, place));
+    let texts = (0..table.width)
+        .filter(|place| is_text(&read, *place) && !(has_time && is_state(&rows, *place)))
+        .count();
+    // One or two columns of remarks may stand beside a single signal.
+    if texts > 2 && texts as f64 > TEXTS * table.width as f64 {
+        return Err(Failure::failed(format_args!(
+            "the file is a list of settings or results, not a recording: {texts} of the {} columns \
+             from line {} on hold texts; expected rows of numbers, one row for each moment",
+            table.width,
+            head.number(table.first)
+        )));
+    }
+    Ok(())
+}
+
+/// The cells of the first rows.
+fn first_cells(head: &Head, table: &Table) -> Vec<Vec<String>> {
+    head.lines[table.first..]
+        .iter()
+        .filter(|line| !is_skipped(&line.text))
+        .take(LISTED)
+        .map(|line| table.dialect.cells(&line.text))
+        .collect()
+}
+
+/// Whether a column holds more texts than data.
+fn is_text(rows: &[Vec<Cell>], place: usize) -> bool {
+    let (mut texts, mut data) = (0, 0);
+    for cell in rows.iter().filter_map(|row| row.get(place)) {
+        texts += usize::from(*cell == Cell::Text);
+        data += usize::from(cell.is_datum());
+    }
+    texts > data
+}
+
+/// Whether a column holds nothing but dates and times.
+fn is_clock(rows: &[Vec<Cell>], place: usize) -> bool {
+    rows.len() > 1
+        && rows
+            .iter()
+            .all(|row| matches!(row.get(place), Some(Cell::Clock(_))))
+}
+
+/// Whether a column holds few different texts, as switches and alarms do.
+fn is_state(rows: &[Vec<String>], place: usize) -> bool {
+    let mut states: Vec<&String> = rows.iter().filter_map(|row| row.get(place)).collect();
+    states.sort_unstable();
+    states.dedup();
+    states.len() <= STATES
+}
+
+/// Whether a few rows have names in the first column, no two the same and none of them a time.
+fn is_list_of_results(rows: &[Vec<Cell>], names: &[String]) -> bool {
+    let is_name = |name: &&String| name.bytes().all(|byte| !byte.is_ascii_digit());
+    let distinct = || {
+        names
+            .iter()
+            .enumerate()
+            .all(|(place, name)| !names[..place].contains(name))
+    };
+    rows.len() <= FEW_RESULTS
+        && rows.iter().all(|row| row.first() == Some(&Cell::Text))
+        && names.iter().filter(is_name).count() == names.len()
+        && distinct()
+}

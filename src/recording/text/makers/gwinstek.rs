@@ -1,0 +1,101 @@
+//! GW Instek exports. In the mode `Fast` they hold no volts but steps of the screen, 25 to a division
+//! (GDS-2000 user manual, page 121: "one division includes 25 points of horizontal and vertical data";
+//! GDS-2000A user manual, page 187: fast data are "recorded as integers").
+
+use super::Maker;
+use crate::failure::Failure;
+use crate::io::csv::Options;
+use crate::recording::text::decode::Text;
+use crate::recording::text::keys;
+use crate::recording::text::table::Hints;
+use crate::recording::{Channel, Recording};
+use crate::report::Warning;
+
+/// Steps of a division of the screen.
+const STEPS: f64 = 25.0;
+
+/// The rule.
+pub const ALL: &[Maker] = &[Maker {
+    name: "GW Instek",
+    is: |head| {
+        head.any(|line| line.starts_with("Waveform Data"))
+            && (head.starts(0, "Format,1.") || head.starts(0, "Memory Length,"))
+            || head.any(|line| line.starts_with("IntpDistance"))
+    },
+    hints: Hints {
+        time_unit: Some("s"),
+        unit: None,
+    },
+    read: Some(read),
+}];
+
+fn read(text: &Text, options: &Options) -> Result<Recording, Failure> {
+    let mut recording = crate::recording::text::general(text, ALL[0].hints, options)?;
+    let details = std::mem::take(&mut recording.details);
+    let (mut scaled, mut bare) = (Vec::new(), Vec::new());
+    for (place, channel) in recording.channels.iter_mut().enumerate() {
+        let said = |key: &str| of_channel(&details, key, place);
+        // Older ones know no modes.
+        let is_fast = said("Mode").is_none_or(|mode| mode == "Fast");
+        if !is_fast || !is_whole(channel) {
+            continue;
+        }
+        match volts_per_step(&said) {
+            Some(step) => {
+                channel.samples.iter_mut().for_each(|value| *value *= step);
+                scaled.push(channel.name.clone());
+            }
+            None => {
+                (channel.unit, channel.unit_text) = (None, None);
+                bare.push(channel.name.clone());
+            }
+        }
+    }
+    recording.warnings.extend(warning(&scaled, |names| {
+        format!(
+            "{names}: the file holds steps of the screen; they were scaled with 25 steps to a division \
+             and the \"Vertical Scale\" of the head"
+        )
+    }));
+    recording.warnings.extend(warning(&bare, |names| {
+        format!(
+            "{names}: the file holds steps of the screen, not the unit in its head, and \"Vertical \
+             Scale\", \"Vertical Position\" and \"Probe\" do not settle what a step is; save it in \
+             the mode Detail, or scale it yourself"
+        )
+    }));
+    recording.details = details;
+    Ok(recording)
+}
+
+fn warning(names: &[String], text: impl Fn(&str) -> String) -> Option<Warning> {
+    let quoted: Vec<String> = names.iter().map(|name| format!("\"{name}\"")).collect();
+    (!names.is_empty()).then(|| Warning::new("screen-steps", text(&quoted.join(", "))))
+}
+
+/// Whether all samples are whole numbers.
+fn is_whole(channel: &Channel) -> bool {
+    let mut finite = channel.samples.iter().filter(|value| value.is_finite());
+    finite.all(|value| value.fract() == 0.0)
+}
+
+/// The value of a key for a channel: the keys stand again above each of them.
+fn of_channel<'a>(details: &'a [(String, String)], key: &str, place: usize) -> Option<&'a str> {
+    let (_, values) = details.iter().find(|(name, _)| name == key)?;
+    let mut values = values
+        .split(',')
+        .map(str::trim)
+        .filter(|value| *value != key);
+    values.nth(place)
+}
+
+/// Volts (or amperes) of a step, where the head leaves no doubt: the trace is not shifted (whether the
+/// steps count from the middle of the screen or from the zero of the trace is told differently), and no
+/// probe divides.
+fn volts_per_step<'a>(said: &impl Fn(&str) -> Option<&'a str>) -> Option<f64> {
+    let number = |key: &str| keys::quantity(said(key)?, b'.').map(|(value, _)| value);
+    let scale = number("Vertical Scale").filter(|scale| *scale > 0.0)?;
+    let is_centred = number("Vertical Position") == Some(0.0);
+    let probe = number("Probe Ratio").or_else(|| number("Probe"));
+    (is_centred && probe.is_none_or(|probe| probe == 1.0)).then_some(scale / STEPS)
+}
