@@ -184,3 +184,28 @@ fn a_gain_that_swings_or_trembles_is_neither_noise_nor_an_effect() {
     let report = changed(&case, |row, y| y * (1.0 + trembles(row)));
     is_unexplained(&report, "the size of the signal from moment to moment");
 }
+
+/// A law that no list has is suspected, and no effect that resembles it is named. A hard stop asks for finer steps than
+/// a suspicion takes, so that more than the noise remains.
+#[test]
+fn laws_beside_the_list_are_suspected_and_not_added() {
+    for (number, law, most_over_noise) in [
+        (2, "end-stop", 3.0),
+        (5, "quintic-stiffness", 1.2),
+        (6, "cubic-damping", 1.2),
+    ] {
+        let case = make(7, "unlisted", number).expect("the catalogue has it");
+        let folder = folder(&case);
+        let report = folder.json(&diagnose(&["-o", "refined.toml", "--json"]));
+        assert_eq!(report["verdict"], "unexplained", "{law}");
+        assert_eq!(report["effects"], serde_json::json!([]), "{law}");
+        let suspected = &report["suspected"];
+        assert_eq!(suspected["law"], law, "{report}");
+        let left = suspected["holdout_rms"].as_f64().expect("a number") / noise_rms(&case);
+        assert!(left < most_over_noise, "{law}: {left}");
+        assert!(
+            !folder.read("refined.toml").contains("[[effects]]"),
+            "{law}"
+        );
+    }
+}

@@ -8,6 +8,9 @@ use super::{Action, Effect, Form, Parameter, Place, Ruler};
 
 const LIMIT: Parameter = Parameter::motion("limit", 1, 0, 0.05, 4.0).by(Ruler::Peak);
 
+/// A record far below the limit of a soft form bends all the same.
+const FAR_LIMIT: Parameter = Parameter::motion("limit", 1, 0, 0.05, 15.0).by(Ruler::Peak);
+
 pub(super) static EFFECT: Effect = Effect {
     name: "saturation",
     equation: "y = clamp(x, -L, L), or L tanh(x/L)",
@@ -79,8 +82,8 @@ pub(super) static EFFECT: Effect = Effect {
         Form {
             name: "soft",
             place: Place::Limit,
-            parameters: &[LIMIT],
-            starts: &[&[1.1], &[2.5]],
+            parameters: &[FAR_LIMIT],
+            starts: &[&[1.1], &[2.5], &[6.0]],
             build: |p| {
                 let limit = p[0];
                 Action::Transform {
