@@ -193,6 +193,9 @@ const SECOND_ROUNDS: usize = 5;
 /// Rounds of a fit.
 const MOST_ROUNDS: usize = 15;
 
+/// Standard uncertainties above zero from which on a parameter is not zero.
+const ABOVE_ZERO: f64 = 3.0;
+
 impl Judged<'_> {
     /// Rms over the training records.
     #[must_use]
@@ -223,6 +226,22 @@ impl Judged<'_> {
             + self.fitted.amplitudes.len()
             + waves.course
             + waves.fades_per_s.len()
+    }
+
+    /// A parameter that makes the last effect what it is called, but is zero as far as the training records tell.
+    #[must_use]
+    pub fn lacks(&self) -> Option<&'static str> {
+        let fitted = &self.fitted;
+        let last = fitted.structure.choices.last()?;
+        let first = fitted.structure.bounds().len() - last.moved();
+        let own = last.form.parameters.iter().take(last.moved()).enumerate();
+        let is_zero = |k: usize| {
+            let std = fitted.std[first + k].unwrap_or(0.0);
+            fitted.values[first + k] <= ABOVE_ZERO * std
+        };
+        own.filter(|(_, p)| p.essential)
+            .find(|(k, _)| is_zero(*k))
+            .map(|(_, p)| p.name)
     }
 
     /// Comparison with another model on the held-out records.

@@ -249,6 +249,11 @@ pub(super) fn refusal(judged: &Judged, before: &Judged) -> Option<String> {
             100.0 * gain / total
         ));
     }
+    if let Some(name) = judged.lacks() {
+        return Some(format!(
+            "its {name} is not different from zero: what it then describes is not what its name says"
+        ));
+    }
     if judged.criterion() >= before.criterion() {
         return Some("it does not pay for its parameters on the training records".to_owned());
     }

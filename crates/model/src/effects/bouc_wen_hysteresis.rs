@@ -12,7 +12,8 @@
 use super::{Action, Effect, Form, Memory, Parameter, Place, Torque};
 
 const PART: Parameter = Parameter::number("stiffness_ratio", 0.0, 50.0);
-const LOSS: Parameter = Parameter::motion("loss", -1, 0, 0.0, 100.0);
+/// Without loss the loops are closed: what is left is a bent spring.
+const LOSS: Parameter = Parameter::motion("loss", -1, 0, 0.0, 100.0).essential();
 const SHAPE: Parameter = Parameter::motion("shape", -1, 0, -100.0, 100.0);
 const SHARE: Parameter = Parameter::number("stiffness_share", 0.0, 1.0);
 const EXPONENT: Parameter = Parameter::number("exponent", 1.0, 5.0);

@@ -19,6 +19,7 @@ const fn grid(hz: f64) -> Parameter {
         upper: 1.0025 * hz,
         reciprocal: false,
         fades: false,
+        essential: false,
     }
 }
 

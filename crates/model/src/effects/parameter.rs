@@ -18,6 +18,8 @@ pub struct Parameter {
     /// Whether it is a corner in Hz with which what was before a record fades: an unknown share of that belongs to the
     /// record.
     pub fades: bool,
+    /// Whether the effect is not what its name says where this is zero.
+    pub essential: bool,
 }
 
 /// Unit of a parameter: recorded unit to a power, seconds to a power; or hertz.
@@ -74,6 +76,7 @@ impl Parameter {
             upper,
             reciprocal: false,
             fades: false,
+            essential: false,
         }
     }
 
@@ -88,6 +91,7 @@ impl Parameter {
             upper,
             reciprocal: false,
             fades: false,
+            essential: false,
         }
     }
 
@@ -108,6 +112,7 @@ impl Parameter {
             upper,
             reciprocal: false,
             fades: false,
+            essential: false,
         }
     }
 
@@ -126,6 +131,15 @@ impl Parameter {
     pub const fn fading(self) -> Self {
         Self {
             fades: true,
+            ..self
+        }
+    }
+
+    /// The same, as what makes the effect what it is called.
+    #[must_use]
+    pub const fn essential(self) -> Self {
+        Self {
+            essential: true,
             ..self
         }
     }

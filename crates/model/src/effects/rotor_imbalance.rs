@@ -44,4 +44,5 @@ const RATE: Parameter = Parameter {
     upper: 5000.0,
     reciprocal: false,
     fades: false,
+    essential: false,
 };
