@@ -79,6 +79,12 @@ pub fn typical_step(stamps: &[f64]) -> Option<f64> {
     if steps.is_empty() {
         return None;
     }
+    // Where all steps are within this part of any one of them, all are within the usual part of their median.
+    let any = steps[0];
+    let alike = |step: &f64| (step / any - 1.0).abs() <= 0.25 * USUAL;
+    if steps.iter().all(alike) {
+        return Some(steps.iter().sum::<f64>() / steps.len() as f64);
+    }
     let middle = steps.len() / 2;
     let (_, median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
     let median = *median;

@@ -23,6 +23,9 @@ pub fn transform(applied: &[f64], measured: &[f64], window: Window) -> Block {
     Transform::new(applied.len(), window).block(applied, measured)
 }
 
+/// Samples from which on both channels are transformed at the same time.
+const WORTH_A_THREAD: usize = 1 << 17;
+
 /// A transform of blocks of one length, with what does not change from block to block.
 struct Transform {
     plan: std::sync::Arc<dyn realfft::RealToComplex<f64>>,
@@ -49,10 +52,19 @@ impl Transform {
     }
 
     fn block(&self, applied: &[f64], measured: &[f64]) -> Block {
-        Block {
-            applied: self.spectrum(applied),
-            measured: self.spectrum(measured),
+        if applied.len() < WORTH_A_THREAD {
+            return Block {
+                applied: self.spectrum(applied),
+                measured: self.spectrum(measured),
+            };
         }
+        std::thread::scope(|scope| {
+            let beside = scope.spawn(|| self.spectrum(measured));
+            Block {
+                applied: self.spectrum(applied),
+                measured: beside.join().expect("a transform does not panic"),
+            }
+        })
     }
 
     fn spectrum(&self, samples: &[f64]) -> Vec<Complex64> {
