@@ -205,13 +205,14 @@ pub fn run<'a>(
     let coarse = records.substeps();
     let mut settled = true;
     let mut suspected = None;
+    let mut rest = dependence_before.clone();
     for _ in 0..MOST_EFFECTS {
         let base = Base::of(after.clone(), &records);
         let tried = search::try_all(&base, &records, threads, progress);
         let accepted = tried.first().filter(|t| t.status == Status::Accepted);
         let next = accepted.and_then(|t| t.judged.clone());
         rounds.push(tried);
-        if next.is_some() || remains(&after, &dependence(&after, &records), floor) {
+        if next.is_some() || remains(&after, &rest, floor) {
             suspected = rivals::best(&base, next.as_ref(), floor, &records, threads);
         }
         if let Some(rival) = &suspected {
@@ -226,17 +227,15 @@ pub fn run<'a>(
             break;
         }
         (after, settled) = candidate::refine_step(next, &mut records, coarse);
+        rest = dependence(&after, &records);
         // Where little is explained, or so little is left that no second effect could be named, none is looked for; nor
         // beside a law that no step of the integration settles.
         let explained = share(&before, &before, &after, floor);
-        if !settled
-            || !remains(&after, &dependence(&after, &records), floor)
-            || !(NAMED..1.0 - SECOND).contains(&explained)
+        if !settled || !remains(&after, &rest, floor) || !(NAMED..1.0 - SECOND).contains(&explained)
         {
             break;
         }
     }
-    let dependence = dependence(&after, &records);
     let floor = without_disturbances(floor, &after, &records);
     let lines = prominent_lines(&after, &records);
     let mut diagnosis = Diagnosis {
@@ -249,7 +248,7 @@ pub fn run<'a>(
         suspected,
         floor,
         dependence_before,
-        dependence,
+        dependence: rest,
         settled,
         verdict: Verdict::NothingMissing,
     };

@@ -4,23 +4,14 @@
 //! the frequency is that of the grid within ¼ %. **Valid for a steady grid.** Mistaken for an order of the shaft
 //! (`rotor-imbalance`) that falls on the same frequency.
 
-use super::{Action, Effect, Form, Line, Parameter, Place, Ruler, Unit};
+use super::{Action, Effect, Form, Line, Parameter, Place, Ruler};
 
 const fn amplitude(name: &'static str) -> Parameter {
     Parameter::motion(name, 1, 0, 0.0, 10.0)
 }
 
 const fn grid(hz: f64) -> Parameter {
-    Parameter {
-        name: "frequency",
-        unit: Unit::Hertz,
-        ruler: Ruler::Absolute,
-        lower: 0.9975 * hz,
-        upper: 1.0025 * hz,
-        reciprocal: false,
-        fades: false,
-        essential: false,
-    }
+    Parameter::frequency("frequency", 0.9975 * hz, 1.0025 * hz).by(Ruler::Absolute)
 }
 
 macro_rules! form {

@@ -84,14 +84,9 @@ impl Parameter {
     #[must_use]
     pub const fn frequency(name: &'static str, lower: f64, upper: f64) -> Self {
         Self {
-            name,
             unit: Unit::Hertz,
             ruler: Ruler::Motion,
-            lower,
-            upper,
-            reciprocal: false,
-            fades: false,
-            essential: false,
+            ..Self::number(name, lower, upper)
         }
     }
 
@@ -105,14 +100,9 @@ impl Parameter {
         upper: f64,
     ) -> Self {
         Self {
-            name,
             unit: Unit::Powers { recorded, second },
             ruler: Ruler::Motion,
-            lower,
-            upper,
-            reciprocal: false,
-            fades: false,
-            essential: false,
+            ..Self::number(name, lower, upper)
         }
     }
 

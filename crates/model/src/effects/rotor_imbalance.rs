@@ -36,13 +36,4 @@ pub(super) static EFFECT: Effect = Effect {
     ],
 };
 
-const RATE: Parameter = Parameter {
-    name: "frequency",
-    unit: super::Unit::Hertz,
-    ruler: Ruler::Absolute,
-    lower: 0.1,
-    upper: 5000.0,
-    reciprocal: false,
-    fades: false,
-    essential: false,
-};
+const RATE: Parameter = Parameter::frequency("frequency", 0.1, 5000.0).by(Ruler::Absolute);
