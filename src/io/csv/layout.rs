@@ -234,7 +234,8 @@ impl Lines {
         for piece in head.split_inclusive(|byte| *byte == b'\n') {
             // A line that goes on after the head says nothing for sure.
             if complete || piece.ends_with(b"\n") {
-                lines.push((start, decode(piece)));
+                let marked = piece.strip_prefix(BYTE_ORDER_MARK);
+                lines.push((start, decode_line(marked.unwrap_or(piece))));
             }
             start += piece.len();
         }
@@ -242,9 +243,17 @@ impl Lines {
     }
 }
 
-/// UTF-8, or else the Windows-1252 of older recorders.
-fn decode(bytes: &[u8]) -> String {
-    crate::recording::text::decode_line(bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes))
+/// UTF-8, or else the Windows-1252 of older recorders (Latin-1 with quotation marks and dashes), in
+/// which any byte is a character.
+#[must_use]
+pub fn decode_line(bytes: &[u8]) -> String {
+    match std::str::from_utf8(bytes) {
+        Ok(text) => text.to_owned(),
+        Err(_) => encoding_rs::WINDOWS_1252
+            .decode_without_bom_handling(bytes)
+            .0
+            .into_owned(),
+    }
 }
 
 /// Rows of numbers, most of them of one width.

@@ -16,7 +16,7 @@ use crate::report::Warning;
 
 pub use chunks::{Chunks, Piece};
 pub(crate) use columns::{list, time_column};
-pub use layout::{Delimiter, Dialect, Layout, Told, is_skipped};
+pub use layout::{Delimiter, Dialect, Layout, Told, decode_line, is_skipped};
 pub(crate) use layout::{dialects, find as find_layout_in, is_not_a_number};
 pub use names::{Column, NamedUnit};
 pub use scan::{Defect, Problem, RowPlan, Rows, place_of};

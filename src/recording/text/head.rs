@@ -2,11 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use encoding_rs::WINDOWS_1252;
-
 use super::cell::Cell;
 use crate::failure::Failure;
-use crate::io::csv::{Delimiter, Dialect, Told, dialects, is_skipped};
+use crate::io::csv::{Delimiter, Dialect, Told, decode_line, dialects, is_skipped};
 
 /// Bytes that a table is looked for in, and more if there is none.
 const HEADS: [usize; 4] = [1 << 15, 1 << 17, 1 << 20, 1 << 23];
@@ -49,19 +47,6 @@ pub struct Table {
     pub has_texts: bool,
 }
 
-/// UTF-8, or else the Windows-1252 of older recorders (Latin-1 with quotation marks and dashes), in
-/// which any byte is a character.
-#[must_use]
-pub fn decode(bytes: &[u8]) -> String {
-    match std::str::from_utf8(bytes) {
-        Ok(text) => text.to_owned(),
-        Err(_) => WINDOWS_1252
-            .decode_without_bom_handling(bytes)
-            .0
-            .into_owned(),
-    }
-}
-
 /// Whether a text begins so, in any case.
 #[must_use]
 pub fn starts(text: &str, with: &str) -> bool {
@@ -80,7 +65,7 @@ impl Head {
         for piece in text[from..end].split_inclusive(|byte| *byte == b'\n') {
             // A line that goes on after the head says nothing for sure.
             if complete || piece.ends_with(b"\n") {
-                let text = decode(piece);
+                let text = decode_line(piece);
                 lines.push(Line {
                     offset,
                     text: text.trim_end_matches(['\r', '\n']).to_owned(),

@@ -26,7 +26,6 @@ use crate::io::csv::{self, Options};
 pub use clock::Clock;
 use decode::Text;
 use head::Head;
-pub(crate) use head::decode as decode_line;
 use keys::Entry;
 use table::Hints;
 
@@ -158,7 +157,7 @@ fn has_slow_column(head: &Head, table: &head::Table) -> bool {
 /// that, it refuses the row, while this reader would begin after it.
 fn begins_with_number(layout: &csv::Layout, text: &[u8]) -> bool {
     let line = text.split(|byte| *byte == b'\n').nth(layout.data_line - 1);
-    let line = head::decode(line.unwrap_or(&[]));
+    let line = csv::decode_line(line.unwrap_or(&[]));
     let cells = layout.dialect.cells(&line);
     cells
         .first()
@@ -182,7 +181,7 @@ fn general(text: &Text, hints: Hints, options: &Options) -> Result<Recording, Fa
         };
         let is_last = part.end >= text.bytes.len()
             || part.end <= from
-            || head::is_end(&head::decode(line_at(&text.bytes, part.end)));
+            || head::is_end(&csv::decode_line(line_at(&text.bytes, part.end)));
         (from, number) = (part.end, part.next_line);
         parts.push(part);
         if is_last {

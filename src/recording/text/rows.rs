@@ -231,7 +231,7 @@ impl Rows {
         plan: &Plan,
         stop: &dyn Fn(&str) -> bool,
     ) -> bool {
-        let text = super::head::decode(line);
+        let text = crate::io::csv::decode_line(line);
         if stop(&text) || self.too_ragged.is_some() {
             return false;
         }

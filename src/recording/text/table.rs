@@ -206,7 +206,7 @@ fn drop_cut_row(text: &[u8], dialect: Dialect, rows: &mut Rows) -> Option<Warnin
     let line_at = |end: usize| memchr::memrchr(b'\n', &text[..end]).map_or(0, |place| place + 1);
     let last = line_at(text.len());
     let before = line_at(last.saturating_sub(1));
-    let cells = |bytes: &[u8]| dialect.cells(&head::decode(bytes)).len();
+    let cells = |bytes: &[u8]| dialect.cells(&crate::io::csv::decode_line(bytes)).len();
     if cells(&text[last..]) >= cells(&text[before..last.max(1) - 1]) {
         return None;
     }

@@ -114,7 +114,7 @@ impl Cursor<'_> {
         }
         let end =
             memchr::memchr(b'\n', &self.text[self.at..]).map_or(self.text.len(), |p| self.at + p);
-        let line = crate::recording::text::head::decode(&self.text[self.at..end]);
+        let line = crate::io::csv::decode_line(&self.text[self.at..end]);
         self.at = end + 1;
         self.number += 1;
         Some(line.trim_end_matches('\r').to_owned())
