@@ -20,7 +20,7 @@ const STRUCTURE: f64 = 0.04;
 /// Standard deviations above none at which a share counts as found.
 const SIGNIFICANT: f64 = 4.0;
 /// Share of a residual's power from which on constants count as changing, a zero as wandering, noise as going with the
-/// signal: 0.008, 0.002 and 0.03 are the most that right models left of the blind records.
+/// signal or its slope: 0.008, 0.002 and 0.03 are the most that right models left of the blind records.
 const CHANGING: f64 = 0.04;
 const WANDERING: f64 = 0.03;
 const WITH_SIGNAL: f64 = 0.08;
@@ -57,6 +57,8 @@ pub struct Dependence {
     pub changing_constants: Share,
     /// Share of its power that goes with the square of the signal from sample to sample.
     pub with_signal: Share,
+    /// Share of its power that goes with the square of the signal's slope from sample to sample.
+    pub with_slope: Share,
     /// Share of its power that lies at the lowest frequencies, above what noise leaves there.
     pub wandering_zero: Share,
 }
@@ -95,6 +97,7 @@ impl Dependence {
             (&self.changing_constants, CHANGING),
             (&self.wandering_zero, WANDERING),
             (&self.with_signal, WITH_SIGNAL),
+            (&self.with_slope, WITH_SIGNAL),
         ];
         least
             .into_iter()
@@ -122,6 +125,10 @@ impl Dependence {
             with_signal: share_of(
                 "the size of the signal from moment to moment",
                 steady::with_signal(sights),
+            ),
+            with_slope: share_of(
+                "the slope of the signal from moment to moment, as sampling instants that tremble do",
+                steady::with_slope(sights),
             ),
             wandering_zero: share_of(
                 "a zero that wanders or jumps",

@@ -85,12 +85,33 @@ pub fn changing_constants(sights: &[Sight], mode: &Mode, rate_hz: f64) -> Beyond
 /// `b ⟨y²⟩/⟨r²⟩` is 1 for noise in proportion to the signal and 0 for noise that does not know it.
 #[must_use]
 pub fn with_signal(sights: &[Sight]) -> Beyond {
+    with_square(sights, |sight| sight.modelled.to_vec())
+}
+
+/// The same with the slope of the modelled record, `r² ≈ a + b y'²`: sampling instants that tremble by `τ` leave
+/// `r = y' τ`.
+#[must_use]
+pub fn with_slope(sights: &[Sight]) -> Beyond {
+    with_square(sights, |sight| slope(sight.modelled))
+}
+
+/// Half the difference of both neighbours; of one neighbour and itself at the ends.
+fn slope(y: &[f64]) -> Vec<f64> {
+    let at = |i: usize| y[i.min(y.len() - 1)];
+    (0..y.len())
+        .map(|i| 0.5 * (at(i + 1) - at(i.saturating_sub(1))))
+        .collect()
+}
+
+/// The power of the residuals that goes with the square of something from sample to sample.
+fn with_square(sights: &[Sight], of: impl Fn(&Sight) -> Vec<f64>) -> Beyond {
     let mut slopes = vec![0.0; TURNS + 1];
     let (mut residual_power, mut signal_power, mut spread) = (0.0, 0.0, 0.0);
     for sight in sights {
         let count = sight.residual.len() as f64;
-        let mean = sight.modelled.iter().sum::<f64>() / count;
-        let mut signal: Vec<f64> = sight.modelled.iter().map(|y| (y - mean).powi(2)).collect();
+        let mut signal = of(sight);
+        let mean = signal.iter().sum::<f64>() / count;
+        signal.iter_mut().for_each(|y| *y = (*y - mean).powi(2));
         let level = signal.iter().sum::<f64>() / count;
         signal.iter_mut().for_each(|s| *s -= level);
         let squares: Vec<f64> = sight.residual.iter().map(|r| r * r).collect();
@@ -304,6 +325,24 @@ mod tests {
         assert!(found.significance > 8.0, "{found:?}");
         let found = with_signal(&[sight(&steady, &y)]);
         assert!(found.share.abs() < 0.1, "{found:?}");
+    }
+
+    #[test]
+    fn sampling_instants_that_tremble_go_with_the_slope_and_steady_noise_does_not() {
+        // A sine of 20 Hz: its slope is largest where it is zero itself.
+        let y: Vec<f64> = (0..COUNT)
+            .map(|i| (TAU * 20.0 * i as f64 / RATE_HZ).sin())
+            .collect();
+        let mut random = noise(7);
+        let tremble: Vec<f64> = (0..COUNT)
+            .map(|i| (TAU * 20.0 * i as f64 / RATE_HZ).cos() * random())
+            .collect();
+        let steady: Vec<f64> = y.iter().map(|_| random()).collect();
+        let found = with_slope(&[sight(&tremble, &y)]);
+        assert!((found.share - 1.0).abs() < 0.2, "{found:?}");
+        assert!(found.significance > 8.0, "{found:?}");
+        assert!(with_signal(&[sight(&tremble, &y)]).share < 0.1);
+        assert!(with_slope(&[sight(&steady, &y)]).share.abs() < 0.1);
     }
 
     #[test]

@@ -350,6 +350,7 @@ impl Report {
         let unsteady = [
             &tests.changing_constants,
             &tests.with_signal,
+            &tests.with_slope,
             &tests.wandering_zero,
         ];
         let rows = tests.shares.iter().chain(unsteady).map(share);
