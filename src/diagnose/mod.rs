@@ -15,11 +15,13 @@ mod spectra;
 mod starts;
 mod steady;
 mod structure;
+mod verdict;
 mod views;
 
 use torqcomp_model::effects::Rulers;
 
 use crate::failure::Failure;
+use verdict::{Missing, remains};
 
 pub use candidate::{Base, Judged, Records, judge, set_substeps};
 pub use dependence::{Dependence, Share, Sight};
@@ -32,33 +34,8 @@ pub use rivals::Rival;
 pub use search::{Status, Tried};
 pub use spectra::{Peak, lines};
 pub use structure::{Choice, Frame, Structure};
+pub use verdict::Verdict;
 pub use views::{Against, Trace, autocorrelation, binned, density, response};
-
-/// How the search ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Verdict {
-    /// What was missing is found, nothing above the noise remains.
-    Explained,
-    /// An effect helps, and something above the noise remains.
-    PartlyExplained,
-    /// Something is missing, and no effect of the list explains it.
-    Unexplained,
-    /// The plain stand explains the records.
-    NothingMissing,
-}
-
-impl Verdict {
-    /// Its name in reports.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Explained => "explained",
-            Self::PartlyExplained => "partly-explained",
-            Self::Unexplained => "unexplained",
-            Self::NothingMissing => "nothing-missing",
-        }
-    }
-}
 
 /// What is diagnosed.
 pub struct Case {
@@ -104,16 +81,6 @@ pub struct Diagnosis<'a> {
     pub verdict: Verdict,
 }
 
-/// Error over the noise floor up to which nothing needs to be missing.
-const AT_FLOOR: f64 = 1.1;
-/// Error over a floor from out of band above which no colour of the noise accounts for it.
-const FAR_ABOVE: f64 = 1.5;
-/// Part of what is missing that an effect must explain to be named.
-const NAMED: f64 = 0.5;
-/// Error over a noise floor that was seen, from which on that part is known well enough to ask for it.
-const CLEARLY_ABOVE: f64 = 1.05;
-/// Part of what is missing at first that a second effect must explain to be named.
-const SECOND: f64 = 0.02;
 /// Effects that are added at most.
 const MOST_EFFECTS: usize = 2;
 
@@ -200,42 +167,17 @@ pub fn run<'a>(
         .collect();
     let floor = floor::noise_floor(&pairs);
 
-    let mut after = before.clone();
-    let mut rounds = Vec::new();
-    let coarse = records.substeps();
-    let mut settled = true;
-    let mut suspected = None;
-    let mut rest = dependence_before.clone();
-    for _ in 0..MOST_EFFECTS {
-        let base = Base::of(after.clone(), &records);
-        let tried = search::try_all(&base, &records, threads, progress);
-        let accepted = tried.first().filter(|t| t.status == Status::Accepted);
-        let next = accepted.and_then(|t| t.judged.clone());
-        rounds.push(tried);
-        if next.is_some() || remains(&after, &rest, floor) {
-            suspected = rivals::best(&base, next.as_ref(), floor, &records, threads);
-        }
-        if let Some(rival) = &suspected {
-            stand_back(&mut rounds, rival);
-            break;
-        }
-        let Some(next) = next else { break };
-        if !after.fitted.structure.choices.is_empty()
-            && share(&before, &after, &next, floor) < SECOND
-        {
-            refuse_second(&mut rounds);
-            break;
-        }
-        (after, settled) = candidate::refine_step(next, &mut records, coarse);
-        rest = dependence(&after, &records);
-        // Where little is explained, or so little is left that no second effect could be named, none is looked for; nor
-        // beside a law that no step of the integration settles.
-        let explained = share(&before, &before, &after, floor);
-        if !settled || !remains(&after, &rest, floor) || !(NAMED..1.0 - SECOND).contains(&explained)
-        {
-            break;
-        }
-    }
+    let missing = Missing {
+        before: &before,
+        floor,
+    };
+    let Found {
+        after,
+        rounds,
+        suspected,
+        rest,
+        settled,
+    } = Found::of(missing, &dependence_before, &mut records, threads, progress);
     let floor = without_disturbances(floor, &after, &records);
     let lines = prominent_lines(&after, &records);
     let mut diagnosis = Diagnosis {
@@ -256,6 +198,69 @@ pub fn run<'a>(
     Ok(diagnosis)
 }
 
+/// What the search for effects has found.
+struct Found<'a> {
+    after: Judged<'a>,
+    rounds: Vec<Vec<Tried<'a>>>,
+    suspected: Option<Rival<'a>>,
+    /// What the residual depends on.
+    rest: Dependence,
+    settled: bool,
+}
+
+impl<'a> Found<'a> {
+    /// Adds one effect after another to the plain stand, as long as each explains enough to be named.
+    fn of(
+        missing: Missing<'a, '_>,
+        rest: &Dependence,
+        records: &mut Records,
+        threads: usize,
+        progress: &(dyn Fn(usize, usize) + Sync),
+    ) -> Self {
+        let mut found = Self {
+            after: missing.before.clone(),
+            rounds: Vec::new(),
+            suspected: None,
+            rest: rest.clone(),
+            settled: true,
+        };
+        let coarse = records.substeps();
+        for _ in 0..MOST_EFFECTS {
+            let base = Base::of(found.after.clone(), records);
+            let mut tried = search::try_all(&base, records, threads, progress);
+            let accepted = tried.first().filter(|t| t.status == Status::Accepted);
+            let next = accepted.and_then(|t| t.judged.clone());
+            if next.is_some() || remains(&found.after, &found.rest, missing.floor) {
+                found.suspected =
+                    rivals::best(&base, next.as_ref(), missing.floor, records, threads);
+            }
+            let is_second = !found.after.fitted.structure.choices.is_empty();
+            let is_little = |next: &Judged| is_second && missing.is_little(&found.after, next);
+            if let Some(rival) = &found.suspected {
+                verdict::stand_back(&mut tried, rival);
+            } else if next.as_ref().is_some_and(is_little) {
+                verdict::refuse_second(&mut tried);
+            }
+            let is_named = tried.iter().any(|t| t.status == Status::Accepted);
+            found.rounds.push(tried);
+            let Some(next) = next.filter(|_| is_named) else {
+                break;
+            };
+            (found.after, found.settled) = candidate::refine_step(next, records, coarse);
+            found.rest = dependence(&found.after, records);
+            // Where little is explained, or so little is left that no second effect could be named, none is looked for; nor
+            // beside a law that no step of the integration settles.
+            if !found.settled
+                || !remains(&found.after, &found.rest, missing.floor)
+                || !missing.has_room(&found.after)
+            {
+                break;
+            }
+        }
+        found
+    }
+}
+
 /// The floor, where the model found takes something out that does not repeat with the input.
 fn without_disturbances(floor: Option<Floor>, after: &Judged, records: &Records) -> Option<Floor> {
     let Some(seen) = floor.filter(|f| f.from == "periods") else {
@@ -269,39 +274,6 @@ fn without_disturbances(floor: Option<Floor>, after: &Judged, records: &Records)
         .collect();
     let again = floor::from_residuals(&residuals);
     Some(again.filter(|f| f.rms < seen.rms).unwrap_or(seen))
-}
-
-/// Part of what the plain stand leaves above the noise that one model explains more than another.
-fn share(before: &Judged, from: &Judged, to: &Judged, floor: Option<Floor>) -> f64 {
-    let noise = floor.map_or(0.0, |f| f.rms.powi(2));
-    let missing = before.hold_rms().powi(2) - noise;
-    (from.hold_rms().powi(2) - to.hold_rms().powi(2)) / missing.max(1e-300)
-}
-
-/// A second effect that explains next to nothing of what was missing at first is not named: what no model has
-/// exactly looks a little like many effects.
-fn refuse_second(rounds: &mut [Vec<Tried>]) {
-    for one in rounds.last_mut().into_iter().flatten() {
-        if one.status != Status::Rejected {
-            one.status = Status::Rejected;
-            one.why = format!(
-                "it explains less than {:.0} % of what was missing at first: too little to be named beside the first effect",
-                100.0 * SECOND
-            );
-        }
-    }
-}
-
-/// The effects of the last round that a law beside the list explains better are not named.
-fn stand_back(rounds: &mut [Vec<Tried>], rival: &Rival) {
-    for one in rounds.last_mut().into_iter().flatten() {
-        if one.status != Status::Rejected
-            && let Some(judged) = &one.judged
-        {
-            one.status = Status::Rejected;
-            one.why = rival.instead(judged);
-        }
-    }
 }
 
 /// The declared constants in place of the fitted ones.
@@ -336,25 +308,6 @@ fn dependence(judged: &Judged, records: &Records) -> Dependence {
     Dependence::of(&sights, &mode, records.hold[0].input.rate_hz())
 }
 
-/// Whether something above the noise is left. Where the noise itself was seen, in the differences of periods, its level
-/// decides; a level from out of band may be too low for coloured noise, so that there the residual must also
-/// follow from input or motion, or lie far above it.
-fn remains(judged: &Judged, dependence: &Dependence, floor: Option<Floor>) -> bool {
-    if dependence.has_spikes() {
-        // Spikes raise a floor that is measured without a model as well.
-        return true;
-    }
-    let structured = dependence.structure().is_some();
-    let Some(floor) = floor else {
-        return structured;
-    };
-    let ratio = judged.hold_rms() / floor.rms;
-    match floor.from {
-        "periods" => ratio > AT_FLOOR,
-        _ => ratio > AT_FLOOR && (structured || ratio > FAR_ABOVE && !dependence.white),
-    }
-}
-
 fn prominent_lines(judged: &Judged, records: &Records) -> Vec<Peak> {
     let rate_hz = records.train[0].input.rate_hz();
     let residuals: Vec<(&[f64], f64)> = judged
@@ -384,50 +337,5 @@ impl Diagnosis<'_> {
             .iter()
             .map(|c| c.effect.name)
             .collect()
-    }
-
-    fn conclude(&mut self) {
-        // What changes over a record raises a floor that is taken from differences of its periods, too. It is not a
-        // reason to look for a second effect: none of the list does that.
-        let open = |judged: &Judged, dependence: &Dependence| {
-            remains(judged, dependence, self.floor) || dependence.unsteady().is_some()
-        };
-        let left = !self.settled || self.suspected.is_some() || open(&self.after, &self.dependence);
-        if self.effects().is_empty() {
-            let missing = self.suspected.is_some() || open(&self.before, &self.dependence_before);
-            self.verdict = if missing {
-                Verdict::Unexplained
-            } else {
-                Verdict::NothingMissing
-            };
-            return;
-        }
-        let explained = share(&self.before, &self.before, &self.after, self.floor);
-        let known = |floor: Floor| {
-            floor.from == "periods" && self.before.hold_rms() > CLEARLY_ABOVE * floor.rms
-        };
-        if explained >= NAMED || !left && !self.floor.is_some_and(known) {
-            self.verdict = if left {
-                Verdict::PartlyExplained
-            } else {
-                Verdict::Explained
-            };
-            return;
-        }
-        self.verdict = Verdict::Unexplained;
-        for one in self.rounds.iter_mut().flatten() {
-            let why = match one.status {
-                Status::Rejected => continue,
-                Status::Indistinguishable => "no effect is accepted".to_owned(),
-                Status::Accepted => format!(
-                    "it helps, but explains only {:.0} % of what is missing: something else is behind it",
-                    100.0 * explained.max(0.0)
-                ),
-            };
-            one.status = Status::Rejected;
-            one.why = why;
-        }
-        self.after = self.before.clone();
-        self.dependence = self.dependence_before.clone();
     }
 }
