@@ -71,20 +71,18 @@ impl RateFrom {
 /// ```
 #[must_use]
 pub fn typical_step(stamps: &[f64]) -> Option<f64> {
-    let mut steps: Vec<f64> = stamps
-        .windows(2)
-        .map(|pair| pair[1] - pair[0])
-        .filter(|step| *step > 0.0)
-        .collect();
-    if steps.is_empty() {
-        return None;
-    }
+    let steps = || {
+        let all = stamps.windows(2).map(|pair| pair[1] - pair[0]);
+        all.filter(|step| *step > 0.0)
+    };
+    let any = steps().next()?;
     // Where all steps are within this part of any one of them, all are within the usual part of their median.
-    let any = steps[0];
-    let alike = |step: &f64| (step / any - 1.0).abs() <= 0.25 * USUAL;
-    if steps.iter().all(alike) {
-        return Some(steps.iter().sum::<f64>() / steps.len() as f64);
+    let alike = |step: f64| (step / any - 1.0).abs() <= 0.25 * USUAL;
+    if steps().all(alike) {
+        let (sum, count) = steps().fold((0.0, 0_usize), |(sum, n), step| (sum + step, n + 1));
+        return Some(sum / count as f64);
     }
+    let mut steps: Vec<f64> = steps().collect();
     let middle = steps.len() / 2;
     let (_, median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
     let median = *median;

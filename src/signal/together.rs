@@ -87,7 +87,7 @@ impl Together {
         if is_given || is_one_axis(&chosen, is_text)? {
             together
                 .warnings
-                .extend(chosen.iter().filter(|_| !is_given).find_map(irregular));
+                .extend(axes(&chosen).filter(|_| !is_given).find_map(irregular));
             let count = chosen.iter().map(|c| c.samples.len()).min().unwrap_or(0);
             let track = |c: &Selection| track(c, c.samples[..count].to_vec());
             together.tracks = chosen.iter().map(track).collect();
@@ -221,8 +221,8 @@ fn whole(selection: &Selection) -> Result<(), Failure> {
 fn is_one_axis(chosen: &[Selection], is_text: bool) -> Result<bool, Failure> {
     let first = &chosen[0];
     let stamps = |c: &Selection| c.channel.axis.stamps_s.clone();
-    let is_uniform = stamps(first).is_none_or(|stamps| uniform(&stamps, first.rate_hz));
-    let mut same = is_text || is_uniform;
+    let is_uniform = || stamps(first).is_none_or(|stamps| uniform(&stamps, first.rate_hz));
+    let mut same = is_text || is_uniform();
     for other in &chosen[1..] {
         let rates = other.rate_hz / first.rate_hz - 1.0;
         if rates.abs() > SIMILAR {
@@ -241,6 +241,21 @@ fn is_one_axis(chosen: &[Selection], is_text: bool) -> Result<bool, Failure> {
         };
     }
     Ok(same)
+}
+
+/// The first channel on each time axis.
+pub fn axes<'a, 'b>(chosen: &'b [Selection<'a>]) -> impl Iterator<Item = &'b Selection<'a>> {
+    let stamps = |c: &'b Selection<'a>| c.channel.axis.stamps_s.as_ref();
+    let is_same = move |a: &'b Selection<'a>, b: &'b Selection<'a>| {
+        a.rate_hz == b.rate_hz
+            && stamps(a)
+                .zip(stamps(b))
+                .is_some_and(|(a, b)| Arc::ptr_eq(a, b))
+    };
+    let is_first = move |(i, c): &(usize, &'b Selection<'a>)| {
+        !chosen[..*i].iter().any(|other| is_same(other, c))
+    };
+    chosen.iter().enumerate().filter(is_first).map(|(_, c)| c)
 }
 
 /// A warning if the stamps of a channel lie more than half a step from the grid of its rate.

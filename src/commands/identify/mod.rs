@@ -21,7 +21,7 @@ use crate::report;
 use crate::report::Warning;
 use crate::report::identify::Report;
 use crate::signal::Together;
-use crate::signal::together::uniform;
+use crate::signal::together::{axes, uniform};
 use crate::stand::update::{self, Entry};
 
 /// Runs the verb.
@@ -115,10 +115,15 @@ fn read(input: &str, wanted: &[Options]) -> Result<Recording, Failure> {
 fn together(input: &str, wanted: &[Options]) -> Result<Together, Failure> {
     let recording = read(input, wanted)?;
     if recording.format != "mcap" {
+        let mut chosen = Vec::new();
         for options in wanted {
             let selection = recording.select(options)?;
             whole(&selection)?;
-            must_be_uniform(&selection, options.rate_hz.is_some())?;
+            chosen.push(selection);
+        }
+        let is_given = wanted.iter().any(|options| options.rate_hz.is_some());
+        for selection in axes(&chosen) {
+            must_be_uniform(selection, is_given)?;
         }
     }
     Together::of(&recording, wanted)

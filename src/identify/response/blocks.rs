@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use torqcomp_dsp::frf::{self, Block, Window};
+use torqcomp_dsp::frf::{self, Block, Powers, Window};
 
 use super::{Driven, Excitation, Options, check};
 use crate::failure::Failure;
@@ -12,6 +12,8 @@ use crate::report::{rounded, short};
 /// Blocks of all records, on one grid of frequencies.
 pub(super) struct Set {
     pub blocks: Vec<Block>,
+    /// Powers of all blocks together.
+    pub powers: Powers,
     /// Record that each block is from.
     pub record: Vec<usize>,
     pub step_hz: f64,
@@ -83,8 +85,10 @@ fn impacts(records: &[Driven], outcome: &mut Outcome) -> Result<Set, Failure> {
         let applied = without(&record.applied[range.clone()]);
         frf::transform(&applied, &without(&record.measured[range]), window)
     };
+    let blocks: Vec<Block> = good.iter().map(block).collect();
     Ok(Set {
-        blocks: good.iter().map(block).collect(),
+        powers: Powers::of(blocks.iter(), 0..usize::MAX),
+        blocks,
         record: good.iter().map(|(r, _)| *r).collect(),
         step_hz: rate_hz / length as f64,
         added_rate,
@@ -184,6 +188,7 @@ fn random(records: &[Driven], options: &Options, outcome: &mut Outcome) -> Resul
         "Hann-weighted segments of {length} samples, half overlapping"
     ));
     Ok(Set {
+        powers: Powers::of(blocks.iter(), 0..usize::MAX),
         blocks,
         record: of,
         step_hz: rate_hz / length as f64,
@@ -227,6 +232,7 @@ fn periodic(records: &[Driven], options: &Options, outcome: &mut Outcome) -> Res
         "periods of {period} samples, the first one left out"
     ));
     Ok(Set {
+        powers: Powers::of(blocks.iter(), 0..usize::MAX),
         blocks,
         record: of,
         step_hz: rate_hz / period as f64,

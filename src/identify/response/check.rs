@@ -7,7 +7,7 @@ use super::lines::Lines;
 use crate::failure::Failure;
 use crate::identify::Outcome;
 use crate::report::{rounded, short};
-use torqcomp_dsp::frf::{Estimator, Frf, Window};
+use torqcomp_dsp::frf::{Estimator, Window};
 
 /// Refuses records that differ in rate, have holes, or do not move.
 pub(super) fn records(records: &[Driven]) -> Result<(), Failure> {
@@ -59,7 +59,7 @@ const IN_PHASE: f64 = 0.02;
 /// driven and measured. Where it leads nearly throughout, the channels are swapped or one has the
 /// wrong sign.
 pub(super) fn leads(set: &Set, lines: &Lines, order: i32) -> bool {
-    let h1 = Frf::of(set.blocks.iter(), Estimator::H1);
+    let h1 = set.powers.response(Estimator::H1);
     let turn = num_complex::Complex64::I.powi(-order);
     let sides: Vec<bool> = lines
         .clone()

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use torqcomp_dsp::frf::{Estimator, Frf};
+use torqcomp_dsp::frf::{Estimator, Powers};
 
 use super::blocks::Set;
 use super::{Data, Options};
@@ -18,7 +18,7 @@ const EXCITES: f64 = 1e-3;
 /// The band that is asked for, or where the excitation has power.
 pub(super) fn band(set: &Set, options: &Options) -> Result<Lines, Failure> {
     let lines = set.blocks[0].applied.len();
-    let frf = Frf::of(set.blocks.iter(), Estimator::H1);
+    let frf = set.powers.response(Estimator::H1);
     let (from, to) = match options.band_hz {
         Some((from, to)) => (
             (from / set.step_hz).ceil() as usize,
@@ -49,21 +49,11 @@ pub(super) fn band(set: &Set, options: &Options) -> Result<Lines, Failure> {
 /// Most lines that are fitted; more are thinned out evenly.
 pub(super) const MOST_LINES: usize = 6000;
 
-/// H1 over the blocks that are kept, a line's weight being the root of its applied power.
-pub(super) fn data(
-    set: &Set,
-    lines: &Lines,
-    options: &Options,
-    keep: &dyn Fn(usize) -> bool,
-) -> Data {
-    let chosen = set
-        .blocks
-        .iter()
-        .enumerate()
-        .filter(|(i, _)| keep(*i))
-        .map(|(_, b)| b);
-    let frf = Frf::between(chosen, Estimator::H1, lines.clone());
-    let powers = &frf.applied_power;
+/// H1 of those powers, a line's weight being the root of its applied power.
+pub(super) fn data(powers: &Powers, set: &Set, lines: &Lines, options: &Options) -> Data {
+    let frf = powers.response(Estimator::H1);
+    let response = frf.response[lines.clone()].to_vec();
+    let powers = &frf.applied_power[lines.clone()];
     let mean = powers.iter().sum::<f64>() / powers.len() as f64;
     Data {
         omega: lines
@@ -71,7 +61,7 @@ pub(super) fn data(
             .map(|k| TAU * k as f64 * set.step_hz)
             .collect(),
         weight: powers.iter().map(|p| (p / mean).sqrt()).collect(),
-        response: frf.response,
+        response,
         order: options.order,
         added_rate: set.added_rate,
         with_delay: options.with_delay,

@@ -94,7 +94,7 @@ pub fn identify(records: &[Driven], options: &Options) -> Result<Evaluated, Fail
     let set = blocks::blocks(records, options, &mut outcome)?;
     let lines = lines::band(&set, options)?;
     let leads = check::leads(&set, &lines, options.order);
-    let data = lines::data(&set, &lines, options, &|_| true);
+    let data = lines::data(&set.powers, &set, &lines, options);
     let (coarse, held_out) = order::order(&set, &lines, options, &data).map_err(|failure| {
         if leads {
             Failure::failed(check::LEADS)
@@ -119,11 +119,11 @@ pub fn identify(records: &[Driven], options: &Options) -> Result<Evaluated, Fail
     say_method(&mut outcome, &set, &lines, options, &fitted);
     let held = held_out.get(fitted.poles.len()).copied();
     say_others(&mut outcome, &set, options, &fitted, held);
-    let h1 = Frf::of(set.blocks.iter(), Estimator::H1);
+    let h1 = set.powers.response(Estimator::H1);
     words::raw_error(&mut outcome, &set, &lines);
     words::levels(&mut outcome, &set, &lines);
     words::draw(&mut outcome, &h1, &lines, set.step_hz, &fitted, &held_out);
-    let part = |estimator| Frf::between(set.blocks.iter(), estimator, lines.clone()).response;
+    let part = |estimator| set.powers.response(estimator).response[lines.clone()].to_vec();
     Ok(Evaluated {
         outcome,
         frequency_hz: lines.clone().map(|k| k as f64 * set.step_hz).collect(),

@@ -1,6 +1,6 @@
 //! How many modes the data pay for, tried on blocks held out.
 
-use torqcomp_dsp::frf::{self, Estimator, Frf};
+use torqcomp_dsp::frf::{self, Estimator, Powers};
 
 use super::blocks::Set;
 use super::lines::{Lines, MOST_LINES, data};
@@ -85,7 +85,10 @@ pub(super) fn order(
 fn training(set: &Set, lines: &Lines, options: &Options, folds: &[Vec<usize>]) -> Vec<Data> {
     folds
         .iter()
-        .map(|fold| data(set, lines, options, &|i| !fold.contains(&i)))
+        .map(|fold| {
+            let held_out = Powers::of(fold.iter().map(|i| &set.blocks[*i]), 0..usize::MAX);
+            data(&set.powers.without(&held_out), set, lines, options)
+        })
         .collect()
 }
 
@@ -147,8 +150,8 @@ fn tried(
 
 /// Error of the response that leaves least of all blocks, with a number of its own for every line.
 fn floor(set: &Set, lines: &Lines) -> f64 {
-    let raw = Frf::between(set.blocks.iter(), Estimator::H1, lines.clone()).response;
-    let error = |block| frf::prediction_error(&raw, block, lines.clone());
+    let raw = &set.powers.response(Estimator::H1).response[lines.clone()];
+    let error = |block| frf::prediction_error(raw, block, lines.clone());
     set.blocks.iter().map(error).sum::<f64>() / set.blocks.len() as f64
 }
 

@@ -12,9 +12,13 @@ const FEWEST: usize = 3;
 /// out of its axis: what is left is a channel of its own, slower than the rows. Without stamps the
 /// values must lie evenly, and the rate is divided by the rows between them.
 pub fn thin(column: &mut Column, axis: &mut Axis) {
+    let rows = column.values.len();
+    let filled_count = rows.saturating_sub(column.holes.len());
+    if filled_count < FEWEST || 2 * filled_count > rows {
+        return;
+    }
     let filled = filled(column);
-    let is_sparse = filled.len() >= FEWEST && 2 * filled.len() <= column.values.len();
-    if !is_sparse {
+    if filled.len() < FEWEST {
         return;
     }
     let every = spacing(&filled);

@@ -20,11 +20,29 @@ pub enum Window {
 /// Spectra of an applied and a measured block of one length.
 #[must_use]
 pub fn transform(applied: &[f64], measured: &[f64], window: Window) -> Block {
-    Transform::new(applied.len(), window).block(applied, measured)
+    let transform = Transform::new(applied.len(), window);
+    let (applied, measured) = of_both(applied, measured, |samples| transform.spectrum(samples));
+    Block { applied, measured }
 }
 
-/// Samples from which on both channels are transformed at the same time.
+/// Samples from which on both channels are worked on at the same time.
 const WORTH_A_THREAD: usize = 1 << 17;
+
+/// The same work for both channels.
+fn of_both<T: Send>(
+    applied: &[f64],
+    measured: &[f64],
+    work: impl Fn(&[f64]) -> T + Sync,
+) -> (T, T) {
+    if applied.len() < WORTH_A_THREAD {
+        return (work(applied), work(measured));
+    }
+    std::thread::scope(|scope| {
+        let beside = scope.spawn(|| work(measured));
+        let first = work(applied);
+        (first, beside.join().expect("a transform does not panic"))
+    })
+}
 
 /// A transform of blocks of one length, with what does not change from block to block.
 struct Transform {
@@ -51,22 +69,6 @@ impl Transform {
         }
     }
 
-    fn block(&self, applied: &[f64], measured: &[f64]) -> Block {
-        if applied.len() < WORTH_A_THREAD {
-            return Block {
-                applied: self.spectrum(applied),
-                measured: self.spectrum(measured),
-            };
-        }
-        std::thread::scope(|scope| {
-            let beside = scope.spawn(|| self.spectrum(measured));
-            Block {
-                applied: self.spectrum(applied),
-                measured: beside.join().expect("a transform does not panic"),
-            }
-        })
-    }
-
     fn spectrum(&self, samples: &[f64]) -> Vec<Complex64> {
         let mean = match self.without_mean {
             true => samples.iter().sum::<f64>() / samples.len().max(1) as f64,
@@ -90,13 +92,16 @@ impl Transform {
 pub fn segments(applied: &[f64], measured: &[f64], length: usize) -> Vec<Block> {
     let count = applied.len().min(measured.len());
     let transform = Transform::new(length, Window::Hann);
-    (0..)
-        .map(|k| k * (length / 2).max(1))
-        .take_while(|from| from + length <= count)
-        .map(|from| {
-            let range = from..from + length;
-            transform.block(&applied[range.clone()], &measured[range])
-        })
+    let step = (length / 2).max(1);
+    let spectra = |samples: &[f64]| -> Vec<Vec<Complex64>> {
+        (0..(count + step).saturating_sub(length) / step)
+            .map(|k| transform.spectrum(&samples[k * step..k * step + length]))
+            .collect()
+    };
+    let (applied, measured) = of_both(applied, measured, spectra);
+    let pairs = applied.into_iter().zip(measured);
+    pairs
+        .map(|(applied, measured)| Block { applied, measured })
         .collect()
 }
 

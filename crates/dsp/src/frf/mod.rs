@@ -33,6 +33,71 @@ pub enum Estimator {
     Hv,
 }
 
+/// Power of each signal and cross-power, summed over blocks, from which every estimate follows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Powers {
+    /// S_xx, S_yy and S_xy at each line.
+    sums: Vec<(f64, f64, Complex64)>,
+    blocks: usize,
+}
+
+impl Powers {
+    /// Those of the blocks at a part of the lines.
+    #[must_use]
+    pub fn of<'a>(blocks: impl Iterator<Item = &'a Block>, lines: std::ops::Range<usize>) -> Self {
+        let mut all = Self {
+            sums: Vec::new(),
+            blocks: 0,
+        };
+        for block in blocks {
+            let range = lines.start..lines.end.min(block.applied.len());
+            all.sums.resize(range.len(), (0.0, 0.0, Complex64::ZERO));
+            let pairs = block.applied[range.clone()]
+                .iter()
+                .zip(&block.measured[range]);
+            for (sum, (x, y)) in all.sums.iter_mut().zip(pairs) {
+                sum.0 += x.norm_sqr();
+                sum.1 += y.norm_sqr();
+                sum.2 += x.conj() * y;
+            }
+            all.blocks += 1;
+        }
+        all
+    }
+
+    /// Those of the other blocks, `some` being those of a part of them.
+    #[must_use]
+    pub fn without(&self, some: &Self) -> Self {
+        let pairs = self.sums.iter().zip(&some.sums);
+        Self {
+            sums: pairs
+                // Rounding must not make a power of nothing negative.
+                .map(|(all, some)| {
+                    let powers = ((all.0 - some.0).max(0.0), (all.1 - some.1).max(0.0));
+                    (powers.0, powers.1, all.2 - some.2)
+                })
+                .collect(),
+            blocks: self.blocks.saturating_sub(some.blocks),
+        }
+    }
+
+    /// The response that follows from them.
+    #[must_use]
+    pub fn response(&self, estimator: Estimator) -> Frf {
+        let n = self.blocks.max(1) as f64;
+        let sums = self.sums.iter();
+        Frf {
+            response: sums.clone().map(|s| estimate(s, estimator)).collect(),
+            coherence: sums
+                .clone()
+                .map(|(xx, yy, xy)| coherence(*xx, *yy, *xy))
+                .collect(),
+            applied_power: sums.map(|(xx, ..)| xx / n).collect(),
+            blocks: self.blocks,
+        }
+    }
+}
+
 /// A response with its coherence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frf {
@@ -72,31 +137,7 @@ impl Frf {
         estimator: Estimator,
         lines: std::ops::Range<usize>,
     ) -> Self {
-        let mut sums: Vec<(f64, f64, Complex64)> = Vec::new();
-        let mut count = 0;
-        for block in blocks {
-            let range = lines.start..lines.end.min(block.applied.len());
-            sums.resize(range.len(), (0.0, 0.0, Complex64::ZERO));
-            let pairs = block.applied[range.clone()]
-                .iter()
-                .zip(&block.measured[range]);
-            for (sum, (x, y)) in sums.iter_mut().zip(pairs) {
-                sum.0 += x.norm_sqr();
-                sum.1 += y.norm_sqr();
-                sum.2 += x.conj() * y;
-            }
-            count += 1;
-        }
-        let n = f64::from(count).max(1.0);
-        Self {
-            response: sums.iter().map(|s| estimate(s, estimator)).collect(),
-            coherence: sums
-                .iter()
-                .map(|(xx, yy, xy)| coherence(*xx, *yy, *xy))
-                .collect(),
-            applied_power: sums.iter().map(|(xx, ..)| xx / n).collect(),
-            blocks: count as usize,
-        }
+        Powers::of(blocks, lines).response(estimator)
     }
 
     /// Relative standard uncertainty of the magnitude, and standard uncertainty of the phase in rad, at

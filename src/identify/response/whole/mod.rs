@@ -25,8 +25,9 @@ use torqcomp_dsp::frf::{Block, Window, transform};
 
 use super::{Data, Driven, Modal, Settled};
 use crate::identify::decay::Pole;
+use crate::parallel::{parallel, threads};
 use line::{Layout, State};
-use normal::{Gram, Solved};
+use normal::{Gram, PART, Solved};
 
 /// The lines of a record in the band.
 struct Spectra {
@@ -124,13 +125,23 @@ impl Spectra {
         }
     }
 
+    /// Power that a fit leaves of each line.
+    fn left(&self, layout: &Layout, state: &State, record: usize) -> Vec<f64> {
+        let count = self.omega.len();
+        let part = |p: usize| {
+            let lines = p * PART..((p + 1) * PART).min(count);
+            let left = |k: usize| layout.left(self, state, record, k).norm_sqr();
+            lines.map(left).collect::<Vec<f64>>()
+        };
+        parallel(count.div_ceil(PART), threads(), part).concat()
+    }
+
     /// Weights from what a fit leaves, which is less than the noise by what the fit takes up.
     fn learn_noise(&mut self, layout: &Layout, state: &State, record: usize) {
         let count = self.omega.len();
         let taken = layout.columns() as f64 / (2 * count) as f64;
         let mut sums = vec![0.0; count + 1];
-        for k in 0..count {
-            let left = layout.left(self, state, record, k).norm_sqr();
+        for (k, left) in self.left(layout, state, record).into_iter().enumerate() {
             sums[k + 1] = sums[k] + left;
         }
         let reach = ((SMOOTHED * count as f64) as usize).clamp(NEIGHBOURS.0, NEIGHBOURS.1);
@@ -146,10 +157,8 @@ impl Spectra {
 fn left_over(layout: &Layout, all: &[Spectra], state: &State) -> f64 {
     let (mut left, mut whole) = (0.0, 0.0);
     for (record, spectra) in all.iter().enumerate() {
-        for k in 0..spectra.omega.len() {
-            left += layout.left(spectra, state, record, k).norm_sqr();
-            whole += spectra.measured[k].norm_sqr();
-        }
+        left += spectra.left(layout, state, record).iter().sum::<f64>();
+        whole += spectra.measured.iter().map(|y| y.norm_sqr()).sum::<f64>();
     }
     (left / whole).sqrt()
 }

@@ -14,7 +14,7 @@ use crate::parallel::{parallel, threads};
 /// Lines that are multiplied at once.
 const AT_ONCE: usize = 256;
 /// Lines of a part that a thread takes; the parts are added in their order, whoever made them.
-const PART: usize = 64 * AT_ONCE;
+pub(super) const PART: usize = 64 * AT_ONCE;
 
 /// Numbers seen as a matrix in any order.
 type View<'a> = DMatrixView<'a, f64, Dyn, Dyn>;
