@@ -71,18 +71,17 @@ impl RateFrom {
 /// ```
 #[must_use]
 pub fn typical_step(stamps: &[f64]) -> Option<f64> {
-    let steps = || {
-        let all = stamps.windows(2).map(|pair| pair[1] - pair[0]);
-        all.filter(|step| *step > 0.0)
-    };
-    let any = steps().next()?;
-    // Where all steps are within this part of any one of them, all are within the usual part of their median.
-    let alike = |step: f64| (step / any - 1.0).abs() <= 0.25 * USUAL;
-    if steps().all(alike) {
-        let (sum, count) = steps().fold((0.0, 0_usize), |(sum, n), step| (sum + step, n + 1));
-        return Some(sum / count as f64);
+    if let Some(step) = equal_step(stamps) {
+        return Some(step);
     }
-    let mut steps: Vec<f64> = steps().collect();
+    let mut steps: Vec<f64> = stamps
+        .windows(2)
+        .map(|pair| pair[1] - pair[0])
+        .filter(|step| *step > 0.0)
+        .collect();
+    if steps.is_empty() {
+        return None;
+    }
     let middle = steps.len() / 2;
     let (_, median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
     let median = *median;
@@ -106,6 +105,20 @@ pub fn typical_step(stamps: &[f64]) -> Option<f64> {
         .find(|(_, count)| 2 * count >= steps.len())
         .unwrap_or((sum, count));
     Some(sum / count as f64)
+}
+
+/// The mean step, where all rise by about as much as the first one: then all are within the usual part of their median.
+fn equal_step(stamps: &[f64]) -> Option<f64> {
+    let [first, second, ..] = stamps else {
+        return None;
+    };
+    let any = second - first;
+    let near = 0.25 * USUAL * any;
+    // Every step is looked at whatever the others were, which several at a time can be.
+    let alike = stamps.windows(2).fold(any > 0.0, |alike, pair| {
+        alike & ((pair[1] - pair[0] - any).abs() <= near)
+    });
+    alike.then(|| (stamps[stamps.len() - 1] - first) / (stamps.len() - 1) as f64)
 }
 
 /// Usual step of stamps, or that of the straight line that they are but for being rounded: 3 and 4 ms

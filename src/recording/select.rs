@@ -105,6 +105,15 @@ impl Recording {
         )))
     }
 
+    /// Which of the channels that is, one of this recording.
+    pub(crate) fn place_of(&self, channel: &Channel) -> usize {
+        let is = |c: &Channel| std::ptr::eq(c, channel);
+        self.channels
+            .iter()
+            .position(is)
+            .expect("channels are chosen from their own recording")
+    }
+
     /// The channels as they can be chosen: by name, or by number where a name is used twice.
     fn names(&self) -> String {
         let one = |(place, channel): (usize, &Channel)| {

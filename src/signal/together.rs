@@ -57,14 +57,15 @@ impl Together {
     /// axis and cannot be brought there.
     pub fn read(place: &Place, wanted: &[Options]) -> Result<Self, Failure> {
         let recording = recording::read_channels(place, wanted)?;
-        Self::of(&recording, wanted).map_err(|failure| failure.at(&recording.source))
+        let source = recording.source.clone();
+        Self::of(recording, wanted).map_err(|failure| failure.at(&source))
     }
 
     /// The channels that the options name.
     ///
     /// # Errors
     /// See [`Together::read`].
-    pub fn of(recording: &Recording, wanted: &[Options]) -> Result<Self, Failure> {
+    pub fn of(mut recording: Recording, wanted: &[Options]) -> Result<Self, Failure> {
         let mut chosen = Vec::new();
         for options in wanted {
             let selection = recording.select(options)?;
@@ -89,8 +90,11 @@ impl Together {
                 .warnings
                 .extend(axes(&chosen).filter(|_| !is_given).find_map(irregular));
             let count = chosen.iter().map(|c| c.samples.len()).min().unwrap_or(0);
-            let track = |c: &Selection| track(c, c.samples[..count].to_vec());
-            together.tracks = chosen.iter().map(track).collect();
+            let empty: Vec<(usize, Track)> = chosen
+                .iter()
+                .map(|c| (recording.place_of(c.channel), track(c, Vec::new())))
+                .collect();
+            together.tracks = filled(&mut recording, empty, count);
         } else {
             together.resample(&chosen)?;
         }
@@ -194,6 +198,22 @@ fn track(selection: &Selection, samples: Vec<f64>) -> Track {
     }
 }
 
+/// Tracks with the first samples of their channels, which are taken out of the recording: they may be most of what
+/// it holds.
+fn filled(recording: &mut Recording, empty: Vec<(usize, Track)>, count: usize) -> Vec<Track> {
+    let places: Vec<usize> = empty.iter().map(|(place, _)| *place).collect();
+    let fill = |(i, (place, track)): (usize, (usize, Track))| {
+        let samples = &mut recording.channels[place].samples;
+        let mut samples = match places[i + 1..].contains(&place) {
+            true => samples.clone(),
+            false => std::mem::take(samples),
+        };
+        samples.truncate(count);
+        Track { samples, ..track }
+    };
+    empty.into_iter().enumerate().map(fill).collect()
+}
+
 /// Refuses samples that are not there.
 fn whole(selection: &Selection) -> Result<(), Failure> {
     let name = &selection.channel.name;
@@ -285,7 +305,10 @@ pub fn uniform(stamps_s: &[f64], rate_hz: f64) -> bool {
     stamps_s
         .iter()
         .enumerate()
-        .all(|(i, t)| ((t - first) * rate_hz - i as f64).abs() < JITTER + DRIFT * i as f64)
+        // Every stamp is looked at whatever the others were, which several at a time can be.
+        .fold(true, |uniform, (i, t)| {
+            uniform & (((t - first) * rate_hz - i as f64).abs() < JITTER + DRIFT * i as f64)
+        })
 }
 
 /// Whether stamps are as good as the same, as far as both go.

@@ -41,7 +41,7 @@ fn named(name: &str) -> Options {
 }
 
 fn both(recording: &Recording) -> Result<Together, Failure> {
-    Together::of(recording, &[named("a"), named("b")])
+    Together::of(recording.clone(), &[named("a"), named("b")])
 }
 
 /// Stamps a millisecond apart, each off by up to so much of that.

@@ -126,7 +126,7 @@ fn together(input: &str, wanted: &[Options]) -> Result<Together, Failure> {
             must_be_uniform(selection, is_given)?;
         }
     }
-    Together::of(&recording, wanted)
+    Together::of(recording, wanted)
 }
 
 /// What was lost of a file, and what else should be known of it.

@@ -95,7 +95,13 @@ pub fn identify(records: &[Driven], options: &Options) -> Result<Evaluated, Fail
     let lines = lines::band(&set, options)?;
     let leads = check::leads(&set, &lines, options.order);
     let data = lines::data(&set.powers, &set, &lines, options);
-    let (coarse, held_out) = order::order(&set, &lines, options, &data).map_err(|failure| {
+    // The transforms of whole records take about as long as the search for the number of modes.
+    let (found, whole) = std::thread::scope(|scope| {
+        let whole = scope.spawn(|| whole::Whole::of(records, &set, &data));
+        let found = order::order(&set, &lines, options, &data);
+        (found, whole.join().expect("a transform does not panic"))
+    });
+    let (coarse, held_out) = found.map_err(|failure| {
         if leads {
             Failure::failed(check::LEADS)
         } else {
@@ -107,7 +113,7 @@ pub fn identify(records: &[Driven], options: &Options) -> Result<Evaluated, Fail
         spread,
         of_mode,
         relative,
-    } = settle(records, &set, &lines, &data, &coarse, &mut outcome)?;
+    } = settle(whole, &set, &lines, &data, &coarse, &mut outcome)?;
     words::name_modes(&mut outcome, &fitted, &spread);
     let quality = Quality {
         rms: words::output_rms(&set, &lines) * relative,
@@ -168,22 +174,20 @@ struct Settled {
 
 /// The final numbers: where a window makes resonances wider, from the whole records without one.
 fn settle(
-    records: &[Driven],
+    whole: Option<whole::Whole>,
     set: &Set,
     lines: &Lines,
     data: &Data,
     coarse: &Modal,
     outcome: &mut Outcome,
 ) -> Result<Settled, Failure> {
-    if set.window == Window::Hann
-        && let Some(whole) = whole::refine(records, data, coarse)
-    {
+    if let Some(settled) = whole.and_then(|whole| whole.refine(data, coarse)) {
         outcome.method.push(
             "constants from the whole records without a window, what their ends do to the spectrum being part \
              of the model"
                 .to_owned(),
         );
-        return Ok(whole);
+        return Ok(settled);
     }
     let averaged = data.fit(&coarse.poles, Effort::Fine)?;
     check::leakage(outcome, set, &averaged);

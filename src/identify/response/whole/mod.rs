@@ -23,6 +23,7 @@ mod normal;
 use num_complex::Complex64;
 use torqcomp_dsp::frf::{Block, Window, transform};
 
+use super::blocks::Set;
 use super::{Data, Driven, Modal, Settled};
 use crate::identify::decay::Pole;
 use crate::parallel::{parallel, threads};
@@ -55,36 +56,54 @@ const ENOUGH: usize = 500;
 /// Lines in half the width of a mode with which the search begins.
 const WITHIN: f64 = 25.0;
 
-/// Fits whole records from a fit of their averaged response; none if that does not come to an end, or if there are
-/// too few lines.
-pub(super) fn refine(records: &[Driven], shape: &Data, start: &Modal) -> Option<Settled> {
-    let band_rad_per_s = (shape.omega[0], shape.omega[shape.omega.len() - 1]);
-    let mut all: Vec<Spectra> = records
-        .iter()
-        .map(|r| Spectra::of(r, band_rad_per_s))
-        .collect();
-    let layout = Layout::of(shape, start.poles.len(), band_rad_per_s);
-    let enough = |s: &Spectra| s.omega.len() >= LEAST_LINES * layout.columns();
-    if start.poles.is_empty() || !all.iter().all(enough) {
-        return None;
+/// Whole records as they are fitted.
+pub(super) struct Whole {
+    records: Vec<Spectra>,
+    band_rad_per_s: (f64, f64),
+}
+
+impl Whole {
+    /// The records of noise at the lines of the averaged response; none of records that are not weighted with Hann's
+    /// window, which have no leakage.
+    pub fn of(records: &[Driven], set: &Set, shape: &Data) -> Option<Self> {
+        let band_rad_per_s = (shape.omega[0], shape.omega[shape.omega.len() - 1]);
+        let spectra = |r| Spectra::of(r, band_rad_per_s);
+        (set.window == Window::Hann).then(|| Self {
+            records: records.iter().map(spectra).collect(),
+            band_rad_per_s,
+        })
     }
-    let state = State::start(&layout, start, all.len());
-    let some: Vec<Spectra> = all.iter().map(|s| s.thinned(&layout, &state)).collect();
-    let (state, _) = descend(&layout, &some, state, LAST_STEP.0)?;
-    for (record, spectra) in all.iter_mut().enumerate() {
-        spectra.learn_noise(&layout, &state, record);
+
+    /// Fits them from a fit of their averaged response; none if that does not come to an end, or if there are
+    /// too few lines.
+    pub fn refine(self, shape: &Data, start: &Modal) -> Option<Settled> {
+        let Self {
+            records: mut all,
+            band_rad_per_s,
+        } = self;
+        let layout = Layout::of(shape, start.poles.len(), band_rad_per_s);
+        let enough = |s: &Spectra| s.omega.len() >= LEAST_LINES * layout.columns();
+        if start.poles.is_empty() || !all.iter().all(enough) {
+            return None;
+        }
+        let state = State::start(&layout, start, all.len());
+        let some: Vec<Spectra> = all.iter().map(|s| s.thinned(&layout, &state)).collect();
+        let (state, _) = descend(&layout, &some, state, LAST_STEP.0)?;
+        for (record, spectra) in all.iter_mut().enumerate() {
+            spectra.learn_noise(&layout, &state, record);
+        }
+        let (state, solved) = descend(&layout, &all, state, LAST_STEP.1)?;
+        Some(Settled {
+            relative: left_over(&layout, &all, &state),
+            spread: solved.of_modes(layout.modes),
+            of_mode: solved.of_mode(&layout),
+            modal: shape.modal_of(
+                &state.poles,
+                (state.delay_s, solved.delay_std(&layout)),
+                &state.linear,
+            ),
+        })
     }
-    let (state, solved) = descend(&layout, &all, state, LAST_STEP.1)?;
-    Some(Settled {
-        relative: left_over(&layout, &all, &state),
-        spread: solved.of_modes(layout.modes),
-        of_mode: solved.of_mode(&layout),
-        modal: shape.modal_of(
-            &state.poles,
-            (state.delay_s, solved.delay_std(&layout)),
-            &state.linear,
-        ),
-    })
 }
 
 impl Spectra {

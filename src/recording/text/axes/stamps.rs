@@ -33,6 +33,9 @@ impl Sources<'_> {
             };
             found.extend(stamps);
         }
+        if found.len() < 2 {
+            return Ok(found.pop());
+        }
         // The finest is the one that repeats the fewest stamps.
         let repeats = |stamps: &Stamps| {
             stamps
@@ -45,9 +48,6 @@ impl Sources<'_> {
             .filter(|place| typical_step(&found[*place].stamps_s).is_some())
             .filter(|place| rises(&found[*place].stamps_s))
             .min_by_key(|place| repeats(&found[*place]));
-        if found.is_empty() {
-            return Ok(None);
-        }
         let date = found.iter().find_map(|stamps| stamps.start_text.clone());
         let mut best = found.swap_remove(best.unwrap_or(0));
         best.start_text = best.start_text.or(date);
@@ -64,11 +64,11 @@ impl Sources<'_> {
         ];
         let (field, values) = (&self.fields[place], &self.columns[place].values);
         let usual = values.get(1).copied().unwrap_or(f64::NAN);
-        let same = values.iter().filter(|value| **value == usual).count();
+        let same = || values.iter().filter(|value| **value == usual).count();
         NAMES.contains(&field.name.to_lowercase().as_str())
             && !self.is_clock(place)
             && self.fields.len() > 1
-            && 2 * same > values.len()
+            && 2 * same() > values.len()
             && values.iter().all(|value| *value >= 0.0)
     }
 
