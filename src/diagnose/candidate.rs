@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use torqcomp_model::effects::{Effect, Mode};
-use torqcomp_model::simulate::Input;
+use torqcomp_model::simulate::{Between, Input};
 
 use super::blocks::{Comparison, compare};
 use super::columns::Columns;
@@ -14,6 +14,7 @@ use super::starts::{self, Trial};
 use super::structure::{Choice, Structure, Waves};
 
 /// The records of a diagnosis.
+#[derive(Clone)]
 pub struct Records {
     /// Fitted.
     pub train: Vec<Record>,
@@ -34,17 +35,40 @@ impl Records {
     pub fn set_substeps(&mut self, substeps: usize) {
         set_substeps(self.train.iter_mut().chain(&mut self.hold), substeps);
     }
+
+    /// The same records with another course of the input between its samples.
+    #[must_use]
+    pub fn with_between(&self, between: Between) -> Self {
+        let mut other = self.clone();
+        let all = other.train.iter_mut().chain(&mut other.hold);
+        change_inputs(all, |input| input.with_between(between));
+        other
+    }
+
+    /// That course.
+    #[must_use]
+    pub fn between(&self) -> Between {
+        self.train[0].input.between()
+    }
 }
 
-/// Gives records that many steps of integration from sample to sample; records that share an input go on to share it.
+/// Gives records that many steps of integration from sample to sample.
 pub fn set_substeps<'r>(records: impl Iterator<Item = &'r mut Record>, substeps: usize) {
+    change_inputs(records, |input| input.with_substeps(substeps));
+}
+
+/// Changes the inputs of records; records that share an input go on to share it.
+fn change_inputs<'r>(
+    records: impl Iterator<Item = &'r mut Record>,
+    change: impl Fn(&Input) -> Input,
+) {
     let mut made: Vec<(Arc<Input>, Arc<Input>)> = Vec::new();
     for record in records {
         let known = made.iter().find(|(old, _)| Arc::ptr_eq(old, &record.input));
         let new = match known {
             Some((_, new)) => new.clone(),
             None => {
-                let new = Arc::new(record.input.with_substeps(substeps));
+                let new = Arc::new(change(&record.input));
                 made.push((record.input.clone(), new.clone()));
                 new
             }
@@ -89,8 +113,8 @@ pub fn refine_step<'a>(
     (judged, true)
 }
 
-/// The same model fitted again, with the step that the records have now.
-fn again<'a>(judged: &Judged<'a>, records: &Records) -> Option<Judged<'a>> {
+/// The same model fitted again, with the step and the course of the input that the records have now.
+pub(super) fn again<'a>(judged: &Judged<'a>, records: &Records) -> Option<Judged<'a>> {
     let fitted = &judged.fitted;
     let training = begun(&records.train, fitted);
     let (structure, values) = (fitted.structure.clone(), &fitted.values);

@@ -1,5 +1,6 @@
 //! Closing the loop: what the model leaves unexplained, the effect behind it, and the error before and after.
 
+mod between;
 mod blocks;
 mod candidate;
 mod columns;
@@ -19,6 +20,7 @@ mod verdict;
 mod views;
 
 use torqcomp_model::effects::Rulers;
+use torqcomp_model::simulate::Between;
 
 use crate::failure::Failure;
 use verdict::{Missing, remains};
@@ -131,71 +133,110 @@ pub fn run<'a>(
     found: Constants,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Diagnosis<'a>, Failure> {
-    let reference = found.mode();
-    let threads = case.threads;
-    let declared = case.declared;
-    let mut records = Records {
+    let records = Records {
         train: case.train,
         hold: case.hold,
-        reference,
+        reference: found.mode(),
     };
-    let mut values = vec![1.0, found.damping_ratio];
-    if frame.gain_is_free {
-        values.push(1.0);
-    }
-    let structure = Structure {
+    let look = Look {
         frame,
-        choices: Vec::new(),
+        found,
+        declared: case.declared,
+        threads: case.threads,
+        progress,
     };
-    let cannot = || Failure::failed("the plain stand cannot be run on the held-out records");
-    let plain =
-        fit::fit(structure, &values, &records.train, &reference, 10).map_err(Failure::failed)?;
-    plain::set_starts(&plain, &mut records.train, &reference);
-    plain::set_starts(&plain, &mut records.hold, &reference);
-    let plain = Fitted {
-        begins: records.train.iter().map(|r| r.begin).collect(),
-        ..plain
-    };
-    let declared = declared.and_then(|d| judge(as_declared(&plain, d), &records));
-    let before = judge(plain, &records).ok_or_else(cannot)?;
-    let dependence_before = dependence(&before, &records);
+    let mut diagnosis = look.at(records.clone())?;
+    if let Some(between) = diagnosis.other_course(case.threads) {
+        diagnosis = look.at(records.with_between(between))?;
+    }
+    diagnosis.conclude();
+    Ok(diagnosis)
+}
+
+/// What records are looked at with.
+struct Look<'a, 'b> {
+    frame: &'a Frame,
+    /// Constants of the plain stand.
+    found: Constants,
+    declared: Option<Constants>,
+    threads: usize,
+    progress: &'b (dyn Fn(usize, usize) + Sync),
+}
+
+impl<'a> Look<'a, '_> {
+    /// The plain stand and the effects that are added to it, without a verdict yet.
+    fn at(&self, mut records: Records) -> Result<Diagnosis<'a>, Failure> {
+        let plain = self.plain(&mut records)?;
+        let cannot = || Failure::failed("the plain stand cannot be run on the held-out records");
+        let declared = self
+            .declared
+            .and_then(|d| judge(as_declared(&plain, d), &records));
+        let before = judge(plain, &records).ok_or_else(cannot)?;
+        let dependence_before = dependence(&before, &records);
+        let missing = Missing {
+            before: &before,
+            floor: first_floor(&before, &records),
+        };
+        let Found {
+            after,
+            rounds,
+            suspected,
+            rest,
+            settled,
+        } = Found::of(
+            missing,
+            &dependence_before,
+            &mut records,
+            self.threads,
+            self.progress,
+        );
+        Ok(Diagnosis {
+            floor: without_disturbances(missing.floor, &after, &records),
+            lines: prominent_lines(&after, &records),
+            records,
+            declared,
+            before,
+            after,
+            rounds,
+            suspected,
+            dependence_before,
+            dependence: rest,
+            settled,
+            verdict: Verdict::NothingMissing,
+        })
+    }
+
+    /// The plain stand, fitted; sets how the records begin.
+    fn plain(&self, records: &mut Records) -> Result<Fitted<'a>, Failure> {
+        let mut values = vec![1.0, self.found.damping_ratio];
+        if self.frame.gain_is_free {
+            values.push(1.0);
+        }
+        let structure = Structure {
+            frame: self.frame,
+            choices: Vec::new(),
+        };
+        let reference = records.reference;
+        let plain = fit::fit(structure, &values, &records.train, &reference, 10)
+            .map_err(Failure::failed)?;
+        plain::set_starts(&plain, &mut records.train, &reference);
+        plain::set_starts(&plain, &mut records.hold, &reference);
+        Ok(Fitted {
+            begins: records.train.iter().map(|r| r.begin).collect(),
+            ..plain
+        })
+    }
+}
+
+/// The noise of the held-out records.
+fn first_floor(before: &Judged, records: &Records) -> Option<Floor> {
     let pairs: Vec<(&Record, &[f64])> = records
         .hold
         .iter()
         .zip(&before.hold)
         .map(|(record, residual)| (record, residual.modelled.as_slice()))
         .collect();
-    let floor = floor::noise_floor(&pairs);
-
-    let missing = Missing {
-        before: &before,
-        floor,
-    };
-    let Found {
-        after,
-        rounds,
-        suspected,
-        rest,
-        settled,
-    } = Found::of(missing, &dependence_before, &mut records, threads, progress);
-    let floor = without_disturbances(floor, &after, &records);
-    let lines = prominent_lines(&after, &records);
-    let mut diagnosis = Diagnosis {
-        records,
-        declared,
-        lines,
-        before,
-        after,
-        rounds,
-        suspected,
-        floor,
-        dependence_before,
-        dependence: rest,
-        settled,
-        verdict: Verdict::NothingMissing,
-    };
-    diagnosis.conclude();
-    Ok(diagnosis)
+    floor::noise_floor(&pairs)
 }
 
 /// What the search for effects has found.
@@ -327,6 +368,24 @@ fn prominent_lines(judged: &Judged, records: &Records) -> Vec<Peak> {
 }
 
 impl Diagnosis<'_> {
+    /// A course of the input between its samples that explains what is missing better than what was found.
+    fn other_course(&self, threads: usize) -> Option<Between> {
+        if self.effects().is_empty() && !remains(&self.before, &self.dependence_before, self.floor)
+        {
+            return None;
+        }
+        let added = self.rounds.iter().filter_map(|tried| {
+            let first = tried.first().filter(|t| t.status == Status::Accepted)?;
+            first.judged.as_ref()
+        });
+        let mut models = vec![&self.before];
+        // Where nothing is left, only one course in place of all effects could say more.
+        if remains(&self.after, &self.dependence, self.floor) {
+            models.extend(added);
+        }
+        between::better(&models, &self.after, self.floor, &self.records, threads)
+    }
+
     /// The effects that were added.
     #[must_use]
     pub fn effects(&self) -> Vec<&'static str> {

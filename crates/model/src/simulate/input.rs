@@ -5,6 +5,8 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
+use super::between::Between;
+
 /// A record of the applied quantity, prepared for simulation.
 ///
 /// Beyond an end where it repeats, the record is continued by its period, beyond others by point reflection; both fade
@@ -21,13 +23,24 @@ pub struct Input {
     forward: Arc<dyn RealToComplex<f64>>,
     backward: Arc<dyn ComplexToReal<f64>>,
     substeps: usize,
+    between: Between,
     fine: Vec<f64>,
 }
 
 impl Input {
-    /// Prepares a record, with that many steps from sample to sample for integration in time.
+    /// Prepares a band-limited record, with that many steps from sample to sample for integration in time.
     #[must_use]
     pub fn new(samples: Vec<f64>, rate_hz: f64, start_s: f64, substeps: usize) -> Self {
+        Self::of(samples, rate_hz, start_s, substeps, Between::BandLimited)
+    }
+
+    fn of(
+        samples: Vec<f64>,
+        rate_hz: f64,
+        start_s: f64,
+        substeps: usize,
+        between: Between,
+    ) -> Self {
         let count = samples.len();
         let lead = (count / 16).clamp(16, 2048).min(count.saturating_sub(1));
         let total = quick_length(count + 2 * lead);
@@ -45,9 +58,13 @@ impl Input {
             forward,
             backward,
             substeps,
+            between,
             fine: Vec::new(),
         };
         input.spectrum = input.transform_with(&input.samples, input.periods);
+        for (line, value) in input.spectrum.iter_mut().enumerate() {
+            *value *= between.factor(line as f64 / total as f64);
+        }
         input.fine = input.refine(substeps);
         input
     }
@@ -55,7 +72,21 @@ impl Input {
     /// The same record with another number of steps.
     #[must_use]
     pub fn with_substeps(&self, substeps: usize) -> Self {
-        Self::new(self.samples.clone(), self.rate_hz, self.start_s, substeps)
+        let samples = self.samples.clone();
+        Self::of(samples, self.rate_hz, self.start_s, substeps, self.between)
+    }
+
+    /// The same record with another course between its samples.
+    #[must_use]
+    pub fn with_between(&self, between: Between) -> Self {
+        let samples = self.samples.clone();
+        Self::of(samples, self.rate_hz, self.start_s, self.substeps, between)
+    }
+
+    /// Its course between its samples.
+    #[must_use]
+    pub fn between(&self) -> Between {
+        self.between
     }
 
     /// The samples.
@@ -82,7 +113,7 @@ impl Input {
         self.substeps
     }
 
-    /// Spectrum of the samples.
+    /// Spectrum of what acts, up to half the sampling rate.
     #[must_use]
     pub fn spectrum(&self) -> &[Complex64] {
         &self.spectrum
@@ -132,7 +163,7 @@ impl Input {
             .collect()
     }
 
-    /// Band-limited interpolation: the spectrum, padded with zeros.
+    /// Interpolation of what acts: its spectrum, padded with zeros.
     fn refine(&self, substeps: usize) -> Vec<f64> {
         let long = self.total * substeps;
         let plan = RealFftPlanner::new().plan_fft_inverse(long);

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{Input, Model, State};
+use super::{Between, Input, Model, State};
 use crate::effects::{Action, Effect, Mode, Place, RIVALS};
 
 const RATE_HZ: f64 = 20_000.0;
@@ -114,6 +114,36 @@ fn both_ways_of_the_linear_stand_agree_with_the_oracle() {
         .map(|(a, b)| a - b);
     let error = rms(difference) / rms(truth[late..].iter().copied());
     assert!(error < 1e-6, "{error:e}");
+}
+
+/// The input as it goes from sample to sample in other ways, put to the oracle as it is.
+#[test]
+fn held_samples_and_straight_lines_agree_with_the_oracle() {
+    let sample = |i: f64| input_at(i.clamp(0.0, (COUNT - 1) as f64) / RATE_HZ);
+    // The middle of an oracle's step tells the sample that it lies in.
+    let held = |place: f64| sample((place + 1e-9).floor());
+    let line = |place: f64| {
+        let part = place - place.floor();
+        (1.0 - part) * sample(place.floor()) + part * sample(place.floor() + 1.0)
+    };
+    let ways: [(Between, &dyn Fn(f64) -> f64); 2] =
+        [(Between::Held, &held), (Between::StraightLines, &line)];
+    let w = MODE.omega_rad_s;
+    for (between, at) in ways {
+        let damped = |s: [f64; 3]| -w * w * s[0] - 2.0 * MODE.damping_ratio * w * s[1];
+        let truth = oracle(|t, s| [s[1], w * w * at(t * RATE_HZ) + damped(s), 0.0]);
+        let found = plain().simulate_from(&input(4).with_between(between), State::default());
+        let error = |found: &[f64]| {
+            let left = found.iter().zip(&truth).map(|(a, b)| a - b);
+            rms(left) / rms(truth.iter().copied())
+        };
+        let (with, without) = (
+            error(&found),
+            error(&plain().simulate_from(&input(4), State::default())),
+        );
+        println!("{}: {with:e} instead of {without:e}", between.name());
+        assert!(with < 3e-4 && with < 0.1 * without, "{with:e} {without:e}");
+    }
 }
 
 /// From rest under a constant input: `1 − e^{−ζω₀t} (cos ω_d t + ζω₀/ω_d sin ω_d t)`.
