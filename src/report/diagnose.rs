@@ -25,6 +25,8 @@ pub struct Report {
     pub verdict: &'static str,
     /// The effects that were added.
     pub effects: Vec<&'static str>,
+    /// What the input was found to do between its samples: `band-limited`, `straight-lines` or `held`.
+    pub input_between_samples: &'static str,
     /// The errors.
     pub error: Error,
     /// Constants of the plain stand: declared, refitted, and refitted with the effects.
@@ -82,8 +84,12 @@ pub struct Constant {
     pub declared: Option<f64>,
     /// Refitted.
     pub before: f64,
+    /// Its standard uncertainty.
+    pub before_std: Option<f64>,
     /// Refitted with the effects.
     pub after: f64,
+    /// Its standard uncertainty.
+    pub after_std: Option<f64>,
 }
 
 /// An effect that was tried.
@@ -122,6 +128,8 @@ pub struct Suspected {
     pub train_rms: f64,
     /// Rms on the held-out records.
     pub holdout_rms: f64,
+    /// Unit of both.
+    pub unit: String,
     /// Its parameters.
     pub parameters: Vec<Parameter>,
 }
@@ -136,10 +144,16 @@ impl Suspected {
             format!(" beside {}", self.with.join(" and "))
         };
         format!(
-            "{} ({}){with}, which would leave {} of the held-out records; it is not among the effects that are added",
+            "{} ({}){with}, which would leave an error of {} {} on the held-out records; it is not among the effects that \
+             are added",
             self.law,
             self.equation,
-            rounded(self.holdout_rms, 4)
+            rounded(self.holdout_rms, 4),
+            if self.unit.is_empty() {
+                "as recorded"
+            } else {
+                &self.unit
+            }
         )
     }
 }
@@ -196,7 +210,31 @@ pub struct Levels {
     pub holdout_relative: f64,
 }
 
+/// A value with its standard uncertainty, if that is known.
+#[must_use]
+pub fn with_std(value: f64, std: Option<f64>) -> String {
+    match std {
+        Some(std) => super::with_std(value, std),
+        None => format!("{} (std unknown)", rounded(value, 6)),
+    }
+}
+
 impl Report {
+    /// What the input does between its samples, where that had to be found out.
+    #[must_use]
+    pub fn course(&self) -> Option<&'static str> {
+        match self.input_between_samples {
+            "held" => Some(
+                "the applied record acts as if each sample were held until the next one, as a converter does; all errors are with \
+                 that",
+            ),
+            "straight-lines" => Some(
+                "the applied record acts as if straight lines ran from sample to sample; all errors are with that",
+            ),
+            _ => None,
+        }
+    }
+
     /// For people.
     #[must_use]
     pub fn text(&self) -> String {
@@ -207,6 +245,9 @@ impl Report {
         };
         let mut text = format!("verdict: {}\neffects: {effects}\n\n", self.verdict);
         text.push_str(&self.errors());
+        if let Some(course) = self.course() {
+            text.push_str(&format!("input: {course}\n"));
+        }
         text.push('\n');
         text.push_str(&self.constants());
         text.push('\n');
@@ -276,8 +317,8 @@ impl Report {
             vec![
                 name,
                 c.declared.map_or_else(|| "-".to_owned(), |v| rounded(v, 6)),
-                rounded(c.before, 6),
-                rounded(c.after, 6),
+                with_std(c.before, c.before_std),
+                with_std(c.after, c.after_std),
             ]
         });
         columns(&std::iter::once(head).chain(rows).collect::<Vec<_>>())
@@ -300,15 +341,10 @@ impl Report {
             ));
             if c.status != "rejected" {
                 for p in &c.parameters {
-                    let std = p
-                        .std
-                        .map_or_else(String::new, |s| format!(" ± {}", rounded(s, 2)));
-                    text.push_str(&format!(
-                        "    {} = {}{std} {}\n",
-                        p.name,
-                        rounded(p.value, 6),
-                        p.unit
-                    ));
+                    let value = with_std(p.value, p.std);
+                    let text_of = format!("    {} = {value} {}", p.name, p.unit);
+                    text.push_str(text_of.trim_end());
+                    text.push('\n');
                 }
             }
         }

@@ -1,7 +1,7 @@
 //! A diagnosis as a page for a browser: records beside both models, residuals, candidates, what remains.
 
 use super::chart::{Chart, Series};
-use super::diagnose::{Candidate, Report, Rms};
+use super::diagnose::{Candidate, Report, Rms, with_std};
 use super::page::Page;
 use super::{rounded, short};
 use crate::diagnose::{Against, Trace, autocorrelation, binned, density, response};
@@ -108,6 +108,9 @@ impl Report {
             ),
             _ => "The noise floor is not known.".to_owned(),
         });
+        if let Some(course) = self.course() {
+            page.text(&format!("Input: {course}."));
+        }
     }
 
     fn unit(&self) -> &str {
@@ -159,8 +162,8 @@ impl Report {
                 c.unit.clone(),
                 c.declared
                     .map_or_else(|| "not declared".to_owned(), |v| rounded(v, 6)),
-                rounded(c.before, 6),
-                rounded(c.after, 6),
+                with_std(c.before, c.before_std),
+                with_std(c.after, c.after_std),
             ]
         });
         std::iter::once(head).chain(rows).collect()

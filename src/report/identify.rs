@@ -7,7 +7,7 @@ use torqcomp_model::{Kind, UnitSystem};
 
 use super::chart::Chart;
 use super::page::Page;
-use super::{Warning, columns, rounded, short};
+use super::{Warning, columns, rounded, short, value_and_std};
 use crate::cli::Units;
 use crate::identify::{Comparison, Found, Outcome, Quality};
 
@@ -151,13 +151,9 @@ impl Parameter {
     }
 
     fn row(&self) -> Vec<String> {
-        // Two digits of the uncertainty say how many of the value count.
-        let value = match self.std {
-            Some(std) if std > 0.0 && self.value != 0.0 => {
-                let digits = (self.value.abs() / std).log10().floor() as i32 + 2;
-                rounded(self.value, digits.clamp(2, 12) as u32)
-            }
-            _ => short(self.value),
+        let [value, std] = match self.std {
+            Some(std) => value_and_std(self.value, std),
+            None => [short(self.value), "unknown".to_owned()],
         };
         let relative = self
             .std
@@ -165,9 +161,6 @@ impl Parameter {
             .map_or_else(String::new, |std| {
                 format!("{} %", rounded(100.0 * (std / self.value).abs(), 2))
             });
-        let std = self
-            .std
-            .map_or_else(|| "unknown".to_owned(), |std| rounded(std, 2));
         vec![
             self.name.replace('_', " "),
             value,

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{columns, rounded};
+use super::{columns, rounded, with_std};
 
 /// Schema of the JSON document.
 pub const SCHEMA: &str = "torqcomp.predict/1";
@@ -103,7 +103,7 @@ fn cell(value: Option<f64>, std: Option<f64>) -> String {
     match (value, std) {
         (None, _) => "-".to_owned(),
         (Some(value), None) => rounded(value, 4),
-        (Some(value), Some(std)) => format!("{} ± {}", rounded(value, 4), rounded(std, 2)),
+        (Some(value), Some(std)) => with_std(value, std),
     }
 }
 

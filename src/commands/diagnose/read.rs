@@ -43,6 +43,23 @@ pub struct Units {
     pub diagnosed: String,
     /// SI units of what is diagnosed per printed unit.
     pub printed: f64,
+    /// SI units of each channel per unit of its file, applied and measured.
+    factors: [f64; 2],
+}
+
+impl Units {
+    /// Unit of the static gain as it is printed, and its number per SI unit.
+    #[must_use]
+    pub fn gain(&self) -> (String, f64) {
+        let [applied, measured] = self.factors;
+        let unit = match (self.measured.as_str(), self.applied.as_str()) {
+            ("", "") => "as recorded".to_owned(),
+            (measured, "") => format!("{measured} per applied unit"),
+            ("", applied) => format!("measured unit per {applied}"),
+            (measured, applied) => format!("{measured}/{applied}"),
+        };
+        (unit, applied / measured)
+    }
 }
 
 /// The records.
@@ -83,6 +100,7 @@ pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<Read, Failure> {
     for other in train.iter().chain(&hold) {
         same(first, other)?;
     }
+    refuse_same_samples(&train, &hold)?;
     let (units, gain, scale) = units(first, stand)?;
     let declared = stand
         .map(|stand| declared(stand, gain.unwrap_or(1.0)))
@@ -193,6 +211,19 @@ fn same(first: &Pair, other: &Pair) -> Result<(), Failure> {
     Ok(())
 }
 
+/// A held-out record that is fitted as well holds nothing out.
+fn refuse_same_samples(train: &[Pair], hold: &[Pair]) -> Result<(), Failure> {
+    let is_same = |a: &Pair, b: &Pair| a.measured == b.measured && a.applied == b.applied;
+    let pairs = hold.iter().flat_map(|h| train.iter().map(move |t| (h, t)));
+    match pairs.into_iter().find(|(h, t)| is_same(h, t)) {
+        None => Ok(()),
+        Some((h, t)) => Err(Failure::failed(format_args!(
+            "{} holds the same samples as the training record {}: nothing would be held out; give another record, or leave              --holdout out to keep the last 30 % of each training record back",
+            h.source, t.source
+        ))),
+    }
+}
+
 fn has_static_gain(stand: Option<&Stand>) -> bool {
     matches!(
         stand.and_then(|s| s.mechanics.as_ref()).map(|m| &m.given),
@@ -256,6 +287,7 @@ fn units(pair: &Pair, stand: Option<&Stand>) -> Result<(Units, Option<f64>, Scal
         measured: text(&pair.measured_unit),
         diagnosed,
         printed,
+        factors: [scale.applied, scale.measured],
     };
     Ok((units, declared, scale))
 }

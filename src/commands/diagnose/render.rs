@@ -36,6 +36,25 @@ pub struct Rendered<'a> {
     pub warnings: Vec<Warning>,
 }
 
+/// Natural frequency in Hz, damping ratio and static gain of a model, with their standard uncertainties.
+fn plain_constants(judged: &Judged) -> [(f64, Option<f64>); 3] {
+    let fitted = &judged.fitted;
+    let (mode, gain) = fitted.structure.mode(&fitted.values);
+    let values = [
+        mode.omega_rad_s / std::f64::consts::TAU,
+        mode.damping_ratio,
+        gain,
+    ];
+    std::array::from_fn(|k| {
+        // What is fitted is a multiple of what is meant.
+        let std = fitted.std.get(k).copied().flatten();
+        let is_fitted = k < fitted.structure.frame.plain_count();
+        let scale = fitted.values.get(k).map(|v| (values[k] / v).abs());
+        let std = std.zip(scale).map(|(std, scale)| std * scale);
+        (values[k], std.filter(|_| is_fitted))
+    })
+}
+
 impl Rendered<'_> {
     /// The report.
     #[must_use]
@@ -49,6 +68,7 @@ impl Rendered<'_> {
             train: self.args.train.clone(),
             holdout: self.args.holdout.clone(),
             verdict: d.verdict.name(),
+            input_between_samples: d.records.between().name(),
             error: Error {
                 unit: self.printed_unit(),
                 declared: d.declared.as_ref().map(|j| self.rms(j)),
@@ -152,41 +172,28 @@ impl Rendered<'_> {
     }
 
     fn constants(&self) -> Vec<Constant> {
-        let of = |judged: &Judged| {
-            let (mode, gain) = judged.fitted.structure.mode(&judged.fitted.values);
-            [
-                mode.omega_rad_s / std::f64::consts::TAU,
-                mode.damping_ratio,
-                gain,
-            ]
-        };
-        let (before, after) = (of(&self.diagnosis.before), of(&self.diagnosis.after));
+        let before = plain_constants(&self.diagnosis.before);
+        let after = plain_constants(&self.diagnosis.after);
         let declared = self
             .declared
             .map(|d| [d.natural_hz, d.damping_ratio, d.gain]);
-        let names = [
-            ("natural_frequency", "Hz"),
-            ("damping_ratio", ""),
-            ("static_gain", ""),
-        ];
+        let names = ["natural_frequency", "damping_ratio", "static_gain"];
+        let (gain_unit, gain_scale) = self.units.gain();
+        let units = ["Hz".to_owned(), String::new(), gain_unit];
+        let scales = [1.0, 1.0, gain_scale];
         let free = self.diagnosis.before.fitted.structure.frame.gain_is_free;
         let shown = if free { 3 } else { 2 };
-        names
-            .iter()
-            .take(shown)
-            .enumerate()
-            .map(|(k, (name, unit))| Constant {
-                name,
-                unit: if k == 2 {
-                    format!("{}/{}", self.units.measured, self.units.applied)
-                } else {
-                    (*unit).to_owned()
-                },
-                declared: declared.map(|d| d[k]),
-                before: before[k],
-                after: after[k],
-            })
-            .collect()
+        let constant = |(k, (name, unit)): (usize, (&'static str, String))| Constant {
+            name,
+            unit,
+            declared: declared.map(|d| d[k] * scales[k]),
+            before: before[k].0 * scales[k],
+            before_std: before[k].1.map(|s| s * scales[k]),
+            after: after[k].0 * scales[k],
+            after_std: after[k].1.map(|s| s * scales[k]),
+        };
+        let named = names.into_iter().zip(units).enumerate();
+        named.take(shown).map(constant).collect()
     }
 
     fn candidates(&self) -> Vec<Candidate> {
@@ -199,7 +206,11 @@ impl Rendered<'_> {
                 let first = |t: &Tried| t.status != Status::Accepted;
                 first(a).cmp(&first(b)).then(key(a).total_cmp(&key(b)))
             });
-            all.extend(sorted.iter().map(|t| self.candidate(t, &with)));
+            all.extend(sorted.iter().map(|t| match t.status {
+                // As they are in the refined stand, not as they were when they were chosen.
+                Status::Accepted => self.accepted(t, &with),
+                _ => self.candidate(t, &with),
+            }));
             with.extend(
                 round
                     .iter()
@@ -208,6 +219,27 @@ impl Rendered<'_> {
             );
         }
         all
+    }
+
+    fn accepted(&self, tried: &Tried, with: &[&'static str]) -> Candidate {
+        let after = &self.diagnosis.after;
+        let is_last = with.len() + 1 == after.fitted.structure.choices.len();
+        let whole = self.rms(after);
+        let chosen = self.candidate(tried, with);
+        Candidate {
+            train_rms: if is_last {
+                Some(whole.train_rms)
+            } else {
+                chosen.train_rms
+            },
+            holdout_rms: if is_last {
+                Some(whole.holdout_rms)
+            } else {
+                chosen.holdout_rms
+            },
+            parameters: self.parameters(after).swap_remove(with.len()),
+            ..chosen
+        }
     }
 
     fn candidate(&self, tried: &Tried, with: &[&'static str]) -> Candidate {
@@ -238,6 +270,7 @@ impl Rendered<'_> {
             with: self.diagnosis.effects(),
             train_rms: rival.judged.train_rms() / self.units.printed,
             holdout_rms: rival.judged.hold_rms() / self.units.printed,
+            unit: self.printed_unit(),
             parameters: self.parameters(&rival.judged).pop().unwrap_or_default(),
         })
     }
