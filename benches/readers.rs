@@ -8,6 +8,7 @@ use std::io::Cursor;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use mcap::records::MessageHeader;
 use mcap::{Compression, WriteOptions, Writer};
+use torqcomp::io::csv::Place;
 use torqcomp::io::mcap::record::frames::Frames;
 use torqcomp::io::mcap::record::input::Input;
 use torqcomp::io::mcap::{Inventory, Options, Selection, Source};
@@ -100,7 +101,8 @@ fn read(bytes: &[u8], field: &str) -> u64 {
     };
     let wanted = selection.check().expect("a topic and a field");
     let options = Options::default();
-    let mut source = Source::read(frames(bytes), &wanted, &options).expect("it is there");
+    let mut source =
+        Source::read(&Place::Stdin, frames(bytes), &wanted, &options).expect("it is there");
     let (mut times, mut values) = (Vec::new(), Vec::new());
     while source.next(&mut times, &mut values).expect("in memory") {
         black_box((&times, &values));

@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
+use torqcomp_model::simulate;
 
 use super::{Result, TimeAxis, digits};
 use crate::io::digits::Digits;
@@ -22,9 +23,9 @@ pub struct Simulate {
     /// Column with the applied quantity, or the signal of an MCAP file, as '/joint_states.effort[name=motor]'
     #[arg(long, value_name = "COL")]
     pub applied: Option<String>,
-    /// Column with the measured quantity: the motion then starts as it tells, instead of at rest
-    #[arg(long, value_name = "COL")]
-    pub start_from: Option<String>,
+    /// What the applied quantity does between its samples
+    #[arg(long, value_enum, default_value = "band-limited")]
+    pub between: Between,
     /// Unit of the applied quantity, if its heading does not say
     #[arg(long, value_name = "UNIT")]
     pub unit: Option<String>,
@@ -34,7 +35,34 @@ pub struct Simulate {
     /// Significant digits of the result, 1 to 15, or "shortest" for as many as bring back every bit
     #[arg(long, value_name = "N", default_value = "12", value_parser = digits)]
     pub digits: Digits,
+    /// Print a JSON report to standard output; the record then needs -o
+    #[arg(long)]
+    pub json: bool,
+    /// End with code 3 if there are warnings
+    #[arg(long)]
+    pub strict: bool,
     /// Say nothing on standard error but warnings
     #[arg(short, long)]
     pub quiet: bool,
+}
+
+/// Courses of a quantity between its samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Between {
+    /// Nothing above half the sampling rate: recorded behind an anti-alias filter
+    BandLimited,
+    /// Straight lines
+    StraightLines,
+    /// Each sample until the next one, as a converter holds it
+    Held,
+}
+
+impl From<Between> for simulate::Between {
+    fn from(between: Between) -> Self {
+        match between {
+            Between::BandLimited => Self::BandLimited,
+            Between::StraightLines => Self::StraightLines,
+            Between::Held => Self::Held,
+        }
+    }
 }

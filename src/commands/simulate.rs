@@ -2,15 +2,18 @@
 
 use torqcomp_model::effects::Action;
 use torqcomp_model::simulate::{Fixed, Input, Model, State, substeps};
+use torqcomp_model::{Estimate, Kind, Unit};
 
 use super::{Outcome, conclude};
 use crate::cli::Simulate;
 use crate::failure::Failure;
-use crate::io::csv::Place;
+use crate::io::csv::{NamedUnit, Place};
 use crate::io::digits;
-use crate::io::output::Output;
-use crate::report;
+use crate::io::output::{self, Output};
+use crate::report::simulate::{Report, SCHEMA};
+use crate::report::{self, Warning};
 use crate::signal::Together;
+use crate::signal::together::Track;
 use crate::stand::{self, Given, Stand};
 
 /// Relative change of the result at which the step of integration is fine enough.
@@ -26,98 +29,143 @@ pub fn run(args: &Simulate) -> Result<Outcome, Failure> {
         .options(args.applied.as_deref(), args.unit.as_deref());
     let read = Together::read(&Place::of(&args.input), &[options])?;
     let chosen = &read.tracks[0];
+    if args.json && matches!(args.result.output.as_deref(), None | Some("-")) {
+        return Err(Failure::usage(
+            "the record and the JSON document cannot both go to standard output; give -o FILE",
+        ));
+    }
+    if chosen.samples.len() < 2 {
+        return Err(Failure::failed(
+            "the record has fewer than two samples; nothing can be simulated",
+        ));
+    }
     let inputs = [args.input.as_ref(), args.stand.as_path()];
     let mut output = Output::open(args.result.output.as_deref(), args.result.force, &inputs)?;
-    let (gain, factor) = scales(&stand, chosen.unit.as_ref().map(|u| u.unit.factor()))?;
-    let applied: Vec<f64> = chosen.samples.iter().map(|u| u * factor.applied).collect();
-    let model = model(&stand, gain)?;
-    let (simulated, steps) = refined(&model, &applied, read.rate_hz, read.start_s)?;
+    let mut warnings: Vec<Warning> = read.lost.iter().chain(&read.warnings).cloned().collect();
+    let units = Units::of(&stand, chosen, &mut warnings)?;
+    let applied: Vec<f64> = chosen.samples.iter().map(|u| u * units.applied).collect();
+    let model = model(&stand, units.gain)?;
+    let between = args.between.into();
+    let input = Input::new(applied, read.rate_hz, read.start_s, 1).with_between(between);
+    let (simulated, steps) = refined(&model, &input)?;
+    write(&mut output, args, &read, &simulated, |value| {
+        (value + stand.diagnosed.offset) / units.measured
+    })?;
+    output.finish()?;
+    let report = Report {
+        schema: SCHEMA,
+        version: env!("CARGO_PKG_VERSION"),
+        input: args.input.clone(),
+        stand: args.stand.display().to_string(),
+        applied: chosen.name.clone(),
+        applied_unit: units.applied_text,
+        measured_unit: units.measured_text,
+        input_between_samples: between.name(),
+        samples: simulated.len(),
+        rate_hz: read.rate_hz,
+        start_s: read.start_s,
+        steps_per_sample: steps,
+        effects: stand.effects.iter().map(|e| e.effect.name).collect(),
+        warnings,
+    };
+    if args.json {
+        output::write_all(None, false, &[], &report::json(&report))?;
+    } else if !args.quiet {
+        report::say(&report.text());
+    }
+    Ok(conclude(&report.warnings, read.lost.is_some(), args.strict))
+}
+
+fn write(
+    output: &mut Output,
+    args: &Simulate,
+    read: &Together,
+    simulated: &[f64],
+    printed: impl Fn(f64) -> f64,
+) -> Result<(), Failure> {
     let mut text = String::from("time_s,measured\n");
     for (i, value) in simulated.iter().enumerate() {
         let time_s = read.start_s + i as f64 / read.rate_hz;
         text.push_str(&digits::text(time_s, 12));
         text.push(',');
         let mut cell = Vec::new();
-        digits::write(
-            &mut cell,
-            (value + stand.diagnosed.offset) / factor.measured,
-            args.digits,
-        );
+        digits::write(&mut cell, printed(*value), args.digits);
         text.push_str(&String::from_utf8_lossy(&cell));
         text.push('\n');
     }
-    output.write(text.as_bytes())?;
-    output.finish()?;
-    if !args.quiet {
-        report::say(&format!(
-            "simulated {} samples at {} Hz from rest, {steps} steps a sample, with {}\n",
-            simulated.len(),
-            report::short(read.rate_hz),
-            if stand.effects.is_empty() {
-                "no effects".to_owned()
-            } else {
-                names(&stand)
-            }
-        ));
-    }
-    let warnings: Vec<_> = read.lost.iter().chain(&read.warnings).cloned().collect();
-    Ok(conclude(&warnings, read.lost.is_some(), false))
+    output.write(text.as_bytes())
 }
 
-fn names(stand: &Stand) -> String {
-    let names: Vec<&str> = stand.effects.iter().map(|e| e.effect.name).collect();
-    names.join(", ")
-}
-
-/// SI units per unit of the files.
-struct Scales {
+/// Units of both quantities, and the gain between them.
+struct Units {
+    /// SI units per unit of the file.
     applied: f64,
+    applied_text: String,
+    /// SI units per unit of the result.
     measured: f64,
+    measured_text: String,
+    /// Measured per applied quantity at rest, in SI units.
+    gain: f64,
 }
 
-/// Gain in SI units, and the units of the files.
-fn scales(stand: &Stand, applied: Option<f64>) -> Result<(f64, Scales), Failure> {
-    let factor = |text: &str| {
-        torqcomp_model::Unit::parse(text)
-            .map(|unit| unit.factor())
-            .map_err(Failure::failed)
+impl Units {
+    fn of(stand: &Stand, chosen: &Track, warnings: &mut Vec<Warning>) -> Result<Self, Failure> {
+        let gain = match &stand.mechanics()?.given {
+            Given::Modal {
+                static_gain: Some(gain),
+                ..
+            } => Some(gain),
+            _ => None,
+        };
+        let expected = gain.map_or("N m", |gain| gain.applied_unit.as_str());
+        let applied = applied_unit(chosen, expected, warnings)?;
+        let text = match (&stand.diagnosed.measured_unit, gain) {
+            (Some(unit), _) => unit.clone(),
+            (None, Some(gain)) => gain.recorded_unit.clone(),
+            (None, None) => applied.text.clone(),
+        };
+        let unit = Unit::parse(&text).map_err(Failure::failed)?;
+        // A record in volts of a stand with a calibration is torque over that constant.
+        let is_volts = gain.is_none() && Kind::Voltage.parse(&format!("1 {text}")).is_ok();
+        let per_volt = stand.torque_per_volt.as_ref().filter(|_| is_volts);
+        Ok(Self {
+            applied: applied.unit.factor(),
+            applied_text: applied.text,
+            measured: unit.factor() * per_volt.map_or(1.0, Estimate::value),
+            measured_text: text,
+            gain: gain.map_or(1.0, |gain| gain.value),
+        })
+    }
+}
+
+/// The unit of the applied column, which must be one that the stand takes.
+fn applied_unit(
+    chosen: &Track,
+    expected: &str,
+    warnings: &mut Vec<Warning>,
+) -> Result<NamedUnit, Failure> {
+    let wanted = NamedUnit {
+        text: expected.to_owned(),
+        unit: Unit::parse(expected).map_err(Failure::failed)?,
     };
-    let gain = match &stand.mechanics()?.given {
-        Given::Modal {
-            static_gain: Some(gain),
-            ..
-        } => Some(gain),
-        _ => None,
-    };
-    let applied = match (applied, gain) {
-        (Some(factor), _) => factor,
-        (None, Some(gain)) => factor(&gain.applied_unit)?,
-        (None, None) => 1.0,
-    };
-    let measured = match (&stand.diagnosed.measured_unit, gain) {
-        (Some(unit), _) => factor(unit)?,
-        (None, Some(gain)) => factor(&gain.recorded_unit)?,
-        (None, None) => applied,
-    };
-    // A record in volts of a stand with a calibration is torque over that constant.
-    let volts = stand
-        .diagnosed
-        .measured_unit
-        .as_deref()
-        .is_some_and(|unit| {
-            torqcomp_model::Kind::Voltage
-                .parse(&format!("1 {unit}"))
-                .is_ok()
-        });
-    let per_volt = stand
-        .torque_per_volt
-        .as_ref()
-        .map(torqcomp_model::Estimate::value);
-    let measured = match (volts && gain.is_none(), per_volt) {
-        (true, Some(constant)) => measured * constant,
-        _ => measured,
-    };
-    Ok((gain.map_or(1.0, |g| g.value), Scales { applied, measured }))
+    match &chosen.unit {
+        Some(given) if given.unit.dimension() == wanted.unit.dimension() => Ok(given.clone()),
+        Some(given) => Err(Failure::failed(format_args!(
+            "the channel \"{}\" is in {}, and what acts on this stand is in {expected}; choose another column with \
+             --applied, or give the right unit with --unit",
+            chosen.name, given.text
+        ))),
+        None => {
+            warnings.push(Warning::new(
+                "unit-assumed",
+                format!(
+                    "the channel \"{}\" does not say its unit: {expected} was assumed, as the stand takes it; --unit says it",
+                    chosen.name
+                ),
+            ));
+            Ok(wanted)
+        }
+    }
 }
 
 /// The stand with its effects.
@@ -138,21 +186,9 @@ fn model(stand: &Stand, gain: f64) -> Result<Model, Failure> {
 }
 
 /// The record from rest, its step halved until that changes nothing that matters; and the steps a sample.
-fn refined(
-    model: &Model,
-    applied: &[f64],
-    rate_hz: f64,
-    start_s: f64,
-) -> Result<(Vec<f64>, usize), Failure> {
-    if applied.len() < 2 {
-        return Err(Failure::failed(
-            "the record has fewer than two samples; nothing can be simulated",
-        ));
-    }
-    let run = |steps: usize| {
-        let input = Input::new(applied.to_vec(), rate_hz, start_s, steps);
-        model.simulate_from(&input, State::default())
-    };
+fn refined(model: &Model, input: &Input) -> Result<(Vec<f64>, usize), Failure> {
+    let run = |steps: usize| model.simulate_from(&input.with_substeps(steps), State::default());
+    let rate_hz = input.rate_hz();
     let mut steps = substeps(model.mode.omega_rad_s / std::f64::consts::TAU, rate_hz);
     let mut last = run(steps);
     loop {

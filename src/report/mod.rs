@@ -10,6 +10,7 @@ pub mod inspect;
 pub mod page;
 pub mod panels;
 pub mod predict;
+pub mod simulate;
 pub mod svg;
 
 use serde::Serialize;

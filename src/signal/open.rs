@@ -60,7 +60,7 @@ impl Signal {
             time: options.messages.time,
             spacing: options.messages.spacing.clone(),
         };
-        let source = Source::read(frames, &wanted, &reading)?;
+        let source = Source::read(place, frames, &wanted, &reading)?;
         Self::of_messages(source, &options.table, &options.messages)
     }
 

@@ -86,9 +86,9 @@ impl Together {
         };
         let is_text = recording.format != "mcap";
         if is_given || is_one_axis(&chosen, is_text)? {
-            together
-                .warnings
-                .extend(axes(&chosen).filter(|_| !is_given).find_map(irregular));
+            if let Some(failure) = axes(&chosen).filter(|_| !is_given).find_map(irregular) {
+                return Err(failure);
+            }
             let count = chosen.iter().map(|c| c.samples.len()).min().unwrap_or(0);
             let empty: Vec<(usize, Track)> = chosen
                 .iter()
@@ -278,24 +278,23 @@ pub fn axes<'a, 'b>(chosen: &'b [Selection<'a>]) -> impl Iterator<Item = &'b Sel
     chosen.iter().enumerate().filter(is_first).map(|(_, c)| c)
 }
 
-/// A warning if the stamps of a channel lie more than half a step from the grid of its rate.
-fn irregular(selection: &Selection) -> Option<Warning> {
+/// Refuses stamps that lie more than half a step from the grid of their rate.
+fn irregular(selection: &Selection) -> Option<Failure> {
     let stamps = selection.channel.axis.stamps_s.as_ref()?;
     let first = *stamps.first()?;
-    let off = |(i, t): (usize, &f64)| ((t - first) * selection.rate_hz - i as f64).abs();
-    let worst = stamps.iter().enumerate().map(off).fold(0.0, f64::max);
-    (worst > HALF).then(|| {
-        Warning::new(
-            "irregular-time-stamps",
-            format!(
-                "the time stamps of \"{}\" lie up to {} steps from a uniform {} Hz, which was assumed; \
-                 torqcomp extract --resample brings them onto a grid",
-                selection.channel.name,
-                report::rounded(worst, 3),
-                report::short(selection.rate_hz)
-            ),
-        )
-    })
+    let off = |(i, t): (usize, &f64)| (t - first) * selection.rate_hz - i as f64;
+    let is_off = |i: &usize| off((*i, &stamps[*i])).abs() > HALF + DRIFT * *i as f64;
+    let place = (0..stamps.len()).find(is_off)?;
+    Some(Failure::failed(format_args!(
+        "the time stamps of \"{}\" are not uniform: the one at {} s (sample {}) lies {} steps from a grid of {} Hz; cut the \
+         record there, give --rate HZ if the stamps are wrong, or bring each channel onto a grid with torqcomp extract \
+         --resample",
+        selection.channel.name,
+        report::short(stamps[place]),
+        place + 1,
+        report::rounded(off((place, &stamps[place])), 3),
+        report::short(selection.rate_hz)
+    )))
 }
 
 /// Whether stamps are as good as uniform.

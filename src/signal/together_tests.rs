@@ -168,10 +168,8 @@ fn rounded_stamps_of_a_text_are_not_interpolated() {
         "csv",
         vec![channel("a", gap.clone(), wave), channel("b", gap, wave)],
     );
-    assert_eq!(
-        both(&record).unwrap().warnings[0].code,
-        "irregular-time-stamps"
-    );
+    let refused = both(&record).unwrap_err().to_string();
+    assert!(refused.contains("(sample 201) lies 20 steps"), "{refused}");
 }
 
 #[test]

@@ -135,16 +135,41 @@ impl Source {
             Wanted::Only => super::inventory::only_topic(place)?,
             wanted => wanted,
         };
-        Self::read(Frames::open(place)?, &wanted, options)
+        Self::read(place, Frames::open(place)?, &wanted, options)
     }
 
-    /// Finds a number in a file that is open.
+    /// Finds a number in a place that is open.
     ///
     /// # Errors
     /// If the number is not in it: then with what is there.
-    pub fn read(mut frames: Frames, wanted: &Wanted, options: &Options) -> Result<Self, Failure> {
+    pub fn read(
+        place: &Place,
+        mut frames: Frames,
+        wanted: &Wanted,
+        options: &Options,
+    ) -> Result<Self, Failure> {
         let mut channels = Channels::default();
-        let (channel, first) = first_message(&mut frames, &mut channels, wanted)?;
+        if let Some(found) = first_message(&mut frames, &mut channels, wanted)? {
+            return Self::after(frames, channels, found, wanted, options);
+        }
+        // Where the chunk that declares a channel is damaged, the end of the file may declare it again.
+        if frames.loss_count() > 0 && *place != Place::Stdin {
+            let mut again = Frames::open(place)?;
+            if let Some(found) = first_message(&mut again, &mut channels, wanted)? {
+                return Self::after(again, channels, found, wanted, options);
+            }
+        }
+        Err(missed(&frames, &channels, wanted))
+    }
+
+    /// Goes on behind the first message of the wanted topic.
+    fn after(
+        frames: Frames,
+        channels: Channels,
+        (channel, first): (std::sync::Arc<Channel>, Copied),
+        wanted: &Wanted,
+        options: &Options,
+    ) -> Result<Self, Failure> {
         let topic = &channel.record.topic;
         let name = frames.name().to_owned();
         let at_topic = |why: String| Failure::failed(format_args!("{name}: topic {topic}: {why}"));
@@ -388,12 +413,12 @@ impl Copied {
     }
 }
 
-/// The first message of the wanted topic.
+/// The first message of the wanted topic; none if there is none.
 fn first_message(
     frames: &mut Frames,
     channels: &mut Channels,
     wanted: &Wanted,
-) -> Result<(std::sync::Arc<Channel>, Copied), Failure> {
+) -> Result<Option<(std::sync::Arc<Channel>, Copied)>, Failure> {
     while let Some(frame) = frames.advance()? {
         let body = frames.body(&frame);
         if frame.op != op::MESSAGE {
@@ -407,14 +432,19 @@ fn first_message(
             continue;
         };
         if wanted.field_in(channel, channels).is_some() {
-            return Ok((channel.clone(), Copied::of(&message)));
+            return Ok(Some((channel.clone(), Copied::of(&message))));
         }
     }
+    Ok(None)
+}
+
+/// The failure of a file without the wanted topic: what is there, and what was lost.
+fn missed(frames: &Frames, channels: &Channels, wanted: &Wanted) -> Failure {
     let mut said = format!("{}: {}", frames.name(), wanted.miss(channels));
     for loss in frames.losses() {
         said.push_str(&format!("; {loss}"));
     }
-    Err(Failure::failed(said))
+    Failure::failed(said)
 }
 
 /// Whether a channel is of the topic; none if it is not declared.

@@ -14,8 +14,13 @@ fn wanted(topic: &str, field: &str) -> Wanted {
 }
 
 fn read(bytes: &[u8], topic: &str, field: &str) -> (Vec<i64>, Vec<f64>, Summary) {
-    let mut source =
-        Source::read(frames(bytes), &wanted(topic, field), &Options::default()).unwrap();
+    let mut source = Source::read(
+        &Place::Stdin,
+        frames(bytes),
+        &wanted(topic, field),
+        &Options::default(),
+    )
+    .unwrap();
     let (mut times, mut values) = (Vec::new(), Vec::new());
     let (mut some_times, mut some_values) = (Vec::new(), Vec::new());
     while source.next(&mut some_times, &mut some_values).unwrap() {
@@ -113,6 +118,36 @@ fn a_damaged_chunk_is_left_out_and_the_others_are_used() {
 }
 
 #[test]
+fn channels_of_a_damaged_first_chunk_are_known_from_the_end_of_the_file() {
+    let mut bytes = numbers(options(Some(Compression::Zstd)), 1000);
+    let mut some = frames(&bytes);
+    let first = loop {
+        let frame = some.advance().unwrap().unwrap();
+        if frame.is_in_chunk {
+            break frame.offset;
+        }
+    };
+    bytes[first as usize + 150] ^= 0x55;
+    let file = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(file.path(), &bytes).unwrap();
+    let place = Place::File(file.path().to_owned());
+    let found = Source::read(
+        &place,
+        frames(&bytes),
+        &wanted("/x", "data"),
+        &Options::default(),
+    );
+    let mut source = found.unwrap();
+    let (mut times, mut values, mut count) = (Vec::new(), Vec::new(), 0);
+    while source.next(&mut times, &mut values).unwrap() {
+        count += values.len();
+    }
+    assert!(count > 500 && count < 1000, "{count}");
+    let summary = source.finish();
+    assert!(summary.is_lossy && summary.warnings[0].code == "mcap-damaged-chunk");
+}
+
+#[test]
 fn messages_out_of_order_are_sorted_and_counted() {
     let mut file = File::new(options(None));
     file.channel(1, "/x", "cdr+ros2msg", FLOAT64);
@@ -143,7 +178,12 @@ fn channels_of_a_topic_are_one_signal_unless_they_differ() {
     file.message(1, 1, &float64(1.0));
     file.message(2, 2, b"{}");
     let bytes = file.finish();
-    let said = Source::read(frames(&bytes), &wanted("/x", ""), &Options::default());
+    let said = Source::read(
+        &Place::Stdin,
+        frames(&bytes),
+        &wanted("/x", ""),
+        &Options::default(),
+    );
     let said = said.err().unwrap().to_string();
     assert!(said.contains("channels of different types"), "{said}");
 }
@@ -171,7 +211,8 @@ fn the_time_is_the_messages_own_if_it_has_one_that_is_set() {
             time,
             spacing: None,
         };
-        let mut source = Source::read(frames(&bytes), &wanted("/x", ""), &options).unwrap();
+        let mut source =
+            Source::read(&Place::Stdin, frames(&bytes), &wanted("/x", ""), &options).unwrap();
         let (mut times, mut values) = (Vec::new(), Vec::new());
         source.next(&mut times, &mut values).unwrap();
         (times[0], source.chosen().time.choice)
@@ -222,7 +263,12 @@ fn whole_lists_have_times_between_messages() {
 fn a_miss_says_what_is_there() {
     let bytes = numbers(options(None), 3);
     let said = |topic: &str, field: &str| {
-        let source = Source::read(frames(&bytes), &wanted(topic, field), &Options::default());
+        let source = Source::read(
+            &Place::Stdin,
+            frames(&bytes),
+            &wanted(topic, field),
+            &Options::default(),
+        );
         source.err().unwrap().to_string()
     };
     assert!(said("/z", "").contains("/x (std_msgs/msg/Float64), /y"));

@@ -77,7 +77,8 @@ fn wanted(topic: &str, field: &str) -> super::super::selection::Wanted {
 
 fn read(bytes: &[u8], field: &str) -> (Vec<i64>, Vec<f64>) {
     let wanted = wanted("/torque", field);
-    let mut source = Source::read(frames(bytes), &wanted, &Options::default()).unwrap();
+    let mut source =
+        Source::read(&Place::Stdin, frames(bytes), &wanted, &Options::default()).unwrap();
     let (mut all_times, mut all_values) = (Vec::new(), Vec::new());
     let (mut times, mut values) = (Vec::new(), Vec::new());
     while source.next(&mut times, &mut values).unwrap() {
