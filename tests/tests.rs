@@ -15,6 +15,7 @@ mod messages;
 mod output;
 mod predict;
 mod refined;
+mod simulate;
 mod table;
 mod text_tables;
 mod thesis;

@@ -1,0 +1,163 @@
+//! `simulate` and the course of an input between its samples, through the binary.
+
+use std::f64::consts::TAU;
+use std::fmt::Write;
+
+use crate::util::{Folder, table};
+
+const RATE_HZ: f64 = 20_000.0;
+const STAND: &str = "schema = \"torqcomp.stand/1\"\n[mechanics]\nnatural_frequency = \"600 Hz\"\ndamping_ratio = 0.08\n";
+
+/// A sum of sines that repeats every 2000 samples.
+fn input(seed: u32, count: usize) -> Vec<f64> {
+    let line = |k: u32, i: usize| {
+        let phase = f64::from(k * k * seed % 97);
+        (TAU * f64::from(4 * k) * i as f64 / 2000.0 + phase).cos()
+    };
+    (0..count)
+        .map(|i| (1..=36).map(|k| line(k, i)).sum::<f64>() / 6.0)
+        .collect()
+}
+
+/// The stand's answer to held samples, exactly: from sample to sample it moves freely about the sample's own rest.
+fn held(input: &[f64]) -> Vec<f64> {
+    let (omega, zeta) = (TAU * 600.0, 0.08_f64);
+    let (sigma, damped) = (zeta * omega, omega * (1.0 - zeta * zeta).sqrt());
+    let step_s = 1.0 / RATE_HZ;
+    let (c, s) = ((damped * step_s).cos(), (damped * step_s).sin());
+    let fade = (-sigma * step_s).exp();
+    let (mut x, mut v) = (0.0, 0.0);
+    let mut answer = Vec::new();
+    for rest in input {
+        answer.push(x);
+        let (d, turn) = (x - rest, (v + sigma * (x - rest)) / damped);
+        x = rest + fade * (d * c + turn * s);
+        v = fade * ((turn * damped - sigma * d) * c - (d * damped + sigma * turn) * s);
+    }
+    answer
+}
+
+fn record(applied: &[f64], measured: &[f64]) -> String {
+    let mut text = String::from("time_s,applied_n_m,measured_n_m\n");
+    for (i, (u, y)) in applied.iter().zip(measured).enumerate() {
+        let _ = writeln!(text, "{:.6},{u:.9},{y:.9}", i as f64 / RATE_HZ);
+    }
+    text
+}
+
+#[test]
+fn held_samples_are_simulated_as_they_are() {
+    let folder = Folder::new();
+    folder.write("stand.toml", STAND);
+    let applied = input(5, 6000);
+    let truth = held(&applied);
+    folder.write("record.csv", record(&applied, &truth));
+    let args = [
+        "simulate",
+        "record.csv",
+        "--stand",
+        "stand.toml",
+        "--applied",
+        "applied_n_m",
+        "--between",
+        "held",
+        "-o",
+        "answer.csv",
+        "--json",
+    ];
+    let report = folder.json(&args);
+    assert_eq!(report["schema"], "torqcomp.simulate/1");
+    assert_eq!(report["measured_unit"], "N m");
+    assert_eq!(report["input_between_samples"], "held");
+    let (_, rows) = table(&folder.read("answer.csv"));
+    let settled = 1000..5900;
+    let left = settled.clone().map(|i| (rows[i][1] - truth[i]).powi(2));
+    let whole = settled.map(|i| truth[i].powi(2));
+    let relative = (left.sum::<f64>() / whole.sum::<f64>()).sqrt();
+    assert!(relative < 1e-3, "{relative:e}");
+}
+
+#[test]
+fn an_input_that_is_held_is_no_effect() {
+    let folder = Folder::new();
+    folder.write("stand.toml", STAND);
+    let mut state = 11_u64;
+    let mut noise = || {
+        let mut sum = -6.0;
+        for _ in 0..12 {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            sum += (state >> 11) as f64 / (1_u64 << 53) as f64;
+        }
+        sum
+    };
+    for (name, seed) in [("train.csv", 5), ("holdout.csv", 8)] {
+        let applied = input(seed, 8000);
+        let measured: Vec<f64> = held(&applied).iter().map(|y| y + 0.005 * noise()).collect();
+        folder.write(name, record(&applied, &measured));
+    }
+    let report = folder.json(&[
+        "diagnose",
+        "--stand",
+        "stand.toml",
+        "--train",
+        "train.csv",
+        "--holdout",
+        "holdout.csv",
+        "--applied",
+        "applied_n_m",
+        "--measured",
+        "measured_n_m",
+        "--json",
+    ]);
+    assert_eq!(report["input_between_samples"], "held");
+    assert_eq!(report["verdict"], "nothing-missing");
+    let after = report["error"]["after"]["holdout_rms"].as_f64().unwrap();
+    assert!((after / 0.005 - 1.0).abs() < 0.05, "{after}");
+}
+
+#[test]
+fn columns_that_the_stand_does_not_take_are_refused() {
+    let folder = Folder::new();
+    folder.write("stand.toml", STAND);
+    let applied = input(5, 600);
+    let text = record(&applied, &applied);
+    folder.write("record.csv", &text);
+    let simulate = |file: &'static str, more: &[&'static str]| {
+        let first = ["simulate", file, "--stand", "stand.toml", "--applied"];
+        folder.run(&[&first[..], more].concat())
+    };
+    simulate("record.csv", &["applied_n_m", "--unit", "kg"]).says(
+        1,
+        &[
+            "\"applied\" is in kg",
+            "acts on this stand is in N m",
+            "--unit",
+        ],
+    );
+    folder.write("bare.csv", text.replace("applied_n_m", "load"));
+    simulate("bare.csv", &["load"]).says(0, &["[unit-assumed]", "N m was assumed"]);
+    simulate("bare.csv", &["load", "--strict"]).says(3, &["[unit-assumed]"]);
+    simulate("record.csv", &["applied_n_m", "--json"]).says(2, &["give -o FILE"]);
+    let kept: Vec<&str> = text
+        .lines()
+        .enumerate()
+        .filter(|(i, _)| !(200..260).contains(i))
+        .map(|(_, l)| l)
+        .collect();
+    folder.write("gap.csv", kept.join("\n"));
+    simulate("gap.csv", &["applied_n_m"]).says(1, &["not uniform", "sample 200", "60 steps"]);
+    folder.write("again.csv", &text);
+    let twice = [
+        "diagnose",
+        "--train",
+        "record.csv",
+        "--holdout",
+        "again.csv",
+    ];
+    let columns = ["--applied", "applied_n_m", "--measured", "measured_n_m"];
+    folder
+        .run(&[&twice[..], &columns].concat())
+        .says(1, &["same samples as the training record record.csv"]);
+}
