@@ -141,6 +141,8 @@ fn mechanics(section: &Section) -> Result<Mechanics, Failure> {
         let inertia = section.positive("inertia", Kind::Inertia)?;
         let damping = section.not_negative("damping", Kind::AngularDamping)?;
         let stiffness = section.positive("stiffness", Kind::AngularStiffness)?;
+        let common = common_std(section)?;
+        let own = |estimate: &Estimate| own_std(section, estimate, common);
         let response = SecondOrder::new(inertia.value(), damping.value(), stiffness.value())
             .map_err(|error| section.fail("", error))?;
         // So that a wrong key is told the right ones of both forms.
@@ -151,9 +153,9 @@ fn mechanics(section: &Section) -> Result<Mechanics, Failure> {
         Mechanics {
             response,
             std: ParameterStd {
-                inertia_kg_m2: inertia.std_uncertainty(),
-                damping_n_m_s_per_rad: damping.std_uncertainty(),
-                stiffness_n_m_per_rad: stiffness.std_uncertainty(),
+                inertia_kg_m2: own(&inertia)?,
+                damping_n_m_s_per_rad: own(&damping)?,
+                stiffness_n_m_per_rad: own(&stiffness)?,
                 static_gain_relative: None,
             },
             given: Given::Constants {
@@ -165,6 +167,33 @@ fn mechanics(section: &Section) -> Result<Mechanics, Failure> {
     };
     section.finish()?;
     Ok(mechanics)
+}
+
+/// Relative standard uncertainty that inertia, damping and stiffness share, since two of them follow from the third.
+fn common_std(section: &Section) -> Result<f64, Failure> {
+    if !section.has("common_std") {
+        return Ok(0.0);
+    }
+    Ok(section.not_negative("common_std", Kind::Ratio)?.value())
+}
+
+/// Largest part by which the common uncertainty may exceed the whole one: both are rounded.
+const ROUNDED: f64 = 1e-6;
+
+/// What is left of a standard uncertainty without the common part, which cancels in every ratio of the constants: the
+/// stand's response follows from these alone.
+fn own_std(section: &Section, estimate: &Estimate, common: f64) -> Result<Option<f64>, Failure> {
+    let Some(std) = estimate.std_uncertainty() else {
+        return Ok(None);
+    };
+    let shared = common * estimate.value();
+    if shared > std * (1.0 + ROUNDED) {
+        return Err(section.fail(
+            "common_std",
+            "expected no more than the relative std of inertia, damping and stiffness, which hold it",
+        ));
+    }
+    Ok(Some((std * std - shared * shared).max(0.0).sqrt()))
 }
 
 fn modal_mechanics(section: &Section) -> Result<Mechanics, Failure> {

@@ -2,19 +2,24 @@
 
 use toml_edit::{DocumentMut, Item, Table, value};
 
+use torqcomp_model::Estimate;
+
+use super::update::COMMON;
 use super::{Given, Stand};
 use crate::failure::Failure;
 use crate::io::digits;
 
-/// An effect as it is written: kind, form, parameters with their texts.
-pub type Written<'a> = (&'a str, &'a str, Vec<(&'a str, String)>);
+/// A parameter of an effect as it is written: name, text of its value, and of its standard uncertainty.
+pub type WrittenParameter<'a> = (&'a str, String, Option<String>);
+/// An effect as it is written: kind, form, parameters.
+pub type Written<'a> = (&'a str, &'a str, Vec<WrittenParameter<'a>>);
 
 /// What a diagnosis found.
 pub struct Refined<'a> {
-    /// Natural frequency in Hz.
-    pub natural_hz: f64,
-    /// Damping ratio.
-    pub damping_ratio: f64,
+    /// Natural frequency in Hz, and its standard uncertainty.
+    pub natural_hz: (f64, Option<f64>),
+    /// Damping ratio, and its standard uncertainty.
+    pub damping_ratio: (f64, Option<f64>),
     /// Recorded per applied quantity at rest, in SI units, where it is part of the fit.
     pub gain: Option<f64>,
     /// Units of record and applied quantity in SI.
@@ -31,6 +36,43 @@ pub struct Refined<'a> {
     pub verdict: &'a str,
 }
 
+fn relative_std(estimate: &Estimate) -> Option<f64> {
+    Some(estimate.std_uncertainty()? / estimate.value())
+}
+
+impl Refined<'_> {
+    /// Inertia `K/ω₀²` and damping `2ζK/ω₀` beside a declared stiffness, each with the standard uncertainty that this and
+    /// the fit give it.
+    fn beside(&self, stiffness: &Estimate) -> [(f64, Option<f64>); 2] {
+        let relative = |(value, std): (f64, Option<f64>)| std.map(|std| std / value);
+        let omega = std::f64::consts::TAU * self.natural_hz.0;
+        let common = relative_std(stiffness).unwrap_or(0.0);
+        let frequency = relative(self.natural_hz);
+        let inertia = stiffness.value() / (omega * omega);
+        let damping = 2.0 * self.damping_ratio.0 * stiffness.value() / omega;
+        let ratio = relative(self.damping_ratio).zip(frequency);
+        [
+            (inertia, frequency.map(|w| inertia * common.hypot(2.0 * w))),
+            (
+                damping,
+                ratio.map(|(z, w)| damping * common.hypot(z).hypot(w)),
+            ),
+        ]
+    }
+
+    /// The static gain with its units, as `"2 V/N"`.
+    fn static_gain(&self, gain: f64) -> String {
+        let (recorded, applied) = self.units;
+        let one = |unit: &str| if unit.is_empty() { "1" } else { unit }.to_owned();
+        let applied = if applied.contains([' ', '/']) {
+            format!("({applied})")
+        } else {
+            one(applied)
+        };
+        format!("{} {}/{applied}", digits::text(gain, 12), one(recorded))
+    }
+}
+
 /// The text of a stand file with the refined constants and the effects: the declared one, changed where it was
 /// refined, or a new one.
 ///
@@ -45,44 +87,38 @@ pub fn refine(declared: Option<(&Stand, &str)>, refined: &Refined) -> Result<Str
     let given = declared
         .and_then(|(stand, _)| stand.mechanics.as_ref())
         .map(|m| &m.given);
-    let quantity = |number: f64, unit: &str| {
-        let text = format!("{} {unit}", digits::text(number, 9));
+    let quantity = |(number, std): (f64, Option<f64>), unit: &str| {
+        let text = |number: f64, digits: u32| format!("{} {unit}", digits::text(number, digits));
         let mut table = toml_edit::InlineTable::new();
-        table.insert("value", text.trim().into());
+        table.insert("value", text(number, 9).trim().into());
+        if let Some(std) = std {
+            table.insert("std", text(std, 9).trim().into());
+        }
         table.insert("source", refined.source.as_str().into());
         value(table)
     };
-    let omega = std::f64::consts::TAU * refined.natural_hz;
     let mechanics = document
         .entry("mechanics")
         .or_insert(Item::Table(Table::new()));
     match given {
         Some(Given::Constants { stiffness, .. }) if refined.gain.is_none() => {
             // Only ratios follow from torque against torque: the stiffness stays as declared.
-            let k = stiffness.value();
-            mechanics["inertia"] = quantity(k / (omega * omega), "kg m^2");
-            mechanics["damping"] = quantity(2.0 * refined.damping_ratio * k / omega, "N m s/rad");
+            let [inertia, damping] = refined.beside(stiffness);
+            mechanics["inertia"] = quantity(inertia, "kg m^2");
+            mechanics["damping"] = quantity(damping, "N m s/rad");
+            if let Some(table) = mechanics.as_table_like_mut() {
+                table.remove(COMMON);
+            }
+            if let Some(common) = relative_std(stiffness) {
+                mechanics[COMMON] = value(digits::text(common, 9));
+            }
         }
         _ => {
             let mut table = Table::new();
             table["natural_frequency"] = quantity(refined.natural_hz, "Hz");
             table["damping_ratio"] = quantity(refined.damping_ratio, "");
             if let Some(gain) = refined.gain {
-                let (recorded, applied) = refined.units;
-                let one = |unit: &str| {
-                    if unit.is_empty() {
-                        "1".to_owned()
-                    } else {
-                        unit.to_owned()
-                    }
-                };
-                let applied = if applied.contains([' ', '/']) {
-                    format!("({applied})")
-                } else {
-                    one(applied)
-                };
-                let text = format!("{} {}/{applied}", digits::text(gain, 12), one(recorded));
-                table["static_gain"] = value(text);
+                table["static_gain"] = value(refined.static_gain(gain));
                 document.remove("calibration");
             }
             document["mechanics"] = Item::Table(table);
@@ -94,8 +130,16 @@ pub fn refine(declared: Option<(&Stand, &str)>, refined: &Refined) -> Result<Str
         let mut table = Table::new();
         table["kind"] = value(*kind);
         table["form"] = value(*form);
-        for (name, text) in parameters {
-            table[*name] = value(text.as_str());
+        for (name, text, std) in parameters {
+            table[*name] = match std {
+                None => value(text.as_str()),
+                Some(std) => {
+                    let mut inline = toml_edit::InlineTable::new();
+                    inline.insert("value", text.as_str().into());
+                    inline.insert("std", std.as_str().into());
+                    value(inline)
+                }
+            };
         }
         table["source"] = value(refined.source.as_str());
         effects.push(table);

@@ -291,11 +291,26 @@ impl<'a> Section<'a> {
         ))
     }
 
-    /// The raw text of a quantity whose unit tells its kind.
+    /// The raw text of a quantity whose unit tells its kind, out of a table of `value`, `std` and `source` as well.
     pub fn raw(&self, key: &'static str) -> Result<Option<String>, Failure> {
-        self.item(key)
-            .map(|item| self.quantity_text(key, item))
-            .transpose()
+        let Some(item) = self.item(key) else {
+            return Ok(None);
+        };
+        let Some(table) = item.as_table_like() else {
+            return self.quantity_text(key, item).map(Some);
+        };
+        let start = item.span().map(|span| span.start);
+        let inner = Section::new(self.source, format!("{} {key}", self.title), table, start);
+        let value = inner
+            .item("value")
+            .ok_or_else(|| inner.fail("", "expected value = \"…\""))?;
+        let text = inner.quantity_text("value", value)?;
+        if let Some(std) = inner.item("std") {
+            inner.quantity_text("std", std)?;
+        }
+        inner.text("source")?;
+        inner.finish()?;
+        Ok(Some(text))
     }
 
     /// Refuses the keys that nobody asked for.

@@ -25,6 +25,8 @@ pub struct Entry {
 const SCHEMA: &str = "torqcomp.stand/1";
 /// Keys of `[mechanics]` that exclude each other.
 const CONSTANTS: [&str; 3] = ["inertia", "damping", "stiffness"];
+/// Relative standard uncertainty that these three share.
+pub const COMMON: &str = "common_std";
 const MODAL: [&str; 2] = ["natural_frequency", "damping_ratio"];
 
 /// The text of a stand file with the entries put in; `existing` is its text so far, if there is one.
@@ -52,6 +54,15 @@ pub fn update(name: &str, existing: Option<&str>, entries: &[Entry]) -> Result<S
                 "{name}: this is not a stand file (schema = \"{SCHEMA}\" is missing); write to another \
                  file"
             )));
+        }
+    }
+    if entries.iter().any(|entry| CONSTANTS.contains(&entry.key)) {
+        // It belongs to the constants that are replaced.
+        if let Some(mechanics) = document
+            .get_mut("mechanics")
+            .and_then(Item::as_table_like_mut)
+        {
+            mechanics.remove(COMMON);
         }
     }
     for entry in entries {

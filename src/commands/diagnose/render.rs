@@ -483,7 +483,7 @@ impl Rendered<'_> {
     /// If the declared one cannot be read again.
     pub fn stand(&self, declared: Option<(&Stand, &str)>) -> Result<String, Failure> {
         let after = &self.diagnosis.after;
-        let (mode, gain) = after.fitted.structure.mode(&after.fitted.values);
+        let [natural_hz, damping_ratio, (gain, _)] = plain_constants(after);
         let frame = after.fitted.structure.frame;
         let parameters = self.parameters(after);
         let effects =
@@ -494,23 +494,20 @@ impl Rendered<'_> {
                 .iter()
                 .zip(&parameters)
                 .map(|(choice, own)| {
-                    let texts = own
-                        .iter()
-                        .map(|p| {
-                            (
-                                p.name,
-                                format!("{} {}", digits::text(p.value, 12), p.unit)
-                                    .trim()
-                                    .to_owned(),
-                            )
-                        })
-                        .collect();
+                    let written = |p: &Parameter| {
+                        let text = |number: f64, digits: u32| {
+                            let text = format!("{} {}", digits::text(number, digits), p.unit);
+                            text.trim().to_owned()
+                        };
+                        (p.name, text(p.value, 12), p.std.map(|std| text(std, 3)))
+                    };
+                    let texts = own.iter().map(written).collect();
                     (choice.effect.name, choice.form.name, texts)
                 });
         let applied = crate::stand::si_unit(&self.units.applied);
         let refined = Refined {
-            natural_hz: mode.omega_rad_s / std::f64::consts::TAU,
-            damping_ratio: mode.damping_ratio,
+            natural_hz,
+            damping_ratio,
             gain: frame.gain_is_free.then_some(gain),
             units: (&self.units.diagnosed, &applied),
             measured_unit: if self.units.measured.is_empty() {

@@ -7,7 +7,7 @@ use crate::cli::identify::{Anchors, Findings};
 use crate::failure::Failure;
 use crate::identify::anchored::{Known, Ringer};
 use crate::identify::{Found, Outcome};
-use crate::stand::update::Entry;
+use crate::stand::update::{COMMON, Entry};
 
 /// Which of the ratios a test tells.
 pub(super) enum Ratios {
@@ -65,9 +65,19 @@ pub(super) fn follow(
     }
     let (mut found, correlated) = told.mode.anchored(known);
     let declared = given.then(|| entry(&anchor, "declared")).flatten();
+    // All three are as uncertain as the anchor, together.
+    let common = anchor.std.map(|std| Entry {
+        section: "mechanics",
+        key: COMMON,
+        value: std / anchor.value,
+        std: None,
+        unit: String::new(),
+        source: format!("of the declared {}", anchor.name),
+    });
     let entries = declared
         .into_iter()
         .chain(found.iter().filter_map(|f| entry(f, &told.source)))
+        .chain(common)
         .collect();
     outcome.method.push(format!(
         "anchored by the declared {}, which the test itself does not tell",

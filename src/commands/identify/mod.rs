@@ -76,12 +76,18 @@ fn deliver(
                 "the stand file and the JSON document cannot both go to standard output; give -o FILE",
             ));
         }
-        // An existing stand file is a basis for the new one, whoever it came from.
+        // An existing stand file is a basis for the new one, whoever it came from; so is the one that declared values
+        // come from.
         let existing = match Path::new(place) {
             path if place != "-" && path.is_file() => {
                 Some(std::fs::read_to_string(path).map_err(|e| Failure::reading(path, &e))?)
             }
-            _ => None,
+            _ => match &findings.stand {
+                Some(path) => {
+                    Some(std::fs::read_to_string(path).map_err(|e| Failure::reading(path, &e))?)
+                }
+                None => None,
+            },
         };
         let text = update::update(place, existing.as_deref(), entries)?;
         let force = result.force || existing.is_some();

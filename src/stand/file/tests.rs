@@ -127,3 +127,31 @@ fn the_recorder_is_read() {
     let wrong = text.replace("low_pass = \"5 kHz\"\n", "");
     assert!(message(&wrong).contains("low_pass = "));
 }
+
+#[test]
+fn what_the_constants_share_is_no_part_of_the_response() {
+    let with = |common: &str| {
+        format!(
+            "schema = \"torqcomp.stand/1\"\n[mechanics]\ninertia = {{ value = \"2 kg m^2\", std = \"0.1 kg m^2\" }}\n\
+             damping = {{ value = \"3 N m s/rad\", std = \"0.15 N m s/rad\" }}\n\
+             stiffness = {{ value = \"100 N m/rad\", std = \"13 N m/rad\" }}\ncommon_std = {common}\n"
+        )
+    };
+    // Of 13 N m/rad, 5 % of 100 are shared: √(13² − 5²) = 12 are left.
+    let std = parse("s", &with("\"0.05\""))
+        .unwrap()
+        .mechanics
+        .unwrap()
+        .std;
+    assert!((std.stiffness_n_m_per_rad.unwrap() - 12.0).abs() < 1e-9);
+    assert!(std.inertia_kg_m2.unwrap() < 1e-8 && std.damping_n_m_s_per_rad.unwrap() < 1e-8);
+    assert!(message(&with("\"0.06\"")).contains("common_std"));
+}
+
+#[test]
+fn effects_may_say_how_sure_they_are() {
+    let effect =
+        "[[effects]]\nkind = \"time-delay\"\ndelay = { value = \"3e-5 s\", std = \"1e-7 s\" }\n";
+    let stand = parse("s", &format!("{MECHANICS}{effect}")).unwrap();
+    assert_eq!(stand.effects[0].values[0], 3e-5);
+}
