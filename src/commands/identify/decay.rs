@@ -116,6 +116,12 @@ fn entries(args: &Decay, evaluated: &mut Evaluated) -> Result<Vec<Entry>, Failur
     let (Some(frequency), Some(ratio)) = both else {
         return Ok(Vec::new());
     };
+    if evaluated.fit.poles.len() > 1 && args.findings.result.output.is_some() {
+        return Err(Failure::failed(
+            "a stand file holds one mode, and several were found; choose one with --band and --modes 1, or leave -o out to \
+             see them",
+        ));
+    }
     let told = Told {
         mode: strongest(evaluated),
         ratios: Ratios::OverInertia,

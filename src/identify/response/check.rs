@@ -76,6 +76,13 @@ pub(super) fn leads(set: &Set, lines: &Lines, order: i32) -> bool {
 pub(super) const LEADS: &str = "the measured signal leads the applied one at nearly all frequencies, which no driven stand does: the \
      channels may be swapped (--applied is what acts, --measured what answers), or one has the wrong sign";
 
+/// Whether a mode lies above all frequencies of the record: swapped channels have none to show below.
+pub(super) fn is_out_of_reach(set: &Set, fitted: &Modal) -> bool {
+    let highest = std::f64::consts::TAU * set.step_hz * (set.blocks[0].applied.len() - 1) as f64;
+    let natural = |pole: &crate::identify::decay::Pole| pole.rate_per_s.hypot(pole.omega_rad_per_s);
+    fitted.poles.iter().any(|pole| natural(pole) > highest)
+}
+
 /// Widening of a resonance by Hann's window, over its width, that is said.
 const WIDER: f64 = 0.01;
 

@@ -114,6 +114,9 @@ pub fn identify(records: &[Driven], options: &Options) -> Result<Evaluated, Fail
         of_mode,
         relative,
     } = settle(whole, &set, &lines, &data, &coarse, &mut outcome)?;
+    if leads && check::is_out_of_reach(&set, &fitted) {
+        return Err(Failure::failed(check::LEADS));
+    }
     words::name_modes(&mut outcome, &fitted, &spread);
     let quality = Quality {
         rms: words::output_rms(&set, &lines) * relative,
