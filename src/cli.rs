@@ -115,7 +115,7 @@ pub struct Record {
     /// Field with the spacing of the samples, for messages that hold many
     #[arg(long, value_name = "FIELD")]
     pub spacing: Option<String>,
-    /// Column with the signal: its heading, with or without the unit, or its number
+    /// Column with the signal: its heading, with or without the unit, or its number as inspect gives it
     #[arg(long, value_name = "NAME")]
     pub channel: Option<String>,
     /// Unit of the signal, if its heading does not say: V, mV, "N m", "ft lbf", ustrain

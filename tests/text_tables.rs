@@ -258,3 +258,33 @@ fn a_comma_that_could_be_either_is_asked_for() {
     ];
     assert_eq!(folder.run(&args).code, 0);
 }
+
+#[test]
+fn a_number_means_the_same_channel_in_every_verb() {
+    let folder = Folder::new();
+    let mut text = String::from("time_s,load_n_m,answer_n_m\n");
+    for i in 0..300 {
+        let t = f64::from(i) * 1e-4;
+        text += &format!("{t:.4},{:.6},{:.6}\n", (400.0 * t).sin(), (700.0 * t).cos());
+    }
+    folder.write("record.csv", &text);
+    let report = folder.json(&["inspect", "record.csv", "--json"]);
+    assert_eq!(report["channels"][1]["name"], "answer");
+    let extracted = |channel| {
+        let ran = folder.run(&["extract", "record.csv", "--channel", channel]);
+        ran.says(0, &[]).stdout.clone()
+    };
+    assert_eq!(extracted("2"), extracted("answer_n_m"));
+    let simulated = |channel| {
+        let args = [
+            "simulate",
+            "record.csv",
+            "--stand",
+            "stand.toml",
+            "--applied",
+        ];
+        let ran = folder.run(&[&args[..], &[channel]].concat());
+        ran.says(0, &[]).stdout.clone()
+    };
+    assert_eq!(simulated("2"), simulated("answer_n_m"));
+}

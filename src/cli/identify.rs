@@ -67,7 +67,7 @@ pub struct Decay {
     /// Recordings of free decays of one stand, or - for standard input
     #[arg(value_name = "INPUT", required = true)]
     pub inputs: Vec<String>,
-    /// Column with the signal: its heading, with or without the unit, or its number
+    /// Column with the signal: its heading, with or without the unit, or its number as inspect gives it
     #[arg(long, value_name = "NAME")]
     pub channel: Option<String>,
     /// Number of modes [default: found from the data]

@@ -3,8 +3,13 @@
 use super::{Column, Options};
 use crate::failure::{Failure, did_you_mean};
 
-/// Place of a column by its heading, its name without the unit, or its number from 1.
-fn find_column(columns: &[Column], wanted: &str, flag: &str) -> Result<usize, Failure> {
+/// Place of a column by its heading, its name without the unit, or its number from 1 among those at `places`.
+fn find_column(
+    columns: &[Column],
+    places: &[usize],
+    wanted: &str,
+    flag: &str,
+) -> Result<usize, Failure> {
     let matching = |is: &dyn Fn(&Column) -> bool| -> Vec<usize> {
         (0..columns.len()).filter(|i| is(&columns[*i])).collect()
     };
@@ -21,25 +26,26 @@ fn find_column(columns: &[Column], wanted: &str, flag: &str) -> Result<usize, Fa
         .map(Vec::as_slice)
     {
         Some([place]) => return Ok(*place),
-        Some(places) => {
+        Some(same) => {
+            let number = |place: &usize| places.iter().position(|p| p == place);
             return Err(Failure::failed(format_args!(
                 "{} columns are called \"{wanted}\"; give the number of the one you mean, {flag} {}",
-                places.len(),
-                list(places.iter().map(|p| (p + 1).to_string()))
+                same.len(),
+                list(same.iter().filter_map(number).map(|n| (n + 1).to_string()))
             )));
         }
         None => {}
     }
     if let Ok(number) = wanted.parse::<usize>()
-        && (1..=columns.len()).contains(&number)
+        && let Some(place) = number.checked_sub(1).and_then(|n| places.get(n))
     {
-        return Ok(number - 1);
+        return Ok(*place);
     }
     let headings = columns.iter().map(|c| c.heading.as_str());
     Err(Failure::failed(format_args!(
         "there is no column \"{wanted}\"{}; the columns are {}",
         did_you_mean(wanted, headings.clone()),
-        list((0..columns.len()).map(|i| label(columns, i)))
+        list((0..columns.len()).map(|i| label(columns, places, i)))
     )))
 }
 
@@ -55,8 +61,9 @@ pub(crate) fn list(items: impl IntoIterator<Item = String>) -> String {
 
 /// Place of the time column, if there is one.
 pub(crate) fn time_column(columns: &[Column], options: &Options) -> Result<Option<usize>, Failure> {
+    let all: Vec<usize> = (0..columns.len()).collect();
     if let Some(wanted) = &options.time_column {
-        return find_column(columns, wanted, "--time-column").map(Some);
+        return find_column(columns, &all, wanted, "--time-column").map(Some);
     }
     let candidates: Vec<usize> = (0..columns.len())
         .filter(|i| columns[*i].is_time())
@@ -75,18 +82,18 @@ pub(crate) fn time_column(columns: &[Column], options: &Options) -> Result<Optio
         (_, several) => Err(Failure::failed(format_args!(
             "{} columns could be the time axis; choose one with --time-column {}",
             several.len(),
-            list(several.iter().map(|i| label(columns, *i)))
+            list(several.iter().map(|i| label(columns, &all, *i)))
         ))),
     }
 }
 
-/// A heading in quotes, or its number where several columns have it.
-fn label(columns: &[Column], place: usize) -> String {
+/// A heading in quotes, with its number where several columns have it.
+fn label(columns: &[Column], places: &[usize], place: usize) -> String {
     let heading = &columns[place].heading;
-    if columns.iter().filter(|c| c.heading == *heading).count() > 1 {
-        format!("{} (\"{heading}\")", place + 1)
-    } else {
-        format!("\"{heading}\"")
+    let is_one = columns.iter().filter(|c| c.heading == *heading).count() == 1;
+    match places.iter().position(|p| *p == place) {
+        Some(number) if !is_one => format!("{} (\"{heading}\")", number + 1),
+        _ => format!("\"{heading}\""),
     }
 }
 
@@ -96,12 +103,13 @@ pub(super) fn channel(
     time: Option<usize>,
     options: &Options,
 ) -> Result<usize, Failure> {
-    if let Some(wanted) = &options.channel {
-        return find_column(columns, wanted, "--channel");
-    }
+    // Their numbers are those that `inspect` gives: the time is not counted.
     let signals: Vec<usize> = (0..columns.len())
         .filter(|i| Some(*i) != time && !columns[*i].is_time())
         .collect();
+    if let Some(wanted) = &options.channel {
+        return find_column(columns, &signals, wanted, "--channel");
+    }
     match signals.as_slice() {
         [one] => Ok(*one),
         [] => Err(Failure::failed(
@@ -110,7 +118,7 @@ pub(super) fn channel(
         several => Err(Failure::failed(format_args!(
             "{} columns could be the signal; choose one with --channel {}",
             several.len(),
-            list(several.iter().map(|i| label(columns, *i)))
+            list(several.iter().map(|i| label(columns, &signals, *i)))
         ))),
     }
 }
