@@ -121,6 +121,11 @@ pub fn is_plain(head: &[u8], complete: bool, options: &Options) -> bool {
             .iter()
             .all(|kind| *kind == Some(rows::Wanted::Numbers))
         && times <= 1
+        // What their values say is not looked at there.
+        && !header
+            .fields
+            .iter()
+            .any(|field| units::is_weak_time_name(&field.name))
 }
 
 /// Whether both readers take a column for the same.

@@ -113,6 +113,7 @@ fn warnings(header: &Header, rows: &Rows, axes: &Axes, dialect: Dialect) -> Vec<
     let differs = count_differs(&header.entries, longest.unwrap_or(0), dialect);
     let mut warnings = odd_lines(rows);
     warnings.extend(assumptions(axes));
+    warnings.extend(axes.warnings.iter().cloned());
     warnings.extend(differs);
     warnings
 }

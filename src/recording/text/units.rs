@@ -4,7 +4,9 @@ use torqcomp_model::{Dimension, Unit};
 
 use crate::io::csv::NamedUnit;
 
-pub use super::axis_names::{is_axis_name, is_index_name, is_time_name};
+pub use super::axis_names::{
+    is_axis_name, is_index_name, is_time_name, is_weak_time_name, time_stem,
+};
 
 /// Other ways to write a unit, in lower case, and how torqcomp writes it.
 const SYNONYMS: [(&str, &str); 44] = [

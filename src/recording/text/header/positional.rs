@@ -247,6 +247,7 @@ fn is_key_block(fitting: &[&Row], used: &[bool]) -> bool {
         field.is_named_time()
             || field.has_time_unit()
             || units::is_axis_name(cell)
+            || units::is_weak_time_name(cell)
             || units::is_index_name(cell)
     });
     let (key, values) = (&nearest.cells[0], &nearest.cells[1..]);

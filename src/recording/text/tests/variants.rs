@@ -159,6 +159,13 @@ fn cassy_with_spaces() {
 }
 
 #[test]
+fn cassy_with_a_cell_each_for_name_symbol_and_unit() {
+    let head = "\"Zeit\";\"t\";\"s\";\"Drehmoment\";\"M\";\"Nm\"\n";
+    let found = read(&format!("{head}0;-0,131\n0,1;-0,162\n0,2;-0,176\n"));
+    check(&found, &[("Drehmoment M", "Nm", 3)], Some(10.0));
+}
+
+#[test]
 fn owon_with_what_was_measured_above() {
     let head = "Channel :,CH1,CH2\nFrequency :,F=0.999KHz,F=?\nPK-PK :,Vp=3.2V,Vp=1.0V\n\
                 Probe attenuation :,X10,X1\nTime interval :,0.01000mS,0.01000mS\n\n\
