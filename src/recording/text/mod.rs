@@ -16,6 +16,7 @@ mod listing;
 mod makers;
 mod rows;
 mod sparse;
+mod summary;
 mod table;
 mod units;
 

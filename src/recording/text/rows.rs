@@ -121,6 +121,21 @@ struct Plan<'a> {
 }
 
 impl Rows {
+    /// Leaves out the rows from one on.
+    pub fn truncate(&mut self, count: usize) {
+        for column in &mut self.columns {
+            column.values.truncate(count);
+            column.holes.retain(|hole| hole.index < count);
+        }
+        self.count = self.count.min(count);
+    }
+
+    /// Number of the line of a row.
+    #[must_use]
+    pub fn line_of(&self, row: usize) -> usize {
+        line_of(&self.breaks, row)
+    }
+
     /// Takes a line in; `false` if reading is to stop before it.
     #[inline]
     fn accept(
@@ -301,6 +316,14 @@ impl Rows {
     }
 }
 
+/// Number of the line of a row, by the rows and lines at which counting went on.
+fn line_of(breaks: &[(usize, usize)], row: usize) -> usize {
+    let place = breaks.partition_point(|(first, _)| *first <= row);
+    place
+        .checked_sub(1)
+        .map_or(0, |place| breaks[place].1 + (row - breaks[place].0))
+}
+
 /// Whether there is something in the line, but only separators.
 fn is_all_separators(text: &str, dialect: Dialect) -> bool {
     let Delimiter::Byte(byte) = dialect.delimiter else {
@@ -337,13 +360,9 @@ impl Column {
     #[cold]
     fn fill(&mut self, row: usize, breaks: &[(usize, usize)]) {
         for index in self.values.len()..row {
-            let place = breaks.partition_point(|(first, _)| *first <= index);
-            let line = place
-                .checked_sub(1)
-                .map_or(0, |place| breaks[place].1 + (index - breaks[place].0));
             self.holes.push(Hole {
                 index,
-                line,
+                line: line_of(breaks, index),
                 what: HoleKind::Empty,
             });
             self.values.push(f64::NAN);

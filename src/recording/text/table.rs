@@ -6,6 +6,7 @@ use super::head::{self, Head, Table};
 use super::header::{self, Header};
 use super::keys::{Entry, Topic};
 use super::rows::{self, Rows, Wanted};
+use super::summary;
 use crate::failure::Failure;
 use crate::io::csv::{Dialect, Options, is_skipped};
 use crate::recording::Channel;
@@ -87,19 +88,28 @@ pub fn read_at(
     if let Some(unit) = hints.unit {
         default_units(&mut header, unit);
     }
-    let axes = Sources {
-        fields: &header.fields,
-        columns: &rows.columns,
-        entries: &header.entries,
-        decimal: table.dialect.decimal,
-        default_time_unit: hints.time_unit,
-        options,
+    let find = |rows: &Rows| {
+        Sources {
+            fields: &header.fields,
+            columns: &rows.columns,
+            entries: &header.entries,
+            decimal: table.dialect.decimal,
+            default_time_unit: hints.time_unit,
+            options,
+        }
+        .find()
+    };
+    let mut axes = find(&rows)?;
+    let summary = summary::leave_out(&mut rows, &axes.roles);
+    if summary.is_some() {
+        axes = find(&rows)?;
     }
-    .find()?;
+    let mut warnings = warnings(&header, &rows, &axes, table.dialect);
+    warnings.extend(summary);
     Ok(Part {
         end: rows.end,
         next_line: number + rows.lines,
-        warnings: warnings(&header, &rows, &axes, table.dialect),
+        warnings,
         channels: channels(&header, rows, &axes),
         dialect: table.dialect,
         entries: header.entries,
@@ -211,12 +221,7 @@ fn drop_cut_row(text: &[u8], dialect: Dialect, rows: &mut Rows) -> Option<Warnin
     if cells(&text[last..]) >= cells(&text[before..last.max(1) - 1]) {
         return None;
     }
-    let row = rows.count - 1;
-    for column in &mut rows.columns {
-        column.values.truncate(row);
-        column.holes.retain(|hole| hole.index < row);
-    }
-    rows.count = row;
+    rows.truncate(rows.count - 1);
     Some(Warning::new(
         "last-line-cut",
         "the file ends within its last line; that line was left out",
