@@ -244,6 +244,26 @@ fn labview_blocks_whose_time_begins_anew() {
 }
 
 #[test]
+fn labview_over_frequency() {
+    let head = |columns: &str| {
+        format!(
+            "LabVIEW Measurement\t\nSeparator\tTab\nDecimal_Separator\t.\nX_Columns\t{columns}\n\
+             ***End_of_Header***\t\n\t\nChannels\t1\t\nSamples\t9\t\nY_Unit_Label\tV\t\n\
+             X_Dimension\tFrequency\t\nX0\t0.0\t\nDelta_X\t2.5\t\n***End_of_Header***\t\t\n\
+             X_Value\tU\tComment\n"
+        )
+    };
+    let found = read(&format!("{}{}", head("One"), with_time(9, "\t", 2.5, 1)));
+    check(&found, &[("Frequency", "", 9), ("U", "V", 9)], None);
+    assert_eq!(found.channels[0].samples[2], 5.0);
+    assert_eq!(found.channels[1].axis.header_rate_hz, None);
+    assert_eq!(found.warnings[0].code, "no-time-axis");
+    let none = |_: f64| String::new();
+    let found = read(&format!("{}{}", head("No"), rows(9, "\t", &[&none, &wave])));
+    check(&found, &[("U", "V", 9)], None);
+}
+
+#[test]
 fn siglent_with_the_unit_of_the_picture() {
     let head = "Record Length,Analog:9\nSample Interval,CH1:0.0000020000000\nVertical Units,CH1:V,,,\n\
                 Horizontal Units,us,,,\nHorizontal Scale,20000.0,,,\nModel Number,SDS1202X-E,,,\n\
