@@ -87,12 +87,28 @@ pub fn entries(line: usize, text: &str, dialect: Dialect) -> Vec<Entry> {
     {
         return assignments;
     }
+    if let Some(entry) = before_comma(line, text, dialect).filter(|_| assignments.len() < 2) {
+        return vec![entry];
+    }
     match cells.split_first() {
         Some((key, values)) if values.iter().any(|value| !value.is_empty()) => {
             entry(line, key, values.to_vec()).into_iter().collect()
         }
         _ => one_cell(line, text).into_iter().collect(),
     }
+}
+
+/// A key and its value parted by the first colon or equals sign, before a comma that is within the value
+/// as it does not part the cells of the table: `Date : 24.11.2011, 09:07:38`.
+fn before_comma(line: usize, text: &str, dialect: Dialect) -> Option<Entry> {
+    let place = text.find([':', '='])?;
+    let is_first = text.find(',').is_some_and(|comma| place < comma);
+    if !is_first || dialect.delimiter == Delimiter::Byte(b',') || text.contains(['\t', ';']) {
+        return None;
+    }
+    let value = text[place + 1..].trim().trim_end_matches(',');
+    let is_path = value.starts_with(['\\', '/']);
+    entry(line, &text[..place], vec![value.to_owned()]).filter(|_| !is_path)
 }
 
 /// Whether the value is a number with or without a unit, and nothing else.

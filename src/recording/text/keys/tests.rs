@@ -64,3 +64,24 @@ fn dates() {
         "2020-03-16 17:04:51"
     );
 }
+
+#[test]
+fn a_comma_within_a_value_parts_nothing() {
+    let dialect = Dialect {
+        delimiter: Delimiter::Byte(b';'),
+        decimal: b',',
+    };
+    let read = |text: &str| entries(7, text, dialect);
+    let found = read("Aufzeichnungsdatum : 24.11.2011, 09:07:38");
+    assert_eq!(found.len(), 1);
+    assert_eq!(found[0].key, "Aufzeichnungsdatum");
+    assert_eq!(found[0].values, ["24.11.2011, 09:07:38"]);
+    assert_eq!(date_text(&found).as_deref(), Some("24.11.2011, 09:07:38"));
+    let found = read("Delta              : 0,001 sec.");
+    assert_eq!(found[0].key, "Delta");
+    assert_eq!(rate_hz(&found[0], None, b','), Some(1000.0));
+    // Cells of their own, and cells of the table.
+    assert_eq!(read("t0 = 5, tInc = 1e-09").len(), 2);
+    assert_eq!(read("Date;24.11.2011, Thu").len(), 1);
+    assert_eq!(entries(7, "Note: a,b", COMMA)[0].values, ["b"]);
+}
