@@ -2,6 +2,7 @@
 
 mod field;
 mod fill;
+mod keyed;
 mod labelled;
 mod positional;
 

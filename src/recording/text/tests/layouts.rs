@@ -157,3 +157,34 @@ fn stamps_in_whole_milliseconds() {
     let rate_hz = found.channels[0].axis.rate_hz.unwrap();
     assert!((rate_hz * 3.3e-3 - 1.0).abs() < 1e-4, "{rate_hz}");
 }
+
+#[test]
+fn headings_whose_first_word_can_be_a_key() {
+    let level = |row: f64| format!("{:.3}", 50.0 + (row * 2.3).sin());
+    let body = rows(9, ",", &[&level, &wave]);
+    for (heading, first, second) in [
+        (
+            "Frequency (Hz),Torque (Nm)",
+            ("Frequency", "Hz", 9),
+            ("Torque", "Nm", 9),
+        ),
+        ("Start,Stop", ("Start", "", 9), ("Stop", "", 9)),
+        ("Delta,Torque", ("Delta", "", 9), ("Torque", "", 9)),
+        (
+            "Rate (Nm/s),Torque (Nm)",
+            ("Rate", "Nm/s", 9),
+            ("Torque", "Nm", 9),
+        ),
+    ] {
+        check(&read(&format!("{heading}\n{body}")), &[first, second], None);
+    }
+    // These are keys.
+    for key in ["Sample rate,50 Hz", "Sample rate (Hz),50"] {
+        let found = read(&format!("{key}\n{body}"));
+        check(
+            &found,
+            &[("column 1", "", 9), ("column 2", "", 9)],
+            Some(50.0),
+        );
+    }
+}
