@@ -1,5 +1,8 @@
 //! Reading the rows of a table: every column at once, plain numbers quickly, the rest with care.
 
+mod cut;
+
+use self::cut::line_of;
 use super::cell::Cell;
 use super::clock::{Clock, DAY};
 use crate::failure::Failure;
@@ -121,21 +124,6 @@ struct Plan<'a> {
 }
 
 impl Rows {
-    /// Leaves out the rows from one on.
-    pub fn truncate(&mut self, count: usize) {
-        for column in &mut self.columns {
-            column.values.truncate(count);
-            column.holes.retain(|hole| hole.index < count);
-        }
-        self.count = self.count.min(count);
-    }
-
-    /// Number of the line of a row.
-    #[must_use]
-    pub fn line_of(&self, row: usize) -> usize {
-        line_of(&self.breaks, row)
-    }
-
     /// Takes a line in; `false` if reading is to stop before it.
     #[inline]
     fn accept(
@@ -314,14 +302,6 @@ impl Rows {
             });
         }
     }
-}
-
-/// Number of the line of a row, by the rows and lines at which counting went on.
-fn line_of(breaks: &[(usize, usize)], row: usize) -> usize {
-    let place = breaks.partition_point(|(first, _)| *first <= row);
-    place
-        .checked_sub(1)
-        .map_or(0, |place| breaks[place].1 + (row - breaks[place].0))
 }
 
 /// Whether there is something in the line, but only separators.

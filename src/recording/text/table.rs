@@ -1,6 +1,7 @@
 //! One table of numbers with the lines above it, as channels.
 
 use super::axes::{Axes, Role, Sources};
+use super::blocks;
 use super::cell::Cell;
 use super::head::{self, Head, Table};
 use super::header::{self, Header};
@@ -27,8 +28,8 @@ pub struct Hints {
 /// A table as read.
 #[derive(Debug)]
 pub struct Part {
-    /// Its channels.
-    pub channels: Vec<Channel>,
+    /// Its channels, for each block of rows in which time begins anew.
+    pub blocks: Vec<Vec<Channel>>,
     /// How it is written.
     pub dialect: Dialect,
     /// Keys and values above it.
@@ -41,6 +42,8 @@ pub struct Part {
     pub end: usize,
     /// Number of the line there.
     pub next_line: usize,
+    /// Whether a line there repeats a key of the head.
+    pub begins_anew: bool,
 }
 
 /// Reads the table that follows an offset, up to the end or to a line that `stop` tells.
@@ -80,7 +83,15 @@ pub fn read_at(
         .map(|kind| kind.unwrap_or(Wanted::Numbers))
         .collect();
     let names = header.names.clone();
-    let is_next = |line: &str| stop(line) || head::is_end(line) || names.as_deref() == Some(line);
+    let mut entries = header.entries.clone();
+    if let Some(names) = &names {
+        entries.extend(super::keys::entries(0, names, table.dialect));
+    }
+    let is_named = wanted.first() == Some(&Wanted::Nothing);
+    let begins_anew = |line: &str| !is_named && blocks::begins_anew(line, &entries, table.dialect);
+    let is_next = |line: &str| {
+        stop(line) || head::is_end(line) || names.as_deref() == Some(line) || begins_anew(line)
+    };
     let offset = head.lines[first].offset;
     let number = head.number(first);
     let mut rows = rows::read(text, offset, number, table.dialect, &wanted, &is_next)?;
@@ -88,12 +99,30 @@ pub fn read_at(
     if let Some(unit) = hints.unit {
         default_units(&mut header, unit);
     }
+    let next = crate::io::csv::decode_line(super::line_at(text, rows.end));
+    Ok(Part {
+        end: rows.end,
+        next_line: number + rows.lines,
+        begins_anew: begins_anew(next.trim_end_matches('\r')),
+        lost,
+        ..part_of(header, rows, table.dialect, hints, options)?
+    })
+}
+
+/// Channels of rows as read, and what should be known of them.
+fn part_of(
+    header: Header,
+    mut rows: Rows,
+    dialect: Dialect,
+    hints: Hints,
+    options: &Options,
+) -> Result<Part, Failure> {
     let find = |rows: &Rows| {
         Sources {
             fields: &header.fields,
             columns: &rows.columns,
             entries: &header.entries,
-            decimal: table.dialect.decimal,
+            decimal: dialect.decimal,
             default_time_unit: hints.time_unit,
             options,
         }
@@ -104,16 +133,31 @@ pub fn read_at(
     if summary.is_some() {
         axes = find(&rows)?;
     }
-    let mut warnings = warnings(&header, &rows, &axes, table.dialect);
+    let mut warnings = warnings(&header, &rows, &axes, dialect);
     warnings.extend(summary);
+    let starts = blocks::restarts(&rows, &axes.roles);
+    let mut further: Vec<Rows> = starts
+        .iter()
+        .rev()
+        .map(|row| rows.split_off(*row))
+        .collect();
+    if !further.is_empty() {
+        axes = find(&rows)?;
+    }
+    let mut blocks = vec![channels(&header, rows, &axes)];
+    while let Some(rows) = further.pop() {
+        let axes = find(&rows)?;
+        blocks.push(channels(&header, rows, &axes));
+    }
     Ok(Part {
-        end: rows.end,
-        next_line: number + rows.lines,
-        warnings,
-        channels: channels(&header, rows, &axes),
-        dialect: table.dialect,
+        blocks,
+        dialect,
         entries: header.entries,
-        lost,
+        warnings,
+        lost: None,
+        end: 0,
+        next_line: 0,
+        begins_anew: false,
     })
 }
 
