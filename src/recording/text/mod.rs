@@ -117,6 +117,7 @@ pub fn is_plain(head: &[u8], complete: bool, options: &Options) -> bool {
     same_columns
         && !has_marks(&head, &table)
         && !has_slow_column(&head, &table)
+        && !summary::may_be_count(&head, &table)
         && layout.dialect == table.dialect
         && (layout.data_line == first_row || begins_with_number(&layout, &text.bytes))
         && wanted

@@ -1,6 +1,7 @@
-//! Rows below the samples that sum them up: largest, least and mean values, totals.
+//! Rows that are no samples: their number above them, largest, least and mean values and totals below.
 
 use super::axes::Role;
+use super::head::{Head, Table};
 use super::rows::{Column, Rows};
 use crate::recording::HoleKind;
 use crate::report::Warning;
@@ -11,6 +12,38 @@ const ROWS: usize = 10;
 const PART: usize = 10;
 /// Samples for one stamp that may be missing among them.
 const DENSE: usize = 100;
+
+/// Leaves out a first row that says how many follow, in each of several columns or beside an empty cell of
+/// time: it is no sample.
+pub fn leave_out_count(rows: &mut Rows) -> Option<Warning> {
+    let below = rows.count.checked_sub(1).filter(|count| *count >= ROWS)?;
+    let mut first = rows
+        .columns
+        .iter()
+        .filter_map(|column| column.values.first())
+        .filter(|value| !value.is_nan())
+        .peekable();
+    let is_one_of_many = rows.columns.len() > 1 && first.peek().is_some();
+    if !is_one_of_many || !first.all(|value| *value == below as f64) {
+        return None;
+    }
+    let line = rows.line_of(0);
+    rows.drop_first();
+    Some(Warning::new(
+        "lines-skipped",
+        format!("line {line} says how many rows follow, {below}; it was left out"),
+    ))
+}
+
+/// Whether the first row may say how many follow: the same whole number in each cell.
+pub fn may_be_count(head: &Head, table: &Table) -> bool {
+    let cells = table.dialect.cells(&head.lines[table.first].text);
+    let mut filled = cells.iter().filter(|cell| !cell.is_empty());
+    let first = filled.next().and_then(|cell| cell.parse::<usize>().ok());
+    cells.len() > 1
+        && first.is_some_and(|first| first >= ROWS)
+        && filled.all(|cell| cell.parse().ok() == first)
+}
 
 /// Leaves out the rows behind the last time stamp whose cells of time hold texts or nothing: they are no
 /// samples. Columns of time that have stamps now and then only say nothing of that.

@@ -128,13 +128,14 @@ fn part_of(
         }
         .find()
     };
+    let count = summary::leave_out_count(&mut rows);
     let mut axes = find(&rows)?;
     let summary = summary::leave_out(&mut rows, &axes.roles);
     if summary.is_some() {
         axes = find(&rows)?;
     }
     let mut warnings = warnings(&header, &rows, &axes, dialect);
-    warnings.extend(summary);
+    warnings.extend(count.into_iter().chain(summary));
     let starts = blocks::restarts(&rows, &axes.roles);
     let mut further: Vec<Rows> = starts
         .iter()

@@ -11,7 +11,7 @@ use super::keys::{self, Entry};
 use super::units;
 use crate::io::csv::{Delimiter, Dialect};
 pub use field::Field;
-use fill::{fill_axis_unit, fill_from_list, fill_names, fill_units};
+use fill::{fill_axis_unit, fill_from_list, fill_names, fill_time_unit, fill_units};
 use labelled::labelled;
 use positional::positional;
 
@@ -78,6 +78,7 @@ pub fn read(head: &Head, table: &Table, used: &[bool]) -> Header {
     }
     fill_units(&mut fields, &entries, used);
     fill_axis_unit(&mut fields, &entries);
+    fill_time_unit(&mut fields);
     Header {
         fields,
         entries,

@@ -67,6 +67,9 @@ pub fn entries(line: usize, text: &str, dialect: Dialect) -> Vec<Entry> {
     if let Some(entry) = one_cell(line, text).filter(is_quantity) {
         return vec![entry];
     }
+    if let Some(entry) = bare_rate(line, text, dialect.decimal) {
+        return vec![entry];
+    }
     let cells = split(text, dialect);
     // `CH1V,CH2V,t0 =-5e-05, tInc = 1e-09,`: cells of their own.
     let assignments: Vec<Entry> = cells
@@ -96,6 +99,15 @@ pub fn entries(line: usize, text: &str, dialect: Dialect) -> Vec<Entry> {
         }
         _ => one_cell(line, text).into_iter().collect(),
     }
+}
+
+/// A rate or an interval without a key: `0.5 msec/sample`, `2000 samples/s`.
+fn bare_rate(line: usize, text: &str, decimal: u8) -> Option<Entry> {
+    let (_, unit) = quantity(text, decimal)?;
+    let lower = unit.to_lowercase();
+    let is_rate = lower.ends_with("sec/sample") || lower.starts_with("samples/s");
+    let value = text.strip_suffix("/sample").unwrap_or(text);
+    entry(line, &unit, vec![value.to_owned()]).filter(|_| is_rate)
 }
 
 /// A key and its value parted by the first colon or equals sign, before a comma that is within the value

@@ -29,6 +29,9 @@ fn rates_and_intervals() {
         ("Sample Rate,1.00GSa/s", 1e9),
         ("XInc:,5.0E-11", 2e10),
         ("Resolution:1e-10:", 1e10),
+        ("0.5 msec/sample", 2000.0),
+        ("2000 samples/s", 2000.0),
+        ("20 sec/sample", 0.05),
     ] {
         let found = hz(text).expect(text);
         assert!((found / value - 1.0).abs() < 1e-12, "{text}: {found}");

@@ -12,6 +12,24 @@ impl Rows {
         self.count = self.count.min(count);
     }
 
+    /// Leaves out the first row.
+    pub fn drop_first(&mut self) {
+        for column in &mut self.columns {
+            if !column.values.is_empty() {
+                column.values.remove(0);
+            }
+            column.holes.retain(|hole| hole.index > 0);
+            column.holes.iter_mut().for_each(|hole| hole.index -= 1);
+        }
+        for (row, line) in &mut self.breaks {
+            match row {
+                0 => *line += 1,
+                row => *row -= 1,
+            }
+        }
+        self.count = self.count.saturating_sub(1);
+    }
+
     /// The rows before which a line is no row: a comment, an empty line, a text.
     pub fn after_other_lines(&self) -> impl Iterator<Item = usize> {
         self.breaks
