@@ -77,6 +77,10 @@ const QUALIFIED: [&str; 16] = [
 /// Whether a name stands for time, or for the axis that is time in a recorder's export.
 #[must_use]
 pub fn is_time_name(name: &str) -> bool {
+    // Us and Ms are a voltage and a torque.
+    if is_weak_time_name(name) || matches!(name.trim(), "Us" | "Ms") {
+        return false;
+    }
     let lower = name.to_lowercase();
     let words: Vec<&str> = lower
         .split(|c: char| !c.is_alphanumeric() && c != '%')
@@ -88,7 +92,9 @@ pub fn is_time_name(name: &str) -> bool {
             .trim_end_matches(|c: char| c.is_ascii_digit());
         let is_compound = (stem.ends_with("zeit") || stem.ends_with("time"))
             && !["lifetime", "risetime", "deadtime", "totzeit", "overtime"].contains(&stem);
-        TIMES.contains(&stem) || is_compound
+        // t5 beside other words is no time.
+        let is_known = TIMES.contains(&stem) && (stem != "t" || word == "t");
+        is_known || is_compound
     };
     match words.as_slice() {
         [] => false,
@@ -100,6 +106,33 @@ pub fn is_time_name(name: &str) -> bool {
                 || QUALIFIED.contains(first) && is(last)
         }
     }
+}
+
+/// Whether a name is that of a time or of a temperature or torque, as `T`, `T1` and `t2` are: its place
+/// and its values must tell.
+#[must_use]
+pub fn is_weak_time_name(name: &str) -> bool {
+    let name = name.trim();
+    let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
+    stem == "T" || stem == "t" && stem.len() < name.len()
+}
+
+/// The word in a name that stands for time, in lower case and without digits: that of columns of time
+/// which belong together, as `Time1` and `Time2` do.
+#[must_use]
+pub fn time_stem(name: &str) -> Option<String> {
+    let is_word = |c: char| c.is_alphanumeric() || c == '%';
+    let lower = name.to_lowercase();
+    let stem = |word: &str| {
+        word.trim_start_matches('%')
+            .trim_end_matches(|c: char| c.is_ascii_digit())
+            .to_owned()
+    };
+    lower
+        .split(|c: char| !is_word(c))
+        .filter(|word| !word.is_empty())
+        .find(|word| is_time_name(word) || is_weak_time_name(word))
+        .map(stem)
 }
 
 /// Whether a name stands for the horizontal axis, which is time unless the file says otherwise.
@@ -194,6 +227,11 @@ mod tests {
             "t_ambient",
             "Time constant",
             "X",
+            "T",
+            "T5",
+            "t1",
+            "T5 ambient",
+            "Us",
         ] {
             assert!(!is_time_name(name), "{name}");
         }

@@ -6,6 +6,7 @@
 
 mod axes;
 mod axis_names;
+mod blocks;
 mod cell;
 mod clock;
 mod decode;
@@ -16,6 +17,7 @@ mod listing;
 mod makers;
 mod rows;
 mod sparse;
+mod summary;
 mod table;
 mod units;
 
@@ -115,12 +117,18 @@ pub fn is_plain(head: &[u8], complete: bool, options: &Options) -> bool {
     same_columns
         && !has_marks(&head, &table)
         && !has_slow_column(&head, &table)
+        && !summary::may_be_count(&head, &table)
         && layout.dialect == table.dialect
         && (layout.data_line == first_row || begins_with_number(&layout, &text.bytes))
         && wanted
             .iter()
             .all(|kind| *kind == Some(rows::Wanted::Numbers))
         && times <= 1
+        // What their values say is not looked at there.
+        && !header
+            .fields
+            .iter()
+            .any(|field| units::is_weak_time_name(&field.name))
 }
 
 /// Whether both readers take a column for the same.
@@ -167,7 +175,7 @@ fn begins_with_number(layout: &csv::Layout, text: &[u8]) -> bool {
 /// A table, or several below each other under the same headings.
 fn general(text: &Text, hints: Hints, options: &Options) -> Result<Recording, Failure> {
     let mut parts = Vec::new();
-    let (mut from, mut number) = (0, 1);
+    let (mut from, mut number, mut begins_anew) = (0, 1, false);
     if let Some(column) = one_line(&text.bytes, options) {
         let part = table::read(&column, 0, 1, hints, options, &|_| false)?;
         return Ok(recording_of(vec![part]));
@@ -175,6 +183,12 @@ fn general(text: &Text, hints: Hints, options: &Options) -> Result<Recording, Fa
     loop {
         let part = match table::read(&text.bytes, from, number, hints, options, &|_| false) {
             Ok(part) => part,
+            Err(failure) if begins_anew => {
+                return Err(Failure::failed(format_args!(
+                    "line {number}: a block of its own begins here, and cannot be read: {failure}; split \
+                     the file"
+                )));
+            }
             // What follows the last table need not be one.
             Err(_) if !parts.is_empty() => break,
             Err(failure) => return Err(failure),
@@ -183,6 +197,7 @@ fn general(text: &Text, hints: Hints, options: &Options) -> Result<Recording, Fa
             || part.end <= from
             || head::is_end(&csv::decode_line(line_at(&text.bytes, part.end)));
         (from, number) = (part.end, part.next_line);
+        begins_anew = part.begins_anew;
         parts.push(part);
         if is_last {
             break;
@@ -228,23 +243,26 @@ fn one_line(text: &[u8], options: &Options) -> Option<Vec<u8>> {
 
 /// Puts tables together as the segments of a recording.
 fn recording_of(parts: Vec<table::Part>) -> Recording {
-    let several = parts.len() > 1;
+    let blocks: usize = parts.iter().map(|part| part.blocks.len()).sum();
     let mut recording = Recording::empty("csv", String::new());
     for (place, part) in parts.into_iter().enumerate() {
         if place == 0 {
             recording.dialect = part.dialect.describe();
             recording.details = details(&part.entries);
         }
-        if several {
-            recording.segments.push(Segment {
-                name: format!("segment {}", place + 1),
-                start_s: None,
-                start_text: keys::date_text(&part.entries),
-            });
-        }
-        for mut channel in part.channels {
-            channel.segment = several.then_some(place);
-            recording.channels.push(channel);
+        for channels in part.blocks {
+            let segment = recording.segments.len();
+            if blocks > 1 {
+                recording.segments.push(Segment {
+                    name: format!("segment {}", segment + 1),
+                    start_s: None,
+                    start_text: keys::date_text(&part.entries),
+                });
+            }
+            for mut channel in channels {
+                channel.segment = (blocks > 1).then_some(segment);
+                recording.channels.push(channel);
+            }
         }
         recording.warnings.extend(part.warnings);
         recording.lost = recording.lost.or(part.lost);

@@ -1,5 +1,8 @@
 //! Reading the rows of a table: every column at once, plain numbers quickly, the rest with care.
 
+mod cut;
+
+use self::cut::line_of;
 use super::cell::Cell;
 use super::clock::{Clock, DAY};
 use crate::failure::Failure;
@@ -337,13 +340,9 @@ impl Column {
     #[cold]
     fn fill(&mut self, row: usize, breaks: &[(usize, usize)]) {
         for index in self.values.len()..row {
-            let place = breaks.partition_point(|(first, _)| *first <= index);
-            let line = place
-                .checked_sub(1)
-                .map_or(0, |place| breaks[place].1 + (index - breaks[place].0));
             self.holes.push(Hole {
                 index,
-                line,
+                line: line_of(breaks, index),
                 what: HoleKind::Empty,
             });
             self.values.push(f64::NAN);

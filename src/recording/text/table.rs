@@ -1,11 +1,13 @@
 //! One table of numbers with the lines above it, as channels.
 
 use super::axes::{Axes, Role, Sources};
+use super::blocks;
 use super::cell::Cell;
 use super::head::{self, Head, Table};
 use super::header::{self, Header};
 use super::keys::{Entry, Topic};
 use super::rows::{self, Rows, Wanted};
+use super::summary;
 use crate::failure::Failure;
 use crate::io::csv::{Dialect, Options, is_skipped};
 use crate::recording::Channel;
@@ -26,8 +28,8 @@ pub struct Hints {
 /// A table as read.
 #[derive(Debug)]
 pub struct Part {
-    /// Its channels.
-    pub channels: Vec<Channel>,
+    /// Its channels, for each block of rows in which time begins anew.
+    pub blocks: Vec<Vec<Channel>>,
     /// How it is written.
     pub dialect: Dialect,
     /// Keys and values above it.
@@ -40,6 +42,8 @@ pub struct Part {
     pub end: usize,
     /// Number of the line there.
     pub next_line: usize,
+    /// Whether a line there repeats a key of the head.
+    pub begins_anew: bool,
 }
 
 /// Reads the table that follows an offset, up to the end or to a line that `stop` tells.
@@ -79,7 +83,15 @@ pub fn read_at(
         .map(|kind| kind.unwrap_or(Wanted::Numbers))
         .collect();
     let names = header.names.clone();
-    let is_next = |line: &str| stop(line) || head::is_end(line) || names.as_deref() == Some(line);
+    let mut entries = header.entries.clone();
+    if let Some(names) = &names {
+        entries.extend(super::keys::entries(0, names, table.dialect));
+    }
+    let is_named = wanted.first() == Some(&Wanted::Nothing);
+    let begins_anew = |line: &str| !is_named && blocks::begins_anew(line, &entries, table.dialect);
+    let is_next = |line: &str| {
+        stop(line) || head::is_end(line) || names.as_deref() == Some(line) || begins_anew(line)
+    };
     let offset = head.lines[first].offset;
     let number = head.number(first);
     let mut rows = rows::read(text, offset, number, table.dialect, &wanted, &is_next)?;
@@ -87,23 +99,66 @@ pub fn read_at(
     if let Some(unit) = hints.unit {
         default_units(&mut header, unit);
     }
-    let axes = Sources {
-        fields: &header.fields,
-        columns: &rows.columns,
-        entries: &header.entries,
-        decimal: table.dialect.decimal,
-        default_time_unit: hints.time_unit,
-        options,
-    }
-    .find()?;
+    let next = crate::io::csv::decode_line(super::line_at(text, rows.end));
     Ok(Part {
         end: rows.end,
         next_line: number + rows.lines,
-        warnings: warnings(&header, &rows, &axes, table.dialect),
-        channels: channels(&header, rows, &axes),
-        dialect: table.dialect,
-        entries: header.entries,
+        begins_anew: begins_anew(next.trim_end_matches('\r')),
         lost,
+        ..part_of(header, rows, table.dialect, hints, options)?
+    })
+}
+
+/// Channels of rows as read, and what should be known of them.
+fn part_of(
+    header: Header,
+    mut rows: Rows,
+    dialect: Dialect,
+    hints: Hints,
+    options: &Options,
+) -> Result<Part, Failure> {
+    let find = |rows: &Rows| {
+        Sources {
+            fields: &header.fields,
+            columns: &rows.columns,
+            entries: &header.entries,
+            decimal: dialect.decimal,
+            default_time_unit: hints.time_unit,
+            options,
+        }
+        .find()
+    };
+    let count = summary::leave_out_count(&mut rows);
+    let mut axes = find(&rows)?;
+    let summary = summary::leave_out(&mut rows, &axes.roles);
+    if summary.is_some() {
+        axes = find(&rows)?;
+    }
+    let mut warnings = warnings(&header, &rows, &axes, dialect);
+    warnings.extend(count.into_iter().chain(summary));
+    let starts = blocks::restarts(&rows, &axes.roles);
+    let mut further: Vec<Rows> = starts
+        .iter()
+        .rev()
+        .map(|row| rows.split_off(*row))
+        .collect();
+    if !further.is_empty() {
+        axes = find(&rows)?;
+    }
+    let mut blocks = vec![channels(&header, rows, &axes)];
+    while let Some(rows) = further.pop() {
+        let axes = find(&rows)?;
+        blocks.push(channels(&header, rows, &axes));
+    }
+    Ok(Part {
+        blocks,
+        dialect,
+        entries: header.entries,
+        warnings,
+        lost: None,
+        end: 0,
+        next_line: 0,
+        begins_anew: false,
     })
 }
 
@@ -113,6 +168,7 @@ fn warnings(header: &Header, rows: &Rows, axes: &Axes, dialect: Dialect) -> Vec<
     let differs = count_differs(&header.entries, longest.unwrap_or(0), dialect);
     let mut warnings = odd_lines(rows);
     warnings.extend(assumptions(axes));
+    warnings.extend(axes.warnings.iter().cloned());
     warnings.extend(differs);
     warnings
 }
@@ -210,12 +266,7 @@ fn drop_cut_row(text: &[u8], dialect: Dialect, rows: &mut Rows) -> Option<Warnin
     if cells(&text[last..]) >= cells(&text[before..last.max(1) - 1]) {
         return None;
     }
-    let row = rows.count - 1;
-    for column in &mut rows.columns {
-        column.values.truncate(row);
-        column.holes.retain(|hole| hole.index < row);
-    }
-    rows.count = row;
+    rows.truncate(rows.count - 1);
     Some(Warning::new(
         "last-line-cut",
         "the file ends within its last line; that line was left out",

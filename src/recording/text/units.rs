@@ -4,10 +4,12 @@ use torqcomp_model::{Dimension, Unit};
 
 use crate::io::csv::NamedUnit;
 
-pub use super::axis_names::{is_axis_name, is_index_name, is_time_name};
+pub use super::axis_names::{
+    is_axis_name, is_index_name, is_time_name, is_weak_time_name, time_stem,
+};
 
 /// Other ways to write a unit, in lower case, and how torqcomp writes it.
-const SYNONYMS: [(&str, &str); 44] = [
+const SYNONYMS: [(&str, &str); 47] = [
     ("sekunde", "s"),
     ("sekunden", "s"),
     ("sek", "s"),
@@ -47,6 +49,9 @@ const SYNONYMS: [(&str, &str); 44] = [
     ("min^-1", "rpm"),
     ("r/min", "rpm"),
     ("rev/min", "rpm"),
+    ("tr/min", "rpm"),
+    ("ot/min", "rpm"),
+    ("obr/min", "rpm"),
     ("nm", "N m"),
     ("n.m", "N m"),
     ("n-m", "N m"),
@@ -170,7 +175,17 @@ pub fn heading(text: &str) -> Heading {
     {
         return Heading::new(name.trim().to_owned(), Some(unit), None);
     }
-    for mark in [" in ", " / ", "/", ", ", ";"] {
+    // Vitesse tr/min
+    if let Some((name, word)) = text.rsplit_once(' ')
+        && is_speed(word)
+        && ![" in", " en", " em", " /", ","]
+            .iter()
+            .any(|mark| name.ends_with(mark))
+        && let Some(unit) = read(word)
+    {
+        return Heading::new(name.trim().to_owned(), Some(unit), None);
+    }
+    for mark in [" in ", " en ", " em ", " / ", "/", ", ", ";"] {
         if let Some((name, unit)) = text.rsplit_once(mark)
             && read(text).is_none()
             && !name.trim().is_empty()
@@ -184,6 +199,15 @@ pub fn heading(text: &str) -> Heading {
         return Heading::new(name.to_owned(), Some(unit), None);
     }
     Heading::new(text.to_owned(), time_word(text), None)
+}
+
+/// Whether a word is a speed, so that its bar parts no name from a unit.
+fn is_speed(word: &str) -> bool {
+    const WORDS: [&str; 15] = [
+        "tr/min", "ot/min", "obr/min", "r/min", "rev/min", "u/min", "1/min", "1/s", "rad/s",
+        "deg/s", "°/s", "m/s", "mm/s", "km/h", "m/min",
+    ];
+    WORDS.contains(&word.to_lowercase().as_str())
 }
 
 /// The unit of time that is part of a name of time: `millis`, `Time ms`, `elapsed seconds`.
@@ -312,6 +336,13 @@ mod tests {
             ("Drehzahl [U/min]", "Drehzahl", Some("U/min"), true),
             ("time_s", "time", Some("s"), true),
             ("m/s", "m/s", None, false),
+            ("Vitesse en tr/min", "Vitesse", Some("tr/min"), true),
+            ("Couple en N.m", "Couple", Some("N.m"), true),
+            ("Temps en s", "Temps", Some("s"), true),
+            ("Velocidade em 1/min", "Velocidade", Some("1/min"), true),
+            ("Speed r/min", "Speed", Some("r/min"), true),
+            ("n / r/min", "n", Some("r/min"), true),
+            ("Weg s/mm", "Weg s", Some("mm"), true),
         ] {
             let want = (name.to_owned(), unit.map(str::to_owned), known);
             assert_eq!(told(text), want, "{text}");

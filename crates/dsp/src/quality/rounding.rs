@@ -3,8 +3,12 @@
 /// A uniform time axis whose stamps are rounded to a coarse step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rounded {
-    /// Step of the samples: slope of the straight line through the stamps.
+    /// Step of the samples: of those that explain all stamps, one near the middle that is said in the
+    /// fewest digits, as a step or as a rate.
     pub step_s: f64,
+    /// Least and largest step that explain all stamps; both the slope of the straight line where none
+    /// explains them to the last digit.
+    pub steps_s: [f64; 2],
     /// What the stamps are multiples of.
     pub quantum_s: f64,
 }
@@ -25,12 +29,22 @@ const HALF: f64 = 0.6;
 /// Stamps that fall are none of a rounded axis. Random jitter passes only if it stays within the quantum everywhere, so a clock that wanders by
 /// more than the last digit it is written with is never taken for rounded.
 ///
+/// The slope of the line by least squares is too flat: through `n` steps of a staircase by the factor
+/// `1 − 1/n²`. So the step is taken from all the lines `a + b i` that stay within one quantum above each
+/// stamp, `tᵢ ≤ a + b i ≤ tᵢ + q` (rounding instead of truncation only moves `a`): these are the `b` with
+/// `(tⱼ − tᵢ − q)/(j − i) ≤ b ≤ (tⱼ − tᵢ + q)/(j − i)` for all `i < j`.
+///
 /// ```
 /// use torqcomp_dsp::quality::rounding::rounded;
 /// // 1.5 kHz, written in whole milliseconds.
 /// let stamps: Vec<f64> = (0..300).map(|i| (i as f64 / 1.5).round() * 1e-3).collect();
 /// let found = rounded(&stamps).unwrap();
-/// assert!((found.quantum_s - 1e-3).abs() < 1e-12 && (found.step_s * 1500.0 - 1.0).abs() < 1e-4);
+/// assert!((found.quantum_s - 1e-3).abs() < 1e-12 && (found.step_s * 1500.0 - 1.0).abs() < 1e-12);
+/// // 10 Hz for ten seconds, in whole seconds: 99 steps are less than 10 s, 81 are more than 8 s.
+/// let stamps: Vec<f64> = (0..100).map(|i| f64::from(i / 10)).collect();
+/// let found = rounded(&stamps).unwrap();
+/// assert!((found.steps_s[0] - 8.0 / 81.0).abs() < 1e-12);
+/// assert!((found.steps_s[1] - 10.0 / 99.0).abs() < 1e-12 && (found.step_s - 0.1).abs() < 1e-12);
 /// ```
 #[must_use]
 pub fn rounded(stamps_s: &[f64]) -> Option<Rounded> {
@@ -52,8 +66,79 @@ pub fn rounded(stamps_s: &[f64]) -> Option<Rounded> {
     let farthest = stamps_s.iter().enumerate();
     let farthest = farthest.fold(0.0, |most: f64, (i, t)| most.max((t - line(i)).abs()));
     // An axis that needs no excuse is not given one.
-    (farthest > 0.5 * COARSE * step_s && farthest <= HALF * quantum_s)
-        .then_some(Rounded { step_s, quantum_s })
+    if farthest <= 0.5 * COARSE * step_s || farthest > HALF * quantum_s {
+        return None;
+    }
+    let steps_s = explaining(stamps_s, quantum_s).unwrap_or([step_s; 2]);
+    let step_s = if steps_s[0] < steps_s[1] {
+        simplest(steps_s)
+    } else {
+        step_s
+    };
+    Some(Rounded {
+        step_s,
+        steps_s,
+        quantum_s,
+    })
+}
+
+/// Least and largest step of the lines that stay within a quantum above each stamp, if there are any
+/// and all of them rise.
+fn explaining(stamps_s: &[f64], quantum_s: f64) -> Option<[f64; 2]> {
+    let first = *stamps_s.first()?;
+    let multiples: Vec<f64> = stamps_s
+        .iter()
+        .map(|t| ((t - first) / quantum_s).round())
+        .collect();
+    // In quanta; the first and the last stamp allow no more than these.
+    let (steps, last) = ((multiples.len() - 1) as f64, *multiples.last()?);
+    let low = bound(&multiples, (last - 1.0) / steps)?;
+    let high = bound(&multiples, (last + 1.0) / steps)?;
+    (low > 0.0 && low < high).then_some([low * quantum_s, high * quantum_s])
+}
+
+/// The bound of the feasible slopes that is met from a slope outside or on it. For the slope `b` the worst
+/// pair is the stamp that lies highest over `b i` and the upper end of the one that lies lowest; from `b`
+/// on to the slope that brings these two together, until no pair is apart. The function is convex and
+/// made of straight pieces, so that this ends after few steps.
+fn bound(multiples: &[f64], mut slope: f64) -> Option<f64> {
+    for _ in 0..100 {
+        let (mut highest, mut lowest) = ((f64::NEG_INFINITY, 0), (f64::INFINITY, 0));
+        for (i, multiple) in multiples.iter().enumerate() {
+            let over = multiple - slope * i as f64;
+            if over > highest.0 {
+                highest = (over, i);
+            }
+            if over < lowest.0 {
+                lowest = (over, i);
+            }
+        }
+        let apart = highest.0 - lowest.0 - 1.0;
+        if apart <= 1e-9 {
+            return Some(slope);
+        }
+        let (above, below) = (highest.1, lowest.1);
+        let places = above as f64 - below as f64;
+        slope = (multiples[above] - multiples[below] - 1.0) / places;
+        if !slope.is_finite() {
+            return None;
+        }
+    }
+    None
+}
+
+/// Of the steps in the middle half of a range the one that takes the fewest digits, itself or as a rate.
+fn simplest([low_s, high_s]: [f64; 2]) -> f64 {
+    let quarter = 0.25 * (high_s - low_s);
+    let (low, high) = (low_s + quarter, high_s - quarter);
+    let middle = 0.5 * (low + high);
+    let digits =
+        |value: f64, count: usize| -> f64 { format!("{value:.count$e}").parse().unwrap_or(value) };
+    let fits = |step: &f64| (low..=high).contains(step);
+    (0..16)
+        .flat_map(|count| [1.0 / digits(1.0 / middle, count), digits(middle, count)])
+        .find(fits)
+        .unwrap_or(middle)
 }
 
 /// The largest power of ten that all stamps are multiples of, from 1 s to 1 ns.
@@ -96,5 +181,38 @@ mod tests {
         assert!((found.step_s - 0.016).abs() < 1e-6, "{found:?}");
         stamps.iter_mut().skip(250).for_each(|t| *t += 0.1);
         assert_eq!(rounded(&stamps), None);
+    }
+
+    #[test]
+    fn the_rate_of_truncated_stamps_is_not_biased() {
+        for rate_hz in [
+            3.0, 7.0, 10.0, 20.0, 62.5, 100.0, 101.37, 1200.0, 1500.0, 4000.0,
+        ] {
+            for decimals in [0, 1, 2, 3] {
+                for count in [60, 100, 400, 999, 6000] {
+                    let scale = 10_f64.powi(decimals);
+                    let stamps: Vec<f64> = (0..count)
+                        .map(|i| (f64::from(i) / rate_hz * scale + 1e-9).floor() / scale)
+                        .collect();
+                    let Some(found) = rounded(&stamps) else {
+                        continue;
+                    };
+                    let [low, high] = found.steps_s;
+                    let (step, slack) = (1.0 / rate_hz, 1e-9 / rate_hz);
+                    let name = format!("{rate_hz} Hz, {decimals} decimals, {count}: {found:?}");
+                    if low == high {
+                        // A second step of the staircase is missing.
+                        assert!(f64::from(count) / rate_hz * scale < 3.0, "{name}");
+                        continue;
+                    }
+                    assert!(low - slack <= step && step <= high + slack, "{name}");
+                    assert!((found.step_s - step).abs() <= 0.75 * (high - low), "{name}");
+                    // Rates of few digits are found to the last one from a few seconds on.
+                    if rate_hz.fract() == 0.0 && (high - low) < 0.02 * step {
+                        assert!((found.step_s / step - 1.0).abs() < 1e-9, "{name}");
+                    }
+                }
+            }
+        }
     }
 }

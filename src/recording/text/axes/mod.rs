@@ -1,6 +1,7 @@
 //! Which columns are time, and the axis of every other column.
 
 mod groups;
+mod left_out;
 mod places;
 mod stamps;
 
@@ -14,6 +15,7 @@ use super::rows::Column;
 use crate::failure::Failure;
 use crate::io::csv::Options;
 use crate::recording::{Axis, RateFrom};
+use crate::report::Warning;
 use groups::{Group, groups};
 
 /// Largest difference of a rate in the head from that of the stamps for both to mean the same.
@@ -43,6 +45,8 @@ pub struct Axes {
     pub roles: Vec<Role>,
     /// The axes.
     pub axes: Vec<Axis>,
+    /// What should be known of columns named as time.
+    pub warnings: Vec<Warning>,
 }
 
 /// What the axes are found from.
@@ -90,12 +94,14 @@ impl Sources<'_> {
             .copied()
             .filter(|p| !index.contains(p))
             .collect();
-        let mut axes = Vec::new();
+        let (mut axes, mut warnings) = (Vec::new(), Vec::new());
+        warnings.extend(self.falling_time(&rest, &named.times));
         for group in groups(&named.times, &rest) {
             for place in &group.times {
                 roles[*place] = Role::Time;
             }
             let axis = self.axis(&group, named.assumed.as_deref())?;
+            warnings.extend(self.other_times(&group, &axis));
             // The time of columns without numbers is no channel.
             let is_channel = |place: &&usize| !self.fields[**place].is_label;
             for place in group.channels.iter().filter(is_channel) {
@@ -103,7 +109,11 @@ impl Sources<'_> {
                 axes.push(self.with_own_rate(axis.clone(), *place));
             }
         }
-        Ok(Axes { roles, axes })
+        Ok(Axes {
+            roles,
+            axes,
+            warnings,
+        })
     }
 
     /// The axis of a group.

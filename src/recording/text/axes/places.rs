@@ -48,16 +48,20 @@ impl Sources<'_> {
             .iter()
             .copied()
             .filter(|place| {
-                field(*place).is_label || field(*place).is_named_time() || self.is_clock(*place)
+                field(*place).is_label
+                    || field(*place).is_named_time()
+                    || self.is_clock(*place)
+                    || self.is_after_t(*place, used)
             })
             .collect();
+        let named = self.told_by_values(&named, used);
         if !named.is_empty() {
             return Ok(TimePlaces::sure(named));
         }
         let by_unit: Vec<usize> = used
             .iter()
             .copied()
-            .filter(|p| field(*p).has_time_unit())
+            .filter(|p| field(*p).has_time_unit() && mostly_rises(&self.columns[*p].values))
             .collect();
         match (by_unit.as_slice(), used.first()) {
             ([first, ..], Some(first_used)) if first == first_used => {
@@ -66,7 +70,99 @@ impl Sources<'_> {
             ([one], _) => return Ok(TimePlaces::sure(vec![*one])),
             _ => {}
         }
-        Ok(self.unnamed_time(used))
+        let axis = self.unnamed_time(used);
+        if axis.times.is_empty() {
+            return Ok(TimePlaces::sure(self.weakly_named(used)));
+        }
+        Ok(axis)
+    }
+
+    /// Whether a column is called `t2` where the first is `t`.
+    fn is_after_t(&self, place: usize, used: &[usize]) -> bool {
+        let field = &self.fields[place];
+        let is_first_t = || {
+            used.first()
+                .is_some_and(|first| self.fields[*first].name == "t")
+        };
+        units::is_weak_time_name(&field.name)
+            && field.name.starts_with('t')
+            && field.unit.is_none()
+            && is_first_t()
+    }
+
+    /// Of the columns named as time, those whose values rise as time does, and of these the ways to
+    /// write the first one's time and its repetitions before other channels.
+    fn told_by_values(&self, named: &[usize], used: &[usize]) -> Vec<usize> {
+        let mut times: Vec<usize> = Vec::new();
+        let mut first_block = 0;
+        for place in named.iter().copied() {
+            let before = used.iter().rev().find(|p| **p < place).copied();
+            let before = before.filter(|before| times.last() == Some(before));
+            let is_time = self.fields[place].is_label
+                || self.is_clock(place)
+                || mostly_rises(&self.columns[place].values)
+                || before.is_some_and(|before| self.is_part(place, before));
+            let fits =
+                before.is_some() || times.is_empty() || self.repeats(place, &times[..first_block]);
+            if is_time && fits {
+                times.push(place);
+                if before.is_some() && first_block + 1 == times.len() || times.len() == 1 {
+                    first_block = times.len();
+                }
+            }
+        }
+        times
+    }
+
+    /// Whether a column of time is named as one of the first: by the same word, or both are dates.
+    fn repeats(&self, place: usize, first: &[usize]) -> bool {
+        let stem = |place: usize| units::time_stem(&self.fields[place].name);
+        first.iter().any(|other| {
+            self.fields[place].name == self.fields[*other].name
+                || self.fields[place].is_label && self.fields[*other].is_label
+                || self.is_clock(place) && self.is_clock(*other)
+                || stem(place).is_some() && stem(place) == stem(*other)
+        })
+    }
+
+    /// Whether a column that falls holds the parts of the seconds in the column before it.
+    fn is_part(&self, place: usize, whole: usize) -> bool {
+        let whole = &self.columns[whole];
+        let are_whole = || whole.values.iter().all(|value| value.fract() == 0.0);
+        let parts = &self.columns[place].values;
+        are_whole() && parts.iter().all(|part| *part >= 0.0 && part.fract() == 0.0)
+    }
+
+    /// A first column named as time or temperature, where nothing else is the time and it always rises;
+    /// and its like before further channels.
+    fn weakly_named(&self, used: &[usize]) -> Vec<usize> {
+        let is_weak = |place: usize| {
+            let field = &self.fields[place];
+            units::is_weak_time_name(&field.name) && field.unit.is_none()
+        };
+        let rises = |place: usize| {
+            let values = &self.columns[place].values;
+            values.len() > 2 && values.windows(2).all(|pair| pair[1] > pair[0])
+        };
+        let is_time = |place: usize| is_weak(place) && rises(place);
+        let counts = |place: &usize| self.is_index(*place, used);
+        match used {
+            [first, ..] if is_time(*first) => {}
+            // After a column that counts, T is a temperature, but t1 a time.
+            [index, first, ..]
+                if counts(index)
+                    && is_time(*first)
+                    && self.fields[*first].name.starts_with('t') =>
+            {
+                return vec![*first];
+            }
+            _ => return Vec::new(),
+        }
+        let stands_alone = |rank: usize| rank == 0 || !is_weak(used[rank - 1]);
+        (0..used.len())
+            .filter(|rank| is_time(used[*rank]) && stands_alone(*rank))
+            .map(|rank| used[rank])
+            .collect()
     }
 
     /// A first column called X, or one without a heading whose values rise steadily.
@@ -76,7 +172,8 @@ impl Sources<'_> {
         };
         let values = &self.columns[first].values;
         let field = &self.fields[first];
-        if units::is_axis_name(&field.name) && field.unit.is_none() && !is_counting(values) {
+        let is_axis = units::is_axis_name(&field.name) && field.unit.is_none();
+        if is_axis && !is_counting(values) && mostly_rises(values) {
             return TimePlaces::sure(vec![first]);
         }
         if used.iter().any(|place| !self.is_unnamed(*place)) {
@@ -142,4 +239,13 @@ impl Sources<'_> {
             && (is_named || is_first && may_count())
             && used.len() > 1
     }
+}
+
+/// Whether values rise or stay as stamps do: all but one in ten steps, or all but one. A clock that was
+/// set back or began anew now and then is a clock still.
+fn mostly_rises(values: &[f64]) -> bool {
+    let falls = values.windows(2).fold(0_usize, |falls, pair| {
+        falls + usize::from(pair[1] < pair[0])
+    });
+    falls <= 1 || 10 * falls < values.len()
 }

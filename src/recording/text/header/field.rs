@@ -107,9 +107,13 @@ impl Field {
         self.unit.as_ref().is_some_and(units::is_time)
     }
 
-    /// Whether its name is that of time.
+    /// Whether its name is that of time, or can be and has a unit of time: `T1 [s]`, `X [s]`.
     #[must_use]
     pub fn is_named_time(&self) -> bool {
-        units::is_time_name(&self.name) && (self.unit.is_none() || self.has_time_unit())
+        let can_be = || units::is_axis_name(&self.name) || units::is_weak_time_name(&self.name);
+        match self.has_time_unit() {
+            true => units::is_time_name(&self.name) || can_be(),
+            false => units::is_time_name(&self.name) && self.unit.is_none(),
+        }
     }
 }

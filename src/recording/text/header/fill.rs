@@ -95,6 +95,17 @@ pub(super) fn fill_axis_unit(fields: &mut [Field], entries: &[Entry]) {
     }
 }
 
+/// The unit of a first column whose heading is nothing but a unit of time, as `min`.
+pub(super) fn fill_time_unit(fields: &mut [Field]) {
+    if let [first, _, ..] = fields
+        && first.unit_text.is_none()
+        && let Some(unit) = units::read(&first.heading).filter(units::is_time)
+    {
+        first.unit_text = Some(unit.text.clone());
+        first.unit = Some(unit);
+    }
+}
+
 /// What stands above a column, or above the one before it of which this is another sight: `CH1 Peak
 /// Detect` after `CH1`.
 fn above<'a>(values: &'a [String], fields: &[Field], place: usize) -> &'a str {

@@ -2,14 +2,16 @@
 
 mod field;
 mod fill;
+mod keyed;
 mod labelled;
 mod positional;
 
 use super::head::{Head, Table};
 use super::keys::{self, Entry};
+use super::units;
 use crate::io::csv::{Delimiter, Dialect};
 pub use field::Field;
-use fill::{fill_axis_unit, fill_from_list, fill_names, fill_units};
+use fill::{fill_axis_unit, fill_from_list, fill_names, fill_time_unit, fill_units};
 use labelled::labelled;
 use positional::positional;
 
@@ -76,6 +78,7 @@ pub fn read(head: &Head, table: &Table, used: &[bool]) -> Header {
     }
     fill_units(&mut fields, &entries, used);
     fill_axis_unit(&mut fields, &entries);
+    fill_time_unit(&mut fields);
     Header {
         fields,
         entries,
@@ -108,6 +111,9 @@ fn split(text: &str, table: &Table, used: &[bool]) -> Vec<String> {
     if count(&cells) >= wanted && cells.len() <= table.width + 1 || wanted < 2 {
         return cells;
     }
+    if let Some(joined) = in_threes(&cells, table.width) {
+        return joined;
+    }
     let others = [b'\t', b';', b',', b'|'];
     let mut ways: Vec<Vec<String>> = others
         .into_iter()
@@ -135,6 +141,14 @@ fn split(text: &str, table: &Table, used: &[bool]) -> Vec<String> {
     ways.into_iter()
         .find(|way| way.len() == table.width)
         .unwrap_or(cells)
+}
+
+/// Headings of three cells each, `"Zeit";"t";"s"`: name, symbol and unit as one.
+fn in_threes(cells: &[String], width: usize) -> Option<Vec<String>> {
+    let is_unit = |three: &[String]| units::read(&three[2]).is_some();
+    let fits = cells.len() == 3 * width && cells.chunks(3).all(is_unit);
+    let joined = |three: &[String]| format!("{} {} / {}", three[0], three[1], three[2]);
+    fits.then(|| cells.chunks(3).map(joined).collect())
 }
 
 /// Headings that begin with a name in quotes each: `"Zeit" t / s "Drehmoment" M / Nm`.

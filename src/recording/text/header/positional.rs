@@ -1,11 +1,11 @@
 //! Columns named by the rows nearest above the data.
 
+use super::Row;
 use super::field::Field;
-use super::{Row, after_definition};
+use super::keyed::{is_key_block, is_key_with_values, is_list_of_quantities, repeats_a_key};
 use crate::io::csv::NamedUnit;
 use crate::recording::text::cell::Cell;
 use crate::recording::text::head::Table;
-use crate::recording::text::keys::{self, Topic};
 use crate::recording::text::units;
 
 /// Lines above a table among which its headings are looked for.
@@ -182,17 +182,6 @@ fn is_symbols_of(symbols: &Row, names: &Row) -> bool {
             .all(|(name, symbol)| is_name(name, symbol) || name == symbol)
 }
 
-/// Whether all cells give the same key a value: `Rate: 50 Hz`, `Rate: 50 Hz`.
-fn repeats_a_key(cells: &[String]) -> bool {
-    let key = |cell: &String| -> Option<String> {
-        let (key, value) = cell.split_once([':', '='])?;
-        keys::quantity(value, b'.').map(|_| key.trim().to_owned())
-    };
-    let mut keys = cells.iter().filter(|cell| !cell.is_empty()).map(key);
-    let first = keys.next().flatten();
-    first.is_some() && keys.clone().count() > 0 && keys.all(|key| key == first)
-}
-
 /// Whether cells can be headings: one for (nearly) each column with data, and no numbers but those
 /// of channels after a text.
 fn is_heading(cells: &[String], table: &Table, used: &[bool]) -> bool {
@@ -232,81 +221,6 @@ fn is_heading(cells: &[String], table: &Table, used: &[bool]) -> bool {
     })
 }
 
-/// Rows of a key and a value each above a table of two columns are no headings.
-fn is_key_block(fitting: &[&Row], used: &[bool]) -> bool {
-    let two = used.iter().filter(|used| **used).count() == 2;
-    let Some(nearest) = fitting.first() else {
-        return false;
-    };
-    // CASSY marks the line of the names.
-    if after_definition(nearest.text).is_some() {
-        return false;
-    }
-    let is_time = nearest.cells.iter().any(|cell| {
-        let field = Field::new(cell, None);
-        field.is_named_time()
-            || field.has_time_unit()
-            || units::is_axis_name(cell)
-            || units::is_index_name(cell)
-    });
-    let (key, values) = (&nearest.cells[0], &nearest.cells[1..]);
-    let topic = keys::topic(key);
-    let is_known = topic.is_some_and(is_of_axis)
-        || topic.is_some() && values.iter().all(|v| units::read(v).is_none());
-    // An empty line parts headings from keys.
-    let in_block = fitting.len() > 2 && fitting[1].line + 1 == nearest.line;
-    two && !is_time && !is_units(&nearest.cells) && (in_block || is_known)
-}
-
-/// Whether a topic is one of rates and units, which is said in no heading.
-fn is_of_axis(topic: Topic) -> bool {
-    !matches!(topic, Topic::Date | Topic::Name)
-}
-
-/// Whether cells are a key about the time axis and its values: `Time interval,0.01(ms),0.01(ms)`.
-fn is_key_with_values(cells: &[String]) -> bool {
-    let Some((key, values)) = cells.split_first() else {
-        return false;
-    };
-    let is_quantity = |v: &String| keys::quantity(v, b'.').is_some();
-    let mut filled = values.iter().filter(|v| !v.is_empty()).peekable();
-    keys::topic(key).is_some_and(is_of_axis) && filled.peek().is_some() && filled.all(is_quantity)
-}
-
-/// Whether cells are a key and what was measured on each channel: `Period:,T=1.000mS,T=?` or
-/// `Vpp,3.2V,?`.
-fn is_list_of_quantities(cells: &[String]) -> bool {
-    let mut filled = cells.iter().filter(|cell| !cell.is_empty());
-    let Some(key) = filled.next() else {
-        return false;
-    };
-    let values: Vec<&String> = filled.collect();
-    let is_marked = |cell: &String| cell.ends_with([':', '=']);
-    let value_of = |cell: &str| {
-        cell.split_once('=')
-            .map_or(cell, |(_, value)| value)
-            .to_owned()
-    };
-    let is_quantity = |cell: &&&String| {
-        let value = value_of(cell);
-        value.starts_with(|c: char| c.is_ascii_digit() || c == '-')
-            && keys::quantity(&value, b'.')
-                // 1 (V) is the name of a channel.
-                .is_some_and(|(_, unit)| !units::is_bracketed(&unit) && is_unit_or_rate(&unit))
-    };
-    let is_unknown = |cell: &&&String| value_of(cell).chars().all(|c| !c.is_alphanumeric());
-    let quantities = values.iter().filter(is_quantity).count();
-    let unknown = values.iter().filter(is_unknown).count();
-    is_marked(key) && values.iter().any(|cell| !is_marked(cell))
-        || quantities > 0 && quantities + unknown == values.len()
-}
-
-/// Whether a text is a unit, in capitals perhaps: `KHz`, `mS`.
-fn is_unit_or_rate(text: &str) -> bool {
-    let lower = text.to_lowercase();
-    units::read(text).is_some() || units::read(&lower).is_some() || lower.ends_with("hz")
-}
-
 /// Whether a row under the names of columns holds their units beside words that it repeats: `NO.`,
 /// `Time`, `ms`, `V`, `N` under `Number`, `Time`, `ms`, `CH1`, `CH2`.
 fn is_units_under(below: &Row, above: &Row) -> bool {
@@ -337,7 +251,7 @@ fn is_units_with_gaps(cells: &[String]) -> bool {
 }
 
 /// Whether cells are units: all of them, or some where others repeat, or most are in brackets.
-fn is_units(cells: &[String]) -> bool {
+pub(super) fn is_units(cells: &[String]) -> bool {
     let filled: Vec<&String> = cells.iter().filter(|cell| !cell.is_empty()).collect();
     let known = filled
         .iter()

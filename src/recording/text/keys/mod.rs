@@ -67,6 +67,9 @@ pub fn entries(line: usize, text: &str, dialect: Dialect) -> Vec<Entry> {
     if let Some(entry) = one_cell(line, text).filter(is_quantity) {
         return vec![entry];
     }
+    if let Some(entry) = bare_rate(line, text, dialect.decimal) {
+        return vec![entry];
+    }
     let cells = split(text, dialect);
     // `CH1V,CH2V,t0 =-5e-05, tInc = 1e-09,`: cells of their own.
     let assignments: Vec<Entry> = cells
@@ -87,12 +90,37 @@ pub fn entries(line: usize, text: &str, dialect: Dialect) -> Vec<Entry> {
     {
         return assignments;
     }
+    if let Some(entry) = before_comma(line, text, dialect).filter(|_| assignments.len() < 2) {
+        return vec![entry];
+    }
     match cells.split_first() {
         Some((key, values)) if values.iter().any(|value| !value.is_empty()) => {
             entry(line, key, values.to_vec()).into_iter().collect()
         }
         _ => one_cell(line, text).into_iter().collect(),
     }
+}
+
+/// A rate or an interval without a key: `0.5 msec/sample`, `2000 samples/s`.
+fn bare_rate(line: usize, text: &str, decimal: u8) -> Option<Entry> {
+    let (_, unit) = quantity(text, decimal)?;
+    let lower = unit.to_lowercase();
+    let is_rate = lower.ends_with("sec/sample") || lower.starts_with("samples/s");
+    let value = text.strip_suffix("/sample").unwrap_or(text);
+    entry(line, &unit, vec![value.to_owned()]).filter(|_| is_rate)
+}
+
+/// A key and its value parted by the first colon or equals sign, before a comma that is within the value
+/// as it does not part the cells of the table: `Date : 24.11.2011, 09:07:38`.
+fn before_comma(line: usize, text: &str, dialect: Dialect) -> Option<Entry> {
+    let place = text.find([':', '='])?;
+    let is_first = text.find(',').is_some_and(|comma| place < comma);
+    if !is_first || dialect.delimiter == Delimiter::Byte(b',') || text.contains(['\t', ';']) {
+        return None;
+    }
+    let value = text[place + 1..].trim().trim_end_matches(',');
+    let is_path = value.starts_with(['\\', '/']);
+    entry(line, &text[..place], vec![value.to_owned()]).filter(|_| !is_path)
 }
 
 /// Whether the value is a number with or without a unit, and nothing else.

@@ -29,6 +29,9 @@ fn rates_and_intervals() {
         ("Sample Rate,1.00GSa/s", 1e9),
         ("XInc:,5.0E-11", 2e10),
         ("Resolution:1e-10:", 1e10),
+        ("0.5 msec/sample", 2000.0),
+        ("2000 samples/s", 2000.0),
+        ("20 sec/sample", 0.05),
     ] {
         let found = hz(text).expect(text);
         assert!((found / value - 1.0).abs() < 1e-12, "{text}: {found}");
@@ -63,4 +66,25 @@ fn dates() {
         date_text(&all(&["Timestamp,2020-03-16 17:04:51"])).unwrap(),
         "2020-03-16 17:04:51"
     );
+}
+
+#[test]
+fn a_comma_within_a_value_parts_nothing() {
+    let dialect = Dialect {
+        delimiter: Delimiter::Byte(b';'),
+        decimal: b',',
+    };
+    let read = |text: &str| entries(7, text, dialect);
+    let found = read("Aufzeichnungsdatum : 24.11.2011, 09:07:38");
+    assert_eq!(found.len(), 1);
+    assert_eq!(found[0].key, "Aufzeichnungsdatum");
+    assert_eq!(found[0].values, ["24.11.2011, 09:07:38"]);
+    assert_eq!(date_text(&found).as_deref(), Some("24.11.2011, 09:07:38"));
+    let found = read("Delta              : 0,001 sec.");
+    assert_eq!(found[0].key, "Delta");
+    assert_eq!(rate_hz(&found[0], None, b','), Some(1000.0));
+    // Cells of their own, and cells of the table.
+    assert_eq!(read("t0 = 5, tInc = 1e-09").len(), 2);
+    assert_eq!(read("Date;24.11.2011, Thu").len(), 1);
+    assert_eq!(entries(7, "Note: a,b", COMMA)[0].values, ["b"]);
 }

@@ -102,7 +102,7 @@ const EXACT: [(&str, Topic); 95] = [
 ];
 
 /// Words within keys, in the order in which they are looked for.
-const WITHIN: [(&str, Topic); 79] = [
+const WITHIN: [(&str, Topic); 80] = [
     ("測定間隔", Topic::Interval),
     ("サンプリング周期", Topic::Interval),
     ("サンプリング間隔", Topic::Interval),
@@ -123,6 +123,7 @@ const WITHIN: [(&str, Topic); 79] = [
     ("sampling freq", Topic::Rate),
     ("samples per second", Topic::Rate),
     ("samples/s", Topic::Rate),
+    ("sec/sample", Topic::Interval),
     ("abtastrate", Topic::Rate),
     ("abtastfrequenz", Topic::Rate),
     ("messrate", Topic::Rate),

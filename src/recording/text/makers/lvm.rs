@@ -257,6 +257,15 @@ fn segment_channels(
     let columns = columns(lines, file, count)?;
     let segment = recording.segments.len();
     let mut channels = Vec::new();
+    if let Some((axis, warning)) = columns.first().and_then(|x| no_time(file, header, x)) {
+        channels.extend(axis.map(|axis| Channel {
+            segment: Some(segment),
+            ..axis
+        }));
+        if !recording.warnings.contains(&warning) {
+            recording.warnings.push(warning);
+        }
+    }
     for place in 0..count {
         let (time, value) = match file.stamps {
             Stamps::Multi => (2 * place, 2 * place + 1),
@@ -322,14 +331,13 @@ fn axis(file: &File, header: &Header, place: usize, times: &Column, options: &Op
     let header_hz = number(&header.steps)
         .filter(|step| *step > 0.0)
         .map(|step| without_rounding(1.0 / step));
-    let is_time =
-        of(&header.dimensions, place).is_none_or(|dimension| dimension.starts_with("Time"));
-    let mut axis = if file.stamps != Stamps::No || !times.values.is_empty() {
-        Axis::of_stamps("X_Value", Arc::new(times.values.clone()))
-    } else if is_time {
-        header_hz.map_or_else(Axis::default, |hz| Axis::of_header("Delta_X", hz, start_s))
-    } else {
+    let is_time = other_dimension(header, place).is_none();
+    let mut axis = if !is_time {
         Axis::default()
+    } else if file.stamps != Stamps::No || !times.values.is_empty() {
+        Axis::of_stamps("X_Value", Arc::new(times.values.clone()))
+    } else {
+        header_hz.map_or_else(Axis::default, |hz| Axis::of_header("Delta_X", hz, start_s))
     };
     axis.header_rate_hz = header_hz.filter(|_| is_time);
     axis.start_text = joined(&header.dates, &header.times, place)
@@ -339,6 +347,26 @@ fn axis(file: &File, header: &Header, place: usize, times: &Column, options: &Op
         axis.rate_from = RateFrom::Given;
     }
     axis
+}
+
+/// What the horizontal axis of a channel shows, if it is not the time: `Frequency`.
+fn other_dimension(header: &Header, place: usize) -> Option<&str> {
+    of(&header.dimensions, place).filter(|dimension| !dimension.starts_with("Time"))
+}
+
+/// The horizontal axis as a channel and what should be known of it, where it is not the time.
+fn no_time(file: &File, header: &Header, values: &Column) -> Option<(Option<Channel>, Warning)> {
+    let dimension = other_dimension(header, 0)?;
+    let is_there = file.stamps == Stamps::One && !values.values.is_empty();
+    let field = Field::new(dimension, None);
+    let axis = is_there.then(|| channel(&field, values.clone(), Axis::default(), None));
+    let warning = Warning::new(
+        "no-time-axis",
+        format!(
+            "the header says that the horizontal axis is {dimension}, not time: the samples have no rate"
+        ),
+    );
+    Some((axis, warning))
 }
 
 /// A warning if the header announces more samples than there are.

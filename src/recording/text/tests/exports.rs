@@ -293,3 +293,27 @@ fn channels_that_have_numbers_for_names() {
     let found = read(&format!("{head}{body}"));
     check(&found, &[("Torque", "Nm", 6), ("Temp", "C", 6)], Some(2.0));
 }
+
+#[test]
+fn acqknowledge_with_the_number_of_samples_below_the_headings() {
+    let head = "run.acq\n0.5 msec/sample\n2 channels\nTorque\nN-m\nSpeed\nrpm\n";
+    let two = rows(40, "\t", &[&wave, &wave]);
+    let found = read(&format!("{head}CH1\tCH2\t\n40\t40\t\n{two}"));
+    check(&found, &[("CH1", "", 40), ("CH2", "", 40)], Some(2000.0));
+    assert_eq!(found.channels[0].samples[0], -0.5);
+    assert_eq!(found.warnings[0].code, "lines-skipped");
+    assert!(
+        found.warnings[0]
+            .message
+            .starts_with("line 9 says how many rows follow, 40")
+    );
+    let minutes = step(0.5 / 6e4, 10);
+    let three = rows(40, "\t", &[&minutes, &wave, &wave]);
+    let found = read(&format!("{head}min\tCH1\tCH2\t\n\t40\t40\t\n{three}"));
+    assert_eq!(found.channels.len(), 2);
+    let axis = &found.channels[0].axis;
+    assert_eq!((axis.rate_hz, axis.start_s), (Some(2000.0), Some(0.0)));
+    // Another number is a sample.
+    let found = read(&format!("CH1\tCH2\n41\t41\n{two}"));
+    check(&found, &[("CH1", "", 41), ("CH2", "", 41)], None);
+}

@@ -157,3 +157,104 @@ fn stamps_in_whole_milliseconds() {
     let rate_hz = found.channels[0].axis.rate_hz.unwrap();
     assert!((rate_hz * 3.3e-3 - 1.0).abs() < 1e-4, "{rate_hz}");
 }
+
+#[test]
+fn headings_whose_first_word_can_be_a_key() {
+    let level = |row: f64| format!("{:.3}", 50.0 + (row * 2.3).sin());
+    let body = rows(9, ",", &[&level, &wave]);
+    for (heading, first, second) in [
+        (
+            "Frequency (Hz),Torque (Nm)",
+            ("Frequency", "Hz", 9),
+            ("Torque", "Nm", 9),
+        ),
+        ("Start,Stop", ("Start", "", 9), ("Stop", "", 9)),
+        ("Delta,Torque", ("Delta", "", 9), ("Torque", "", 9)),
+        (
+            "Rate (Nm/s),Torque (Nm)",
+            ("Rate", "Nm/s", 9),
+            ("Torque", "Nm", 9),
+        ),
+    ] {
+        check(&read(&format!("{heading}\n{body}")), &[first, second], None);
+    }
+    // These are keys.
+    for key in ["Sample rate,50 Hz", "Sample rate (Hz),50"] {
+        let found = read(&format!("{key}\n{body}"));
+        check(
+            &found,
+            &[("column 1", "", 9), ("column 2", "", 9)],
+            Some(50.0),
+        );
+    }
+}
+
+/// Names, units, numbers of samples, rates and segments.
+fn told(found: &Recording) -> Vec<(&str, &str, usize, Option<f64>, Option<usize>)> {
+    let one = |c: &'_ crate::recording::Channel| (c.samples.len(), c.axis.rate_hz, c.segment);
+    let all = found.channels.iter();
+    all.map(|c| {
+        let (count, hz, segment) = one(c);
+        (
+            c.name.as_str(),
+            c.unit_text.as_deref().unwrap_or(""),
+            count,
+            hz,
+            segment,
+        )
+    })
+    .collect()
+}
+
+#[test]
+fn time_that_begins_anew_after_a_comment_or_an_empty_line() {
+    let run = |count| rows(count, " ", &[&step(0.5, 1), &wave]);
+    let head = "# time[s] torque[Nm]\n";
+    for between in ["\n\n", "\n# run 2\n"] {
+        let found = read(&format!(
+            "{head}{}{between}{}{between}{}",
+            run(40),
+            run(30),
+            run(20)
+        ));
+        let wanted = [
+            ("torque", "Nm", 40, Some(2.0), Some(0)),
+            ("torque", "Nm", 30, Some(2.0), Some(1)),
+            ("torque", "Nm", 20, Some(2.0), Some(2)),
+        ];
+        assert_eq!(told(&found), wanted);
+        assert_eq!(found.channels[2].axis.start_s, Some(0.0));
+        assert_eq!(found.segments.len(), 3);
+    }
+    // A remark among the rows ends nothing.
+    let more = rows(
+        30,
+        " ",
+        &[&|row| format!("{:.1}", (row + 40.0) * 0.5), &wave],
+    );
+    let found = read(&format!("{head}{}# gear 2\n{more}", run(40)));
+    assert_eq!(told(&found), [("torque", "Nm", 70, Some(2.0), None)]);
+}
+
+#[test]
+fn blocks_of_one_channel_each_below_each_other() {
+    let block = |name: &str, unit: &str, hz: usize, count: usize| {
+        let samples = rows(count, "", &[&wave]);
+        format!("Channel: {name}\nUnit: {unit}\nSample rate: {hz} Hz\nSamples: {count}\n{samples}")
+    };
+    let first = block("Torque", "Nm", 1000, 30);
+    let found = read(&format!(
+        "Recorder X\n{first}{}",
+        block("Speed", "rpm", 100, 10)
+    ));
+    let wanted = [
+        ("Torque", "Nm", 30, Some(1000.0), Some(0)),
+        ("Speed", "rpm", 10, Some(100.0), Some(1)),
+    ];
+    assert_eq!(told(&found), wanted);
+    let message = failure(&format!("{first}Channel: Speed\nUnit: rpm\n"));
+    assert!(
+        message.starts_with("line 35: a block of its own begins here"),
+        "{message}"
+    );
+}

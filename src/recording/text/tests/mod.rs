@@ -3,6 +3,7 @@
 mod exports;
 mod layouts;
 mod makers;
+mod names_of_time;
 mod others;
 mod plain;
 mod variants;

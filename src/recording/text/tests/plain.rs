@@ -327,3 +327,13 @@ fn comments_among_rows_and_columns_by_spaces() {
         Some(2.0),
     );
 }
+
+#[test]
+fn whole_seconds_tell_the_rate_without_bias() {
+    let stamp = |row: f64| format!("{}", (row / 100.0).floor());
+    let found = read(&format!(
+        "Time [s],M [Nm]\n{}",
+        rows(400, ",", &[&stamp, &wave])
+    ));
+    check(&found, &[("M", "Nm", 400)], Some(100.0));
+}

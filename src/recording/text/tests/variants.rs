@@ -159,6 +159,13 @@ fn cassy_with_spaces() {
 }
 
 #[test]
+fn cassy_with_a_cell_each_for_name_symbol_and_unit() {
+    let head = "\"Zeit\";\"t\";\"s\";\"Drehmoment\";\"M\";\"Nm\"\n";
+    let found = read(&format!("{head}0;-0,131\n0,1;-0,162\n0,2;-0,176\n"));
+    check(&found, &[("Drehmoment M", "Nm", 3)], Some(10.0));
+}
+
+#[test]
 fn owon_with_what_was_measured_above() {
     let head = "Channel :,CH1,CH2\nFrequency :,F=0.999KHz,F=?\nPK-PK :,Vp=3.2V,Vp=1.0V\n\
                 Probe attenuation :,X10,X1\nTime interval :,0.01000mS,0.01000mS\n\n\
@@ -234,6 +241,26 @@ fn labview_blocks_whose_time_begins_anew() {
     let text = format!("{head}{}", "0,000000\t12,8\n1,000000E-5\t-1,5\n".repeat(9));
     let found = read(&text);
     check(&found, &[("U", "Volts", 18)], Some(1e5));
+}
+
+#[test]
+fn labview_over_frequency() {
+    let head = |columns: &str| {
+        format!(
+            "LabVIEW Measurement\t\nSeparator\tTab\nDecimal_Separator\t.\nX_Columns\t{columns}\n\
+             ***End_of_Header***\t\n\t\nChannels\t1\t\nSamples\t9\t\nY_Unit_Label\tV\t\n\
+             X_Dimension\tFrequency\t\nX0\t0.0\t\nDelta_X\t2.5\t\n***End_of_Header***\t\t\n\
+             X_Value\tU\tComment\n"
+        )
+    };
+    let found = read(&format!("{}{}", head("One"), with_time(9, "\t", 2.5, 1)));
+    check(&found, &[("Frequency", "", 9), ("U", "V", 9)], None);
+    assert_eq!(found.channels[0].samples[2], 5.0);
+    assert_eq!(found.channels[1].axis.header_rate_hz, None);
+    assert_eq!(found.warnings[0].code, "no-time-axis");
+    let none = |_: f64| String::new();
+    let found = read(&format!("{}{}", head("No"), rows(9, "\t", &[&none, &wave])));
+    check(&found, &[("U", "V", 9)], None);
 }
 
 #[test]

@@ -84,3 +84,40 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn sums_and_means_below_the_samples() {
+    let samples = rows(40, ";", &[&comma(step(0.5, 1)), &comma(wave)]);
+    for below in [
+        "\nMittelwert;2,001\nMaximum;2,06\nMinimum;1,94\n",
+        "Min;1,94\nMax;2,06\nMittel;2,00\n",
+        ";2,06\n;1,94\n;2,00\n",
+    ] {
+        let found = read(&format!("Zeit [s];M [Nm]\n{samples}{below}"));
+        check(&found, &[("M", "Nm", 40)], Some(2.0));
+        let said = &found.warnings[0];
+        assert_eq!(said.code, "lines-skipped", "{below}");
+        assert!(said.message.starts_with("3 row(s)"), "{}", said.message);
+        // The headings, 40 rows, and perhaps an empty line.
+        let line = if below.starts_with('\n') { 43 } else { 42 };
+        assert!(
+            said.message.ends_with(&format!("line {line}")),
+            "{}",
+            said.message
+        );
+        assert!(found.channels[0].holes.is_empty());
+    }
+    // Stamps now and then only.
+    let now_and_then = |row: f64| {
+        if row % 4.0 == 0.0 {
+            format!("{row}")
+        } else {
+            String::new()
+        }
+    };
+    let found = read(&format!(
+        "Zeit [s];M [Nm]\n{}",
+        rows(40, ";", &[&now_and_then, &comma(wave)])
+    ));
+    assert_eq!(found.channels[0].samples.len(), 40);
+}

@@ -1,0 +1,62 @@
+//! Columns whose names are those of time, but whose values are not used so.
+
+use super::Sources;
+use super::groups::Group;
+use crate::recording::Axis;
+use crate::report::Warning;
+
+/// Fewest rows that two columns of time are compared by.
+const ROWS: usize = 20;
+/// Most that the middle of the time differs between two ways to write it, as a part of the whole.
+const ALIKE: f64 = 0.05;
+
+impl Sources<'_> {
+    /// A warning of a column that is named as time but falls, where no other gives the time.
+    pub(super) fn falling_time(&self, used: &[usize], times: &[usize]) -> Option<Warning> {
+        let named = |place: &&usize| self.fields[**place].is_named_time();
+        let place = used.iter().find(named).filter(|_| times.is_empty())?;
+        Some(Warning::new(
+            "time-falls",
+            format!(
+                "\"{}\" is named as time but falls too often to be that: it was taken for a channel; \
+                 choose the time with --time-column, or give --rate HZ",
+                self.fields[*place].heading
+            ),
+        ))
+    }
+
+    /// Warnings of columns of numbers that were left out beside the time because of their names, but do
+    /// not run as it does.
+    pub(super) fn other_times(&self, group: &Group, axis: &Axis) -> Vec<Warning> {
+        let Some(stamps) = axis.stamps_s.as_ref() else {
+            return Vec::new();
+        };
+        let is_other = |place: &&usize| {
+            let values = &self.columns[**place].values;
+            !self.fields[**place].is_label
+                && !self.is_clock(**place)
+                && values.len() >= ROWS
+                && values.windows(2).all(|pair| pair[1] >= pair[0])
+                && runs_otherwise(values, stamps)
+        };
+        let warning = |place: &usize| {
+            Warning::new(
+                "time-left-out",
+                format!(
+                    "\"{}\" is named as time but does not run as the time of the rows does; it was \
+                     left out (another time is chosen with --time-column)",
+                    self.fields[*place].heading
+                ),
+            )
+        };
+        group.times.iter().filter(is_other).map(warning).collect()
+    }
+}
+
+/// Whether the middle of two columns of time differs.
+fn runs_otherwise(values: &[f64], stamps: &[f64]) -> bool {
+    let end = values.len().min(stamps.len()) - 1;
+    let middle = |all: &[f64]| (all[end / 2] - all[0]) / (all[end] - all[0]);
+    let difference = middle(values) - middle(stamps);
+    difference.abs() > ALIKE
+}

@@ -1,0 +1,96 @@
+//! Rows that are no samples: their number above them, largest, least and mean values and totals below.
+
+use super::axes::Role;
+use super::head::{Head, Table};
+use super::rows::{Column, Rows};
+use crate::recording::HoleKind;
+use crate::report::Warning;
+
+/// Most rows of a summary, besides one for each [`PART`] samples.
+const ROWS: usize = 10;
+/// Samples for one row more.
+const PART: usize = 10;
+/// Samples for one stamp that may be missing among them.
+const DENSE: usize = 100;
+
+/// Leaves out a first row that says how many follow, in each of several columns or beside an empty cell of
+/// time: it is no sample.
+pub fn leave_out_count(rows: &mut Rows) -> Option<Warning> {
+    let below = rows.count.checked_sub(1).filter(|count| *count >= ROWS)?;
+    let mut first = rows
+        .columns
+        .iter()
+        .filter_map(|column| column.values.first())
+        .filter(|value| !value.is_nan())
+        .peekable();
+    let is_one_of_many = rows.columns.len() > 1 && first.peek().is_some();
+    if !is_one_of_many || !first.all(|value| *value == below as f64) {
+        return None;
+    }
+    let line = rows.line_of(0);
+    rows.drop_first();
+    Some(Warning::new(
+        "lines-skipped",
+        format!("line {line} says how many rows follow, {below}; it was left out"),
+    ))
+}
+
+/// Whether the first row may say how many follow: the same whole number in each cell.
+pub fn may_be_count(head: &Head, table: &Table) -> bool {
+    let cells = table.dialect.cells(&head.lines[table.first].text);
+    let mut filled = cells.iter().filter(|cell| !cell.is_empty());
+    let first = filled.next().and_then(|cell| cell.parse::<usize>().ok());
+    cells.len() > 1
+        && first.is_some_and(|first| first >= ROWS)
+        && filled.all(|cell| cell.parse().ok() == first)
+}
+
+/// Leaves out the rows behind the last time stamp whose cells of time hold texts or nothing: they are no
+/// samples. Columns of time that have stamps now and then only say nothing of that.
+pub fn leave_out(rows: &mut Rows, roles: &[Role]) -> Option<Warning> {
+    let times = || {
+        let all = rows.columns.iter().zip(roles);
+        all.filter(|(_, role)| **role == Role::Time)
+            .map(|(column, _)| column)
+    };
+    let samples = times().filter_map(stamped).max()?;
+    let filled = rows
+        .columns
+        .iter()
+        .map(|column| column.values.len())
+        .max()?;
+    let behind = filled.checked_sub(samples).filter(|count| *count > 0)?;
+    let is_dense = |column: &Column| {
+        let missing = column.holes.partition_point(|hole| hole.index < samples);
+        stamped(column) == Some(samples) && DENSE * missing <= samples
+    };
+    let is_no_stamp = |column: &Column| {
+        let from = column.holes.partition_point(|hole| hole.index < samples);
+        column.holes[from..].iter().all(|hole| {
+            matches!(
+                hole.what,
+                HoleKind::Empty | HoleKind::Missing | HoleKind::Text
+            )
+        })
+    };
+    let is_summary = times().any(is_dense) && times().all(is_no_stamp);
+    if !is_summary || behind > ROWS + samples / PART {
+        return None;
+    }
+    let line = rows.line_of(samples);
+    rows.truncate(samples);
+    rows.too_wide = rows.too_wide.filter(|wide| *wide < line);
+    Some(Warning::new(
+        "lines-skipped",
+        format!(
+            "{behind} row(s) behind the last time stamp have none, as sums and mean values below the \
+             samples; they were left out; the first is line {line}"
+        ),
+    ))
+}
+
+/// Rows up to the last stamp.
+fn stamped(column: &Column) -> Option<usize> {
+    let last = column.values.iter().rposition(|value| value.is_finite())?;
+    Some(last + 1)
+}
