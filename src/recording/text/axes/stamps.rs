@@ -11,7 +11,6 @@ use torqcomp_model::Unit;
 
 /// Stamps as one column gives them.
 pub(super) struct Stamps {
-    pub(super) place: usize,
     pub(super) heading: String,
     pub(super) stamps_s: Vec<f64>,
     pub(super) start_text: Option<String>,
@@ -90,7 +89,6 @@ impl Sources<'_> {
                 sum * unit.unit.factor()
             });
         Some(Stamps {
-            place,
             heading: self.fields[place].heading.clone(),
             stamps_s: stamps_s.collect(),
             start_text: None,
@@ -125,7 +123,6 @@ impl Sources<'_> {
             (clock.nanoseconds.is_none()).then_some(text)
         });
         Some(Stamps {
-            place,
             heading: self.fields[place].heading.clone(),
             stamps_s,
             start_text: Some(match date.filter(|_| clock.day.is_none()) {
@@ -146,7 +143,6 @@ impl Sources<'_> {
             return Ok(None);
         };
         Ok(Some(Stamps {
-            place,
             heading: field.heading.clone(),
             stamps_s: column
                 .values

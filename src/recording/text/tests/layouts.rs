@@ -189,18 +189,19 @@ fn headings_whose_first_word_can_be_a_key() {
     }
 }
 
-/// Names, units, numbers of samples, rates and segments.
-fn told(found: &Recording) -> Vec<(&str, &str, usize, Option<f64>, Option<usize>)> {
-    let one = |c: &'_ crate::recording::Channel| (c.samples.len(), c.axis.rate_hz, c.segment);
+/// Name, unit, number of samples, rate and segment of a channel.
+type Told<'a> = (&'a str, &'a str, usize, Option<f64>, Option<usize>);
+
+fn told(found: &Recording) -> Vec<Told<'_>> {
     let all = found.channels.iter();
     all.map(|c| {
-        let (count, hz, segment) = one(c);
+        let unit = c.unit_text.as_deref().unwrap_or("");
         (
             c.name.as_str(),
-            c.unit_text.as_deref().unwrap_or(""),
-            count,
-            hz,
-            segment,
+            unit,
+            c.samples.len(),
+            c.axis.rate_hz,
+            c.segment,
         )
     })
     .collect()
