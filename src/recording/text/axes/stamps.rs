@@ -11,7 +11,6 @@ use torqcomp_model::Unit;
 
 /// Stamps as one column gives them.
 pub(super) struct Stamps {
-    pub(super) place: usize,
     pub(super) heading: String,
     pub(super) stamps_s: Vec<f64>,
     pub(super) start_text: Option<String>,
@@ -90,7 +89,6 @@ impl Sources<'_> {
                 sum * unit.unit.factor()
             });
         Some(Stamps {
-            place,
             heading: self.fields[place].heading.clone(),
             stamps_s: stamps_s.collect(),
             start_text: None,
@@ -125,7 +123,6 @@ impl Sources<'_> {
             (clock.nanoseconds.is_none()).then_some(text)
         });
         Some(Stamps {
-            place,
             heading: self.fields[place].heading.clone(),
             stamps_s,
             start_text: Some(match date.filter(|_| clock.day.is_none()) {
@@ -146,7 +143,6 @@ impl Sources<'_> {
             return Ok(None);
         };
         Ok(Some(Stamps {
-            place,
             heading: field.heading.clone(),
             stamps_s: column
                 .values
@@ -182,6 +178,9 @@ impl Sources<'_> {
         if let Some(unit) = field.unit.as_ref().filter(|unit| units::is_time(unit)) {
             return Ok(Some((unit.unit.factor(), None)));
         }
+        if let Some(seconds) = units::scaled_time(&field.heading) {
+            return Ok(Some((seconds, None)));
+        }
         let values = &self.columns[place].values;
         if let (Some(step), Some(hz)) = (typical_step(values), header_hz) {
             if let Some(factor) = seconds_of_step(step, hz) {
@@ -200,6 +199,13 @@ impl Sources<'_> {
         }
         if is_spreadsheet_date(&field.name, values) {
             return Ok(Some((86_400.0, None)));
+        }
+        if are_days(values) {
+            let assumed = format!(
+                "\"{}\" gives no unit: by its size and its steps it was taken for a date in days",
+                field.heading
+            );
+            return Ok(Some((86_400.0, Some(assumed))));
         }
         if let Some(unit) = self.default_time_unit.and_then(units::read) {
             return Ok(Some((unit.unit.factor(), None)));
@@ -240,6 +246,17 @@ fn is_spreadsheet_date(name: &str, values: &[f64]) -> bool {
         && values
             .iter()
             .all(|value| (25_569.0..73_051.0).contains(value))
+}
+
+/// Whether values are dates in days, of spreadsheets (1982 to 2064) or since the year 0 (1971 to 2080): their
+/// steps are below 2 s then, and would be below 20 µs were they seconds.
+fn are_days(values: &[f64]) -> bool {
+    let is_date = |value: &f64| {
+        (30_000.0..60_000.0).contains(value) || (720_000.0..760_000.0).contains(value)
+    };
+    let ends = [values.first(), values.last()];
+    ends.iter().flatten().all(|value| is_date(value))
+        && typical_step(values).is_some_and(|step| step < 2e-5)
 }
 
 fn rises(values: &[f64]) -> bool {
