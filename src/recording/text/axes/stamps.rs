@@ -190,28 +190,35 @@ impl Sources<'_> {
                 return Ok(None);
             }
         }
+        Ok(Some(self.seconds_by_size(place)))
+    }
+
+    /// Seconds per unit of a column of stamps by how large they are, or what is usual, and what was
+    /// assumed.
+    fn seconds_by_size(&self, place: usize) -> (f64, Option<String>) {
+        let (field, values) = (&self.fields[place], &self.columns[place].values);
         let first = match self.columns[place].first_ticks {
             Some(ticks) => ticks as f64,
             None => values.first().copied().unwrap_or(0.0).abs(),
         };
         if let Some(seconds) = epoch_unit(first) {
-            return Ok(Some((seconds, None)));
+            return (seconds, None);
         }
         if is_spreadsheet_date(&field.name, values) {
-            return Ok(Some((86_400.0, None)));
+            return (86_400.0, None);
         }
         if are_days(values) {
             let assumed = format!(
                 "\"{}\" gives no unit: by its size and its steps it was taken for a date in days",
                 field.heading
             );
-            return Ok(Some((86_400.0, Some(assumed))));
+            return (86_400.0, Some(assumed));
         }
         if let Some(unit) = self.default_time_unit.and_then(units::read) {
-            return Ok(Some((unit.unit.factor(), None)));
+            return (unit.unit.factor(), None);
         }
         let assumed = format!("\"{}\" gives no unit: seconds were assumed", field.heading);
-        Ok(Some((1.0, Some(assumed))))
+        (1.0, Some(assumed))
     }
 }
 
