@@ -81,7 +81,7 @@ pub fn is_time_name(name: &str) -> bool {
     if is_weak_time_name(name) || matches!(name.trim(), "Us" | "Ms") {
         return false;
     }
-    let lower = name.to_lowercase();
+    let lower = spaced(name).to_lowercase();
     let words: Vec<&str> = lower
         .split(|c: char| !c.is_alphanumeric() && c != '%')
         .filter(|word| !word.is_empty())
@@ -106,6 +106,21 @@ pub fn is_time_name(name: &str) -> bool {
                 || QUALIFIED.contains(first) && is(last)
         }
     }
+}
+
+/// A name with a space before a unit of time that is joined to time: `TimeMs`, `timeMillis`.
+#[must_use]
+pub fn spaced(name: &str) -> String {
+    const UNITS: [&str; 9] = [
+        "Ms", "MS", "Us", "US", "Ns", "Millis", "Micros", "Sec", "Seconds",
+    ];
+    let name = name.trim();
+    let parts = UNITS.iter().find_map(|unit| {
+        let front = name.strip_suffix(unit)?;
+        let is_time = ["time", "zeit", "timestamp"].contains(&front.to_lowercase().as_str());
+        is_time.then(|| format!("{front} {unit}"))
+    });
+    parts.unwrap_or_else(|| name.to_owned())
 }
 
 /// Whether a name is that of a time or of a temperature or torque, as `T`, `T1` and `t2` are: its place
@@ -217,6 +232,9 @@ mod tests {
             "%time",
             "Uhrzeit",
             "Time 1",
+            "TimeMs",
+            "ms_since_boot",
+            "millis()",
         ] {
             assert!(is_time_name(name), "{name}");
         }

@@ -28,6 +28,9 @@ impl Cell {
         if text.is_empty() {
             return Self::Empty;
         }
+        if let Some(clock) = Clock::compact(text) {
+            return Self::Clock(clock);
+        }
         if let Some(value) = number::cell(text, decimal) {
             return Self::Number(value);
         }

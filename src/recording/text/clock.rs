@@ -37,6 +37,9 @@ impl Clock {
     #[must_use]
     pub fn parse(text: &str) -> Option<Self> {
         let text = text.trim();
+        if let Some(clock) = Self::compact(text) {
+            return Some(clock);
+        }
         // The shortest is 1:02:03, the longest has a date, 19 decimals and a zone.
         if !(6..=60).contains(&text.len()) || !may_be_clock(text) {
             return None;
@@ -63,6 +66,24 @@ impl Clock {
                     nanoseconds: Some(time_of_day(rest)?),
                 })
             })
+    }
+
+    /// Reads fourteen digits that are a date and a time, with decimals or without: `20210304235958.05`.
+    #[must_use]
+    pub fn compact(text: &str) -> Option<Self> {
+        let (whole, decimals) = text.split_once('.').unwrap_or((text, ""));
+        if whole.len() != 14 || !whole.bytes().all(|byte| byte.is_ascii_digit()) {
+            return None;
+        }
+        let part = |from: usize, to: usize| whole[from..to].parse::<i64>().ok();
+        let (hours, minutes, seconds) = (part(8, 10)?, part(10, 12)?, part(12, 14)?);
+        let day = days(part(0, 4)? as i32, part(4, 6)? as u32, part(6, 8)? as u32)?;
+        (hours < 24 && minutes < 60 && seconds <= 60).then_some(Self {
+            day: Some(day),
+            nanoseconds: Some(
+                ((hours * 60 + minutes) * 60 + seconds) * SECOND + fraction(decimals)?,
+            ),
+        })
     }
 
     /// Nanoseconds since 1970, or since midnight without a date.
@@ -267,6 +288,7 @@ mod tests {
             "5/2/2022 3:56:24.376 PM",
             "2022/05/02, 15:56:24.376",
             "02-May-2022 15:56:24.376",
+            "20220502155624.376",
         ] {
             let clock = Clock::parse(text).expect(text);
             assert_eq!(clock.day, Some(19_114), "{text}");
@@ -293,6 +315,8 @@ mod tests {
             "191179-001",
             "Model 54 2022",
             "Run 12 of 2022",
+            "20221502155624",
+            "2022050215562",
         ] {
             assert_eq!(Clock::parse(text), None, "{text}");
         }

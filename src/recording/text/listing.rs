@@ -2,6 +2,7 @@
 
 use super::cell::Cell;
 use super::head::{Head, Table};
+use super::rows::Wanted;
 use crate::failure::Failure;
 use crate::io::csv::is_skipped;
 
@@ -52,6 +53,48 @@ pub fn refuse(head: &Head, table: &Table) -> Result<(), Failure> {
         )));
     }
     Ok(())
+}
+
+/// Refuses a table whose rows name one variable after the other beside the same stamps: their values would
+/// be read as one channel.
+///
+/// # Errors
+/// If it is one.
+pub fn refuse_variables(head: &Head, table: &Table, wanted: &[Wanted]) -> Result<(), Failure> {
+    let has = |kind: Wanted| wanted.contains(&kind);
+    if !has(Wanted::Nothing) || !has(Wanted::Clock) {
+        return Ok(());
+    }
+    let rows = first_cells(head, table);
+    let of = |kind: Wanted| (0..wanted.len()).filter(move |place| wanted[*place] == kind);
+    let listed = of(Wanted::Nothing).find_map(|place| {
+        let count = cycle(&rows, place)?;
+        let same = |time: usize| {
+            rows.chunks_exact(count)
+                .all(|cycle| cycle.iter().all(|row| row.get(time) == cycle[0].get(time)))
+        };
+        of(Wanted::Clock)
+            .any(same)
+            .then(|| (count, &rows[0][place]))
+    });
+    match listed {
+        Some((count, first)) => Err(Failure::failed(format_args!(
+            "line {}: the rows name {count} variables in turn, first \"{first}\", each with a value at the \
+             same time; expected a column for each variable: write the file anew that way",
+            head.number(table.first)
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// After how many rows the texts of a column come again in the same order, all of them different.
+fn cycle(rows: &[Vec<String>], place: usize) -> Option<usize> {
+    let texts: Vec<&String> = rows.iter().filter_map(|row| row.get(place)).collect();
+    let count = 1 + texts.iter().skip(1).position(|text| *text == texts[0])?;
+    let is_distinct = (1..count).all(|i| !texts[..i].contains(&texts[i]));
+    let comes_again = texts.iter().zip(&texts[count..]).all(|(a, b)| a == b);
+    let is_long = texts.len() == rows.len() && texts.len() >= 3 * count;
+    (count > 1 && is_distinct && comes_again && is_long).then_some(count)
 }
 
 /// The cells of the first rows.

@@ -82,6 +82,7 @@ pub fn read_at(
         .into_iter()
         .map(|kind| kind.unwrap_or(Wanted::Numbers))
         .collect();
+    super::listing::refuse_variables(head, table, &wanted)?;
     let names = header.names.clone();
     let mut entries = header.entries.clone();
     if let Some(names) = &names {

@@ -5,7 +5,7 @@ use torqcomp_model::{Dimension, Unit};
 use crate::io::csv::NamedUnit;
 
 pub use super::axis_names::{
-    is_axis_name, is_index_name, is_time_name, is_weak_time_name, time_stem,
+    is_axis_name, is_index_name, is_time_name, is_weak_time_name, spaced, time_stem,
 };
 
 /// Other ways to write a unit, in lower case, and how torqcomp writes it.
@@ -238,9 +238,15 @@ fn time_word(text: &str) -> Option<NamedUnit> {
         ("minuten", "min"),
         ("hours", "h"),
     ];
-    let lower = text.to_lowercase();
-    let last = lower.rsplit(|c: char| !c.is_alphanumeric()).next()?;
-    let (_, unit) = WORDS.iter().find(|(word, _)| *word == last)?;
+    let lower = spaced(text).to_lowercase();
+    let mut words = lower
+        .rsplit(|c: char| !c.is_alphanumeric())
+        .filter(|word| !word.is_empty());
+    let known = |word: &str| WORDS.iter().find(|(known, _)| *known == word);
+    let last = words.next()?;
+    // ms_since_boot; but whole seconds may be counted, as in second_run.
+    let before = || words.filter_map(known).find(|(_, unit)| unit.len() == 2);
+    let (_, unit) = known(last).or_else(before)?;
     let meaning = Unit::parse(unit).ok().filter(|_| is_time_name(text))?;
     Some(NamedUnit {
         text: (*unit).to_owned(),
@@ -299,6 +305,23 @@ fn bracket(text: &str) -> Option<(String, &str)> {
     None
 }
 
+/// Seconds of a unit of time with a factor in a heading: 0.01 of `Zeit [1/100 s]` and of `Zeit x10ms`.
+#[must_use]
+pub fn scaled_time(heading: &str) -> Option<f64> {
+    let inside = heading.split(['[', '(', ']', ')']).nth(1).or_else(|| {
+        heading
+            .split_whitespace()
+            .find_map(|word| word.strip_prefix('x'))
+    })?;
+    let end = inside.find(|c: char| !(c.is_ascii_digit() || c == '.' || c == '/'))?;
+    let (number, unit) = (&inside[..end], read(&inside[end..])?);
+    let factor = match number.split_once('/') {
+        Some((above, below)) => above.parse::<f64>().ok()? / below.parse::<f64>().ok()?,
+        None => number.parse().ok()?,
+    };
+    (is_time(&unit) && factor > 0.0 && factor.is_finite()).then(|| factor * unit.unit.factor())
+}
+
 /// Whether it is a unit of time.
 #[must_use]
 pub fn is_time(unit: &NamedUnit) -> bool {
@@ -346,6 +369,20 @@ mod tests {
         ] {
             let want = (name.to_owned(), unit.map(str::to_owned), known);
             assert_eq!(told(text), want, "{text}");
+        }
+    }
+
+    #[test]
+    fn units_of_time_with_a_factor() {
+        assert_eq!(scaled_time("Zeit [1/100 s]"), Some(0.01));
+        assert_eq!(scaled_time("Zeit x10ms"), Some(0.01));
+        assert_eq!(scaled_time("Zeit (2 min)"), Some(120.0));
+        for text in ["Zeit [s]", "Time", "Time (1)", "Zeit [1/0 s]", "Zeit x10"] {
+            assert_eq!(scaled_time(text), None, "{text}");
+        }
+        for text in ["ms_since_boot", "millis()", "TimeMs", "timeMillis"] {
+            let unit = heading(text).unit.expect(text);
+            assert_eq!(unit.unit.factor(), 1e-3, "{text}");
         }
     }
 

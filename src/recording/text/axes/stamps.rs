@@ -178,6 +178,9 @@ impl Sources<'_> {
         if let Some(unit) = field.unit.as_ref().filter(|unit| units::is_time(unit)) {
             return Ok(Some((unit.unit.factor(), None)));
         }
+        if let Some(seconds) = units::scaled_time(&field.heading) {
+            return Ok(Some((seconds, None)));
+        }
         let values = &self.columns[place].values;
         if let (Some(step), Some(hz)) = (typical_step(values), header_hz) {
             if let Some(factor) = seconds_of_step(step, hz) {
@@ -187,21 +190,35 @@ impl Sources<'_> {
                 return Ok(None);
             }
         }
+        Ok(Some(self.seconds_by_size(place)))
+    }
+
+    /// Seconds per unit of a column of stamps by how large they are, or what is usual, and what was
+    /// assumed.
+    fn seconds_by_size(&self, place: usize) -> (f64, Option<String>) {
+        let (field, values) = (&self.fields[place], &self.columns[place].values);
         let first = match self.columns[place].first_ticks {
             Some(ticks) => ticks as f64,
             None => values.first().copied().unwrap_or(0.0).abs(),
         };
         if let Some(seconds) = epoch_unit(first) {
-            return Ok(Some((seconds, None)));
+            return (seconds, None);
         }
         if is_spreadsheet_date(&field.name, values) {
-            return Ok(Some((86_400.0, None)));
+            return (86_400.0, None);
+        }
+        if are_days(values) {
+            let assumed = format!(
+                "\"{}\" gives no unit: by its size and its steps it was taken for a date in days",
+                field.heading
+            );
+            return (86_400.0, Some(assumed));
         }
         if let Some(unit) = self.default_time_unit.and_then(units::read) {
-            return Ok(Some((unit.unit.factor(), None)));
+            return (unit.unit.factor(), None);
         }
         let assumed = format!("\"{}\" gives no unit: seconds were assumed", field.heading);
-        Ok(Some((1.0, Some(assumed))))
+        (1.0, Some(assumed))
     }
 }
 
@@ -236,6 +253,17 @@ fn is_spreadsheet_date(name: &str, values: &[f64]) -> bool {
         && values
             .iter()
             .all(|value| (25_569.0..73_051.0).contains(value))
+}
+
+/// Whether values are dates in days, of spreadsheets (1982 to 2064) or since the year 0 (1971 to 2080): their
+/// steps are below 2 s then, and would be below 20 µs were they seconds.
+fn are_days(values: &[f64]) -> bool {
+    let is_date = |value: &f64| {
+        (30_000.0..60_000.0).contains(value) || (720_000.0..760_000.0).contains(value)
+    };
+    let ends = [values.first(), values.last()];
+    ends.iter().flatten().all(|value| is_date(value))
+        && typical_step(values).is_some_and(|step| step < 2e-5)
 }
 
 fn rises(values: &[f64]) -> bool {

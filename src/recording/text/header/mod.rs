@@ -86,12 +86,14 @@ pub fn read(head: &Head, table: &Table, used: &[bool]) -> Header {
     }
 }
 
-/// Keys in a line of their own with their values in the next: `dt:` above `0.001`.
+/// Keys in a line of their own with their values in the next: `dt:` above `0.001`, `*RATE` above `500 Hz`.
 fn entries_below_keys(head: &Head, rows: &[Row]) -> Vec<Entry> {
     rows.windows(2)
         .filter(|pair| pair[1].line == pair[0].line + 1)
         .filter_map(|pair| {
-            let key = pair[0].text.trim().strip_suffix(':')?;
+            let text = pair[0].text.trim();
+            let starred = || text.strip_prefix('*').filter(|key| is_about_axis(key));
+            let key = text.strip_suffix(':').or_else(starred)?;
             Some(Entry {
                 line: head.number(pair[0].line),
                 key: key.to_owned(),
@@ -99,6 +101,15 @@ fn entries_below_keys(head: &Head, rows: &[Row]) -> Vec<Entry> {
             })
         })
         .collect()
+}
+
+/// Whether a key is about the time axis.
+fn is_about_axis(key: &str) -> bool {
+    use keys::Topic::{Count, Date, Interval, Rate, Start};
+    matches!(
+        keys::topic(key),
+        Some(Rate | Interval | Start | Date | Count)
+    )
 }
 
 /// Splits a line above the table as the table is split, or, if that does not give a cell for each

@@ -259,3 +259,12 @@ fn blocks_of_one_channel_each_below_each_other() {
         "{message}"
     );
 }
+
+#[test]
+fn values_in_the_line_below_their_keys() {
+    let head = "*STARTTIME\n2009-07-23 12:51:42\n*RATE\n500 Hz\n*DATA\nTorque;Speed\n";
+    let found = read(&format!("{head}{}", rows(9, ";", &[&wave, &wave])));
+    check(&found, &[("Torque", "", 9), ("Speed", "", 9)], Some(500.0));
+    let start = found.channels[0].axis.start_text.as_deref();
+    assert_eq!(start, Some("2009-07-23 12:51:42"));
+}

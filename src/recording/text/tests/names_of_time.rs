@@ -110,3 +110,32 @@ fn an_axis_in_seconds_is_time_again_and_again() {
         .collect();
     assert_eq!(told, [("EMG 1", 40, Some(2.0)), ("ACC 1", 10, Some(1.0))]);
 }
+
+#[test]
+fn dates_as_numbers() {
+    // A twentieth of a second is 1/1728000 of a day.
+    let days = |first: f64| move |row: f64| format!("{:.10}", first + row / 1_728_000.0);
+    for first in [44_259.25, 738_219.25] {
+        let found = headed("Timestamp,M", &[&days(first), &wave]);
+        let rate_hz = found.channels[0].axis.rate_hz.unwrap();
+        assert!((rate_hz / 20.0 - 1.0).abs() < 1e-4, "{rate_hz}");
+        assert_eq!(codes(&found), ["time-assumed"]);
+    }
+    // Seconds of the day.
+    let seconds = |row: f64| format!("{:.3}", 36_000.0 + row * 0.005);
+    check(
+        &headed("Time,M", &[&seconds, &wave]),
+        &[("M", "", 40)],
+        Some(200.0),
+    );
+    // Over midnight.
+    let digits = |row: f64| match row < 20.0 {
+        true => format!("20210304235959.{:02}", row * 5.0),
+        false => format!("20210305000000.{:02}", (row - 20.0) * 5.0),
+    };
+    check(
+        &headed("Timestamp,M", &[&digits, &wave]),
+        &[("M", "", 40)],
+        Some(20.0),
+    );
+}

@@ -121,3 +121,30 @@ fn sums_and_means_below_the_samples() {
     ));
     assert_eq!(found.channels[0].samples.len(), 40);
 }
+
+#[test]
+fn variables_in_turn_are_refused() {
+    let list: String = (0..20)
+        .flat_map(|second| {
+            [("Torque", 2), ("Speed", 100)].map(|(name, value)| {
+                format!("\"{name}\";\"10.03.2015 14:10:{second:02}\";{value},5;1\n")
+            })
+        })
+        .collect();
+    let message = failure(&format!("VarName;TimeString;VarValue;Validity\n{list}"));
+    assert!(
+        message.starts_with("line 2: the rows name 2 variables in turn, first \"Torque\""),
+        "{message}"
+    );
+    // The states of a switch are none.
+    let states: String = (0..20)
+        .map(|second| {
+            format!(
+                "\"{}\";\"10.03.2015 14:10:{second:02}\";2,5;1\n",
+                if second < 9 { "on" } else { "off" }
+            )
+        })
+        .collect();
+    let found = read(&format!("State;TimeString;M;n\n{states}"));
+    assert_eq!(found.channels[0].samples.len(), 20);
+}
