@@ -1,5 +1,6 @@
 //! Work that is shared among threads, with results that do not depend on how many there are.
 
+use std::ops::Range;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -10,6 +11,18 @@ const MOST_THREADS: usize = 8;
 #[must_use]
 pub fn threads() -> usize {
     std::thread::available_parallelism().map_or(1, |n| n.get().min(MOST_THREADS))
+}
+
+/// Runs a job for each part of so many things, at most `most` of them together; results in their order.
+pub fn in_parts<T: Send>(
+    count: usize,
+    most: usize,
+    threads: usize,
+    run: impl Fn(Range<usize>) -> T + Sync,
+) -> Vec<T> {
+    parallel(count.div_ceil(most), threads, |k| {
+        run(k * most..((k + 1) * most).min(count))
+    })
 }
 
 /// Runs jobs on all threads; results in the order of the jobs.

@@ -1,5 +1,6 @@
 //! `compensate` gives back the torque that acted.
 
+use crate::noise::Noise;
 use crate::util::{Folder, column, hertel_response, record, steady, table};
 
 const PARTS: [(f64, f64, f64); 5] = [
@@ -49,15 +50,8 @@ fn the_torque_comes_back_in_both_ways_to_run_it() {
 #[test]
 fn stream_and_whole_record_agree() {
     let rate = 20_000.0;
-    let mut state = 3_u64;
-    let noise: Vec<f64> = (0..70_000)
-        .map(|_| {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1_u64 << 53) as f64
-        })
-        .collect();
+    let mut noise = Noise(3);
+    let noise: Vec<f64> = (0..70_000).map(|_| noise.uniform()).collect();
     let folder = Folder::new();
     folder.write("in.csv", record(&noise, rate));
     let run = |more: &[&str]| {

@@ -20,7 +20,8 @@ fn folder(case: &Case) -> Folder {
     folder
 }
 
-fn diagnose<'a>(more: &[&'a str]) -> Vec<&'a str> {
+/// A diagnosis of both records in a folder.
+pub(crate) fn diagnose<'a>(more: &[&'a str]) -> Vec<&'a str> {
     let files = [
         "--stand",
         "stand.toml",

@@ -1,5 +1,6 @@
 //! `harmonics` against a record whose components are known.
 
+use crate::noise::Noise;
 use crate::util::{Folder, hertel_response, record, steady};
 
 const PARTS: [(f64, f64, f64); 4] = [
@@ -12,15 +13,10 @@ const PARTS: [(f64, f64, f64); 4] = [
 fn folder() -> Folder {
     let folder = Folder::new();
     let (shown, _) = steady(&PARTS, 20_000.0, 30_000);
-    let mut state = 5_u64;
+    let mut noise = Noise(5);
     let noisy: Vec<f64> = shown
         .iter()
-        .map(|x| {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            x + 0.01 * ((state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5)
-        })
+        .map(|x| x + 0.01 * (noise.uniform() - 0.5))
         .collect();
     folder.write("in.csv", record(&noisy, 20_000.0));
     folder

@@ -5,20 +5,13 @@ use std::fmt::Write;
 
 use serde_json::Value;
 
+use crate::noise::Noise;
 use crate::util::Folder;
 
-/// White noise of about unit variance, seeded.
+/// White noise of unit variance, seeded.
 fn noise(seed: u64, count: usize) -> Vec<f64> {
-    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
-    let mut uniform = move || {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-    };
-    (0..count)
-        .map(|_| (0..12).map(|_| uniform()).sum())
-        .collect()
+    let mut noise = Noise(seed);
+    (0..count).map(|_| noise.normal()).collect()
 }
 
 /// A good torque signal: two components and noise.

@@ -3,6 +3,7 @@
 use std::io::Read;
 use std::process::Stdio;
 
+use crate::noise::Noise;
 use crate::util::{Folder, command, record, steady};
 
 fn folder() -> Folder {
@@ -227,15 +228,9 @@ fn json_is_one_document_and_talk_goes_to_stderr() {
 fn strict_turns_a_warning_into_3() {
     let folder = Folder::new();
     // Nothing but noise above 100 Hz.
-    let mut state = 1_u64;
+    let mut noise = Noise(1);
     let noisy: Vec<f64> = (0..60_000)
-        .map(|i| {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            let noise = (state >> 40) as f64 / (1 << 24) as f64 - 0.5;
-            (f64::from(i) * 0.01).sin() + 0.01 * noise
-        })
+        .map(|i| (f64::from(i) * 0.01).sin() + 0.01 * (noise.uniform() - 0.5))
         .collect();
     folder.write("in.csv", record(&noisy, 20_000.0));
     let args = [&COMPENSATE[..], &["-o", "out.csv", "--force"]].concat();

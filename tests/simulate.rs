@@ -3,6 +3,8 @@
 use std::f64::consts::TAU;
 use std::fmt::Write;
 
+use crate::diagnose::diagnose;
+use crate::noise::Noise;
 use crate::util::{Folder, table};
 
 const RATE_HZ: f64 = 20_000.0;
@@ -81,36 +83,14 @@ fn held_samples_are_simulated_as_they_are() {
 fn an_input_that_is_held_is_no_effect() {
     let folder = Folder::new();
     folder.write("stand.toml", STAND);
-    let mut state = 11_u64;
-    let mut noise = || {
-        let mut sum = -6.0;
-        for _ in 0..12 {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            sum += (state >> 11) as f64 / (1_u64 << 53) as f64;
-        }
-        sum
-    };
+    let mut noise = Noise(11);
     for (name, seed) in [("train.csv", 5), ("holdout.csv", 8)] {
         let applied = input(seed, 8000);
-        let measured: Vec<f64> = held(&applied).iter().map(|y| y + 0.005 * noise()).collect();
+        let answer = held(&applied);
+        let measured: Vec<f64> = answer.iter().map(|y| y + 0.005 * noise.normal()).collect();
         folder.write(name, record(&applied, &measured));
     }
-    let report = folder.json(&[
-        "diagnose",
-        "--stand",
-        "stand.toml",
-        "--train",
-        "train.csv",
-        "--holdout",
-        "holdout.csv",
-        "--applied",
-        "applied_n_m",
-        "--measured",
-        "measured_n_m",
-        "--json",
-    ]);
+    let report = folder.json(&diagnose(&["--json"]));
     assert_eq!(report["input_between_samples"], "held");
     assert_eq!(report["verdict"], "nothing-missing");
     let after = report["error"]["after"]["holdout_rms"].as_f64().unwrap();

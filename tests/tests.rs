@@ -12,6 +12,7 @@ mod harmonics;
 mod identify;
 mod inspect;
 mod messages;
+mod noise;
 mod output;
 mod predict;
 mod refined;

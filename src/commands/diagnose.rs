@@ -1,6 +1,7 @@
 //! `diagnose`: what the stand lacks, and the error before and after it is added.
 
 mod read;
+mod refined;
 mod render;
 
 use std::io::IsTerminal;

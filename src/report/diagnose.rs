@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{Warning, columns, rounded};
+use super::{Warning, columns, rounded, unit_or_as_recorded};
 use crate::diagnose::Dependence;
 
 /// Schema of the document.
@@ -149,11 +149,7 @@ impl Suspected {
             self.law,
             self.equation,
             rounded(self.holdout_rms, 4),
-            if self.unit.is_empty() {
-                "as recorded"
-            } else {
-                &self.unit
-            }
+            unit_or_as_recorded(&self.unit)
         )
     }
 }
@@ -263,11 +259,7 @@ impl Report {
     }
 
     fn errors(&self) -> String {
-        let unit = if self.error.unit.is_empty() {
-            "as recorded"
-        } else {
-            &self.error.unit
-        };
+        let unit = unit_or_as_recorded(&self.error.unit);
         let mut rows = vec![vec![
             format!("error, {unit}"),
             "training".to_owned(),

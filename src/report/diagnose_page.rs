@@ -3,7 +3,7 @@
 use super::chart::{Chart, Series};
 use super::diagnose::{Candidate, Report, Rms, with_std};
 use super::page::Page;
-use super::{rounded, short};
+use super::{rounded, short, unit_or_as_recorded};
 use crate::diagnose::{Against, Trace, autocorrelation, binned, density, response};
 
 /// What the page shows beside the report.
@@ -114,10 +114,7 @@ impl Report {
     }
 
     fn unit(&self) -> &str {
-        match self.error.unit.as_str() {
-            "" => "as recorded",
-            unit => unit,
-        }
+        unit_or_as_recorded(&self.error.unit)
     }
 
     fn what_was_measured(&self, page: &mut Page, sights: &Sights) {

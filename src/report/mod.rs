@@ -120,6 +120,15 @@ pub fn value_and_std(value: f64, std: f64) -> [String; 2] {
     [text(value), text(std)]
 }
 
+/// A unit for people, also where a file says none.
+#[must_use]
+pub fn unit_or_as_recorded(unit: &str) -> &str {
+    match unit {
+        "" => "as recorded",
+        unit => unit,
+    }
+}
+
 /// Rows of cells as columns of equal width, the first to the left, the others to the right.
 #[must_use]
 pub fn columns(rows: &[Vec<String>]) -> String {

@@ -10,24 +10,9 @@ mod static_load;
 use serde_json::Value;
 use torqcomp::identify::{Found, Outcome};
 
+use crate::noise::Noise;
+
 const TAU: f64 = std::f64::consts::TAU;
-
-/// Normal noise, the same on every run.
-struct Noise(u64);
-
-impl Noise {
-    fn uniform(&mut self) -> f64 {
-        // xorshift64*, S. Vigna.
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        ((self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
-    }
-
-    fn normal(&mut self) -> f64 {
-        (-2.0 * self.uniform().ln()).sqrt() * (TAU * self.uniform()).cos()
-    }
-}
 
 fn times(count: usize, rate_hz: f64) -> Vec<f64> {
     (0..count).map(|i| i as f64 / rate_hz).collect()

@@ -9,7 +9,7 @@ use crate::cli::Diagnose;
 use crate::diagnose::{Begin, Case, Constants, Record, set_substeps};
 use crate::failure::Failure;
 use crate::io::csv::{NamedUnit, Place};
-use crate::report::Warning;
+use crate::report::{Warning, unit_or_as_recorded};
 use crate::signal::Together;
 use crate::stand::{Given, Stand};
 
@@ -53,7 +53,7 @@ impl Units {
     pub fn gain(&self) -> (String, f64) {
         let [applied, measured] = self.factors;
         let unit = match (self.measured.as_str(), self.applied.as_str()) {
-            ("", "") => "as recorded".to_owned(),
+            ("", "") => unit_or_as_recorded("").to_owned(),
             (measured, "") => format!("{measured} per applied unit"),
             ("", applied) => format!("measured unit per {applied}"),
             (measured, applied) => format!("{measured}/{applied}"),
@@ -218,7 +218,8 @@ fn refuse_same_samples(train: &[Pair], hold: &[Pair]) -> Result<(), Failure> {
     match pairs.into_iter().find(|(h, t)| is_same(h, t)) {
         None => Ok(()),
         Some((h, t)) => Err(Failure::failed(format_args!(
-            "{} holds the same samples as the training record {}: nothing would be held out; give another record, or leave              --holdout out to keep the last 30 % of each training record back",
+            "{} holds the same samples as the training record {}: nothing would be held out; give another record, or leave \
+             --holdout out to keep the last 30 % of each training record back",
             h.source, t.source
         ))),
     }

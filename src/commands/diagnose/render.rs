@@ -1,17 +1,16 @@
-//! From a diagnosis to its report and to the refined stand file.
+//! From a diagnosis to its report.
 
 use crate::cli::Diagnose;
 use crate::diagnose::{Constants, Dependence, Diagnosis, Judged, Status, Trace, Tried, Verdict};
-use crate::failure::Failure;
-use crate::io::digits;
 use crate::report::diagnose::{
     Candidate, Constant, Error, Levels, Line, Parameter, Report, Residual, Rms, SCHEMA, Suspected,
 };
 use crate::report::diagnose_page::Sights;
 use crate::report::{Warning, rounded};
-use crate::stand::{self, Refined, Stand};
+use crate::stand;
 
 use super::read::Units;
+use super::refined::plain_constants;
 
 /// Factor between levels of excitation from which on errors are compared.
 const LEVELS_DIFFER: f64 = 1.2;
@@ -34,25 +33,6 @@ pub struct Rendered<'a> {
     pub levels: [f64; 2],
     /// Warnings so far.
     pub warnings: Vec<Warning>,
-}
-
-/// Natural frequency in Hz, damping ratio and static gain of a model, with their standard uncertainties.
-fn plain_constants(judged: &Judged) -> [(f64, Option<f64>); 3] {
-    let fitted = &judged.fitted;
-    let (mode, gain) = fitted.structure.mode(&fitted.values);
-    let values = [
-        mode.omega_rad_s / std::f64::consts::TAU,
-        mode.damping_ratio,
-        gain,
-    ];
-    std::array::from_fn(|k| {
-        // What is fitted is a multiple of what is meant.
-        let std = fitted.std.get(k).copied().flatten();
-        let is_fitted = k < fitted.structure.frame.plain_count();
-        let scale = fitted.values.get(k).map(|v| (values[k] / v).abs());
-        let std = std.zip(scale).map(|(std, scale)| std * scale);
-        (values[k], std.filter(|_| is_fitted))
-    })
 }
 
 impl Rendered<'_> {
@@ -223,23 +203,15 @@ impl Rendered<'_> {
 
     fn accepted(&self, tried: &Tried, with: &[&'static str]) -> Candidate {
         let after = &self.diagnosis.after;
+        let mut candidate = self.candidate(tried, with);
+        candidate.parameters = self.parameters(after).swap_remove(with.len());
         let is_last = with.len() + 1 == after.fitted.structure.choices.len();
-        let whole = self.rms(after);
-        let chosen = self.candidate(tried, with);
-        Candidate {
-            train_rms: if is_last {
-                Some(whole.train_rms)
-            } else {
-                chosen.train_rms
-            },
-            holdout_rms: if is_last {
-                Some(whole.holdout_rms)
-            } else {
-                chosen.holdout_rms
-            },
-            parameters: self.parameters(after).swap_remove(with.len()),
-            ..chosen
+        if is_last {
+            let whole = self.rms(after);
+            candidate.train_rms = Some(whole.train_rms);
+            candidate.holdout_rms = Some(whole.holdout_rms);
         }
+        candidate
     }
 
     fn candidate(&self, tried: &Tried, with: &[&'static str]) -> Candidate {
@@ -276,7 +248,7 @@ impl Rendered<'_> {
     }
 
     /// Parameters of each effect of a model.
-    fn parameters(&self, judged: &Judged) -> Vec<Vec<Parameter>> {
+    pub(super) fn parameters(&self, judged: &Judged) -> Vec<Vec<Parameter>> {
         let fitted = &judged.fitted;
         let structure = &fitted.structure;
         let rulers = &structure.frame.rulers;
@@ -466,60 +438,5 @@ impl Rendered<'_> {
         }
         asked.dedup();
         (!asked.is_empty()).then(|| asked.join("; "))
-    }
-
-    /// Means over the training records of the constant in them and of the displacement by a constant load.
-    fn record_constants(&self) -> [f64; 2] {
-        let train = &self.diagnosis.after.train;
-        let mean = |of: &dyn Fn(&crate::diagnose::Residual) -> f64| {
-            train.iter().map(of).sum::<f64>() / train.len() as f64
-        };
-        [mean(&|r| r.taken.offset), mean(&|r| r.begin.shift)]
-    }
-
-    /// The refined stand file.
-    ///
-    /// # Errors
-    /// If the declared one cannot be read again.
-    pub fn stand(&self, declared: Option<(&Stand, &str)>) -> Result<String, Failure> {
-        let after = &self.diagnosis.after;
-        let [natural_hz, damping_ratio, (gain, _)] = plain_constants(after);
-        let frame = after.fitted.structure.frame;
-        let parameters = self.parameters(after);
-        let effects =
-            after
-                .fitted
-                .structure
-                .choices
-                .iter()
-                .zip(&parameters)
-                .map(|(choice, own)| {
-                    let written = |p: &Parameter| {
-                        let text = |number: f64, digits: u32| {
-                            let text = format!("{} {}", digits::text(number, digits), p.unit);
-                            text.trim().to_owned()
-                        };
-                        (p.name, text(p.value, 12), p.std.map(|std| text(std, 3)))
-                    };
-                    let texts = own.iter().map(written).collect();
-                    (choice.effect.name, choice.form.name, texts)
-                });
-        let applied = crate::stand::si_unit(&self.units.applied);
-        let refined = Refined {
-            natural_hz,
-            damping_ratio,
-            gain: frame.gain_is_free.then_some(gain),
-            units: (&self.units.diagnosed, &applied),
-            measured_unit: if self.units.measured.is_empty() {
-                "1"
-            } else {
-                &self.units.measured
-            },
-            constants: self.record_constants(),
-            effects: effects.collect(),
-            source: format!("diagnosed: {}", self.args.train.join(", ")),
-            verdict: self.diagnosis.verdict.name(),
-        };
-        stand::refine(declared, &refined)
     }
 }

@@ -1,7 +1,7 @@
 //! `identify decay`.
 
 use super::anchor::{Ratios, Told, follow};
-use super::{deliver, read, said, uniform};
+use super::{ONE_MODE, deliver, read, said, uniform};
 use crate::cli::identify::Decay;
 use crate::commands::Outcome;
 use crate::failure::Failure;
@@ -117,10 +117,7 @@ fn entries(args: &Decay, evaluated: &mut Evaluated) -> Result<Vec<Entry>, Failur
         return Ok(Vec::new());
     };
     if evaluated.fit.poles.len() > 1 && args.findings.result.output.is_some() {
-        return Err(Failure::failed(
-            "a stand file holds one mode, and several were found; choose one with --band and --modes 1, or leave -o out to \
-             see them",
-        ));
+        return Err(Failure::failed(ONE_MODE));
     }
     let told = Told {
         mode: strongest(evaluated),

@@ -34,17 +34,27 @@ pub fn run(args: &Identify) -> Result<Outcome, Failure> {
     }
 }
 
+/// Why several modes are not written.
+const ONE_MODE: &str = "a stand file holds one mode, and several were found; choose one with --band and --modes 1, or \
+                        leave -o out to see them";
+
 /// Text of the stand file that declared values come from, with its name.
 fn stand_text(findings: &Findings) -> Result<Option<(String, String)>, Failure> {
-    let read = |path: &Path| {
-        std::fs::read_to_string(path)
-            .map(|text| Some((path.display().to_string(), text)))
-            .map_err(|error| Failure::reading(path, &error))
-    };
-    match (&findings.stand, &findings.result.output) {
-        (Some(path), _) => read(path),
-        (None, Some(place)) if place != "-" && Path::new(place).is_file() => read(Path::new(place)),
-        _ => Ok(None),
+    let declaring = findings.stand.as_deref().or_else(|| existing(findings));
+    declaring.map(read_stand).transpose()
+}
+
+/// The stand file of `-o`, if it is there already.
+fn existing(findings: &Findings) -> Option<&Path> {
+    let place = findings.result.output.as_deref()?;
+    (place != "-" && Path::new(place).is_file()).then(|| Path::new(place))
+}
+
+/// Name and text of a stand file.
+fn read_stand(path: &Path) -> Result<(String, String), Failure> {
+    match std::fs::read_to_string(path) {
+        Ok(text) => Ok((path.display().to_string(), text)),
+        Err(error) => Err(Failure::reading(path, &error)),
     }
 }
 
@@ -78,18 +88,13 @@ fn deliver(
         }
         // An existing stand file is a basis for the new one, whoever it came from; so is the one that declared values
         // come from.
-        let existing = match Path::new(place) {
-            path if place != "-" && path.is_file() => {
-                Some(std::fs::read_to_string(path).map_err(|e| Failure::reading(path, &e))?)
-            }
-            _ => match &findings.stand {
-                Some(path) => {
-                    Some(std::fs::read_to_string(path).map_err(|e| Failure::reading(path, &e))?)
-                }
-                None => None,
-            },
-        };
-        let text = update::update(place, existing.as_deref(), entries)?;
+        let existing = existing(findings);
+        let basis = existing.or(findings.stand.as_deref());
+        let basis = basis.map(read_stand).transpose()?;
+        let text = match &basis {
+            Some((name, text)) => update::update(name, Some(text), entries),
+            None => update::update(place, None, entries),
+        }?;
         let force = result.force || existing.is_some();
         output::write_all(Some(place), force, &taken, &text)?;
     }

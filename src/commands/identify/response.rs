@@ -3,7 +3,7 @@
 use torqcomp_model::Dimension;
 
 use super::anchor::{Ratios, Told, follow};
-use super::{deliver, plain, said, together};
+use super::{ONE_MODE, deliver, plain, said, together};
 use crate::cli::identify::{Excitation, Measured, Response};
 use crate::commands::Outcome;
 use crate::failure::Failure;
@@ -155,9 +155,7 @@ fn entries(
     let pair = (get("natural_frequency"), get("damping_ratio"));
     let (Some(frequency), Some(ratio)) = pair else {
         return match args.findings.result.output {
-            Some(_) => Err(Failure::failed(
-                "a stand file holds one mode, and several were found; choose one with --band and --modes 1",
-            )),
+            Some(_) => Err(Failure::failed(ONE_MODE)),
             None => Ok(Vec::new()),
         };
     };

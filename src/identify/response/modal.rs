@@ -68,6 +68,11 @@ impl Data {
         self.omega[self.omega.len() / 2]
     }
 
+    /// First and last frequency, in rad/s.
+    pub(super) fn band_rad_per_s(&self) -> (f64, f64) {
+        (self.omega[0], self.omega[self.omega.len() - 1])
+    }
+
     /// The columns at a frequency, instead of what `all` held.
     fn columns(&self, omega: f64, poles: &[Pole], delay_s: f64, all: &mut Vec<Complex64>) {
         let scale = self.scale();

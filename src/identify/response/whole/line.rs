@@ -46,7 +46,8 @@ impl State {
 }
 
 impl<'a> Layout<'a> {
-    pub fn of(shape: &'a Data, modes: usize, band_rad_per_s: (f64, f64)) -> Self {
+    pub fn of(shape: &'a Data, modes: usize) -> Self {
+        let band_rad_per_s = shape.band_rad_per_s();
         Self {
             shape,
             modes,
@@ -226,7 +227,7 @@ mod tests {
         };
         for order in 0..3 {
             let shape = shape(order);
-            let layout = Layout::of(&shape, 2, (100.0, 200.0));
+            let layout = Layout::of(&shape, 2);
             let number = |i: usize| ((i * i + 3) as f64 * 0.7).sin();
             let state = State {
                 poles: vec![pole(4.0, 130.0), pole(9.0, 180.0)],

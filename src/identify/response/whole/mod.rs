@@ -20,13 +20,15 @@
 mod line;
 mod normal;
 
+use std::ops::Range;
+
 use num_complex::Complex64;
 use torqcomp_dsp::frf::{Block, Window, transform};
 
 use super::blocks::Set;
 use super::{Data, Driven, Modal, Settled};
 use crate::identify::decay::Pole;
-use crate::parallel::{parallel, threads};
+use crate::parallel::{in_parts, threads};
 use line::{Layout, State};
 use normal::{Gram, PART, Solved};
 
@@ -59,29 +61,23 @@ const WITHIN: f64 = 25.0;
 /// Whole records as they are fitted.
 pub(super) struct Whole {
     records: Vec<Spectra>,
-    band_rad_per_s: (f64, f64),
 }
 
 impl Whole {
     /// The records of noise at the lines of the averaged response; none of records that are not weighted with Hann's
     /// window, which have no leakage.
     pub fn of(records: &[Driven], set: &Set, shape: &Data) -> Option<Self> {
-        let band_rad_per_s = (shape.omega[0], shape.omega[shape.omega.len() - 1]);
-        let spectra = |r| Spectra::of(r, band_rad_per_s);
+        let spectra = |r| Spectra::of(r, shape.band_rad_per_s());
         (set.window == Window::Hann).then(|| Self {
             records: records.iter().map(spectra).collect(),
-            band_rad_per_s,
         })
     }
 
     /// Fits them from a fit of their averaged response; none if that does not come to an end, or if there are
     /// too few lines.
     pub fn refine(self, shape: &Data, start: &Modal) -> Option<Settled> {
-        let Self {
-            records: mut all,
-            band_rad_per_s,
-        } = self;
-        let layout = Layout::of(shape, start.poles.len(), band_rad_per_s);
+        let Self { records: mut all } = self;
+        let layout = Layout::of(shape, start.poles.len());
         let enough = |s: &Spectra| s.omega.len() >= LEAST_LINES * layout.columns();
         if start.poles.is_empty() || !all.iter().all(enough) {
             return None;
@@ -146,13 +142,9 @@ impl Spectra {
 
     /// Power that a fit leaves of each line.
     fn left(&self, layout: &Layout, state: &State, record: usize) -> Vec<f64> {
-        let count = self.omega.len();
-        let part = |p: usize| {
-            let lines = p * PART..((p + 1) * PART).min(count);
-            let left = |k: usize| layout.left(self, state, record, k).norm_sqr();
-            lines.map(left).collect::<Vec<f64>>()
-        };
-        parallel(count.div_ceil(PART), threads(), part).concat()
+        let left = |k: usize| layout.left(self, state, record, k).norm_sqr();
+        let part = |lines: Range<usize>| lines.map(left).collect::<Vec<f64>>();
+        in_parts(self.omega.len(), PART, threads(), part).concat()
     }
 
     /// Weights from what a fit leaves, which is less than the noise by what the fit takes up.

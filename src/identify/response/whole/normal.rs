@@ -9,7 +9,7 @@ use super::Spectra;
 use super::line::{Layout, State};
 use crate::identify::response::inverse::invert;
 use crate::identify::response::scatter::{OfMode, Spread};
-use crate::parallel::{parallel, threads};
+use crate::parallel::{in_parts, threads};
 
 /// Lines that are multiplied at once.
 const AT_ONCE: usize = 256;
@@ -30,10 +30,8 @@ impl Gram {
     }
 
     fn of(layout: &Layout, spectra: &Spectra, state: &State, record: usize) -> Self {
-        let count = spectra.omega.len();
-        let part = |k: usize| k * PART..((k + 1) * PART).min(count);
-        let parts = parallel(count.div_ceil(PART), threads(), |k| {
-            Self::of_lines(layout, spectra, state, record, part(k))
+        let parts = in_parts(spectra.omega.len(), PART, threads(), |lines| {
+            Self::of_lines(layout, spectra, state, record, lines)
         });
         let rows = layout.columns() + 1;
         Self(
