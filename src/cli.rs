@@ -4,13 +4,14 @@ pub mod diagnose;
 pub mod identify;
 pub mod reading;
 pub mod simulate;
+mod values;
 
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use torqcomp_model::{Kind, UnitSystem};
+use torqcomp_model::UnitSystem;
 
-use crate::io::csv::{self, Delimiter};
+use crate::io::csv;
 use crate::io::digits::Digits;
 use crate::io::mcap::{Selection, TimeChoice};
 use crate::signal::{self, MessageOptions};
@@ -18,6 +19,10 @@ use crate::signal::{self, MessageOptions};
 pub use diagnose::Diagnose;
 pub use reading::{Marks, Reading, TimeAxis};
 pub use simulate::Simulate;
+pub use values::Orders;
+use values::{
+    clock, decimal, delimiter, digits, frequency, orders, percent, positive_frequency, range,
+};
 
 /// True torque from the records of a reaction-torque stand.
 ///
@@ -369,114 +374,6 @@ pub struct Inspect {
     pub strict: bool,
 }
 
-/// Orders of a fundamental, rising.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Orders(pub Vec<f64>);
-
-/// Most orders that are fitted at once.
-const MOST_ORDERS: usize = 500;
-
-/// A frequency: a number of Hz, or a number with a unit.
-fn frequency(text: &str) -> std::result::Result<f64, String> {
-    let value = match text.trim().parse::<f64>() {
-        Ok(value) => value,
-        Err(_) => Kind::Frequency.parse(text).map_err(|e| e.to_string())?,
-    };
-    if value.is_finite() && value >= 0.0 {
-        Ok(value)
-    } else {
-        Err("expected a frequency in Hz, such as 2400 or \"2.4 kHz\"".to_owned())
-    }
-}
-
-fn positive_frequency(text: &str) -> std::result::Result<f64, String> {
-    match frequency(text)? {
-        0.0 => Err("expected a frequency greater than zero".to_owned()),
-        value => Ok(value),
-    }
-}
-
-fn percent(text: &str) -> std::result::Result<f64, String> {
-    match text.trim().trim_end_matches('%').trim().parse::<f64>() {
-        Ok(value) if value > 0.0 && value < 50.0 => Ok(value),
-        _ => Err("expected per cent between 0 and 50, such as 2".to_owned()),
-    }
-}
-
-fn clock(text: &str) -> std::result::Result<TimeChoice, String> {
-    TimeChoice::parse(text).ok_or_else(|| "expected log, publish or header".to_owned())
-}
-
-fn delimiter(text: &str) -> std::result::Result<Delimiter, String> {
-    match text {
-        "tab" | "\t" | "\\t" => Ok(Delimiter::Byte(b'\t')),
-        "space" | "spaces" | " " => Ok(Delimiter::Spaces),
-        "none" => Ok(Delimiter::None),
-        _ => match text.as_bytes() {
-            [byte] if byte.is_ascii_punctuation() && !b".+-\"".contains(byte) => {
-                Ok(Delimiter::Byte(*byte))
-            }
-            _ => Err("expected one of , ; | tab space none".to_owned()),
-        },
-    }
-}
-
-fn decimal(text: &str) -> std::result::Result<u8, String> {
-    match text {
-        "." | "point" => Ok(b'.'),
-        "," | "comma" => Ok(b','),
-        _ => Err("expected . or ,".to_owned()),
-    }
-}
-
-fn digits(text: &str) -> std::result::Result<Digits, String> {
-    match text.parse::<u32>() {
-        Ok(count @ 1..=15) => Ok(Digits::Significant(count)),
-        _ if text == "shortest" => Ok(Digits::Shortest),
-        _ => Err("expected a number from 1 to 15, or \"shortest\"".to_owned()),
-    }
-}
-
-fn range(text: &str) -> std::result::Result<(f64, f64), String> {
-    let ends = text
-        .split_once("..")
-        .and_then(|(from, to)| Some((from.trim().parse().ok()?, to.trim().parse().ok()?)));
-    match ends {
-        Some((from, to)) if from < to => Ok((from, to)),
-        _ => Err("expected two times in seconds, such as 0.1..0.15".to_owned()),
-    }
-}
-
-fn orders(text: &str) -> std::result::Result<Orders, String> {
-    let wrong = || "expected orders such as 1-20 or 0.5,1,2".to_owned();
-    let mut all = Vec::new();
-    for item in text.split(',') {
-        match item.split_once('-') {
-            Some((from, to)) => {
-                let from: u32 = from.trim().parse().map_err(|_| wrong())?;
-                let to: u32 = to.trim().parse().map_err(|_| wrong())?;
-                if from > to || to as usize > 100_000 {
-                    return Err(wrong());
-                }
-                all.extend((from..=to).map(f64::from));
-            }
-            None => all.push(item.trim().parse::<f64>().map_err(|_| wrong())?),
-        }
-    }
-    if all.iter().any(|order| !(*order > 0.0 && order.is_finite())) {
-        return Err("orders must be greater than zero; the mean is always fitted".to_owned());
-    }
-    all.sort_by(f64::total_cmp);
-    all.dedup();
-    if all.len() > MOST_ORDERS {
-        return Err(format!(
-            "{} orders are too many; at most {MOST_ORDERS}",
-            all.len()
-        ));
-    }
-    Ok(Orders(all))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -485,20 +382,5 @@ mod tests {
     #[test]
     fn the_command_line_is_sound() {
         Cli::command().debug_assert();
-    }
-
-    #[test]
-    fn values_are_read_as_people_write_them() {
-        assert_eq!(frequency("2400"), Ok(2400.0));
-        assert_eq!(frequency("2.4 kHz"), Ok(2400.0));
-        assert!(frequency("-1").is_err() && frequency("nan").is_err() && frequency("2 V").is_err());
-        assert_eq!(orders("1-3,0.5,2").unwrap().0, [0.5, 1.0, 2.0, 3.0]);
-        assert!(orders("3-1").is_err() && orders("0").is_err() && orders("a").is_err());
-        assert_eq!(delimiter("tab"), Ok(Delimiter::Byte(b'\t')));
-        assert!(delimiter("ab").is_err());
-        assert_eq!(range("0.1..0.2"), Ok((0.1, 0.2)));
-        assert!(range("0.2..0.1").is_err());
-        assert_eq!(digits("9"), Ok(Digits::Significant(9)));
-        assert!(digits("0").is_err() && digits("16").is_err());
     }
 }

@@ -1,0 +1,135 @@
+//! Values as people write them on the command line.
+
+use torqcomp_model::Kind;
+
+use crate::io::csv::Delimiter;
+use crate::io::digits::Digits;
+use crate::io::mcap::TimeChoice;
+
+/// Orders of a fundamental, rising.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Orders(pub Vec<f64>);
+
+/// Most orders that are fitted at once.
+const MOST_ORDERS: usize = 500;
+
+/// A frequency: a number of Hz, or a number with a unit.
+pub fn frequency(text: &str) -> Result<f64, String> {
+    let value = match text.trim().parse::<f64>() {
+        Ok(value) => value,
+        Err(_) => Kind::Frequency.parse(text).map_err(|e| e.to_string())?,
+    };
+    if value.is_finite() && value >= 0.0 {
+        Ok(value)
+    } else {
+        Err("expected a frequency in Hz, such as 2400 or \"2.4 kHz\"".to_owned())
+    }
+}
+
+pub fn positive_frequency(text: &str) -> Result<f64, String> {
+    match frequency(text)? {
+        0.0 => Err("expected a frequency greater than zero".to_owned()),
+        value => Ok(value),
+    }
+}
+
+pub fn percent(text: &str) -> Result<f64, String> {
+    match text.trim().trim_end_matches('%').trim().parse::<f64>() {
+        Ok(value) if value > 0.0 && value < 50.0 => Ok(value),
+        _ => Err("expected per cent between 0 and 50, such as 2".to_owned()),
+    }
+}
+
+pub fn clock(text: &str) -> Result<TimeChoice, String> {
+    TimeChoice::parse(text).ok_or_else(|| "expected log, publish or header".to_owned())
+}
+
+pub fn delimiter(text: &str) -> Result<Delimiter, String> {
+    match text {
+        "tab" | "\t" | "\\t" => Ok(Delimiter::Byte(b'\t')),
+        "space" | "spaces" | " " => Ok(Delimiter::Spaces),
+        "none" => Ok(Delimiter::None),
+        _ => match text.as_bytes() {
+            [byte] if byte.is_ascii_punctuation() && !b".+-\"".contains(byte) => {
+                Ok(Delimiter::Byte(*byte))
+            }
+            _ => Err("expected one of , ; | tab space none".to_owned()),
+        },
+    }
+}
+
+pub fn decimal(text: &str) -> Result<u8, String> {
+    match text {
+        "." | "point" => Ok(b'.'),
+        "," | "comma" => Ok(b','),
+        _ => Err("expected . or ,".to_owned()),
+    }
+}
+
+pub fn digits(text: &str) -> Result<Digits, String> {
+    match text.parse::<u32>() {
+        Ok(count @ 1..=15) => Ok(Digits::Significant(count)),
+        _ if text == "shortest" => Ok(Digits::Shortest),
+        _ => Err("expected a number from 1 to 15, or \"shortest\"".to_owned()),
+    }
+}
+
+pub fn range(text: &str) -> Result<(f64, f64), String> {
+    let ends = text
+        .split_once("..")
+        .and_then(|(from, to)| Some((from.trim().parse().ok()?, to.trim().parse().ok()?)));
+    match ends {
+        Some((from, to)) if from < to => Ok((from, to)),
+        _ => Err("expected two times in seconds, such as 0.1..0.15".to_owned()),
+    }
+}
+
+pub fn orders(text: &str) -> Result<Orders, String> {
+    let wrong = || "expected orders such as 1-20 or 0.5,1,2".to_owned();
+    let mut all = Vec::new();
+    for item in text.split(',') {
+        match item.split_once('-') {
+            Some((from, to)) => {
+                let from: u32 = from.trim().parse().map_err(|_| wrong())?;
+                let to: u32 = to.trim().parse().map_err(|_| wrong())?;
+                if from > to || to as usize > 100_000 {
+                    return Err(wrong());
+                }
+                all.extend((from..=to).map(f64::from));
+            }
+            None => all.push(item.trim().parse::<f64>().map_err(|_| wrong())?),
+        }
+    }
+    if all.iter().any(|order| !(*order > 0.0 && order.is_finite())) {
+        return Err("orders must be greater than zero; the mean is always fitted".to_owned());
+    }
+    all.sort_by(f64::total_cmp);
+    all.dedup();
+    if all.len() > MOST_ORDERS {
+        return Err(format!(
+            "{} orders are too many; at most {MOST_ORDERS}",
+            all.len()
+        ));
+    }
+    Ok(Orders(all))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_read_as_people_write_them() {
+        assert_eq!(frequency("2400"), Ok(2400.0));
+        assert_eq!(frequency("2.4 kHz"), Ok(2400.0));
+        assert!(frequency("-1").is_err() && frequency("nan").is_err() && frequency("2 V").is_err());
+        assert_eq!(orders("1-3,0.5,2").unwrap().0, [0.5, 1.0, 2.0, 3.0]);
+        assert!(orders("3-1").is_err() && orders("0").is_err() && orders("a").is_err());
+        assert_eq!(delimiter("tab"), Ok(Delimiter::Byte(b'\t')));
+        assert!(delimiter("ab").is_err());
+        assert_eq!(range("0.1..0.2"), Ok((0.1, 0.2)));
+        assert!(range("0.2..0.1").is_err());
+        assert_eq!(digits("9"), Ok(Digits::Significant(9)));
+        assert!(digits("0").is_err() && digits("16").is_err());
+    }
+}
