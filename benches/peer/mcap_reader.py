@@ -1,5 +1,6 @@
 """One number of a ROS 2 JointState recording: torqcomp beside the Python `mcap` reader with ROS 2
-decoding, on the same file, one after the other, as user plus system time on one core.
+decoding, on the same file, one after the other, as user plus system time on one core. Each compression has several
+rounds, the reader once and then torqcomp several times; printed are medians, and the smallest and largest ratio.
 
 Usage: python mcap_reader.py path/to/torqcomp [messages]
 Needs the packages mcap and mcap-ros2-support.
@@ -7,6 +8,7 @@ Needs the packages mcap and mcap-ros2-support.
 
 import os
 import resource
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -24,6 +26,8 @@ DEFINITION = (
     "string frame_id\n" + "=" * 80 + "\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
 )
 JOINTS = 6
+ROUNDS = 3
+RUNS = 5
 
 
 def make(path, compression, messages):
@@ -60,27 +64,31 @@ def python_seconds(path):
 
 def torqcomp_seconds(torqcomp, path):
     command = [torqcomp, "extract", str(path), "--topic", "/joint_states", "--field", "effort[0]"]
-    best = float("inf")
-    for _ in range(3):
+    used = []
+    for _ in range(RUNS):
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         subprocess.run([*command, "-o", os.devnull], check=True, capture_output=True)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-        best = min(best, used)
-    return best
+        used.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+    return statistics.median(used)
 
 
 def main():
     torqcomp, messages = sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else 100_000
-    print("compression  messages  python s  torqcomp s  times  torqcomp messages/s")
+    print("compression  messages  python s  torqcomp s  times              torqcomp messages/s")
     with tempfile.TemporaryDirectory() as folder:
         for name in ("NONE", "ZSTD", "LZ4"):
             path = Path(folder) / f"{name}.mcap"
             make(path, getattr(CompressionType, name), messages)
-            theirs, _ = python_seconds(path)
-            ours = torqcomp_seconds(torqcomp, path)
+            rounds = []
+            for _ in range(ROUNDS):
+                theirs, _ = python_seconds(path)
+                rounds.append((theirs, torqcomp_seconds(torqcomp, path)))
+            theirs, ours = (statistics.median(seconds) for seconds in zip(*rounds))
+            ratios = sorted(theirs / ours for theirs, ours in rounds)
+            times = f"{statistics.median(ratios):.0f} ({ratios[0]:.0f}..{ratios[-1]:.0f})"
             print(
-                f"{name:11}  {messages:8}  {theirs:8.2f}  {ours:10.3f}  {theirs / ours:5.0f}"
+                f"{name:11}  {messages:8}  {theirs:8.2f}  {ours:10.3f}  {times:17}"
                 f"  {messages / ours:12.0f}"
             )
 

@@ -1,7 +1,6 @@
 //! Bytes of any encoding and with any line ends to text with line feeds.
 
-use encoding_rs::SHIFT_JIS;
-
+use super::encoding;
 use crate::failure::Failure;
 use crate::report::Warning;
 
@@ -45,13 +44,10 @@ pub fn decode(bytes: Vec<u8>) -> Result<Text, Failure> {
             format!("{zeros} zero byte(s) stand in the text; they were left out"),
         ));
     }
-    if is_shift_jis(&bytes[..bytes.len().min(HEAD)]) {
-        oddities.push("Shift-JIS");
-        bytes = SHIFT_JIS
-            .decode_without_bom_handling(&bytes)
-            .0
-            .into_owned()
-            .into_bytes();
+    if let Some(encoding) = encoding::told(&bytes[..bytes.len().min(HEAD)]) {
+        oddities.push(encoding::name(encoding));
+        let (text, _) = encoding.decode_without_bom_handling(&bytes);
+        bytes = text.into_owned().into_bytes();
     }
     while bytes.last() == Some(&0x1A) {
         bytes.pop();
@@ -114,36 +110,6 @@ fn from_utf16(bytes: &[u8], is_big: bool) -> Vec<u8> {
     }
 }
 
-/// Whether it is Japanese text in Shift-JIS, not UTF-8 and not the Latin-1 or Windows-1252 of western
-/// recorders: it decodes without a fault, most characters beyond ASCII are of two bytes that begin
-/// with one that Latin-1 leaves unused, and two of them make a word somewhere.
-fn is_shift_jis(head: &[u8]) -> bool {
-    // A character that is cut at the end of the head is no fault.
-    let is_utf8 = |head: &[u8]| match std::str::from_utf8(head) {
-        Ok(_) => true,
-        Err(error) => error.error_len().is_none(),
-    };
-    if head.is_ascii() || is_utf8(head) {
-        return false;
-    }
-    let whole = head
-        .iter()
-        .rposition(|byte| *byte == b'\n')
-        .map_or(head, |end| &head[..end]);
-    let (_, has_faults) = SHIFT_JIS.decode_without_bom_handling(whole);
-    let (mut doubles, mut others, mut words) = (0_usize, 0_usize, 0_usize);
-    let (mut at, mut was_double) = (0, false);
-    while let Some(byte) = whole.get(at) {
-        let is_double = matches!(byte, 0x81..=0x9F);
-        doubles += usize::from(is_double);
-        others += usize::from(!is_double && *byte >= 0x80);
-        words += usize::from(is_double && was_double);
-        was_double = is_double;
-        at += if is_double || *byte >= 0xE0 { 2 } else { 1 };
-    }
-    !has_faults && words > 0 && doubles > others
-}
-
 /// Brings line ends of CR alone and of CR CR LF to LF. CR LF stays: the readers take it.
 fn line_ends(bytes: &mut Vec<u8>) -> Option<&'static str> {
     let head = &bytes[..bytes.len().min(HEAD)];
@@ -194,24 +160,6 @@ mod tests {
         for (mark, big) in [(&b"\xFF\xFE"[..], false), (b"\xFE\xFF", true), (b"", false)] {
             let bytes = [mark, &wide(big)].concat();
             assert_eq!(text(&bytes), "Zeit;\u{b5}m\n1;2\n", "{mark:?} {big}");
-        }
-    }
-
-    #[test]
-    fn japanese_is_told_from_western_letters() {
-        let japanese = "時間,トルク[N・m],回転数\n0,1.5,60\n";
-        let (bytes, _, _) = SHIFT_JIS.encode(japanese);
-        assert_eq!(text(&bytes), japanese);
-        assert_eq!(decode(bytes.into_owned()).unwrap().oddities, ["Shift-JIS"]);
-        // Latin-1 and Windows-1252, with quotation marks and a dash.
-        for western in [
-            &b"Kr\xE4nge [\xB5m/m];Temperatur [\xB0C]\n1;2\n"[..],
-            b"\xDCberh\xF6hung;Gr\xF6\xDFe;\xC4\xD6\xDC\xE4\xF6\xFC\n1;2\n",
-            b"it\x92s \x93good\x94 \x96 it\x92s;b\n1;2\n",
-            b"Acc\xE9l\xE9ration [m/s\xB2];d\xE9bit\n1;2\n",
-        ] {
-            let found = decode(western.to_vec()).unwrap();
-            assert_eq!((found.bytes.as_slice(), found.oddities.len()), (western, 0));
         }
     }
 

@@ -10,6 +10,7 @@ mod blocks;
 mod cell;
 mod clock;
 mod decode;
+mod encoding;
 mod head;
 mod header;
 mod keys;

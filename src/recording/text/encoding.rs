@@ -1,0 +1,141 @@
+//! Encodings of text before Unicode, told from its bytes.
+//!
+//! Western recorders write Windows-1252, often nothing of it but the signs of units (°, µ, ²): that is what is taken
+//! unless a word says otherwise. Words are judged by `chardetng`, which knows how often letters follow each other in the
+//! languages of each encoding; a sign or two are too little for it.
+
+use chardetng::{EncodingDetector, Iso2022JpDetection, Utf8Detection};
+use encoding_rs::{Encoding, SHIFT_JIS, WINDOWS_1252};
+
+/// Bytes beyond ASCII that follow each other in a word of an alphabet or script that is not Latin.
+const WORD: usize = 4;
+
+/// The encoding of a text by its head; none for UTF-8 and Windows-1252.
+pub fn told(head: &[u8]) -> Option<&'static Encoding> {
+    // A character that is cut at the end of the head is no fault.
+    let is_utf8 = |head: &[u8]| match std::str::from_utf8(head) {
+        Ok(_) => true,
+        Err(error) => error.error_len().is_none(),
+    };
+    if head.is_ascii() || is_utf8(head) {
+        return None;
+    }
+    let last_line = head.iter().rposition(|byte| *byte == b'\n');
+    let whole = last_line.map_or(head, |end| &head[..end]);
+    if is_shift_jis(whole) {
+        return Some(SHIFT_JIS);
+    }
+    let mut detector = EncodingDetector::new(Iso2022JpDetection::Deny);
+    detector.feed(whole, true);
+    let guess = detector.guess(None, Utf8Detection::Deny);
+    let (text, has_faults) = guess.decode_without_bom_handling(whole);
+    let is_foreign = |c: char| c.is_alphabetic() && !is_latin(c);
+    let has_words = match text.chars().any(is_foreign) {
+        true => has_long_run(whole),
+        false => whole.windows(3).any(is_letter_in_word),
+    };
+    (guess != WINDOWS_1252 && !has_faults && has_words).then_some(guess)
+}
+
+/// The name of an encoding for people.
+pub fn name(encoding: &'static Encoding) -> &'static str {
+    match encoding.name() {
+        "Shift_JIS" => "Shift-JIS",
+        name => name,
+    }
+}
+
+fn is_latin(c: char) -> bool {
+    matches!(c, '\0'..='\u{24F}' | '\u{1E00}'..='\u{1EFF}')
+}
+
+/// Whether bytes beyond ASCII make a word somewhere.
+fn has_long_run(text: &[u8]) -> bool {
+    text.split(u8::is_ascii).any(|run| run.len() >= WORD)
+}
+
+/// Whether a byte beyond ASCII is a letter between two letters and not the sign of a unit, of which µ alone stands
+/// before one.
+fn is_letter_in_word(bytes: &[u8]) -> bool {
+    let &[before, byte, after] = bytes else {
+        return false;
+    };
+    byte >= 0x80 && byte != 0xB5 && before.is_ascii_alphabetic() && after.is_ascii_alphabetic()
+}
+
+/// Whether it is Japanese text in Shift-JIS: it decodes without a fault, most characters beyond ASCII are of two bytes
+/// that begin with one that Latin-1 leaves unused, and two of them make a word somewhere.
+fn is_shift_jis(whole: &[u8]) -> bool {
+    let (_, has_faults) = SHIFT_JIS.decode_without_bom_handling(whole);
+    let (mut doubles, mut others, mut words) = (0_usize, 0_usize, 0_usize);
+    let (mut at, mut was_double) = (0, false);
+    while let Some(byte) = whole.get(at) {
+        let is_double = matches!(byte, 0x81..=0x9F);
+        doubles += usize::from(is_double);
+        others += usize::from(!is_double && *byte >= 0x80);
+        words += usize::from(is_double && was_double);
+        was_double = is_double;
+        at += if is_double || *byte >= 0xE0 { 2 } else { 1 };
+    }
+    !has_faults && words > 0 && doubles > others
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::text::decode::decode;
+
+    #[test]
+    fn words_of_other_scripts_tell_the_encoding() {
+        for (words, encoding) in [
+            ("时间(s),扭矩(Nm),转速(rpm)\n0,1,2\n", encoding_rs::GBK),
+            ("시간(s),토크(Nm)\n0,1\n", encoding_rs::EUC_KR),
+            ("時間,扭矩,轉速\n0,1,2\n", encoding_rs::BIG5),
+            ("時間(s),トルク(Nm)\n0,1\n", encoding_rs::EUC_JP),
+            ("Время, с;Момент, Нм\n0;1\n", encoding_rs::WINDOWS_1251),
+            ("Prędkość;Siła [N]\n0;1\n", encoding_rs::WINDOWS_1250),
+        ] {
+            let (bytes, _, _) = encoding.encode(words);
+            let text = decode(bytes.into_owned()).unwrap();
+            assert_eq!(String::from_utf8(text.bytes).unwrap(), words);
+            assert_eq!(text.oddities, [encoding.name()]);
+        }
+    }
+
+    #[test]
+    fn signs_of_units_tell_nothing() {
+        for western in [
+            "Dehnung µm/m",
+            "Ø [mm]",
+            "Kraft ± 5 %",
+            "µ",
+            "m³/h",
+            "x·s²",
+            "§ 3;¼",
+            "Nm/° ½",
+            "KRÄFTE;ÄÖÜ;Größe",
+        ] {
+            let (bytes, _, _) = WINDOWS_1252.encode(western);
+            assert_eq!(told(&bytes), None, "{western}");
+        }
+    }
+
+    #[test]
+    fn japanese_is_told_from_western_letters() {
+        let japanese = "時間,トルク[N・m],回転数\n0,1.5,60\n";
+        let (bytes, _, _) = SHIFT_JIS.encode(japanese);
+        let text = decode(bytes.into_owned()).unwrap();
+        assert_eq!(String::from_utf8(text.bytes).unwrap(), japanese);
+        assert_eq!(text.oddities, ["Shift-JIS"]);
+        // Latin-1 and Windows-1252, with quotation marks and a dash.
+        for western in [
+            &b"Kr\xE4nge [\xB5m/m];Temperatur [\xB0C]\n1;2\n"[..],
+            b"\xDCberh\xF6hung;Gr\xF6\xDFe;\xC4\xD6\xDC\xE4\xF6\xFC\n1;2\n",
+            b"it\x92s \x93good\x94 \x96 it\x92s;b\n1;2\n",
+            b"Acc\xE9l\xE9ration [m/s\xB2];d\xE9bit\n1;2\n",
+        ] {
+            let found = decode(western.to_vec()).unwrap();
+            assert_eq!((found.bytes.as_slice(), found.oddities.len()), (western, 0));
+        }
+    }
+}
