@@ -14,6 +14,7 @@ pub mod simulate;
 pub mod svg;
 
 use serde::Serialize;
+use unicode_width::UnicodeWidthStr;
 
 use crate::io::digits;
 
@@ -136,7 +137,7 @@ pub fn columns(rows: &[Vec<String>]) -> String {
     let width = |i: usize| {
         rows.iter()
             .filter_map(|row| row.get(i))
-            .map(|cell| cell.chars().count())
+            .map(|cell| cell.width())
             .max()
             .unwrap_or(0)
     };
@@ -147,9 +148,12 @@ pub fn columns(rows: &[Vec<String>]) -> String {
             .iter()
             .zip(&widths)
             .enumerate()
-            .map(|(i, (cell, width))| match i {
-                0 => format!("{cell:<width$}"),
-                _ => format!("  {cell:>width$}"),
+            .map(|(i, (cell, width))| {
+                let rest = " ".repeat(width.saturating_sub(cell.width()));
+                match i {
+                    0 => format!("{cell}{rest}"),
+                    _ => format!("  {rest}{cell}"),
+                }
             })
             .collect();
         text.push_str(line.trim_end());

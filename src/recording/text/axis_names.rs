@@ -1,7 +1,21 @@
 //! Names of columns that hold time, the horizontal axis, or the number of the sample.
 
 /// Words that stand for time.
-const TIMES: [&str; 51] = [
+const TIMES: &[&str] = &[
+    "时间",
+    "时刻",
+    "日期",
+    "時間戳",
+    "시간",
+    "시각",
+    "время",
+    "дата",
+    "czas",
+    "čas",
+    "idő",
+    "χρόνος",
+    "aika",
+    "zaman",
     "heure",
     "horodatage",
     "durée",
@@ -163,9 +177,13 @@ pub fn is_axis_name(name: &str) -> bool {
 /// Whether a name stands for a number that counts samples.
 #[must_use]
 pub fn is_index_name(name: &str) -> bool {
-    const NAMES: [&str; 39] = [
+    const NAMES: &[&str] = &[
         "frame",
         "番号",
+        "序号",
+        "번호",
+        "номер",
+        "№",
         "x",
         "#",
         "nummer",

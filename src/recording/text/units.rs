@@ -1,4 +1,4 @@
-//! Units and headings as recorders write them, in English and German.
+//! Units and headings as recorders write them, in English, German and some other languages.
 
 use torqcomp_model::{Dimension, Unit};
 
@@ -9,7 +9,19 @@ pub use super::axis_names::{
 };
 
 /// Other ways to write a unit, in lower case, and how torqcomp writes it.
-const SYNONYMS: [(&str, &str); 47] = [
+const SYNONYMS: &[(&str, &str)] = &[
+    ("с", "s"),
+    ("мс", "ms"),
+    ("мкс", "us"),
+    ("秒", "s"),
+    ("毫秒", "ms"),
+    ("н·м", "N m"),
+    ("нм", "N m"),
+    ("н", "N"),
+    ("в", "V"),
+    ("мв", "mV"),
+    ("гц", "Hz"),
+    ("об/мин", "rpm"),
     ("sekunde", "s"),
     ("sekunden", "s"),
     ("sek", "s"),
@@ -138,7 +150,7 @@ pub struct Heading {
 }
 
 /// Reads a heading: what [`crate::io::csv::Column::read`] knows, and `C1 in V`, `U/V`, `Kraft, N`,
-/// a unit in brackets before other words, units in square brackets that are not known.
+/// `Torque Nm`, a unit in brackets before other words, units in square brackets that are not known.
 #[must_use]
 pub fn heading(text: &str) -> Heading {
     // "Zeit" t / s
@@ -175,9 +187,9 @@ pub fn heading(text: &str) -> Heading {
     {
         return Heading::new(name.trim().to_owned(), Some(unit), None);
     }
-    // Vitesse tr/min
+    // Vitesse tr/min, Torque Nm
     if let Some((name, word)) = text.rsplit_once(' ')
-        && is_speed(word)
+        && (is_speed(word) || ONLY_UNITS.contains(&word))
         && ![" in", " en", " em", " /", ","]
             .iter()
             .any(|mark| name.ends_with(mark))
@@ -201,6 +213,12 @@ pub fn heading(text: &str) -> Heading {
     Heading::new(text.to_owned(), time_word(text), None)
 }
 
+/// Words at the end of a name that are units and nothing else; `in`, `min` and `N` are not among them.
+const ONLY_UNITS: &[&str] = &[
+    "Nm", "N·m", "N.m", "N*m", "mNm", "kNm", "Н·м", "Нм", "mN", "kN", "mV", "µV", "uV", "kV", "mA",
+    "Hz", "kHz", "rpm", "kPa", "MPa", "hPa", "psi", "lbf", "µm/m", "°C", "°F",
+];
+
 /// Whether a word is a speed, so that its bar parts no name from a unit.
 fn is_speed(word: &str) -> bool {
     const WORDS: [&str; 15] = [
@@ -212,7 +230,8 @@ fn is_speed(word: &str) -> bool {
 
 /// The unit of time that is part of a name of time: `millis`, `Time ms`, `elapsed seconds`.
 fn time_word(text: &str) -> Option<NamedUnit> {
-    const WORDS: [(&str, &str); 24] = [
+    const WORDS: &[(&str, &str)] = &[
+        ("s", "s"),
         ("ms", "ms"),
         ("msec", "ms"),
         ("millis", "ms"),
@@ -361,6 +380,11 @@ mod tests {
             ("m/s", "m/s", None, false),
             ("Vitesse en tr/min", "Vitesse", Some("tr/min"), true),
             ("Couple en N.m", "Couple", Some("N.m"), true),
+            ("Torque Nm", "Torque", Some("Nm"), true),
+            ("Force N", "Force N", None, false),
+            ("Voltage in", "Voltage in", None, false),
+            ("Time s", "Time s", Some("s"), true),
+            ("Момент, Н·м", "Момент", Some("Н·м"), true),
             ("Temps en s", "Temps", Some("s"), true),
             ("Velocidade em 1/min", "Velocidade", Some("1/min"), true),
             ("Speed r/min", "Speed", Some("r/min"), true),

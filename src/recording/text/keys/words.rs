@@ -3,7 +3,12 @@
 use super::Topic;
 
 /// Keys that are about something exactly, in lower case without brackets.
-const EXACT: [(&str, Topic); 95] = [
+const EXACT: &[(&str, Topic)] = &[
+    ("单位", Topic::Unit),
+    ("日期", Topic::Date),
+    ("时间", Topic::Date),
+    ("дата", Topic::Date),
+    ("время", Topic::Date),
     ("x zero", Topic::Start),
     ("x at 0%", Topic::Start),
     ("x interval", Topic::Interval),
@@ -102,7 +107,26 @@ const EXACT: [(&str, Topic); 95] = [
 ];
 
 /// Words within keys, in the order in which they are looked for.
-const WITHIN: [(&str, Topic); 80] = [
+const WITHIN: &[(&str, Topic)] = &[
+    ("采样频率", Topic::Rate),
+    ("采样率", Topic::Rate),
+    ("采样速率", Topic::Rate),
+    ("采样间隔", Topic::Interval),
+    ("采样周期", Topic::Interval),
+    ("采样时间", Topic::Interval),
+    ("采样点数", Topic::Count),
+    ("サンプリング周波数", Topic::Rate),
+    ("サンプリングレート", Topic::Rate),
+    ("샘플링 주파수", Topic::Rate),
+    ("частота дискретизации", Topic::Rate),
+    ("частота опроса", Topic::Rate),
+    ("fréquence d'échantillonnage", Topic::Rate),
+    ("période d'échantillonnage", Topic::Interval),
+    ("pas de temps", Topic::Interval),
+    ("frecuencia de muestreo", Topic::Rate),
+    ("frequenza di campionamento", Topic::Rate),
+    ("taxa de amostragem", Topic::Rate),
+    ("częstotliwość próbkowania", Topic::Rate),
     ("測定間隔", Topic::Interval),
     ("サンプリング周期", Topic::Interval),
     ("サンプリング間隔", Topic::Interval),

@@ -170,3 +170,26 @@ fn values_in_one_line_are_one_channel() {
     assert_eq!(found.channels.len(), 1);
     assert_eq!(found.channels[0].samples.len(), 200);
 }
+
+/// Time, units, rate and numbers of samples in other languages and alphabets.
+#[test]
+fn words_of_other_languages() {
+    let russian = "Время, с;Момент, Н·м;Частота, об/мин\n";
+    let (head, _, _) = encoding_rs::WINDOWS_1251.encode(russian);
+    let rows = rows(40, ";", &[&step(0.01, 2), &wave, &wave]);
+    let found = read_bytes(&[&head, rows.as_bytes()].concat(), &Options::default());
+    check(
+        &found,
+        &[("Момент", "Н·м", 40), ("Частота", "об/мин", 40)],
+        Some(100.0),
+    );
+    let chinese = "采样频率,100 Hz\n扭矩(Nm),转速(rpm)\n";
+    let (head, _, _) = encoding_rs::GBK.encode(chinese);
+    let rows = self::rows(40, ",", &[&wave, &wave]);
+    let found = read_bytes(&[&head, rows.as_bytes()].concat(), &Options::default());
+    check(
+        &found,
+        &[("扭矩", "Nm", 40), ("转速", "rpm", 40)],
+        Some(100.0),
+    );
+}
