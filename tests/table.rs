@@ -44,6 +44,38 @@ fn a_delay_adds_to_the_phase_without_folding() {
 }
 
 #[test]
+fn linear_effects_are_in_it_and_others_are_refused() {
+    let folder = Folder::new();
+    let stand = |effect: &str| {
+        let text = format!("{}[[effects]]\n{effect}\n", crate::util::HERTEL);
+        folder.write("stand.toml", text);
+        folder.run(&[
+            "table",
+            "--stand",
+            "stand.toml",
+            "--from",
+            "500",
+            "--to",
+            "500",
+        ])
+    };
+    let ran = stand("kind = \"recorder-lowpass\"\nform = \"order-1\"\ncutoff = \"500 Hz\"");
+    let (_, rows) = rows_of(&ran.stdout);
+    // At its corner a low-pass lets 1/√2 through, 45 degrees late.
+    let (gain, lag) = hertel_response(500.0);
+    assert!(
+        (rows[0][1] * gain / 2.0_f64.sqrt() - 1.0).abs() < 1e-9,
+        "{rows:?}"
+    );
+    assert!(
+        (rows[0][2] - (45.0 - lag.to_degrees())).abs() < 1e-7,
+        "{rows:?}"
+    );
+    let cubic = "kind = \"cubic-stiffness\"\nform = \"beside\"\ncoefficient = \"1 N m/(N m)^3\"";
+    stand(cubic).says(1, &["cubic-stiffness", "no response over frequency"]);
+}
+
+#[test]
 fn uncertainty_is_empty_where_it_is_unknown() {
     let folder = Folder::new();
     let ran = folder.run(&[

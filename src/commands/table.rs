@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use serde::Serialize;
+use torqcomp_dsp::compensate::Inverse;
 
 use super::Outcome;
 use crate::cli;
@@ -52,8 +53,13 @@ pub fn run(args: &cli::Table) -> Result<Outcome, Failure> {
             "a table of {steps} rows is too long; choose a larger --step"
         )));
     }
+    let refined = match stand.effects.is_empty() {
+        true => None,
+        false => Some(stand.inverse()?),
+    };
     let rows: Vec<Row> = (0..=steps as u64)
-        .map(|i| row(&stand, mechanics, args.from + i as f64 * args.step))
+        .map(|i| args.from + i as f64 * args.step)
+        .map(|hz| row(&stand, mechanics, refined.as_ref(), hz))
         .collect();
     let text = if args.json {
         report::json(&Report {
@@ -74,9 +80,19 @@ pub fn run(args: &cli::Table) -> Result<Outcome, Failure> {
     Ok(Outcome::Done)
 }
 
-fn row(stand: &Stand, mechanics: &Mechanics, frequency_hz: f64) -> Row {
-    let inverse = mechanics.response.inverse(frequency_hz);
+/// A row of the plain stand, whose phase goes on beyond half a turn, or of the refined one.
+fn row(stand: &Stand, mechanics: &Mechanics, refined: Option<&Inverse>, frequency_hz: f64) -> Row {
     let recorder = &stand.recorder.recorder;
+    let (magnitude, phase_rad) = match refined {
+        Some(inverse) => inverse(frequency_hz).to_polar(),
+        None => {
+            let (magnitude, phase_rad) = mechanics.response.inverse(frequency_hz).to_polar();
+            (
+                magnitude / recorder.response(frequency_hz).norm(),
+                phase_rad - recorder.phase_rad(frequency_hz),
+            )
+        }
+    };
     let std = mechanics
         .response
         .inverse_uncertainty(frequency_hz, &mechanics.std)
@@ -84,8 +100,8 @@ fn row(stand: &Stand, mechanics: &Mechanics, frequency_hz: f64) -> Row {
         .flatten();
     Row {
         frequency_hz,
-        magnitude: inverse.norm() / recorder.response(frequency_hz).norm(),
-        phase_deg: (inverse.arg() - recorder.phase_rad(frequency_hz)).to_degrees(),
+        magnitude,
+        phase_deg: phase_rad.to_degrees(),
         magnitude_relative_std: std.as_ref().map(|s| s.magnitude_relative),
         phase_std_deg: std.as_ref().map(|s| s.phase_rad.to_degrees()),
     }
