@@ -134,7 +134,7 @@ pub struct Record {
     pub time_unit: Option<String>,
     /// Sampling rate, where there are no time stamps or they are wrong; with --resample, the rate
     /// to interpolate to
-    #[arg(long, value_name = "HZ", value_parser = positive_frequency)]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = positive_frequency)]
     pub rate: Option<f64>,
     /// Interpolate where the time stamps are not uniform, instead of refusing
     #[arg(long)]
@@ -216,7 +216,7 @@ pub struct Compensate {
     #[arg(long, value_name = "FILE")]
     pub stand: PathBuf,
     /// Compensate up to this frequency [default: 2400 Hz, or less if the rate demands it]
-    #[arg(long, value_name = "HZ", value_parser = positive_frequency)]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = positive_frequency)]
     pub band: Option<f64>,
     /// Units of the result
     #[arg(long, value_enum, default_value = "si")]
@@ -286,7 +286,7 @@ pub struct Harmonics {
     #[arg(long, value_name = "FILE")]
     pub stand: PathBuf,
     /// Fundamental frequency
-    #[arg(long, value_name = "HZ", value_parser = positive_frequency)]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = positive_frequency)]
     pub fundamental: f64,
     /// Orders of the fundamental: ranges and single ones, as in 1-20 or 0.5,1,2
     #[arg(long, value_name = "LIST", default_value = "1-20", value_parser = orders)]
@@ -295,7 +295,7 @@ pub struct Harmonics {
     #[arg(long)]
     pub refine: bool,
     /// How far from the given fundamental to search, in per cent of it
-    #[arg(long, value_name = "PERCENT", default_value = "2", requires = "refine", value_parser = percent)]
+    #[arg(long, value_name = "PERCENT", default_value = "2", requires = "refine", allow_negative_numbers = true, value_parser = percent)]
     pub refine_span: f64,
     /// Units of the result
     #[arg(long, value_enum, default_value = "si")]
@@ -318,13 +318,13 @@ pub struct Table {
     #[arg(long, value_name = "FILE")]
     pub stand: PathBuf,
     /// First frequency
-    #[arg(long, value_name = "HZ", default_value = "0", value_parser = frequency)]
+    #[arg(long, value_name = "HZ", default_value = "0", allow_negative_numbers = true, value_parser = frequency)]
     pub from: f64,
     /// Last frequency
-    #[arg(long, value_name = "HZ", default_value = "2500", value_parser = frequency)]
+    #[arg(long, value_name = "HZ", default_value = "2500", allow_negative_numbers = true, value_parser = frequency)]
     pub to: f64,
     /// Step of the frequency
-    #[arg(long, value_name = "HZ", default_value = "10", value_parser = positive_frequency)]
+    #[arg(long, value_name = "HZ", default_value = "10", allow_negative_numbers = true, value_parser = positive_frequency)]
     pub step: f64,
     /// Add the standard uncertainties that follow from those of the stand's constants
     #[arg(long)]

@@ -15,7 +15,7 @@ pub struct TimeAxis {
     #[arg(long, value_name = "UNIT")]
     pub time_unit: Option<String>,
     /// Sampling rate, where there are no time stamps or they are wrong
-    #[arg(long, value_name = "HZ", value_parser = positive_frequency)]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = positive_frequency)]
     pub rate: Option<f64>,
 }
 
