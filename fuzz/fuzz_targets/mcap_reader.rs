@@ -4,6 +4,7 @@
 use std::io::Cursor;
 
 use libfuzzer_sys::fuzz_target;
+use torqcomp::io::csv::Place;
 use torqcomp::io::mcap::record::frames::Frames;
 use torqcomp::io::mcap::record::input::Input;
 use torqcomp::io::mcap::{Inventory, Options, Selection, Source};
@@ -27,7 +28,8 @@ fuzz_target!(|bytes: &[u8]| {
             let (Ok(wanted), Some(frames)) = (selection.check(), frames(bytes)) else {
                 continue;
             };
-            let Ok(mut source) = Source::read(frames, &wanted, &Options::default()) else {
+            let Ok(mut source) = Source::read(&Place::Stdin, frames, &wanted, &Options::default())
+            else {
                 continue;
             };
             let (mut times, mut values) = (Vec::new(), Vec::new());

@@ -46,10 +46,11 @@ pub(super) static EFFECT: Effect = Effect {
             name: "high-pass-leak",
             place: Place::Chain,
             parameters: &[
-                Parameter::number("share", -3.0, 3.0),
-                Parameter::frequency("corner", 0.01, 30.0),
+                // A small capacitor has a corner far above the band, and much of it passes there.
+                Parameter::number("share", -100.0, 100.0),
+                Parameter::frequency("corner", 0.01, 300.0),
             ],
-            starts: &[&[0.01, 0.3], &[0.01, 1.0], &[0.01, 4.0]],
+            starts: &[&[0.01, 0.3], &[0.01, 1.0], &[0.01, 4.0], &[0.1, 40.0]],
             build: |p| {
                 let (share, corner) = (p[0], TAU * p[1]);
                 Action::Feedthrough(Box::new(move |_, omega| {

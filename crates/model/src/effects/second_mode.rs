@@ -9,7 +9,8 @@ use super::{Action, Effect, Form, Mode, Parameter, Place};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
-const FREQUENCY: Parameter = Parameter::frequency("frequency", 0.05, 60.0);
+/// Far above the band nothing shows of a mode but a slope, which has other causes.
+const FREQUENCY: Parameter = Parameter::frequency("frequency", 0.05, 20.0);
 const DAMPING: Parameter = Parameter::number("damping_ratio", 1e-4, 1.0);
 const SHARE: Parameter = Parameter::number("share", -3.0, 3.0);
 
