@@ -138,15 +138,19 @@ fn threads_do_not_change_a_byte() {
     assert!(one.stdout.contains("\"gain-error\""));
 }
 
-/// A complete stand's records, each measured sample changed by a function of the row, and what is said of them.
-fn changed(case: &Case, change: impl Fn(usize, f64) -> f64) -> serde_json::Value {
+/// A case's records, each measured sample changed by a function of what was applied, the row and itself, and what is
+/// said of them.
+fn changed(case: &Case, change: impl Fn(&[f64], usize, f64) -> f64) -> serde_json::Value {
     let folder = folder(case);
-    for name in ["train.csv", "holdout.csv"] {
+    for (name, record) in [("train.csv", &case.train), ("holdout.csv", &case.holdout)] {
         let text = folder.read(name);
         let rows = text.lines().enumerate().map(|(row, line)| {
             let (head, measured) = line.rsplit_once(',').expect("three columns");
             match measured.parse() {
-                Ok(measured) => format!("{head},{:.8}\n", change(row, measured)),
+                Ok(measured) => {
+                    let measured = change(&record.applied_n_m, row, measured);
+                    format!("{head},{measured:.8}\n")
+                }
                 Err(_) => line.to_owned() + "\n",
             }
         });
@@ -167,7 +171,7 @@ fn is_unexplained(report: &serde_json::Value, says: &str) {
 fn spikes_are_neither_noise_nor_an_effect() {
     let case = make(7, "none", 1).expect("the catalogue has it");
     let height = 40.0 * noise_rms(&case);
-    let report = changed(&case, |row, y| {
+    let report = changed(&case, |_, row, y| {
         y + if row % 613 == 300 { height } else { 0.0 }
     });
     is_unexplained(&report, "spikes");
@@ -178,12 +182,28 @@ fn a_gain_that_swings_or_trembles_is_neither_noise_nor_an_effect() {
     let case = make(7, "none", 1).expect("the catalogue has it");
     // 1 % at 7 Hz.
     let swings = |row: usize| 0.01 * (0.0022 * row as f64).sin();
-    let report = changed(&case, |row, y| y * (1.0 + swings(row)));
+    let report = changed(&case, |_, row, y| y * (1.0 + swings(row)));
     is_unexplained(&report, "constants that change over the record");
     // 1 % from sample to sample: the fractions of a multiple of the golden ratio are even between 0 and 1.
     let trembles = |row: usize| 0.035 * ((row as f64 * 0.618_033_988_75).fract() - 0.5);
-    let report = changed(&case, |row, y| y * (1.0 + trembles(row)));
+    let report = changed(&case, |_, row, y| y * (1.0 + trembles(row)));
     is_unexplained(&report, "the size of the signal from moment to moment");
+}
+
+/// Less than half as much as the noise comes 10 samples after the load: the right name stands, and is not called the whole.
+#[test]
+fn an_effect_that_leaves_an_echo_explains_a_part() {
+    let case = make(7, "cubic-stiffness", 1).expect("the catalogue has it");
+    let applied = &case.holdout.applied_n_m;
+    let squares: f64 = applied.iter().map(|u| u * u).sum();
+    let gain = 0.4 * noise_rms(&case) / (squares / applied.len() as f64).sqrt();
+    let report = changed(&case, |applied, row, y| {
+        y + gain * if row > 10 { applied[row - 11] } else { 0.0 }
+    });
+    assert_eq!(report["verdict"], "partly-explained", "{report}");
+    assert_eq!(report["effects"][0], "cubic-stiffness");
+    assert_eq!(report["residual"]["independent_of_input"], false);
+    assert_eq!(report["candidates"][0]["effect"], "cubic-stiffness");
 }
 
 /// A law that no list has is suspected, and no effect that resembles it is named. Of the two laws with a

@@ -41,6 +41,8 @@ const FAR_ABOVE: f64 = 1.5;
 const NAMED: f64 = 0.5;
 /// Error over a noise floor that was seen, from which on that part is known well enough to ask for it.
 const CLEARLY_ABOVE: f64 = 1.05;
+/// Error over the noise floor above which what follows the input is left and not by chance.
+const ABOVE: f64 = 1.02;
 /// Part of what is missing at first that a second effect must explain to be named.
 const SECOND: f64 = 0.02;
 
@@ -95,6 +97,13 @@ pub(super) fn remains(judged: &Judged, dependence: &Dependence, floor: Option<Fl
         "periods" => ratio > AT_FLOOR,
         _ => ratio > AT_FLOOR && (structured || ratio > FAR_ABOVE && !dependence.white),
     }
+}
+
+/// Whether effects leave more than they should of what they are to explain, little as it may be: what is left is above
+/// the noise, has a colour, and follows the input.
+fn follows_input(judged: &Judged, dependence: &Dependence, floor: Option<Floor>) -> bool {
+    let is_above = floor.is_none_or(|floor| judged.hold_rms() > ABOVE * floor.rms);
+    is_above && !dependence.white && !dependence.independent_of_input
 }
 
 /// A second effect that explains next to nothing of what was missing at first is not named: what no model has
@@ -152,7 +161,8 @@ impl Diagnosis<'_> {
             floor.from == "periods" && self.before.hold_rms() > CLEARLY_ABOVE * floor.rms
         };
         if explained >= NAMED || !left && !self.floor.is_some_and(known) {
-            self.verdict = if left {
+            let follows = follows_input(&self.after, &self.dependence, self.floor);
+            self.verdict = if left || follows {
                 Verdict::PartlyExplained
             } else {
                 Verdict::Explained

@@ -342,6 +342,10 @@ impl Rendered<'_> {
             )),
             // What changes over a record follows from the motion in each stretch of it.
             None if tests.unsteady().is_some() => {}
+            None if !tests.independent_of_input => parts.push(format!(
+                "correlated with the input beyond chance (99 %), most at a lag of {} samples",
+                tests.largest_lag
+            )),
             None => {
                 parts.push("independent of input and motion as far as the tests see".to_owned())
             }
@@ -385,7 +389,8 @@ impl Rendered<'_> {
         let level = self.levels[1] / self.levels[0];
         let error = relative[1] / relative[0];
         let differ = |ratio: f64, factor: f64| ratio.ln().abs() > factor.ln();
-        (differ(level, LEVELS_DIFFER) && differ(error, ERRORS_DIFFER)).then(|| {
+        let is_open = self.diagnosis.verdict != Verdict::Explained;
+        (is_open && differ(level, LEVELS_DIFFER) && differ(error, ERRORS_DIFFER)).then(|| {
             format!(
                 "the plain stand leaves {:.1} % of the training records and {:.1} % of the held-out ones, which are excited {} times \
                  as much: what it lacks depends on amplitude",
