@@ -97,6 +97,37 @@ fn an_input_that_is_held_is_no_effect() {
     assert!((after / 0.005 - 1.0).abs() < 0.05, "{after}");
 }
 
+/// A drift begins with the record, also where its stamps are seconds of 1970.
+#[test]
+fn stamps_far_from_zero_do_not_move_a_drift() {
+    let folder = Folder::new();
+    let drift = "[[effects]]\nkind = \"thermal-drift\"\nform = \"exponential\"\ndrift = \"2 N m\"\ntime_constant = \"0.05 s\"\n";
+    folder.write("stand.toml", format!("{STAND}{drift}"));
+    let rest = vec![0.0; 3000];
+    let text = record(&rest, &rest);
+    folder.write("record.csv", &text);
+    folder.write("later.csv", text.replace("\n0.", "\n1700000000."));
+    let answer = |file: &str| {
+        let args = [
+            "simulate",
+            file,
+            "--stand",
+            "stand.toml",
+            "--applied",
+            "applied_n_m",
+        ];
+        let (_, rows) = table(&folder.run(&args).stdout);
+        rows.iter().map(|row| row[1]).collect::<Vec<f64>>()
+    };
+    let (first, later) = (answer("record.csv"), answer("later.csv"));
+    assert_eq!(first.len(), 3000);
+    // 2 (1 - 1/e) after one time constant: 1.26424.
+    assert!((first[1000] - 1.264_24).abs() < 1e-5, "{}", first[1000]);
+    for (a, b) in first.iter().zip(&later) {
+        assert!((a - b).abs() < 1e-6, "{a} {b}");
+    }
+}
+
 #[test]
 fn columns_that_the_stand_does_not_take_are_refused() {
     let folder = Folder::new();

@@ -241,7 +241,10 @@ pub(super) fn refusal(judged: &Judged, before: &Judged) -> Option<String> {
         ));
     }
     if gain < LEAST_GAIN * variance || comparison.significance() < LEAST_SIGNIFICANCE {
-        return Some("the error on the held-out records falls by no more than chance".to_owned());
+        return Some(format!(
+            "the error on the held-out records falls by no more than chance, seen from stretch to stretch ({:+.2} % over all)",
+            100.0 * (judged.hold_rms() / before.hold_rms() - 1.0)
+        ));
     }
     if gain < LEAST_SHARE * total {
         return Some(format!(

@@ -51,10 +51,7 @@ pub fn invert(
 
 /// How far from zero towards an end a curve can be inverted.
 fn branch_end(apply: &Transform, undo: &Transform, end: f64) -> f64 {
-    let now = Clock {
-        start_s: 0.0,
-        step_s: 0.0,
-    };
+    let now = Clock { step_s: 0.0 };
     let step = 1e-6 * end.abs();
     let good = |y: f64| {
         let mut x = [y - step, y + step];
@@ -89,10 +86,7 @@ pub fn at_limit(apply: &Transform, samples: &[f64], noise_std: f64) -> ([f64; 2]
         .iter()
         .fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
     let mut limits = [-1e3 * largest, 1e3 * largest];
-    let now = Clock {
-        start_s: 0.0,
-        step_s: 0.0,
-    };
+    let now = Clock { step_s: 0.0 };
     apply(now, &mut limits);
     let near = |limit: f64| AT_LIMIT * noise_std + RELATIVE * limit.abs();
     let lost = |y: &f64| *y <= limits[0] + near(limits[0]) || *y >= limits[1] - near(limits[1]);
@@ -105,10 +99,7 @@ mod tests {
     use super::*;
     use torqcomp_model::effects::{Action, Effect};
 
-    const CLOCK: Clock = Clock {
-        start_s: 0.0,
-        step_s: 1e-3,
-    };
+    const CLOCK: Clock = Clock { step_s: 1e-3 };
 
     fn curve(effect: &str, form: &str, values: &[f64]) -> (Transform, Option<Transform>) {
         let form = Effect::named(effect).unwrap().form(Some(form)).unwrap();

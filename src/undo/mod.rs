@@ -130,17 +130,10 @@ impl Undo {
     ///
     /// # Errors
     /// If a coupling past the stand and the torques in it do not come into agreement.
-    pub fn run(
-        &self,
-        record: &[f64],
-        rate_hz: f64,
-        start_s: f64,
-        noise_std: f64,
-    ) -> Result<Undone, Failure> {
+    pub fn run(&self, record: &[f64], rate_hz: f64, noise_std: f64) -> Result<Undone, Failure> {
         let lead = (4 * self.filter.half_length()).max(SHORTEST_LEAD);
         let extension = Extension::new(record.len(), rate_hz, lead);
         let clock = Clock {
-            start_s,
             step_s: 1.0 / rate_hz,
         };
         let back = |torque: Option<&[f64]>| {

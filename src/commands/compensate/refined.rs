@@ -61,7 +61,7 @@ pub fn run(args: &Compensate, plan: Plan, sink: &mut Sink) -> Result<Run, Failur
         (0.5 * noise.floor_density * record.rate_hz).sqrt() * stand.gain() / scale
     });
     let recorded: Vec<f64> = record.samples.iter().map(|x| x * stand.gain()).collect();
-    let mut undone = undo.run(&recorded, record.rate_hz, record.start_s, noise_std)?;
+    let mut undone = undo.run(&recorded, record.rate_hz, noise_std)?;
     let torque = std::mem::take(&mut undone.applied);
     let noise_rms = if noise_std > 0.0 {
         Some(scale * spread(&undo, &record, (&recorded, &torque), noise_std)?)
@@ -123,7 +123,7 @@ fn spread(
     // Twelve uniform numbers have a variance of one together.
     let mut normal = || (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
     let noisy: Vec<f64> = recorded.iter().map(|y| y + noise_std * normal()).collect();
-    let other = undo.run(&noisy, record.rate_hz, record.start_s, noise_std)?;
+    let other = undo.run(&noisy, record.rate_hz, noise_std)?;
     let pairs = other.applied.iter().zip(torque);
     let square: f64 = pairs.map(|(a, b)| (a - b).powi(2)).sum();
     Ok((square / torque.len() as f64).sqrt())

@@ -37,20 +37,18 @@ pub type Frequency = Box<dyn Fn(&Mode, f64) -> Complex64 + Send + Sync>;
 /// A change of recorded samples in place.
 pub type Transform = Box<dyn Fn(Clock, &mut [f64]) + Send + Sync>;
 
-/// Times of samples.
+/// Times of samples since their record began: what drifts begins anew with each record, whatever its time stamps say.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clock {
-    /// Time of the first sample in s.
-    pub start_s: f64,
     /// Time between samples in s.
     pub step_s: f64,
 }
 
 impl Clock {
-    /// Time of a sample.
+    /// Time of a sample in s.
     #[must_use]
     pub fn time_s(&self, index: usize) -> f64 {
-        self.start_s + index as f64 * self.step_s
+        index as f64 * self.step_s
     }
 }
 

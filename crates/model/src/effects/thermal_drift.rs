@@ -1,7 +1,7 @@
 //! A zero or a sensitivity that moves with temperature.
 //!
 //! `linear`: `y = x + d t`; `exponential`: `y = x + D (1 − e^{−t/τ})`, a body that warms up; `sensitivity`:
-//! `y = (1 + g t) x`. `t` is the time of the record's own axis.
+//! `y = (1 + g t) x`. `t` is the time since the record began.
 //! `course`: any slow course, of up to eight half waves over the record; like the phase of a line it belongs to the
 //! record and is found anew in each. Thesis, Appendix B: "temperatures … not large enough" for the
 //! gage factor; as a zero shift 2 % of resistance at 85 °F is. **Valid over one warm-up.** Mistaken for `ac-coupled` of

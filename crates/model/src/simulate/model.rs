@@ -154,7 +154,6 @@ impl Model {
             Place::Disturbance,
         ];
         let clock = Clock {
-            start_s: input.start_s(),
             step_s: 1.0 / input.rate_hz(),
         };
         for place in ALONG {

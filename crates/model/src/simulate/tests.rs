@@ -368,7 +368,6 @@ fn what_the_chain_does_can_be_undone() {
             panic!("{effect} has no way back");
         };
         let clock = crate::effects::Clock {
-            start_s: 0.0,
             step_s: 1.0 / RATE_HZ,
         };
         let before: Vec<f64> = (0..200).map(|i| 3.0 * (0.1 * f64::from(i)).sin()).collect();
