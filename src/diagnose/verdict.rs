@@ -42,7 +42,7 @@ const NAMED: f64 = 0.5;
 /// Error over a noise floor that was seen, from which on that part is known well enough to ask for it.
 const CLEARLY_ABOVE: f64 = 1.05;
 /// Error over the noise floor above which what follows the input is left and not by chance.
-const ABOVE: f64 = 1.02;
+const ABOVE: f64 = 1.005;
 /// Part of what is missing at first that a second effect must explain to be named.
 const SECOND: f64 = 0.02;
 

@@ -9,6 +9,7 @@ use super::protobuf;
 use super::route::{Hop, Route};
 use super::schema::Schema;
 use super::time::Stamp;
+use crate::failure::did_you_mean;
 
 /// What is wanted of every message.
 #[derive(Debug, Clone, PartialEq)]
@@ -65,7 +66,12 @@ pub enum Damage {
         count: u64,
     },
     /// No item has that name.
-    NoName(String),
+    NoName {
+        /// Name asked for.
+        name: String,
+        /// The first names that there are.
+        there: Vec<String>,
+    },
     /// The message says it is encoded in a way that is not known.
     Encapsulation(u8),
     /// The field is not set.
@@ -81,7 +87,18 @@ impl fmt::Display for Damage {
             Self::NoItem { index, count } => {
                 write!(f, "there is no item [{index}], the list has {count}")
             }
-            Self::NoName(name) => write!(f, "no item is called \"{name}\""),
+            Self::NoName { name, there } => {
+                let known = there.iter().map(String::as_str);
+                write!(
+                    f,
+                    "no item is called \"{name}\"{}",
+                    did_you_mean(name, known)
+                )?;
+                match there.is_empty() {
+                    true => f.write_str("; none has a name"),
+                    false => write!(f, "; there are: {}", there.join(", ")),
+                }
+            }
             Self::Encapsulation(kind) => write!(
                 f,
                 "its encapsulation 0x{kind:02x} is not supported; expected plain CDR (0x00, 0x01) \
@@ -89,6 +106,63 @@ impl fmt::Display for Damage {
             ),
             Self::Absent => f.write_str("the field is not set"),
             Self::Malformed(why) => write!(f, "the message cannot be read: {why}"),
+        }
+    }
+}
+
+/// Most names that are told, and most bytes of one.
+const NAMES: usize = 32;
+const NAME_BYTES: usize = 100;
+
+/// A name that is looked for among those of the items of a list.
+#[derive(Debug, Default)]
+pub struct Names<'a> {
+    wanted: &'a [u8],
+    /// Items seen so far.
+    pub seen: usize,
+    /// Place of the first item with the name.
+    pub found: Option<usize>,
+    /// Names seen, where they are to be listed.
+    there: Option<Vec<String>>,
+}
+
+impl<'a> Names<'a> {
+    /// A search for a name.
+    #[must_use]
+    pub fn search(wanted: &'a [u8]) -> Self {
+        Self {
+            wanted,
+            ..Self::default()
+        }
+    }
+
+    /// The same search once more, to list what there is.
+    #[must_use]
+    pub fn listing(&self) -> Self {
+        Self {
+            there: Some(Vec::new()),
+            ..Self::search(self.wanted)
+        }
+    }
+
+    /// Looks at the name of the next item.
+    pub fn compare(&mut self, text: &[u8]) {
+        if self.found.is_none() && text == self.wanted {
+            self.found = Some(self.seen);
+        }
+        self.seen += 1;
+        if let Some(there) = self.there.as_mut().filter(|there| there.len() < NAMES) {
+            let text = &text[..text.len().min(NAME_BYTES)];
+            there.push(String::from_utf8_lossy(text).into_owned());
+        }
+    }
+
+    /// What is said where the name is not among them.
+    #[must_use]
+    pub fn missing(self) -> Damage {
+        Damage::NoName {
+            name: String::from_utf8_lossy(self.wanted).into_owned(),
+            there: self.there.unwrap_or_default(),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::decode::{Damage, Reading, Targets};
+use super::decode::{Damage, Names, Reading, Targets};
 use super::route::Hop;
 use super::schema::{Kind, Schema};
 
@@ -52,11 +52,14 @@ impl Decoder {
             .map_err(|error| Damage::Malformed(format!("no JSON: {error}")))?;
         let mut place = None;
         if let Some((steps, name)) = &self.lookup {
-            let mut seen = 0;
-            find(&message, steps, name, &mut seen, &mut place);
-            if place.is_none() {
-                return Err(Damage::NoName(name.clone()));
+            let mut names = Names::search(name.as_bytes());
+            find(&message, steps, &mut names);
+            if names.found.is_none() {
+                names = names.listing();
+                find(&message, steps, &mut names);
+                return Err(names.missing());
             }
+            place = names.found;
         }
         collect(&message, &self.value, place, &mut reading.values)?;
         if let Some((seconds, nanoseconds)) = &self.stamp {
@@ -136,22 +139,20 @@ fn collect(
 }
 
 /// Looks for a text among those at the end of a way.
-fn find(value: &Value, steps: &[Step], name: &str, seen: &mut usize, place: &mut Option<usize>) {
+fn find(value: &Value, steps: &[Step], names: &mut Names) {
+    // An item without a name is an item all the same.
     match steps.split_first() {
-        None => {
-            if place.is_none() && value.as_str() == Some(name) {
-                *place = Some(*seen);
-            }
-            *seen += 1;
-        }
+        None => match value.as_str() {
+            Some(text) => names.compare(text.as_bytes()),
+            None => names.seen += 1,
+        },
         Some((Step::Field(field), rest)) => match value.get(field) {
-            Some(inner) => find(inner, rest, name, seen, place),
-            // An item without a name is an item all the same.
-            None => *seen += 1,
+            Some(inner) => find(inner, rest, names),
+            None => names.seen += 1,
         },
         Some((_, rest)) => {
             for item in value.as_array().into_iter().flatten() {
-                find(item, rest, name, seen, place);
+                find(item, rest, names);
             }
         }
     }
@@ -221,7 +222,16 @@ mod tests {
             Err(Damage::Absent)
         );
         let said = read("effort[name=a]", r#"{"name": [], "effort": []}"#);
-        assert_eq!(said, Err(Damage::NoName("a".to_owned())));
+        let text = said.unwrap_err().to_string();
+        assert_eq!(text, "no item is called \"a\"; none has a name");
+        let said = read(
+            "effort[name=motr]",
+            r#"{"name": ["motor", "load"], "effort": [1, 2]}"#,
+        );
+        assert_eq!(
+            said.unwrap_err().to_string(),
+            "no item is called \"motr\" (did you mean \"motor\"?); there are: motor, load"
+        );
         assert!(matches!(read("on", "{"), Err(Damage::Malformed(_))));
     }
 }

@@ -73,7 +73,9 @@ impl Tally {
     /// Counts a message that gives no value.
     pub fn skip(&mut self, damage: Damage, log_time_ns: u64) {
         let skipped = match damage {
-            Damage::NoItem { .. } | Damage::NoName(_) | Damage::Absent => &mut self.without_item,
+            Damage::NoItem { .. } | Damage::NoName { .. } | Damage::Absent => {
+                &mut self.without_item
+            }
             _ => &mut self.unreadable,
         };
         skipped.add(damage, log_time_ns);

@@ -8,7 +8,7 @@ pub mod walk;
 
 use std::sync::Arc;
 
-use super::decode::{Damage, Reading, Targets};
+use super::decode::{Damage, Names, Reading, Targets};
 use super::schema::{Kind, Schema};
 use plan::{Plan, Rules};
 use walk::Walk;
@@ -83,13 +83,16 @@ impl Decoder {
             is_big,
             plan,
             reading,
-            name,
-            seen: 0,
-            found: None,
+            names: Names::search(name),
         };
         if !plan.lookup.is_empty() {
             walk.follow(&plan.lookup)?;
             walk.at = 0;
+            if walk.names.found.is_none() {
+                walk.names = walk.names.listing();
+                walk.follow(&plan.lookup)?;
+                return Err(walk.names.missing());
+            }
         }
         walk.follow(&plan.steps)
     }
@@ -147,9 +150,7 @@ impl Layout {
                 is_big,
                 plan,
                 reading,
-                name: &[],
-                seen: 0,
-                found: None,
+                names: Names::default(),
             };
             walk.skip(&plan.whole).is_ok() && data.len() - walk.at <= TAIL
         });

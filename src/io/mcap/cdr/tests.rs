@@ -291,7 +291,13 @@ fn damage_is_an_error_and_allocates_nothing() {
     let said = read(&schema, "effort[1]", &message);
     assert_eq!(said, Err(Damage::NoItem { index: 1, count: 1 }));
     let said = read(&schema, "effort[name=nobody]", &message);
-    assert_eq!(said, Err(Damage::NoName("nobody".to_owned())));
+    assert_eq!(
+        said,
+        Err(Damage::NoName {
+            name: "nobody".to_owned(),
+            there: vec!["left".to_owned(), "motor_joint".to_owned()]
+        })
+    );
     assert_eq!(
         read(&schema, "effort[0]", &[0, 3, 0, 0]),
         Err(Damage::Encapsulation(3))

@@ -1,7 +1,7 @@
 //! Following the steps of a plan through the bytes of a message.
 
 use super::plan::{Item, List, Pick, Plan, Sinks, Step};
-use crate::io::mcap::decode::{Damage, Reading};
+use crate::io::mcap::decode::{Damage, Names, Reading};
 use crate::io::mcap::route::Hop;
 use crate::io::mcap::schema::Number;
 
@@ -17,12 +17,8 @@ pub struct Walk<'a> {
     pub plan: &'a Plan,
     /// What is filled.
     pub reading: &'a mut Reading,
-    /// Name that is looked for.
-    pub name: &'a [u8],
-    /// Names seen so far.
-    pub seen: usize,
-    /// Place of the name.
-    pub found: Option<usize>,
+    /// The name that is looked for.
+    pub names: Names<'a>,
 }
 
 impl<'a> Walk<'a> {
@@ -145,10 +141,10 @@ impl<'a> Walk<'a> {
                 }
                 return Ok(());
             }
-            Hop::Called => self
-                .found
-                .and_then(|place| i64::try_from(place).ok())
-                .ok_or_else(|| Damage::NoName(String::from_utf8_lossy(self.name).into_owned()))?,
+            Hop::Called => {
+                let place = self.names.found.and_then(|place| i64::try_from(place).ok());
+                place.ok_or_else(|| std::mem::take(&mut self.names).missing())?
+            }
             Hop::Item(index) => index,
             Hop::Field(_) => return Err(Damage::Malformed("a list has no fields".to_owned())),
         };
@@ -191,10 +187,7 @@ impl<'a> Walk<'a> {
         let text = text.ok_or(Damage::Short)?;
         // CDR writes the zero at the end of a text, ROS 1 does not.
         let text = text.strip_suffix(&[0]).unwrap_or(text);
-        if self.found.is_none() && text == self.name {
-            self.found = Some(self.seen);
-        }
-        self.seen += 1;
+        self.names.compare(text);
         self.at += length;
         Ok(())
     }

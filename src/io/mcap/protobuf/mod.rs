@@ -5,7 +5,7 @@ pub mod wire;
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use super::decode::{Damage, Reading, Targets};
+use super::decode::{Damage, Names, Reading, Targets};
 use super::route::Hop;
 use super::schema::{Field, Kind, Schema, Wire};
 use wire::{Both, Content, Fields};
@@ -37,14 +37,16 @@ impl Decoder {
         let value = &self.targets.value;
         let mut found = None;
         if let Some(lookup) = &value.lookup {
-            let mut search = Search {
-                name: lookup.name.as_bytes(),
-                seen: 0,
-                found: None,
+            let run = |names| {
+                let mut search = Search(names);
+                search.run(&self.schema, self.schema.root, &lookup.hops, message)?;
+                Ok(search.0)
             };
-            search.run(&self.schema, self.schema.root, &lookup.hops, message)?;
-            let missing = || Damage::NoName(lookup.name.clone());
-            found = Some(search.found.ok_or_else(missing)?);
+            let names = run(Names::search(lookup.name.as_bytes()))?;
+            if names.found.is_none() {
+                return Err(run(names.listing())?.missing());
+            }
+            found = names.found;
         }
         let mut collect = Collect {
             schema: &self.schema,
@@ -219,11 +221,7 @@ fn place(hops: &[Hop], found: Option<usize>, count: usize) -> Result<Option<usiz
 }
 
 /// Looks for a text among those at the end of a way.
-struct Search<'a> {
-    name: &'a [u8],
-    seen: usize,
-    found: Option<usize>,
-}
+struct Search<'a>(Names<'a>);
 
 impl Search<'_> {
     fn run(
@@ -246,27 +244,20 @@ impl Search<'_> {
                 Kind::Struct(next) => self.run(schema, *next, rest, bytes)?,
                 Kind::Many(many) => match many.item {
                     Kind::Struct(next) => {
-                        let before = self.seen;
+                        let before = self.0.seen;
                         self.run(schema, next, behind, bytes)?;
                         // An item without a name is an item all the same.
-                        self.seen = before + 1;
+                        self.0.seen = before + 1;
                     }
-                    _ => self.compare(bytes),
+                    _ => self.0.compare(bytes),
                 },
                 _ => {}
             }
         }
         if let Some(text) = text {
-            self.compare(text);
+            self.0.compare(text);
         }
         Ok(())
-    }
-
-    fn compare(&mut self, text: &[u8]) {
-        if self.found.is_none() && text == self.name {
-            self.found = Some(self.seen);
-        }
-        self.seen += 1;
     }
 }
 

@@ -83,7 +83,13 @@ fn items_by_place_and_by_name() {
     assert_eq!(value("joints[0].torque").unwrap(), [4.0]);
     assert_eq!(value("joints[:].torque").unwrap(), [4.0, 8.0]);
     assert_eq!(value("z").unwrap(), [-2.0]);
-    assert_eq!(value("effort[name=c]"), Err(Damage::NoName("c".to_owned())));
+    assert_eq!(
+        value("effort[name=c]"),
+        Err(Damage::NoName {
+            name: "c".to_owned(),
+            there: vec!["a".to_owned(), "b".to_owned()]
+        })
+    );
     let index = 3;
     assert_eq!(value("effort[3]"), Err(Damage::NoItem { index, count: 3 }));
 }
