@@ -252,6 +252,13 @@ fn details(inventory: &Inventory) -> Vec<(String, String)> {
             topic.message_encoding, topic.messages
         );
         details.push((topic.topic.clone(), value));
+        let names = topic.leaves.iter().map(|leaf| &leaf.names);
+        if let Some(names) = names
+            .max_by_key(|names| names.len())
+            .filter(|n| !n.is_empty())
+        {
+            details.push((format!("names in {}", topic.topic), names.join(", ")));
+        }
     }
     for file in &inventory.attachments {
         let value = format!("{}, {}, {} bytes", file.name, file.media_type, file.size);

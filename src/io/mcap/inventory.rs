@@ -7,8 +7,8 @@ use mcap::records::op;
 use serde::Serialize;
 
 use super::channels::{Channel, Channels};
-use super::decode::{Decoder, Encoding, Reading, Targets};
-use super::path;
+use super::decode::{Damage, Decoder, Encoding, Reading, Targets};
+use super::path::{self, Part};
 use super::record::frames::Frames;
 use super::record::{AttachmentHead, HeaderRecord, Message, MetadataRecord};
 use super::route::Route;
@@ -24,6 +24,8 @@ use crate::report::Warning;
 
 /// Leaves of a channel whose value in the first message is shown.
 const EXAMPLES: usize = 64;
+/// A name that no item has: asked for, all names are told.
+const NOBODY: &str = "\0";
 
 /// What is in a file.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -100,6 +102,8 @@ pub struct LeafReport {
     pub unit: Option<String>,
     /// Value in the first message, of the first item in lists.
     pub example: Option<f64>,
+    /// Names of the items in the first message, of a number in a list whose items have names.
+    pub names: Vec<String>,
     /// Whether it is part of a time stamp.
     pub is_stamp: bool,
 }
@@ -401,9 +405,22 @@ fn leaf_report(
     message: Option<&[u8]>,
     metadata: &BTreeMap<String, String>,
 ) -> LeafReport {
-    let route = path::parse(&leaf.first_item())
-        .and_then(|parts| Route::find(schema, &parts))
-        .ok();
+    let parts = path::parse(&leaf.first_item()).unwrap_or_default();
+    let route = Route::find(schema, &parts).ok();
+    let read = |value: Route, message: &[u8]| {
+        let targets = Targets {
+            value,
+            stamp: None,
+            spacing: None,
+        };
+        let mut reading = Reading::default();
+        let read = Decoder::new(encoding, schema, targets).read(message, &mut reading);
+        read.map(|()| reading.values.first().copied())
+    };
+    let by_name = called(parts, NOBODY).and_then(|parts| Route::find(schema, &parts).ok());
+    let missed = by_name
+        .zip(message)
+        .map(|(value, message)| read(value, message));
     LeafReport {
         path: leaf.path.clone(),
         kind: leaf.number.name(),
@@ -412,18 +429,25 @@ fn leaf_report(
             .filter(|_| !leaf.is_stamp)
             .and_then(|route| units::find(route, metadata))
             .map(|found| found.unit),
-        example: route.zip(message).and_then(|(value, message)| {
-            let targets = Targets {
-                value,
-                stamp: None,
-                spacing: None,
-            };
-            let mut reading = Reading::default();
-            let read = Decoder::new(encoding, schema, targets).read(message, &mut reading);
-            read.ok().and_then(|()| reading.values.first().copied())
-        }),
+        example: route
+            .zip(message)
+            .and_then(|(value, message)| read(value, message).ok().flatten()),
+        names: match missed {
+            Some(Err(Damage::NoName { there, .. })) => there,
+            _ => Vec::new(),
+        },
         is_stamp: leaf.is_stamp,
     }
+}
+
+/// A path whose first item of a list is asked for by a name.
+fn called(mut parts: Vec<Part>, name: &str) -> Option<Vec<Part>> {
+    let item = parts.iter_mut().find(|part| **part == Part::Index(0))?;
+    *item = Part::Called {
+        key: None,
+        name: name.to_owned(),
+    };
+    Some(parts)
 }
 
 fn rate_hz(seen: &Seen) -> Option<f64> {

@@ -23,7 +23,8 @@ fn file(compression: Option<Compression>) -> Vec<u8> {
     for time in [10, 30, 20, 40] {
         file.message(2, time * 1_000_000, &float64(time as f64));
     }
-    let mut joint = vec![0, 1, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0];
+    // One name of six bytes, padding, one number.
+    let mut joint = b"\0\x01\0\0\x01\0\0\0\x06\0\0\0motor\0\0\0\x01\0\0\0\0\0\0\0".to_vec();
     joint.extend_from_slice(&(-2.5_f64).to_le_bytes());
     file.message(1, 15_000_000, &joint);
     file.message(3, 15_000_000, b"?");
@@ -68,6 +69,7 @@ fn everything_in_a_file_is_listed() {
     assert_eq!(joints.leaves[0].path, "effort[]");
     assert_eq!(joints.leaves[0].unit.as_deref(), Some("N m"));
     assert_eq!(joints.leaves[0].example, Some(-2.5));
+    assert_eq!(joints.leaves[0].names, ["motor"]);
     assert_eq!(joints.rate_hz, None);
     let flat = &inventory.channels[1];
     assert!(flat.unreadable.as_ref().unwrap().contains("\"flatbuffer\""));
