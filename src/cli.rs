@@ -326,7 +326,8 @@ pub struct Table {
     /// Step of the frequency
     #[arg(long, value_name = "HZ", default_value = "10", allow_negative_numbers = true, value_parser = positive_frequency)]
     pub step: f64,
-    /// Add the standard uncertainties that follow from those of the stand's constants
+    /// Add the standard uncertainties that follow from those of the stand's constants; empty with effects, of which
+    /// none is known
     #[arg(long)]
     pub uncertainty: bool,
     /// Print JSON instead of CSV

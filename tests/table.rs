@@ -71,6 +71,22 @@ fn linear_effects_are_in_it_and_others_are_refused() {
         (rows[0][2] - (45.0 - lag.to_degrees())).abs() < 1e-7,
         "{rows:?}"
     );
+    let ran = stand("kind = \"capacitive-coupling\"\nform = \"ac-coupled\"\ncorner = \"500 Hz\"");
+    // A series capacitor at its corner: 1/√2 as well, 45 degrees early; at rest it lets nothing through.
+    let (_, rows) = rows_of(&ran.stdout);
+    assert!(
+        (rows[0][2] - (-45.0 - lag.to_degrees())).abs() < 1e-7,
+        "{rows:?}"
+    );
+    let at_rest = folder.run(&[
+        "table",
+        "--stand",
+        "stand.toml",
+        "--to",
+        "0",
+        "--uncertainty",
+    ]);
+    assert_eq!(at_rest.stdout.lines().nth(1), Some("0,,,,"));
     let cubic = "kind = \"cubic-stiffness\"\nform = \"beside\"\ncoefficient = \"1 N m/(N m)^3\"";
     stand(cubic).says(1, &["cubic-stiffness", "no response over frequency"]);
 }

@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use num_complex::Complex64;
 use serde::Serialize;
 use torqcomp_dsp::compensate::Inverse;
 
@@ -80,24 +81,22 @@ pub fn run(args: &cli::Table) -> Result<Outcome, Failure> {
     Ok(Outcome::Done)
 }
 
-/// A row of the plain stand, whose phase goes on beyond half a turn, or of the refined one.
+/// A row, of the refined stand if there is one: then its uncertainty is not known, as that of the effects is not.
 fn row(stand: &Stand, mechanics: &Mechanics, refined: Option<&Inverse>, frequency_hz: f64) -> Row {
     let recorder = &stand.recorder.recorder;
-    let (magnitude, phase_rad) = match refined {
-        Some(inverse) => inverse(frequency_hz).to_polar(),
-        None => {
-            let (magnitude, phase_rad) = mechanics.response.inverse(frequency_hz).to_polar();
-            (
-                magnitude / recorder.response(frequency_hz).norm(),
-                phase_rad - recorder.phase_rad(frequency_hz),
-            )
-        }
-    };
+    let mechanical = mechanics.response.inverse(frequency_hz);
+    let recorded = recorder.response(frequency_hz);
+    // Of effects there is no more than the response, so that only their own phase folds.
+    let of_effects = refined.map(|inverse| inverse(frequency_hz) * recorded / mechanical);
+    let (more, phase_of_effects) = of_effects.unwrap_or(Complex64::ONE).to_polar();
+    let magnitude = more * mechanical.norm() / recorded.norm();
+    let phase_rad = mechanical.arg() - recorder.phase_rad(frequency_hz) + phase_of_effects;
     let std = mechanics
         .response
         .inverse_uncertainty(frequency_hz, &mechanics.std)
         .ok()
-        .flatten();
+        .flatten()
+        .filter(|_| refined.is_none());
     Row {
         frequency_hz,
         magnitude,
@@ -114,12 +113,17 @@ fn csv(rows: &[Row], uncertainty: bool) -> String {
     }
     text.push('\n');
     for row in rows {
+        // Where nothing passes, there is no inverse: an empty cell.
+        let cell = |value: f64| match value.is_finite() {
+            true => rounded(value, DIGITS),
+            false => String::new(),
+        };
         let _ = write!(
             text,
             "{},{},{}",
             rounded(row.frequency_hz, DIGITS),
-            rounded(row.magnitude, DIGITS),
-            rounded(row.phase_deg, DIGITS)
+            cell(row.magnitude),
+            cell(row.phase_deg)
         );
         if uncertainty {
             // An unknown uncertainty is an empty cell, never 0.

@@ -102,7 +102,7 @@ pub(super) fn remains(judged: &Judged, dependence: &Dependence, floor: Option<Fl
 /// Whether effects leave more than they should of what they are to explain, little as it may be: what is left is above
 /// the noise, has a colour, and follows the input.
 fn follows_input(judged: &Judged, dependence: &Dependence, floor: Option<Floor>) -> bool {
-    let is_above = floor.is_none_or(|floor| judged.hold_rms() > ABOVE * floor.rms);
+    let is_above = floor.is_some_and(|floor| judged.hold_rms() > ABOVE * floor.rms);
     is_above && !dependence.white && !dependence.independent_of_input
 }
 

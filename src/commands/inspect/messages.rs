@@ -252,12 +252,14 @@ fn details(inventory: &Inventory) -> Vec<(String, String)> {
             topic.message_encoding, topic.messages
         );
         details.push((topic.topic.clone(), value));
-        let names = topic.leaves.iter().map(|leaf| &leaf.names);
-        if let Some(names) = names
-            .max_by_key(|names| names.len())
-            .filter(|n| !n.is_empty())
-        {
-            details.push((format!("names in {}", topic.topic), names.join(", ")));
+        let mut told: Vec<&[String]> = Vec::new();
+        for leaf in topic.leaves.iter().filter(|leaf| !leaf.names.is_empty()) {
+            // Position, velocity and effort of a joint state have the same names.
+            if !told.contains(&leaf.names.as_slice()) {
+                told.push(&leaf.names);
+                let list = format!("names for {}.{}", topic.topic, leaf.path);
+                details.push((list, leaf.names.join(", ")));
+            }
         }
     }
     for file in &inventory.attachments {

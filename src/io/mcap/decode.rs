@@ -69,7 +69,7 @@ pub enum Damage {
     NoName {
         /// Name asked for.
         name: String,
-        /// The first names that there are.
+        /// Names that there are, up to [`NAMES`].
         there: Vec<String>,
     },
     /// The message says it is encoded in a way that is not known.
@@ -94,9 +94,13 @@ impl fmt::Display for Damage {
                     "no item is called \"{name}\"{}",
                     did_you_mean(name, known)
                 )?;
-                match there.is_empty() {
-                    true => f.write_str("; none has a name"),
-                    false => write!(f, "; there are: {}", there.join(", ")),
+                let shown = &there[..there.len().min(SHOWN)];
+                match (there.is_empty(), there.len() > SHOWN) {
+                    (true, _) => f.write_str("; none has a name"),
+                    (false, more) => {
+                        write!(f, "; there are: {}", shown.join(", "))?;
+                        f.write_str(if more { " and more" } else { "" })
+                    }
                 }
             }
             Self::Encapsulation(kind) => write!(
@@ -110,9 +114,11 @@ impl fmt::Display for Damage {
     }
 }
 
-/// Most names that are told, and most bytes of one.
-const NAMES: usize = 32;
-const NAME_BYTES: usize = 100;
+/// Most names that are kept of a message, and most of them in a sentence.
+pub const NAMES: usize = 256;
+const SHOWN: usize = 32;
+/// Most bytes of a name: a longer one is left out.
+const NAME_BYTES: usize = 200;
 
 /// A name that is looked for among those of the items of a list.
 #[derive(Debug, Default)]
@@ -151,8 +157,8 @@ impl<'a> Names<'a> {
             self.found = Some(self.seen);
         }
         self.seen += 1;
-        if let Some(there) = self.there.as_mut().filter(|there| there.len() < NAMES) {
-            let text = &text[..text.len().min(NAME_BYTES)];
+        let there = self.there.as_mut().filter(|there| there.len() < NAMES);
+        if let Some(there) = there.filter(|_| text.len() <= NAME_BYTES) {
             there.push(String::from_utf8_lossy(text).into_owned());
         }
     }

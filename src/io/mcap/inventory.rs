@@ -102,7 +102,7 @@ pub struct LeafReport {
     pub unit: Option<String>,
     /// Value in the first message, of the first item in lists.
     pub example: Option<f64>,
-    /// Names of the items in the first message, of a number in a list whose items have names.
+    /// Names of the items in the first message, up to 256, of a number in a list whose items have names.
     pub names: Vec<String>,
     /// Whether it is part of a time stamp.
     pub is_stamp: bool,
@@ -405,8 +405,9 @@ fn leaf_report(
     message: Option<&[u8]>,
     metadata: &BTreeMap<String, String>,
 ) -> LeafReport {
-    let parts = path::parse(&leaf.first_item()).unwrap_or_default();
-    let route = Route::find(schema, &parts).ok();
+    let parts = path::parse(&leaf.first_item()).ok();
+    let find = |parts: &Vec<Part>| Route::find(schema, parts).ok();
+    let route = parts.as_ref().and_then(find);
     let read = |value: Route, message: &[u8]| {
         let targets = Targets {
             value,
@@ -417,7 +418,8 @@ fn leaf_report(
         let read = Decoder::new(encoding, schema, targets).read(message, &mut reading);
         read.map(|()| reading.values.first().copied())
     };
-    let by_name = called(parts, NOBODY).and_then(|parts| Route::find(schema, &parts).ok());
+    let by_name = parts.and_then(|parts| called(parts, NOBODY));
+    let by_name = by_name.as_ref().and_then(find);
     let missed = by_name
         .zip(message)
         .map(|(value, message)| read(value, message));

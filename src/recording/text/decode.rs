@@ -46,7 +46,16 @@ pub fn decode(bytes: Vec<u8>) -> Result<Text, Failure> {
     }
     if let Some(encoding) = encoding::told(&bytes[..bytes.len().min(HEAD)]) {
         oddities.push(encoding::name(encoding));
-        let (text, _) = encoding.decode_without_bom_handling(&bytes);
+        let (text, has_faults) = encoding.decode_without_bom_handling(&bytes);
+        if has_faults {
+            warnings.push(Warning::new(
+                "unreadable-characters",
+                format!(
+                    "some bytes are no characters of {}; they were replaced by \u{FFFD}",
+                    encoding::name(encoding)
+                ),
+            ));
+        }
         bytes = text.into_owned().into_bytes();
     }
     while bytes.last() == Some(&0x1A) {

@@ -12,12 +12,9 @@ const WORD: usize = 4;
 
 /// The encoding of a text by its head; none for UTF-8 and Windows-1252.
 pub fn told(head: &[u8]) -> Option<&'static Encoding> {
-    // A character that is cut at the end of the head is no fault.
-    let is_utf8 = |head: &[u8]| match std::str::from_utf8(head) {
-        Ok(_) => true,
-        Err(error) => error.error_len().is_none(),
-    };
-    if head.is_ascii() || is_utf8(head) {
+    // A line of UTF-8 with more than ASCII is not so by chance: another line has a fault then.
+    let is_utf8 = |line: &[u8]| !line.is_ascii() && std::str::from_utf8(line).is_ok();
+    if head.is_ascii() || head.split(|byte| *byte == b'\n').any(is_utf8) {
         return None;
     }
     let last_line = head.iter().rposition(|byte| *byte == b'\n');
@@ -54,13 +51,15 @@ fn has_long_run(text: &[u8]) -> bool {
     text.split(u8::is_ascii).any(|run| run.len() >= WORD)
 }
 
-/// Whether a byte beyond ASCII is a letter between two letters and not the sign of a unit, of which µ alone stands
-/// before one.
+/// Whether a byte beyond ASCII is a letter between two letters and not the sign of a unit between them, as in `N·m`,
+/// `m²K`, `Temp°C` and `xµm`.
 fn is_letter_in_word(bytes: &[u8]) -> bool {
+    const SIGNS: [u8; 4] = [0xB0, 0xB2, 0xB5, 0xB7];
     let &[before, byte, after] = bytes else {
         return false;
     };
-    byte >= 0x80 && byte != 0xB5 && before.is_ascii_alphabetic() && after.is_ascii_alphabetic()
+    let is_letter = byte >= 0x80 && !SIGNS.contains(&byte);
+    is_letter && before.is_ascii_alphabetic() && after.is_ascii_alphabetic()
 }
 
 /// Whether it is Japanese text in Shift-JIS: it decodes without a fault, most characters beyond ASCII are of two bytes
@@ -103,6 +102,12 @@ mod tests {
     }
 
     #[test]
+    fn a_stray_byte_takes_no_utf8_away() {
+        let bytes = ["时间,扭矩\n# 20 ".as_bytes(), b"\xB0C\n0,1\n"].concat();
+        assert_eq!(told(&bytes), None);
+    }
+
+    #[test]
     fn signs_of_units_tell_nothing() {
         for western in [
             "Dehnung µm/m",
@@ -111,6 +116,7 @@ mod tests {
             "µ",
             "m³/h",
             "x·s²",
+            "N·m;m²K;Temp°C",
             "§ 3;¼",
             "Nm/° ½",
             "KRÄFTE;ÄÖÜ;Größe",

@@ -10,18 +10,8 @@ pub use super::axis_names::{
 
 /// Other ways to write a unit, in lower case, and how torqcomp writes it.
 const SYNONYMS: &[(&str, &str)] = &[
-    ("с", "s"),
-    ("мс", "ms"),
-    ("мкс", "us"),
     ("秒", "s"),
     ("毫秒", "ms"),
-    ("н·м", "N m"),
-    ("нм", "N m"),
-    ("н", "N"),
-    ("в", "V"),
-    ("мв", "mV"),
-    ("гц", "Hz"),
-    ("об/мин", "rpm"),
     ("sekunde", "s"),
     ("sekunden", "s"),
     ("sek", "s"),
@@ -71,6 +61,25 @@ const SYNONYMS: &[(&str, &str)] = &[
     ("µe", "ustrain"),
 ];
 
+/// Units in Cyrillic letters, of which great and small ones differ: с is a second, С stands for °C, нм is a length.
+const CYRILLIC: &[(&str, &str)] = &[
+    ("с", "s"),
+    ("сек", "s"),
+    ("мс", "ms"),
+    ("мкс", "us"),
+    ("Н·м", "N m"),
+    ("Нм", "N m"),
+    ("Н", "N"),
+    ("кН", "kN"),
+    ("В", "V"),
+    ("мВ", "mV"),
+    ("А", "A"),
+    ("Гц", "Hz"),
+    ("кГц", "kHz"),
+    ("об/мин", "rpm"),
+    ("мм", "mm"),
+];
+
 /// Units that no reckoning is done with, told from other words in round brackets all the same.
 const OTHERS: [&str; 35] = [
     "C", "W", "kW", "MW", "mW", "VA", "kVA", "var", "kvar", "J", "kJ", "Wh", "kWh", "Ah", "mAh",
@@ -105,7 +114,8 @@ pub fn read(text: &str) -> Option<NamedUnit> {
     // NM, Nm and N.m are torque; nm is a length.
     let synonym = SYNONYMS
         .iter()
-        .find(|(word, _)| *word == lower && (*word != "nm" || text.starts_with('N')))?;
+        .find(|(word, _)| *word == lower && (*word != "nm" || text.starts_with('N')))
+        .or_else(|| CYRILLIC.iter().find(|(word, _)| *word == text))?;
     Some(NamedUnit {
         text: text.to_owned(),
         unit: Unit::parse(synonym.1).ok()?,
@@ -189,7 +199,7 @@ pub fn heading(text: &str) -> Heading {
     }
     // Vitesse tr/min, Torque Nm
     if let Some((name, word)) = text.rsplit_once(' ')
-        && (is_speed(word) || ONLY_UNITS.contains(&word))
+        && (is_speed(word) || ONLY_UNITS.contains(&word) && can_end_before_unit(name))
         && ![" in", " en", " em", " /", ","]
             .iter()
             .any(|mark| name.ends_with(mark))
@@ -216,8 +226,17 @@ pub fn heading(text: &str) -> Heading {
 /// Words at the end of a name that are units and nothing else; `in`, `min` and `N` are not among them.
 const ONLY_UNITS: &[&str] = &[
     "Nm", "N·m", "N.m", "N*m", "mNm", "kNm", "Н·м", "Нм", "mN", "kN", "mV", "µV", "uV", "kV", "mA",
-    "Hz", "kHz", "rpm", "kPa", "MPa", "hPa", "psi", "lbf", "µm/m", "°C", "°F",
+    "Hz", "kHz", "rpm", "kPa", "MPa", "hPa", "lbf", "µm/m", "°C", "°F",
 ];
+
+/// Whether a unit can stand behind a text: not behind a number (`lowpass 100 Hz`) nor a word that asks for more
+/// (`mV per Nm`).
+fn can_end_before_unit(name: &str) -> bool {
+    let last = name.rsplit(' ').next().unwrap_or_default();
+    let is_number = last.starts_with(|c: char| c.is_ascii_digit());
+    let is_open = !last.ends_with(char::is_alphanumeric);
+    !is_number && !is_open && !["per", "pro", "at", "bei", "par"].contains(&last)
+}
 
 /// Whether a word is a speed, so that its bar parts no name from a unit.
 fn is_speed(word: &str) -> bool {
@@ -382,6 +401,9 @@ mod tests {
             ("Couple en N.m", "Couple", Some("N.m"), true),
             ("Torque Nm", "Torque", Some("Nm"), true),
             ("Force N", "Force N", None, false),
+            ("Lowpass 100 Hz", "Lowpass 100 Hz", None, false),
+            ("Gain mV per Nm", "Gain mV per Nm", None, false),
+            ("Температура, С", "Температура, С", None, false),
             ("Voltage in", "Voltage in", None, false),
             ("Time s", "Time s", Some("s"), true),
             ("Момент, Н·м", "Момент", Some("Н·м"), true),
@@ -412,7 +434,7 @@ mod tests {
 
     #[test]
     fn every_synonym_leads_to_a_unit() {
-        for (_, unit) in SYNONYMS {
+        for (_, unit) in SYNONYMS.iter().chain(CYRILLIC) {
             assert!(Unit::parse(unit).is_ok(), "{unit}");
         }
     }

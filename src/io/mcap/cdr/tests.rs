@@ -276,7 +276,7 @@ fn lists_of_lists_and_tables() {
 }
 
 #[test]
-fn damage_is_an_error_and_allocates_nothing() {
+fn damage_is_an_error() {
     let schema = schema(JOINTS, Generation::Ros2);
     let message = joints(1, 8, &[0.1]);
     for end in 0..message.len() {

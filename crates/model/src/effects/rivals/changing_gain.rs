@@ -1,7 +1,7 @@
 //! A gain that changes evenly over the record and is right somewhere in it.
 //!
 //! `y = x (1 + a + r t)`. **Valid for small changes.** Mistaken for `thermal-drift`, whose sensitivity is right at
-//! zero of the time axis, and, in a sweep, where time stands for frequency, for `second-mode` and `recorder-lowpass`.
+//! the start of a record, and, in a sweep, where time stands for frequency, for `second-mode` and `recorder-lowpass`.
 
 use crate::effects::{Action, Effect, Form, Parameter, Place, Ruler};
 
