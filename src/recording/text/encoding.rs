@@ -12,9 +12,7 @@ const WORD: usize = 4;
 
 /// The encoding of a text by its head; none for UTF-8 and Windows-1252.
 pub fn told(head: &[u8]) -> Option<&'static Encoding> {
-    // A line of UTF-8 with more than ASCII is not so by chance: another line has a fault then.
-    let is_utf8 = |line: &[u8]| !line.is_ascii() && std::str::from_utf8(line).is_ok();
-    if head.is_ascii() || head.split(|byte| *byte == b'\n').any(is_utf8) {
+    if is_utf8(head) {
         return None;
     }
     let last_line = head.iter().rposition(|byte| *byte == b'\n');
@@ -40,6 +38,19 @@ pub fn name(encoding: &'static Encoding) -> &'static str {
         "Shift_JIS" => "Shift-JIS",
         name => name,
     }
+}
+
+/// Whether it is UTF-8, apart from faults: most bytes beyond ASCII are in lines without any.
+fn is_utf8(head: &[u8]) -> bool {
+    let (mut good, mut bad) = (0, 0);
+    for line in head.split(|byte| *byte == b'\n') {
+        let beyond = line.iter().filter(|byte| !byte.is_ascii()).count();
+        match std::str::from_utf8(line) {
+            Ok(_) => good += beyond,
+            Err(_) => bad += beyond,
+        }
+    }
+    good >= bad
 }
 
 fn is_latin(c: char) -> bool {
@@ -105,6 +116,9 @@ mod tests {
     fn a_stray_byte_takes_no_utf8_away() {
         let bytes = ["时间,扭矩\n# 20 ".as_bytes(), b"\xB0C\n0,1\n"].concat();
         assert_eq!(told(&bytes), None);
+        // 转 is D7 AA in GBK, which is a letter of UTF-8 as well.
+        let (bytes, _, _) = encoding_rs::GBK.encode("转\n时间,扭矩\n0,1\n");
+        assert_eq!(told(&bytes), Some(encoding_rs::GBK));
     }
 
     #[test]
