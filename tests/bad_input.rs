@@ -438,17 +438,9 @@ fn wrong_usage_ends_with_2() {
         assert_eq!(ran.code, 2, "{args:?}: {}", ran.stderr);
         assert!(ran.stdout.is_empty() && !ran.stderr.is_empty());
     }
-    let negative = [
-        "compensate",
-        "in.csv",
-        "--stand",
-        "stand.toml",
-        "--band",
-        "-5",
-    ];
-    folder
-        .run(&negative)
-        .says(2, &["'-5'", "expected a frequency in Hz"]);
+    let negative = "compensate in.csv --stand stand.toml --band -5".split(' ');
+    let ran = folder.run(&negative.collect::<Vec<_>>());
+    ran.says(2, &["'-5'", "expected a frequency in Hz"]);
 }
 
 #[test]

@@ -2,6 +2,16 @@
 
 use crate::util::{Folder, hertel_response, table as rows_of};
 
+/// The row at 0 Hz, with uncertainties.
+const AT_REST: [&str; 6] = [
+    "table",
+    "--stand",
+    "stand.toml",
+    "--to",
+    "0",
+    "--uncertainty",
+];
+
 #[test]
 fn the_default_table_is_that_of_the_thesis() {
     let ran = Folder::new().run(&["table", "--stand", "stand.toml"]);
@@ -78,14 +88,7 @@ fn linear_effects_are_in_it_and_others_are_refused() {
         (rows[0][2] - (-45.0 - lag.to_degrees())).abs() < 1e-7,
         "{rows:?}"
     );
-    let at_rest = folder.run(&[
-        "table",
-        "--stand",
-        "stand.toml",
-        "--to",
-        "0",
-        "--uncertainty",
-    ]);
+    let at_rest = folder.run(&AT_REST);
     assert_eq!(at_rest.stdout.lines().nth(1), Some("0,,,,"));
     let cubic = "kind = \"cubic-stiffness\"\nform = \"beside\"\ncoefficient = \"1 N m/(N m)^3\"";
     stand(cubic).says(1, &["cubic-stiffness", "no response over frequency"]);
@@ -94,14 +97,7 @@ fn linear_effects_are_in_it_and_others_are_refused() {
 #[test]
 fn uncertainty_is_empty_where_it_is_unknown() {
     let folder = Folder::new();
-    let ran = folder.run(&[
-        "table",
-        "--stand",
-        "stand.toml",
-        "--to",
-        "0",
-        "--uncertainty",
-    ]);
+    let ran = folder.run(&AT_REST);
     assert_eq!(ran.stdout.lines().nth(1), Some("0,1,0,,"));
     let known = crate::util::HERTEL.replace(
         "\"8.1e4 ft lbf/rad\"",

@@ -20,8 +20,8 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
     let stand: Option<(Stand, String)> = match &args.stand {
         None => None,
         Some(path) => {
-            let text = std::fs::read_to_string(path).map_err(|e| Failure::reading(path, &e))?;
-            Some((stand::parse(&path.display().to_string(), &text)?, text))
+            let (name, text) = stand::text(path)?;
+            Some((stand::parse(&name, &text)?, text))
         }
     };
     let files: Vec<&Path> = args

@@ -21,8 +21,19 @@ const SCHEMA: &str = "torqcomp.stand/1";
 /// If it cannot be read, is no TOML, or holds a key or value that does not belong there; the
 /// message names the line.
 pub fn read(path: &Path) -> Result<Stand, Failure> {
-    let text = std::fs::read_to_string(path).map_err(|error| Failure::reading(path, &error))?;
-    parse(&path.display().to_string(), &text)
+    let (name, text) = text(path)?;
+    parse(&name, &text)
+}
+
+/// Name and text of a stand file.
+///
+/// # Errors
+/// If it cannot be read.
+pub fn text(path: &Path) -> Result<(String, String), Failure> {
+    match std::fs::read_to_string(path) {
+        Ok(text) => Ok((path.display().to_string(), text)),
+        Err(error) => Err(Failure::reading(path, &error)),
+    }
 }
 
 /// Reads a stand from text; `name` stands in messages.

@@ -15,8 +15,7 @@ use torqcomp_model::{Estimate, ParameterStd, SecondOrder};
 
 pub use chain::{Applied, Chain, applied_by_unit};
 pub use effects::{DeclaredEffect, is_smooth_at_rest};
-pub use file::parse;
-pub use file::read;
+pub use file::{parse, read, text};
 pub use refine::{Refined, refine, si_unit};
 
 /// A stand: its mechanics, and how its record becomes torque.

@@ -22,7 +22,8 @@ use crate::report::Warning;
 use crate::report::identify::Report;
 use crate::signal::Together;
 use crate::signal::together::{axes, uniform};
-use crate::stand::update::{self, Entry};
+use crate::stand::update::Entry;
+use crate::stand::{self, update};
 
 /// Runs the verb.
 pub fn run(args: &Identify) -> Result<Outcome, Failure> {
@@ -41,21 +42,13 @@ const ONE_MODE: &str = "a stand file holds one mode, and several were found; cho
 /// Text of the stand file that declared values come from, with its name.
 fn stand_text(findings: &Findings) -> Result<Option<(String, String)>, Failure> {
     let declaring = findings.stand.as_deref().or_else(|| existing(findings));
-    declaring.map(read_stand).transpose()
+    declaring.map(stand::text).transpose()
 }
 
 /// The stand file of `-o`, if it is there already.
 fn existing(findings: &Findings) -> Option<&Path> {
     let place = findings.result.output.as_deref()?;
     (place != "-" && Path::new(place).is_file()).then(|| Path::new(place))
-}
-
-/// Name and text of a stand file.
-fn read_stand(path: &Path) -> Result<(String, String), Failure> {
-    match std::fs::read_to_string(path) {
-        Ok(text) => Ok((path.display().to_string(), text)),
-        Err(error) => Err(Failure::reading(path, &error)),
-    }
 }
 
 /// A value of `[mechanics]` that is declared, and its standard uncertainty.
@@ -90,7 +83,7 @@ fn deliver(
         // come from.
         let existing = existing(findings);
         let basis = existing.or(findings.stand.as_deref());
-        let basis = basis.map(read_stand).transpose()?;
+        let basis = basis.map(stand::text).transpose()?;
         let text = match &basis {
             Some((name, text)) => update::update(name, Some(text), entries),
             None => update::update(place, None, entries),

@@ -133,22 +133,29 @@ pub struct Names<'a> {
 }
 
 impl<'a> Names<'a> {
-    /// A search for a name.
-    #[must_use]
-    pub fn search(wanted: &'a [u8]) -> Self {
-        Self {
+    /// Searches a message, which `run` goes through; a message without the name is gone through once more, to list what
+    /// there is.
+    ///
+    /// # Errors
+    /// If the message cannot be gone through, or does not hold the name.
+    pub fn search(
+        wanted: &'a [u8],
+        mut run: impl FnMut(Self) -> Result<Self, Damage>,
+    ) -> Result<Self, Damage> {
+        let names = |there| Self {
             wanted,
+            there,
             ..Self::default()
+        };
+        let searched = run(names(None))?;
+        if searched.found.is_some() {
+            return Ok(searched);
         }
-    }
-
-    /// The same search once more, to list what there is.
-    #[must_use]
-    pub fn listing(&self) -> Self {
-        Self {
-            there: Some(Vec::new()),
-            ..Self::search(self.wanted)
-        }
+        let listed = run(names(Some(Vec::new())))?;
+        Err(Damage::NoName {
+            name: String::from_utf8_lossy(wanted).into_owned(),
+            there: listed.there.unwrap_or_default(),
+        })
     }
 
     /// Looks at the name of the next item.
@@ -160,15 +167,6 @@ impl<'a> Names<'a> {
         let there = self.there.as_mut().filter(|there| there.len() < NAMES);
         if let Some(there) = there.filter(|_| text.len() <= NAME_BYTES) {
             there.push(String::from_utf8_lossy(text).into_owned());
-        }
-    }
-
-    /// What is said where the name is not among them.
-    #[must_use]
-    pub fn missing(self) -> Damage {
-        Damage::NoName {
-            name: String::from_utf8_lossy(self.wanted).into_owned(),
-            there: self.there.unwrap_or_default(),
         }
     }
 }

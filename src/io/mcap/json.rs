@@ -52,13 +52,10 @@ impl Decoder {
             .map_err(|error| Damage::Malformed(format!("no JSON: {error}")))?;
         let mut place = None;
         if let Some((steps, name)) = &self.lookup {
-            let mut names = Names::search(name.as_bytes());
-            find(&message, steps, &mut names);
-            if names.found.is_none() {
-                names = names.listing();
+            let names = Names::search(name.as_bytes(), |mut names| {
                 find(&message, steps, &mut names);
-                return Err(names.missing());
-            }
+                Ok(names)
+            })?;
             place = names.found;
         }
         collect(&message, &self.value, place, &mut reading.values)?;

@@ -83,16 +83,15 @@ impl Decoder {
             is_big,
             plan,
             reading,
-            names: Names::search(name),
+            names: Names::default(),
         };
         if !plan.lookup.is_empty() {
-            walk.follow(&plan.lookup)?;
-            walk.at = 0;
-            if walk.names.found.is_none() {
-                walk.names = walk.names.listing();
+            walk.names = Names::search(name, |names| {
+                (walk.at, walk.names) = (0, names);
                 walk.follow(&plan.lookup)?;
-                return Err(walk.names.missing());
-            }
+                Ok(std::mem::take(&mut walk.names))
+            })?;
+            walk.at = 0;
         }
         walk.follow(&plan.steps)
     }

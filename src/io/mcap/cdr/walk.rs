@@ -143,7 +143,7 @@ impl<'a> Walk<'a> {
             }
             Hop::Called => {
                 let place = self.names.found.and_then(|place| i64::try_from(place).ok());
-                place.ok_or_else(|| std::mem::take(&mut self.names).missing())?
+                place.ok_or_else(|| Damage::Malformed("no name was looked for".to_owned()))?
             }
             Hop::Item(index) => index,
             Hop::Field(_) => return Err(Damage::Malformed("a list has no fields".to_owned())),

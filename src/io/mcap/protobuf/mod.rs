@@ -37,15 +37,11 @@ impl Decoder {
         let value = &self.targets.value;
         let mut found = None;
         if let Some(lookup) = &value.lookup {
-            let run = |names| {
+            let names = Names::search(lookup.name.as_bytes(), |names| {
                 let mut search = Search(names);
                 search.run(&self.schema, self.schema.root, &lookup.hops, message)?;
                 Ok(search.0)
-            };
-            let names = run(Names::search(lookup.name.as_bytes()))?;
-            if names.found.is_none() {
-                return Err(run(names.listing())?.missing());
-            }
+            })?;
             found = names.found;
         }
         let mut collect = Collect {
