@@ -8,9 +8,9 @@ use std::io::Cursor;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use mcap::records::MessageHeader;
 use mcap::{Compression, WriteOptions, Writer};
-use torqcomp::io::csv::Place;
+use torqcomp::io::Input;
 use torqcomp::io::mcap::record::frames::Frames;
-use torqcomp::io::mcap::record::input::Input;
+use torqcomp::io::mcap::record::input::CountedInput;
 use torqcomp::io::mcap::{Inventory, Options, Selection, Source};
 
 const MESSAGES: u64 = 100_000;
@@ -89,7 +89,7 @@ fn recording(compression: Option<Compression>) -> Vec<u8> {
 }
 
 fn frames(bytes: &[u8]) -> Frames {
-    let input = Input::new(Box::new(Cursor::new(bytes.to_vec())));
+    let input = CountedInput::new(Box::new(Cursor::new(bytes.to_vec())));
     Frames::new("bench".to_owned(), input).expect("an MCAP file")
 }
 
@@ -102,7 +102,7 @@ fn read(bytes: &[u8], field: &str) -> u64 {
     let wanted = selection.check().expect("a topic and a field");
     let options = Options::default();
     let mut source =
-        Source::read(&Place::Stdin, frames(bytes), &wanted, &options).expect("it is there");
+        Source::read(&Input::Stdin, frames(bytes), &wanted, &options).expect("it is there");
     let (mut times, mut values) = (Vec::new(), Vec::new());
     while source.next(&mut times, &mut values).expect("in memory") {
         black_box((&times, &values));

@@ -6,12 +6,12 @@ use clap::Parser;
 use torqcomp::cli::Cli;
 use torqcomp::commands::{self, Outcome};
 use torqcomp::io::output;
-use torqcomp::report;
+use torqcomp::print;
 
 fn main() -> ExitCode {
     if let Err(error) = output::clean_up_when_interrupted() {
         let message = "interrupting this run may leave a temporary file behind";
-        report::say(&format!("torqcomp: {message}: {error}\n"));
+        print::say(&format!("torqcomp: {message}: {error}\n"));
     }
     // clap ends wrong usage with code 2 itself, and help with 0.
     match commands::run(Cli::parse()) {
@@ -20,7 +20,7 @@ fn main() -> ExitCode {
         Err(failure) => {
             let code = failure.exit_code();
             if code != 0 {
-                report::say(&format!("torqcomp: {failure}\n"));
+                print::say(&format!("torqcomp: {failure}\n"));
             }
             ExitCode::from(code)
         }

@@ -4,13 +4,13 @@
 use std::io::Cursor;
 
 use libfuzzer_sys::fuzz_target;
-use torqcomp::io::csv::Place;
+use torqcomp::io::Input;
 use torqcomp::io::mcap::record::frames::Frames;
-use torqcomp::io::mcap::record::input::Input;
+use torqcomp::io::mcap::record::input::CountedInput;
 use torqcomp::io::mcap::{Inventory, Options, Selection, Source};
 
 fn frames(bytes: &[u8]) -> Option<Frames> {
-    let input = Input::new(Box::new(Cursor::new(bytes.to_vec())));
+    let input = CountedInput::new(Box::new(Cursor::new(bytes.to_vec())));
     Frames::new("fuzz".to_owned(), input).ok()
 }
 
@@ -28,7 +28,7 @@ fuzz_target!(|bytes: &[u8]| {
             let (Ok(wanted), Some(frames)) = (selection.check(), frames(bytes)) else {
                 continue;
             };
-            let Ok(mut source) = Source::read(&Place::Stdin, frames, &wanted, &Options::default())
+            let Ok(mut source) = Source::read(&Input::Stdin, frames, &wanted, &Options::default())
             else {
                 continue;
             };

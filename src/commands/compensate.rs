@@ -17,15 +17,16 @@ use self::sink::Sink;
 use super::{Outcome, conclude, uncertainty};
 use crate::cli::Compensate;
 use crate::failure::Failure;
-use crate::io::csv::Place;
+use crate::io::Input;
 use crate::io::output::Output;
+use crate::print::{self};
 use crate::quality::excerpt;
 use crate::report::compensate::{Ends, Gain, Noise, RecordNoise, Report, SCHEMA};
 use crate::report::svg::Traces;
-use crate::report::{self, Warning};
 use crate::signal::{Signal, Summary};
 use crate::stand::{self, Chain, Stand};
 use crate::undo::Undo;
+use crate::warning::Warning;
 
 /// The band unless another is asked for, as far as the rate allows: that of the thesis.
 const DEFAULT_BAND_HZ: f64 = 2400.0;
@@ -166,12 +167,12 @@ pub fn run(args: &Compensate) -> Result<Outcome, Failure> {
         plot.write(traces.svg(&unit).as_bytes())?;
     }
     if args.json {
-        crate::io::output::write_all(None, false, &[], &report::json(&report))?;
+        crate::io::output::write_all(None, false, &[], &print::json(&report))?;
     }
     sink.finish(args, &report)?;
     plot.map_or(Ok(()), Output::finish)?;
     if !args.work.quiet {
-        report::say(&report.text());
+        print::say(&report.text());
     }
     Ok(conclude(
         &report.warnings,
@@ -193,7 +194,7 @@ fn open_plot(path: &Path, args: &Compensate, inputs: &[&Path]) -> Result<Output,
 fn plan(args: &Compensate) -> Result<Plan, Failure> {
     let stand = stand::read(&args.stand)?;
     stand.mechanics()?;
-    let place = Place::of(&args.record.input);
+    let place = Input::of(&args.record.input);
     let signal = Signal::open(&place, &args.record.options())?;
     let chain = stand.chain(
         &signal.channel.name,
@@ -324,7 +325,7 @@ fn complete(report: &mut Report, run: &Run, scale: f64) {
             format!(
                 "the record is multiplied by up to {} and how much noise it has cannot be told; \
                  choose a lower --band if the result looks noisy",
-                report::rounded(report.noise.largest_gain, 3)
+                print::rounded(report.noise.largest_gain, 3)
             ),
         ));
     }
@@ -337,8 +338,8 @@ fn complete(report: &mut Report, run: &Run, scale: f64) {
             "empty-plot",
             format!(
                 "no sample lies within --plot-range; the record runs from {} to {} s",
-                report::short(run.start_s),
-                report::short(end_s)
+                print::short(run.start_s),
+                print::short(end_s)
             ),
         ));
     }
@@ -354,7 +355,7 @@ fn complete(report: &mut Report, run: &Run, scale: f64) {
                  ends; record at least {} for a band of {} Hz",
                 run.samples,
                 reach_s as usize,
-                report::short(report.band_hz)
+                print::short(report.band_hz)
             ),
         ));
     }
@@ -386,15 +387,15 @@ fn noise_warnings(noise: &torqcomp_dsp::noise::RecordNoise, report: &Report) -> 
             format!(
                 "{} {unit} rms of the record lie above the band of {} Hz and are left out, {} {unit} \
                  rms lie within it",
-                report::rounded(noise.above_band_rms, 3),
-                report::short(band_hz),
-                report::rounded(noise.in_band_rms, 3)
+                print::rounded(noise.above_band_rms, 3),
+                print::short(band_hz),
+                print::rounded(noise.in_band_rms, 3)
             ),
         ));
     }
     if let Some(from_hz) = noise.lost_from_hz(band_hz) {
         let remedy = if from_hz > 0.0 {
-            format!("--band {} keeps it out", report::rounded(from_hz, 4))
+            format!("--band {} keeps it out", print::rounded(from_hz, 4))
         } else {
             "the whole band is affected: check the channel".to_owned()
         };
@@ -403,8 +404,8 @@ fn noise_warnings(noise: &torqcomp_dsp::noise::RecordNoise, report: &Report) -> 
             format!(
                 "from {} to {} Hz the record does not rise above its noise, which the compensation \
                  multiplies there; {remedy}",
-                report::rounded(from_hz, 4),
-                report::short(band_hz)
+                print::rounded(from_hz, 4),
+                print::short(band_hz)
             ),
         ));
     }
@@ -413,8 +414,8 @@ fn noise_warnings(noise: &torqcomp_dsp::noise::RecordNoise, report: &Report) -> 
             "mostly-noise",
             format!(
                 "noise makes up {} of {} {unit} rms of the result; choose a lower --band",
-                report::rounded(noise.compensated_rms, 3),
-                report::rounded(rms, 3)
+                print::rounded(noise.compensated_rms, 3),
+                print::rounded(rms, 3)
             ),
         ));
     }
@@ -430,7 +431,7 @@ fn gap_warning(resampled: &resample::Resampled) -> Option<Warning> {
                  longest {} s), {} repeated stamp(s) left out",
                 resampled.gaps,
                 resampled.bridged,
-                report::rounded(resampled.longest_step_s, 4),
+                print::rounded(resampled.longest_step_s, 4),
                 resampled.repeated
             ),
         )

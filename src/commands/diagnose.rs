@@ -12,8 +12,9 @@ use crate::cli::Diagnose;
 use crate::diagnose::{self, Diagnosis, Verdict};
 use crate::failure::Failure;
 use crate::io::output::Output;
-use crate::report::{self, Warning};
+use crate::print::{self};
 use crate::stand::{self, Stand};
+use crate::warning::Warning;
 
 /// Runs the verb.
 pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
@@ -48,7 +49,7 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
     let shown = !args.work.quiet && std::io::stderr().is_terminal();
     let progress = |done: usize, of: usize| {
         if shown {
-            report::say(&format!(
+            print::say(&format!(
                 "\r{done} of {of} fits{}",
                 if done == of { "\r\x1b[K" } else { "" }
             ));
@@ -77,7 +78,7 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
         page.finish()?;
     }
     let text = if args.json {
-        report::json(&report)
+        print::json(&report)
     } else {
         report.text()
     };

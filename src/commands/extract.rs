@@ -4,10 +4,10 @@ use super::rows::{Rows, Times};
 use super::{Outcome, conclude};
 use crate::cli::Extract;
 use crate::failure::Failure;
-use crate::io::csv::Place;
+use crate::io::Input;
 use crate::io::output::Output;
 use crate::io::text::Text;
-use crate::report;
+use crate::print;
 use crate::signal::{Batch, Record, Signal, Summary};
 
 /// Rows that are written at once.
@@ -17,7 +17,7 @@ const ROWS_AT_ONCE: usize = 1 << 14;
 pub fn run(args: &Extract) -> Result<Outcome, Failure> {
     let mut options = args.record.options();
     options.table.any_steps = true;
-    let signal = Signal::open(&Place::of(&args.record.input), &options)?;
+    let signal = Signal::open(&Input::of(&args.record.input), &options)?;
     let inputs = [args.record.input.as_ref()];
     let mut output = Output::open(args.result.output.as_deref(), args.result.force, &inputs)?;
     output.write(&heading(&signal))?;
@@ -25,7 +25,7 @@ pub fn run(args: &Extract) -> Result<Outcome, Failure> {
         "{}: {}; {} Hz {}\n",
         signal.source,
         signal.dialect,
-        report::rounded(signal.time.rate_hz, 9),
+        print::rounded(signal.time.rate_hz, 9),
         signal.time.rate_from()
     );
     let summary = if signal.time.is_resampled() {
@@ -35,7 +35,7 @@ pub fn run(args: &Extract) -> Result<Outcome, Failure> {
     };
     output.finish()?;
     if !args.quiet {
-        report::say(&said);
+        print::say(&said);
     }
     let mut warnings: Vec<_> = summary.lost.iter().cloned().collect();
     warnings.extend(summary.warnings);

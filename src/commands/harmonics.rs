@@ -6,13 +6,14 @@ use torqcomp_dsp::harmonics::{self, Fundamental, refine_fundamental};
 use super::{Outcome, conclude};
 use crate::cli::Harmonics;
 use crate::failure::Failure;
-use crate::io::csv::Place;
+use crate::io::Input;
 use crate::io::output::Output;
+use crate::print::{self};
 use crate::quality::excerpt;
 use crate::report::harmonics::{Component, Report, SCHEMA};
-use crate::report::{self, Warning};
 use crate::signal::{Record, Signal};
 use crate::stand::{self, Chain, Stand};
+use crate::warning::Warning;
 
 /// Distance of the record from time zero, in its own lengths, up to which phases refer to zero.
 const FAR_FROM_ZERO: f64 = 10.0;
@@ -24,7 +25,7 @@ const MAINS_LINES: f64 = 5.0;
 pub fn run(args: &Harmonics) -> Result<Outcome, Failure> {
     let stand = stand::read(&args.stand)?;
     stand.mechanics()?;
-    let signal = Signal::open(&Place::of(&args.record.input), &args.record.options())?;
+    let signal = Signal::open(&Input::of(&args.record.input), &args.record.options())?;
     let chain = stand.chain(
         &signal.channel.name,
         signal.channel.unit.as_ref(),
@@ -38,7 +39,7 @@ pub fn run(args: &Harmonics) -> Result<Outcome, Failure> {
     let fitted = fit(args, &stand, &chain, &record, &mut report);
     fitted.map_err(|failure| failure.at(&source))?;
     let text = if args.json {
-        report::json(&report)
+        print::json(&report)
     } else {
         report.text()
     };
@@ -159,8 +160,8 @@ fn visible_orders(
         return Err(Failure::failed(format_args!(
             "no order of {} Hz lies below half the sampling rate of {} Hz; ask for lower orders or \
              record faster",
-            report::short(args.fundamental),
-            report::short(rate_hz)
+            print::short(args.fundamental),
+            print::short(rate_hz)
         )));
     }
     if let (Some(first), Some(last)) = (unseen.first(), unseen.last()) {
@@ -168,9 +169,9 @@ fn visible_orders(
             "orders-above-nyquist",
             format!(
                 "orders {} to {} were left out: they lie above half the sampling rate of {} Hz",
-                report::short(*first),
-                report::short(*last),
-                report::short(rate_hz)
+                print::short(*first),
+                print::short(*last),
+                print::short(rate_hz)
             ),
         ));
     }
@@ -215,7 +216,7 @@ fn mains_warning(components: &[Component], duration_s: f64) -> Option<Warning> {
                 slower && (c.frequency_hz - line).abs() < 1.0 / duration_s
             })
         })
-        .map(|c| format!("{} ({:.2} Hz)", report::short(c.order), c.frequency_hz))
+        .map(|c| format!("{} ({:.2} Hz)", print::short(c.order), c.frequency_hz))
         .collect();
     (!doubtful.is_empty()).then(|| {
         Warning::new(
@@ -233,7 +234,7 @@ fn lost_warning(components: &[Component]) -> Option<Warning> {
     let lost: Vec<String> = components
         .iter()
         .filter(|c| c.torque < 2.0 * c.std)
-        .map(|c| report::short(c.order))
+        .map(|c| print::short(c.order))
         .collect();
     (!lost.is_empty()).then(|| {
         Warning::new(

@@ -16,8 +16,9 @@ use torqcomp_model::InverseUncertainty;
 
 use crate::cli::{Cli, Verb};
 use crate::failure::Failure;
-use crate::report::{self, Warning};
+use crate::print::{self};
 use crate::stand::{Chain, Stand};
+use crate::warning::Warning;
 
 /// How a command ended well.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,7 +50,7 @@ pub fn run(cli: Cli) -> Result<Outcome, Failure> {
 /// Says the warnings and what was lost, and tells how the command ended.
 fn conclude(warnings: &[Warning], lost: bool, strict: bool) -> Outcome {
     for warning in warnings {
-        report::say(&format!(
+        print::say(&format!(
             "torqcomp: warning [{}]: {}\n",
             warning.code, warning.message
         ));

@@ -9,8 +9,8 @@ use super::Outcome;
 use crate::cli::Predict;
 use crate::failure::Failure;
 use crate::io::output;
+use crate::print::{self, rounded};
 use crate::report::predict::{Constant, Refinement, Report, SCHEMA, residual_percent};
-use crate::report::{self, rounded};
 use crate::stand::{self, BeamDrawing, Given, Stand};
 
 /// Part of a residual that must be left at most for an effect to explain it.
@@ -39,7 +39,7 @@ pub fn run(args: &Predict) -> Result<Outcome, Failure> {
         constants,
     };
     let text = if args.json {
-        report::json(&report)
+        print::json(&report)
     } else {
         report.text()
     };

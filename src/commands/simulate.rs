@@ -1,20 +1,22 @@
 //! `simulate`: the stand's answer to a given input.
 
 use torqcomp_model::effects::Action;
-use torqcomp_model::simulate::{Fixed, Input, Model, State, substeps};
+use torqcomp_model::simulate::{Excitation, Fixed, Model, State, substeps};
 use torqcomp_model::{Estimate, Kind, Unit};
 
 use super::{Outcome, conclude};
 use crate::cli::Simulate;
 use crate::failure::Failure;
-use crate::io::csv::{NamedUnit, Place};
+use crate::io::Input;
+use crate::io::csv::NamedUnit;
 use crate::io::digits;
 use crate::io::output::{self, Output};
+use crate::print::{self};
 use crate::report::simulate::{Report, SCHEMA};
-use crate::report::{self, Warning};
 use crate::signal::Together;
 use crate::signal::together::Track;
 use crate::stand::{self, Given, Stand};
+use crate::warning::Warning;
 
 /// Relative change of the result at which the step of integration is fine enough.
 const FINE: f64 = 1e-5;
@@ -27,7 +29,7 @@ pub fn run(args: &Simulate) -> Result<Outcome, Failure> {
     let options = args
         .axis
         .options(args.applied.as_deref(), args.unit.as_deref());
-    let read = Together::read(&Place::of(&args.input), &[options])?;
+    let read = Together::read(&Input::of(&args.input), &[options])?;
     let chosen = &read.tracks[0];
     if args.json && matches!(args.result.output.as_deref(), None | Some("-")) {
         return Err(Failure::usage(
@@ -46,7 +48,7 @@ pub fn run(args: &Simulate) -> Result<Outcome, Failure> {
     let applied: Vec<f64> = chosen.samples.iter().map(|u| u * units.applied).collect();
     let model = model(&stand, units.gain)?;
     let between = args.between.into();
-    let input = Input::new(applied, read.rate_hz, read.start_s, 1).with_between(between);
+    let input = Excitation::new(applied, read.rate_hz, read.start_s, 1).with_between(between);
     let (simulated, steps) = refined(&model, &input)?;
     write(&mut output, args, &read, &simulated, |value| {
         (value + stand.diagnosed.offset) / units.measured
@@ -69,9 +71,9 @@ pub fn run(args: &Simulate) -> Result<Outcome, Failure> {
         warnings,
     };
     if args.json {
-        output::write_all(None, false, &[], &report::json(&report))?;
+        output::write_all(None, false, &[], &print::json(&report))?;
     } else if !args.quiet {
-        report::say(&report.text());
+        print::say(&report.text());
     }
     Ok(conclude(&report.warnings, read.lost.is_some(), args.strict))
 }
@@ -186,7 +188,7 @@ fn model(stand: &Stand, gain: f64) -> Result<Model, Failure> {
 }
 
 /// The record from rest, its step halved until that changes nothing that matters; and the steps a sample.
-fn refined(model: &Model, input: &Input) -> Result<(Vec<f64>, usize), Failure> {
+fn refined(model: &Model, input: &Excitation) -> Result<(Vec<f64>, usize), Failure> {
     let run = |steps: usize| model.simulate_from(&input.with_substeps(steps), State::default());
     let rate_hz = input.rate_hz();
     let mut steps = substeps(model.mode.omega_rad_s / std::f64::consts::TAU, rate_hz);

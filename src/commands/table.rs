@@ -10,7 +10,7 @@ use super::Outcome;
 use crate::cli;
 use crate::failure::Failure;
 use crate::io::output;
-use crate::report::{self, rounded};
+use crate::print::{self, rounded};
 use crate::stand::{self, Mechanics, Stand};
 
 /// Most rows of a table.
@@ -63,7 +63,7 @@ pub fn run(args: &cli::Table) -> Result<Outcome, Failure> {
         .map(|hz| row(&stand, mechanics, refined.as_ref(), hz))
         .collect();
     let text = if args.json {
-        report::json(&Report {
+        print::json(&Report {
             schema: "torqcomp.table/1",
             version: env!("CARGO_PKG_VERSION"),
             stand: stand.file.clone(),

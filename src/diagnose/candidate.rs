@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use torqcomp_model::effects::{Effect, Mode};
-use torqcomp_model::simulate::{Between, Input};
+use torqcomp_model::simulate::{Between, Excitation};
 
 use super::blocks::{Comparison, compare};
 use super::columns::Columns;
@@ -60,9 +60,9 @@ pub fn set_substeps<'r>(records: impl Iterator<Item = &'r mut Record>, substeps:
 /// Changes the inputs of records; records that share an input go on to share it.
 fn change_inputs<'r>(
     records: impl Iterator<Item = &'r mut Record>,
-    change: impl Fn(&Input) -> Input,
+    change: impl Fn(&Excitation) -> Excitation,
 ) {
-    let mut made: Vec<(Arc<Input>, Arc<Input>)> = Vec::new();
+    let mut made: Vec<(Arc<Excitation>, Arc<Excitation>)> = Vec::new();
     for record in records {
         let known = made.iter().find(|(old, _)| Arc::ptr_eq(old, &record.input));
         let new = match known {

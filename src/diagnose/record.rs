@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use torqcomp_model::effects::Mode;
-use torqcomp_model::simulate::{Input, State};
+use torqcomp_model::simulate::{Excitation, State};
 
 use super::columns::Columns;
 use super::structure::Waves;
@@ -24,7 +24,7 @@ pub struct Record {
     /// File it comes from.
     pub source: String,
     /// The applied quantity.
-    pub input: Arc<Input>,
+    pub input: Arc<Excitation>,
     /// The measured one, of the same length.
     pub measured: Arc<Vec<f64>>,
     /// The samples that count.

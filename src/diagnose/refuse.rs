@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use torqcomp_model::simulate::{Input, State};
+use torqcomp_model::simulate::{Excitation, State};
 
 use super::plain::{Constants, fit_plain};
 use super::record::{Record, dot};
@@ -81,7 +81,7 @@ fn swap(record: &Record) -> Record {
     let input = &record.input;
     let applied = record.measured.to_vec();
     Record {
-        input: Arc::new(Input::new(
+        input: Arc::new(Excitation::new(
             applied,
             input.rate_hz(),
             input.start_s(),

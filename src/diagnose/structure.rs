@@ -172,7 +172,7 @@ impl Structure<'_> {
             match (choice.form.build)(&own) {
                 Action::Lines(lines) => waves.lines_hz.extend(lines.iter().map(|l| l.frequency_hz)),
                 Action::Course(count) => waves.course = waves.course.max(count),
-                action => actions.push((choice.form.place, action)),
+                action => actions.push((choice.form.stage, action)),
             }
         }
         let recorder = self.frame.recorder.clone();
@@ -205,7 +205,7 @@ impl Choice {
     pub fn is_line(&self) -> bool {
         let parameters = self.form.parameters;
         parameters.first().is_some_and(|p| p.unit == Unit::Hertz)
-            && self.form.place == torqcomp_model::effects::Place::Disturbance
+            && self.form.stage == torqcomp_model::effects::Stage::Disturbance
     }
 
     /// `backlash (joint)`, or the name alone if it has one form.

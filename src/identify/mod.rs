@@ -10,8 +10,8 @@ pub mod static_load;
 use torqcomp_model::fit::FitError;
 
 use crate::failure::Failure;
-use crate::report::Warning;
 use crate::report::chart::Chart;
+use crate::warning::Warning;
 
 /// A number that was found, with what is known of it.
 #[derive(Debug, Clone, PartialEq)]

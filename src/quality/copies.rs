@@ -3,8 +3,9 @@
 use torqcomp_dsp::quality::copies::{Portrait, Relation, relation};
 
 use super::{labels, unit_of, with_unit};
+use crate::print::rounded;
 use crate::recording::{Channel, Recording};
-use crate::report::{Warning, rounded};
+use crate::warning::Warning;
 
 /// A channel among those that are compared.
 struct Seen<'a> {

@@ -1,7 +1,7 @@
 //! What is wrong with a record that a verb works on, told from as much of it as may be kept.
 
 use crate::recording::Axis;
-use crate::report::Warning;
+use crate::warning::Warning;
 
 /// Samples that are kept of a record that goes by as a stream.
 pub const OF_STREAM: usize = 1 << 15;

@@ -11,7 +11,7 @@ pub mod time;
 use std::collections::HashMap;
 
 use crate::recording::{Axis, Channel};
-use crate::report::Warning;
+use crate::warning::Warning;
 
 pub use samples::Findings;
 pub use time::TimeFindings;
@@ -43,7 +43,7 @@ pub fn warnings(name: &str, unit: &str, samples: &[f64], axis: &Axis) -> Vec<War
 pub fn constant(channels: &[(&str, f64)]) -> Warning {
     let named = channels
         .iter()
-        .map(|(name, value)| format!("\"{name}\" is always {}", crate::report::short(*value)));
+        .map(|(name, value)| format!("\"{name}\" is always {}", crate::print::short(*value)));
     Warning::new(
         "constant-channel",
         format!(
@@ -65,9 +65,9 @@ pub fn coarse(
     let named = channels.iter().map(|(name, unit, q)| {
         format!(
             "\"{name}\" has {} steps of {} in its range ({} bits)",
-            crate::report::short(q.levels - 1.0),
+            crate::print::short(q.levels - 1.0),
             with_unit(q.step, unit, 4),
-            crate::report::rounded(q.bits, 2)
+            crate::print::rounded(q.bits, 2)
         )
     });
     Warning::new(
@@ -95,7 +95,7 @@ fn join(items: impl Iterator<Item = String>) -> String {
 
 /// A number with its unit, if that is known.
 pub(crate) fn with_unit(value: f64, unit: &str, digits: u32) -> String {
-    let value = crate::report::rounded(value, digits);
+    let value = crate::print::rounded(value, digits);
     if unit.is_empty() {
         value
     } else {
@@ -111,7 +111,7 @@ fn place(axis: &Axis, index: usize) -> String {
             .map(|rate| axis.start_s.unwrap_or(0.0) + index as f64 / rate)
     };
     match stamp.filter(|t| t.is_finite()).or_else(counted) {
-        Some(time_s) => format!("{} s", crate::report::rounded(time_s, 7)),
+        Some(time_s) => format!("{} s", crate::print::rounded(time_s, 7)),
         None => format!("sample {}", index + 1),
     }
 }

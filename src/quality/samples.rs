@@ -9,8 +9,9 @@ use torqcomp_dsp::quality::stuck::{constant, standstills};
 use torqcomp_dsp::quality::{Run, is_straight, range};
 
 use super::{place, with_unit};
+use crate::print::{rounded, short};
 use crate::recording::{Axis, Hole, HoleKind};
-use crate::report::{Warning, rounded, short};
+use crate::warning::Warning;
 
 /// Levels in the range below which a resolution is coarse: 8 bits.
 const COARSE: f64 = 256.0;

@@ -5,8 +5,9 @@ use torqcomp_dsp::quality::rate::{Contradiction, contradiction};
 use torqcomp_dsp::quality::rounding::{Rounded, rounded};
 use torqcomp_dsp::quality::steps::{Event, Events, Steps, rounded_steps, steps};
 
+use crate::print::rounded as number;
 use crate::recording::{Axis, Channel};
-use crate::report::{Warning, rounded as number};
+use crate::warning::Warning;
 
 /// Largest deviation of a step, as a part of it, in an axis that counts as uniform.
 const UNIFORM: f64 = 0.01;

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use super::{Axis, Channel, Recording};
 use crate::failure::Failure;
-use crate::io::csv::{NamedUnit, Place};
+use crate::io::Input;
+use crate::io::csv::NamedUnit;
 use crate::io::mcap::{self, Selection, Source, source::Chosen, time::TimeUsed};
 
 /// The signals that are named as `--signal` names them, or the only one in the file for `None`. Their
@@ -12,8 +13,8 @@ use crate::io::mcap::{self, Selection, Source, source::Chosen, time::TimeUsed};
 ///
 /// # Errors
 /// If the file cannot be read, or a signal is not in it: then with what is there.
-pub fn read(place: &Place, wanted: &[Option<&str>]) -> Result<Recording, Failure> {
-    if *place == Place::Stdin && wanted.len() > 1 {
+pub fn read(place: &Input, wanted: &[Option<&str>]) -> Result<Recording, Failure> {
+    if *place == Input::Stdin && wanted.len() > 1 {
         return Err(Failure::usage(
             "several signals of an MCAP file are read one after the other, which standard input does \
              not allow; give the name of the file",
@@ -29,7 +30,7 @@ pub fn read(place: &Place, wanted: &[Option<&str>]) -> Result<Recording, Failure
 }
 
 fn one(
-    place: &Place,
+    place: &Input,
     signal: Option<&str>,
     origin_ns: &mut Option<i64>,
     recording: &mut Recording,

@@ -10,8 +10,9 @@ mod select;
 pub mod text;
 
 use crate::failure::Failure;
-use crate::io::csv::{NamedUnit, Options, Place};
-use crate::report::Warning;
+use crate::io::Input;
+use crate::io::csv::{NamedUnit, Options};
+use crate::warning::Warning;
 
 pub use axis::{Axis, RateFrom, typical_step};
 pub use select::Selection;
@@ -116,7 +117,7 @@ pub enum HoleKind {
 ///
 /// # Errors
 /// If the file cannot be read, is no recording, or leaves open how it is to be read.
-pub fn read(place: &Place, options: &Options) -> Result<Recording, Failure> {
+pub fn read(place: &Input, options: &Options) -> Result<Recording, Failure> {
     read_channels(place, std::slice::from_ref(options))
 }
 
@@ -125,7 +126,7 @@ pub fn read(place: &Place, options: &Options) -> Result<Recording, Failure> {
 ///
 /// # Errors
 /// See [`read`].
-pub fn read_channels(place: &Place, wanted: &[Options]) -> Result<Recording, Failure> {
+pub fn read_channels(place: &Input, wanted: &[Options]) -> Result<Recording, Failure> {
     let name = place.name();
     let options = wanted.first().cloned().unwrap_or_default();
     if place.is_mcap()? {
@@ -142,7 +143,7 @@ pub fn read_channels(place: &Place, wanted: &[Options]) -> Result<Recording, Fai
 ///
 /// # Errors
 /// See [`read`].
-pub fn read_first(place: &Place, options: &Options, most: u64) -> Result<Recording, Failure> {
+pub fn read_first(place: &Input, options: &Options, most: u64) -> Result<Recording, Failure> {
     let name = place.name();
     let (bytes, left_out) = part::first(place, most)?;
     let mut recording = text::read(&name, bytes, options).map_err(|failure| failure.at(&name))?;

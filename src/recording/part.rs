@@ -3,15 +3,15 @@
 use std::io::Read;
 
 use crate::failure::Failure;
-use crate::io::csv::Place;
-use crate::report::Warning;
+use crate::io::Input;
+use crate::warning::Warning;
 
 /// Bytes that are gone through at a time.
 const PIECE: usize = 1 << 16;
 
 /// The first bytes of a text, no more than so many, up to the end of a line; and a warning about what was
 /// left out, if anything. A text that is all one line is read as a whole.
-pub(super) fn first(place: &Place, most: u64) -> Result<(Vec<u8>, Option<Warning>), Failure> {
+pub(super) fn first(place: &Input, most: u64) -> Result<(Vec<u8>, Option<Warning>), Failure> {
     let failed = |error| Failure::failed(format_args!("{}: cannot be read: {error}", place.name()));
     let mut input = place.open()?;
     let mut bytes = Vec::new();
@@ -69,7 +69,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("text");
         std::fs::write(&path, bytes).unwrap();
-        first(&Place::File(path), most).unwrap()
+        first(&Input::File(path), most).unwrap()
     }
 
     #[test]

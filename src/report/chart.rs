@@ -3,8 +3,8 @@
 
 use std::fmt::Write;
 
-use super::rounded;
 use super::svg::mark_step;
+use crate::print::rounded;
 
 /// Size of a chart and its margins, in user units.
 const WIDTH: f64 = 720.0;

@@ -5,7 +5,8 @@ use std::fmt::Write;
 use serde::Serialize;
 use torqcomp_dsp::resample::Resampled;
 
-use super::{Warning, rounded, short};
+use crate::print::{rounded, short};
+use crate::warning::Warning;
 
 /// Schema of the JSON document.
 pub const SCHEMA: &str = "torqcomp.compensate/1";

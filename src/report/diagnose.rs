@@ -2,8 +2,9 @@
 
 use serde::Serialize;
 
-use super::{Warning, columns, rounded, unit_or_as_recorded};
 use crate::diagnose::Dependence;
+use crate::print::{columns, rounded, unit_or_as_recorded};
+use crate::warning::Warning;
 
 /// Schema of the document.
 pub const SCHEMA: &str = "torqcomp.diagnose/1";
@@ -210,7 +211,7 @@ pub struct Levels {
 #[must_use]
 pub fn with_std(value: f64, std: Option<f64>) -> String {
     match std {
-        Some(std) => super::with_std(value, std),
+        Some(std) => crate::print::with_std(value, std),
         None => format!("{} (std unknown)", rounded(value, 6)),
     }
 }

@@ -3,8 +3,8 @@
 use super::chart::{Chart, Series};
 use super::diagnose::{Candidate, Report, Rms, with_std};
 use super::page::Page;
-use super::{rounded, short, unit_or_as_recorded};
 use crate::diagnose::{Against, Trace, autocorrelation, binned, density, response};
+use crate::print::{rounded, short, unit_or_as_recorded};
 
 /// What the page shows beside the report.
 pub struct Sights {

@@ -4,7 +4,8 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
-use super::{Warning, columns, rounded, short};
+use crate::print::{columns, rounded, short};
+use crate::warning::Warning;
 
 /// Schema of the JSON document.
 pub const SCHEMA: &str = "torqcomp.harmonics/1";

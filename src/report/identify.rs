@@ -7,9 +7,10 @@ use torqcomp_model::{Kind, UnitSystem};
 
 use super::chart::Chart;
 use super::page::Page;
-use super::{Warning, columns, rounded, short, value_and_std};
 use crate::cli::Units;
 use crate::identify::{Comparison, Found, Outcome, Quality};
+use crate::print::{columns, rounded, short, value_and_std};
+use crate::warning::Warning;
 
 /// Schema of the JSON document.
 pub const SCHEMA: &str = "torqcomp.identify/1";

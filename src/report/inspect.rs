@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use super::{columns, rounded, short};
 use crate::io::mcap::Inventory;
+use crate::print::{columns, rounded, short};
 
 /// Schema of the JSON document.
 pub const SCHEMA: &str = "torqcomp.inspect/1";
@@ -219,12 +219,12 @@ impl Report {
     pub fn json(&self) -> String {
         let (schema, version) = (SCHEMA, env!("CARGO_PKG_VERSION"));
         match self.files.as_slice() {
-            [file] => super::json(&Single {
+            [file] => crate::print::json(&Single {
                 schema,
                 version,
                 file,
             }),
-            files => super::json(&Several {
+            files => crate::print::json(&Several {
                 schema,
                 version,
                 files,

@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
-use super::rounded;
 use super::svg::{Axis, escaped};
+use crate::print::rounded;
 
 /// Size of the picture, its margins, and of a panel, in user units.
 const WIDTH: f64 = 960.0;

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{columns, rounded, with_std};
+use crate::print::{columns, rounded, with_std};
 
 /// Schema of the JSON document.
 pub const SCHEMA: &str = "torqcomp.predict/1";

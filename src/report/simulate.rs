@@ -2,7 +2,8 @@
 
 use serde::Serialize;
 
-use super::{Warning, short};
+use crate::print::short;
+use crate::warning::Warning;
 
 /// Schema of the document.
 pub const SCHEMA: &str = "torqcomp.simulate/1";

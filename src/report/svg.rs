@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::rounded;
+use crate::print::rounded;
 
 /// Most points of a trace, an even number; a longer one is drawn as its envelope.
 const MOST_BINS: usize = 4096;

@@ -4,7 +4,7 @@ use std::io::Read;
 
 use crate::failure::Failure;
 use crate::io::csv::{Break, Chunks, Piece, RowPlan, Rows, TimeAxis};
-use crate::report::Warning;
+use crate::warning::Warning;
 
 /// Bytes of a piece: large enough to be quick, small enough to stay in cache.
 const PIECE: usize = 1 << 17;

@@ -4,7 +4,7 @@ use super::{Feed, MessageOptions, Origin, RowSource, Signal};
 use crate::failure::Failure;
 use crate::io::csv::{Column, NamedUnit, Options, Rows, Stamps, TimeAxis, TimeSource};
 use crate::io::mcap::{self, Source};
-use crate::report::Warning;
+use crate::warning::Warning;
 
 /// Nanoseconds that an `f64` holds exactly: 104 days.
 const EXACT_NS: i64 = 1 << 53;

@@ -12,7 +12,7 @@ pub mod together;
 use crate::io::csv::{Column, RowPlan, TimeAxis, TimeSource};
 use crate::io::mcap::TimeChoice;
 use crate::io::mcap::decode::Encoding;
-use crate::report::Warning;
+use crate::warning::Warning;
 
 pub use feed::{Batch, Fetch, RowSource};
 pub use options::{MessageOptions, Options};

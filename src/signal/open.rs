@@ -5,9 +5,10 @@ use std::io::{Cursor, Read};
 use super::sequence::TextRows;
 use super::{Feed, Options, Signal};
 use crate::failure::Failure;
-use crate::io::csv::{self, Place, Table};
+use crate::io::Input;
+use crate::io::csv::{self, Table};
 use crate::io::mcap::record::frames::Frames;
-use crate::io::mcap::record::input::Input;
+use crate::io::mcap::record::input::CountedInput;
 use crate::io::mcap::{self, Source, selection::Wanted};
 use crate::recording;
 
@@ -21,7 +22,7 @@ impl Signal {
     ///
     /// # Errors
     /// If the file cannot be read, holds no recording, or leaves open what is to be read.
-    pub fn open(place: &Place, options: &Options) -> Result<Self, Failure> {
+    pub fn open(place: &Input, options: &Options) -> Result<Self, Failure> {
         let name = place.name();
         let mut input = place.open()?;
         let unreadable =
@@ -47,7 +48,7 @@ impl Signal {
     }
 
     fn open_messages(
-        place: &Place,
+        place: &Input,
         input: Box<dyn Read + Send>,
         options: &Options,
     ) -> Result<Self, Failure> {
@@ -55,7 +56,7 @@ impl Signal {
             Wanted::Only => mcap::inventory::only_topic(place)?,
             wanted => wanted,
         };
-        let frames = Frames::new(place.name(), Input::new(input))?;
+        let frames = Frames::new(place.name(), CountedInput::new(input))?;
         let reading = mcap::Options {
             time: options.messages.time,
             spacing: options.messages.spacing.clone(),

@@ -6,7 +6,7 @@ use super::{Feed, RowSource, Signal};
 use crate::failure::Failure;
 use crate::io::csv::{Column, Options, Rows, Stamps, TimeAxis, TimeSource};
 use crate::recording::{Channel, HoleKind, RateFrom, Recording};
-use crate::report::Warning;
+use crate::warning::Warning;
 
 /// Samples handed on at once.
 const ROWS: usize = 1 << 13;

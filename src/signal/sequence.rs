@@ -3,7 +3,7 @@
 use super::feed::{Batch, Fetch};
 use crate::failure::Failure;
 use crate::io::csv::{Break, Defect, Problem, RowPlan, Rows, TimeAxis, TimeSource};
-use crate::report::Warning;
+use crate::warning::Warning;
 
 /// Code of the warning that stamps are irregular.
 const IRREGULAR: &str = "irregular-stamps";

@@ -5,9 +5,11 @@ use std::sync::Arc;
 use torqcomp_dsp::resample::{Resampled, Resampler};
 
 use crate::failure::Failure;
-use crate::io::csv::{NamedUnit, Options, Place};
+use crate::io::Input;
+use crate::io::csv::{NamedUnit, Options};
+use crate::print::{self};
 use crate::recording::{self, Recording, Selection};
-use crate::report::{self, Warning};
+use crate::warning::Warning;
 
 /// Largest distance of stamps from a uniform grid, or from those of another channel, that is none, in
 /// steps.
@@ -55,7 +57,7 @@ impl Together {
     /// # Errors
     /// If one is not there, has no rate or holds no number somewhere, or if they do not lie on one time
     /// axis and cannot be brought there.
-    pub fn read(place: &Place, wanted: &[Options]) -> Result<Self, Failure> {
+    pub fn read(place: &Input, wanted: &[Options]) -> Result<Self, Failure> {
         let recording = recording::read_channels(place, wanted)?;
         let source = recording.source.clone();
         Self::of(recording, wanted).map_err(|failure| failure.at(&source))
@@ -158,21 +160,21 @@ impl Together {
              step)",
             names(chosen),
             if several { "were" } else { "was" },
-            report::short(self.rate_hz),
-            report::short(self.start_s),
+            print::short(self.rate_hz),
+            print::short(self.start_s),
             if several {
                 "are not uniform or not the same"
             } else {
                 "are not uniform"
             },
-            report::rounded(100.0 * done.largest_jitter, 2),
+            print::rounded(100.0 * done.largest_jitter, 2),
         );
         if done.gaps > 0 {
             message += &format!(
                 "; {} gap(s), the longest of {} s, were bridged by straight lines: do not trust what is \
                  found from them",
                 done.gaps,
-                report::rounded(done.longest_step_s, 4)
+                print::rounded(done.longest_step_s, 4)
             );
         }
         if done.repeated > 0 {
@@ -290,10 +292,10 @@ fn irregular(selection: &Selection) -> Option<Failure> {
          record there, give --rate HZ if the stamps are wrong, or bring each channel onto a grid with torqcomp extract \
          --resample",
         selection.channel.name,
-        report::short(stamps[place]),
+        print::short(stamps[place]),
         place + 1,
-        report::rounded(off((place, &stamps[place])), 3),
-        report::short(selection.rate_hz)
+        print::rounded(off((place, &stamps[place])), 3),
+        print::short(selection.rate_hz)
     )))
 }
 
@@ -327,8 +329,8 @@ fn differ(chosen: &[Selection]) -> Failure {
         format!(
             "\"{}\" has {} Hz from {} s on",
             c.channel.name,
-            report::short(c.rate_hz),
-            report::short(c.start_s)
+            print::short(c.rate_hz),
+            print::short(c.start_s)
         )
     };
     let all: Vec<String> = chosen.iter().map(one).collect();

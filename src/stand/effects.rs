@@ -6,7 +6,7 @@ use num_complex::Complex64;
 use torqcomp_dsp::compensate::Inverse;
 use torqcomp_model::Unit as TextUnit;
 use torqcomp_model::effects::{
-    Action, EFFECTS, Effect, Form, Frequency, Mode, Parameter, Place, Unit,
+    Action, EFFECTS, Effect, Form, Frequency, Mode, Parameter, Stage, Unit,
 };
 
 use super::section::Section;
@@ -32,8 +32,8 @@ pub struct DeclaredEffect {
 impl DeclaredEffect {
     /// What it does.
     #[must_use]
-    pub fn action(&self) -> (Place, Action) {
-        (self.form.place, (self.form.build)(&self.values))
+    pub fn action(&self) -> (Stage, Action) {
+        (self.form.stage, (self.form.build)(&self.values))
     }
 }
 
@@ -166,7 +166,7 @@ impl Stand {
         for declared in &self.effects {
             match declared.action() {
                 (_, action @ (Action::Factor(_) | Action::Feedthrough(_))) => {
-                    links.push((declared.form.place, action));
+                    links.push((declared.form.stage, action));
                 }
                 (_, _) => {
                     return Err(Failure::failed(format_args!(
@@ -183,7 +183,7 @@ impl Stand {
             let mut through = response.inverse(frequency_hz).inv();
             let mut recorded = false;
             for (place, action) in &links {
-                if *place >= Place::Chain && !recorded {
+                if *place >= Stage::Chain && !recorded {
                     through *= recorder.response(frequency_hz);
                     recorded = true;
                 }

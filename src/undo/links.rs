@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use num_complex::Complex64;
-use torqcomp_model::effects::{Action, Mode, Place};
+use torqcomp_model::effects::{Action, Mode, Stage};
 use torqcomp_model::simulate::Fixed;
 
 use crate::failure::Failure;
@@ -19,7 +19,7 @@ pub struct Link {
     /// Its form.
     pub form: &'static str,
     /// Where it sits.
-    pub place: Place,
+    pub stage: Stage,
     /// Its parameters.
     pub values: Vec<f64>,
     /// What it does; nothing here for the recorder.
@@ -47,7 +47,7 @@ pub fn treatment(link: &Link) -> &'static str {
         Some(Action::Transform { .. }) if ["linear", "exponential"].contains(&link.form) => {
             "subtracted"
         }
-        Some(Action::Transform { undo: None, .. }) if link.place == Place::Limit => "marked",
+        Some(Action::Transform { undo: None, .. }) if link.stage == Stage::Limit => "marked",
         Some(Action::Transform { .. }) => "inverted",
         Some(Action::Torque { torque, .. }) => {
             if torque.begin(1.0) == [0.0; 2] {
@@ -110,29 +110,29 @@ pub fn of(stand: &Stand) -> Result<Vec<Link>, Failure> {
     let mut links = vec![Link {
         effect: "recorder",
         form: "",
-        place: Place::Chain,
+        stage: Stage::Chain,
         values: Vec::new(),
         action: None,
         recorder: Some(Arc::new(move |hz| recorder.response(hz))),
     }];
     for declared in &stand.effects {
-        let (place, action) = declared.action();
+        let (stage, action) = declared.action();
         links.push(Link {
             effect: declared.effect.name,
             form: declared.form.name,
-            place,
+            stage,
             values: declared.values.clone(),
             action: Some(action),
             recorder: None,
         });
     }
     // Stable: the recorder stays before what else is in the chain.
-    links.sort_by_key(|link| link.place);
+    links.sort_by_key(|link| link.stage);
     let coupled = links
         .iter()
         .position(|link| link.is(&|a| matches!(a, Action::Feedthrough(_))));
     let bent = |link: &&Link| {
-        link.place < Place::Chain && link.is(&|a| matches!(a, Action::Transform { .. }))
+        link.stage < Stage::Chain && link.is(&|a| matches!(a, Action::Transform { .. }))
     };
     if let (Some(coupled), Some(curve)) = (coupled, links.iter().find(bent)) {
         return Err(Failure::failed(format_args!(
@@ -147,7 +147,7 @@ pub fn of(stand: &Stand) -> Result<Vec<Link>, Failure> {
 /// Links that are taken back together, in order; disturbances are not among them.
 pub fn groups(links: &[Link]) -> Vec<Group<'_>> {
     let mut groups = Vec::new();
-    for link in links.iter().filter(|l| l.place != Place::Disturbance) {
+    for link in links.iter().filter(|l| l.stage != Stage::Disturbance) {
         let torque = link.is(&|a| matches!(a, Action::Torque { .. }));
         match groups.last_mut() {
             Some(Group::Stand(group)) if torque => group.push(link),

@@ -17,7 +17,7 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use torqcomp_dsp::band::Band;
 use torqcomp_dsp::compensate::{Extension, Inverse, InverseFilter};
-use torqcomp_model::effects::{Action, Clock, Line, Mode, Place};
+use torqcomp_model::effects::{Action, Clock, Line, Mode, Stage};
 
 use crate::failure::Failure;
 use crate::stand::Stand;
@@ -219,7 +219,7 @@ impl Way<'_> {
             .undo
             .links
             .iter()
-            .filter(|l| l.place == Place::Disturbance)
+            .filter(|l| l.stage == Stage::Disturbance)
         {
             match &link.action {
                 Some(Action::Lines(more)) => lines.extend(more),
@@ -250,7 +250,7 @@ impl Way<'_> {
                 );
                 (text, beyond)
             }
-            None if link.place == Place::Limit => {
+            None if link.stage == Stage::Limit => {
                 let (limits, at) = curve::at_limit(apply, &self.samples, self.noise_std);
                 let text = format!(
                     "at the limits {:.4} and {:.4} of the record in SI units it holds no more than that",

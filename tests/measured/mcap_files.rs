@@ -4,14 +4,14 @@
 use std::path::Path;
 
 use libtest_mimic::Failed;
-use torqcomp::io::csv::Place;
+use torqcomp::io::Input;
 use torqcomp::io::mcap::record::frames::Loss;
 use torqcomp::io::mcap::{Inventory, Options, Selection, Source, Summary, TimeChoice, Writer};
 
 use super::check;
 
 fn scan(folder: &Path, name: &str) -> Result<Inventory, Failed> {
-    let place = Place::File(folder.join("mcap").join(name));
+    let place = Input::File(folder.join("mcap").join(name));
     Ok(Inventory::scan(&place)?)
 }
 
@@ -26,7 +26,7 @@ fn read(
         field: Some(field.to_owned()),
         signal: None,
     };
-    let place = Place::File(folder.join("mcap").join(name));
+    let place = Input::File(folder.join("mcap").join(name));
     let mut source = Source::open(&place, &selection, &Options::default())?;
     let (mut all_times, mut all_values) = (Vec::new(), Vec::new());
     let (mut times, mut values) = (Vec::new(), Vec::new());
@@ -126,7 +126,7 @@ pub fn copied(folder: &Path) -> Result<(), Failed> {
             name: "torque".to_owned(),
             encoding,
         };
-        let place = Place::File(folder.join("mcap").join(name));
+        let place = Input::File(folder.join("mcap").join(name));
         let mut writer = Writer::copying(&place, Vec::new(), name, &added)?;
         check(writer.losses() == [] as [Loss; 0], "nothing is lost")?;
         let start = before
@@ -163,7 +163,7 @@ pub fn times(folder: &Path) -> Result<(), Failed> {
         time: Some(TimeChoice::Log),
         spacing: None,
     };
-    let place = Place::File(folder.join("mcap").join(name));
+    let place = Input::File(folder.join("mcap").join(name));
     let mut source = Source::open(&place, &selection, &options)?;
     let (mut times, mut values) = (Vec::new(), Vec::new());
     source.next(&mut times, &mut values)?;

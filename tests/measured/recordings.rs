@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use libtest_mimic::Failed;
-use torqcomp::io::csv::{Options, Place};
+use torqcomp::io::Input;
+use torqcomp::io::csv::Options;
 use torqcomp::recording::{self, Recording};
 
 use crate::check;
@@ -42,7 +43,7 @@ fn expected() -> BTreeMap<(&'static str, &'static str), Vec<Line<'static>>> {
 }
 
 fn read(folder: &Path, path: &str) -> Result<Recording, Failed> {
-    let place = Place::File(folder.join(path));
+    let place = Input::File(folder.join(path));
     recording::read(&place, &Options::default()).map_err(|failure| failure.to_string().into())
 }
 
@@ -112,7 +113,7 @@ pub fn segments(folder: &Path) -> Result<(), Failed> {
 
 /// A list of settings is no recording.
 pub fn settings(folder: &Path) -> Result<(), Failed> {
-    let place = Place::File(folder.join("dialects/precision_filters_settings.csv"));
+    let place = Input::File(folder.join("dialects/precision_filters_settings.csv"));
     match recording::read(&place, &Options::default()) {
         Ok(found) => Err(format!("read as {}", found.dialect).into()),
         Err(failure) => check(failure.to_string().contains("not a recording"), failure),

@@ -9,12 +9,13 @@ use super::{Extent, Plan, Run};
 use crate::cli::Compensate;
 use crate::commands::convert;
 use crate::failure::Failure;
+use crate::print::rounded;
 use crate::quality::excerpt;
 use crate::report::compensate::{Effect, Line, LostSpan, Report};
-use crate::report::{Warning, rounded};
 use crate::signal::Record;
 use crate::stand::Stand;
 use crate::undo::{FoundLine, Undo, Undone, treatment};
+use crate::warning::Warning;
 
 /// Most samples of a record: about 100 bytes of memory each are needed.
 const MOST_SAMPLES: usize = 1 << 24;

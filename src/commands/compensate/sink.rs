@@ -7,7 +7,7 @@ use super::{Plan, heading};
 use crate::cli::{Compensate, Format};
 use crate::commands::rows::Rows;
 use crate::failure::Failure;
-use crate::io::csv::Place;
+use crate::io::Input;
 use crate::io::mcap::Writer;
 use crate::io::mcap::writer::Added;
 use crate::io::output::Output;
@@ -54,7 +54,7 @@ impl Sink {
             encoding,
         };
         let name = output.name().to_owned();
-        let writer = Writer::copying(&Place::of(&args.record.input), output, &name, &added)?;
+        let writer = Writer::copying(&Input::of(&args.record.input), output, &name, &added)?;
         Ok(Self::Messages(Box::new(Messages {
             writer,
             origin,

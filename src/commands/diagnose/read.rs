@@ -3,15 +3,17 @@
 use std::sync::Arc;
 
 use torqcomp_model::Dimension;
-use torqcomp_model::simulate::{Input, substeps};
+use torqcomp_model::simulate::{Excitation, substeps};
 
 use crate::cli::Diagnose;
 use crate::diagnose::{Begin, Case, Constants, Record, set_substeps};
 use crate::failure::Failure;
-use crate::io::csv::{NamedUnit, Place};
-use crate::report::{Warning, unit_or_as_recorded};
+use crate::io::Input;
+use crate::io::csv::NamedUnit;
+use crate::print::unit_or_as_recorded;
 use crate::signal::Together;
 use crate::stand::{Given, Stand};
+use crate::warning::Warning;
 
 /// Part of a training record that is fitted where none is held out.
 const FITTED: f64 = 0.7;
@@ -162,7 +164,7 @@ fn pair(args: &Diagnose, file: &str) -> Result<Pair, Failure> {
         (&args.measured, &args.measured_unit),
     ]
     .map(|(channel, unit)| args.axis.options(Some(channel), unit.as_deref()));
-    let read = Together::read(&Place::of(file), &wanted)?;
+    let read = Together::read(&Input::of(file), &wanted)?;
     let mut tracks = read.tracks.into_iter();
     let (Some(applied), Some(measured)) = (tracks.next(), tracks.next()) else {
         return Err(Failure::failed(format_args!(
@@ -324,7 +326,12 @@ fn record(pair: Pair, stand: Option<&Stand>, scale: Scale) -> Result<Record, Fai
     let count = measured.len();
     Ok(Record {
         source: pair.source,
-        input: Arc::new(Input::new(applied, pair.rate_hz, pair.start_s, FIRST_STEPS)),
+        input: Arc::new(Excitation::new(
+            applied,
+            pair.rate_hz,
+            pair.start_s,
+            FIRST_STEPS,
+        )),
         measured: Arc::new(measured),
         range: LEFT_OUT.min(count / 10)..count,
         begin: Begin::default(),

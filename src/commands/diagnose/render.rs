@@ -2,12 +2,13 @@
 
 use crate::cli::Diagnose;
 use crate::diagnose::{Constants, Dependence, Diagnosis, Judged, Status, Trace, Tried, Verdict};
+use crate::print::rounded;
 use crate::report::diagnose::{
     Candidate, Constant, Error, Levels, Line, Parameter, Report, Residual, Rms, SCHEMA, Suspected,
 };
 use crate::report::diagnose_page::Sights;
-use crate::report::{Warning, rounded};
 use crate::stand;
+use crate::warning::Warning;
 
 use super::read::Units;
 use super::refined::plain_constants;

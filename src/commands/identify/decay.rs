@@ -7,9 +7,9 @@ use crate::commands::Outcome;
 use crate::failure::Failure;
 use crate::identify::anchored::Ringer;
 use crate::identify::decay::{Evaluated, Options, Ringing, identify};
-use crate::report::Warning;
 use crate::report::identify::{Law, Report};
 use crate::stand::update::Entry;
+use crate::warning::Warning;
 
 /// A record as it is evaluated.
 struct Loaded {

@@ -14,16 +14,17 @@ use torqcomp_model::Kind;
 use super::{Outcome, conclude};
 use crate::cli::identify::{Findings, Identify, Test};
 use crate::failure::Failure;
-use crate::io::csv::{NamedUnit, Options, Place};
+use crate::io::Input;
+use crate::io::csv::{NamedUnit, Options};
 use crate::io::output;
+use crate::print;
 use crate::recording::{Recording, Selection};
-use crate::report;
-use crate::report::Warning;
 use crate::report::identify::Report;
 use crate::signal::Together;
 use crate::signal::together::{axes, uniform};
 use crate::stand::update::Entry;
 use crate::stand::{self, update};
+use crate::warning::Warning;
 
 /// Runs the verb.
 pub fn run(args: &Identify) -> Result<Outcome, Failure> {
@@ -100,7 +101,7 @@ fn deliver(
         output::write_all(Some(place), result.force, &beside, &report.page())?;
     }
     let printed = match (findings.json, result.output.as_deref()) {
-        (true, _) => report::json(report),
+        (true, _) => print::json(report),
         // The stand file is there already.
         (false, Some("-")) => String::new(),
         (false, _) => report.text(),
@@ -111,7 +112,7 @@ fn deliver(
 
 /// Reads one file: all of a text, the signals that are named of an MCAP file.
 fn read(input: &str, wanted: &[Options]) -> Result<Recording, Failure> {
-    crate::recording::read_channels(&Place::of(input), wanted)
+    crate::recording::read_channels(&Input::of(input), wanted)
 }
 
 /// Reads channels of one file that are to lie on one time axis. Stamps of a text must be uniform, those

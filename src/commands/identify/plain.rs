@@ -5,7 +5,7 @@ use crate::cli::identify::{Anchors, Findings};
 use crate::failure::Failure;
 use crate::identify::Outcome;
 use crate::identify::plain::Answer;
-use crate::report::{rounded, short};
+use crate::print::{rounded, short};
 use crate::stand::update::Entry;
 
 /// Adds all three constants; entries of the stand file.

@@ -10,9 +10,9 @@ use crate::failure::Failure;
 use crate::identify::anchored::Ringer;
 use crate::identify::response::{self, Driven, Evaluated, Options, identify};
 use crate::io::csv::NamedUnit;
-use crate::report::Warning;
 use crate::report::identify::Report;
 use crate::stand::update::Entry;
+use crate::warning::Warning;
 
 /// A record as it is evaluated.
 struct Loaded {

@@ -68,7 +68,7 @@ fn entries(args: &Runup, outcome: &crate::identify::Outcome) -> Result<Vec<Entry
         return Err(Failure::failed(format_args!(
             "the inertia came out as {} kg m^2, which no body has, and is not written: check the sign of \"{}\" and \
              \"{}\"",
-            crate::report::short(found.value),
+            crate::print::short(found.value),
             args.motion,
             args.torque
         )));

@@ -3,7 +3,8 @@
 use super::messages;
 use super::whole::Whole;
 use crate::failure::Failure;
-use crate::io::csv::{Options, Place};
+use crate::io::Input;
+use crate::io::csv::Options;
 use crate::io::mcap::Inventory;
 use crate::recording::{self, Recording};
 use crate::report::inspect::Channel;
@@ -25,7 +26,7 @@ pub struct Content {
 }
 
 /// Reads a file, whatever its format.
-pub fn read(place: &Place, options: &Options) -> Result<Content, Failure> {
+pub fn read(place: &Input, options: &Options) -> Result<Content, Failure> {
     if place.is_mcap()? {
         return messages::read(place);
     }

@@ -8,8 +8,8 @@ use super::content::Content;
 use crate::parallel::{parallel, threads};
 use crate::quality::{self, Findings, TimeFindings, copies, labels, unit_of};
 use crate::recording::{Axis, Channel, Recording};
-use crate::report::Warning;
 use crate::report::inspect::{self, Detail, File, Gap, MainsLine, Said, Segment};
+use crate::warning::Warning;
 
 /// Describes the content of a file.
 pub fn file(content: &Content) -> File {

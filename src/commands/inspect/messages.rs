@@ -5,11 +5,13 @@ use std::sync::Arc;
 use super::content::Content;
 use super::whole::{self, Kept, Stamps, Whole};
 use crate::failure::Failure;
-use crate::io::csv::{NamedUnit, Place};
+use crate::io::Input;
+use crate::io::csv::NamedUnit;
 use crate::io::mcap::inventory::{ChannelReport, LeafReport};
 use crate::io::mcap::{Inventory, Options, Selection, Source, Summary};
 use crate::recording::{Axis, Channel, RateFrom, Recording, typical_step};
-use crate::report::{Warning, inspect};
+use crate::report::inspect;
+use crate::warning::Warning;
 
 /// Samples that are kept at most, of all numbers together: eight bytes each, and as many for stamps.
 const MOST_SAMPLES: u64 = 1 << 22;
@@ -19,12 +21,12 @@ const MOST_BYTES: u64 = 4_000_000_000;
 const MOST_NUMBERS: u64 = 64;
 
 /// Lists a file and reads the numbers in it, as far as they are not too many.
-pub fn read(place: &Place) -> Result<Content, Failure> {
+pub fn read(place: &Input) -> Result<Content, Failure> {
     read_most(place, MOST_SAMPLES)
 }
 
 /// The same, keeping so many samples of all numbers together.
-fn read_most(place: &Place, most: u64) -> Result<Content, Failure> {
+fn read_most(place: &Input, most: u64) -> Result<Content, Failure> {
     let inventory = Inventory::scan(place)?;
     let mut content = Content {
         recording: Recording {
@@ -89,10 +91,10 @@ struct Budget {
 }
 
 impl Budget {
-    fn of(place: &Place, inventory: &Inventory, samples: u64) -> Self {
+    fn of(place: &Input, inventory: &Inventory, samples: u64) -> Self {
         let length = match place {
-            Place::Stdin => None,
-            Place::File(path) => std::fs::metadata(path).ok().map(|meta| meta.len()),
+            Input::Stdin => None,
+            Input::File(path) => std::fs::metadata(path).ok().map(|meta| meta.len()),
         };
         let topics = inventory.channels.iter().filter(|topic| topic.messages > 0);
         let numbers = topics.flat_map(|topic| topic.leaves.iter().filter(|leaf| !leaf.is_stamp));
@@ -118,7 +120,7 @@ impl Budget {
 
 /// Reads one number of a topic and keeps so many samples, and what all of them come to if there are more.
 fn samples(
-    place: &Place,
+    place: &Input,
     topic: &ChannelReport,
     number: &LeafReport,
     most: usize,
@@ -329,7 +331,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("long.mcap");
         std::fs::write(&path, file.finish()).unwrap();
-        let content = read_most(&Place::File(path), 610).unwrap();
+        let content = read_most(&Input::File(path), 610).unwrap();
         let kept = content.recording.channels.iter().map(|c| c.samples.len());
         assert_eq!(kept.collect::<Vec<_>>(), [10, 300, 300]);
         let all = content.wholes.iter().map(|whole| whole.map(|w| w.samples));

@@ -13,11 +13,11 @@ use self::content::Content;
 use super::Outcome;
 use crate::cli::Inspect;
 use crate::failure::Failure;
-use crate::io::csv::Place;
+use crate::io::Input;
 use crate::io::output::Output;
+use crate::print;
 use crate::quality::copies;
 use crate::recording::Recording;
-use crate::report;
 use crate::report::inspect::{Entry, Report, Said};
 
 /// Runs the verb.
@@ -36,7 +36,7 @@ pub fn run(args: &Inspect) -> Result<Outcome, Failure> {
     let read: Vec<Result<Content, Failure>> = args
         .files
         .iter()
-        .map(|file| content::read(&Place::of(file), &args.reading.options(None, None)))
+        .map(|file| content::read(&Input::of(file), &args.reading.options(None, None)))
         .collect();
     if let [Err(failure)] = read.as_slice() {
         return Err(failure.clone());
@@ -106,7 +106,7 @@ fn finish(
     let failed: Vec<&Failure> = read.iter().filter_map(|r| r.as_ref().err()).collect();
     if let Some((last, others)) = failed.split_last() {
         for failure in others {
-            report::say(&format!("torqcomp: {failure}\n"));
+            print::say(&format!("torqcomp: {failure}\n"));
         }
         return Err((*last).clone());
     }

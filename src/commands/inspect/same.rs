@@ -3,7 +3,7 @@
 use std::fs::File;
 use std::io::{self, BufReader, Read};
 
-use crate::report::Warning;
+use crate::warning::Warning;
 
 /// Bytes that are compared at a time.
 const PIECE: usize = 1 << 16;

@@ -1,6 +1,7 @@
 //! Channels too long to be kept: their first samples, and what all of them come to.
 
-use crate::report::{Warning, inspect};
+use crate::report::inspect;
+use crate::warning::Warning;
 
 /// What all samples of a channel come to of which only the first were kept.
 #[derive(Debug, Clone, Copy, PartialEq)]

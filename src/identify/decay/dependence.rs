@@ -4,7 +4,7 @@ use super::laws::{self, Law, LawFit};
 use super::modes::{self, ModesFit, Stretch};
 use crate::failure::Failure;
 use crate::identify::Outcome;
-use crate::report::rounded;
+use crate::print::rounded;
 
 /// A law is preferred if its criterion is lower by that much.
 const CLEARLY: f64 = 10.0;

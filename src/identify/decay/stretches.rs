@@ -6,7 +6,7 @@ use super::modes::Stretch;
 use super::{Options, Ringing};
 use crate::failure::Failure;
 use crate::identify::Outcome;
-use crate::report::short;
+use crate::print::short;
 
 /// Most samples of all stretches together that are fitted at once.
 const MOST_SAMPLES: usize = 20_000;

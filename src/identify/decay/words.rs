@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use super::modes::{ModesFit, Stretch};
 use crate::identify::{Correlated, Found, Outcome, STRONG};
+use crate::print::rounded;
 use crate::report::chart::{Chart, Series};
-use crate::report::rounded;
 
 /// Frequency, damping and natural frequency of a mode with their uncertainties, (C7) to (C14).
 pub(super) fn name_mode(

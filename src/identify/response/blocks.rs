@@ -7,7 +7,7 @@ use torqcomp_dsp::frf::{self, Block, Powers, Window};
 use super::{Driven, Excitation, Options, check};
 use crate::failure::Failure;
 use crate::identify::{Outcome, rms};
-use crate::report::{rounded, short};
+use crate::print::{rounded, short};
 
 /// Blocks of all records, on one grid of frequencies.
 pub(super) struct Set {

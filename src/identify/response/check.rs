@@ -6,7 +6,7 @@ use super::blocks::Set;
 use super::lines::Lines;
 use crate::failure::Failure;
 use crate::identify::Outcome;
-use crate::report::{rounded, short};
+use crate::print::{rounded, short};
 use torqcomp_dsp::frf::{Estimator, Window};
 
 /// Refuses records that differ in rate, have holes, or do not move.

@@ -7,7 +7,7 @@ use torqcomp_dsp::frf::{Estimator, Powers};
 use super::blocks::Set;
 use super::{Data, Options};
 use crate::failure::Failure;
-use crate::report::short;
+use crate::print::short;
 
 /// Numbers of lines in a band.
 pub(super) type Lines = std::ops::Range<usize>;

@@ -15,7 +15,7 @@ use torqcomp_dsp::frf::{self, Estimator, Frf, Window};
 use super::plain::Answer;
 use super::{Found, Outcome, Quality};
 use crate::failure::Failure;
-use crate::report::{rounded, short};
+use crate::print::{rounded, short};
 use blocks::Set;
 use lines::Lines;
 pub use modal::{Data, Effort, Modal};

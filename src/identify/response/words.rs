@@ -11,8 +11,8 @@ use super::lines::Lines;
 use super::order::folds;
 use super::scatter::Spread;
 use crate::identify::{Comparison, Correlated, Found, Outcome, STRONG};
+use crate::print::rounded;
 use crate::report::chart::{Chart, Series};
-use crate::report::rounded;
 
 /// Frequency and damping of every mode, by rising frequency, and which are hard to tell apart.
 pub(super) fn name_modes(outcome: &mut Outcome, fitted: &Modal, spread: &Spread) {

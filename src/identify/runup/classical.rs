@@ -40,7 +40,7 @@ pub(super) fn identify(
     let method = format!(
         "classical: Butterworth low-pass at {} Hz forwards and backwards, central differences, \
          every {step} samples, least squares",
-        crate::report::short(corner_hz)
+        crate::print::short(corner_hz)
     );
     let names = names(run, directions, split);
     let quality = (left, left / rms(&right));

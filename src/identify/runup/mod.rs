@@ -132,7 +132,7 @@ pub fn identify(run: &Run, options: &Options) -> Result<Outcome, Failure> {
         outcome.method.push(format!(
             "what is left is not white noise, so the equation lacks something: the uncertainties are taken from \
              how it hangs together, up to {} times those of noise",
-            crate::report::rounded(fitted.fit.coloured, 2)
+            crate::print::rounded(fitted.fit.coloured, 2)
         ));
     }
     correlations(&mut outcome, &fitted);
@@ -165,7 +165,7 @@ fn method(run: &Run, fitted: &Fitted) -> String {
     format!(
         "weighted averages of the equation of motion over windows of ±{} s ({which}), derivatives taken \
          from the weight",
-        crate::report::short(fitted.rows.half as f64 / run.rate_hz),
+        crate::print::short(fitted.rows.half as f64 / run.rate_hz),
     )
 }
 

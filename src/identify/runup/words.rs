@@ -111,7 +111,7 @@ pub(super) fn say(
             format!(
                 "noise makes up {} % of a regressor's power; it was taken out, but a longer window \
                  or a better sensor would be safer",
-                crate::report::rounded(100.0 * fitted.fit.noise_share, 2)
+                crate::print::rounded(100.0 * fitted.fit.noise_share, 2)
             ),
         );
     }

@@ -7,8 +7,8 @@ use torqcomp_model::fit::linear::{self, LinearFit};
 
 use super::{Found, Outcome, Quality, rms};
 use crate::failure::Failure;
+use crate::print::rounded;
 use crate::report::chart::{Chart, Series};
-use crate::report::rounded;
 
 /// One reading under a known load.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -7,7 +7,7 @@ use super::scan::Rows;
 use super::{NamedUnit, Options};
 use crate::failure::Failure;
 use crate::io::digits;
-use crate::report::Warning;
+use crate::warning::Warning;
 
 /// Largest deviation of a step from the uniform one, as a fraction of it.
 const TOLERANCE: f64 = 0.01;

@@ -19,8 +19,8 @@ use super::summary;
 use super::time::Stamp;
 use super::units;
 use crate::failure::Failure;
-use crate::io::csv::Place;
-use crate::report::Warning;
+use crate::io::Input;
+use crate::warning::Warning;
 
 /// Leaves of a channel whose value in the first message is shown.
 const EXAMPLES: usize = 64;
@@ -148,7 +148,7 @@ impl Inventory {
     ///
     /// # Errors
     /// If it cannot be read or is not MCAP. Damage is no error: it is among the warnings.
-    pub fn scan(place: &Place) -> Result<Self, Failure> {
+    pub fn scan(place: &Input) -> Result<Self, Failure> {
         Self::read(Frames::open(place)?)
     }
 
@@ -169,8 +169,8 @@ impl Inventory {
 ///
 /// # Errors
 /// If there are several, or none, or the file can only be read once.
-pub fn only_topic(place: &Place) -> Result<Wanted, Failure> {
-    if *place == Place::Stdin {
+pub fn only_topic(place: &Input) -> Result<Wanted, Failure> {
+    if *place == Input::Stdin {
         return Err(Failure::usage(
             "choose what to read from standard input with --topic, as --topic /joint_states \
              --field effort[0]",

@@ -17,7 +17,7 @@ use super::summary::{Summary, Tally};
 use super::time::{Stamp, TimeChoice, TimeUsed};
 use super::units::{self, UnitFound};
 use crate::failure::Failure;
-use crate::io::csv::Place;
+use crate::io::Input;
 
 /// Samples given at a time.
 const BATCH: usize = 1 << 13;
@@ -130,7 +130,7 @@ impl Source {
     ///
     /// # Errors
     /// If the file cannot be read, or the number is not in it: then with what is there.
-    pub fn open(place: &Place, selection: &Selection, options: &Options) -> Result<Self, Failure> {
+    pub fn open(place: &Input, selection: &Selection, options: &Options) -> Result<Self, Failure> {
         let wanted = match selection.check()? {
             Wanted::Only => super::inventory::only_topic(place)?,
             wanted => wanted,
@@ -143,7 +143,7 @@ impl Source {
     /// # Errors
     /// If the number is not in it: then with what is there.
     pub fn read(
-        place: &Place,
+        place: &Input,
         mut frames: Frames,
         wanted: &Wanted,
         options: &Options,
@@ -153,7 +153,7 @@ impl Source {
             return Self::after(frames, channels, found, wanted, options);
         }
         // Where the chunk that declares a channel is damaged, the end of the file may declare it again.
-        if frames.loss_count() > 0 && *place != Place::Stdin {
+        if frames.loss_count() > 0 && *place != Input::Stdin {
             let mut again = Frames::open(place)?;
             if let Some(found) = first_message(&mut again, &mut channels, wanted)? {
                 return Self::after(again, channels, found, wanted, options);

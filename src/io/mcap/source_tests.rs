@@ -15,7 +15,7 @@ fn wanted(topic: &str, field: &str) -> Wanted {
 
 fn read(bytes: &[u8], topic: &str, field: &str) -> (Vec<i64>, Vec<f64>, Summary) {
     let mut source = Source::read(
-        &Place::Stdin,
+        &Input::Stdin,
         frames(bytes),
         &wanted(topic, field),
         &Options::default(),
@@ -130,7 +130,7 @@ fn channels_of_a_damaged_first_chunk_are_known_from_the_end_of_the_file() {
     bytes[first as usize + 150] ^= 0x55;
     let file = tempfile::NamedTempFile::new().unwrap();
     std::fs::write(file.path(), &bytes).unwrap();
-    let place = Place::File(file.path().to_owned());
+    let place = Input::File(file.path().to_owned());
     let found = Source::read(
         &place,
         frames(&bytes),
@@ -179,7 +179,7 @@ fn channels_of_a_topic_are_one_signal_unless_they_differ() {
     file.message(2, 2, b"{}");
     let bytes = file.finish();
     let said = Source::read(
-        &Place::Stdin,
+        &Input::Stdin,
         frames(&bytes),
         &wanted("/x", ""),
         &Options::default(),
@@ -212,7 +212,7 @@ fn the_time_is_the_messages_own_if_it_has_one_that_is_set() {
             spacing: None,
         };
         let mut source =
-            Source::read(&Place::Stdin, frames(&bytes), &wanted("/x", ""), &options).unwrap();
+            Source::read(&Input::Stdin, frames(&bytes), &wanted("/x", ""), &options).unwrap();
         let (mut times, mut values) = (Vec::new(), Vec::new());
         source.next(&mut times, &mut values).unwrap();
         (times[0], source.chosen().time.choice)
@@ -264,7 +264,7 @@ fn a_miss_says_what_is_there() {
     let bytes = numbers(options(None), 3);
     let said = |topic: &str, field: &str| {
         let source = Source::read(
-            &Place::Stdin,
+            &Input::Stdin,
             frames(&bytes),
             &wanted(topic, field),
             &Options::default(),
@@ -275,7 +275,7 @@ fn a_miss_says_what_is_there() {
     assert!(said("/x", "dat").contains("did you mean \"data\"?"));
     let not = Frames::new(
         "no.mcap".to_owned(),
-        super::super::record::input::Input::new(Box::new(&b"time,v"[..])),
+        super::super::record::input::CountedInput::new(Box::new(&b"time,v"[..])),
     );
     assert!(not.err().unwrap().to_string().contains("not an MCAP file"));
 }

@@ -6,7 +6,7 @@ use super::decode::Damage;
 use super::order::{Sorter, WINDOW};
 use super::record::frames::Frames;
 use super::source::Chosen;
-use crate::report::Warning;
+use crate::warning::Warning;
 
 /// What a signal came to.
 #[derive(Debug, Clone, PartialEq)]

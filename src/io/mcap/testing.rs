@@ -7,11 +7,11 @@ use mcap::records::MessageHeader;
 use mcap::{Compression, WriteOptions, Writer};
 
 use super::record::frames::Frames;
-use super::record::input::Input;
+use super::record::input::CountedInput;
 
 /// Frames of bytes in memory.
 pub fn frames(bytes: &[u8]) -> Frames {
-    let input = Input::new(Box::new(Cursor::new(bytes.to_vec())));
+    let input = CountedInput::new(Box::new(Cursor::new(bytes.to_vec())));
     Frames::new("test.mcap".to_owned(), input).unwrap()
 }
 

@@ -2,7 +2,7 @@
 
 use super::encoding;
 use crate::failure::Failure;
-use crate::report::Warning;
+use crate::warning::Warning;
 
 /// Bytes whose lines end with a line feed: UTF-8, or a superset of ASCII with one byte a character.
 #[derive(Debug, Clone, PartialEq)]

@@ -4,7 +4,7 @@ use super::axes::Role;
 use super::head::{Head, Table};
 use super::rows::{Column, Rows};
 use crate::recording::HoleKind;
-use crate::report::Warning;
+use crate::warning::Warning;
 
 /// Most rows of a summary, besides one for each [`PART`] samples.
 const ROWS: usize = 10;

@@ -11,7 +11,7 @@ use super::summary;
 use crate::failure::Failure;
 use crate::io::csv::{Dialect, Options, is_skipped};
 use crate::recording::Channel;
-use crate::report::Warning;
+use crate::warning::Warning;
 
 /// Rows that tell what a column holds.
 const SAMPLE: usize = 400;

@@ -9,7 +9,7 @@
 //! **Valid for stiff flanks without impact losses.** Mistaken for `coulomb-friction`, `bouc-wen-hysteresis`, and at
 //! one level for `cubic-stiffness`.
 
-use super::{Action, Effect, Form, Memory, Parameter, Place, Torque};
+use super::{Action, Effect, Form, Memory, Parameter, Stage, Torque};
 
 const GAP: Parameter = Parameter::motion("gap", 1, 0, 0.0, 3.0);
 /// With the gap far out, this would be an end stop beside the beam.
@@ -28,42 +28,42 @@ pub(super) static EFFECT: Effect = Effect {
     forms: &[
         Form {
             name: "gap",
-            place: Place::Stand,
+            stage: Stage::Stand,
             parameters: &[GAP],
             starts: GAPS,
             build: |p| Action::shown(Gap::of(p)),
         },
         Form {
             name: "gap-beside",
-            place: Place::Stand,
+            stage: Stage::Stand,
             parameters: &[GAP],
             starts: GAPS,
             build: |p| Action::beside(Gap::of(p)),
         },
         Form {
             name: "soft-gap",
-            place: Place::Stand,
+            stage: Stage::Stand,
             parameters: &[SMALL_GAP, SOFTENING],
             starts: SOFT_GAPS,
             build: |p| Action::shown(Gap::of(p)),
         },
         Form {
             name: "soft-gap-beside",
-            place: Place::Stand,
+            stage: Stage::Stand,
             parameters: &[SMALL_GAP, SOFTENING],
             starts: SOFT_GAPS,
             build: |p| Action::beside(Gap::of(p)),
         },
         Form {
             name: "joint",
-            place: Place::Stand,
+            stage: Stage::Stand,
             parameters: &[GAP],
             starts: &[&[0.02], &[0.1]],
             build: |p| Action::beside(Joint { gap: p[0] }),
         },
         Form {
             name: "recorded",
-            place: Place::Gage,
+            stage: Stage::Gage,
             parameters: &[GAP],
             starts: &[&[0.02], &[0.1]],
             build: |p| {

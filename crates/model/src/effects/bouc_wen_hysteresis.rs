@@ -9,7 +9,7 @@
 //!
 //! The law does not depend on rate: `z` follows the steps of `x`, by the midpoint rule.
 
-use super::{Action, Effect, Form, Memory, Parameter, Place, Torque};
+use super::{Action, Effect, Form, Memory, Parameter, Stage, Torque};
 
 const PART: Parameter = Parameter::number("stiffness_ratio", 0.0, 50.0);
 /// Without loss the loops are closed: what is left is a bent spring.
@@ -40,42 +40,42 @@ pub(super) static EFFECT: Effect = Effect {
     forms: &[
         Form {
             name: "linear",
-            place: Place::Stand,
+            stage: Stage::Stand,
             parameters: &[PART, LOSS, SHAPE],
             starts: STARTS,
             build: |p| Action::beside(BoucWen::of(p)),
         },
         Form {
             name: "shown",
-            place: Place::Stand,
+            stage: Stage::Stand,
             parameters: &[PART, LOSS, SHAPE],
             starts: STARTS,
             build: |p| Action::shown(BoucWen::of(p)),
         },
         Form {
             name: "part",
-            place: Place::Stand,
+            stage: Stage::Stand,
             parameters: &[SHARE, LOSS, SHAPE],
             starts: STARTS,
             build: |p| Action::beside(Part::of(p)),
         },
         Form {
             name: "exponent-part",
-            place: Place::Stand,
+            stage: Stage::Stand,
             parameters: &[SHARE, LOSS, SHAPE, EXPONENT],
             starts: CURVED,
             build: |p| Action::beside(Part::of(p)),
         },
         Form {
             name: "exponent",
-            place: Place::Stand,
+            stage: Stage::Stand,
             parameters: &[PART, LOSS, SHAPE, EXPONENT],
             starts: CURVED,
             build: |p| Action::beside(BoucWen::of(p)),
         },
         Form {
             name: "exponent-shown",
-            place: Place::Stand,
+            stage: Stage::Stand,
             parameters: &[PART, LOSS, SHAPE, EXPONENT],
             starts: CURVED,
             build: |p| Action::shown(BoucWen::of(p)),

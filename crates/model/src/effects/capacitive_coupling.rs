@@ -6,7 +6,7 @@
 //! **Valid far below the corner of the stray path** for the first two. Mistaken for `second-mode` below the excitation,
 //! `time-delay` of the other channel.
 
-use super::{Action, Effect, Form, Parameter, Place};
+use super::{Action, Effect, Form, Parameter, Stage};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
@@ -20,7 +20,7 @@ pub(super) static EFFECT: Effect = Effect {
     forms: &[
         Form {
             name: "slope-of-load",
-            place: Place::Chain,
+            stage: Stage::Chain,
             parameters: &[Parameter::motion("time", 0, 1, -5.0, 5.0)],
             starts: &[&[0.005]],
             build: |p| {
@@ -32,7 +32,7 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "slope-of-record",
-            place: Place::Chain,
+            stage: Stage::Chain,
             parameters: &[Parameter::motion("time", 0, 1, -5.0, 5.0)],
             starts: &[&[0.005]],
             build: |p| {
@@ -44,7 +44,7 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "high-pass-leak",
-            place: Place::Chain,
+            stage: Stage::Chain,
             parameters: &[
                 // A small capacitor has a corner far above the band, and much of it passes there.
                 Parameter::number("share", -100.0, 100.0),
@@ -61,7 +61,7 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "ac-coupled",
-            place: Place::Chain,
+            stage: Stage::Chain,
             // Below, a record of a thousand periods shows no corner but a slope, which is a drift.
             parameters: &[Parameter::frequency("corner", 1e-4, 3.0).fading()],
             starts: &[&[0.003], &[0.05], &[0.3]],

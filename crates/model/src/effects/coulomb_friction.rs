@@ -10,7 +10,7 @@
 //! the speed changes sign between two nodes, `v` is taken no less than half the change, so that the sum over
 //! the nodes has the friction switch at the right time.
 
-use super::{Action, Effect, Form, Memory, Parameter, Place, Torque};
+use super::{Action, Effect, Form, Memory, Parameter, Stage, Torque};
 
 pub(super) static EFFECT: Effect = Effect {
     name: "coulomb-friction",
@@ -26,7 +26,7 @@ pub(super) static EFFECT: Effect = Effect {
     forms: &[
         Form {
             name: "sharp",
-            place: Place::Stand,
+            stage: Stage::Stand,
             parameters: &[Parameter::motion("torque", 1, 0, 0.0, 5.0)],
             starts: &[&[0.02], &[0.2]],
             build: |p| {
@@ -38,7 +38,7 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "tanh",
-            place: Place::Stand,
+            stage: Stage::Stand,
             parameters: &[
                 Parameter::motion("torque", 1, 0, 0.0, 5.0),
                 Parameter::motion("transition_speed", 1, -1, 1e-5, 0.3),

@@ -6,7 +6,7 @@
 //! a gap, which sets in at one displacement, is not cubic. Mistaken for `gage-nonlinearity` of the same
 //! power, which bends the record and not the motion, at low level for `quadratic-stiffness`.
 
-use super::{Action, Effect, Form, Memory, Parameter, Place, Torque};
+use super::{Action, Effect, Form, Memory, Parameter, Stage, Torque};
 
 const COEFFICIENT: &[Parameter] = &[Parameter::motion("coefficient", -2, 0, -0.2, 100.0)];
 const STARTS: &[&[f64]] = &[&[0.01], &[-0.005]];
@@ -21,14 +21,14 @@ pub(super) static EFFECT: Effect = Effect {
     forms: &[
         Form {
             name: "beside",
-            place: Place::Stand,
+            stage: Stage::Stand,
             parameters: COEFFICIENT,
             starts: STARTS,
             build: |p| Action::beside(Cubic { coefficient: p[0] }),
         },
         Form {
             name: "shown",
-            place: Place::Stand,
+            stage: Stage::Stand,
             parameters: COEFFICIENT,
             starts: STARTS,
             build: |p| Action::shown(Cubic { coefficient: p[0] }),

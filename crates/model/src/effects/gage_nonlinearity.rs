@@ -4,7 +4,7 @@
 //! `ΔR/R = GF (T₀/T) ε + C₂ (T₀/T)² ε²`), `y = x + b x³` (`cube`) or both (`both`). **Valid while the curve rises.**
 //! Mistaken for `quadratic-stiffness` or `cubic-stiffness`, which change the motion too, and for `saturation`.
 
-use super::{Action, Effect, Form, Parameter, Place};
+use super::{Action, Effect, Form, Parameter, Stage};
 
 const SQUARE: Parameter = Parameter::motion("square", -1, 0, -0.15, 0.15);
 const CUBE: Parameter = Parameter::motion("cube", -2, 0, -0.05, 1.0);
@@ -19,21 +19,21 @@ pub(super) static EFFECT: Effect = Effect {
     forms: &[
         Form {
             name: "square",
-            place: Place::Gage,
+            stage: Stage::Gage,
             parameters: &[SQUARE],
             starts: &[&[0.005]],
             build: |p| curve(p[0], 0.0),
         },
         Form {
             name: "cube",
-            place: Place::Gage,
+            stage: Stage::Gage,
             parameters: &[CUBE],
             starts: &[&[0.002]],
             build: |p| curve(0.0, p[0]),
         },
         Form {
             name: "both",
-            place: Place::Gage,
+            stage: Stage::Gage,
             parameters: &[SQUARE, CUBE],
             starts: &[&[0.005, 0.002]],
             build: |p| curve(p[0], p[1]),

@@ -4,7 +4,7 @@
 //! the frequency is that of the grid within ¼ %. **Valid for a steady grid.** Mistaken for an order of the shaft
 //! (`rotor-imbalance`) that falls on the same frequency.
 
-use super::{Action, Effect, Form, Line, Parameter, Place, Ruler};
+use super::{Action, Effect, Form, Line, Parameter, Ruler, Stage};
 
 const fn amplitude(name: &'static str) -> Parameter {
     Parameter::motion(name, 1, 0, 0.0, 10.0)
@@ -18,7 +18,7 @@ macro_rules! form {
     ($name:literal, $hz:literal, $($amplitude:literal),+) => {
         Form {
             name: $name,
-            place: Place::Disturbance,
+            stage: Stage::Disturbance,
             parameters: &[grid($hz), $(amplitude($amplitude)),+],
             starts: &[&[$hz]],
             build: |p| Action::Lines(Line::orders(p)),

@@ -5,10 +5,10 @@
 //!
 //! | place | what it does |
 //! |---|---|
-//! | [`Place::Stand`] | a torque `n(x, x', z)` beside `x`, in units of the record: `x'' + 2ζω₀ x' + ω₀² (x + n) = ω₀² G u` |
-//! | [`Place::Dynamics`] | a factor or a term of the linear response |
-//! | [`Place::Chain`] | what gage, amplifier and recorder make of `x` |
-//! | [`Place::Disturbance`] | something added that does not come from `u` |
+//! | [`Stage::Stand`] | a torque `n(x, x', z)` beside `x`, in units of the record: `x'' + 2ζω₀ x' + ω₀² (x + n) = ω₀² G u` |
+//! | [`Stage::Dynamics`] | a factor or a term of the linear response |
+//! | [`Stage::Chain`] | what gage, amplifier and recorder make of `x` |
+//! | [`Stage::Disturbance`] | something added that does not come from `u` |
 //!
 //! Of one effect there can be several forms, as the same name stands for different equations in
 //! different texts.
@@ -65,7 +65,7 @@ pub const EFFECTS: &[&Effect] = &[
 
 /// Where in the chain from torque to record an effect sits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Place {
+pub enum Stage {
     /// A restoring or friction torque in the stand, integrated in time.
     Stand,
     /// A factor or a term of the linear response of the stand.
@@ -105,7 +105,7 @@ pub struct Form {
     /// Its name within the effect.
     pub name: &'static str,
     /// Where it sits in the chain.
-    pub place: Place,
+    pub stage: Stage,
     /// Its parameters.
     pub parameters: &'static [Parameter],
     /// Values, in rulers, from which a fit starts; several where the error has several minima.

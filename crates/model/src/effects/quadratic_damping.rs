@@ -6,7 +6,7 @@
 //!
 //! Integration: for a fixed `x`, `x' = v/(1 + ω₀² d |v| t)` exactly.
 
-use super::{Action, Effect, Form, Memory, Parameter, Place, Torque};
+use super::{Action, Effect, Form, Memory, Parameter, Stage, Torque};
 
 pub(super) static EFFECT: Effect = Effect {
     name: "quadratic-damping",
@@ -17,7 +17,7 @@ pub(super) static EFFECT: Effect = Effect {
     experiment: "free decays from two amplitudes, or the response at two levels",
     forms: &[Form {
         name: "drag",
-        place: Place::Stand,
+        stage: Stage::Stand,
         parameters: &[Parameter::motion("coefficient", -1, 2, 0.0, 20.0)],
         starts: &[&[0.02]],
         build: |p| Action::beside(Drag { coefficient: p[0] }),

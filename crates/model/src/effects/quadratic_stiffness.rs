@@ -5,7 +5,7 @@
 //! changes**: at `2 c x = −1` the even form has no stiffness left. Mistaken for `gage-nonlinearity` (even) and
 //! `cubic-stiffness` (odd).
 
-use super::{Action, Effect, Form, Memory, Parameter, Place, Torque};
+use super::{Action, Effect, Form, Memory, Parameter, Stage, Torque};
 
 pub(super) static EFFECT: Effect = Effect {
     name: "quadratic-stiffness",
@@ -17,28 +17,28 @@ pub(super) static EFFECT: Effect = Effect {
     forms: &[
         Form {
             name: "even",
-            place: Place::Stand,
+            stage: Stage::Stand,
             parameters: &[Parameter::motion("coefficient", -1, 0, -0.5, 0.5)],
             starts: &[&[0.005]],
             build: |p| Action::beside(Even { coefficient: p[0] }),
         },
         Form {
             name: "even-shown",
-            place: Place::Stand,
+            stage: Stage::Stand,
             parameters: &[Parameter::motion("coefficient", -1, 0, -0.5, 0.5)],
             starts: &[&[0.005]],
             build: |p| Action::shown(Even { coefficient: p[0] }),
         },
         Form {
             name: "odd",
-            place: Place::Stand,
+            stage: Stage::Stand,
             parameters: &[Parameter::motion("coefficient", -1, 0, -0.3, 20.0)],
             starts: &[&[0.01]],
             build: |p| Action::beside(Odd { coefficient: p[0] }),
         },
         Form {
             name: "odd-shown",
-            place: Place::Stand,
+            stage: Stage::Stand,
             parameters: &[Parameter::motion("coefficient", -1, 0, -0.3, 20.0)],
             starts: &[&[0.01]],
             build: |p| Action::shown(Odd { coefficient: p[0] }),

@@ -4,7 +4,7 @@
 //! `p_k = e^{jπ(2k+n−1)/2n}`. S. Butterworth, Exp. Wireless 7 (1930), 536. **Valid below half the sampling rate.**
 //! Mistaken for `time-delay` where the corner lies far above the excitation.
 
-use super::{Action, Effect, Form, Parameter, Place};
+use super::{Action, Effect, Form, Parameter, Stage};
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
 
@@ -15,7 +15,7 @@ macro_rules! order {
     ($order:literal, $name:literal) => {
         Form {
             name: $name,
-            place: Place::Chain,
+            stage: Stage::Chain,
             parameters: &[CORNER],
             starts: STARTS,
             build: |p| butterworth($order, p[0]),
@@ -37,7 +37,7 @@ pub(super) static EFFECT: Effect = Effect {
         order!(4, "order-4"),
         Form {
             name: "second-order",
-            place: Place::Chain,
+            stage: Stage::Chain,
             parameters: &[CORNER, Parameter::number("damping_ratio", 0.3, 3.0)],
             starts: &[&[1.0, 0.8], &[0.3, 0.8], &[0.1, 0.8]],
             build: |p| {

@@ -4,7 +4,7 @@
 //! thesis, section III). The rate is found in the data; the phase belongs to the record. **Valid for a
 //! constant speed.** Mistaken for `mains-pickup` where the rate or an order of it falls on the mains.
 
-use super::{Action, Effect, Form, Line, Parameter, Place, Ruler};
+use super::{Action, Effect, Form, Line, Parameter, Ruler, Stage};
 
 pub(super) static EFFECT: Effect = Effect {
     name: "rotor-imbalance",
@@ -16,7 +16,7 @@ pub(super) static EFFECT: Effect = Effect {
     forms: &[
         Form {
             name: "line",
-            place: Place::Disturbance,
+            stage: Stage::Disturbance,
             parameters: &[RATE, Parameter::motion("amplitude", 1, 0, 0.0, 10.0)],
             // The rate is looked for in the spectrum of the residual.
             starts: &[],
@@ -24,7 +24,7 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "twice",
-            place: Place::Disturbance,
+            stage: Stage::Disturbance,
             parameters: &[
                 RATE,
                 Parameter::motion("amplitude", 1, 0, 0.0, 10.0),

@@ -4,7 +4,7 @@
 //! (`knee`). **What was cut off cannot be recovered**; the soft
 //! form can, up to just below `L`. Mistaken for `gage-nonlinearity` (cube) if soft.
 
-use super::{Action, Effect, Form, Parameter, Place, Ruler};
+use super::{Action, Effect, Form, Parameter, Ruler, Stage};
 
 const LIMIT: Parameter = Parameter::motion("limit", 1, 0, 0.05, 4.0).by(Ruler::Peak);
 
@@ -21,7 +21,7 @@ pub(super) static EFFECT: Effect = Effect {
     forms: &[
         Form {
             name: "hard",
-            place: Place::Limit,
+            stage: Stage::Limit,
             parameters: &[LIMIT],
             starts: &[&[0.99], &[0.7]],
             build: |p| {
@@ -38,7 +38,7 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "uneven",
-            place: Place::Limit,
+            stage: Stage::Limit,
             parameters: &[
                 LIMIT,
                 Parameter::motion("lower_limit", 1, 0, -4.0, -0.05).by(Ruler::Peak),
@@ -58,7 +58,7 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "knee",
-            place: Place::Limit,
+            stage: Stage::Limit,
             parameters: &[LIMIT, Parameter::number("sharpness", 1.0, 30.0)],
             starts: &[&[1.1, 4.0], &[1.02, 10.0]],
             build: |p| {
@@ -81,7 +81,7 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "soft",
-            place: Place::Limit,
+            stage: Stage::Limit,
             parameters: &[FAR_LIMIT],
             starts: &[&[1.1], &[2.5], &[6.0]],
             build: |p| {

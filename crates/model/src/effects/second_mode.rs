@@ -5,7 +5,7 @@
 //! **Valid for modes apart by more than their widths.** Mistaken for `recorder-lowpass` or `time-delay` if it lies
 //! above the excitation.
 
-use super::{Action, Effect, Form, Mode, Parameter, Place};
+use super::{Action, Effect, Form, Mode, Parameter, Stage};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
@@ -46,7 +46,7 @@ pub(super) static EFFECT: Effect = Effect {
     forms: &[
         Form {
             name: "added",
-            place: Place::Dynamics,
+            stage: Stage::Dynamics,
             parameters: &[FREQUENCY, DAMPING, SHARE],
             starts: starts!(0.02),
             build: |p| {
@@ -58,7 +58,7 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "shared",
-            place: Place::Dynamics,
+            stage: Stage::Dynamics,
             parameters: &[FREQUENCY, DAMPING, SHARE],
             starts: starts!(0.02),
             build: |p| {
@@ -70,7 +70,7 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "series",
-            place: Place::Dynamics,
+            stage: Stage::Dynamics,
             // With more damping it is a low-pass of second order.
             parameters: &[FREQUENCY, Parameter::number("damping_ratio", 1e-4, 0.3)],
             starts: starts!(),
@@ -81,7 +81,7 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "coupled",
-            place: Place::Dynamics,
+            stage: Stage::Dynamics,
             parameters: &[
                 FREQUENCY,
                 DAMPING,
@@ -102,7 +102,7 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "free",
-            place: Place::Dynamics,
+            stage: Stage::Dynamics,
             parameters: &[
                 FREQUENCY,
                 DAMPING,

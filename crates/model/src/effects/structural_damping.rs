@@ -5,7 +5,7 @@
 //! before its cause (`springpot`, `K (jω/ω₀)^α`, does not; A. Gemant, Physics 7 (1936), 311), which shows in the first moments of a transient only. Mistaken for viscous damping where
 //! only the resonance is excited, `coulomb-friction` at one level.
 
-use super::{Action, Effect, Form, Parameter, Place};
+use super::{Action, Effect, Form, Parameter, Stage};
 use num_complex::Complex64;
 
 pub(super) static EFFECT: Effect = Effect {
@@ -18,7 +18,7 @@ pub(super) static EFFECT: Effect = Effect {
     forms: &[
         Form {
             name: "loss-factor",
-            place: Place::Dynamics,
+            stage: Stage::Dynamics,
             parameters: &[Parameter::number("loss_factor", 0.0, 2.0)],
             starts: &[&[0.02]],
             build: |p| {
@@ -34,7 +34,7 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "springpot",
-            place: Place::Dynamics,
+            stage: Stage::Dynamics,
             parameters: &[Parameter::number("order", 0.0, 0.5)],
             starts: &[&[0.02]],
             build: |p| {
@@ -50,7 +50,7 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "springpot-stiffness",
-            place: Place::Dynamics,
+            stage: Stage::Dynamics,
             parameters: &[
                 Parameter::number("order", 0.0, 0.5),
                 Parameter::number("stiffness_ratio", 0.3, 3.0),

@@ -7,7 +7,7 @@
 //! gage factor; as a zero shift 2 % of resistance at 85 °F is. **Valid over one warm-up.** Mistaken for `ac-coupled` of
 //! `capacitive-coupling`, a slow disturbance.
 
-use super::{Action, Clock, Effect, Form, Parameter, Place, Ruler};
+use super::{Action, Clock, Effect, Form, Parameter, Ruler, Stage};
 
 /// Most half waves of a course over a record.
 const HALF_WAVES: usize = 8;
@@ -22,7 +22,7 @@ pub(super) static EFFECT: Effect = Effect {
     forms: &[
         Form {
             name: "linear",
-            place: Place::Chain,
+            stage: Stage::Chain,
             parameters: &[Parameter::motion("slope", 1, -1, -100.0, 100.0).by(Ruler::Record)],
             starts: &[&[0.01]],
             build: |p| {
@@ -32,7 +32,7 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "exponential",
-            place: Place::Chain,
+            stage: Stage::Chain,
             parameters: &[
                 Parameter::motion("drift", 1, 0, -100.0, 100.0),
                 Parameter::motion("time_constant", 0, 1, 0.01, 20.0).by(Ruler::Record),
@@ -45,7 +45,7 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "sensitivity",
-            place: Place::Chain,
+            stage: Stage::Chain,
             parameters: &[Parameter::motion("rate", 0, -1, -0.9, 10.0).by(Ruler::Record)],
             starts: &[&[0.01]],
             build: |p| {
@@ -60,7 +60,7 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "course",
-            place: Place::Disturbance,
+            stage: Stage::Disturbance,
             parameters: &[],
             starts: &[&[]],
             build: |_| Action::Course(HALF_WAVES),

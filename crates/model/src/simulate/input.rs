@@ -12,7 +12,7 @@ use super::between::Between;
 /// Beyond an end where it repeats, the record is continued by its period, beyond others by point reflection; both fade
 /// out, so that the transform, which takes it for periodic, meets no step. What that makes up differs from
 /// what was there before the record by an initial state of the stand.
-pub struct Input {
+pub struct Excitation {
     samples: Vec<f64>,
     rate_hz: f64,
     start_s: f64,
@@ -27,7 +27,7 @@ pub struct Input {
     fine: Vec<f64>,
 }
 
-impl Input {
+impl Excitation {
     /// Prepares a band-limited record, with that many steps from sample to sample for integration in time.
     #[must_use]
     pub fn new(samples: Vec<f64>, rate_hz: f64, start_s: f64, substeps: usize) -> Self {
@@ -125,7 +125,7 @@ impl Input {
         std::f64::consts::TAU * line as f64 * self.rate_hz / self.total as f64
     }
 
-    /// Input at the steps of integration, from one step before the first sample to two after the last.
+    /// Excitation at the steps of integration, from one step before the first sample to two after the last.
     pub(super) fn fine(&self) -> &[f64] {
         &self.fine
     }

@@ -11,7 +11,7 @@ mod model;
 mod run;
 
 pub use between::Between;
-pub use input::Input;
+pub use input::Excitation;
 pub use integrate::{State, substeps};
 pub use model::{Fixed, Model};
 

@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use num_complex::Complex64;
 
-use super::input::Input;
+use super::input::Excitation;
 use super::integrate::{State, free_motion};
 use super::run::{self, Link};
-use crate::effects::{Action, Clock, Mode, Place};
+use crate::effects::{Action, Clock, Mode, Stage};
 
 /// A response that is known and not fitted, such as that of the recorder: of the frequency in Hz.
 pub type Fixed = Arc<dyn Fn(f64) -> Complex64 + Send + Sync>;
@@ -24,7 +24,7 @@ pub struct Model {
     /// the stand see it; what the gage shows of it is left to the record's own constant.
     pub shift: f64,
     /// The effects.
-    pub actions: Vec<(Place, Action)>,
+    pub actions: Vec<(Stage, Action)>,
 }
 
 /// A record on its way through the chain, in the domain that the last link left it in.
@@ -34,14 +34,14 @@ enum Signal {
 }
 
 impl Signal {
-    fn into_spectrum(self, input: &Input) -> Vec<Complex64> {
+    fn into_spectrum(self, input: &Excitation) -> Vec<Complex64> {
         match self {
             Self::Spectrum(spectrum) => spectrum,
             Self::Samples(samples) => input.transform(&samples),
         }
     }
 
-    fn into_samples(self, input: &Input) -> Vec<f64> {
+    fn into_samples(self, input: &Excitation) -> Vec<f64> {
         match self {
             Self::Spectrum(spectrum) => input.samples_of(spectrum),
             Self::Samples(samples) => samples,
@@ -55,7 +55,7 @@ impl Model {
     /// With torques in the stand the motion starts from `start`; without, from the steady state of what
     /// continues the record backwards. Samples after the motion has left all bounds are NaN.
     #[must_use]
-    pub fn simulate(&self, input: &Input, start: State) -> Vec<f64> {
+    pub fn simulate(&self, input: &Excitation, start: State) -> Vec<f64> {
         let torques = self.torques();
         let moved = if torques.is_empty() {
             self.respond(input)
@@ -71,7 +71,7 @@ impl Model {
 
     /// The record for an input when the stand is at rest before it, by integration in time.
     #[must_use]
-    pub fn simulate_from(&self, input: &Input, start: State) -> Vec<f64> {
+    pub fn simulate_from(&self, input: &Excitation, start: State) -> Vec<f64> {
         let samples = run::run(
             &self.mode,
             self.gain,
@@ -95,7 +95,7 @@ impl Model {
     /// Displacement and speed at the first sample, in the steady state of what continues the record
     /// backwards; torques left out.
     #[must_use]
-    pub fn state_at_start(&self, input: &Input) -> [f64; 2] {
+    pub fn state_at_start(&self, input: &Excitation) -> [f64; 2] {
         let Signal::Spectrum(x) = self.respond(input) else {
             return [0.0; 2];
         };
@@ -138,26 +138,26 @@ impl Model {
             .collect()
     }
 
-    fn respond(&self, input: &Input) -> Signal {
+    fn respond(&self, input: &Excitation) -> Signal {
         let line =
             |(k, u): (usize, &Complex64)| u * self.gain * self.mode.response(input.omega_rad_s(k));
         Signal::Spectrum(input.spectrum().iter().enumerate().map(line).collect())
     }
 
     /// What the chain makes of the motion, place by place.
-    fn record(&self, mut signal: Signal, input: &Input) -> Vec<f64> {
-        const ALONG: [Place; 5] = [
-            Place::Dynamics,
-            Place::Gage,
-            Place::Chain,
-            Place::Limit,
-            Place::Disturbance,
+    fn record(&self, mut signal: Signal, input: &Excitation) -> Vec<f64> {
+        const ALONG: [Stage; 5] = [
+            Stage::Dynamics,
+            Stage::Gage,
+            Stage::Chain,
+            Stage::Limit,
+            Stage::Disturbance,
         ];
         let clock = Clock {
             step_s: 1.0 / input.rate_hz(),
         };
         for place in ALONG {
-            if place == Place::Chain
+            if place == Stage::Chain
                 && let Some(recorder) = &self.recorder
             {
                 signal = multiply(signal, input, |omega| {
@@ -171,7 +171,7 @@ impl Model {
         signal.into_samples(input)
     }
 
-    fn apply(&self, action: &Action, signal: Signal, input: &Input, clock: Clock) -> Signal {
+    fn apply(&self, action: &Action, signal: Signal, input: &Excitation, clock: Clock) -> Signal {
         match action {
             Action::Factor(factor) => multiply(signal, input, |omega| factor(&self.mode, omega)),
             Action::Feedthrough(term) => {
@@ -191,7 +191,7 @@ impl Model {
     }
 }
 
-fn multiply(signal: Signal, input: &Input, factor: impl Fn(f64) -> Complex64) -> Signal {
+fn multiply(signal: Signal, input: &Excitation, factor: impl Fn(f64) -> Complex64) -> Signal {
     let mut spectrum = signal.into_spectrum(input);
     for (k, y) in spectrum.iter_mut().enumerate() {
         *y *= factor(input.omega_rad_s(k));

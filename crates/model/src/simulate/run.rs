@@ -1,6 +1,6 @@
 //! The motion with the torques of the stand, node by node.
 
-use super::input::Input;
+use super::input::Excitation;
 use super::integrate::{State, Step, free};
 use crate::effects::{Memory, Mode, Torque};
 
@@ -30,7 +30,7 @@ pub(super) fn run(
     mode: &Mode,
     gain: f64,
     torques: &[Link<'_>],
-    input: &Input,
+    input: &Excitation,
     start: State,
     shift: f64,
 ) -> Vec<f64> {

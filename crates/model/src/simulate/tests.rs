@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use super::{Between, Input, Model, State};
-use crate::effects::{Action, Effect, Mode, Place, RIVALS};
+use super::{Between, Excitation, Model, State};
+use crate::effects::{Action, Effect, Mode, RIVALS, Stage};
 
 const RATE_HZ: f64 = 20_000.0;
 const COUNT: usize = 2000;
@@ -14,7 +14,7 @@ const MODE: Mode = Mode {
 /// Tones of the input: amplitude, frequency, phase. Their sum and its slope are zero at the start.
 const TONES: [(f64, f64); 4] = [(1.0, 80.0), (0.8, 310.0), (0.7, 620.0), (0.4, 1430.0)];
 
-/// Input that begins and ends smoothly, so that it is band-limited as it stands.
+/// Excitation that begins and ends smoothly, so that it is band-limited as it stands.
 fn input_at(time_s: f64) -> f64 {
     let length_s = COUNT as f64 / RATE_HZ;
     let fade = (0.5 * TAU * (time_s / length_s).clamp(0.0, 1.0))
@@ -24,9 +24,9 @@ fn input_at(time_s: f64) -> f64 {
     fade * tones.sum::<f64>()
 }
 
-fn input(substeps: usize) -> Input {
+fn input(substeps: usize) -> Excitation {
     let samples = (0..COUNT).map(|i| input_at(i as f64 / RATE_HZ)).collect();
-    Input::new(samples, RATE_HZ, 0.0, substeps)
+    Excitation::new(samples, RATE_HZ, 0.0, substeps)
 }
 
 fn model(effect: &str, form: &str, values: &[f64]) -> Model {
@@ -46,7 +46,7 @@ fn with(effect: &Effect, form: &str, values: &[f64]) -> Model {
         gain: 1.0,
         recorder: None,
         shift: 0.0,
-        actions: vec![(form.place, (form.build)(values))],
+        actions: vec![(form.stage, (form.build)(values))],
     }
 }
 
@@ -379,5 +379,5 @@ fn what_the_chain_does_can_be_undone() {
             assert!((a - b).abs() < 1e-9, "{effect}: {a} {b}");
         }
     }
-    assert!(Place::Stand < Place::Dynamics && Place::Gage < Place::Chain);
+    assert!(Stage::Stand < Stage::Dynamics && Stage::Gage < Stage::Chain);
 }

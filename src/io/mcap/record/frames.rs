@@ -8,9 +8,9 @@ use mcap::MAGIC;
 use mcap::records::op;
 
 use super::chunk::{self, ChunkError, ChunkHead};
-use super::input::Input;
+use super::input::CountedInput;
 use crate::failure::Failure;
-use crate::io::csv::Place;
+use crate::io::Input;
 
 /// Bytes of a record's opcode and length.
 const RECORD_HEAD: usize = 9;
@@ -137,7 +137,7 @@ pub struct ChunkCount {
 /// The records of a file.
 pub struct Frames {
     name: String,
-    input: Input,
+    input: CountedInput,
     /// Unpacked records of the current chunk.
     chunk: Vec<u8>,
     /// Where they lie in the window instead, of a chunk that is not compressed.
@@ -159,15 +159,15 @@ impl Frames {
     ///
     /// # Errors
     /// If it cannot be read, or does not begin as an MCAP file does.
-    pub fn open(place: &Place) -> Result<Self, Failure> {
-        Self::new(place.name(), Input::new(place.open()?))
+    pub fn open(place: &Input) -> Result<Self, Failure> {
+        Self::new(place.name(), CountedInput::new(place.open()?))
     }
 
     /// Reads from bytes that come from elsewhere.
     ///
     /// # Errors
     /// If they do not begin as an MCAP file does.
-    pub fn new(name: String, mut input: Input) -> Result<Self, Failure> {
+    pub fn new(name: String, mut input: CountedInput) -> Result<Self, Failure> {
         let there = input.want(MAGIC.len()).map_err(|e| failed(&name, &e))?;
         if input.window()[..there] != *MAGIC {
             return Err(not_mcap(&name));

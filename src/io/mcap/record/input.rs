@@ -7,7 +7,7 @@ use std::io::{self, Read};
 const PIECE: usize = 1 << 18;
 
 /// A stream with a window of bytes that have been read and not yet used.
-pub struct Input {
+pub struct CountedInput {
     stream: Box<dyn Read + Send>,
     buffer: Vec<u8>,
     start: usize,
@@ -16,7 +16,7 @@ pub struct Input {
     offset: u64,
 }
 
-impl Input {
+impl CountedInput {
     /// Begins at the front of a stream.
     #[must_use]
     pub fn new(stream: Box<dyn Read + Send>) -> Self {
@@ -116,7 +116,7 @@ mod tests {
     #[test]
     fn bytes_come_in_order_whatever_the_steps() {
         let bytes: Vec<u8> = (0..2_000_000_u32).map(|i| (i % 251) as u8).collect();
-        let mut input = Input::new(Box::new(io::Cursor::new(bytes.clone())));
+        let mut input = CountedInput::new(Box::new(io::Cursor::new(bytes.clone())));
         let mut at = 0;
         for step in [1, 9, 300_000, 17, 600_000, 5] {
             assert_eq!(input.want(step).unwrap(), step);
@@ -133,7 +133,7 @@ mod tests {
 
     #[test]
     fn a_huge_wish_takes_no_more_memory_than_there_are_bytes() {
-        let mut input = Input::new(Box::new(io::Cursor::new(vec![1_u8; 10])));
+        let mut input = CountedInput::new(Box::new(io::Cursor::new(vec![1_u8; 10])));
         assert_eq!(input.want(1 << 40).unwrap(), 10);
         assert!(input.buffer.len() <= 2 * PIECE);
     }

@@ -9,11 +9,11 @@ use super::chunks::Chunk;
 use super::index::{ChunkEntry, Entry, Index};
 use super::sink::{Body, Sink};
 use crate::failure::Failure;
-use crate::io::csv::Place;
+use crate::io::Input;
 use crate::io::mcap::record::chunk::{self, ChunkError, ChunkHead};
 use crate::io::mcap::record::fields::Fields;
 use crate::io::mcap::record::frames::{Loss, not_mcap};
-use crate::io::mcap::record::input::Input;
+use crate::io::mcap::record::input::CountedInput;
 use crate::io::mcap::record::{
     AttachmentHead, ChannelRecord, Message, MetadataRecord, SchemaRecord,
 };
@@ -40,12 +40,12 @@ pub struct Copied {
 /// # Errors
 /// If the input cannot be read or is not MCAP, or the output cannot be written.
 pub fn copy<W: Write>(
-    place: &Place,
+    place: &Input,
     sink: &mut Sink<W>,
     output_name: &str,
 ) -> Result<Copied, Failure> {
     let mut copier = Copier {
-        input: Input::new(place.open()?),
+        input: CountedInput::new(place.open()?),
         input_name: place.name(),
         sink,
         output_name,
@@ -77,7 +77,7 @@ fn usual_compression(index: &Index) -> Option<&'static str> {
 }
 
 struct Copier<'a, W: Write> {
-    input: Input,
+    input: CountedInput,
     input_name: String,
     sink: &'a mut Sink<W>,
     output_name: &'a str,

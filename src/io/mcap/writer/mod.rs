@@ -21,7 +21,7 @@ use mcap::records::op;
 use super::decode::Encoding;
 use super::record::frames::Loss;
 use crate::failure::Failure;
-use crate::io::csv::Place;
+use crate::io::Input;
 use chunks::Chunk;
 use index::{Entry, Index};
 use sink::{Body, Sink};
@@ -60,7 +60,7 @@ impl<W: Write> Writer<W> {
     /// # Errors
     /// If the input cannot be read or the output not be written, or the topic is taken.
     pub fn copying(
-        input: &Place,
+        input: &Input,
         output: W,
         output_name: &str,
         added: &Added,

@@ -50,7 +50,7 @@ fn copy(bytes: &[u8], encoding: Encoding) -> (Vec<u8>, Vec<Loss>) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("in.mcap");
     std::fs::write(&path, bytes).unwrap();
-    let place = Place::File(path);
+    let place = Input::File(path);
     let mut writer = Writer::copying(&place, Vec::new(), "out", &added(encoding)).unwrap();
     for place in 0..20_000_i64 {
         writer
@@ -78,7 +78,7 @@ fn wanted(topic: &str, field: &str) -> super::super::selection::Wanted {
 fn read(bytes: &[u8], field: &str) -> (Vec<i64>, Vec<f64>) {
     let wanted = wanted("/torque", field);
     let mut source =
-        Source::read(&Place::Stdin, frames(bytes), &wanted, &Options::default()).unwrap();
+        Source::read(&Input::Stdin, frames(bytes), &wanted, &Options::default()).unwrap();
     let (mut all_times, mut all_values) = (Vec::new(), Vec::new());
     let (mut times, mut values) = (Vec::new(), Vec::new());
     while source.next(&mut times, &mut values).unwrap() {
@@ -249,6 +249,6 @@ fn a_topic_that_is_taken_is_refused() {
         topic: "/x".to_owned(),
         ..added(Encoding::Cdr)
     };
-    let said = Writer::copying(&Place::File(path), Vec::new(), "out", &added);
+    let said = Writer::copying(&Input::File(path), Vec::new(), "out", &added);
     assert!(said.err().unwrap().to_string().contains("name another"));
 }

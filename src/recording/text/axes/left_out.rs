@@ -3,7 +3,7 @@
 use super::Sources;
 use super::groups::Group;
 use crate::recording::Axis;
-use crate::report::Warning;
+use crate::warning::Warning;
 
 /// Fewest rows that two columns of time are compared by.
 const ROWS: usize = 20;

@@ -15,7 +15,7 @@ use super::rows::Column;
 use crate::failure::Failure;
 use crate::io::csv::Options;
 use crate::recording::{Axis, RateFrom};
-use crate::report::Warning;
+use crate::warning::Warning;
 use groups::{Group, groups};
 
 /// Largest difference of a rate in the head from that of the stamps for both to mean the same.

@@ -9,7 +9,7 @@ use crate::recording::text::decode::Text;
 use crate::recording::text::keys;
 use crate::recording::text::table::Hints;
 use crate::recording::{Channel, Recording};
-use crate::report::Warning;
+use crate::warning::Warning;
 
 /// Steps of a division of the screen.
 const STEPS: f64 = 25.0;

@@ -11,7 +11,7 @@ use crate::recording::text::head::Head;
 use crate::recording::text::table::{self, Hints};
 use crate::recording::text::{FOR_MAKER, recording_of};
 use crate::recording::{Axis, Channel, Hole, RateFrom, Recording, Segment};
-use crate::report::Warning;
+use crate::warning::Warning;
 
 const HINTS: Hints = Hints {
     time_unit: Some("s"),

@@ -13,7 +13,7 @@ use crate::recording::text::header::Field;
 use crate::recording::text::rows::{self, Column, Wanted};
 use crate::recording::text::table::Hints;
 use crate::recording::{Axis, Channel, RateFrom, Recording, Segment};
-use crate::report::Warning;
+use crate::warning::Warning;
 
 const END: &str = "***End_of_Header***";
 

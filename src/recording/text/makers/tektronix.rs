@@ -15,7 +15,7 @@ use crate::recording::text::rows::{self, Wanted};
 use crate::recording::text::table::Hints;
 use crate::recording::text::{FOR_MAKER, details, units};
 use crate::recording::{Axis, RateFrom, Recording};
-use crate::report::Warning;
+use crate::warning::Warning;
 
 const HINTS: Hints = Hints {
     time_unit: Some("s"),

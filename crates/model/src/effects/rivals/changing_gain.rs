@@ -3,7 +3,7 @@
 //! `y = x (1 + a + r t)`. **Valid for small changes.** Mistaken for `thermal-drift`, whose sensitivity is right at
 //! the start of a record, and, in a sweep, where time stands for frequency, for `second-mode` and `recorder-lowpass`.
 
-use crate::effects::{Action, Effect, Form, Parameter, Place, Ruler};
+use crate::effects::{Action, Effect, Form, Parameter, Ruler, Stage};
 
 const OFFSET: Parameter = Parameter::number("offset", -0.5, 0.5);
 const RATE: Parameter = Parameter::motion("rate", 0, -1, -1.0, 2.0).by(Ruler::Record);
@@ -17,7 +17,7 @@ pub(super) static EFFECT: Effect = Effect {
     experiment: "the same excitation several times over, or a sweep in the other direction",
     forms: &[Form {
         name: "even",
-        place: Place::Gage,
+        stage: Stage::Gage,
         parameters: &[RATE, OFFSET],
         starts: &[&[0.02, -0.01], &[-0.02, 0.01]],
         build: |p| {

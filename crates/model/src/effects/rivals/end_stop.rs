@@ -4,7 +4,7 @@
 //! piecewise linear oscillator*, J. Sound Vib. 90 (1983), 129. **Valid without impact losses.** Mistaken for
 //! `cubic-stiffness`, `saturation` and `bouc-wen-hysteresis`.
 
-use crate::effects::{Action, Effect, Form, Memory, Parameter, Place, Ruler, Torque};
+use crate::effects::{Action, Effect, Form, Memory, Parameter, Ruler, Stage, Torque};
 
 const GAP: Parameter = Parameter::motion("gap", 1, 0, 0.05, 2.0).by(Ruler::Peak);
 const UPPER: Parameter = Parameter::motion("gap", 1, 0, -1.0, 2.0).by(Ruler::Peak);
@@ -23,28 +23,28 @@ pub(super) static EFFECT: Effect = Effect {
     forms: &[
         Form {
             name: "both",
-            place: Place::Stand,
+            stage: Stage::Stand,
             parameters: &[STIFFNESS, GAP],
             starts: STARTS,
             build: |p| Action::beside(Stop::both(p)),
         },
         Form {
             name: "both-shown",
-            place: Place::Stand,
+            stage: Stage::Stand,
             parameters: &[STIFFNESS, GAP],
             starts: STARTS,
             build: |p| Action::shown(Stop::both(p)),
         },
         Form {
             name: "above",
-            place: Place::Stand,
+            stage: Stage::Stand,
             parameters: &[STIFFNESS, UPPER],
             starts: TO_ONE_SIDE,
             build: |p| Action::beside(Stop::above(p)),
         },
         Form {
             name: "below",
-            place: Place::Stand,
+            stage: Stage::Stand,
             parameters: &[STIFFNESS, UPPER],
             starts: TO_ONE_SIDE,
             build: |p| Action::beside(Stop::below(p)),

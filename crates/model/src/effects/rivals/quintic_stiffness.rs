@@ -3,7 +3,7 @@
 //! `n = c x⁵`. I. Kovacic, M. J. Brennan (eds.), *The Duffing Equation* (2011), 1. **Valid where the cubic part is
 //! small.** Mistaken for `cubic-stiffness` and, through what four parameters can do, `bouc-wen-hysteresis`.
 
-use crate::effects::{Action, Effect, Form, Memory, Parameter, Place, Torque};
+use crate::effects::{Action, Effect, Form, Memory, Parameter, Stage, Torque};
 
 const COEFFICIENT: &[Parameter] = &[Parameter::motion("coefficient", -4, 0, -0.02, 100.0)];
 const STARTS: &[&[f64]] = &[&[1e-3], &[-3e-4]];
@@ -18,14 +18,14 @@ pub(super) static EFFECT: Effect = Effect {
     forms: &[
         Form {
             name: "beside",
-            place: Place::Stand,
+            stage: Stage::Stand,
             parameters: COEFFICIENT,
             starts: STARTS,
             build: |p| Action::beside(Quintic { coefficient: p[0] }),
         },
         Form {
             name: "shown",
-            place: Place::Stand,
+            stage: Stage::Stand,
             parameters: COEFFICIENT,
             starts: STARTS,
             build: |p| Action::shown(Quintic { coefficient: p[0] }),

@@ -1,0 +1,142 @@
+//! Numbers, columns and documents as they are printed.
+
+use serde::Serialize;
+use unicode_width::UnicodeWidthStr;
+
+use crate::io::digits;
+
+/// A JSON document, indented, with a line end.
+///
+/// # Panics
+/// Never: the reports have string keys and no failing parts.
+#[must_use]
+pub fn json(report: &impl Serialize) -> String {
+    let mut text = serde_json::to_string_pretty(report).expect("reports are plain data");
+    text.push('\n');
+    text
+}
+
+/// Says something to a person on standard error. Nobody may be there to read it: that is no failure.
+pub fn say(text: &str) {
+    use std::io::Write;
+    let _ = std::io::stderr().lock().write_all(text.as_bytes());
+}
+
+/// A number for people: six significant digits.
+#[must_use]
+pub fn short(value: f64) -> String {
+    digits::text(value, 6)
+}
+
+/// A number for people with that many significant digits.
+#[must_use]
+pub fn rounded(value: f64, digits: u32) -> String {
+    digits::text(value, digits)
+}
+
+/// A value with its standard uncertainty, which has two significant digits; the value ends with the same digit
+/// (GUM, JCGM 100:2008, 7.2.6). Powers of ten stand behind both where the value is far from one.
+///
+/// ```
+/// use torqcomp::print::with_std;
+/// assert_eq!(with_std(20.5781, 0.297), "20.58 ± 0.30");
+/// assert_eq!(with_std(0.00704812, 1.03e-5), "0.007048 ± 0.000010");
+/// assert_eq!(with_std(81234.0, 996.0), "81200 ± 1000");
+/// assert_eq!(with_std(-1.99982e-7, 1.7e-11), "(-1.99982 ± 0.00017)e-7");
+/// ```
+#[must_use]
+pub fn with_std(value: f64, std: f64) -> String {
+    let [value, std] = value_and_std(value, std);
+    match (value.split_once('e'), std.split_once('e')) {
+        (Some((value, power)), Some((std, _))) => format!("({value} ± {std})e{power}"),
+        _ => format!("{value} ± {std}"),
+    }
+}
+
+/// The same as two texts, for columns.
+#[must_use]
+pub fn value_and_std(value: f64, std: f64) -> [String; 2] {
+    if !(value.is_finite() && std.is_finite() && std > 0.0) {
+        return [rounded(value, 6), rounded(std, 2)];
+    }
+    // Exponent of the second digit of the uncertainty, once it is rounded to two.
+    let exponent = |std: f64| std.log10().floor() as i32 - 1;
+    let first = exponent(std);
+    let last = exponent((std / 10_f64.powi(first)).round() * 10_f64.powi(first) * (1.0 + 1e-9));
+    let largest = value.abs().max(std).log10().floor() as i32;
+    let power = if !(-3..=8).contains(&largest) {
+        largest
+    } else {
+        0
+    };
+    let decimals = (power - last).max(0) as usize;
+    let step = 10_f64.powi((last - power).max(0));
+    let scale = 10_f64.powi(-power);
+    let text = |number: f64| {
+        let scaled = number * scale;
+        // Decimals are rounded by the formatter, what stands before the point here.
+        let shown = if decimals > 0 {
+            scaled
+        } else {
+            (scaled / step).round() * step
+        };
+        match power {
+            0 => format!("{shown:.decimals$}"),
+            _ => format!("{shown:.decimals$}e{power}"),
+        }
+    };
+    [text(value), text(std)]
+}
+
+/// A unit for people, also where a file says none.
+#[must_use]
+pub fn unit_or_as_recorded(unit: &str) -> &str {
+    match unit {
+        "" => "as recorded",
+        unit => unit,
+    }
+}
+
+/// Rows of cells as columns of equal width, the first to the left, the others to the right.
+#[must_use]
+pub fn columns(rows: &[Vec<String>]) -> String {
+    let count = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let width = |i: usize| {
+        rows.iter()
+            .filter_map(|row| row.get(i))
+            .map(|cell| cell.width())
+            .max()
+            .unwrap_or(0)
+    };
+    let widths: Vec<usize> = (0..count).map(width).collect();
+    let mut text = String::new();
+    for row in rows {
+        let line: String = row
+            .iter()
+            .zip(&widths)
+            .enumerate()
+            .map(|(i, (cell, width))| {
+                let rest = " ".repeat(width.saturating_sub(cell.width()));
+                match i {
+                    0 => format!("{cell}{rest}"),
+                    _ => format!("  {rest}{cell}"),
+                }
+            })
+            .collect();
+        text.push_str(line.trim_end());
+        text.push('\n');
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_line_up() {
+        let row = |a: &str, b: &str| vec![a.to_owned(), b.to_owned()];
+        let text = columns(&[row("name", "value"), row("µ", "1.25")]);
+        assert_eq!(text, "name  value\nµ      1.25\n");
+    }
+}
