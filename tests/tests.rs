@@ -8,6 +8,7 @@ mod blind;
 mod blind_generator;
 mod compensate;
 mod diagnose;
+mod golden;
 mod harmonics;
 mod identify;
 mod inspect;
