@@ -220,7 +220,7 @@ impl<'a> Section<'a> {
     /// A quantity that must be there and greater than zero.
     pub fn positive(&self, key: &'static str, kind: Kind) -> Result<Estimate, Failure> {
         let estimate = self.required(key, kind)?;
-        self.check_positive(key, &estimate)?;
+        self.check_positive(key, kind, &estimate)?;
         Ok(estimate)
     }
 
@@ -232,12 +232,12 @@ impl<'a> Section<'a> {
     ) -> Result<Option<Estimate>, Failure> {
         let estimate = self.quantity(key, kind)?;
         if let Some(estimate) = &estimate {
-            self.check_positive(key, estimate)?;
+            self.check_positive(key, kind, estimate)?;
         }
         Ok(estimate)
     }
 
-    fn check_positive(&self, key: &str, estimate: &Estimate) -> Result<(), Failure> {
+    fn check_positive(&self, key: &str, kind: Kind, estimate: &Estimate) -> Result<(), Failure> {
         if estimate.value() > 0.0 {
             return Ok(());
         }
@@ -245,8 +245,8 @@ impl<'a> Section<'a> {
             key,
             format_args!(
                 "expected a {} greater than zero, as in \"{}\"",
-                estimate.kind().name(),
-                estimate.kind().example()
+                kind.name(),
+                kind.example()
             ),
         ))
     }
@@ -271,7 +271,7 @@ impl<'a> Section<'a> {
         std: Option<f64>,
         source: &str,
     ) -> Result<Estimate, Failure> {
-        Estimate::new(kind, value, std, source).map_err(|error| self.fail(key, error))
+        Estimate::new(kind, value, std, source.to_owned()).map_err(|error| self.fail(key, error))
     }
 
     /// The text of a quantity; a bare number is passed on so that its kind can refuse it.

@@ -58,6 +58,7 @@ pub mod effects;
 pub mod error;
 pub mod fit;
 pub mod inertia;
+mod mode;
 pub mod quantity;
 pub mod response;
 pub mod section;
@@ -68,7 +69,10 @@ pub use beam::{Beam, Compliance, Segment};
 pub use damping::FreeDecay;
 pub use error::ModelError;
 pub use inertia::Part;
-pub use quantity::{Dimension, Estimate, Kind, QuantityError, Unit, UnitSystem};
+pub use mode::Mode;
+pub use quantity::{
+    Covariance, Dimension, Estimate, Estimates, Kind, Measure, QuantityError, Unit, UnitSystem,
+};
 pub use response::SecondOrder;
 pub use section::Section;
 pub use uncertainty::{InverseGradient, InverseUncertainty, ParameterStd};

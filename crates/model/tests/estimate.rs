@@ -40,10 +40,7 @@ fn product_of_powers_adds_relative_variances() {
         .sqrt();
     let got = beam_estimate();
     assert_close(got.std_uncertainty().unwrap() / got.value(), relative, 1e-8);
-    assert_eq!(
-        (got.kind(), got.source()),
-        (Kind::AngularStiffness, "drawing")
-    );
+    assert_eq!((got.unit(), got.source()), ("N m/rad", "drawing"));
 }
 
 #[test]

@@ -2,34 +2,7 @@
 
 use num_complex::Complex64;
 
-/// The linear mode of the plain stand.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Mode {
-    /// Natural angular frequency in rad/s.
-    pub omega_rad_s: f64,
-    /// Damping ratio.
-    pub damping_ratio: f64,
-}
-
-impl Mode {
-    /// `1 − (ω/ω₀)² + 2jζ ω/ω₀`: applied per recorded quantity, relative to that at rest.
-    ///
-    /// ```
-    /// let mode = torqcomp_model::effects::Mode { omega_rad_s: 5.0, damping_ratio: 0.6 };
-    /// assert!((mode.inverse(5.0).im - 1.2).abs() < 1e-15);
-    /// ```
-    #[must_use]
-    pub fn inverse(&self, omega_rad_s: f64) -> Complex64 {
-        let w = omega_rad_s / self.omega_rad_s;
-        Complex64::new(1.0 - w * w, 2.0 * self.damping_ratio * w)
-    }
-
-    /// The response `ω₀²/(s² + 2ζω₀ s + ω₀²)` at `s = jω`.
-    #[must_use]
-    pub fn response(&self, omega_rad_s: f64) -> Complex64 {
-        self.inverse(omega_rad_s).inv()
-    }
-}
+use crate::mode::Mode;
 
 /// A function of the plain mode and the angular frequency.
 pub type Frequency = Box<dyn Fn(&Mode, f64) -> Complex64 + Send + Sync>;

@@ -37,7 +37,8 @@ mod structural_damping;
 mod thermal_drift;
 mod time_delay;
 
-pub use action::{Action, Clock, Frequency, Line, Memory, Mode, Torque, Transform};
+pub use crate::mode::Mode;
+pub use action::{Action, Clock, Frequency, Line, Memory, Torque, Transform};
 pub use parameter::{Parameter, Ruler, Rulers, Unit};
 pub use rivals::RIVALS;
 

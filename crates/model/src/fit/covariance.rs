@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::Covariance;
+use crate::quantity::Covariance;
 
 /// Singular values below this part of the largest, after scaling of the columns, count as zero:
 /// derivatives by differences have about ten digits.

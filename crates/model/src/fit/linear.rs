@@ -4,7 +4,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::covariance::covariance;
 use super::reduce::reduce;
-use super::{Covariance, FitError, Undetermined};
+use super::{FitError, Undetermined};
+use crate::quantity::Covariance;
 
 /// A linear fit.
 #[derive(Debug, Clone, PartialEq)]

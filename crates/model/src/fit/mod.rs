@@ -44,5 +44,5 @@ pub use minimize::{Options, minimize};
 pub use multistart::{MultiStart, multi_start};
 pub use parameter::Parameter;
 pub use problem::{Differences, Residuals, WithJacobian};
-pub use result::{Covariance, Fit, StopReason};
+pub use result::{Fit, StopReason};
 pub use robust::{Loss, Robust, minimize_robust};

@@ -1,8 +1,7 @@
 //! What a fit found, how sure it is, and why it stopped.
 
-use nalgebra::DMatrix;
-
 use super::Undetermined;
+use crate::quantity::{Covariance, Estimates};
 
 /// Why a fit stopped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,59 +26,6 @@ impl StopReason {
     #[must_use]
     pub fn converged(self) -> bool {
         self != Self::Evaluations
-    }
-}
-
-/// Covariance of the parameters that the data determine.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Covariance {
-    /// Place of each parameter in the matrix, if it has one.
-    pub(super) places: Vec<Option<usize>>,
-    pub(super) matrix: DMatrix<f64>,
-}
-
-impl Covariance {
-    /// Covariance of two parameters; `None` if one is fixed, at a bound or undetermined.
-    #[must_use]
-    pub fn get(&self, i: usize, j: usize) -> Option<f64> {
-        let (i, j) = (*self.places.get(i)?, *self.places.get(j)?);
-        Some(self.matrix[(i?, j?)])
-    }
-
-    /// The same times a factor, as where the noise is larger than the residuals show.
-    #[must_use]
-    pub fn times(mut self, factor: f64) -> Self {
-        self.matrix *= factor;
-        self
-    }
-
-    /// Standard uncertainty of a parameter.
-    #[must_use]
-    pub fn std(&self, i: usize) -> Option<f64> {
-        self.get(i, i).map(f64::sqrt)
-    }
-
-    /// Correlation coefficient of two parameters, −1 to 1.
-    #[must_use]
-    pub fn correlation(&self, i: usize, j: usize) -> Option<f64> {
-        let size = self.std(i)? * self.std(j)?;
-        self.get(i, j)
-            .filter(|_| size > 0.0)
-            .map(|c| (c / size).clamp(-1.0, 1.0))
-    }
-
-    /// Standard uncertainty of a function of the parameters with that gradient (one entry each
-    /// parameter): √(gᵀ C g), JCGM 100:2008 (13). `None` if it depends on a parameter that has no
-    /// uncertainty.
-    #[must_use]
-    pub fn std_of(&self, gradient: &[f64]) -> Option<f64> {
-        let mut sum = 0.0;
-        for (i, gi) in gradient.iter().enumerate().filter(|(_, g)| **g != 0.0) {
-            for (j, gj) in gradient.iter().enumerate().filter(|(_, g)| **g != 0.0) {
-                sum += gi * gj * self.get(i, j)?;
-            }
-        }
-        Some(sum.max(0.0).sqrt())
     }
 }
 
@@ -117,6 +63,12 @@ impl Fit {
     pub fn residual_std(&self) -> Option<f64> {
         (self.degrees_of_freedom > 0)
             .then(|| (self.sum_of_squares / self.degrees_of_freedom as f64).sqrt())
+    }
+
+    /// The parameters with their covariance, for numbers that follow from them.
+    #[must_use]
+    pub fn estimates(&self) -> Estimates {
+        Estimates::new(self.values.clone(), self.covariance.clone())
     }
 
     /// Correlation coefficient of two parameters.

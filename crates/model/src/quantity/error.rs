@@ -106,8 +106,8 @@ pub enum QuantityError {
     EstimateNotFinite {
         /// `value` or `standard uncertainty`.
         part: &'static str,
-        /// Name of the kind.
-        kind: &'static str,
+        /// Name of the kind, or the unit.
+        kind: String,
         /// Where the estimate comes from.
         origin: String,
         /// Number got, in SI units.

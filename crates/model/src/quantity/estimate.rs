@@ -1,29 +1,56 @@
 //! A number with its standard uncertainty and its origin.
 
+use std::borrow::Cow;
 use std::fmt;
 
+use serde::ser::{Serialize, SerializeStruct, Serializer};
+
 use super::error::QuantityError;
+use super::estimates::slope;
 use super::kind::{Kind, UnitSystem};
 
-/// Relative step of the central differences: the cube root of the spacing of floats, where the
-/// errors of truncation and rounding are about equal.
-const STEP: f64 = 6.055_454_452_393_343e-6;
+/// What a number is measured in.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Measure {
+    /// A kind of quantity, in its SI unit.
+    Kind(Kind),
+    /// A unit as text, such as `1/s^2`; empty for a ratio.
+    Unit(Cow<'static, str>),
+}
 
-/// An estimate of a quantity, in the SI unit of its kind.
+impl From<Kind> for Measure {
+    fn from(kind: Kind) -> Self {
+        Self::Kind(kind)
+    }
+}
+
+impl From<&'static str> for Measure {
+    fn from(unit: &'static str) -> Self {
+        Self::Unit(unit.into())
+    }
+}
+
+impl From<String> for Measure {
+    fn from(unit: String) -> Self {
+        Self::Unit(unit.into())
+    }
+}
+
+/// An estimate of a quantity, in the SI unit of its kind or in a unit given as text.
 ///
 /// The uncertainty is a standard uncertainty (one standard deviation). `None` means that none is
-/// known; it is never written as 0.
+/// known; it is never written as 0. Serialised as `value`, `std` and `unit`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate {
-    kind: Kind,
+    measure: Measure,
     value: f64,
     std_uncertainty: Option<f64>,
-    source: String,
+    source: Cow<'static, str>,
 }
 
 impl Estimate {
-    /// An estimate from its value and standard uncertainty, both in the SI unit of `kind`, and
-    /// from its origin, such as `drawing` or `fitted: decay.csv`.
+    /// An estimate from its value and standard uncertainty, both in the SI unit of the kind or in the
+    /// unit given, and from its origin, such as `drawing` or `fitted: decay.csv`.
     ///
     /// # Errors
     /// [`QuantityError`] if a number is not finite or the uncertainty is negative.
@@ -35,23 +62,22 @@ impl Estimate {
     /// # Ok::<(), torqcomp_model::QuantityError>(())
     /// ```
     pub fn new(
-        kind: Kind,
+        measure: impl Into<Measure>,
         value: f64,
         std_uncertainty: Option<f64>,
-        source: impl Into<String>,
+        source: impl Into<Cow<'static, str>>,
     ) -> Result<Self, QuantityError> {
-        let source = source.into();
+        let estimate = Self::of(measure, value, std_uncertainty).with_source(source);
         let named = [
             ("value", Some(value)),
             ("standard uncertainty", std_uncertainty),
         ];
         for (part, number) in named {
             if let Some(value) = number.filter(|number| !number.is_finite()) {
-                let (kind, origin) = (kind.name(), source);
                 return Err(QuantityError::EstimateNotFinite {
                     part,
-                    kind,
-                    origin,
+                    kind: estimate.name().to_owned(),
+                    origin: estimate.source.into_owned(),
                     value,
                 });
             }
@@ -61,12 +87,33 @@ impl Estimate {
                 got: std.to_string(),
             });
         }
-        Ok(Self {
-            kind,
+        Ok(estimate)
+    }
+
+    /// An estimate of computed numbers, without a source and unchecked: a value that is not finite is
+    /// an unknown one.
+    ///
+    /// ```
+    /// let ratio = torqcomp_model::Estimate::of("1/s^2", 25.0, Some(0.5));
+    /// assert_eq!((ratio.value(), ratio.unit()), (25.0, "1/s^2"));
+    /// ```
+    #[must_use]
+    pub fn of(measure: impl Into<Measure>, value: f64, std_uncertainty: Option<f64>) -> Self {
+        Self {
+            measure: measure.into(),
             value,
             std_uncertainty,
-            source,
-        })
+            source: Cow::Borrowed(""),
+        }
+    }
+
+    /// The same from that origin.
+    #[must_use]
+    pub fn with_source(self, source: impl Into<Cow<'static, str>>) -> Self {
+        Self {
+            source: source.into(),
+            ..self
+        }
     }
 
     /// An estimate from text: its value and, if known, its standard uncertainty, each with a unit.
@@ -86,7 +133,7 @@ impl Estimate {
         kind: Kind,
         value: &str,
         std_uncertainty: Option<&str>,
-        source: impl Into<String>,
+        source: impl Into<Cow<'static, str>>,
     ) -> Result<Self, QuantityError> {
         let std_uncertainty = std_uncertainty
             .map(|text| kind.parse_std(text))
@@ -120,7 +167,7 @@ impl Estimate {
     /// ```
     pub fn derive(
         kind: Kind,
-        source: impl Into<String>,
+        source: impl Into<Cow<'static, str>>,
         inputs: &[&Self],
         f: impl Fn(&[f64]) -> f64,
     ) -> Result<Self, QuantityError> {
@@ -141,19 +188,40 @@ impl Estimate {
         Self::new(kind, value, std_uncertainty, source)
     }
 
-    /// Kind of the quantity.
-    pub fn kind(&self) -> Kind {
-        self.kind
+    /// The unit of value and uncertainty; empty for a ratio.
+    #[must_use]
+    pub fn unit(&self) -> &str {
+        match &self.measure {
+            Measure::Kind(kind) => match kind.unit(UnitSystem::Si) {
+                "1" => "",
+                unit => unit,
+            },
+            Measure::Unit(unit) => unit,
+        }
     }
 
-    /// Value in the SI unit of the kind.
+    /// Name of the kind, or the unit.
+    fn name(&self) -> &str {
+        match &self.measure {
+            Measure::Kind(kind) => kind.name(),
+            Measure::Unit(unit) => unit,
+        }
+    }
+
+    /// Value in the SI unit of the kind, or in the unit given.
     pub fn value(&self) -> f64 {
         self.value
     }
 
-    /// Standard uncertainty in the SI unit of the kind, if known.
+    /// Standard uncertainty in the same unit, if known.
     pub fn std_uncertainty(&self) -> Option<f64> {
         self.std_uncertainty
+    }
+
+    /// Standard uncertainty over the magnitude of the value, if known.
+    #[must_use]
+    pub fn relative_std(&self) -> Option<f64> {
+        Some(self.std_uncertainty? / self.value.abs())
     }
 
     /// Where the estimate comes from.
@@ -173,15 +241,20 @@ impl Estimate {
     /// # Ok::<(), torqcomp_model::QuantityError>(())
     /// ```
     pub fn text(&self, system: UnitSystem) -> String {
-        let value = self.kind.to(system, self.value);
-        let unit = match self.kind.unit(system) {
-            "1" => String::new(),
+        let (value, std, unit) = match &self.measure {
+            Measure::Kind(kind) => (
+                kind.to(system, self.value),
+                self.std_uncertainty
+                    .map(|std| kind.difference_to(system, std)),
+                kind.unit(system),
+            ),
+            Measure::Unit(unit) => (self.value, self.std_uncertainty, unit.as_ref()),
+        };
+        let unit = match unit {
+            "1" | "" => String::new(),
             unit => format!(" {unit}"),
         };
-        match self
-            .std_uncertainty
-            .map(|std| self.kind.difference_to(system, std))
-        {
+        match std {
             None => format!("{}{unit}", significant(value, 6)),
             Some(0.0) => format!("({} ± 0){unit}", significant(value, 6)),
             Some(std) => format!("{}{unit}", with_uncertainty(value, std)),
@@ -189,23 +262,20 @@ impl Estimate {
     }
 }
 
+impl Serialize for Estimate {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut fields = serializer.serialize_struct("Estimate", 3)?;
+        fields.serialize_field("value", &self.value)?;
+        fields.serialize_field("std", &self.std_uncertainty)?;
+        fields.serialize_field("unit", self.unit())?;
+        fields.end()
+    }
+}
+
 impl fmt::Display for Estimate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} [{}]", self.text(UnitSystem::Si), self.source)
     }
-}
-
-/// ∂f/∂x_i by central differences; leaves `x` as it was.
-fn slope(f: impl Fn(&[f64]) -> f64, x: &mut [f64], i: usize, std: f64) -> f64 {
-    let centre = x[i];
-    let step = STEP * centre.abs().max(std);
-    x[i] = centre + step;
-    let (upper, above) = (x[i], f(x));
-    x[i] = centre - step;
-    let (lower, below) = (x[i], f(x));
-    x[i] = centre;
-    // The steps as the floats took them, not as asked.
-    (above - below) / (upper - lower)
 }
 
 /// Decimal exponent of a number after rounding to `digits` significant digits.

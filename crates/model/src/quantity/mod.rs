@@ -24,6 +24,7 @@
 mod dimension;
 mod error;
 mod estimate;
+mod estimates;
 mod grammar;
 mod kind;
 mod kind_table;
@@ -32,6 +33,7 @@ mod unit;
 
 pub use dimension::Dimension;
 pub use error::QuantityError;
-pub use estimate::Estimate;
+pub use estimate::{Estimate, Measure};
+pub use estimates::{Covariance, Estimates};
 pub use kind::{Kind, UnitSystem};
 pub use unit::Unit;
