@@ -2,6 +2,7 @@
 
 mod util;
 
+mod agreement;
 mod bad_input;
 #[allow(dead_code)] // the example writes and scores what the tests only look into
 mod blind;
@@ -16,6 +17,7 @@ mod messages;
 mod noise;
 mod output;
 mod predict;
+mod recordings;
 mod refined;
 mod simulate;
 mod table;

@@ -82,7 +82,7 @@ fn check(verb: &str) {
 }
 
 /// The folder that the commands run in.
-fn workplace() -> &'static Path {
+pub fn workplace() -> &'static Path {
     static PLACE: OnceLock<PathBuf> = OnceLock::new();
     PLACE.get_or_init(|| {
         let place = Path::new(env!("CARGO_TARGET_TMPDIR")).join("golden");
@@ -166,6 +166,30 @@ fn execute(command: &str) -> std::process::Output {
         .stdin(input)
         .output()
         .expect("the binary starts")
+}
+
+/// What a run of the binary in the folder of the golden outputs left.
+pub struct Ran {
+    pub code: i32,
+    pub stdout: String,
+    pub stderr: String,
+}
+
+impl Ran {
+    pub fn of(args: &[&str]) -> Self {
+        let output = Command::new(env!("CARGO_BIN_EXE_torqcomp"))
+            .args(args)
+            .current_dir(workplace())
+            .stdin(Stdio::null())
+            .output()
+            .expect("the binary starts");
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
+        Self {
+            code: output.status.code().expect("an exit code"),
+            stdout: text(output.stdout),
+            stderr: text(output.stderr),
+        }
+    }
 }
 
 /// Words of a command line; quotes keep spaces.

@@ -42,7 +42,11 @@ impl Excitation {
         between: Between,
     ) -> Self {
         let count = samples.len();
-        let lead = (count / 16).clamp(16, 2048).min(count.saturating_sub(1));
+        // Integration needs a step before the record and two after it, however short it is.
+        let lead = (count / 16)
+            .clamp(16, 2048)
+            .min(count.saturating_sub(1))
+            .max(2);
         let total = quick_length(count + 2 * lead);
         let mut planner = RealFftPlanner::new();
         let forward = planner.plan_fft_forward(total);
