@@ -2,7 +2,7 @@
 
 pub mod cli;
 pub mod commands;
-pub mod diagnose;
+mod diagnose;
 pub mod failure;
 pub mod identify;
 pub mod io;

@@ -57,7 +57,7 @@ fn an_effect_is_named_added_and_simulated() {
     assert!(rms("declared") > rms("before") && rms("before") > 3.0 * rms("after"));
     assert!(rms("after") < 1.2 * noise_rms(&case), "{}", rms("after"));
 
-    // The refined stand says the same of the held-out record when it is run forward on its own.
+    // The refined stand predicts the held-out record when it is run forwards.
     let simulated = folder.run(&[
         "simulate",
         "holdout.csv",
@@ -71,7 +71,7 @@ fn an_effect_is_named_added_and_simulated() {
     assert_eq!(simulated.code, 0, "{}", simulated.stderr);
     let (head, rows) = table(&folder.read("simulated.csv"));
     assert_eq!(head, ["time_s", "measured"]);
-    // What was before the record has died out after 50 ms.
+    // The motion from before the record has decayed after 50 ms.
     let settled = 1000..KEPT - 40;
     let squares = settled
         .clone()
@@ -85,11 +85,11 @@ fn page_is_complete(page: &str) {
     let parts = [
         "Explained: with cubic-stiffness",
         "Error before and after",
-        "What was measured",
+        "Records",
         "holdout.csv",
         "Autocorrelation",
         "Spectrum",
-        "Against displacement",
+        "Over displacement",
         "Candidates",
         "coulomb-friction",
         "Next experiment",
@@ -111,7 +111,7 @@ fn a_complete_stand_lacks_nothing() {
 }
 
 #[test]
-fn training_that_leaves_the_resonance_open_is_said() {
+fn training_that_does_not_excite_the_resonance_is_reported() {
     // A quarter of a logarithmic sweep ends at 19 Hz, far below the resonance.
     let case = make(7, "none", 3).expect("the catalogue has it");
     let folder = folder(&case);
@@ -138,8 +138,8 @@ fn threads_do_not_change_a_byte() {
     assert!(one.stdout.contains("\"gain-error\""));
 }
 
-/// A case's records, each measured sample changed by a function of what was applied, the row and itself, and what is
-/// said of them.
+/// The diagnosis of a case whose measured samples are changed by a function of the applied record, the row and the
+/// sample.
 fn changed(case: &Case, change: impl Fn(&[f64], usize, f64) -> f64) -> serde_json::Value {
     let folder = folder(case);
     for (name, record) in [("train.csv", &case.train), ("holdout.csv", &case.holdout)] {
@@ -159,7 +159,7 @@ fn changed(case: &Case, change: impl Fn(&[f64], usize, f64) -> f64) -> serde_jso
     folder.json(&diagnose(&["--json"]))
 }
 
-/// Whether an answer claims no effect, and says what there is.
+/// Checks that a diagnosis names no effect and describes the residual.
 fn is_unexplained(report: &serde_json::Value, says: &str) {
     assert_eq!(report["verdict"], "unexplained");
     assert_eq!(report["effects"], serde_json::json!([]));
@@ -178,19 +178,19 @@ fn spikes_are_neither_noise_nor_an_effect() {
 }
 
 #[test]
-fn a_gain_that_swings_or_trembles_is_neither_noise_nor_an_effect() {
+fn a_slowly_or_rapidly_varying_gain_is_neither_noise_nor_an_effect() {
     let case = make(7, "none", 1).expect("the catalogue has it");
     // 1 % at 7 Hz.
-    let swings = |row: usize| 0.01 * (0.0022 * row as f64).sin();
-    let report = changed(&case, |_, row, y| y * (1.0 + swings(row)));
+    let slow = |row: usize| 0.01 * (0.0022 * row as f64).sin();
+    let report = changed(&case, |_, row, y| y * (1.0 + slow(row)));
     is_unexplained(&report, "constants that change over the record");
-    // 1 % from sample to sample: the fractions of a multiple of the golden ratio are even between 0 and 1.
-    let trembles = |row: usize| 0.035 * ((row as f64 * 0.618_033_988_75).fract() - 0.5);
-    let report = changed(&case, |_, row, y| y * (1.0 + trembles(row)));
-    is_unexplained(&report, "the size of the signal from moment to moment");
+    // 1 % from sample to sample: multiples of the golden ratio modulo 1 are uniformly distributed.
+    let fast = |row: usize| 0.035 * ((row as f64 * 0.618_033_988_75).fract() - 0.5);
+    let report = changed(&case, |_, row, y| y * (1.0 + fast(row)));
+    is_unexplained(&report, "the magnitude of the signal");
 }
 
-/// Less than half as much as the noise comes 10 samples after the load: the right name stands, and is not called the whole.
+/// An echo of the load after 10 samples, at 0.4 of the noise: the right effect is accepted, but not as a full explanation.
 #[test]
 fn an_effect_that_leaves_an_echo_explains_a_part() {
     let case = make(7, "cubic-stiffness", 1).expect("the catalogue has it");
@@ -206,8 +206,8 @@ fn an_effect_that_leaves_an_echo_explains_a_part() {
     assert_eq!(report["candidates"][0]["effect"], "cubic-stiffness");
 }
 
-/// A law that no list has is suspected, and no effect that resembles it is named. Of the two laws with a
-/// single number the noise remains; a stop that training hardly reaches is found less exactly.
+/// A law that is not in the list is suspected, and no effect that resembles it is named. Two laws with one parameter leave
+/// only noise; a stop that training hardly reaches is found less accurately.
 #[test]
 fn laws_beside_the_list_are_suspected_and_not_added() {
     for (seed, number, law) in [

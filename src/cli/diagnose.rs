@@ -9,13 +9,13 @@ use super::{TimeAxis, Work};
 /// Arguments of `diagnose`.
 #[derive(Debug, Args)]
 pub struct Diagnose {
-    /// Stand file; without it a plain second-order stand is fitted
+    /// Stand file [default: fit a plain second-order stand]
     #[arg(long, value_name = "FILE")]
     pub stand: Option<PathBuf>,
     /// Record to fit; may be given several times
     #[arg(long, value_name = "FILE", required = true)]
     pub train: Vec<String>,
-    /// Record that is held out; may be given several times [default: the last 30 % of each training record]
+    /// Hold-out record; may be given several times [default: the last 30 % of each training record]
     #[arg(long, value_name = "FILE")]
     pub holdout: Vec<String>,
     /// Column with the applied quantity, or the signal of an MCAP file, as '/joint_states.effort[name=motor]'
@@ -33,19 +33,19 @@ pub struct Diagnose {
     /// The time axis.
     #[command(flatten)]
     pub axis: TimeAxis,
-    /// Write a page for a browser: models beside the records, residuals, candidates
+    /// Write an HTML report with charts of records, models and residuals
     #[arg(long, value_name = "FILE")]
     pub html: Option<String>,
-    /// Stand file to write, refined, for simulate and compensate
+    /// Write the refined stand file, for simulate and compensate
     #[arg(short, long, value_name = "OUT")]
     pub output: Option<String>,
-    /// Replace outputs that exist
+    /// Replace existing outputs
     #[arg(long)]
     pub force: bool,
     /// Print JSON instead of text
     #[arg(long)]
     pub json: bool,
-    /// End with code 3 if there are warnings
+    /// Exit with code 3 if there are warnings
     #[arg(long)]
     pub strict: bool,
     /// How it works.

@@ -2,19 +2,18 @@
 
 mod read;
 mod refined;
-mod render;
 
 use std::io::IsTerminal;
 use std::path::Path;
 
 use super::{Outcome, conclude};
 use crate::cli::Diagnose;
-use crate::diagnose::{self, Diagnosis, Verdict};
+use crate::diagnose::{self, Workers};
 use crate::failure::Failure;
 use crate::io::output::Output;
-use crate::print::{self};
+use crate::print;
+use crate::report::{diagnose as text, diagnose_page as page};
 use crate::stand::{self, Stand};
-use crate::warning::Warning;
 
 /// Runs the verb.
 pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
@@ -25,83 +24,41 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
             Some((stand::parse(&name, &text)?, text))
         }
     };
-    let files: Vec<&Path> = args
-        .train
-        .iter()
-        .chain(&args.holdout)
-        .map(Path::new)
-        .chain(args.stand.as_deref())
-        .collect();
-    let refined = match &args.output {
-        Some(place) => Some(Output::open(Some(place), args.force, &files)?),
-        None => None,
-    };
-    let page = match &args.html {
-        Some(place) => Some(Output::open(Some(place), args.force, &files)?),
-        None => None,
-    };
-    let mut output = Output::open(None, args.force, &files)?;
-    let mut read = read::read(args, stand.as_ref().map(|(stand, _)| stand))?;
-    let (frame, found) = diagnose::prepare(&mut read.case)?;
-    diagnose::check(&read.case, &frame, found)?;
-    read.refine(&found);
-    let levels = read.levels();
-    let shown = !args.work.quiet && std::io::stderr().is_terminal();
+    let records = args.train.iter().chain(&args.holdout).map(Path::new);
+    let files: Vec<&Path> = records.chain(args.stand.as_deref()).collect();
+    let open = |place: &String| Output::open(Some(place), args.force, &files);
+    let refined = args.output.as_ref().map(open).transpose()?;
+    let html = args.html.as_ref().map(open).transpose()?;
+    let output = Output::open(None, args.force, &files)?;
+    let case = read::read(args, stand.as_ref().map(|(stand, _)| stand))?;
+    let is_shown = !args.work.quiet && std::io::stderr().is_terminal();
     let progress = |done: usize, of: usize| {
-        if shown {
-            print::say(&format!(
-                "\r{done} of {of} fits{}",
-                if done == of { "\r\x1b[K" } else { "" }
-            ));
+        if is_shown {
+            let end = if done == of { "\r\x1b[K" } else { "" };
+            print::say(&format!("\r{done} of {of} fits{end}"));
         }
     };
-    let declared = read.case.declared;
-    let diagnosis = diagnose::run(read.case, &frame, found, &progress)?;
-    let mut warnings = read.warnings;
-    warnings.extend(apart(&diagnosis));
-    let rendered = render::Rendered {
-        args,
-        diagnosis: &diagnosis,
-        units: &read.units,
-        declared,
-        levels,
-        warnings,
+    let workers = Workers {
+        threads: args.work.thread_count(),
+        progress: &progress,
     };
-    let report = rendered.report();
-    if let Some(mut refined) = refined {
-        let text = rendered.stand(stand.as_ref().map(|(stand, text)| (stand, text.as_str())))?;
-        refined.write(text.as_bytes())?;
-        refined.finish()?;
+    let diagnosis = diagnose::run(case, workers)?;
+    if let Some(refined) = refined {
+        let declared = stand.as_ref().map(|(stand, text)| (stand, text.as_str()));
+        write(refined, &refined::stand_file(&diagnosis, declared)?)?;
     }
-    if let Some(mut page) = page {
-        page.write(report.page(&rendered.sights()).as_bytes())?;
-        page.finish()?;
+    if let Some(html) = html {
+        write(html, &page::page(&diagnosis))?;
     }
-    let text = if args.json {
-        print::json(&report)
-    } else {
-        report.text()
+    let text = match args.json {
+        true => print::json(&diagnosis),
+        false => text::text(&diagnosis),
     };
-    output.write(text.as_bytes())?;
-    output.finish()?;
-    Ok(conclude(&report.warnings, false, args.strict))
+    write(output, &text)?;
+    Ok(conclude(&diagnosis.warnings, false, args.strict))
 }
 
-/// Says so where training and held-out records do not follow one stand.
-fn apart(diagnosis: &Diagnosis) -> Option<Warning> {
-    if matches!(
-        diagnosis.verdict,
-        Verdict::Explained | Verdict::NothingMissing
-    ) {
-        return None;
-    }
-    let [train, hold] = diagnose::apart(diagnosis)?;
-    Some(Warning::new(
-        "records-apart",
-        format!(
-            "no one stand fits both: the training records alone give {:.5} Hz and a damping ratio of {:.4}, the held-out ones \
-             {:.5} Hz and {:.4}; they are of two stands or settings, or the stand changes with the level",
-            train.natural_hz, train.damping_ratio, hold.natural_hz, hold.damping_ratio
-        ),
-    ))
+fn write(mut output: Output, text: &str) -> Result<(), Failure> {
+    output.write(text.as_bytes())?;
+    output.finish()
 }

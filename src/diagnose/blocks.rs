@@ -1,8 +1,8 @@
-//! Whether one model is better than another by more than chance, where neighbouring samples are correlated.
+//! Whether one model is significantly better than another where neighbouring samples are correlated.
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-/// Blocks that a record is cut into.
+/// Blocks that the residuals are cut into.
 const BLOCKS: usize = 64;
 /// Draws of the bootstrap.
 const DRAWS: usize = 2000;
@@ -18,14 +18,12 @@ pub struct Comparison {
 }
 
 /// Compares the residuals of two models on the same samples.
-#[must_use]
 pub fn compare(before: &[f64], after: &[f64]) -> Comparison {
     let length = before.len().div_ceil(BLOCKS).max(1);
     let sums = |f: fn(f64, f64) -> f64| -> Vec<f64> {
-        let pairs = before.chunks(length).zip(after.chunks(length));
-        pairs
-            .map(|(b, a)| b.iter().zip(a).map(|(b, a)| f(*b, *a)).sum())
-            .collect()
+        let blocks = before.chunks(length).zip(after.chunks(length));
+        let sum = |(b, a): (&[f64], &[f64])| b.iter().zip(a).map(|(b, a)| f(*b, *a)).sum();
+        blocks.map(sum).collect()
     };
     Comparison {
         before: sums(|b, _| b * b),
@@ -35,59 +33,53 @@ pub fn compare(before: &[f64], after: &[f64]) -> Comparison {
 }
 
 impl Comparison {
-    /// By how much the sum of squares falls.
-    #[must_use]
+    /// Reduction of the sum of squares.
     pub fn gain(&self) -> f64 {
         self.before.iter().sum::<f64>() - self.after.iter().sum::<f64>()
     }
 
-    /// The gain over the standard deviation that noise gives it.
+    /// The gain over its standard deviation due to noise.
     ///
     /// With `d` the difference of the residuals and `r` the second one, the gain is `Σ d² + 2 Σ d r`. If `r` is noise,
-    /// only the second sum varies, and its blocks, which are long against the correlation of neighbours,
-    /// show by how much. A gain that comes from a few places, as in a sweep, counts no less.
-    #[must_use]
+    /// only the second sum varies, and the scatter of its blocks, which are long compared with the correlation of
+    /// neighbours, gives its variance. A gain from a few places, as in a sweep, counts no less.
     pub fn significance(&self) -> f64 {
         let std = 2.0 * self.product.iter().map(|p| p * p).sum::<f64>().sqrt();
         if std > 0.0 { self.gain() / std } else { 0.0 }
     }
 
     /// Probability of a gain as large by chance, if the second model were no better.
-    #[must_use]
     pub fn p_value(&self) -> Option<f64> {
         let law = StudentsT::new(0.0, 1.0, self.before.len() as f64 - 1.0).ok()?;
         Some(law.sf(self.significance()))
     }
 
-    /// Interval that holds the relative fall of the rms with 95 % confidence: bootstrap of the blocks.
-    #[must_use]
+    /// 95 % confidence interval of the relative reduction of the rms: bootstrap over the blocks.
     pub fn improvement_ci95(&self) -> [f64; 2] {
-        let mut chance = Chance(0x9E37_79B9_7F4A_7C15);
+        let mut random = SplitMix64(0x9E37_79B9_7F4A_7C15);
         let count = self.before.len();
-        let mut falls: Vec<f64> = (0..DRAWS)
-            .map(|_| {
-                let (mut before, mut after) = (0.0, 0.0);
-                for _ in 0..count {
-                    let k = chance.below(count);
-                    before += self.before[k];
-                    after += self.after[k];
-                }
-                if before > 0.0 {
-                    1.0 - (after / before).sqrt()
-                } else {
-                    0.0
-                }
-            })
-            .collect();
-        falls.sort_by(f64::total_cmp);
-        [falls[DRAWS / 40], falls[DRAWS - 1 - DRAWS / 40]]
+        let mut draw = || {
+            let (mut before, mut after) = (0.0, 0.0);
+            for _ in 0..count {
+                let k = random.below(count);
+                before += self.before[k];
+                after += self.after[k];
+            }
+            match before > 0.0 {
+                true => 1.0 - (after / before).sqrt(),
+                false => 0.0,
+            }
+        };
+        let mut reductions: Vec<f64> = (0..DRAWS).map(|_| draw()).collect();
+        reductions.sort_by(f64::total_cmp);
+        [reductions[DRAWS / 40], reductions[DRAWS - 1 - DRAWS / 40]]
     }
 }
 
-/// Numbers that look random, the same on every run (SplitMix64; G. Steele et al., OOPSLA 2014).
-struct Chance(u64);
+/// Reproducible pseudo-random numbers (SplitMix64; G. Steele et al., OOPSLA 2014).
+struct SplitMix64(u64);
 
-impl Chance {
+impl SplitMix64 {
     fn below(&mut self, limit: usize) -> usize {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut z = self.0;

@@ -1,158 +1,137 @@
-//! Fitting a structure to the training records, and its errors on any records.
+//! Fitting a model to the training records, and its residual on any record.
 
-use torqcomp_model::effects::Mode;
-use torqcomp_model::fit::{self, Differences, FitError, Options, Parameter};
+use std::f64::consts::TAU;
+
+use torqcomp_model::Mode;
+use torqcomp_model::fit::{self, Differences, Fit, FitError, Options, Parameter};
 use torqcomp_model::simulate::Model;
 
-use super::record::{Begin, Nuisance, Record, Taken, dot};
-use super::structure::{Structure, Waves};
+use super::record::{InitialState, Nuisance, NuisanceFit, NuisanceTerms, StandRecord, dot};
+use super::structure::{PlainStand, Structure};
 
-/// A structure with fitted values.
+/// A model with fitted values.
 #[derive(Clone)]
-pub struct Fitted<'a> {
-    /// The structure.
-    pub structure: Structure<'a>,
-    /// Its parameters.
+pub struct FittedModel {
+    pub structure: Structure,
+    /// Values of its parameters.
     pub values: Vec<f64>,
     /// Their standard uncertainties where the data determine them.
     pub std: Vec<Option<f64>>,
-    /// Whether one of them ended at a bound.
-    pub at_bound: Vec<bool>,
-    /// Whether the fit came to its end.
     pub converged: bool,
     /// Amplitudes of its lines, from the training records.
     pub amplitudes: Vec<f64>,
-    /// Sum of squares over the training records.
+    /// Sum of squares of the residuals on the training records.
     pub train_sum: f64,
-    /// How each training record begins.
-    pub begins: Vec<Begin>,
+    /// Initial state of each training record.
+    pub initial: Vec<InitialState>,
 }
 
 /// What a model leaves of a record.
 #[derive(Clone)]
-pub struct Residual {
-    /// Measured less modelled, over the record's range.
+pub struct RecordResidual {
+    /// The record, with the initial state found for this model.
+    pub record: StandRecord,
+    /// Measured less modelled over the record's range, nuisance terms removed.
     pub samples: Vec<f64>,
-    /// What belonged to the record.
-    pub taken: Taken,
-    /// The model's record, over the range, without what belonged to the record.
+    /// The modelled record over the range, without the nuisance terms.
     pub modelled: Vec<f64>,
-    /// How the record begins.
-    pub begin: Begin,
+    pub nuisance: NuisanceFit,
 }
 
-/// Relative reduction of the sum of squares that counts as none.
-const TOLERANCE: f64 = 1e-6;
-/// Rounds in which the beginning of a held-out record is set right.
-const BEGIN_ROUNDS: usize = 3;
-/// Largest displacement by a constant load, over the rms of the record.
-const LARGEST_SHIFT: f64 = 0.5;
-/// Step of the displacement by a constant load, for differences.
-const SHIFT_STEP: f64 = 1e-4;
+/// How far a fit goes.
+#[derive(Clone, Copy)]
+pub struct FitEffort {
+    /// Iterations, each with one evaluation per parameter and one more.
+    pub iterations: usize,
+    /// Whether the fit is repeated once the motion at the start of the records has been corrected.
+    pub corrects_start: bool,
+}
 
-/// Fits a structure from start values; the records' own beginnings are refined with it.
+/// Relative reduction of the sum of squares at which a fit has converged.
+const TOLERANCE: f64 = 1e-6;
+/// Iterations for the initial state of a held-out record.
+const INITIAL_STATE_ITERATIONS: usize = 3;
+/// Largest displacement by a constant load, over the rms of the record.
+const LARGEST_PRELOAD: f64 = 0.5;
+/// Step of that displacement for differences, over the rms of the record.
+const PRELOAD_STEP: f64 = 1e-4;
+/// Correction of the motion at a record's start, over the rms of the residual, that makes a second fit worthwhile.
+const START_MATTERS: f64 = 0.05;
+
+/// Fits a model from start values.
 ///
 /// # Errors
 /// If the model cannot be evaluated at the start.
-pub fn fit<'a>(
-    structure: Structure<'a>,
+pub fn fit(
+    structure: Structure,
     start: &[f64],
-    records: &[Record],
-    reference: &Mode,
-    most: usize,
-) -> Result<Fitted<'a>, FitError> {
+    records: &[StandRecord],
+    effort: FitEffort,
+) -> Result<FittedModel, FitError> {
     let mut records = records.to_vec();
-    let mut found = minimize(&structure, start, &mut records, reference, most)?;
-    if structure.model(start).0.has_torques()
-        && correct_starts(&structure, &found.values, &mut records, reference)
+    let mut found = minimize(&structure, start, &mut records, effort)?;
+    if effort.corrects_start
+        && structure.model(start).0.has_torques()
+        && correct_starts(&structure, &found.values, &mut records)
     {
-        let values = structure.own(&found.values).to_vec();
-        found = minimize(&structure, &values, &mut records, reference, most)?;
+        let values = &found.values[..start.len()];
+        found = minimize(&structure, values, &mut records, effort)?;
     }
-    Ok(complete(structure, found, &records, reference))
-}
-
-/// Fits a structure without setting the start of the motion right.
-///
-/// # Errors
-/// As [`fit`].
-pub fn look<'a>(
-    structure: Structure<'a>,
-    start: &[f64],
-    records: &[Record],
-    reference: &Mode,
-    most: usize,
-) -> Result<Fitted<'a>, FitError> {
-    let mut records = records.to_vec();
-    let found = minimize(&structure, start, &mut records, reference, most)?;
-    Ok(complete(structure, found, &records, reference))
-}
-
-fn complete<'a>(
-    structure: Structure<'a>,
-    found: fit::Fit,
-    records: &[Record],
-    reference: &Mode,
-) -> Fitted<'a> {
     let count = structure.bounds().len();
     let mut values = found.values;
     values.truncate(count);
-    Fitted {
-        amplitudes: line_amplitudes(&structure, &values, records, reference),
+    Ok(FittedModel {
+        amplitudes: line_amplitudes(&structure, &values, &records),
         structure,
         std: found.std[..count].to_vec(),
-        at_bound: found.at_bound[..count].to_vec(),
         train_sum: found.sum_of_squares,
         converged: found.stop.converged(),
-        begins: records.iter().map(|r| r.begin).collect(),
+        initial: records.iter().map(|r| r.initial).collect(),
         values,
-    }
+    })
 }
 
 fn minimize(
     structure: &Structure,
     start: &[f64],
-    records: &mut [Record],
-    reference: &Mode,
-    most: usize,
-) -> Result<fit::Fit, FitError> {
-    let size = structure.frame.rulers.rms;
+    records: &mut [StandRecord],
+    effort: FitEffort,
+) -> Result<Fit, FitError> {
+    let size = structure.context.scales.rms;
+    let reference = structure.context.plain.mode();
     let own = structure.bounds().len();
-    let shifted = structure.model(start).0.has_zero();
-    let parameters = parameters(structure, start, records, shifted);
-    let found = {
-        let records = &*records;
-        // Without lines, what belongs to a record does not depend on the parameters.
-        let fixed: Vec<Nuisance> = records
-            .iter()
-            .map(|r| r.nuisance(reference, &Waves::NONE, None))
-            .collect();
-        let problem = |values: &[f64], out: &mut Vec<f64>| {
-            let (mut model, waves) = structure.model(&values[..own]);
-            for (k, (record, fixed)) in records.iter().zip(&fixed).enumerate() {
-                model.shift = values.get(own + k).map_or(record.begin.shift, |s| s * size);
-                let mut residual = difference(&model, record)?;
-                if waves.is_empty() {
-                    fixed.clear(&mut residual);
-                } else {
-                    record
-                        .nuisance(reference, &waves, None)
-                        .clear(&mut residual);
-                }
-                out.append(&mut residual);
+    let has_preload = structure.model(start).0.has_zero();
+    let parameters = parameters(structure, start, records, has_preload);
+    // Without lines, the nuisance terms do not depend on the parameters.
+    let fixed: Vec<Nuisance> = records
+        .iter()
+        .map(|r| r.nuisance(&reference, &NuisanceTerms::NONE, None))
+        .collect();
+    let problem = |values: &[f64], out: &mut Vec<f64>| {
+        let (mut model, terms) = structure.model(&values[..own]);
+        for (k, (record, fixed)) in records.iter().zip(&fixed).enumerate() {
+            let preload = values.get(own + k).map(|s| s * size);
+            model.shift = preload.unwrap_or(record.initial.preload);
+            let mut residual = raw_residual(&model, record)?;
+            if terms.is_empty() {
+                fixed.clear(&mut residual);
+            } else {
+                let nuisance = record.nuisance(&reference, &terms, None);
+                nuisance.clear(&mut residual);
             }
-            Ok(())
-        };
-        let options = Options {
-            differences: Differences::Forward,
-            tolerance: TOLERANCE,
-            most_evaluations: most * (parameters.len() + 1),
-            ..Options::default()
-        };
-        fit::minimize(&problem, &parameters, &options)?
+            out.append(&mut residual);
+        }
+        Ok(())
     };
-    for (k, record) in records.iter_mut().enumerate().filter(|_| shifted) {
-        record.begin.shift = found.values[own + k] * size;
+    let options = Options {
+        differences: Differences::Forward,
+        tolerance: TOLERANCE,
+        most_evaluations: effort.iterations * (parameters.len() + 1),
+        ..Options::default()
+    };
+    let found = fit::minimize(&problem, &parameters, &options)?;
+    for (record, preload) in records.iter_mut().zip(&found.values[own..]) {
+        record.initial.preload = preload * size;
     }
     Ok(found)
 }
@@ -161,169 +140,212 @@ fn minimize(
 fn parameters(
     structure: &Structure,
     start: &[f64],
-    records: &[Record],
-    shifted: bool,
+    records: &[StandRecord],
+    has_preload: bool,
 ) -> Vec<Parameter> {
+    let within = |start: f64, [lower, upper]: [f64; 2], scale: f64| {
+        Parameter::new("", start.clamp(lower, upper))
+            .at_least(lower)
+            .at_most(upper)
+            .scaled(scale)
+    };
     let bounds = structure.bounds();
-    let own = bounds.iter().zip(start).map(|(b, s)| {
-        Parameter::new("", s.clamp(b.lower, b.upper))
-            .at_least(b.lower)
-            .at_most(b.upper)
-            .scaled(s.abs().max(1e-4))
+    let own = start.iter().zip(bounds);
+    let own = own.map(|(s, bounds)| within(*s, bounds, s.abs().max(1e-4)));
+    let size = structure.context.scales.rms;
+    let preloads = records.iter().filter(|_| has_preload).map(|r| {
+        let bounds = [-LARGEST_PRELOAD, LARGEST_PRELOAD];
+        within(r.initial.preload / size, bounds, 0.1)
     });
-    let size = structure.frame.rulers.rms;
-    let shifts = records.iter().filter(|_| shifted).map(|r| {
-        let start = (r.begin.shift / size).clamp(-LARGEST_SHIFT, LARGEST_SHIFT);
-        Parameter::new("", start)
-            .at_least(-LARGEST_SHIFT)
-            .at_most(LARGEST_SHIFT)
-            .scaled(0.1)
-    });
-    own.chain(shifts).collect()
+    own.chain(preloads).collect()
 }
 
-/// Measured less modelled over the range of a record.
-pub(super) fn difference(model: &Model, record: &Record) -> Result<Vec<f64>, FitError> {
-    let modelled = model.simulate(&record.input, record.begin.start);
-    let range = record.range.clone();
-    let pairs = record.measured[range.clone()].iter().zip(&modelled[range]);
+/// Measured less modelled over the range of a record, nuisance terms included.
+pub fn raw_residual(model: &Model, record: &StandRecord) -> Result<Vec<f64>, FitError> {
+    let modelled = model.simulate(&record.input, record.initial.motion);
+    let pairs = record.measured_in_range().iter();
+    let pairs = pairs.zip(&modelled[record.range.clone()]);
     let residual: Vec<f64> = pairs.map(|(y, x)| y - x).collect();
     if residual.last().is_none_or(|r| !r.is_finite()) {
-        return Err(FitError::Model("the motion leaves all bounds".to_owned()));
+        return Err(FitError::Model("the motion diverges".to_owned()));
     }
     Ok(residual)
 }
 
-/// Takes over what the residual says of the motion at the start of each record; whether any moved by an
-/// amount that matters.
-fn correct_starts(
+/// Mean square of the raw residual of a record, and the nuisance terms in it.
+fn nuisance_of(
     structure: &Structure,
-    values: &[f64],
-    records: &mut [Record],
-    reference: &Mode,
-) -> bool {
-    let (mut model, waves) = structure.model(structure.own(values));
-    let mut any = false;
-    for record in records {
-        model.shift = record.begin.shift;
-        let Ok(mut residual) = difference(&model, record) else {
-            continue;
-        };
-        let before = dot(&residual, &residual) / residual.len() as f64;
-        let taken = record.nuisance(reference, &waves, None).fit(&mut residual);
-        if let Some([x, speed]) = taken.motion {
-            record.begin.start.x += x;
-            record.begin.start.speed += speed * reference.omega_rad_s;
-            any |= x.hypot(speed) > 0.05 * before.sqrt();
-        }
-    }
-    any
+    (model, terms): &mut (Model, NuisanceTerms),
+    record: &StandRecord,
+) -> Option<(f64, NuisanceFit)> {
+    model.shift = record.initial.preload;
+    let mut residual = raw_residual(model, record).ok()?;
+    let mean_square = dot(&residual, &residual) / residual.len() as f64;
+    let nuisance = record.nuisance(&structure.context.plain.mode(), terms, None);
+    Some((mean_square, nuisance.fit(&mut residual)))
 }
 
-fn line_amplitudes(
-    structure: &Structure,
-    values: &[f64],
-    records: &[Record],
-    reference: &Mode,
-) -> Vec<f64> {
-    let (mut model, waves) = structure.model(values);
-    let mut sums = vec![0.0; waves.lines_hz.len()];
+/// Corrects the motion at the start of each record by what the residual shows of it; whether any correction matters.
+fn correct_starts(structure: &Structure, values: &[f64], records: &mut [StandRecord]) -> bool {
+    let mut model = structure.model(values);
+    let mut matters = false;
+    for record in records {
+        let Some((mean_square, found)) = nuisance_of(structure, &mut model, record) else {
+            continue;
+        };
+        if let Some([x, speed]) = found.motion {
+            record.initial.correct([x, speed], &structure.context.plain);
+            matters |= x.hypot(speed) > START_MATTERS * mean_square.sqrt();
+        }
+    }
+    matters
+}
+
+/// Mean amplitude of each line over the records.
+fn line_amplitudes(structure: &Structure, values: &[f64], records: &[StandRecord]) -> Vec<f64> {
+    let mut model = structure.model(values);
+    let mut sums = vec![0.0; model.1.lines_hz.len()];
     if sums.is_empty() {
         return sums;
     }
     for record in records {
-        model.shift = record.begin.shift;
-        let Ok(mut residual) = difference(&model, record) else {
+        let Some((_, found)) = nuisance_of(structure, &mut model, record) else {
             continue;
         };
-        let taken = record.nuisance(reference, &waves, None).fit(&mut residual);
-        for (sum, [c, s]) in sums.iter_mut().zip(&taken.lines) {
+        for (sum, [c, s]) in sums.iter_mut().zip(&found.lines) {
             *sum += c.hypot(*s) / records.len() as f64;
         }
     }
     sums
 }
 
-impl Fitted<'_> {
+impl InitialState {
+    /// Adds a displacement, and a speed over `ω₀`, to the motion at the first sample.
+    fn correct(&mut self, [x, speed]: [f64; 2], plain: &PlainStand) {
+        self.motion.x += x;
+        self.motion.speed += speed * plain.mode().omega_rad_s;
+    }
+}
+
+impl FittedModel {
+    /// The same model fitted again, from where this fit ended.
+    pub fn refit(&self, train: &[StandRecord], effort: FitEffort) -> Result<Self, FitError> {
+        let train = self.with_initial_states(train);
+        fit(self.structure.clone(), &self.values, &train, effort)
+    }
+
+    /// The training records with the initial states that this fit found.
+    pub fn with_initial_states(&self, train: &[StandRecord]) -> Vec<StandRecord> {
+        let both = train.iter().zip(&self.initial);
+        both.map(|(record, initial)| record.starting_from(*initial))
+            .collect()
+    }
+
     /// Whether its motion is integrated in time.
-    #[must_use]
     pub fn integrates(&self) -> bool {
         self.structure.model(&self.values).0.has_torques()
     }
 
-    /// What the fitted model leaves of a record that it was not fitted to: the record's own constants, start and
-    /// phases are estimated, nothing else.
-    #[must_use]
-    pub fn residual(&self, record: &Record, reference: &Mode) -> Option<Residual> {
-        let (mut model, waves) = self.structure.model(&self.values);
-        let mut record = record.clone();
-        let rounds = if model.has_torques() { BEGIN_ROUNDS } else { 1 };
-        let step = SHIFT_STEP * self.structure.frame.rulers.rms;
-        for round in 1..=rounds {
-            model.shift = record.begin.shift;
-            let mut samples = difference(&model, &record).ok()?;
-            let column = if model.has_zero() {
-                model.shift += step;
-                let there = difference(&model, &record).ok()?;
-                Some(
-                    samples
-                        .iter()
-                        .zip(&there)
-                        .map(|(a, b)| (a - b) / step)
-                        .collect(),
-                )
-            } else {
-                None
-            };
-            let measured = &record.measured[record.range.clone()];
-            let modelled: Vec<f64> = measured.iter().zip(&samples).map(|(y, r)| y - r).collect();
-            let taken = record.nuisance(reference, &waves, column).fit(&mut samples);
-            if round == rounds {
-                self.restore_amplitudes(&record, &waves, &taken, &mut samples);
-                let begin = record.begin;
-                return Some(Residual {
-                    samples,
-                    taken,
-                    modelled,
-                    begin,
-                });
-            }
-            let limit = LARGEST_SHIFT * self.structure.frame.rulers.rms;
-            let [x, speed] = taken.motion.unwrap_or_default();
-            record.begin.start.x += x;
-            record.begin.start.speed += speed * reference.omega_rad_s;
-            record.begin.shift =
-                (record.begin.shift + taken.shift.unwrap_or(0.0)).clamp(-limit, limit);
-        }
-        None
+    /// The mode of the plain stand in it.
+    pub fn mode(&self) -> Mode {
+        self.structure.mode(&self.values).0
     }
 
-    /// The phase of a line belongs to the record, its amplitude does not: puts back what the record's own amplitude
-    /// has taken too much or too little.
-    fn restore_amplitudes(
+    /// The plain stand in it.
+    pub fn stand(&self) -> PlainStand {
+        self.structure.stand(&self.values)
+    }
+
+    /// What the fitted model leaves of a record: the record's own constants, initial state and phases are estimated,
+    /// nothing else. `None` if the motion diverges.
+    pub fn residual(&self, record: &StandRecord) -> Option<RecordResidual> {
+        let (mut model, terms) = self.structure.model(&self.values);
+        let context = &self.structure.context;
+        let limit = LARGEST_PRELOAD * context.scales.rms;
+        let mut found = self.evaluate(&mut model, &terms, record.clone())?;
+        let iterations = match model.has_torques() {
+            true => INITIAL_STATE_ITERATIONS,
+            false => 1,
+        };
+        for _ in 1..iterations {
+            let mut record = found.record;
+            let motion = found.nuisance.motion.unwrap_or_default();
+            record.initial.correct(motion, &context.plain);
+            let preload = record.initial.preload + found.nuisance.preload.unwrap_or(0.0);
+            record.initial.preload = preload.clamp(-limit, limit);
+            found = self.evaluate(&mut model, &terms, record)?;
+        }
+        self.restore_amplitudes(&terms, &mut found);
+        Some(found)
+    }
+
+    /// The residual of a record with the initial state that it has.
+    fn evaluate(
         &self,
-        record: &Record,
-        waves: &Waves,
-        taken: &Taken,
-        samples: &mut [f64],
-    ) {
-        let rate_hz = record.input.rate_hz();
-        let lines = waves
-            .lines_hz
-            .iter()
-            .zip(&taken.lines)
-            .zip(&self.amplitudes);
-        for ((frequency_hz, [c, s]), amplitude) in lines {
+        model: &mut Model,
+        terms: &NuisanceTerms,
+        record: StandRecord,
+    ) -> Option<RecordResidual> {
+        let context = &self.structure.context;
+        model.shift = record.initial.preload;
+        let mut samples = raw_residual(model, &record).ok()?;
+        let mut preload = None;
+        if model.has_zero() {
+            let step = PRELOAD_STEP * context.scales.rms;
+            model.shift += step;
+            let moved = raw_residual(model, &record).ok()?;
+            let pairs = samples.iter().zip(&moved);
+            preload = Some(pairs.map(|(a, b)| (a - b) / step).collect());
+        }
+        let pairs = record.measured_in_range().iter().zip(&samples);
+        let modelled = pairs.map(|(y, r)| y - r).collect();
+        let nuisance = record.nuisance(&context.plain.mode(), terms, preload);
+        let nuisance = nuisance.fit(&mut samples);
+        Some(RecordResidual {
+            record,
+            samples,
+            modelled,
+            nuisance,
+        })
+    }
+
+    /// The phase of a line belongs to the record, its amplitude to the stand: undoes the difference between the
+    /// amplitude that was removed and the fitted one.
+    fn restore_amplitudes(&self, terms: &NuisanceTerms, found: &mut RecordResidual) {
+        let rate_hz = found.record.rate_hz();
+        let lines = terms.lines_hz.iter().zip(&found.nuisance.lines);
+        for ((frequency_hz, [c, s]), amplitude) in lines.zip(&self.amplitudes) {
             let own = c.hypot(*s);
             if own == 0.0 {
                 continue;
             }
             let excess = 1.0 - amplitude / own;
-            let turn = std::f64::consts::TAU * frequency_hz / rate_hz;
-            for (sample, i) in samples.iter_mut().zip(record.range.clone()) {
+            let turn = TAU * frequency_hz / rate_hz;
+            for (sample, i) in found.samples.iter_mut().zip(found.record.range.clone()) {
                 let (sine, cosine) = (turn * i as f64).sin_cos();
                 *sample += excess * (c * cosine + s * sine);
             }
+        }
+    }
+}
+
+#[cfg(test)]
+impl RecordResidual {
+    /// The residual of a record at 1 kHz, for tests.
+    pub fn made(applied: Vec<f64>, measured: Vec<f64>, samples: Vec<f64>) -> Self {
+        use torqcomp_model::simulate::Excitation;
+        let record = StandRecord {
+            source: "a.csv".to_owned(),
+            input: std::sync::Arc::new(Excitation::new(applied, 1000.0, 1.0, 1)),
+            range: 0..measured.len(),
+            measured: std::sync::Arc::new(measured.clone()),
+            initial: InitialState::default(),
+        };
+        Self {
+            record,
+            samples,
+            modelled: measured,
+            nuisance: NuisanceFit::default(),
         }
     }
 }

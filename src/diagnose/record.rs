@@ -1,79 +1,128 @@
-//! A record of applied and measured quantity, ready to be compared with models.
+//! A record of the applied and the measured quantity, ready for comparison with models.
 
+use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 use std::sync::Arc;
 
-use torqcomp_model::effects::Mode;
-use torqcomp_model::simulate::{Excitation, State};
+use torqcomp_model::Mode;
+use torqcomp_model::simulate::{Excitation, Model, State};
 
 use super::columns::Columns;
-use super::structure::Waves;
 
-/// How a record begins.
+/// State of the stand at the first sample of a record.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Begin {
-    /// Motion at the first sample.
-    pub start: State,
+pub struct InitialState {
+    pub motion: State,
     /// Displacement by a constant load that is not in the input.
-    pub shift: f64,
+    pub preload: f64,
 }
 
 /// One record, or the part of it that is fitted or held out.
 #[derive(Clone)]
-pub struct Record {
+pub struct StandRecord {
     /// File it comes from.
     pub source: String,
     /// The applied quantity.
     pub input: Arc<Excitation>,
-    /// The measured one, of the same length.
+    /// The measured quantity, of the same length.
     pub measured: Arc<Vec<f64>>,
     /// The samples that count.
     pub range: Range<usize>,
-    /// How the record begins, as far as it is known.
-    pub begin: Begin,
+    pub initial: InitialState,
 }
 
-/// What belongs to a record and not to the stand, and is taken out of its residual.
+/// What a model adds to a record whose phase or size belongs to the record, not to the stand.
+#[derive(Debug, Clone, Default)]
+pub struct NuisanceTerms {
+    /// Frequencies of lines, such as mains pickup.
+    pub lines_hz: Vec<f64>,
+    /// Half waves of a slow drift.
+    pub drift_half_waves: usize,
+    /// Rates at which a state from before the record decays, per s.
+    pub decays_per_s: Vec<f64>,
+}
+
+impl NuisanceTerms {
+    pub const NONE: Self = Self {
+        lines_hz: Vec::new(),
+        drift_half_waves: 0,
+        decays_per_s: Vec::new(),
+    };
+
+    pub fn is_empty(&self) -> bool {
+        !self.disturb() && self.decays_per_s.is_empty()
+    }
+
+    /// Whether something is added that the applied quantity does not cause.
+    pub fn disturb(&self) -> bool {
+        !self.lines_hz.is_empty() || self.drift_half_waves > 0
+    }
+}
+
+/// What belongs to a record and not to the stand: it is removed from the record's residual by least squares.
 #[derive(Default)]
 pub struct Nuisance {
     columns: Columns,
-    /// Place of the columns of the free motion, if they are in it.
+    /// Index of the first of the two columns of the free motion.
     motion: Option<usize>,
-    /// Whether enough of the free motion is left in the range to tell how it began.
+    /// Whether enough of the free motion is left in the range to determine the motion at the first sample.
     sees_start: bool,
-    /// Place of the column of a constant load.
-    shift: Option<usize>,
-    /// Place of the first column of the lines.
+    /// Index of the column of a constant load.
+    preload: Option<usize>,
+    /// Index of the first column of the lines.
     lines: usize,
 }
 
-/// Time constants before the range after which nothing is left of the motion at a record's start.
-const NOTHING_LEFT: f64 = 12.0;
-/// Time constants up to which the range tells that motion: beyond, noise would be multiplied by more than `e³` on its way back to the start.
+/// Time constants after which the free motion from a record's start is gone.
+const DECAYED: f64 = 12.0;
+/// Time constants up to which the range determines that motion: beyond, noise would be amplified by more than `e³` on its
+/// way back to the start.
 const START_SEEN: f64 = 3.0;
 
-impl Record {
+impl StandRecord {
     /// Samples of the range.
-    #[must_use]
     pub fn count(&self) -> usize {
         self.range.len()
     }
 
-    /// What belongs to this record: a constant, the free motion of the plain stand after the record's
-    /// start, and lines of the given frequencies.
-    ///
-    /// `shift` is what a constant load does to the record, where that is more than a constant.
-    #[must_use]
-    pub fn nuisance(&self, mode: &Mode, waves: &Waves, shift: Option<Vec<f64>>) -> Nuisance {
+    pub fn rate_hz(&self) -> f64 {
+        self.input.rate_hz()
+    }
+
+    /// The applied quantity over the range.
+    pub fn applied_in_range(&self) -> &[f64] {
+        &self.input.samples()[self.range.clone()]
+    }
+
+    /// The measured quantity over the range.
+    pub fn measured_in_range(&self) -> &[f64] {
+        &self.measured[self.range.clone()]
+    }
+
+    pub fn starting_from(&self, initial: InitialState) -> Self {
+        Self {
+            initial,
+            ..self.clone()
+        }
+    }
+
+    /// What belongs to this record: a constant, the free motion of the plain stand after the record's start, and the
+    /// given terms. `preload` is the change of the record with a constant load, where that is more than a constant.
+    pub fn nuisance(
+        &self,
+        mode: &Mode,
+        terms: &NuisanceTerms,
+        preload: Option<Vec<f64>>,
+    ) -> Nuisance {
         let mut nuisance = Nuisance::default();
-        nuisance.columns.push(vec![1.0; self.count()]);
-        let rate_hz = self.input.rate_hz();
+        let columns = &mut nuisance.columns;
+        columns.push(vec![1.0; self.count()]);
+        let rate_hz = self.rate_hz();
         let decay = mode.damping_ratio * mode.omega_rad_s / rate_hz * self.range.start as f64;
-        // After many time constants nothing is left of it.
-        if decay < NOTHING_LEFT {
+        if decay < DECAYED {
             nuisance.motion = Some(1);
             nuisance.sees_start = decay < START_SEEN;
-            let model = torqcomp_model::simulate::Model {
+            let model = Model {
                 mode: *mode,
                 gain: 1.0,
                 recorder: None,
@@ -81,72 +130,61 @@ impl Record {
                 actions: Vec::new(),
             };
             for column in model.free_motion(rate_hz, self.range.end) {
-                nuisance.columns.push(column[self.range.clone()].to_vec());
+                columns.push(column[self.range.clone()].to_vec());
             }
         }
-        if let Some(column) = shift {
-            nuisance.shift = Some(nuisance.columns.count());
-            nuisance.columns.push(column);
+        if let Some(column) = preload {
+            nuisance.preload = Some(columns.count());
+            columns.push(column);
         }
-        let count = self.count() as f64;
-        for wave in 1..=waves.course {
-            let turn = std::f64::consts::PI * wave as f64 / count;
-            nuisance.columns.push(
-                (0..self.count())
-                    .map(|i| (turn * (i as f64 + 0.5)).cos())
-                    .collect(),
-            );
+        let count = self.count();
+        for wave in 1..=terms.drift_half_waves {
+            let turn = PI * wave as f64 / count as f64;
+            let cosine = |i| (turn * (i as f64 + 0.5)).cos();
+            columns.push((0..count).map(cosine).collect());
         }
-        for rate_per_s in &waves.fades_per_s {
+        for rate_per_s in &terms.decays_per_s {
             let step = rate_per_s / rate_hz;
-            nuisance.columns.push(
-                (0..self.count())
-                    .map(|i| (-step * i as f64).exp())
-                    .collect(),
-            );
+            columns.push((0..count).map(|i| (-step * i as f64).exp()).collect());
         }
-        nuisance.lines = nuisance.columns.count();
-        for frequency_hz in &waves.lines_hz {
-            let turn = std::f64::consts::TAU * frequency_hz / rate_hz;
-            // A turning phasor, set right now and then.
+        nuisance.lines = columns.count();
+        for frequency_hz in &terms.lines_hz {
+            let turn = TAU * frequency_hz / rate_hz;
             let wave =
                 |part: fn(f64) -> f64| self.range.clone().map(|i| part(turn * i as f64)).collect();
-            nuisance.columns.push(wave(f64::cos));
-            nuisance.columns.push(wave(f64::sin));
+            columns.push(wave(f64::cos));
+            columns.push(wave(f64::sin));
         }
         nuisance
     }
 }
 
-/// Coefficients of what was taken out of a residual.
+/// Coefficients of the nuisance terms in a residual.
 #[derive(Debug, Clone, Default)]
-pub struct Taken {
-    /// The constant.
+pub struct NuisanceFit {
     pub offset: f64,
-    /// Displacement, and speed over `ω₀`, at the start of the record, where the range still tells them.
+    /// Displacement, and speed over `ω₀`, at the start of the record, where the range determines them.
     pub motion: Option<[f64; 2]>,
-    /// The constant load's displacement.
-    pub shift: Option<f64>,
+    /// Displacement by the constant load.
+    pub preload: Option<f64>,
     /// Cosine and sine part of each line.
     pub lines: Vec<[f64; 2]>,
 }
 
 impl Nuisance {
-    /// Clears a residual.
+    /// Removes the nuisance terms from a residual.
     pub fn clear(&self, residual: &mut [f64]) {
         self.columns.clear(residual);
     }
 
-    /// Clears a residual and tells what was in it.
-    pub fn fit(&self, residual: &mut [f64]) -> Taken {
+    /// Removes the nuisance terms from a residual and returns their coefficients.
+    pub fn fit(&self, residual: &mut [f64]) -> NuisanceFit {
         let raw = self.columns.fit(residual);
-        Taken {
+        let motion = self.motion.filter(|_| self.sees_start);
+        NuisanceFit {
             offset: raw[0],
-            motion: self
-                .motion
-                .filter(|_| self.sees_start)
-                .map(|k| [raw[k], raw[k + 1]]),
-            shift: self.shift.map(|k| raw[k]),
+            motion: motion.map(|k| [raw[k], raw[k + 1]]),
+            preload: self.preload.map(|k| raw[k]),
             lines: raw[self.lines..]
                 .chunks_exact(2)
                 .map(|c| [c[0], c[1]])
@@ -156,17 +194,12 @@ impl Nuisance {
 }
 
 /// Sum of products.
-#[must_use]
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
-    // Eight sums side by side: one would wait for each addition.
+    // Eight independent sums, so that no addition waits for the one before.
     let mut sums = [0.0_f64; 8];
     let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest: f64 = a8
-        .remainder()
-        .iter()
-        .zip(b8.remainder())
-        .map(|(x, y)| x * y)
-        .sum();
+    let rest = a8.remainder().iter().zip(b8.remainder());
+    let rest: f64 = rest.map(|(x, y)| x * y).sum();
     for (x, y) in a8.zip(b8) {
         for k in 0..8 {
             sums[k] += x[k] * y[k];

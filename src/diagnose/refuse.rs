@@ -1,19 +1,21 @@
-//! Records that no diagnosis can be made of.
+//! Records that cannot be diagnosed.
 
 use std::sync::Arc;
 
 use torqcomp_model::simulate::{Excitation, State};
 
-use super::plain::{Constants, fit_plain};
-use super::record::{Record, dot};
-use super::structure::{Frame, Structure, Waves};
-use super::{Case, Diagnosis, rulers};
+use super::plain::find_plain;
+use super::record::{NuisanceTerms, StandRecord, dot};
+use super::residual_tests::without_mean;
+use super::score::ScoredModel;
+use super::structure::{FitContext, PlainStand, Structure};
+use super::{Case, scales};
 use crate::failure::Failure;
 
-/// Fewest periods of the natural frequency in the training records together.
+/// Minimum number of periods of the natural frequency in the longest training record.
 const FEWEST_PERIODS: f64 = 10.0;
-/// Part of the record that a plain stand must leave before the channels are tried the other way round.
-const LEAVES_MUCH: f64 = 0.3;
+/// Relative error of the plain stand from which on the channels are tried the other way round.
+const LARGE_ERROR: f64 = 0.3;
 /// Error the other way round, over that as given, below which the channels count as swapped.
 const SWAPPED: f64 = 0.5;
 /// Error of a plain stand fitted to the held-out records alone, over that of the one from training, below which the records
@@ -24,120 +26,105 @@ const APART: f64 = 0.5;
 ///
 /// # Errors
 /// If they are.
-pub fn check(case: &Case, frame: &Frame, found: Constants) -> Result<(), Failure> {
+pub fn check(case: &Case, context: &FitContext) -> Result<(), Failure> {
     // Swapped channels fit any frequency, which may make them look too short.
-    refuse_swapped(case, frame, found)?;
-    let Some((record, duration_s)) = longest(case) else {
+    refuse_swapped(case, context)?;
+    let train = &case.records.train;
+    let Some((record, duration_s)) = longest(train) else {
         return Ok(());
     };
-    let periods = duration_s * found.natural_hz;
+    let natural_hz = context.plain.natural_hz;
+    let periods = duration_s * natural_hz;
     if periods >= FEWEST_PERIODS {
         return Ok(());
     }
     Err(Failure::failed(format_args!(
-        "{}: {duration_s:.4} s are {periods:.1} periods of the {:.4} Hz that fit best, and a diagnosis needs at \
-         least {FEWEST_PERIODS} in a training record; record for longer, or, for a stand that turns freely, use \
-         \"identify runup\"",
-        record.source, found.natural_hz
+        "{}: {duration_s:.4} s are only {periods:.1} periods of the fitted natural frequency ({natural_hz:.4} Hz); at \
+         least one training record must have {FEWEST_PERIODS} periods. Record for longer, or, for a stand that turns \
+         freely, use \"identify runup\"",
+        record.source
     )))
 }
 
 /// The longest training record and its duration in s.
-fn longest(case: &Case) -> Option<(&Record, f64)> {
-    let longest = case.train.iter().max_by_key(|r| r.count())?;
-    Some((longest, longest.count() as f64 / longest.input.rate_hz()))
+fn longest(train: &[StandRecord]) -> Option<(&StandRecord, f64)> {
+    let longest = train.iter().max_by_key(|r| r.count())?;
+    Some((longest, longest.count() as f64 / longest.rate_hz()))
 }
 
-fn refuse_swapped(case: &Case, frame: &Frame, found: Constants) -> Result<(), Failure> {
-    let as_given = left(frame, found, &case.train);
-    if as_given < LEAVES_MUCH {
+fn refuse_swapped(case: &Case, context: &FitContext) -> Result<(), Failure> {
+    let train = &case.records.train;
+    let as_given = relative_error(context, train);
+    if as_given < LARGE_ERROR {
         return Ok(());
     }
-    let swapped: Vec<Record> = case.train.iter().map(swap).collect();
-    let mut other = Frame {
-        rulers: rulers(&swapped),
-        gain: 1.0 / frame.gain,
-        gain_is_free: frame.gain_is_free,
-        recorder: None,
+    let swapped: Vec<StandRecord> = train.iter().map(swap).collect();
+    let plain = PlainStand {
+        natural_hz: 1.0,
+        gain: 1.0 / context.plain.gain,
+        ..context.plain
     };
-    let Ok(constants) = fit_plain(&mut other, case.declared, &swapped) else {
+    let other = FitContext {
+        scales: scales(&swapped),
+        recorder: None,
+        ..context.at(plain)
+    };
+    let Ok(other) = find_plain(&other, case.declared, &swapped) else {
         return Ok(());
     };
-    let periods = longest(case).map_or(0.0, |(_, duration_s)| duration_s * constants.natural_hz);
-    let the_other_way = left(&other, constants, &swapped);
-    if periods < FEWEST_PERIODS || the_other_way >= SWAPPED * as_given {
+    let duration_s = longest(train).map_or(0.0, |(_, duration_s)| duration_s);
+    let the_other_way = relative_error(&other, &swapped);
+    if duration_s * other.plain.natural_hz < FEWEST_PERIODS || the_other_way >= SWAPPED * as_given {
         return Ok(());
     }
     Err(Failure::failed(format_args!(
-        "{}: the channels look swapped: a stand from --applied to --measured leaves {:.0} % of the record, one the other \
-         way round {:.0} %; exchange the two",
-        case.train[0].source,
+        "{}: the channels look swapped: a stand from --applied to --measured has an error of {:.0} %, one from --measured \
+         to --applied {:.0} %; exchange the two",
+        train[0].source,
         100.0 * as_given,
         100.0 * the_other_way
     )))
 }
 
-fn swap(record: &Record) -> Record {
+fn swap(record: &StandRecord) -> StandRecord {
     let input = &record.input;
     let applied = record.measured.to_vec();
-    Record {
-        input: Arc::new(Excitation::new(
-            applied,
-            input.rate_hz(),
-            input.start_s(),
-            input.substeps(),
-        )),
+    let (rate_hz, start_s) = (input.rate_hz(), input.start_s());
+    StandRecord {
+        input: Arc::new(Excitation::new(applied, rate_hz, start_s, input.substeps())),
         measured: Arc::new(input.samples().to_vec()),
         ..record.clone()
     }
 }
 
-/// Rms that a plain stand leaves of records, over theirs.
-fn left(frame: &Frame, constants: Constants, records: &[Record]) -> f64 {
-    let mut values = vec![
-        constants.natural_hz / frame.rulers.natural_hz,
-        constants.damping_ratio,
-    ];
-    if frame.gain_is_free {
-        values.push(constants.gain / frame.gain);
-    }
-    let structure = Structure {
-        frame,
-        choices: Vec::new(),
-    };
-    let (model, _) = structure.model(&values);
-    let (mut rest, mut whole) = (0.0, 0.0);
+/// Rms error of the plain stand of a context on records, over their rms.
+fn relative_error(context: &FitContext, records: &[StandRecord]) -> f64 {
+    let plain = context.plain;
+    let structure = Structure::plain(Arc::new(context.clone()));
+    let (model, _) = structure.model(&context.plain_values(&plain));
+    let (mut error, mut whole) = (0.0, 0.0);
     for record in records {
         let modelled = model.simulate(&record.input, State::default());
-        let range = record.range.clone();
-        let nuisance = record.nuisance(&constants.mode(), &Waves::NONE, None);
-        let mut measured = record.measured[range.clone()].to_vec();
-        let pairs = measured.iter().zip(&modelled[range]);
+        let measured = record.measured_in_range();
+        let pairs = measured.iter().zip(&modelled[record.range.clone()]);
         let mut residual: Vec<f64> = pairs.map(|(y, x)| y - x).collect();
+        let nuisance = record.nuisance(&plain.mode(), &NuisanceTerms::NONE, None);
         nuisance.clear(&mut residual);
-        let mean = measured.iter().sum::<f64>() / measured.len() as f64;
-        measured.iter_mut().for_each(|y| *y -= mean);
-        rest += dot(&residual, &residual);
+        let measured = without_mean(measured);
+        error += dot(&residual, &residual);
         whole += dot(&measured, &measured);
     }
-    (rest / whole).sqrt()
+    (error / whole).sqrt()
 }
 
-/// The constants of plain stands fitted to training and to held-out records alone, where the two do not follow one
-/// plain stand but each follows its own.
-#[must_use]
-pub fn apart(diagnosis: &Diagnosis) -> Option<[Constants; 2]> {
-    let fitted = &diagnosis.before.fitted;
-    let (mode, gain) = fitted.structure.mode(&fitted.values);
-    let train = Constants {
-        natural_hz: mode.omega_rad_s / std::f64::consts::TAU,
-        damping_ratio: mode.damping_ratio,
-        gain,
-    };
-    let records = &diagnosis.records;
-    let mut frame = fitted.structure.frame.clone();
-    let hold = fit_plain(&mut frame, Some(train), &records.hold).ok()?;
-    let whole = left(fitted.structure.frame, train, &records.hold);
-    let alone = left(&frame, hold, &records.hold);
-    (alone < APART * whole).then_some([train, hold])
+/// The plain stands fitted to training and to held-out records alone, where no common one fits both but each has its
+/// own.
+pub fn plain_stands_apart(before: &ScoredModel) -> Option<[PlainStand; 2]> {
+    let train = before.fitted.stand();
+    let common = &before.fitted.structure.context;
+    let records: Vec<StandRecord> = before.holdout.iter().map(|r| r.record.clone()).collect();
+    let alone = find_plain(common, Some(train), &records).ok()?;
+    let error_alone = relative_error(&alone, &records);
+    let is_apart = error_alone < APART * relative_error(&common.at(train), &records);
+    is_apart.then_some([train, alone.plain])
 }

@@ -1,222 +1,299 @@
-//! The search: every effect put to the model, the best taken if it helps beyond chance.
+//! The search: every effect is fitted, the best is accepted if it reduces the hold-out error significantly.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use serde::{Serialize, Serializer};
 use torqcomp_model::effects::{EFFECTS, Effect};
 
-use super::candidate::{
-    Base, Judged, Records, begin, choices, finish, first_look, judge, second_look,
-};
-use super::fit::Fitted;
-use super::spectra::{Peak, lines};
-use super::structure::Choice;
+use super::fit::{FitEffort, FittedModel, fit};
+use super::reason::{Reason, Status};
+use super::records::Records;
+use super::score::{BaseModel, EffectParameter, ScoredModel};
+use super::spectra::{SpectralLine, lines_of};
+use super::starts::{Start, best_starts};
+use super::structure::EffectForm;
 use crate::parallel::parallel;
 
-/// What became of an effect that was tried.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Status {
-    /// It is added to the model.
-    Accepted,
-    /// It is not.
-    Rejected,
-    /// The data cannot tell it from the one that is added.
-    Indistinguishable,
-}
-
 /// An effect that was tried, in its best form.
-pub struct Tried<'a> {
-    /// The effect.
+#[derive(Serialize)]
+pub struct CandidateFit {
+    #[serde(serialize_with = "name_of")]
     pub effect: &'static Effect,
-    /// The model with it; `None` if no fit came out.
-    pub judged: Option<Judged<'a>>,
+    pub form: Option<&'static str>,
+    /// The effects that were in the model already.
+    pub with: Vec<&'static str>,
+    pub train_rms: Option<f64>,
+    pub holdout_rms: Option<f64>,
     /// Probability of its gain by chance.
     pub p_value: Option<f64>,
-    /// What became of it.
-    pub status: Status,
-    /// Why.
-    pub why: String,
+    pub parameters: Vec<EffectParameter>,
+    #[serde(flatten)]
+    pub reason: Reason,
+    /// The model with it, if a fit came about.
+    #[serde(skip)]
+    pub model: Option<ScoredModel>,
 }
 
-/// Least fall of the held-out sum of squares, in variances of the residual.
+pub fn name_of<S: Serializer>(effect: &&'static Effect, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(effect.name)
+}
+
+/// How the search is run: threads, and who is told of the fits done and of all.
+#[derive(Clone, Copy)]
+pub struct Workers<'p> {
+    pub threads: usize,
+    pub progress: &'p (dyn Fn(usize, usize) + Sync),
+}
+
+/// Minimum reduction of the hold-out sum of squares, in residual variances.
 const LEAST_GAIN: f64 = 40.0;
-/// Least relative fall of the held-out sum of squares.
+/// Minimum relative reduction of the hold-out sum of squares.
 const LEAST_SHARE: f64 = 0.005;
-/// Least significance over the blocks of the held-out records.
+/// Minimum significance of the reduction over the blocks of the held-out records.
 const LEAST_SIGNIFICANCE: f64 = 3.0;
 /// Significance up to which one effect counts as no better than another.
-const WITHIN_CHANCE: f64 = 2.33;
-/// Forms that get a first look, by what their starts leave; beside an effect, where each look costs more.
-const MOST_LOOKS: [usize; 2] = [usize::MAX, 12];
-/// Gain of a first look, over the largest of all, from which on a second one follows; beside an effect that is accepted
-/// already, where each look costs more and finds less.
-const FOLLOWED_UP: [f64; 2] = [0.03, 0.1];
-/// Gain of a second look, over the largest of all, from which on a fit is taken to its end.
-const PROMISING: f64 = 0.5;
-/// Least such gain in variances of the residual: what does not pay for a parameter is not taken on.
-const PAYS: f64 = 5.0;
-/// Forms that are fitted to the end at most, ties aside; and beside an effect.
-const MOST_FITS: [usize; 2] = [12, 4];
+const TIED_SIGNIFICANCE: f64 = 2.33;
+/// Reduction of the hold-out sum of squares, in residual variances, up to which one effect counts as no better than
+/// another.
+const TIED_GAIN: f64 = 9.0;
 /// Difference of the criterion on all records that counts as none.
 const SAME: f64 = 4.0;
 /// Lines of the residual's spectrum that may be that of a shaft.
-const PEAKS: usize = 3;
-/// Prominence of a line over the spectrum around it.
+const LINES: usize = 3;
+/// Minimum power of such a line over the spectrum around it.
 const PROMINENT: f64 = 12.0;
+/// Reduction of the training sum of squares, in residual variances, below which a fit is not continued.
+const WORTHWHILE: f64 = 5.0;
+/// Gain of the second fit, over the largest of all, from which on a fit is continued to its end.
+const PROMISING: f64 = 0.5;
 
-/// Puts every effect to a base model and says which one, if any, is accepted: the first of the result then.
-pub fn try_all<'a>(
-    base: &Base<'a>,
-    records: &Records,
-    threads: usize,
-    progress: &(dyn Fn(usize, usize) + Sync),
-) -> Vec<Tried<'a>> {
-    let peaks = peaks(base, records);
-    let present = &base.judged.fitted.structure.choices;
-    let gain_is_free = base.judged.fitted.structure.frame.gain_is_free;
-    let jobs: Vec<Choice> = EFFECTS
-        .iter()
-        .filter(|e| present.iter().all(|c| c.effect.name != e.name))
-        .filter(|e| !(gain_is_free && e.name == "gain-error"))
-        .flat_map(|e| choices(e))
+const FIRST_FIT: FitEffort = FitEffort {
+    iterations: 3,
+    corrects_start: false,
+};
+const SECOND_FIT: FitEffort = FitEffort {
+    iterations: 5,
+    corrects_start: false,
+};
+const FULL_FIT: FitEffort = FitEffort {
+    iterations: 15,
+    corrects_start: true,
+};
+
+/// How many forms go on from one stage of fitting to the next.
+struct Selection {
+    /// Forms that get a first fit, by the residual that their starts leave.
+    first: usize,
+    /// Gain of the first fit, over the largest of all, from which on a second one follows.
+    second: f64,
+    /// Forms that get a full fit, ties aside.
+    full: usize,
+}
+
+const FOR_FIRST_EFFECT: Selection = Selection {
+    first: usize::MAX,
+    second: 0.03,
+    full: 12,
+};
+/// Beside an accepted effect a fit costs more and finds less.
+const FOR_SECOND_EFFECT: Selection = Selection {
+    first: 12,
+    second: 0.1,
+    full: 4,
+};
+
+/// Adds every effect to a base model in turn; if one of them is accepted, it is the first of the result.
+pub fn try_all(base: &BaseModel, records: &Records, workers: Workers) -> Vec<CandidateFit> {
+    let present = base.scored.effect_names();
+    let gain_is_free = base.scored.fitted.structure.context.gain_is_free;
+    let effects = EFFECTS.iter().copied().filter(|effect| {
+        !(present.contains(&effect.name) || gain_is_free && effect.name == "gain-error")
+    });
+    let forms = EffectForm::all(effects.clone());
+    let lines = residual_lines(base, records);
+    let mut fits = fit_all(base, &forms, &lines, records, workers).into_iter();
+    let mut tried: Vec<CandidateFit> = effects
+        .map(|effect| {
+            let models = fits.by_ref().take(effect.forms.len()).flatten();
+            let best = models.min_by(|a, b| a.criterion().total_cmp(&b.criterion()));
+            CandidateFit::new(effect, &base.scored, best)
+        })
         .collect();
-    let fits = fit_all(base, &jobs, &peaks, records, threads, progress);
-    let mut tried: Vec<Tried> = Vec::new();
-    for (choice, judged) in jobs.iter().zip(fits) {
-        match tried
-            .last_mut()
-            .filter(|t| std::ptr::eq(t.effect, choice.effect))
-        {
-            Some(last) => {
-                let better = judged.as_ref().is_some_and(|new| {
-                    last.judged
-                        .as_ref()
-                        .is_none_or(|old| new.criterion() < old.criterion())
-                });
-                if better {
-                    last.judged = judged;
-                }
-            }
-            None => tried.push(Tried {
-                effect: choice.effect,
-                judged,
-                p_value: None,
-                status: Status::Rejected,
-                why: String::new(),
-            }),
-        }
-    }
-    decide(base, &mut tried);
+    decide(&mut tried);
     tried
 }
 
-/// The best fit of each form, judged: those whose starts leave least get a first look (all of them, unless there is an
-/// effect already), those that lower the training error a second one, and those
-/// that lower it nearly most a fit to the end. How much work that is depends on the records alone, not on the clock.
-pub(super) fn fit_all<'a>(
-    base: &Base<'a>,
-    jobs: &[Choice],
-    peaks: &[Peak],
+impl CandidateFit {
+    fn new(effect: &'static Effect, base: &ScoredModel, model: Option<ScoredModel>) -> Self {
+        let last = model
+            .as_ref()
+            .and_then(|m| m.fitted.structure.effects.last());
+        let errors = model.as_ref().map(ScoredModel::errors);
+        let comparison = model.as_ref().map(|m| m.against(base));
+        let refusal = model.as_ref().map(|m| refusal(m, base));
+        Self {
+            effect,
+            form: last.map(|e| e.form.name),
+            with: Vec::new(),
+            train_rms: errors.map(|e| e.train_rms),
+            holdout_rms: errors.map(|e| e.holdout_rms),
+            p_value: comparison.and_then(|c| c.p_value()),
+            parameters: model
+                .as_ref()
+                .map_or_else(Vec::new, ScoredModel::last_parameters),
+            reason: match refusal {
+                None => Reason::NotFitted,
+                Some(refusal) => refusal.unwrap_or(Reason::Best),
+            },
+            model,
+        }
+    }
+
+    /// The effects of its model.
+    pub fn names(&self) -> Vec<&'static str> {
+        [&self.with[..], &[self.effect.name]].concat()
+    }
+
+    pub fn status(&self) -> Status {
+        self.reason.status()
+    }
+
+    /// Hold-out error for comparisons: infinite without a fit.
+    pub fn holdout_error(&self) -> f64 {
+        self.holdout_rms.unwrap_or(f64::INFINITY)
+    }
+}
+
+/// Rejects every candidate that has not been rejected yet, for a reason.
+pub fn reject_all(tried: &mut [CandidateFit], reason: impl Fn(&CandidateFit) -> Reason) {
+    let named = tried.iter_mut().filter(|t| t.status() != Status::Rejected);
+    for candidate in named {
+        candidate.reason = reason(candidate);
+    }
+}
+
+/// The best fit of each form, scored. The forms whose starts leave least get a first fit (all of them if there is no effect
+/// yet), those that reduce the training error a second one, and those that reduce it nearly most a full one. The
+/// amount of work depends on the records alone, not on the clock.
+pub fn fit_all(
+    base: &BaseModel,
+    forms: &[EffectForm],
+    lines: &[SpectralLine],
     records: &Records,
-    threads: usize,
-    progress: &(dyn Fn(usize, usize) + Sync),
-) -> Vec<Option<Judged<'a>>> {
-    let whole = base.judged.fitted.train_sum;
-    let variance = base.judged.train_rms().powi(2);
-    let later = usize::from(!base.judged.fitted.structure.choices.is_empty());
-    let started = parallel(jobs.len(), threads, |k| {
-        begin(base, jobs[k], peaks, records)
-    });
-    let left = |k: usize| {
-        started[k]
-            .iter()
-            .map(|t| t.left)
-            .fold(f64::INFINITY, f64::min)
+    workers: Workers,
+) -> Vec<Option<ScoredModel>> {
+    let fitted = &base.scored.fitted;
+    let selection = match fitted.structure.effects.is_empty() {
+        true => FOR_FIRST_EFFECT,
+        false => FOR_SECOND_EFFECT,
     };
-    let mut looked: Vec<usize> = (0..jobs.len()).collect();
-    looked.sort_by(|a, b| left(*a).total_cmp(&left(*b)));
-    looked.truncate(MOST_LOOKS[later]);
-    let done = AtomicUsize::new(0);
-    let first = parallel(jobs.len(), threads, |k| {
-        let from = if looked.contains(&k) {
-            started[k].as_slice()
-        } else {
-            &[]
-        };
-        let found = first_look(base, jobs[k], from, records);
-        progress(done.fetch_add(1, Ordering::Relaxed) + 1, jobs.len());
-        found
-    });
-    let most = first.iter().flatten().map(|f| whole - f.train_sum);
-    let least = FOLLOWED_UP[later] * most.fold(0.0, f64::max);
-    let second = parallel(jobs.len(), threads, |k| {
-        let looks = first[k].iter().map(|look| {
-            let followed = !look.converged && whole - look.train_sum >= least;
-            let found = followed.then(|| second_look(look, records)).flatten();
-            found.unwrap_or_else(|| look.clone())
+    let first = first_fits(base, forms, lines, records, &selection, workers);
+    let gain = |fit: &FittedModel| fitted.train_sum - fit.train_sum;
+    let largest = first.iter().flatten().map(gain).fold(0.0, f64::max);
+    let second = parallel(forms.len(), workers.threads, |k| {
+        let fits = first[k].iter().map(|fit| {
+            let is_followed = !fit.converged && gain(fit) >= selection.second * largest;
+            let second = is_followed.then(|| fit.refit(&records.train, SECOND_FIT));
+            second.and_then(Result::ok).unwrap_or_else(|| fit.clone())
         });
-        looks.min_by(|a, b| a.train_sum.total_cmp(&b.train_sum))
+        fits.min_by(|a, b| a.train_sum.total_cmp(&b.train_sum))
     });
-    let gain = |look: &Option<Fitted>| look.as_ref().map_or(0.0, |f| whole - f.train_sum);
-    let mut gains: Vec<f64> = second.iter().map(gain).collect();
+    let mut gains: Vec<f64> = second
+        .iter()
+        .map(|f| f.as_ref().map_or(0.0, gain))
+        .collect();
     gains.sort_by(|a, b| b.total_cmp(a));
     let least = gains
-        .get(MOST_FITS[later])
+        .get(selection.full)
         .copied()
         .unwrap_or(0.0)
         .max(PROMISING * gains.first().copied().unwrap_or(0.0))
-        .max(PAYS * variance);
-    parallel(jobs.len(), threads, |k| {
-        // A form that only raises the training error is not worth judging.
-        let look = second[k].as_ref().filter(|f| f.train_sum < whole)?;
-        let done = look.converged && !look.integrates() || gain(&second[k]) < least;
-        let taken_on = if done { None } else { finish(look, records) };
-        judge(taken_on.unwrap_or_else(|| look.clone()), records)
+        .max(WORTHWHILE * base.scored.train_rms().powi(2));
+    parallel(forms.len(), workers.threads, |k| {
+        let fit = second[k].as_ref().filter(|f| gain(f) > 0.0)?;
+        let is_done = fit.converged && !fit.integrates() || gain(fit) < least;
+        let full = (!is_done).then(|| fit.refit(&records.train, FULL_FIT));
+        let full = full.and_then(Result::ok);
+        ScoredModel::of(full.unwrap_or_else(|| fit.clone()), records)
     })
 }
 
-/// Lines of the residual that stand out.
-fn peaks(base: &Base, records: &Records) -> Vec<Peak> {
-    let rate_hz = records.train[0].input.rate_hz();
-    let longest = records.train.iter().map(|r| r.count()).max().unwrap_or(1);
-    let residuals: Vec<(&[f64], f64)> = base
-        .judged
-        .train
-        .iter()
-        .map(|r| (r.samples.as_slice(), rate_hz))
-        .collect();
-    let from_hz = 3.0 * rate_hz / longest as f64;
-    let mut found = lines(&residuals, from_hz, 0.45 * rate_hz, 4 * PEAKS);
-    found.retain(|p| p.prominence > PROMINENT);
-    found.truncate(PEAKS);
+/// Fits with very few iterations from the best starts of each form, where these leave least.
+fn first_fits(
+    base: &BaseModel,
+    forms: &[EffectForm],
+    lines: &[SpectralLine],
+    records: &Records,
+    selection: &Selection,
+    workers: Workers,
+) -> Vec<Vec<FittedModel>> {
+    let structure = &base.scored.fitted.structure;
+    let training = base.scored.fitted.with_initial_states(&records.train);
+    let starts = parallel(forms.len(), workers.threads, |k| {
+        best_starts(base, &structure.with(forms[k]), lines, &training)
+    });
+    let left = |k: usize| {
+        let left = starts[k].iter().map(|start: &Start| start.left);
+        left.fold(f64::INFINITY, f64::min)
+    };
+    let mut chosen: Vec<usize> = (0..forms.len()).collect();
+    chosen.sort_by(|a, b| left(*a).total_cmp(&left(*b)));
+    chosen.truncate(selection.first);
+    let done = AtomicUsize::new(0);
+    parallel(forms.len(), workers.threads, |k| {
+        let starts = starts[k].iter().filter(|_| chosen.contains(&k));
+        let fits = starts.filter_map(|start| {
+            let structure = structure.with(forms[k]);
+            fit(structure, &start.values, &training, FIRST_FIT).ok()
+        });
+        let fits = fits.collect();
+        (workers.progress)(done.fetch_add(1, Ordering::Relaxed) + 1, forms.len());
+        fits
+    })
+}
+
+/// Lines that stand out of the residual on the training records.
+fn residual_lines(base: &BaseModel, records: &Records) -> Vec<SpectralLine> {
+    let highest_hz = 0.45 * records.rate_hz();
+    let mut found = lines_of(&base.scored.train, highest_hz, 4 * LINES);
+    found.retain(|line| line.prominence > PROMINENT);
+    found.truncate(LINES);
     found
 }
 
-fn decide<'a>(base: &Base<'a>, tried: &mut [Tried<'a>]) {
-    let before = &base.judged;
-    let mut passing: Vec<usize> = Vec::new();
-    for (k, one) in tried.iter_mut().enumerate() {
-        let Some(judged) = &one.judged else {
-            one.why = "not followed: its first steps do not lower the error on the training records, or nothing in them suggests where to start".to_owned();
-            continue;
-        };
-        let comparison = judged.against(before);
-        one.p_value = comparison.p_value();
-        match refusal(judged, before) {
-            Some(why) => one.why = why,
-            None => passing.push(k),
-        }
+/// Why an effect is not accepted, considered alone.
+pub fn refusal(model: &ScoredModel, before: &ScoredModel) -> Option<Reason> {
+    let comparison = model.against(before);
+    let (gain, variance) = (comparison.gain(), model.holdout_rms().powi(2));
+    let total = before.holdout_rms().powi(2) * before.holdout_samples().len() as f64;
+    let change = model.holdout_rms() / before.holdout_rms() - 1.0;
+    if gain <= 0.0 {
+        return Some(Reason::NoReduction { change });
     }
-    let hold = |k: usize| {
-        tried[k]
-            .judged
-            .as_ref()
-            .map_or(f64::INFINITY, Judged::hold_rms)
+    if gain < LEAST_GAIN * variance || comparison.significance() < LEAST_SIGNIFICANCE {
+        return Some(Reason::NotSignificant { change });
+    }
+    if gain < LEAST_SHARE * total {
+        let share = gain / total;
+        return Some(Reason::SmallShare { share });
+    }
+    if let Some(name) = model.insignificant_parameter() {
+        return Some(Reason::ZeroParameter { name });
+    }
+    (model.criterion() >= before.criterion()).then_some(Reason::CriterionNotLower)
+}
+
+/// Accepts the best of the candidates that nothing speaks against, and compares the others with it.
+fn decide(tried: &mut [CandidateFit]) {
+    let passing: Vec<usize> = (0..tried.len())
+        .filter(|k| tried[*k].reason == Reason::Best)
+        .collect();
+    let error = |k: &usize| {
+        let model = tried[*k].model.as_ref();
+        model.map_or(f64::INFINITY, ScoredModel::holdout_rms)
     };
-    let Some(best) = passing
-        .iter()
-        .copied()
-        .min_by(|a, b| hold(*a).total_cmp(&hold(*b)))
-    else {
+    let by_error = |a: &usize, b: &usize| error(a).total_cmp(&error(b));
+    let Some(best) = passing.iter().copied().min_by(by_error) else {
         return;
     };
     let tied: Vec<usize> = passing
@@ -224,117 +301,51 @@ fn decide<'a>(base: &Base<'a>, tried: &mut [Tried<'a>]) {
         .copied()
         .filter(|k| is_tied(tried, *k, best))
         .collect();
-    let simplest = best_of(tried, &tied).unwrap_or(best);
-    name_all(tried, &passing, &tied, simplest);
-    tried.swap(0, simplest);
+    let chosen = simplest(tried, &tied).unwrap_or(best);
+    for k in passing.into_iter().filter(|k| *k != chosen) {
+        if let Some(reason) = behind(&tried[k], &tried[chosen], tied.contains(&k)) {
+            tried[k].reason = reason;
+        }
+    }
+    tried.swap(0, chosen);
 }
 
-/// Why an effect is not accepted, as far as it alone tells.
-pub(super) fn refusal(judged: &Judged, before: &Judged) -> Option<String> {
-    let comparison = judged.against(before);
-    let (gain, variance) = (comparison.gain(), judged.hold_rms().powi(2));
-    let total = before.hold_rms().powi(2) * before.held_out().len() as f64;
-    if gain <= 0.0 {
-        return Some(format!(
-            "the error on the held-out records does not fall (it changes by {:+.2} %)",
-            100.0 * (judged.hold_rms() / before.hold_rms() - 1.0)
-        ));
-    }
-    if gain < LEAST_GAIN * variance || comparison.significance() < LEAST_SIGNIFICANCE {
-        return Some(format!(
-            "the error on the held-out records falls by no more than chance, seen from stretch to stretch ({:+.2} % over all)",
-            100.0 * (judged.hold_rms() / before.hold_rms() - 1.0)
-        ));
-    }
-    if gain < LEAST_SHARE * total {
-        return Some(format!(
-            "it explains {:.2} % of the power of the residual: too little to tell from what else is not exact",
-            100.0 * gain / total
-        ));
-    }
-    if let Some(name) = judged.lacks() {
-        return Some(format!(
-            "its {name} is not different from zero: what it then describes is not what its name says"
-        ));
-    }
-    if judged.criterion() >= before.criterion() {
-        return Some("it does not pay for its parameters on the training records".to_owned());
-    }
-    None
-}
-
-/// Whether an effect is within chance of the best one.
-fn is_tied(tried: &[Tried], k: usize, best: usize) -> bool {
-    let (Some(one), Some(other)) = (&tried[k].judged, &tried[best].judged) else {
+/// Whether an effect is not significantly worse than the best one.
+fn is_tied(tried: &[CandidateFit], k: usize, best: usize) -> bool {
+    let (Some(one), Some(other)) = (&tried[k].model, &tried[best].model) else {
         return false;
     };
     let comparison = other.against(one);
     k == best
-        || comparison.significance() < WITHIN_CHANCE
-        || comparison.gain() < 9.0 * other.hold_rms().powi(2)
+        || comparison.significance() < TIED_SIGNIFICANCE
+        || comparison.gain() < TIED_GAIN * other.holdout_rms().powi(2)
 }
 
-/// Of effects that the held-out records do not tell apart: the one with the least criterion on all records, which has a
-/// price for parameters; of those within a hair of it, the one that stands first in the list: a line on the
-/// frequency of the grid is the grid's rather than a shaft's by chance, a lag without a corner is a delay.
-fn best_of(tried: &[Tried], tied: &[usize]) -> Option<usize> {
+/// Of effects that the held-out records cannot distinguish: the one with the smallest criterion on all records, which
+/// penalises parameters; of those close to it, the one that comes first in the list. So a line at the mains frequency
+/// is mains pickup rather than a shaft that happens to turn so fast, and a lag without a corner is a delay.
+fn simplest(tried: &[CandidateFit], tied: &[usize]) -> Option<usize> {
     let criterion = |k: &usize| {
-        let judged = tried[*k].judged.as_ref();
-        judged.map_or(f64::INFINITY, Judged::pooled_criterion)
+        let model = tried[*k].model.as_ref();
+        model.map_or(f64::INFINITY, ScoredModel::pooled_criterion)
     };
     let least = tied.iter().map(criterion).fold(f64::INFINITY, f64::min);
-    let place = |k: &usize| {
-        EFFECTS
-            .iter()
-            .position(|e| std::ptr::eq(*e, tried[*k].effect))
-    };
-    let near = tied.iter().filter(|k| criterion(k) <= least + SAME);
-    near.min_by_key(|k| place(k)).copied()
+    // The candidates are in the order of the list.
+    tied.iter().copied().find(|k| criterion(k) <= least + SAME)
 }
 
-fn name_all(tried: &mut [Tried], passing: &[usize], tied: &[usize], chosen: usize) {
-    let Some(judged) = &tried[chosen].judged else {
-        return;
+/// Why a candidate that passes is not the accepted one.
+fn behind(other: &CandidateFit, chosen: &CandidateFit, is_tied: bool) -> Option<Reason> {
+    let (model, accepted) = (other.model.as_ref()?, chosen.model.as_ref()?);
+    let best = chosen.effect.name;
+    let reason = if !is_tied {
+        let ratio = model.holdout_rms() / accepted.holdout_rms();
+        Reason::Worse { ratio, best }
+    } else if model.parameter_count() > accepted.parameter_count() {
+        Reason::MoreParameters { best }
+    } else {
+        let experiment = other.effect.experiment;
+        Reason::Tied { best, experiment }
     };
-    let (own, parameters, name) = (
-        judged.hold_rms(),
-        judged.parameters(),
-        tried[chosen].effect.name,
-    );
-    for k in passing {
-        let Some(other) = &tried[*k].judged else {
-            continue;
-        };
-        let (rms, count) = (other.hold_rms(), other.parameters());
-        let (status, why) = if *k == chosen {
-            (
-                Status::Accepted,
-                "the error on the held-out records falls beyond chance, to the least of all"
-                    .to_owned(),
-            )
-        } else if !tied.contains(k) {
-            (
-                Status::Rejected,
-                format!(
-                    "it helps, but leaves {:.3} times the held-out error of {name}",
-                    rms / own
-                ),
-            )
-        } else if count > parameters {
-            (
-                Status::Rejected,
-                format!("no better than {name}, with more parameters"),
-            )
-        } else {
-            (
-                Status::Indistinguishable,
-                format!(
-                    "within chance of {name}; to tell them apart: {}",
-                    tried[*k].effect.experiment
-                ),
-            )
-        };
-        tried[*k].status = status;
-        tried[*k].why = why;
-    }
+    Some(reason)
 }

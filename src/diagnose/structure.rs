@@ -1,197 +1,95 @@
-//! A model with free parameters: the plain stand and the forms of effects put to it.
+//! A model with free parameters: the plain stand and the effects added to it.
 
-use torqcomp_model::effects::{Action, Effect, Form, Mode, Rulers, Unit};
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use torqcomp_model::Mode;
+use torqcomp_model::effects::{Action, Effect, Form, Rulers, Stage, Unit};
 use torqcomp_model::simulate::{Fixed, Model};
 
-/// An effect in one of its forms.
-#[derive(Clone, Copy)]
-pub struct Choice {
-    /// The effect.
-    pub effect: &'static Effect,
-    /// Its form.
-    pub form: &'static Form,
+use super::record::NuisanceTerms;
+use super::units::ChannelUnits;
+
+/// The plain stand: one mode and a static gain.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlainStand {
+    pub natural_hz: f64,
+    pub damping_ratio: f64,
+    /// Recorded per applied quantity at rest.
+    pub gain: f64,
+}
+
+impl PlainStand {
+    pub fn mode(&self) -> Mode {
+        Mode {
+            omega_rad_s: TAU * self.natural_hz,
+            damping_ratio: self.damping_ratio,
+        }
+    }
 }
 
 /// What all models of a diagnosis share.
 #[derive(Clone)]
-pub struct Frame {
-    /// Rulers of the parameters.
-    pub rulers: Rulers,
-    /// Size that the gain is measured with.
-    pub gain: f64,
+pub struct FitContext {
+    /// Scales that make the parameters pure numbers.
+    pub scales: Rulers,
+    /// The fitted plain stand: scale of natural frequency and gain, and the mode of the free motion in the residuals.
+    pub plain: PlainStand,
     /// Whether the gain is a parameter of the plain stand.
     pub gain_is_free: bool,
-    /// The recorder as far as the stand file declares it.
+    /// The recorder, as declared in the stand file.
     pub recorder: Option<Fixed>,
+    pub units: ChannelUnits,
 }
 
-/// A model with free parameters, all pure numbers: natural frequency, damping ratio, gain if free, then
-/// those of the effects.
-#[derive(Clone)]
-pub struct Structure<'a> {
-    /// What all models share.
-    pub frame: &'a Frame,
-    /// The effects.
-    pub choices: Vec<Choice>,
-}
-
-/// What a model adds that belongs to a record: frequencies of lines, half waves of a slow course.
-#[derive(Debug, Clone, Default)]
-pub struct Waves {
-    /// Frequencies of the lines.
-    pub lines_hz: Vec<f64>,
-    /// Half waves of the course.
-    pub course: usize,
-    /// Rates at which what was before the record fades, per s.
-    pub fades_per_s: Vec<f64>,
-}
-
-impl Waves {
-    /// No waves.
-    pub const NONE: Self = Self {
-        lines_hz: Vec::new(),
-        course: 0,
-        fades_per_s: Vec::new(),
-    };
-
-    /// Whether there are none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        !self.disturb() && self.fades_per_s.is_empty()
+impl FitContext {
+    /// The same context for another plain stand.
+    pub fn at(&self, plain: PlainStand) -> Self {
+        let scales = Rulers {
+            natural_hz: plain.natural_hz,
+            ..self.scales
+        };
+        Self {
+            scales,
+            plain,
+            ..self.clone()
+        }
     }
 
-    /// Whether something is added that does not come from what is applied.
-    #[must_use]
-    pub fn disturb(&self) -> bool {
-        !self.lines_hz.is_empty() || self.course > 0
-    }
-}
-
-/// One of the parameters.
-#[derive(Debug, Clone, Copy)]
-pub struct Bounds {
-    /// Least value.
-    pub lower: f64,
-    /// Greatest value.
-    pub upper: f64,
-}
-
-impl Frame {
-    /// Count of the plain stand's parameters.
-    #[must_use]
+    /// Number of parameters of the plain stand.
     pub fn plain_count(&self) -> usize {
         2 + usize::from(self.gain_is_free)
     }
-}
 
-impl Structure<'_> {
-    /// Count of parameters that a fit moves: amplitudes of lines follow from the data at once.
-    #[must_use]
-    pub fn bounds(&self) -> Vec<Bounds> {
-        let mut all = vec![
-            Bounds {
-                lower: 0.02,
-                upper: 50.0,
-            },
-            Bounds {
-                lower: 0.0,
-                upper: 10.0,
-            },
-        ];
-        if self.frame.gain_is_free {
-            all.push(Bounds {
-                lower: -1e3,
-                upper: 1e3,
-            });
+    /// Parameter values of a plain stand.
+    pub fn plain_values(&self, plain: &PlainStand) -> Vec<f64> {
+        let natural = plain.natural_hz / self.scales.natural_hz;
+        let mut values = vec![natural, plain.damping_ratio];
+        if self.gain_is_free {
+            values.push(plain.gain / self.plain.gain);
         }
-        for choice in &self.choices {
-            let own = choice.form.parameters.iter().take(choice.moved());
-            all.extend(own.map(|p| Bounds {
-                lower: p.lower,
-                upper: p.upper,
-            }));
-        }
-        all
-    }
-
-    /// The structure's own values, without what a fit adds for each record.
-    #[must_use]
-    pub fn own<'v>(&self, values: &'v [f64]) -> &'v [f64] {
-        &values[..self.bounds().len()]
-    }
-
-    /// The mode and gain of parameter values.
-    #[must_use]
-    pub fn mode(&self, values: &[f64]) -> (Mode, f64) {
-        let mode = Mode {
-            omega_rad_s: std::f64::consts::TAU * self.frame.rulers.natural_hz * values[0],
-            damping_ratio: values[1],
-        };
-        let gain = if self.frame.gain_is_free {
-            values[2] * self.frame.gain
-        } else {
-            self.frame.gain
-        };
-        (mode, gain)
-    }
-
-    /// Values of each effect's own parameters in units of the record, s and Hz; amplitudes of lines are
-    /// left at zero.
-    #[must_use]
-    pub fn effect_values(&self, values: &[f64]) -> Vec<Vec<f64>> {
-        let mut next = self.frame.plain_count();
-        let mut all = Vec::with_capacity(self.choices.len());
-        for choice in &self.choices {
-            let moved = choice.moved();
-            let own = choice.form.parameters.iter().enumerate().map(|(k, p)| {
-                if k < moved {
-                    p.value(values[next + k], &self.frame.rulers)
-                } else {
-                    0.0
-                }
-            });
-            all.push(own.collect());
-            next += moved;
-        }
-        all
-    }
-
-    /// The model of parameter values, and what it adds that belongs to a record.
-    #[must_use]
-    pub fn model(&self, values: &[f64]) -> (Model, Waves) {
-        let (mode, gain) = self.mode(values);
-        let mut waves = Waves::NONE;
-        let mut actions = Vec::new();
-        for (choice, own) in self.choices.iter().zip(self.effect_values(values)) {
-            let fading = choice.form.parameters.iter().zip(&own);
-            waves.fades_per_s.extend(
-                fading
-                    .filter(|(p, _)| p.fades)
-                    .map(|(_, corner_hz)| std::f64::consts::TAU * corner_hz),
-            );
-            match (choice.form.build)(&own) {
-                Action::Lines(lines) => waves.lines_hz.extend(lines.iter().map(|l| l.frequency_hz)),
-                Action::Course(count) => waves.course = waves.course.max(count),
-                action => actions.push((choice.form.stage, action)),
-            }
-        }
-        let recorder = self.frame.recorder.clone();
-        (
-            Model {
-                mode,
-                gain,
-                recorder,
-                shift: 0.0,
-                actions,
-            },
-            waves,
-        )
+        values
     }
 }
 
-impl Choice {
-    /// How many of its parameters a fit moves.
-    #[must_use]
+/// An effect in one of its forms.
+#[derive(Clone, Copy)]
+pub struct EffectForm {
+    pub effect: &'static Effect,
+    pub form: &'static Form,
+}
+
+impl EffectForm {
+    /// All forms of some effects.
+    pub fn all(effects: impl IntoIterator<Item = &'static Effect>) -> Vec<Self> {
+        let forms = |effect: &'static Effect| {
+            let forms = effect.forms.iter();
+            forms.map(move |form| Self { effect, form })
+        };
+        effects.into_iter().flat_map(forms).collect()
+    }
+
+    /// Number of parameters that a fit moves: amplitudes of lines follow from the data by least squares.
     pub fn moved(&self) -> usize {
         if self.is_line() {
             1
@@ -200,21 +98,113 @@ impl Choice {
         }
     }
 
-    /// Whether it adds lines: a frequency first, then amplitudes.
-    #[must_use]
+    /// Whether it adds lines: its parameters are a frequency, then amplitudes.
     pub fn is_line(&self) -> bool {
-        let parameters = self.form.parameters;
-        parameters.first().is_some_and(|p| p.unit == Unit::Hertz)
-            && self.form.stage == torqcomp_model::effects::Stage::Disturbance
+        let first = self.form.parameters.first();
+        first.is_some_and(|p| p.unit == Unit::Hertz) && self.form.stage == Stage::Disturbance
+    }
+}
+
+/// A model with free parameters, all pure numbers: natural frequency, damping ratio, gain if free, then those of the
+/// effects.
+#[derive(Clone)]
+pub struct Structure {
+    pub context: Arc<FitContext>,
+    pub effects: Vec<EffectForm>,
+}
+
+/// Bounds of the natural frequency, of the damping ratio and of the gain, as parameters of a fit.
+const PLAIN_BOUNDS: [[f64; 2]; 3] = [[0.02, 50.0], [0.0, 10.0], [-1e3, 1e3]];
+
+impl Structure {
+    /// The plain stand without effects.
+    pub fn plain(context: Arc<FitContext>) -> Self {
+        Self {
+            context,
+            effects: Vec::new(),
+        }
     }
 
-    /// `backlash (joint)`, or the name alone if it has one form.
-    #[must_use]
-    pub fn describe(&self) -> String {
-        if self.effect.forms.len() == 1 {
-            self.effect.name.to_owned()
-        } else {
-            format!("{} ({})", self.effect.name, self.form.name)
+    /// The same with one more effect.
+    pub fn with(&self, effect: EffectForm) -> Self {
+        let mut structure = self.clone();
+        structure.effects.push(effect);
+        structure
+    }
+
+    /// Lower and upper bound of each parameter that a fit moves.
+    pub fn bounds(&self) -> Vec<[f64; 2]> {
+        let mut all = PLAIN_BOUNDS[..self.context.plain_count()].to_vec();
+        for effect in &self.effects {
+            let own = effect.form.parameters.iter().take(effect.moved());
+            all.extend(own.map(|p| [p.lower, p.upper]));
         }
+        all
+    }
+
+    /// Mode and gain of parameter values.
+    pub fn mode(&self, values: &[f64]) -> (Mode, f64) {
+        let mode = Mode {
+            omega_rad_s: TAU * self.context.scales.natural_hz * values[0],
+            damping_ratio: values[1],
+        };
+        let gain = match self.context.gain_is_free {
+            true => values[2] * self.context.plain.gain,
+            false => self.context.plain.gain,
+        };
+        (mode, gain)
+    }
+
+    /// The plain stand of parameter values.
+    pub fn stand(&self, values: &[f64]) -> PlainStand {
+        let (mode, gain) = self.mode(values);
+        PlainStand {
+            natural_hz: mode.omega_rad_s / TAU,
+            damping_ratio: mode.damping_ratio,
+            gain,
+        }
+    }
+
+    /// Values of each effect's own parameters in units of the record, s and Hz; amplitudes of lines are zero.
+    pub fn effect_values(&self, values: &[f64]) -> Vec<Vec<f64>> {
+        let mut rest = &values[self.context.plain_count()..];
+        let of_effect = |effect: &EffectForm| {
+            let (own, others) = rest.split_at(effect.moved());
+            rest = others;
+            let fitted = effect.form.parameters.iter().zip(own);
+            let mut own: Vec<f64> = fitted
+                .map(|(p, value)| p.value(*value, &self.context.scales))
+                .collect();
+            own.resize(effect.form.parameters.len(), 0.0);
+            own
+        };
+        self.effects.iter().map(of_effect).collect()
+    }
+
+    /// The model of parameter values, and what it adds that belongs to a record.
+    pub fn model(&self, values: &[f64]) -> (Model, NuisanceTerms) {
+        let (mode, gain) = self.mode(values);
+        let mut terms = NuisanceTerms::NONE;
+        let mut actions = Vec::new();
+        for (effect, own) in self.effects.iter().zip(self.effect_values(values)) {
+            let corners = effect.form.parameters.iter().zip(&own);
+            let fading = corners.filter(|(p, _)| p.fades);
+            terms.decays_per_s.extend(fading.map(|(_, hz)| TAU * hz));
+            match (effect.form.build)(&own) {
+                Action::Lines(lines) => terms.lines_hz.extend(lines.iter().map(|l| l.frequency_hz)),
+                Action::Course(count) => {
+                    terms.drift_half_waves = terms.drift_half_waves.max(count);
+                }
+                action => actions.push((effect.form.stage, action)),
+            }
+        }
+        let model = Model {
+            mode,
+            gain,
+            recorder: self.context.recorder.clone(),
+            shift: 0.0,
+            actions,
+        };
+        (model, terms)
     }
 }

@@ -1,194 +1,193 @@
-//! Whether stand and chain hold still over a record: constants that differ from stretch to stretch, and noise that
-//! goes with the signal. Neither repeats with the input, so that both pass for noise where the noise is taken from the
-//! differences of periods.
+//! Whether stand and measuring chain change over a record: constants that differ from segment to segment, and noise that
+//! follows the signal. Neither repeats with the input, so that differences between periods show both as noise.
 
 use std::f64::consts::TAU;
 use std::ops::{Range, RangeInclusive};
 
 use num_complex::Complex64;
 use realfft::RealFftPlanner;
-use torqcomp_model::effects::Mode;
+use torqcomp_model::Mode;
 
 use super::columns::Columns;
-use super::dependence::Sight;
+use super::fit::RecordResidual;
 use super::record::dot;
+use super::residual_tests::{PowerShare, differences, without_mean};
+use super::spectra::spectra;
 
-/// Stretches that a record is cut into: few for what changes slowly, many for what changes fast.
-const STRETCHES: [usize; 3] = [12, 36, 108];
-/// Fewest stretches.
+/// Segments that a record is cut into: few for slow changes, many for fast ones.
+const SEGMENTS: [usize; 3] = [12, 36, 108];
+/// Minimum number of segments.
 const FEWEST: usize = 8;
-/// Fewest samples and fewest time constants of the stand in a stretch.
+/// Minimum length of a segment: samples, and time constants of the stand.
 const SHORTEST: [f64; 2] = [24.0, 3.0];
-/// Turns of the residual against the record, that say what chance does.
-const TURNS: usize = 33;
-/// Part of a record by which the first turn is off, and each further one: the golden section meets no period.
-const TURN: f64 = 0.618_033_988_749_895;
-/// Lines of a record's spectrum in which a wandering zero is looked for, and the lines around, for comparison.
+/// Circular shifts of the residual against the record, whose results show what chance does.
+const SHIFTS: usize = 33;
+/// Each shift differs from the one before by the golden section of the range, which avoids periods.
+const GOLDEN: f64 = 0.618_033_988_749_895;
+/// Range of the shifts, as parts of the record.
+const SHIFT_RANGE: [f64; 2] = [0.1, 0.9];
+/// Lowest lines of a record's spectrum, where a drifting zero shows, and the lines around for comparison.
 const LOWEST: RangeInclusive<usize> = 1..=12;
 const AROUND: Range<usize> = 30..130;
-/// From a median absolute deviation to a standard deviation of a normal law.
-const MAD: f64 = 1.4826;
+/// Standard deviation of a normal law over its median absolute deviation.
+const STD_PER_MAD: f64 = 1.4826;
 
-/// Share of the residual's power beyond what chance explains, and how many standard deviations that is.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Beyond {
-    /// Part of the power.
-    pub share: f64,
-    /// Standard deviations above none.
-    pub significance: f64,
-}
-
-/// The power that constants of their own in each stretch take out of a residual: natural frequency, damping ratio and
-/// gain, to first order, `r ≈ Σ_k a_k ∂y/∂p_k` with other `a_k` in each stretch. A residual that does not follow from
-/// the motion loses as much when it is turned against the record in time, whatever its colour.
-#[must_use]
-pub fn changing_constants(sights: &[Sight], mode: &Mode, rate_hz: f64) -> Beyond {
-    let records: Vec<(Vec<f64>, [Vec<f64>; 3])> = sights
+/// The power that separate constants in each segment remove from a residual: natural frequency, damping ratio and gain, to
+/// first order, `r ≈ Σ_k a_k ∂y/∂p_k` with other `a_k` in each segment. A residual that does not follow from the
+/// motion loses as much when it is shifted against the record in time, whatever its colour.
+pub fn changing_constants(residuals: &[RecordResidual], mode: &Mode) -> PowerShare {
+    const OF: &str = "constants that change over the record";
+    let records: Vec<(Vec<f64>, [Vec<f64>; 3])> = residuals
         .iter()
-        .map(|sight| {
-            let slopes = slopes(sight.modelled, mode, rate_hz);
-            let mut residual = sight.residual.to_vec();
-            // What other constants for the whole record take out does not change over it.
-            slopes
-                .iter()
-                .cloned()
-                .collect::<Columns>()
-                .clear(&mut residual);
-            (residual, slopes)
+        .map(|residual| {
+            let slopes = slopes(&residual.modelled, mode, residual.record.rate_hz());
+            let mut rest = residual.samples.clone();
+            // What other constants for the whole record remove does not change over it.
+            let whole: Columns = slopes.iter().cloned().collect();
+            whole.clear(&mut rest);
+            (rest, slopes)
         })
         .collect();
+    let rate_hz = residuals.first().map_or(1.0, |r| r.record.rate_hz());
     let decay_samples = rate_hz / (mode.damping_ratio * mode.omega_rad_s).max(1e-12);
     let shortest = SHORTEST[0].max(SHORTEST[1] * decay_samples).ceil() as usize;
-    let of = |count: usize| {
-        let mut sums = vec![0.0; TURNS + 1];
+    let with_segments = |count: usize| {
+        let mut sums = vec![0.0; SHIFTS + 1];
         let mut total = 0.0;
         for (residual, slopes) in &records {
             let length = (residual.len() / count).max(shortest);
             if residual.len() < FEWEST * length {
-                return Beyond::default();
+                return PowerShare::none(OF);
             }
             total += dot(residual, residual);
-            let stretches = stretches(slopes, length);
-            for (turn, sum) in sums.iter_mut().enumerate() {
-                *sum += explained(&stretches, &turned(residual, turn), length);
+            let segments = segments(slopes, length);
+            for (shift, sum) in sums.iter_mut().enumerate() {
+                let shifted = shifted(residual, shift);
+                let pieces = shifted.chunks_exact(length).zip(&segments);
+                *sum += pieces.map(|(r, slopes)| slopes.explained(r)).sum::<f64>();
             }
         }
-        beyond(&sums, total)
+        beyond_chance(OF, &sums, total)
     };
-    let found = STRETCHES.into_iter().map(of);
+    let found = SEGMENTS.into_iter().map(with_segments);
     found
         .max_by(|a, b| a.share.total_cmp(&b.share))
-        .unwrap_or_default()
+        .unwrap_or(PowerShare::none(OF))
 }
 
-/// The power that goes with the square of the modelled record from sample to sample, `r² ≈ a + b y²`: the share
-/// `b ⟨y²⟩/⟨r²⟩` is 1 for noise in proportion to the signal and 0 for noise that does not know it.
-#[must_use]
-pub fn with_signal(sights: &[Sight]) -> Beyond {
-    with_square(sights, |sight| sight.modelled.to_vec())
+/// The power proportional to the square of the modelled record, sample by sample, `r² ≈ a + b y²`: the share
+/// `b ⟨y²⟩/⟨r²⟩` is 1 for noise proportional to the signal and 0 for noise independent of it.
+pub fn with_signal(residuals: &[RecordResidual]) -> PowerShare {
+    const OF: &str = "the magnitude of the signal";
+    with_square(OF, residuals, |r| r.modelled.clone())
 }
 
-/// The same with the slope of the modelled record, `r² ≈ a + b y'²`: sampling instants that tremble by `τ` leave
-/// `r = y' τ`.
-#[must_use]
-pub fn with_slope(sights: &[Sight]) -> Beyond {
-    with_square(sights, |sight| slope(sight.modelled))
+/// The same with the slope of the modelled record, `r² ≈ a + b y'²`: sampling jitter `τ` leaves `r = y' τ`.
+pub fn with_slope(residuals: &[RecordResidual]) -> PowerShare {
+    const OF: &str = "the slope of the signal, as sampling jitter would cause";
+    with_square(OF, residuals, |r| slope(&r.modelled))
 }
 
-/// Half the difference of both neighbours; of one neighbour and itself at the ends.
+/// Change from sample to sample.
 fn slope(y: &[f64]) -> Vec<f64> {
-    let at = |i: usize| y[i.min(y.len() - 1)];
-    (0..y.len())
-        .map(|i| 0.5 * (at(i + 1) - at(i.saturating_sub(1))))
-        .collect()
+    let differences = differences(y).into_iter();
+    differences.map(|difference| 0.5 * difference).collect()
 }
 
-/// The power of the residuals that goes with the square of something from sample to sample.
-fn with_square(sights: &[Sight], of: impl Fn(&Sight) -> Vec<f64>) -> Beyond {
-    let mut slopes = vec![0.0; TURNS + 1];
+/// The power of the residuals proportional to the square of something, sample by sample.
+fn with_square(
+    of: &'static str,
+    residuals: &[RecordResidual],
+    signal: impl Fn(&RecordResidual) -> Vec<f64>,
+) -> PowerShare {
+    let mut slopes = vec![0.0; SHIFTS + 1];
     let (mut residual_power, mut signal_power, mut spread) = (0.0, 0.0, 0.0);
-    for sight in sights {
-        let count = sight.residual.len() as f64;
-        let mut signal = of(sight);
-        let mean = signal.iter().sum::<f64>() / count;
-        signal.iter_mut().for_each(|y| *y = (*y - mean).powi(2));
+    for residual in residuals {
+        let count = residual.samples.len() as f64;
+        let mut signal = without_mean(&signal(residual));
+        signal.iter_mut().for_each(|y| *y = y.powi(2));
         let level = signal.iter().sum::<f64>() / count;
         signal.iter_mut().for_each(|s| *s -= level);
-        let squares: Vec<f64> = sight.residual.iter().map(|r| r * r).collect();
+        let squares: Vec<f64> = residual.samples.iter().map(|r| r * r).collect();
         residual_power += squares.iter().sum::<f64>();
         signal_power += level * count;
         spread += dot(&signal, &signal);
-        for (turn, sum) in slopes.iter_mut().enumerate() {
-            *sum += dot(&signal, &turned(&squares, turn));
+        for (shift, sum) in slopes.iter_mut().enumerate() {
+            *sum += dot(&signal, &shifted(&squares, shift));
         }
     }
     if spread <= 0.0 {
-        return Beyond::default();
+        return PowerShare::none(of);
     }
     let shares: Vec<f64> = slopes.iter().map(|s| s / spread * signal_power).collect();
-    beyond(&shares, residual_power)
+    beyond_chance(of, &shares, residual_power)
 }
 
-/// The power at the lowest frequencies above that of the noise next to them: a zero that wanders or jumps. The mean is
-/// not part of it.
-#[must_use]
-pub fn wandering_zero(sights: &[Sight]) -> Beyond {
+/// The power at the lowest frequencies above that of the noise next to them: a zero that drifts or jumps. The mean is not
+/// part of it.
+pub fn wandering_zero(residuals: &[RecordResidual]) -> PowerShare {
+    const OF: &str = "a zero that drifts or jumps";
     let (mut excess, mut total, mut variance) = (0.0, 0.0, 0.0);
-    for sight in sights {
-        let count = sight.residual.len();
-        let spectrum = super::spectra::pieces(sight.residual, count).power();
+    for residual in residuals {
+        let spectrum = spectra(&residual.samples, residual.samples.len()).power();
         total += spectrum.iter().sum::<f64>();
         let Some(around) = spectrum.get(AROUND) else {
             continue;
         };
-        let mut around = around.to_vec();
-        around.sort_by(f64::total_cmp);
-        // The median of what is distributed exponentially is ln 2 of its mean.
-        let level = around[around.len() / 2] / std::f64::consts::LN_2;
+        // The median of an exponential distribution is ln 2 of its mean.
+        let level = median(around.to_vec()) / std::f64::consts::LN_2;
         let lowest = &spectrum[LOWEST];
         excess += lowest.iter().sum::<f64>() - level * lowest.len() as f64;
         variance += level * level * lowest.len() as f64;
     }
     if total <= 0.0 || variance <= 0.0 {
-        return Beyond::default();
+        return PowerShare::none(OF);
     }
-    Beyond {
+    PowerShare {
+        of: OF,
         share: excess / total,
         significance: excess / variance.sqrt(),
     }
 }
 
-/// The first of several sums against the others, which chance has made.
-fn beyond(sums: &[f64], total: f64) -> Beyond {
-    if total <= 0.0 {
-        return Beyond::default();
-    }
-    let middle = |values: &mut Vec<f64>| {
-        values.sort_by(f64::total_cmp);
-        values[values.len() / 2]
-    };
-    let by_chance = middle(&mut sums[1..].to_vec());
-    let mut off: Vec<f64> = sums[1..].iter().map(|s| (s - by_chance).abs()).collect();
-    let deviation = MAD * middle(&mut off);
-    let excess = sums[0] - by_chance;
-    Beyond {
-        share: excess / total,
-        significance: if deviation > 0.0 {
-            excess / deviation
-        } else {
-            0.0
-        },
+impl PowerShare {
+    fn none(of: &'static str) -> Self {
+        Self {
+            of,
+            share: 0.0,
+            significance: 0.0,
+        }
     }
 }
 
-/// A residual turned against the record; not at all for turn 0.
-fn turned(values: &[f64], turn: usize) -> Vec<f64> {
-    // Between a tenth and nine tenths of the record.
-    let part = 0.1 + 0.8 * (turn as f64 * TURN).fract();
-    let by = if turn == 0 {
-        0
-    } else {
-        (part * values.len() as f64) as usize
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+/// The excess of the first of several sums over the others, which are due to chance.
+fn beyond_chance(of: &'static str, sums: &[f64], total: f64) -> PowerShare {
+    if total <= 0.0 {
+        return PowerShare::none(of);
+    }
+    let by_chance = median(sums[1..].to_vec());
+    let deviations = sums[1..].iter().map(|s| (s - by_chance).abs());
+    let std = STD_PER_MAD * median(deviations.collect());
+    let excess = sums[0] - by_chance;
+    PowerShare {
+        of,
+        share: excess / total,
+        significance: if std > 0.0 { excess / std } else { 0.0 },
+    }
+}
+
+/// A residual shifted circularly against the record; not at all for shift 0.
+fn shifted(values: &[f64], shift: usize) -> Vec<f64> {
+    let [from, to] = SHIFT_RANGE;
+    let part = from + (to - from) * (shift as f64 * GOLDEN).fract();
+    let by = match shift {
+        0 => 0,
+        _ => (part * values.len() as f64) as usize,
     };
     [&values[by..], &values[..by]].concat()
 }
@@ -197,8 +196,7 @@ fn turned(values: &[f64], turn: usize) -> Vec<f64> {
 /// itself: `∂ln H/∂ln ω₀ = 2 − 2(1 + jζw)/D`, `∂ln H/∂ζ = −2jw/D`, with `D = 1 − w² + 2jζw` and `w = ω/ω₀`.
 fn slopes(modelled: &[f64], mode: &Mode, rate_hz: f64) -> [Vec<f64>; 3] {
     let count = modelled.len();
-    let mean = modelled.iter().sum::<f64>() / count as f64;
-    let own: Vec<f64> = modelled.iter().map(|y| y - mean).collect();
+    let own = without_mean(modelled);
     let mut planner = RealFftPlanner::<f64>::new();
     let (forward, back) = (
         planner.plan_fft_forward(count),
@@ -228,18 +226,13 @@ fn slopes(modelled: &[f64], mode: &Mode, rate_hz: f64) -> [Vec<f64>; 3] {
     [own, frequency, damping]
 }
 
-/// The slopes in each stretch.
-fn stretches(slopes: &[Vec<f64>; 3], length: usize) -> Vec<Columns> {
+/// The slopes in each segment.
+fn segments(slopes: &[Vec<f64>; 3], length: usize) -> Vec<Columns> {
     let of = |k: usize| {
         let part = |slope: &Vec<f64>| slope[k * length..(k + 1) * length].to_vec();
         slopes.iter().map(part).collect()
     };
     (0..slopes[0].len() / length).map(of).collect()
-}
-
-fn explained(stretches: &[Columns], residual: &[f64], length: usize) -> f64 {
-    let pieces = residual.chunks_exact(length).zip(stretches);
-    pieces.map(|(piece, slopes)| slopes.explained(piece)).sum()
 }
 
 #[cfg(test)]
@@ -256,7 +249,7 @@ mod tests {
         }
     }
 
-    /// Numbers between −0.5 and 0.5 that repeat on every run (a linear congruence).
+    /// Reproducible pseudo-random numbers in [−0.5, 0.5] (linear congruential).
     fn noise(seed: u64) -> impl FnMut() -> f64 {
         let mut state = seed;
         move || {
@@ -283,16 +276,13 @@ mod tests {
             .collect()
     }
 
-    fn sight<'a>(residual: &'a [f64], modelled: &'a [f64]) -> Sight<'a> {
-        Sight {
-            residual,
-            input: modelled,
-            modelled,
-        }
+    fn of(residual: &[f64], modelled: &[f64]) -> [RecordResidual; 1] {
+        let y = modelled.to_vec();
+        [RecordResidual::made(y.clone(), y, residual.to_vec())]
     }
 
     #[test]
-    fn a_gain_that_swings_is_seen_and_white_or_coloured_noise_is_not() {
+    fn a_changing_gain_is_detected_and_white_or_coloured_noise_is_not() {
         let y = record();
         let mut random = noise(9);
         let white: Vec<f64> = (0..COUNT).map(|_| random()).collect();
@@ -304,44 +294,44 @@ mod tests {
         let swings: Vec<f64> = (0..COUNT)
             .map(|i| 0.01 * (TAU * 0.5 * i as f64 / RATE_HZ).sin() * y[i])
             .collect();
-        let of = |r: &[f64]| changing_constants(&[sight(r, &y)], &mode(), RATE_HZ);
+        let changing = |r: &[f64]| changing_constants(&of(r, &y), &mode());
         for quiet in [&white, &coloured] {
-            let found = of(quiet);
+            let found = changing(quiet);
             assert!(found.share < 0.05, "{found:?}");
             assert!(found.significance < 5.0, "{found:?}");
         }
-        let found = of(&swings);
+        let found = changing(&swings);
         assert!(found.share > 0.7 && found.significance > 10.0, "{found:?}");
     }
 
     #[test]
-    fn noise_in_proportion_to_the_signal_has_a_share_of_one() {
+    fn noise_proportional_to_the_signal_has_a_share_of_one() {
         let y = record();
         let mut random = noise(3);
         let proportional: Vec<f64> = y.iter().map(|y| y * random()).collect();
-        let steady: Vec<f64> = y.iter().map(|_| random()).collect();
-        let found = with_signal(&[sight(&proportional, &y)]);
+        let stationary: Vec<f64> = y.iter().map(|_| random()).collect();
+        let found = with_signal(&of(&proportional, &y));
         assert!((found.share - 1.0).abs() < 0.2, "{found:?}");
         assert!(found.significance > 8.0, "{found:?}");
-        let found = with_signal(&[sight(&steady, &y)]);
+        let found = with_signal(&of(&stationary, &y));
         assert!(found.share.abs() < 0.1, "{found:?}");
     }
 
     #[test]
-    fn sampling_instants_that_tremble_go_with_the_slope_and_steady_noise_does_not() {
+    fn sampling_jitter_follows_the_slope_and_stationary_noise_does_not() {
         let y = record();
         let mut random = noise(7);
-        let tremble: Vec<f64> = slope(&y).iter().map(|s| s * random()).collect();
-        let steady: Vec<f64> = y.iter().map(|_| random()).collect();
-        let found = with_slope(&[sight(&tremble, &y)]);
+        let jitter: Vec<f64> = slope(&y).iter().map(|s| s * random()).collect();
+        let stationary: Vec<f64> = y.iter().map(|_| random()).collect();
+        let found = with_slope(&of(&jitter, &y));
         assert!((found.share - 1.0).abs() < 0.2, "{found:?}");
         assert!(found.significance > 8.0, "{found:?}");
-        assert!(with_signal(&[sight(&tremble, &y)]).share < 0.5 * found.share);
-        assert!(with_slope(&[sight(&steady, &y)]).share.abs() < 0.1);
+        assert!(with_signal(&of(&jitter, &y)).share < 0.5 * found.share);
+        assert!(with_slope(&of(&stationary, &y)).share.abs() < 0.1);
     }
 
     #[test]
-    fn a_zero_that_jumps_is_seen_beside_noise() {
+    fn a_jumping_zero_is_detected_in_noise() {
         let mut random = noise(4);
         let quiet: Vec<f64> = (0..COUNT).map(|_| random()).collect();
         let jumps: Vec<f64> = quiet
@@ -349,9 +339,9 @@ mod tests {
             .enumerate()
             .map(|(i, r)| r + if (3000..7000).contains(&i) { 0.5 } else { 0.0 })
             .collect();
-        assert!(wandering_zero(&[sight(&quiet, &quiet)]).share.abs() < 0.01);
+        assert!(wandering_zero(&of(&quiet, &quiet)).share.abs() < 0.01);
         // A variance of 1/12 beside 0.25 · (1/3 · 2/3).
-        let found = wandering_zero(&[sight(&jumps, &jumps)]);
+        let found = wandering_zero(&of(&jumps, &jumps));
         assert!(
             (found.share - 0.4).abs() < 0.1 && found.significance > 10.0,
             "{found:?}"
@@ -359,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn slopes_are_the_differences_of_two_records() {
+    fn slopes_match_differences_of_two_records() {
         // One line of 66 Hz, w = 1.1: H = 1/(1 − w² + 0.1 j w), changed by one part in 10⁵ of frequency or of ζ.
         let at = |natural_hz: f64, zeta: f64| {
             let w = 66.0 / natural_hz;

@@ -1,0 +1,197 @@
+//! What is said about a diagnosis in words: the residual, the next experiment, warnings.
+
+use super::Found;
+use super::guard_models::GuardModel;
+use super::noise_floor::NoiseFloorSource;
+use super::reason::Status;
+use super::refuse::plain_stands_apart;
+use super::residual_tests::{FROM_INPUT, ResidualTests};
+use super::result::ExcitationLevels;
+use super::score::ScoredModel;
+use super::spectra::SpectralLine;
+use super::verdict::Verdict;
+use crate::print::rounded;
+use crate::warning::Warning;
+
+/// Ratio between levels of excitation from which on errors are compared.
+const LEVELS_DIFFER: f64 = 1.2;
+/// Ratio between relative errors at two levels from which on it is reported.
+const ERRORS_DIFFER: f64 = 1.3;
+/// Relative standard uncertainty of natural frequency and damping ratio above which the hold-out error says little.
+const MOST_UNCERTAIN: [f64; 2] = [0.005, 0.1];
+
+/// What remains after the diagnosis.
+pub fn residual(
+    found: &Found,
+    verdict: Verdict,
+    lines: &[SpectralLine],
+    levels: &ExcitationLevels,
+) -> String {
+    let tests = &found.tests;
+    let mut parts = Vec::new();
+    if let Some(floor) = found.noise_floor {
+        let ratio = found.after.holdout_rms() / floor.rms;
+        parts.push(format!("{} times the noise floor", rounded(ratio, 3)));
+    }
+    parts.push(if tests.white { "white" } else { "not white" }.to_owned());
+    parts.extend(dependence(tests));
+    if tests.has_spikes() {
+        parts.push(format!(
+            "{:.0} % of its power is in 1 % of its samples: spikes",
+            100.0 * tests.in_largest_hundredth
+        ));
+    }
+    if let Some(share) = tests.nonstationary() {
+        let is_hidden = |source| source == NoiseFloorSource::Periods;
+        let is_hidden = found.noise_floor.is_some_and(|f| is_hidden(f.from));
+        parts.push(format!(
+            "{:.0} % of its power follows {}{}",
+            100.0 * share.share.min(1.0),
+            share.of,
+            match is_hidden {
+                true => " (the noise floor, from differences between periods, contains that too)",
+                false => "",
+            }
+        ));
+    }
+    if !found.settled && !found.after.fitted.structure.effects.is_empty() {
+        parts.push(
+            "the effect found switches so fast that the step size of the integration adds to the error; a second effect was not \
+             searched for"
+                .to_owned(),
+        );
+    }
+    if verdict != Verdict::Explained {
+        parts.extend(level_dependence(levels));
+    }
+    let line = |line: &SpectralLine| format!("a line at {} Hz", rounded(line.frequency_hz, 5));
+    parts.extend(lines.iter().map(line));
+    parts.join("; ")
+}
+
+/// What the residual follows from.
+fn dependence(tests: &ResidualTests) -> Option<String> {
+    match tests.dependence() {
+        Some(share) => Some(format!(
+            "{:.0} % of its power follows from {}",
+            100.0 * share.share,
+            share.of
+        )),
+        // Changes over a record also make the residual follow from the motion in each part of it.
+        None if tests.nonstationary().is_some() => None,
+        None if !tests.independent_of_input => Some(format!(
+            "correlated with the input (significant at 99 %), strongest at lag {}",
+            tests.largest_lag
+        )),
+        None => Some("no dependence on input or motion detected".to_owned()),
+    }
+}
+
+/// Whether the plain stand does worse on records with another level of excitation.
+fn level_dependence(levels: &ExcitationLevels) -> Option<String> {
+    let level = levels.holdout_applied_rms / levels.train_applied_rms;
+    let error = levels.holdout_relative / levels.train_relative;
+    let differ = |ratio: f64, factor: f64| ratio.ln().abs() > factor.ln();
+    (differ(level, LEVELS_DIFFER) && differ(error, ERRORS_DIFFER)).then(|| {
+        format!(
+            "the plain stand has an error of {} % on the training records and {} % on the held-out ones, at {} times the \
+             excitation: what it lacks depends on amplitude",
+            rounded(100.0 * levels.train_relative, 3),
+            rounded(100.0 * levels.holdout_relative, 3),
+            rounded(level, 3)
+        )
+    })
+}
+
+/// What to record next.
+pub fn next_experiment(
+    found: &Found,
+    suspected: Option<&GuardModel>,
+    verdict: Verdict,
+) -> Option<String> {
+    if let Some(guard) = suspected {
+        return Some(guard.effect.experiment.to_owned());
+    }
+    let all = found.rounds.iter().flatten();
+    let tied = all.filter(|c| c.status() == Status::Indistinguishable);
+    let mut tied: Vec<&str> = tied.map(|c| c.effect.experiment).collect();
+    tied.dedup();
+    if !tied.is_empty() {
+        return Some(tied.join("; "));
+    }
+    if matches!(verdict, Verdict::Explained | Verdict::NothingMissing) {
+        return None;
+    }
+    if found.tests.nonstationary().is_some() {
+        return Some(
+            "the same record twice, cold and after an hour of running, and once at half the level: do the constants or the \
+             noise differ?"
+                .to_owned(),
+        );
+    }
+    let follows = found.tests.dependence().map(|share| share.of);
+    if let Some(of) = follows.filter(|of| *of != FROM_INPUT) {
+        let record = match of.contains("displacement") {
+            true => {
+                "a slow load and unload over the whole range, and the response at two more levels"
+            }
+            false => "free decays from several amplitudes, and the response at two more levels",
+        };
+        return Some(record.to_owned());
+    }
+    let fitted = found.rounds.last()?.iter().filter(|c| c.model.is_some());
+    let closest = fitted.min_by(|a, b| a.holdout_error().total_cmp(&b.holdout_error()));
+    closest.map(|c| c.effect.experiment.to_owned())
+}
+
+/// What limits the diagnosis.
+pub fn warnings(before: &ScoredModel, verdict: Verdict) -> Vec<Warning> {
+    let is_open = matches!(verdict, Verdict::PartlyExplained | Verdict::Unexplained);
+    let apart = is_open.then(|| records_apart(before)).flatten();
+    apart
+        .into_iter()
+        .chain(uncertain_constants(before))
+        .collect()
+}
+
+/// Training and held-out records that no one stand fits.
+fn records_apart(before: &ScoredModel) -> Option<Warning> {
+    let [train, holdout] = plain_stands_apart(before)?;
+    Some(Warning::new(
+        "records-apart",
+        format!(
+            "no single plain stand fits both training and held-out records: fitted separately, the training records give {:.5} Hz \
+             and damping ratio {:.4}, the held-out ones {:.5} Hz and {:.4}. They are of two stands or settings, or the stand \
+             changes with the level",
+            train.natural_hz, train.damping_ratio, holdout.natural_hz, holdout.damping_ratio
+        ),
+    ))
+}
+
+/// Constants that the training records do not determine well enough for the hold-out error to show a missing effect.
+fn uncertain_constants(before: &ScoredModel) -> Option<Warning> {
+    let constants = ["natural frequency", "damping ratio"];
+    let constants = constants.into_iter().zip(MOST_UNCERTAIN).enumerate();
+    let uncertain = constants.filter_map(|(k, (name, most))| {
+        let plain = &before.fitted;
+        match plain.std[k].map(|s| s / plain.values[k].abs()) {
+            Some(relative) if relative <= most => None,
+            Some(relative) => Some(format!(
+                "the {name} to ± {} %",
+                rounded(100.0 * relative, 2)
+            )),
+            None => Some(format!("the {name} not at all")),
+        }
+    });
+    let uncertain: Vec<String> = uncertain.collect();
+    (!uncertain.is_empty()).then(|| {
+        Warning::new(
+            "training-leaves-constants-open",
+            format!(
+                "the training records determine {}: the hold-out error may come from that instead of a missing effect; train \
+                 on records that excite the resonance",
+                uncertain.join(" and ")
+            ),
+        )
+    })
+}

@@ -1,0 +1,86 @@
+//! Guard models: laws that are not offered as effects. An effect is not named where one of them explains what it leaves.
+
+use serde::Serialize;
+use torqcomp_model::effects::{Effect, RIVALS};
+
+use super::reason::Reason;
+use super::records::Records;
+use super::score::{BaseModel, EffectParameter, RmsErrors, ScoredModel};
+use super::search::{CandidateFit, Workers, fit_all, refusal};
+use super::structure::EffectForm;
+
+/// A law that is not offered as an effect, fitted.
+#[derive(Serialize)]
+pub struct GuardModel {
+    #[serde(rename = "law", serialize_with = "super::search::name_of")]
+    pub effect: &'static Effect,
+    pub equation: &'static str,
+    /// The effects that were in the model already.
+    pub with: Vec<&'static str>,
+    #[serde(flatten)]
+    pub errors: RmsErrors,
+    /// Unit of both errors.
+    pub unit: String,
+    pub parameters: Vec<EffectParameter>,
+    #[serde(skip)]
+    pub model: ScoredModel,
+}
+
+/// Minimum significance with which a guard model leaves less than an effect on the held-out records.
+const LEAST_SIGNIFICANCE: f64 = 3.0;
+/// Minimum reduction of the criterion on all records from an effect to a guard model.
+const LEAST_REDUCTION: f64 = 20.0;
+/// Largest part of an effect's excess error power that a guard model may leave: a law that explains half of it is not its cause.
+const LEFT: f64 = 0.5;
+
+impl GuardModel {
+    /// The guard model that explains most, if it passes as an effect would and leaves significantly less than the accepted
+    /// effect, if any.
+    pub fn best(
+        base: &BaseModel,
+        accepted: Option<&ScoredModel>,
+        noise_rms: f64,
+        records: &Records,
+        workers: Workers,
+    ) -> Option<Self> {
+        let forms = EffectForm::all(RIVALS.iter().copied());
+        let silent = Workers {
+            progress: &|_, _| {},
+            ..workers
+        };
+        let fits = fit_all(base, &forms, &[], records, silent).into_iter();
+        let passing = fits
+            .flatten()
+            .filter(|model| refusal(model, &base.scored).is_none());
+        let model = passing.min_by(|a, b| a.pooled_criterion().total_cmp(&b.pooled_criterion()))?;
+        if accepted.is_some_and(|accepted| !outdoes(&model, accepted, noise_rms)) {
+            return None;
+        }
+        let effect = model.effects().pop()?;
+        Some(Self {
+            effect,
+            equation: effect.equation,
+            with: Vec::new(),
+            errors: model.errors(),
+            unit: model.fitted.structure.context.units.printed(),
+            parameters: model.last_parameters(),
+            model,
+        })
+    }
+
+    /// Why a candidate is not accepted beside this law.
+    pub fn instead_of(&self, candidate: &CandidateFit) -> Reason {
+        let error = candidate.model.as_ref().map(ScoredModel::holdout_rms);
+        Reason::GuardModel {
+            ratio: error.unwrap_or(f64::INFINITY) / self.model.holdout_rms(),
+            law: self.effect.name,
+            equation: self.equation,
+        }
+    }
+}
+
+fn outdoes(guard: &ScoredModel, accepted: &ScoredModel, noise_rms: f64) -> bool {
+    guard.against(accepted).significance() >= LEAST_SIGNIFICANCE
+        && guard.pooled_criterion() + LEAST_REDUCTION <= accepted.pooled_criterion()
+        && guard.excess_power(noise_rms) <= LEFT * accepted.excess_power(noise_rms)
+}

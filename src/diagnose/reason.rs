@@ -1,0 +1,165 @@
+//! Status of a candidate effect and the reason for it: both come from one [`Reason`].
+
+use serde::ser::{Serialize, SerializeStruct, Serializer};
+
+use crate::print::rounded;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Status {
+    /// Added to the model.
+    Accepted,
+    /// Not added.
+    Rejected,
+    /// The data cannot distinguish it from the one that is added.
+    Indistinguishable,
+}
+
+impl Status {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Accepted => "accepted",
+            Self::Rejected => "rejected",
+            Self::Indistinguishable => "indistinguishable",
+        }
+    }
+}
+
+/// Why a candidate has its status.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Reason {
+    /// No fit came about.
+    NotFitted,
+    /// The hold-out error changes by this part.
+    NoReduction {
+        change: f64,
+    },
+    /// The hold-out error changes by this part.
+    NotSignificant {
+        change: f64,
+    },
+    /// Part of the residual's power that it explains.
+    SmallShare {
+        share: f64,
+    },
+    /// An essential parameter does not differ from zero.
+    ZeroParameter {
+        name: &'static str,
+    },
+    CriterionNotLower,
+    /// The best of all.
+    Best,
+    /// Its hold-out error over that of the best.
+    Worse {
+        ratio: f64,
+        best: &'static str,
+    },
+    MoreParameters {
+        best: &'static str,
+    },
+    Tied {
+        best: &'static str,
+        experiment: &'static str,
+    },
+    /// A law that is not offered as an effect leaves less.
+    GuardModel {
+        ratio: f64,
+        law: &'static str,
+        equation: &'static str,
+    },
+    /// A second effect that explains less than this part of the initial excess error.
+    SmallSecond {
+        least: f64,
+    },
+    /// It explains only this part of the excess error.
+    SmallPart {
+        explained: f64,
+    },
+    NoneAccepted,
+}
+
+impl Reason {
+    pub fn status(&self) -> Status {
+        match self {
+            Self::Best => Status::Accepted,
+            Self::Tied { .. } => Status::Indistinguishable,
+            _ => Status::Rejected,
+        }
+    }
+
+    /// The reason for people.
+    pub fn text(&self) -> String {
+        match self {
+            Self::NotFitted => {
+                "not fitted: no starting point reduces the training error".to_owned()
+            }
+            Self::NoReduction { change } => {
+                format!(
+                    "does not reduce the hold-out error (change: {})",
+                    percent(*change)
+                )
+            }
+            Self::NotSignificant { change } => format!(
+                "hold-out error changes by {}: not significant",
+                percent(*change)
+            ),
+            Self::SmallShare { share } => format!(
+                "explains only {} % of the residual power: too little to distinguish from other model errors",
+                rounded(100.0 * share, 2)
+            ),
+            Self::ZeroParameter { name } => {
+                format!("its {name} is not significantly different from zero")
+            }
+            Self::CriterionNotLower => "too small a gain for its extra parameters (BIC)".to_owned(),
+            Self::Best => "largest significant reduction of the hold-out error".to_owned(),
+            Self::Worse { ratio, best } => format!(
+                "improves the fit, but its hold-out error is {} times that of {best}",
+                rounded(*ratio, 3)
+            ),
+            Self::MoreParameters { best } => {
+                format!("no better than {best}, with more parameters")
+            }
+            Self::Tied { best, experiment } => {
+                format!(
+                    "not significantly different from {best}; to distinguish them: {experiment}"
+                )
+            }
+            Self::GuardModel {
+                ratio,
+                law,
+                equation,
+            } => format!(
+                "improves the fit, but its hold-out error is {} times that of {law} ({equation}), a law that is not in the \
+                 list of effects",
+                rounded(*ratio, 3)
+            ),
+            Self::SmallSecond { least } => format!(
+                "explains less than {:.0} % of what the plain stand leaves above the noise: too little for a second effect",
+                100.0 * least
+            ),
+            Self::SmallPart { explained } => format!(
+                "improves the fit, but explains only {:.0} % of the error above the noise: the main cause is something else",
+                100.0 * explained.max(0.0)
+            ),
+            Self::NoneAccepted => "no effect is accepted".to_owned(),
+        }
+    }
+}
+
+/// A relative change in percent, with its sign.
+fn percent(change: f64) -> String {
+    let change = 100.0 * change;
+    match change.abs() {
+        size if size < 0.005 => "less than 0.01 %".to_owned(),
+        size if size < 10.0 => format!("{change:+.2} %"),
+        _ => format!("{change:+.0} %"),
+    }
+}
+
+impl Serialize for Reason {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut fields = serializer.serialize_struct("Reason", 2)?;
+        fields.serialize_field("status", self.status().name())?;
+        fields.serialize_field("why", &self.text())?;
+        fields.end()
+    }
+}

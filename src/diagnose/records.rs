@@ -1,0 +1,110 @@
+//! The training and held-out records of a diagnosis.
+
+use std::sync::Arc;
+
+use torqcomp_model::simulate::{Between, Excitation, substeps};
+
+use super::record::StandRecord;
+use super::structure::PlainStand;
+
+#[derive(Clone)]
+pub struct Records {
+    pub train: Vec<StandRecord>,
+    pub holdout: Vec<StandRecord>,
+}
+
+/// Samples at both ends that are always excluded: there the extrapolation beyond the record matters most.
+const EXCLUDED: usize = 32;
+/// Part of a record that is excluded at its start, and at its end: a second mode, a filter or a joint decays more slowly
+/// than the stand, and a complex stiffness responds before its cause.
+const EXCLUDED_PARTS: [f64; 2] = [0.04, 0.01];
+/// Time constants of the stand that are excluded at the start: the state of recorder and joints from before the record has
+/// decayed by then.
+const SETTLING: f64 = 3.0;
+/// Largest part of a record that is excluded.
+const MOST_EXCLUDED: f64 = 0.1;
+
+/// Part of a training record that is fitted if the rest is held out.
+const FITTED: f64 = 0.7;
+
+impl Records {
+    /// Holds out the end of each training record.
+    pub fn hold_out_ends(&mut self) {
+        for record in &mut self.train {
+            let count = record.measured.len();
+            let cut = (FITTED * count as f64) as usize;
+            let mut rest = record.clone();
+            rest.range = cut..count;
+            record.range.end = cut;
+            self.holdout.push(rest);
+        }
+    }
+
+    fn all(&mut self) -> impl Iterator<Item = &mut StandRecord> {
+        self.train.iter_mut().chain(&mut self.holdout)
+    }
+
+    pub fn rate_hz(&self) -> f64 {
+        self.train[0].rate_hz()
+    }
+
+    /// Steps of integration from sample to sample.
+    pub fn substeps(&self) -> usize {
+        self.train[0].input.substeps()
+    }
+
+    pub fn set_substeps(&mut self, substeps: usize) {
+        self.change_inputs(|input| input.with_substeps(substeps));
+    }
+
+    /// The same records with another course of the input between its samples.
+    pub fn with_between(&self, between: Between) -> Self {
+        let mut other = self.clone();
+        other.change_inputs(|input| input.with_between(between));
+        other
+    }
+
+    /// Course of the input between its samples.
+    pub fn between(&self) -> Between {
+        self.train[0].input.between()
+    }
+
+    /// Changes the inputs; records that share an input go on sharing it.
+    fn change_inputs(&mut self, change: impl Fn(&Excitation) -> Excitation) {
+        let mut made: Vec<(Arc<Excitation>, Arc<Excitation>)> = Vec::new();
+        for record in self.all() {
+            let known = made.iter().find(|(old, _)| Arc::ptr_eq(old, &record.input));
+            let new = match known {
+                Some((_, new)) => new.clone(),
+                None => {
+                    let new = Arc::new(change(&record.input));
+                    made.push((record.input.clone(), new.clone()));
+                    new
+                }
+            };
+            record.input = new;
+        }
+    }
+
+    /// Sets the steps of integration and the samples that count for a plain stand.
+    pub fn prepare_for(&mut self, plain: &PlainStand) {
+        let rate_hz = self.rate_hz();
+        let mode = plain.mode();
+        let decay = mode.damping_ratio * mode.omega_rad_s / rate_hz;
+        for record in self.all() {
+            let count = record.measured.len();
+            let most = (MOST_EXCLUDED * count as f64) as usize;
+            let [first, last] =
+                EXCLUDED_PARTS.map(|part| EXCLUDED.max((part * count as f64) as usize).min(most));
+            let settled = ((SETTLING / decay.max(1e-9)) as usize).clamp(first, most);
+            record.range.start = record.range.start.max(settled);
+            if record.range.end == count {
+                record.range.end = count - last;
+            }
+        }
+        let steps = substeps(plain.natural_hz, rate_hz);
+        if steps != self.substeps() {
+            self.set_substeps(steps);
+        }
+    }
+}

@@ -1,0 +1,270 @@
+//! Tests of a residual: whiteness, dependence on the input and on nonlinear functions of the motion, stationarity.
+
+use serde::Serialize;
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+use torqcomp_model::Mode;
+
+use super::fit::RecordResidual;
+use super::record::dot;
+use super::spectra::coherent_share;
+use super::stationarity;
+
+/// Lags of the tests of whiteness and of independence from the input.
+const LAGS: usize = 25;
+/// Confidence level of these tests.
+const CONFIDENCE: f64 = 0.99;
+/// Lags over which the colour of residual and input counts, and their largest part of a record.
+const COLOUR_LAGS: usize = 400;
+const COLOUR_PART: usize = 4;
+/// Share of a residual's power in its largest hundredth of samples above which it has spikes: 8 % of that of normal noise is
+/// there, 15 % of that of double-exponential noise.
+const SPIKES: f64 = 0.5;
+/// Share of a residual's power, and standard deviations from zero, above which it depends on something.
+const DEPENDENT: [f64; 2] = [0.04, 4.0];
+/// Share of a residual's power above which the constants change, the zero drifts, or the noise follows the signal or its
+/// slope: right models leave at most 0.008, 0.002 and 0.03 of the blind records.
+const CHANGING: f64 = 0.04;
+const DRIFTING: f64 = 0.03;
+const FOLLOWING: f64 = 0.08;
+/// Standard deviations from zero for that.
+const NONSTATIONARY: f64 = 6.0;
+
+/// A share of the residual's power that follows from something.
+#[derive(Debug, Clone, Serialize)]
+pub struct PowerShare {
+    /// What it follows from.
+    pub of: &'static str,
+    pub share: f64,
+    /// Standard deviations from zero.
+    pub significance: f64,
+}
+
+/// What the tests found in the residuals of the held-out records.
+#[derive(Debug, Clone, Serialize)]
+pub struct ResidualTests {
+    /// Whether its autocorrelation stays within 99 % bounds.
+    pub white: bool,
+    /// Sum of its squared autocorrelation over the 99 % bound for white noise.
+    pub whiteness_ratio: Option<f64>,
+    /// Whether its cross-correlation with the input, at positive and negative lags, stays within 99 % bounds.
+    pub independent_of_input: bool,
+    /// Lag of the largest cross-correlation in samples; negative: the residual comes before the input.
+    pub largest_lag: i64,
+    /// Part of its power in the largest hundredth of its samples.
+    pub in_largest_hundredth: f64,
+    /// Shares of its power that follow from the input or the motion.
+    pub shares: Vec<PowerShare>,
+    /// Share that other constants in each segment of the record remove.
+    pub changing_constants: PowerShare,
+    /// Share proportional to the square of the signal, sample by sample.
+    pub with_signal: PowerShare,
+    /// Share proportional to the square of the signal's slope, sample by sample.
+    pub with_slope: PowerShare,
+    /// Share at the lowest frequencies, above the noise there.
+    pub wandering_zero: PowerShare,
+}
+
+impl ResidualTests {
+    /// Tests the residuals of records of a stand with that mode.
+    pub fn of(residuals: &[RecordResidual], mode: &Mode) -> Self {
+        let (white, whiteness_ratio) = whiteness(residuals);
+        let (independent_of_input, largest_lag) = input_independence(residuals);
+        Self {
+            white,
+            whiteness_ratio,
+            independent_of_input,
+            largest_lag,
+            in_largest_hundredth: in_largest_hundredth(residuals),
+            shares: shares(residuals),
+            changing_constants: stationarity::changing_constants(residuals, mode),
+            with_signal: stationarity::with_signal(residuals),
+            with_slope: stationarity::with_slope(residuals),
+            wandering_zero: stationarity::wandering_zero(residuals),
+        }
+    }
+
+    /// The largest significant share that follows from the input or the motion.
+    pub fn dependence(&self) -> Option<&PowerShare> {
+        let shares = self.shares.iter().filter(|s| s.exceeds(DEPENDENT));
+        shares.max_by(|a, b| a.share.total_cmp(&b.share))
+    }
+
+    /// Whether a few samples have most of the power.
+    pub fn has_spikes(&self) -> bool {
+        self.in_largest_hundredth > SPIKES
+    }
+
+    /// Whether stand, measuring chain or noise change over the record; differences between periods show that as noise.
+    pub fn nonstationary(&self) -> Option<&PowerShare> {
+        // The specific ones first: changing constants also leave a residual that follows the signal.
+        let least = [CHANGING, DRIFTING, FOLLOWING, FOLLOWING];
+        let [changing, signal, slope, zero] = self.stationarity();
+        let mut both = [changing, zero, signal, slope].into_iter().zip(least);
+        let found = both.find(|(s, least)| s.exceeds([*least, NONSTATIONARY]));
+        found.map(|(share, _)| share)
+    }
+
+    /// The shares of what changes over the record.
+    pub fn stationarity(&self) -> [&PowerShare; 4] {
+        [
+            &self.changing_constants,
+            &self.with_signal,
+            &self.with_slope,
+            &self.wandering_zero,
+        ]
+    }
+}
+
+impl PowerShare {
+    fn exceeds(&self, [share, significance]: [f64; 2]) -> bool {
+        self.share > share && self.significance > significance
+    }
+}
+
+fn in_largest_hundredth(residuals: &[RecordResidual]) -> f64 {
+    let all = residuals.iter().flat_map(|r| &r.samples);
+    let mut squares: Vec<f64> = all.map(|r| r * r).collect();
+    let whole: f64 = squares.iter().sum();
+    squares.sort_by(|a, b| b.total_cmp(a));
+    let largest: f64 = squares.iter().take(squares.len() / 100).sum();
+    if whole > 0.0 { largest / whole } else { 0.0 }
+}
+
+/// Sums of products at lags from 0.
+fn autocorrelation(values: &[f64], lags: usize) -> Vec<f64> {
+    let sum = |lag: usize| dot(&values[lag..], &values[..values.len() - lag]);
+    (0..=lags.min(values.len() - 1)).map(sum).collect()
+}
+
+/// Sums of products at lags from 0, of several residuals together.
+pub fn autocorrelations<'a>(
+    residuals: impl Iterator<Item = &'a RecordResidual>,
+    lags: usize,
+) -> Vec<f64> {
+    let mut sums = vec![0.0; lags + 1];
+    for residual in residuals {
+        let own = autocorrelation(&residual.samples, lags);
+        sums.iter_mut().zip(own).for_each(|(sum, r)| *sum += r);
+    }
+    sums
+}
+
+fn total(residuals: &[RecordResidual]) -> f64 {
+    residuals.iter().map(|r| r.samples.len()).sum::<usize>() as f64
+}
+
+/// The portmanteau test over the first lags (G. E. P. Box, D. A. Pierce, J. Am. Stat. Assoc. 65 (1970), 1509).
+fn whiteness(residuals: &[RecordResidual]) -> (bool, Option<f64>) {
+    let sums = autocorrelations(residuals.iter(), LAGS);
+    if sums[0] <= 0.0 {
+        return (true, None);
+    }
+    let q = total(residuals) * sums[1..].iter().map(|r| (r / sums[0]).powi(2)).sum::<f64>();
+    let bound =
+        ChiSquared::new(LAGS as f64).map_or(f64::INFINITY, |law| law.inverse_cdf(CONFIDENCE));
+    (q <= bound, Some(q / bound))
+}
+
+/// Largest cross-correlation with the input against its bound, with the colour of both taken into account
+/// (M. S. Bartlett, J. R. Stat. Soc. Suppl. 8 (1946), 27).
+fn input_independence(residuals: &[RecordResidual]) -> (bool, i64) {
+    let mut colour = 0.0;
+    let (mut rr0, mut uu0) = (0.0, 0.0);
+    let mut cross = vec![0.0; 2 * LAGS + 1];
+    for residual in residuals {
+        let r = &residual.samples;
+        let u = without_mean(residual.record.applied_in_range());
+        let reach = COLOUR_LAGS.min(r.len() / COLOUR_PART);
+        let (rr, uu) = (autocorrelation(r, reach), autocorrelation(&u, reach));
+        colour += rr[0] * uu[0] + 2.0 * dot(&rr[1..], &uu[1..]);
+        rr0 += rr[0];
+        uu0 += uu[0];
+        for (k, sum) in cross.iter_mut().enumerate() {
+            *sum += match k.checked_sub(LAGS) {
+                Some(lag) => dot(&r[lag..], &u[..u.len() - lag]),
+                None => dot(&r[..r.len() - (LAGS - k)], &u[LAGS - k..]),
+            };
+        }
+    }
+    let largest = (0..cross.len())
+        .max_by(|a, b| cross[*a].abs().total_cmp(&cross[*b].abs()))
+        .unwrap_or(LAGS);
+    let count = cross.len() as f64;
+    let quantile = Normal::standard().inverse_cdf(1.0 - 0.5 * (1.0 - CONFIDENCE) / count);
+    let variance = colour.max(rr0 * uu0 * 1e-6) / total(residuals);
+    let within = cross[largest].abs() <= quantile * variance.sqrt();
+    (within || rr0 * uu0 == 0.0, largest as i64 - LAGS as i64)
+}
+
+/// A function of the motion that a residual may follow from, of displacement and speed in units of their rms.
+type MotionFunction = (&'static str, fn(f64, f64) -> f64);
+
+const MOTION_FUNCTIONS: [MotionFunction; 6] = [
+    ("the square of the displacement", |x, _| x * x),
+    ("the cube of the displacement", |x, _| x * x * x),
+    ("the magnitude of the displacement", |x, _| x.abs()),
+    ("large displacements", |x, _| x - x.clamp(-1.5, 1.5)),
+    ("the direction of motion", |_, v| (20.0 * v).tanh()),
+    ("the square of the speed", |_, v| v * v.abs()),
+];
+
+/// What the share that follows linearly from the input is called.
+pub const FROM_INPUT: &str = "the input";
+
+fn shares(residuals: &[RecordResidual]) -> Vec<PowerShare> {
+    let shortest = residuals.iter().map(|r| r.samples.len()).min();
+    let length = (shortest.unwrap_or(0) / 24).next_power_of_two();
+    let length = length.clamp(32, 2048);
+    let input = |r: &RecordResidual| r.record.applied_in_range().to_vec();
+    let mut found = vec![pooled_share(FROM_INPUT, residuals, length, input)];
+    for (of, function) in MOTION_FUNCTIONS {
+        found.push(pooled_share(of, residuals, length, |r| {
+            let x = without_mean(&r.modelled);
+            let (x, v) = (over_rms(&x), over_rms(&differences(&x)));
+            x.iter().zip(&v).map(|(x, v)| function(*x, *v)).collect()
+        }));
+    }
+    found
+}
+
+pub fn without_mean(values: &[f64]) -> Vec<f64> {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    values.iter().map(|x| x - mean).collect()
+}
+
+/// Difference of both neighbours; of one neighbour and the sample itself at the ends.
+pub fn differences(x: &[f64]) -> Vec<f64> {
+    let last = x.len().saturating_sub(1);
+    let difference = |i: usize| x[(i + 1).min(last)] - x[i.saturating_sub(1)];
+    (0..x.len()).map(difference).collect()
+}
+
+fn over_rms(values: &[f64]) -> Vec<f64> {
+    let rms = (dot(values, values) / values.len() as f64).sqrt();
+    values.iter().map(|x| x / rms.max(1e-300)).collect()
+}
+
+/// The share over all records, each weighted with its residual's power.
+fn pooled_share(
+    of: &'static str,
+    residuals: &[RecordResidual],
+    length: usize,
+    from: impl Fn(&RecordResidual) -> Vec<f64>,
+) -> PowerShare {
+    let (mut share, mut variance, mut total) = (0.0, 0.0, 0.0_f64);
+    for residual in residuals {
+        let power = dot(&residual.samples, &residual.samples);
+        let (own, significance) = coherent_share(&from(residual), &residual.samples, length);
+        share += power * own;
+        total += power;
+        if significance != 0.0 {
+            variance += (power * own / significance).powi(2);
+        }
+    }
+    let over = |size: f64| if size > 0.0 { share / size } else { 0.0 };
+    PowerShare {
+        of,
+        share: over(total),
+        significance: over(variance.sqrt()),
+    }
+}

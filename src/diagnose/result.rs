@@ -1,0 +1,276 @@
+//! The result of a diagnosis: its JSON document, from which text and page are written as well.
+
+use serde::Serialize;
+
+use super::describe;
+use super::guard_models::GuardModel;
+use super::reason::Status;
+use super::record::StandRecord;
+use super::residual_tests::ResidualTests;
+use super::score::{RmsErrors, ScoredModel};
+use super::search::CandidateFit;
+use super::spectra::SpectralLine;
+use super::structure::{FitContext, PlainStand};
+use super::verdict::Verdict;
+use super::{Case, Found};
+use crate::warning::Warning;
+
+/// Files of a diagnosis.
+#[derive(Debug, Clone, Serialize)]
+pub struct Sources {
+    pub stand: Option<String>,
+    pub train: Vec<String>,
+    /// Empty if parts of the training records are held out.
+    pub holdout: Vec<String>,
+}
+
+#[derive(Serialize)]
+pub struct Diagnosis {
+    pub schema: &'static str,
+    /// Version of torqcomp.
+    pub version: &'static str,
+    #[serde(flatten)]
+    pub sources: Sources,
+    pub verdict: Verdict,
+    /// Names of the effects that were added.
+    pub effects: Vec<&'static str>,
+    /// `band-limited`, `straight-lines` or `held`.
+    pub input_between_samples: &'static str,
+    pub error: ErrorTable,
+    pub constants: Vec<StandConstant>,
+    /// The effects that were tried: accepted ones first, then by hold-out error.
+    pub candidates: Vec<CandidateFit>,
+    /// A law that is not offered as an effect and leaves less than each of them; it is named and not added.
+    pub suspected: Option<GuardModel>,
+    pub residual: ResidualReport,
+    pub next_experiment: Option<String>,
+    pub warnings: Vec<Warning>,
+    /// The plain stand, fitted.
+    #[serde(skip)]
+    pub before: ScoredModel,
+    /// The same with the accepted effects.
+    #[serde(skip)]
+    pub after: ScoredModel,
+}
+
+/// The three errors.
+#[derive(Debug, Serialize)]
+pub struct ErrorTable {
+    pub unit: String,
+    /// Of the stand file as it is.
+    pub declared: Option<ModelErrors>,
+    /// Of the plain stand, refitted.
+    pub before: ModelErrors,
+    /// With the accepted effects.
+    pub after: ModelErrors,
+    /// Relative reduction of the hold-out rms from before to after, 95 % interval.
+    pub improvement_ci95: Option<[f64; 2]>,
+    /// Rms of the noise of the held-out records, estimated without a model.
+    pub noise_floor_rms: Option<f64>,
+    pub noise_floor_from: Option<&'static str>,
+}
+
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct ModelErrors {
+    #[serde(flatten)]
+    pub rms: RmsErrors,
+    /// Hold-out rms over the rms of the held-out records about their mean.
+    pub holdout_relative: f64,
+}
+
+/// A constant of the plain stand.
+#[derive(Debug, Serialize)]
+pub struct StandConstant {
+    pub name: &'static str,
+    pub unit: String,
+    pub declared: Option<f64>,
+    pub before: f64,
+    pub before_std: Option<f64>,
+    pub after: f64,
+    pub after_std: Option<f64>,
+}
+
+/// What the model leaves of the held-out records.
+#[derive(Debug, Serialize)]
+pub struct ResidualReport {
+    pub white: bool,
+    /// At positive and negative lags.
+    pub independent_of_input: bool,
+    pub tests: ResidualTests,
+    /// Lines in its spectrum.
+    pub lines: Vec<SpectralLine>,
+    pub levels: ExcitationLevels,
+    /// In words.
+    pub described: String,
+}
+
+/// Levels of excitation, and the relative error of the plain stand at each.
+#[derive(Debug, Serialize)]
+pub struct ExcitationLevels {
+    /// Rms of the applied quantity in SI units, training.
+    pub train_applied_rms: f64,
+    /// The same, held out.
+    pub holdout_applied_rms: f64,
+    pub train_relative: f64,
+    pub holdout_relative: f64,
+}
+
+impl Diagnosis {
+    pub(super) fn of(case: Case, mut found: Found) -> Self {
+        let lines = found.lines();
+        let verdict = found.conclude();
+        let effects = found.after.effect_names();
+        let error = ErrorTable::of(&found);
+        let levels = ExcitationLevels::of(&found, &error.before);
+        let residual = ResidualReport {
+            white: found.tests.white,
+            independent_of_input: found.tests.independent_of_input,
+            described: describe::residual(&found, verdict, &lines, &levels),
+            tests: found.tests.clone(),
+            lines: found.printed(lines),
+            levels,
+        };
+        let mut suspected = found.suspected.take();
+        if let Some(guard) = &mut suspected {
+            guard.with.clone_from(&effects);
+        }
+        Self {
+            schema: "torqcomp.diagnose/1",
+            version: env!("CARGO_PKG_VERSION"),
+            sources: case.sources,
+            verdict,
+            effects,
+            input_between_samples: found.records.between().name(),
+            error,
+            constants: constants(case.declared, &found),
+            next_experiment: describe::next_experiment(&found, suspected.as_ref(), verdict),
+            warnings: [case.warnings, describe::warnings(&found.before, verdict)].concat(),
+            candidates: found.candidates(),
+            suspected,
+            residual,
+            before: found.before,
+            after: found.after,
+        }
+    }
+
+    /// What all its models share.
+    pub fn context(&self) -> &FitContext {
+        &self.after.fitted.structure.context
+    }
+}
+
+impl Found {
+    /// Lines with their amplitudes in the printed unit.
+    fn printed(&self, mut lines: Vec<SpectralLine>) -> Vec<SpectralLine> {
+        let unit = self.after.fitted.structure.context.units.per_printed;
+        lines.iter_mut().for_each(|line| line.amplitude /= unit);
+        lines
+    }
+
+    /// All candidates in the order in which they are reported; the accepted ones as they are in the last model, not as they
+    /// were when they were chosen.
+    fn candidates(&mut self) -> Vec<CandidateFit> {
+        let mut parameters = self.after.parameters().into_iter();
+        let mut with = Vec::new();
+        let mut all = Vec::new();
+        for mut round in std::mem::take(&mut self.rounds) {
+            round.sort_by(|a, b| {
+                let first = |c: &CandidateFit| c.status() != Status::Accepted;
+                let by_error = a.holdout_error().total_cmp(&b.holdout_error());
+                first(a).cmp(&first(b)).then(by_error)
+            });
+            round.iter_mut().for_each(|c| c.with.clone_from(&with));
+            if let Some(accepted) = round.first_mut().filter(|c| c.status() == Status::Accepted) {
+                accepted.parameters = parameters.next().unwrap_or_default();
+                with.push(accepted.effect.name);
+                if parameters.len() == 0 {
+                    let errors = self.after.errors();
+                    accepted.train_rms = Some(errors.train_rms);
+                    accepted.holdout_rms = Some(errors.holdout_rms);
+                }
+            }
+            all.extend(round);
+        }
+        all
+    }
+}
+
+impl ErrorTable {
+    fn of(found: &Found) -> Self {
+        let (before, after) = (&found.before, &found.after);
+        let units = &after.fitted.structure.context.units;
+        let size = holdout_rms(before);
+        let errors = |model: &ScoredModel| ModelErrors {
+            rms: model.errors(),
+            holdout_relative: model.holdout_rms() / size,
+        };
+        let has_effects = !after.fitted.structure.effects.is_empty();
+        Self {
+            unit: units.printed(),
+            declared: found.declared.as_ref().map(errors),
+            before: errors(before),
+            after: errors(after),
+            improvement_ci95: has_effects.then(|| after.against(before).improvement_ci95()),
+            noise_floor_rms: found.noise_floor.map(|f| f.rms / units.per_printed),
+            noise_floor_from: found.noise_floor.map(|f| f.from.name()),
+        }
+    }
+}
+
+/// Rms of the held-out records about their means, nuisance terms removed.
+fn holdout_rms(before: &ScoredModel) -> f64 {
+    let (mut sum, mut count) = (0.0, 0_usize);
+    for residual in &before.holdout {
+        let pairs = residual.modelled.iter().zip(&residual.samples);
+        let y: Vec<f64> = pairs.map(|(m, r)| m + r).collect();
+        let mean = y.iter().sum::<f64>() / y.len() as f64;
+        sum += y.iter().map(|y| (y - mean).powi(2)).sum::<f64>();
+        count += y.len();
+    }
+    (sum / count as f64).sqrt()
+}
+
+impl ExcitationLevels {
+    fn of(found: &Found, before: &ModelErrors) -> Self {
+        let context = &found.before.fitted.structure.context;
+        let train_size = context.scales.rms / context.units.per_printed;
+        Self {
+            train_applied_rms: applied_rms(&found.records.train),
+            holdout_applied_rms: applied_rms(&found.records.holdout),
+            train_relative: before.rms.train_rms / train_size,
+            holdout_relative: before.holdout_relative,
+        }
+    }
+}
+
+fn applied_rms(records: &[StandRecord]) -> f64 {
+    let count: usize = records.iter().map(StandRecord::count).sum();
+    let all = records.iter().flat_map(StandRecord::applied_in_range);
+    (all.map(|u| u * u).sum::<f64>() / count as f64).sqrt()
+}
+
+/// The constants of the plain stand: declared, refitted, and refitted with the effects.
+fn constants(declared: Option<PlainStand>, found: &Found) -> Vec<StandConstant> {
+    let context = &found.before.fitted.structure.context;
+    let (gain_unit, gain_scale) = context.units.gain();
+    let named = [
+        ("natural_frequency", "Hz".to_owned(), 1.0),
+        ("damping_ratio", String::new(), 1.0),
+        ("static_gain", gain_unit, gain_scale),
+    ];
+    let declared = declared.map(|d| [d.natural_hz, d.damping_ratio, d.gain]);
+    let (before, after) = (found.before.constants(), found.after.constants());
+    let all = named.into_iter().zip(before).zip(after).enumerate();
+    let all = all.map(
+        |(k, (((name, unit, scale), before), after))| StandConstant {
+            name,
+            unit,
+            declared: declared.map(|d| d[k] * scale),
+            before: before.value() * scale,
+            before_std: before.std_uncertainty().map(|s| s * scale),
+            after: after.value() * scale,
+            after_std: after.std_uncertainty().map(|s| s * scale),
+        },
+    );
+    all.take(context.plain_count()).collect()
+}

@@ -1,0 +1,312 @@
+//! Models with their errors on the training and on the held-out records.
+
+use std::sync::Arc;
+
+use serde::Serialize;
+use torqcomp_model::Estimate;
+use torqcomp_model::effects::Effect;
+
+use super::blocks::{Comparison, compare};
+use super::columns::Columns;
+use super::fit::{FitEffort, FittedModel, RecordResidual, raw_residual};
+use super::record::{Nuisance, NuisanceTerms, StandRecord, dot};
+use super::records::Records;
+
+/// A fitted model with its residuals.
+#[derive(Clone)]
+pub struct ScoredModel {
+    pub fitted: FittedModel,
+    /// Residuals on the training records.
+    pub train: Vec<RecordResidual>,
+    /// Residuals on the held-out records.
+    pub holdout: Vec<RecordResidual>,
+}
+
+/// A parameter of an effect, as it is reported.
+#[derive(Debug, Clone, Serialize)]
+pub struct EffectParameter {
+    /// Name of the effect.
+    #[serde(skip)]
+    pub effect: &'static str,
+    pub name: &'static str,
+    #[serde(flatten)]
+    pub estimate: Estimate,
+}
+
+/// Errors on training and held-out records, in the printed unit.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct RmsErrors {
+    pub train_rms: f64,
+    pub holdout_rms: f64,
+}
+
+/// Standard uncertainties from zero from which on a parameter differs from zero.
+const SIGNIFICANT: f64 = 3.0;
+/// A repeated fit with a finer step of integration or another course of the input.
+const REPEATED_FIT: FitEffort = FitEffort {
+    iterations: 6,
+    corrects_start: true,
+};
+/// Change of a record with half the step of integration, over the hold-out rms, above which the step is halved.
+const STEP_ERROR: f64 = 0.1;
+/// Most steps of integration, over those of the stand without effects: a listed effect needs one to four of them, a law that
+/// imitates something else (a hard stop, say) does not converge.
+const FINEST: usize = 8;
+
+impl ScoredModel {
+    /// Runs a fitted model on all records; `None` if the motion diverges on one of them.
+    pub fn of(fitted: FittedModel, records: &Records) -> Option<Self> {
+        let train = fitted.with_initial_states(&records.train);
+        let train = train.iter().map(|record| fitted.residual(record));
+        let train = train.collect::<Option<Vec<_>>>()?;
+        let holdout = records.holdout.iter().map(|record| {
+            // A part of a training record starts where that record starts.
+            let mut whole = records.train.iter();
+            match whole.position(|t| Arc::ptr_eq(&t.input, &record.input)) {
+                Some(k) => fitted.residual(&record.starting_from(fitted.initial[k])),
+                None => fitted.residual(record),
+            }
+        });
+        let holdout = holdout.collect::<Option<Vec<_>>>()?;
+        Some(Self {
+            fitted,
+            train,
+            holdout,
+        })
+    }
+
+    /// The same model fitted again, with the step and the course of the input that the records have now.
+    pub fn again(&self, records: &Records) -> Option<Self> {
+        let fitted = self.fitted.refit(&records.train, REPEATED_FIT).ok()?;
+        Self::of(fitted, records)
+    }
+
+    /// Halves the step of integration and fits again until the error of the integration no longer matters; whether that
+    /// was reached. `coarse` is the number of steps for the stand without effects.
+    pub fn refine_step(mut self, records: &mut Records, coarse: usize) -> (Self, bool) {
+        while self.fitted.integrates() {
+            let Some(change) = self.fitted.step_change(&records.train[0]) else {
+                return (self, false);
+            };
+            if change <= STEP_ERROR * self.holdout_rms() {
+                break;
+            }
+            let steps = 2 * records.substeps();
+            if steps > FINEST * coarse {
+                return (self, false);
+            }
+            records.set_substeps(steps);
+            match self.again(records) {
+                Some(finer) => self = finer,
+                None => return (self, false),
+            }
+        }
+        (self, true)
+    }
+
+    pub fn train_rms(&self) -> f64 {
+        rms(&self.train)
+    }
+
+    pub fn holdout_rms(&self) -> f64 {
+        rms(&self.holdout)
+    }
+
+    /// Errors in the printed unit.
+    pub fn errors(&self) -> RmsErrors {
+        let unit = self.fitted.structure.context.units.per_printed;
+        RmsErrors {
+            train_rms: self.train_rms() / unit,
+            holdout_rms: self.holdout_rms() / unit,
+        }
+    }
+
+    /// Mean square on the held-out records above that of the noise.
+    pub fn excess_power(&self, noise_rms: f64) -> f64 {
+        self.holdout_rms().powi(2) - noise_rms.powi(2)
+    }
+
+    /// All held-out residuals, one after the other.
+    pub fn holdout_samples(&self) -> Vec<f64> {
+        let all = self.holdout.iter().map(|r| r.samples.as_slice());
+        all.collect::<Vec<_>>().concat()
+    }
+
+    /// Number of parameters, amplitudes of lines included.
+    pub fn parameter_count(&self) -> usize {
+        let (_, terms) = self.fitted.structure.model(&self.fitted.values);
+        self.fitted.values.len()
+            + self.fitted.amplitudes.len()
+            + terms.drift_half_waves
+            + terms.decays_per_s.len()
+    }
+
+    /// An essential parameter of the last effect that does not differ significantly from zero.
+    pub fn insignificant_parameter(&self) -> Option<&'static str> {
+        let fitted = &self.fitted;
+        let last = fitted.structure.effects.last()?;
+        let first = fitted.values.len() - last.moved();
+        let is_zero = |k: usize| {
+            let std = fitted.std[first + k].unwrap_or(0.0);
+            fitted.values[first + k] <= SIGNIFICANT * std
+        };
+        let own = last.form.parameters.iter().take(last.moved()).enumerate();
+        own.filter(|(_, p)| p.essential)
+            .find(|(k, _)| is_zero(*k))
+            .map(|(_, p)| p.name)
+    }
+
+    /// Comparison with another model on the held-out records.
+    pub fn against(&self, before: &Self) -> Comparison {
+        compare(&before.holdout_samples(), &self.holdout_samples())
+    }
+
+    /// Bayesian information criterion on the training records, less a constant: smaller is better
+    /// (G. Schwarz, Ann. Stat. 6 (1978), 461).
+    pub fn criterion(&self) -> f64 {
+        let (fit, n) = likelihood(&self.train);
+        fit + self.parameter_count() as f64 * n.ln()
+    }
+
+    /// The same on all records.
+    pub fn pooled_criterion(&self) -> f64 {
+        let ((train, n), (holdout, m)) = (likelihood(&self.train), likelihood(&self.holdout));
+        train + holdout + self.parameter_count() as f64 * (n + m).ln()
+    }
+
+    pub fn effects(&self) -> Vec<&'static Effect> {
+        let effects = self.fitted.structure.effects.iter();
+        effects.map(|e| e.effect).collect()
+    }
+
+    pub fn effect_names(&self) -> Vec<&'static str> {
+        self.effects().iter().map(|e| e.name).collect()
+    }
+
+    /// Natural frequency in Hz, damping ratio and static gain of the plain stand in the model.
+    pub fn constants(&self) -> [Estimate; 3] {
+        let fitted = &self.fitted;
+        let plain = fitted.stand();
+        let values = [plain.natural_hz, plain.damping_ratio, plain.gain];
+        let count = fitted.structure.context.plain_count();
+        std::array::from_fn(|k| {
+            // The fit moves multiples of the constants.
+            let moved = fitted.values[..count].get(k).zip(fitted.std.get(k));
+            let std = moved.and_then(|(v, std)| std.map(|std| std * (values[k] / v).abs()));
+            Estimate::of(["Hz", "", ""][k], values[k], std)
+        })
+    }
+
+    /// Parameters of each effect of the model.
+    pub fn parameters(&self) -> Vec<Vec<EffectParameter>> {
+        let fitted = &self.fitted;
+        let context = &fitted.structure.context;
+        let mut next = context.plain_count();
+        let mut amplitudes = fitted.amplitudes.iter();
+        let effects = fitted.structure.effects.iter();
+        let values = fitted.structure.effect_values(&fitted.values);
+        let of_effect = |(effect, mut values): (&super::structure::EffectForm, Vec<f64>)| {
+            let moved = effect.moved();
+            for (value, amplitude) in values[moved..].iter_mut().zip(&mut amplitudes) {
+                *value = *amplitude;
+            }
+            let own = effect.form.parameters.iter().zip(values).enumerate();
+            let own = own.map(|(k, (parameter, value))| {
+                let std = fitted.std.get(next + k).copied().flatten();
+                let std = std.filter(|_| k < moved);
+                let std = std.map(|s| parameter.std(fitted.values[next + k], s, &context.scales));
+                let unit = parameter.unit.text(&context.units.diagnosed);
+                EffectParameter {
+                    effect: effect.effect.name,
+                    name: parameter.name,
+                    estimate: Estimate::of(unit, value, std),
+                }
+            });
+            let own = own.collect();
+            next += moved;
+            own
+        };
+        effects.zip(values).map(of_effect).collect()
+    }
+
+    /// Parameters of the last effect.
+    pub fn last_parameters(&self) -> Vec<EffectParameter> {
+        self.parameters().pop().unwrap_or_default()
+    }
+}
+
+/// `n ln s²`, twice the negative log-likelihood of normal residuals less a constant, and `n`.
+fn likelihood(residuals: &[RecordResidual]) -> (f64, f64) {
+    let n = residuals.iter().map(|r| r.samples.len()).sum::<usize>() as f64;
+    (2.0 * n * rms(residuals).ln(), n)
+}
+
+fn rms(residuals: &[RecordResidual]) -> f64 {
+    let count: usize = residuals.iter().map(|r| r.samples.len()).sum();
+    let sum: f64 = residuals.iter().map(|r| dot(&r.samples, &r.samples)).sum();
+    (sum / count as f64).sqrt()
+}
+
+impl FittedModel {
+    /// Rms by which a training record changes with half the step of integration.
+    fn step_change(&self, first: &StandRecord) -> Option<f64> {
+        let (mut model, _) = self.structure.model(&self.values);
+        let mut record = first.starting_from(*self.initial.first()?);
+        model.shift = record.initial.preload;
+        let coarse = raw_residual(&model, &record).ok()?;
+        record.input = Arc::new(record.input.with_substeps(2 * record.input.substeps()));
+        let fine = raw_residual(&model, &record).ok()?;
+        let sum: f64 = coarse.iter().zip(&fine).map(|(a, b)| (a - b).powi(2)).sum();
+        Some((sum / coarse.len() as f64).sqrt())
+    }
+}
+
+/// A model to which effects are added, with the slopes of its residuals.
+pub struct BaseModel {
+    pub scored: ScoredModel,
+    /// For each training record, the derivatives of the residual with respect to the parameters.
+    pub slopes: Vec<Columns>,
+    /// For each training record, what belongs to it.
+    pub nuisance: Vec<Nuisance>,
+}
+
+/// Relative step of the differences.
+const STEP: f64 = 1e-6;
+
+impl BaseModel {
+    pub fn of(scored: ScoredModel, records: &Records) -> Self {
+        let fitted = &scored.fitted;
+        let training = fitted.with_initial_states(&records.train);
+        let (slopes, nuisance) = training.iter().map(|r| slopes(fitted, r)).unzip();
+        Self {
+            scored,
+            slopes,
+            nuisance,
+        }
+    }
+}
+
+/// Derivatives of a record's residual with respect to the parameters, and the nuisance terms removed from it.
+fn slopes(fitted: &FittedModel, record: &StandRecord) -> (Columns, Nuisance) {
+    let reference = fitted.structure.context.plain.mode();
+    let nuisance = record.nuisance(&reference, &NuisanceTerms::NONE, None);
+    let at = |values: &[f64]| {
+        let (model, _) = fitted.structure.model(values);
+        let mut residual = raw_residual(&model, record).ok()?;
+        nuisance.clear(&mut residual);
+        Some(residual)
+    };
+    let mut slopes = Columns::default();
+    if let Some(here) = at(&fitted.values) {
+        for k in 0..fitted.values.len() {
+            let mut values = fitted.values.clone();
+            let step = STEP * values[k].abs().max(1e-3);
+            values[k] += step;
+            if let Some(there) = at(&values) {
+                let pairs = there.iter().zip(&here);
+                slopes.push(pairs.map(|(a, b)| (a - b) / step).collect());
+            }
+        }
+    }
+    (slopes, nuisance)
+}
