@@ -90,6 +90,12 @@ impl From<torqcomp_dsp::Error> for Failure {
     }
 }
 
+impl From<torqcomp_model::fit::FitError> for Failure {
+    fn from(error: torqcomp_model::fit::FitError) -> Self {
+        Self::failed(error)
+    }
+}
+
 /// The known name nearest to a wrong one, as a sentence for the end of a message.
 #[must_use]
 pub fn did_you_mean<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str>) -> String {

@@ -88,6 +88,22 @@ pub fn value_and_std(value: f64, std: f64) -> [String; 2] {
     [text(value), text(std)]
 }
 
+/// A count with its noun, which takes an s (or es) behind any number but one.
+///
+/// ```
+/// use torqcomp::print::plural;
+/// assert_eq!(plural(1, "mode"), "1 mode");
+/// assert_eq!(plural(2, "stretch"), "2 stretches");
+/// ```
+#[must_use]
+pub fn plural(count: usize, noun: &str) -> String {
+    match (count, noun.ends_with("ch")) {
+        (1, _) => format!("1 {noun}"),
+        (_, true) => format!("{count} {noun}es"),
+        (_, false) => format!("{count} {noun}s"),
+    }
+}
+
 /// A unit for people, also where a file says none.
 #[must_use]
 pub fn unit_or_as_recorded(unit: &str) -> &str {

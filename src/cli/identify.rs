@@ -2,9 +2,11 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, Subcommand, ValueEnum};
+use clap::{Args, Subcommand};
 
 use super::{Reading, Result, Units, range};
+use crate::identify::Motion;
+use crate::identify::response::Excitation;
 
 /// Arguments of `identify`.
 #[derive(Debug, Args)]
@@ -14,49 +16,49 @@ pub struct Identify {
     pub test: Test,
 }
 
-/// Tests that constants follow from.
+/// Tests that give constants.
 #[derive(Debug, Subcommand)]
 pub enum Test {
-    /// Frequencies and damping from a free decay after a step or an impulse
+    /// Frequencies and damping from a free decay after a step or a hit
     Decay(Decay),
-    /// Modes from a known input and the measured output
+    /// Modes from a known input and the measured response
     Response(Response),
-    /// Inertia and friction from the motion of the free body under a known torque
+    /// Inertia and friction from the motion of a free body under a known torque
     Runup(Runup),
     /// Sensitivity and zero from known loads
     Static(Static),
 }
 
-/// Where the findings go: the stand file of `-o` is written, or updated if it is there.
+/// Output: the stand file of `-o` is written, or updated if it exists.
 #[derive(Debug, Args)]
 pub struct Findings {
     /// The stand file.
     #[command(flatten)]
     pub result: Result,
-    /// Stand file to take declared values from [default: that of -o, if it is there]
+    /// Stand file with declared constants [default: that of -o, if it exists]
     #[arg(long, value_name = "FILE")]
     pub stand: Option<PathBuf>,
-    /// Units of the printed values
+    /// Units of printed values
     #[arg(long, value_enum, default_value = "si")]
     pub units: Units,
     /// Print JSON instead of text
     #[arg(long)]
     pub json: bool,
-    /// Write a page with the fit, the residual and the constants
+    /// Write an HTML page with the fit, the residual and the constants
     #[arg(long, value_name = "FILE")]
     pub html: Option<String>,
-    /// End with code 3 if there are warnings
+    /// Exit with code 3 if there are warnings
     #[arg(long)]
     pub strict: bool,
 }
 
-/// One constant that is known otherwise; without one, that of the stand file.
+/// A constant known from elsewhere; by default, that of the stand file.
 #[derive(Debug, Args)]
 pub struct Anchors {
-    /// Inertia, known otherwise: stiffness and damping then follow
+    /// Known inertia, from which stiffness and damping follow
     #[arg(long, value_name = "QUANTITY", conflicts_with = "stiffness")]
     pub inertia: Option<String>,
-    /// Stiffness, known otherwise: inertia and damping then follow
+    /// Known stiffness, from which inertia and damping follow
     #[arg(long, value_name = "QUANTITY")]
     pub stiffness: Option<String>,
 }
@@ -67,49 +69,27 @@ pub struct Decay {
     /// Recordings of free decays of one stand, or - for standard input
     #[arg(value_name = "INPUT", required = true)]
     pub inputs: Vec<String>,
-    /// Column with the signal: its heading, with or without the unit, or its number as inspect gives it
+    /// Column of the signal: its heading, with or without the unit, or its number as printed by inspect
     #[arg(long, value_name = "NAME")]
     pub channel: Option<String>,
-    /// Number of modes [default: found from the data]
+    /// Number of modes [default: chosen from the data]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=20))]
     pub modes: Option<u8>,
-    /// Part of the record to use, in seconds of its time axis
+    /// Part of the record to use, in seconds on its time axis
     #[arg(long, value_name = "FROM..TO", value_parser = range, allow_hyphen_values = true)]
     pub range: Option<(f64, f64)>,
-    /// Frequencies to look for modes at, in Hz
+    /// Frequencies of the modes, in Hz
     #[arg(long, value_name = "FROM..TO", value_parser = range)]
     pub band: Option<(f64, f64)>,
-    /// What is known otherwise.
+    /// Known constants.
     #[command(flatten)]
     pub anchors: Anchors,
-    /// How the table is read.
+    /// How the file is read.
     #[command(flatten)]
     pub reading: Reading,
-    /// Where the findings go.
+    /// Output.
     #[command(flatten)]
     pub findings: Findings,
-}
-
-/// How a stand was excited.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Excitation {
-    /// By hits, one or several a record
-    Impact,
-    /// By noise
-    Random,
-    /// By the same signal again and again
-    Periodic,
-}
-
-/// What the measured channel is of the motion.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Measured {
-    /// Displacement, angle, strain, or torque of the beam
-    Displacement,
-    /// Speed
-    Speed,
-    /// Acceleration
-    Acceleration,
 }
 
 /// Arguments of `identify response`.
@@ -118,41 +98,41 @@ pub struct Response {
     /// Recordings of one stand
     #[arg(value_name = "INPUT", required = true)]
     pub inputs: Vec<String>,
-    /// Column with what acted: hammer force, exciter force, known torque; or the signal of an MCAP
-    /// file, as '/joint_states.effort[name=motor]'
+    /// Column of the excitation: hammer force, exciter force, known torque; or the signal of an MCAP file, such as
+    /// '/joint_states.effort[name=motor]'
     #[arg(long, value_name = "NAME")]
     pub applied: String,
-    /// Column with what was measured, or the signal of an MCAP file
+    /// Column of the response, or the signal of an MCAP file
     #[arg(long, value_name = "NAME")]
     pub measured: String,
-    /// What the measured channel is [default: by its unit]
+    /// Quantity of the measured channel [default: from its unit]
     #[arg(long, value_enum)]
-    pub measured_as: Option<Measured>,
-    /// How the stand was excited [default: found from the data]
+    pub measured_as: Option<Motion>,
+    /// How the stand was excited [default: detected from the data]
     #[arg(long, value_enum)]
     pub excitation: Option<Excitation>,
     /// Frequencies to fit, in Hz [default: where the excitation has power]
     #[arg(long, value_name = "FROM..TO", value_parser = range)]
     pub band: Option<(f64, f64)>,
-    /// Number of modes [default: found on data held out]
+    /// Number of modes [default: chosen by the error on held-out data]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=40))]
     pub modes: Option<u8>,
-    /// Period of a periodic excitation, in samples [default: found from the data]
+    /// Period of a periodic excitation, in samples [default: detected from the data]
     #[arg(long, value_name = "N")]
     pub period: Option<usize>,
-    /// Length of a segment of random data, in samples [default: from the length of the record]
+    /// Length of a segment of noise, in samples [default: from the length of the record]
     #[arg(long, value_name = "N")]
     pub segment: Option<usize>,
-    /// Fit a delay of the measured channel too
+    /// Also fit a delay of the measured channel
     #[arg(long)]
     pub delay: bool,
-    /// What is known otherwise.
+    /// Known constants.
     #[command(flatten)]
     pub anchors: Anchors,
-    /// How the table is read.
+    /// How the file is read.
     #[command(flatten)]
     pub reading: Reading,
-    /// Where the findings go.
+    /// Output.
     #[command(flatten)]
     pub findings: Findings,
 }
@@ -163,34 +143,34 @@ pub struct Runup {
     /// Recording of the run
     #[arg(value_name = "INPUT")]
     pub input: String,
-    /// Column with the position, speed or acceleration
+    /// Column of the position, speed or acceleration
     #[arg(long, value_name = "NAME")]
     pub motion: String,
-    /// Unit of the motion, if its heading does not say: rad, rpm, m, m/s^2
+    /// Unit of the motion, if its heading does not give it: rad, rpm, m, m/s^2
     #[arg(long, value_name = "UNIT")]
     pub motion_unit: Option<String>,
-    /// Column with the torque or force
+    /// Column of the torque or force
     #[arg(long, value_name = "NAME")]
     pub torque: String,
-    /// Unit of the torque or force, if its heading does not say
+    /// Unit of the torque or force, if its heading does not give it
     #[arg(long, value_name = "UNIT")]
     pub torque_unit: Option<String>,
-    /// Torque or force for one unit of its channel, such as "35.15 N/V"
+    /// Torque or force per unit of its channel, such as "35.15 N/V"
     #[arg(long, value_name = "QUANTITY", allow_hyphen_values = true)]
     pub torque_factor: Option<String>,
-    /// Radius at which a force drives a turning body
+    /// Radius at which a force drives a rotating body
     #[arg(long, value_name = "QUANTITY")]
     pub radius: Option<String>,
     /// Let viscous friction differ by direction
     #[arg(long)]
     pub by_direction: bool,
-    /// Half of the averaging window, in seconds [default: found from the data]
+    /// Half of the averaging window, in seconds [default: chosen from the data]
     #[arg(long, value_name = "S")]
     pub window: Option<f64>,
-    /// How the table is read.
+    /// How the file is read.
     #[command(flatten)]
     pub reading: Reading,
-    /// Where the findings go.
+    /// Output.
     #[command(flatten)]
     pub findings: Findings,
 }
@@ -198,40 +178,40 @@ pub struct Runup {
 /// Arguments of `identify static`.
 #[derive(Debug, Args)]
 pub struct Static {
-    /// Table of loads and readings, a row each, in the order they were taken
+    /// Table of loads and readings, one row each, in the order in which they were taken
     #[arg(value_name = "INPUT")]
     pub input: String,
-    /// Column with the load
+    /// Column of the load
     #[arg(long, value_name = "NAME")]
     pub load: String,
-    /// Unit of the load, if its heading does not say
+    /// Unit of the load, if its heading does not give it
     #[arg(long, value_name = "UNIT")]
     pub load_unit: Option<String>,
     /// Radius at which a load given as a force acts
     #[arg(long, value_name = "QUANTITY")]
     pub radius: Option<String>,
-    /// Column with the reading
+    /// Column of the reading
     #[arg(long, value_name = "NAME")]
     pub reading: String,
-    /// Unit of the reading, if its heading does not say
+    /// Unit of the reading, if its heading does not give it
     #[arg(long, value_name = "UNIT")]
     pub reading_unit: Option<String>,
-    /// Column with the standard uncertainty of each reading, in the unit of the reading
+    /// Column of the standard uncertainty of each reading, in the unit of the reading
     #[arg(long, value_name = "NAME")]
     pub std: Option<String>,
-    /// Column that numbers the series [default: a new one after each return to no load]
+    /// Column with the number of the series [default: a new one after each return to no load]
     #[arg(long, value_name = "NAME")]
     pub series: Option<String>,
-    /// Column that numbers the mounting positions
+    /// Column with the number of the mounting position
     #[arg(long, value_name = "NAME")]
     pub position: Option<String>,
-    /// Highest power of the load
+    /// Degree of the curve
     #[arg(long, value_name = "1|3", default_value = "1", value_parser = degree)]
     pub degree: usize,
-    /// How the table is read.
+    /// How the file is read.
     #[command(flatten)]
     pub table: Reading,
-    /// Where the findings go.
+    /// Output.
     #[command(flatten)]
     pub findings: Findings,
 }

@@ -1,126 +1,256 @@
 //! Constants of a stand from records of it: signals from `dsp`, fits from `model`, joined here.
 
-pub mod anchored;
 pub mod decay;
-pub mod plain;
+mod mode;
+mod motion;
+mod present;
 pub mod response;
 pub mod runup;
 pub mod static_load;
 
-use torqcomp_model::fit::FitError;
+use serde::Serialize;
+use torqcomp_model::{Covariance, Estimate, Estimates, Kind, Measure, UnitSystem};
 
-use crate::failure::Failure;
 use crate::report::chart::Chart;
 use crate::warning::Warning;
+pub use mode::{KnownConstant, ModalPole, Pole};
+pub use motion::Motion;
 
-/// A number that was found, with what is known of it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Found {
-    /// Stable name, such as `inertia`.
+/// Schema of the JSON document.
+const SCHEMA: &str = "torqcomp.identify/1";
+
+/// A number with a stable name, such as `inertia`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NamedEstimate {
+    /// The name.
     pub name: String,
-    /// Its value in the unit.
-    pub value: f64,
-    /// Standard uncertainty in the unit, if the data tell one.
-    pub std: Option<f64>,
-    /// Its unit as text; empty for a ratio.
-    pub unit: String,
+    /// Value, standard uncertainty and unit.
+    #[serde(flatten)]
+    pub estimate: Estimate,
 }
 
-impl Found {
-    /// A number with its uncertainty.
-    #[must_use]
-    pub fn new(
+/// Kinds whose unit depends on the unit system.
+const CONVERTED: [Kind; 9] = [
+    Kind::Inertia,
+    Kind::AngularDamping,
+    Kind::AngularStiffness,
+    Kind::Torque,
+    Kind::Force,
+    Kind::Mass,
+    Kind::TorquePerVolt,
+    Kind::Length,
+    Kind::Frequency,
+];
+
+impl NamedEstimate {
+    fn new(
         name: impl Into<String>,
+        unit: impl Into<Measure>,
         value: f64,
         std: Option<f64>,
-        unit: impl Into<String>,
     ) -> Self {
         Self {
             name: name.into(),
-            value,
-            std,
-            unit: unit.into(),
+            estimate: Estimate::of(unit, value, std.filter(|std| std.is_finite())),
+        }
+    }
+
+    /// The value, in the constant's unit.
+    #[must_use]
+    pub fn value(&self) -> f64 {
+        self.estimate.value()
+    }
+
+    /// The standard uncertainty; `None` if the data do not determine it.
+    #[must_use]
+    pub fn std(&self) -> Option<f64> {
+        self.estimate.std_uncertainty()
+    }
+
+    /// Converts from SI units.
+    fn convert(&mut self, units: UnitSystem) {
+        let is_of = |kind: &&Kind| kind.unit(UnitSystem::Si) == self.estimate.unit();
+        if let Some(kind) = CONVERTED.iter().find(is_of) {
+            let factor = kind.difference_to(units, 1.0);
+            let std = self.std().map(|std| std * factor);
+            self.estimate = Estimate::of(kind.unit(units), self.value() * factor, std);
         }
     }
 }
 
-/// How well a model follows the data.
+/// Named estimates with the covariance of their errors.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Quality {
-    /// Root mean square of what is left, in the unit.
+pub struct NamedEstimates {
+    /// The constants.
+    pub list: Vec<NamedEstimate>,
+    covariance: Covariance,
+}
+
+impl NamedEstimates {
+    /// The numbers with their names and units.
+    fn new(names: &[(&str, &'static str)], numbers: &Estimates) -> Self {
+        let constant = |(i, (name, unit)): (usize, &(&str, &'static str))| {
+            NamedEstimate::new(
+                *name,
+                *unit,
+                numbers.values()[i],
+                numbers.covariance().std(i),
+            )
+        };
+        Self {
+            list: names.iter().enumerate().map(constant).collect(),
+            covariance: numbers.covariance().clone(),
+        }
+    }
+
+    /// Those with these names, in this order; each behind the prefix.
+    pub(crate) fn only(mut self, names: &[&str], prefix: &str) -> Self {
+        let place = |name: &&str| self.list.iter().position(|c| c.name == **name);
+        let places: Vec<usize> = names.iter().filter_map(place).collect();
+        let renamed = |i: &usize| NamedEstimate {
+            name: format!("{prefix}{}", self.list[*i].name),
+            ..self.list[*i].clone()
+        };
+        self.list = places.iter().map(renamed).collect();
+        self.covariance = self.covariance.select(&places);
+        self
+    }
+
+    /// Pairs with a correlation of at least [`STRONG`].
+    pub(crate) fn correlations(&self) -> Vec<Correlation> {
+        let names: Vec<&str> = self.list.iter().map(|c| c.name.as_str()).collect();
+        correlations(&names, &self.covariance)
+    }
+}
+
+/// How well a model follows the data.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FitQuality {
+    /// Root mean square of the residual, in the unit.
     pub rms: f64,
-    /// Its unit.
+    /// The unit.
     pub unit: String,
-    /// The same as a part of the root mean square of the data.
+    /// `rms` over the root mean square of the data.
     pub relative: f64,
 }
 
-/// What one way of evaluating a record says, beside the main one.
-#[derive(Debug, Clone, PartialEq)]
+/// Result of another method on the same record.
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
-    /// The method, for people.
+    /// The method.
     pub method: String,
-    /// Its numbers.
-    pub found: Vec<Found>,
-    /// How well it follows the data, if it says.
-    pub quality: Option<Quality>,
+    /// Its results.
+    pub parameters: Vec<NamedEstimate>,
+    /// How well it follows the data, if it predicts them.
+    pub fit: Option<FitQuality>,
 }
 
-/// Two parameters that the data tell apart only weakly.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Correlated {
-    /// The one.
+/// Two parameters that these data hardly separate.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Correlation {
+    /// Name of the one.
     pub first: String,
-    /// The other.
+    /// Name of the other.
     pub second: String,
-    /// Their correlation coefficient.
+    /// Correlation coefficient.
     pub coefficient: f64,
 }
 
-/// Correlations from this size on are said.
-pub const STRONG: f64 = 0.95;
+/// Smallest correlation that is reported.
+const STRONG: f64 = 0.95;
 
-/// What an evaluation of records comes to, whatever the test was.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Outcome {
-    /// The numbers, the main ones first.
-    pub found: Vec<Found>,
-    /// How well the model follows the data.
-    pub quality: Option<Quality>,
-    /// What other methods say.
-    pub comparisons: Vec<Comparison>,
-    /// Pairs that are hard to tell apart.
-    pub correlated: Vec<Correlated>,
-    /// How it was done, for people, a sentence each.
-    pub method: Vec<String>,
-    /// What a user should know.
-    pub warnings: Vec<Warning>,
-    /// Data, fit and residual, to be drawn.
-    pub charts: Vec<Chart>,
+/// Pairs with a correlation of at least [`STRONG`].
+fn correlations(names: &[&str], covariance: &Covariance) -> Vec<Correlation> {
+    let pairs = (0..names.len()).flat_map(|i| (i + 1..names.len()).map(move |j| (i, j)));
+    let strong = |(i, j)| {
+        let coefficient = covariance.correlation(i, j)?;
+        (coefficient.abs() >= STRONG).then(|| Correlation {
+            first: names[i].to_owned(),
+            second: names[j].to_owned(),
+            coefficient,
+        })
+    };
+    pairs.filter_map(strong).collect()
 }
 
-impl Outcome {
-    /// A number by its name.
-    #[must_use]
-    pub fn get(&self, name: &str) -> Option<&Found> {
-        self.found.iter().find(|found| found.name == name)
+/// The result of an identification; serialises to the JSON document.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Identification {
+    /// Schema of the document.
+    pub schema: &'static str,
+    /// Version of torqcomp.
+    pub version: &'static str,
+    /// `decay`, `response`, `runup` or `static`.
+    pub test: &'static str,
+    /// Files that were read.
+    pub inputs: Vec<String>,
+    /// Samples read.
+    pub samples: usize,
+    /// Sampling rate; `None` for a table of loads.
+    pub rate_hz: Option<f64>,
+    /// The constants, the main ones first.
+    pub parameters: Vec<NamedEstimate>,
+    /// How well the model follows the data.
+    pub fit: Option<FitQuality>,
+    /// Results of other methods.
+    pub comparisons: Vec<Comparison>,
+    /// Parameters that these data hardly separate.
+    pub correlations: Vec<Correlation>,
+    /// Laws of damping, the best first (`decay` with one mode).
+    pub laws: Vec<decay::LawFit>,
+    /// Terms of the calibration standards (`static`).
+    pub terms: Vec<static_load::Term>,
+    /// Relative hold-out error with 0, 1, 2, … modes (`response`); NaN, which becomes `null`, where it was not tried.
+    pub held_out_errors: Vec<f64>,
+    /// The method, a sentence each.
+    pub method: Vec<String>,
+    /// The warnings.
+    pub warnings: Vec<Warning>,
+    /// Data, fit and residual, for the HTML page.
+    #[serde(skip)]
+    pub(crate) charts: Vec<Chart>,
+    /// The modes (`decay`: by falling energy; `response`: by rising frequency).
+    #[serde(skip)]
+    pub modes: Vec<ModalPole>,
+}
+
+impl Identification {
+    fn new(test: &'static str) -> Self {
+        Self {
+            schema: SCHEMA,
+            version: env!("CARGO_PKG_VERSION"),
+            test,
+            ..Self::default()
+        }
     }
 
-    /// Notes a warning.
-    pub fn warn(&mut self, code: &'static str, message: impl Into<String>) {
+    /// A parameter by its name.
+    #[must_use]
+    pub fn get(&self, name: &str) -> Option<&NamedEstimate> {
+        self.parameters.iter().find(|c| c.name == name)
+    }
+
+    /// Adds a warning.
+    pub(crate) fn warn(&mut self, code: &'static str, message: impl Into<String>) {
         self.warnings.push(Warning::new(code, message));
     }
-}
 
-impl From<FitError> for Failure {
-    fn from(error: FitError) -> Self {
-        Self::failed(error)
+    /// Adds constants, and which of them are strongly correlated.
+    pub(crate) fn add(&mut self, constants: NamedEstimates) {
+        self.correlations.extend(constants.correlations());
+        self.parameters.extend(constants.list);
+    }
+
+    /// Converts all parameters from SI units.
+    pub(crate) fn convert(&mut self, units: UnitSystem) {
+        let compared = self.comparisons.iter_mut().flat_map(|c| &mut c.parameters);
+        let all = self.parameters.iter_mut().chain(compared);
+        all.for_each(|constant| constant.convert(units));
     }
 }
 
-/// Root of the mean square; 0 for nothing.
-#[must_use]
-pub fn rms(values: &[f64]) -> f64 {
+/// Root of the mean square; 0 for no values.
+fn rms(values: &[f64]) -> f64 {
     if values.is_empty() {
         return 0.0;
     }

@@ -5,7 +5,6 @@ pub mod compensate;
 pub mod diagnose;
 pub mod diagnose_page;
 pub mod harmonics;
-pub mod identify;
 pub mod inspect;
 pub mod page;
 pub mod panels;

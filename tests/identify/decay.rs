@@ -1,19 +1,19 @@
 //! Decays: how exact they are, how often the intervals hold the truth, modes and laws of damping.
 
 use nalgebra::DMatrix;
-use torqcomp::identify::decay;
+use torqcomp::identify::{Identification, decay};
 
 use super::{Coverage, Noise, TAU, of, times};
 use crate::util::assert_close;
 
-fn ring(times_s: &[f64], values: &[f64], rate_hz: f64) -> decay::Evaluated {
+fn ring(times_s: &[f64], values: &[f64], rate_hz: f64) -> (Identification, Vec<decay::Stretch>) {
     let record = decay::Ringing {
         name: "simulated",
         times_s,
         rate_hz: Some(rate_hz),
         values,
     };
-    decay::identify(&[record], &decay::Options::default()).unwrap()
+    decay::identify(&[record], &decay::DecayOptions::default()).unwrap()
 }
 
 /// The stand of figure 5: 1.7 ms a cycle, from 2 to 0.5 in 5.3 ms.
@@ -51,15 +51,15 @@ fn intervals_of_decays_cover_the_truth() {
                 rate_hz: Some(rate_hz),
                 values: &y,
             };
-            let options = decay::Options {
+            let options = decay::DecayOptions {
                 band_hz,
                 modes: band_hz.map(|_| 1),
                 ..Default::default()
             };
-            let found = decay::identify(&[record], &options).unwrap();
-            assert_eq!(found.fit.poles.len(), 1, "at {decibel} dB");
-            covered[0].count(of(&found.outcome, "natural_frequency"), natural / TAU);
-            covered[1].count(of(&found.outcome, "damping_ratio"), sigma() / natural);
+            let (found, _) = decay::identify(&[record], &options).unwrap();
+            assert_eq!(found.modes.len(), 1, "at {decibel} dB");
+            covered[0].count(of(&found, "natural_frequency"), natural / TAU);
+            covered[1].count(of(&found, "damping_ratio"), sigma() / natural);
         }
         covered[0].check(&format!("decays, frequency, band {band_hz:?}"));
         covered[1].check(&format!("decays, damping, band {band_hz:?}"));
@@ -111,15 +111,15 @@ impl Stand {
     /// Errors of frequency and damping ratio over the true ones, and of the bounds of both.
     fn errors(&self, noise: &mut Noise) -> ([f64; 2], [f64; 2]) {
         let (t, y) = self.record(noise);
-        let found = ring(&t, &y, self.rate_hz);
-        assert_eq!(found.stretches.len(), self.decays as usize);
+        let (found, stretches) = ring(&t, &y, self.rate_hz);
+        assert_eq!(stretches.len(), self.decays as usize);
         let natural = self.omega.hypot(self.sigma);
-        let frequency = of(&found.outcome, "damped_frequency").value * TAU / self.omega - 1.0;
-        let ratio = of(&found.outcome, "damping_ratio").value * natural / self.sigma - 1.0;
+        let frequency = of(&found, "damped_frequency").value() * TAU / self.omega - 1.0;
+        let ratio = of(&found, "damping_ratio").value() * natural / self.sigma - 1.0;
         // Each stretch begins where the fit lets it begin; decays add their information.
         let (mut of_frequency, mut of_rate) = (0.0, 0.0);
-        for (start, stretch) in found.starts_s.iter().zip(&found.stretches) {
-            let late = start % self.length_s;
+        for stretch in &stretches {
+            let late = stretch.start_s % self.length_s;
             let amplitude = 2.0 * (-self.sigma * late).exp();
             let truth = (amplitude, self.sigma, self.omega);
             let (frequency, rate) = least_std(&stretch.times_s, truth, 0.02);
@@ -194,15 +194,15 @@ fn several_modes_and_hits_are_found() {
         .iter()
         .map(|t| hit(t - 0.02, 1.0) + hit(t - 0.3, 0.7) + 0.01 * t + 1e-3 * noise.normal())
         .collect();
-    let found = ring(&t, &y, rate_hz);
-    assert_eq!((found.fit.poles.len(), found.stretches.len()), (2, 2));
+    let (found, stretches) = ring(&t, &y, rate_hz);
+    assert_eq!((found.modes.len(), stretches.len()), (2, 2));
     for (name, want, within) in [
         ("mode_1_damped_frequency", 590.0, 2e-4),
         ("mode_1_decay_rate", 80.0, 1e-2),
         ("mode_2_damped_frequency", 1480.0, 2e-4),
         ("mode_2_decay_rate", 120.0, 2e-2),
     ] {
-        assert_close(of(&found.outcome, name).value, want, within);
+        assert_close(of(&found, name).value(), want, within);
     }
 }
 
@@ -216,25 +216,18 @@ fn the_law_of_damping_is_told() {
             .iter()
             .map(|t| envelope(*t) * (TAU * 120.0 * t).cos() + 2e-3 * noise.normal())
             .collect();
-        ring(&t, &y, rate_hz)
+        ring(&t, &y, rate_hz).0
     };
     let dry = law(&|t| (1.0 - 3.0 * t).max(0.0));
     assert_eq!(dry.laws[0].law, decay::Law::Dry);
-    assert!(dry.outcome.warnings.iter().any(|w| w.code == "not-viscous"));
+    assert!(dry.warnings.iter().any(|w| w.code == "not-viscous"));
     let drag = law(&|t| 1.0 / (1.0 + 20.0 * t));
     assert_eq!(drag.laws[0].law, decay::Law::Quadratic);
     let viscous = law(&|t| (-12.0 * t).exp());
-    assert!(
-        !viscous
-            .outcome
-            .warnings
-            .iter()
-            .any(|w| w.code == "not-viscous")
-    );
+    assert!(!viscous.warnings.iter().any(|w| w.code == "not-viscous"));
     let both = law(&|t| ((1.0 + 0.1) * (-6.0 * t).exp() - 0.1).max(0.0));
     assert!(
-        both.outcome
-            .warnings
+        both.warnings
             .iter()
             .any(|w| w.code == "amplitude-dependent" || w.code == "not-viscous")
     );

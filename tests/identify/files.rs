@@ -151,7 +151,7 @@ fn what_cannot_be_identified_is_said() {
     folder.write("flat.csv", format!("time_s,gage_V\n{flat}"));
     folder
         .run(&["identify", "decay", "flat.csv"])
-        .says(1, &["does not swing"]);
+        .says(1, &["no free decay found"]);
     folder
         .run(&["identify", "decay", "none.csv"])
         .says(1, &["none.csv", "check the path"]);
@@ -258,7 +258,7 @@ fn loads_and_runs_of_nonsense_are_refused() {
             reading,
         ])
     };
-    loads("flat.csv", "weight", "bridge").says(1, &["same under every load"]);
+    loads("flat.csv", "weight", "bridge").says(1, &["does not change with load"]);
     loads("wild.csv", "bridge", "weight").says(2, &["swapped"]);
     loads("wild.csv", "weight", "bridge").says(0, &["poor-fit"]);
     // An angle of the wrong sign.
@@ -278,5 +278,5 @@ fn loads_and_runs_of_nonsense_are_refused() {
     folder.run(&args).says(0, &["impossible"]);
     folder
         .run(&[&args[..], &["-o", "new.toml"]].concat())
-        .says(1, &["inertia came out as -", "check the sign"]);
+        .says(1, &["inertia is negative (-", "check the sign"]);
 }

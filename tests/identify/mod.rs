@@ -8,7 +8,7 @@ mod runup;
 mod static_load;
 
 use serde_json::Value;
-use torqcomp::identify::{Found, Outcome};
+use torqcomp::identify::{Identification, NamedEstimate};
 
 use crate::noise::Noise;
 
@@ -18,10 +18,10 @@ fn times(count: usize, rate_hz: f64) -> Vec<f64> {
     (0..count).map(|i| i as f64 / rate_hz).collect()
 }
 
-fn of<'a>(outcome: &'a Outcome, name: &str) -> &'a Found {
-    outcome
+fn of<'a>(result: &'a Identification, name: &str) -> &'a NamedEstimate {
+    result
         .get(name)
-        .unwrap_or_else(|| panic!("{name} in {:?}", outcome.found))
+        .unwrap_or_else(|| panic!("{name} in {:?}", result.parameters))
 }
 
 /// Share of true values within 1.96 standard uncertainties.
@@ -32,11 +32,11 @@ struct Coverage {
 }
 
 impl Coverage {
-    fn count(&mut self, found: &Found, truth: f64) {
+    fn count(&mut self, found: &NamedEstimate, truth: f64) {
         let std = found
-            .std
+            .std()
             .unwrap_or_else(|| panic!("{} has no uncertainty", found.name));
-        self.inside += usize::from((found.value - truth).abs() <= 1.96 * std);
+        self.inside += usize::from((found.value() - truth).abs() <= 1.96 * std);
         self.all += 1;
     }
 

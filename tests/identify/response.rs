@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 use realfft::RealFftPlanner;
 use serde_json::Value;
-use torqcomp::identify::response;
+use torqcomp::identify::{Identification, response};
 
 use super::{Coverage, Noise, TAU, of, parameter};
 use crate::util::{Folder, assert_close};
@@ -45,18 +45,16 @@ fn a_mode_is_found_from_noise() {
         applied: &applied,
         measured: &measured,
     };
-    let options = response::Options {
+    let options = response::ResponseOptions {
         band_hz: Some((20.0, 150.0)),
         ..Default::default()
     };
     let found = response::identify(&[record], &options).unwrap();
-    let outcome = &found.outcome;
-    let first = found
-        .modal
-        .poles
+    let poles: Vec<_> = found.modes.iter().map(|mode| mode.pole()).collect();
+    let first = poles
         .iter()
         .find(|p| (p.omega_rad_per_s / TAU - 60.0).abs() < 0.3);
-    let pole = first.unwrap_or_else(|| panic!("{:?}", outcome.found));
+    let pole = first.unwrap_or_else(|| panic!("{:?}", found.parameters));
     assert_close(pole.rate_per_s, 0.03 * TAU * 60.0, 0.005);
 }
 
@@ -134,14 +132,14 @@ fn noisy(shown: &[f64], decibel: f64, noise: &mut Noise) -> (Vec<f64>, f64) {
     )
 }
 
-fn one_mode(applied: &[f64], measured: &[f64], how: response::Excitation) -> response::Evaluated {
+fn one_mode(applied: &[f64], measured: &[f64], how: response::Excitation) -> Identification {
     let record = response::Driven {
         name: "simulated",
         rate_hz: RATE_HZ,
         applied,
         measured,
     };
-    let options = response::Options {
+    let options = response::ResponseOptions {
         excitation: Some(how),
         band_hz: Some((20.0, 150.0)),
         modes: Some(1),
@@ -163,7 +161,7 @@ fn coverage_of(how: response::Excitation, seed: u64) -> [Coverage; 2] {
         };
         let (measured, _) = noisy(&shown, [20.0, 30.0, 40.0, 50.0, 60.0][k % 5], &mut noise);
         let found = one_mode(&applied, &measured, how);
-        let codes: Vec<&str> = found.outcome.warnings.iter().map(|w| w.code).collect();
+        let codes: Vec<&str> = found.warnings.iter().map(|w| w.code).collect();
         assert!(!codes.contains(&"leakage"), "{how:?}: {codes:?}");
         let truth = [NATURAL / TAU, RATIO];
         for ((name, truth), coverage) in ["natural_frequency", "damping_ratio"]
@@ -171,7 +169,7 @@ fn coverage_of(how: response::Excitation, seed: u64) -> [Coverage; 2] {
             .zip(truth)
             .zip(&mut covered)
         {
-            coverage.count(of(&found.outcome, name), truth);
+            coverage.count(of(&found, name), truth);
         }
     }
     covered
@@ -234,8 +232,8 @@ fn squares_at_40_decibels(
         let measured;
         (measured, std) = noisy(shown, 40.0, noise);
         let found = one_mode(applied, &measured, how);
-        let frequency = of(&found.outcome, "natural_frequency").value * TAU / NATURAL - 1.0;
-        let ratio = of(&found.outcome, "damping_ratio").value / RATIO - 1.0;
+        let frequency = of(&found, "natural_frequency").value() * TAU / NATURAL - 1.0;
+        let ratio = of(&found, "damping_ratio").value() / RATIO - 1.0;
         assert!(
             frequency.abs() < 2e-4 && ratio.abs() < 1e-2,
             "{how:?}: {frequency} {ratio}"
@@ -452,11 +450,11 @@ fn intervals_of_constants_cover_the_truth() {
         };
         let decibel = [20.0, 30.0, 40.0, 50.0, 60.0][k / 3 % 5];
         let (measured, _) = noisy(&shown, decibel, &mut noise);
-        let answer = one_mode(&applied, &measured, how).single.expect("a mode");
+        let found = one_mode(&applied, &measured, how);
         // A gain of 1 at rest: K = 1.
         let truth = [NATURAL.powi(-2), 2.0 * RATIO / NATURAL, 1.0];
-        let (found, _) = answer.constants();
-        for ((found, truth), coverage) in found.iter().zip(truth).zip(&mut covered) {
+        let found = found.modes[0].stand_constants().expect("a residue");
+        for ((found, truth), coverage) in found.list.iter().zip(truth).zip(&mut covered) {
             coverage.count(found, truth);
         }
     }

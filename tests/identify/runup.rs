@@ -1,6 +1,6 @@
 //! Run-ups: how often the intervals hold the truth. The records follow from closed forms.
 
-use torqcomp::identify::runup;
+use torqcomp::identify::{Motion, runup};
 
 use super::{Coverage, Noise, TAU, of};
 use crate::util::assert_close;
@@ -132,11 +132,11 @@ fn record(decibel: f64, noise: &mut Noise) -> (Vec<f64>, Vec<f64>) {
     (BODY.angles(&drive, &times), torques)
 }
 
-fn turning<'a>(angles: &'a [f64], torques: &'a [f64]) -> runup::Run<'a> {
-    runup::Run {
+fn turning<'a>(angles: &'a [f64], torques: &'a [f64]) -> runup::FreeRun<'a> {
+    runup::FreeRun {
         rate_hz: 1000.0,
         motion: angles,
-        kind: runup::Motion::Position,
+        kind: Motion::Displacement,
         effort: torques,
         body: runup::Body::Turning,
     }
@@ -152,11 +152,11 @@ fn coverage_at(decibel: f64, seed: u64, runs: usize) -> [Coverage; 4] {
     for _ in 0..runs {
         let (angles, torques) = record(decibel, &mut noise);
         let run = turning(&angles, &torques);
-        let found = runup::identify(&run, &runup::Options::default()).unwrap();
+        let found = runup::identify(&run, &runup::RunupOptions::default()).unwrap();
         for ((name, truth), coverage) in NAMES.iter().zip(TRUTH).zip(&mut covered) {
             coverage.count(of(&found, name), truth);
         }
-        assert_close(of(&found, "inertia").value, BODY.inertia, 0.05);
+        assert_close(of(&found, "inertia").value(), BODY.inertia, 0.05);
     }
     covered
 }
@@ -185,23 +185,27 @@ fn a_run_in_one_direction_does_not_invent_a_dry_friction() {
         .collect();
     // 2 N m = J·50 e^{−t} + f·50(1 − e^{−t}) + C with J = f = 0.03, C = 0.5.
     let torque = vec![2.0; 2000];
-    let run = runup::Run {
+    let run = runup::FreeRun {
         rate_hz: 1000.0,
         motion: &speed,
-        kind: runup::Motion::Speed,
+        kind: Motion::Speed,
         effort: &torque,
         body: runup::Body::Turning,
     };
-    let found = runup::identify(&run, &runup::Options::default());
+    let found = runup::identify(&run, &runup::RunupOptions::default());
     // Constant torque and an exponential speed satisfy θ'' + θ' = 50 throughout: only J/f follows.
     match found {
         Ok(found) => {
-            assert!(found.get("dry_friction").is_none(), "{:?}", found.found);
+            assert!(
+                found.get("dry_friction").is_none(),
+                "{:?}",
+                found.parameters
+            );
             assert!(found.warnings.iter().any(|w| w.code == "one-direction"));
-            assert!(!found.correlated.is_empty(), "{found:?}");
+            assert!(!found.correlations.is_empty(), "{found:?}");
         }
         Err(error) => assert!(
-            error.to_string().contains("cannot be told apart"),
+            error.to_string().contains("not separately identifiable"),
             "{error}"
         ),
     }

@@ -1,6 +1,6 @@
 //! Known loads.
 
-use torqcomp::identify::static_load::{Options, Point, Units, identify, series_of};
+use torqcomp::identify::static_load::{LoadUnits, Point, identify, series_of};
 
 use super::{Coverage, Noise, of, parameter};
 use crate::util::{Folder, assert_close};
@@ -72,7 +72,7 @@ fn points(decibel: f64, known: bool, noise: &mut Noise) -> Vec<Point> {
 
 #[test]
 fn intervals_of_known_loads_cover_the_truth() {
-    let units = Units {
+    let units = LoadUnits {
         load: "N m".to_owned(),
         reading: "V".to_owned(),
     };
@@ -87,9 +87,9 @@ fn intervals_of_known_loads_cover_the_truth() {
         for k in 0..400 {
             let decibel = [20.0, 30.0, 40.0, 50.0, 60.0][k % 5];
             let points = points(decibel, known, &mut noise);
-            let found = identify(&points, Options { degree: 1 }, &units).unwrap();
+            let found = identify(&points, 1, &units).unwrap();
             for ((name, truth), coverage) in names.iter().zip(&mut covered) {
-                coverage.count(of(&found.outcome, name), *truth);
+                coverage.count(of(&found, name), *truth);
             }
         }
         for ((name, _), coverage) in names.iter().zip(&covered) {

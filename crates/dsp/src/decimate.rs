@@ -1,4 +1,4 @@
-//! Fewer samples of a record whose upper frequencies hold only noise.
+//! Decimation of records whose upper frequencies are only noise.
 
 use std::f64::consts::PI;
 
@@ -6,19 +6,19 @@ use crate::Error;
 
 /// Half-length of the low-pass in samples of the result.
 const REACH: usize = 8;
-/// Corner as a part of the new rate.
+/// Corner over the new rate.
 const CORNER: f64 = 0.36;
-/// Kaiser's window for 80 dB.
+/// Shape of the Kaiser window, for 80 dB.
 const BETA: f64 = 7.9;
 
-/// Part of the new rate up to which the response is 1 within 2·10⁻⁴.
+/// Frequency, over the new rate, up to which the response is 1 within 2·10⁻⁴.
 pub const PASS: f64 = 0.2;
 
-/// Power of white noise that is left, over the power that noise of its density would have at the new
-/// rate: twice the corner over the new rate.
+/// Power of white noise after decimation, over that of white noise of the same density at the new rate: twice the corner
+/// over the new rate.
 ///
-/// Noise that was white is not afterwards: it has nothing between the corner and half the rate, so that a
-/// fit over the samples sees less of it than lies where the signal is.
+/// White noise is not white afterwards: it has no power between the corner and half the rate, so the residual of a fit
+/// shows less noise than there is at the frequencies of the signal.
 pub const NOISE: f64 = 2.0 * CORNER;
 
 /// A record at a lower rate.
@@ -28,19 +28,18 @@ pub struct Decimated {
     pub samples: Vec<f64>,
     /// Place of the first of them in the record.
     pub first: usize,
-    /// Samples of the record for one of these.
+    /// Samples of the record per sample.
     pub factor: usize,
 }
 
-/// Low-passes a record and keeps every `factor`-th sample, only where the low-pass (a sinc under
-/// Kaiser's window, symmetrical) lies within the record.
+/// Low-passes a record (symmetrical Kaiser-windowed sinc) and keeps every `factor`-th sample, where the filter lies within
+/// the record.
 ///
-/// A sum of exponentials stays a sum of exponentials with the same frequencies and decay rates, since
-/// every linear filter only changes their amplitudes; those below [`PASS`] times the new rate keep
-/// them.
+/// A sum of exponentials keeps its frequencies and decay rates, as a linear filter changes only amplitudes; below [`PASS`]
+/// times the new rate it also keeps those.
 ///
 /// # Errors
-/// [`Error::TooShort`] if not two samples would be left.
+/// [`Error::TooShort`] if fewer than two samples would remain.
 ///
 /// ```
 /// let slow: Vec<f64> = (0..1000).map(|i| (0.01 * f64::from(i)).sin()).collect();
@@ -80,7 +79,7 @@ pub fn decimate(samples: &[f64], factor: usize) -> Result<Decimated, Error> {
     })
 }
 
-/// A low-pass of 2·half + 1 taps with sum 1; the corner in cycles a sample.
+/// A low-pass of 2·half + 1 taps with sum 1; the corner in cycles per sample.
 fn taps(half: usize, corner: f64) -> Vec<f64> {
     let mut taps: Vec<f64> = (0..=2 * half)
         .map(|i| {

@@ -1,20 +1,20 @@
-//! Where a record is hit, and what rings after each hit.
+//! Onsets of free ringing in a record.
 
 use std::ops::Range;
 
-/// Blocks that a record is looked at in.
+/// Number of blocks of a record.
 const BLOCKS: usize = 400;
 /// Fewest samples of a block.
 const LEAST_BLOCK: usize = 8;
-/// A hit raises the swing of a block to this many times that of the blocks before it …
+/// Swing of a block after a hit, over that of the blocks before it …
 const RISE: f64 = 3.0;
-/// … and to this part of the largest swing in the record.
+/// … and over the largest swing in the record.
 const SIZE: f64 = 0.15;
 /// Blocks before a hit that it is compared with.
 const BEFORE: usize = 4;
 
-/// The stretches of free ringing: each begins at the largest swing after a hit and ends before the
-/// next hit or at the end. What rings from the first sample on is a stretch too.
+/// The stretches of free ringing: each begins at the largest swing after a hit and ends before the next hit or at the end.
+/// Ringing from the first sample on is a stretch, too.
 ///
 /// ```
 /// // Silence, then a decay from sample 500 on.
@@ -44,7 +44,7 @@ pub fn decays(samples: &[f64]) -> Vec<Range<usize>> {
             hits.push(i);
         }
     }
-    // What rings from the first sample on, and has died down when the first hit comes, is one more.
+    // Ringing from the first sample on is one more, if it has decayed before the first hit.
     let rings_first = hits.first().is_none_or(|hit| {
         let ended = swings[hit.saturating_sub(BEFORE)..*hit].iter();
         *hit > BEFORE
@@ -78,14 +78,14 @@ fn swing(block: &[f64]) -> f64 {
     0.5 * (high - low)
 }
 
-/// The sample farthest from where the stretch settles, within the first blocks of it.
+/// The sample farthest from the final level of the stretch, within its first blocks.
 fn peak_after(samples: &[f64], start: usize, end: usize, block: usize) -> usize {
     let tail = &samples[start + (end - start) * 3 / 4..end];
     let rest = tail.iter().sum::<f64>() / tail.len().max(1) as f64;
     let near = &samples[start..end.min(start + 2 * (BEFORE + 1) * block)];
     let far = |i: &usize| (near[*i] - rest).abs();
     let peak = (0..near.len()).max_by(|a, b| far(a).total_cmp(&far(b)));
-    // Several samples of one size: the first.
+    // The first of equal samples.
     let first = peak.and_then(|p| (0..=p).find(|i| far(i) >= far(&p)));
     start + first.unwrap_or(0)
 }

@@ -13,10 +13,10 @@ pub struct Peak {
     pub prominence: f64,
 }
 
-/// Longest transform; a longer record is cut, since a start needs no more.
+/// Longest transform; longer records are truncated, which is enough for a start.
 const LONGEST: usize = 1 << 20;
 
-/// Power at frequencies k·rate/size, the record padded to at least twice its length.
+/// Power at frequencies k·rate/size, with the record padded to at least twice its length.
 fn power(samples: &[f64]) -> (Vec<f64>, usize) {
     let used = &samples[..samples.len().min(LONGEST)];
     let size = (2 * used.len()).next_power_of_two().max(16);
@@ -30,8 +30,7 @@ fn power(samples: &[f64]) -> (Vec<f64>, usize) {
     (spectrum.iter().map(|bin| bin.norm_sqr()).collect(), size)
 }
 
-/// The strongest peak between two frequencies; `None` if the record is too short or has no power
-/// there.
+/// The strongest peak between two frequencies; `None` if the record is too short or has no power there.
 ///
 /// ```
 /// let sine: Vec<f64> = (0..1000).map(|i| (0.5 * f64::from(i)).sin()).collect();
@@ -68,8 +67,7 @@ pub fn strongest(samples: &[f64], rate_hz: f64, from_hz: f64, to_hz: f64) -> Opt
     })
 }
 
-/// Highest frequency with a peak that stands out of the noise: `share` of the strongest power and
-/// 50 times the median.
+/// Highest frequency with a significant peak: at least `share` times the power of the strongest and 50 times the median.
 #[must_use]
 pub fn highest(samples: &[f64], rate_hz: f64, share: f64) -> Option<f64> {
     if samples.len() < 8 {

@@ -1,11 +1,10 @@
 //! Derivatives averaged over a smooth window, without differences of samples.
 //!
-//! An equation such as `T = J θ'' + f θ' + C` holds at every moment, so it holds averaged with a
-//! weight φ that is zero at the ends of a window. There, integration by parts moves the derivatives
-//! from the record to the weight: `∫φ θ'' dt = ∫φ'' θ dt`. Every term of the equation sees the same
-//! weight, so that no term is damped more than another and none is shifted, unlike with filtered
-//! differences (M. Shinbrot, On the analysis of linear and nonlinear systems, Trans. ASME 79 (1957),
-//! 547, modulating functions).
+//! An equation such as `T = J θ'' + f θ' + C` holds at every moment, so it also holds averaged with a weight φ that is zero
+//! at both ends of a window. Integration by parts then moves the derivatives from the record to the weight:
+//! `∫φ θ'' dt = ∫φ'' θ dt`. All terms have the same weight, so none is attenuated or shifted relative to another, unlike with
+//! filtered differences (modulating functions: M. Shinbrot, On the analysis of linear and nonlinear systems, Trans. ASME 79
+//! (1957), 547).
 
 use crate::Error;
 
@@ -23,7 +22,7 @@ pub struct Window {
 }
 
 impl Window {
-    /// A window that reaches `half` samples to both sides.
+    /// A window of `half` samples on each side.
     ///
     /// # Errors
     /// [`Error::TooShort`] if that is fewer than 4, [`Error::NotPositive`] for the rate.
@@ -104,8 +103,7 @@ impl Window {
         if order == 1 { -sum } else { sum }
     }
 
-    /// The averages at every sample that has a whole window; the first belongs to sample
-    /// [`Window::half`].
+    /// The averages at every sample with a whole window, from sample [`Window::half`] on.
     #[must_use]
     pub fn slide(&self, samples: &[f64], order: usize) -> Vec<f64> {
         (self.half..samples.len().saturating_sub(self.half))
@@ -113,14 +111,13 @@ impl Window {
             .collect()
     }
 
-    /// Covariance of two averages of white noise of variance 1, of orders `i` and `j` over the same
-    /// window.
+    /// Covariance of averages of orders `i` and `j` over the same window, for white noise of variance 1.
     #[must_use]
     pub fn noise(&self, i: usize, j: usize) -> f64 {
         self.noise_apart(i, j, 0)
     }
 
-    /// The same over two windows, that of order `j` so many samples later than that of order `i`.
+    /// The same over two windows, that of order `j` being `samples` later than that of order `i`.
     ///
     /// ```
     /// let window = torqcomp_dsp::weak::Window::new(20, 100.0)?;
@@ -133,15 +130,15 @@ impl Window {
     pub fn noise_apart(&self, i: usize, j: usize, samples: usize) -> f64 {
         let early = self.weights[i].iter().skip(samples);
         let sum: f64 = early.zip(&self.weights[j]).map(|(a, b)| a * b).sum();
-        // The sign with which `at` takes the first derivative.
+        // `at` negates the first derivative.
         if (i == 1) != (j == 1) { -sum } else { sum }
     }
 }
 
-/// Variance of white noise on a smooth record, from its fourth differences: those of a smooth
-/// signal vanish, those of noise have 70 times its variance (1² + 4² + 6² + 4² + 1²).
+/// Variance of white noise on a smooth record, from its fourth differences: those of a smooth signal vanish, those of noise
+/// have 70 times its variance (1² + 4² + 6² + 4² + 1²).
 ///
-/// `None` for fewer than eight samples. The median is taken, so that single jumps do not count.
+/// `None` for fewer than eight samples. From the median, so single jumps do not matter.
 ///
 /// ```
 /// // A straight line has none.

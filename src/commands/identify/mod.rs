@@ -1,30 +1,32 @@
 //! `identify`: constants of the stand from records, with uncertainties.
 
-mod anchor;
+mod constants;
 mod decay;
-mod plain;
 mod response;
 mod runup;
 mod static_load;
 
 use std::path::Path;
 
-use torqcomp_model::Kind;
+use torqcomp_model::{Dimension, Kind, UnitSystem};
 
 use super::{Outcome, conclude};
 use crate::cli::identify::{Findings, Identify, Test};
 use crate::failure::Failure;
+use crate::identify::{Identification, NamedEstimate};
 use crate::io::Input;
 use crate::io::csv::{NamedUnit, Options};
 use crate::io::output;
 use crate::print;
 use crate::recording::{Recording, Selection};
-use crate::report::identify::Report;
 use crate::signal::Together;
 use crate::signal::together::{axes, uniform};
 use crate::stand::update::Entry;
 use crate::stand::{self, update};
 use crate::warning::Warning;
+
+const TORQUE: Dimension = Dimension::new([1, 2, -2, 0, 0, 0]);
+const FORCE: Dimension = Dimension::new([1, 1, -2, 0, 0, 0]);
 
 /// Runs the verb.
 pub fn run(args: &Identify) -> Result<Outcome, Failure> {
@@ -36,9 +38,36 @@ pub fn run(args: &Identify) -> Result<Outcome, Failure> {
     }
 }
 
-/// Why several modes are not written.
-const ONE_MODE: &str = "a stand file holds one mode, and several were found; choose one with --band and --modes 1, or \
-                        leave -o out to see them";
+const ONE_MODE: &str = "a stand file describes one mode, and several were found; choose one with --band and --modes 1, or \
+                        omit -o to see them";
+
+/// What was read, for the result.
+#[derive(Default)]
+struct Recorded {
+    inputs: Vec<String>,
+    samples: usize,
+    rate_hz: Option<f64>,
+    warnings: Vec<Warning>,
+    is_lossy: bool,
+}
+
+impl Recorded {
+    /// Adds a file; the sampling rate is that of the first one.
+    fn add(&mut self, input: &str, samples: usize, rate_hz: Option<f64>) {
+        if self.inputs.is_empty() {
+            self.rate_hz = rate_hz;
+        }
+        self.inputs.push(input.to_owned());
+        self.samples += samples;
+    }
+
+    /// Adds the warnings about a file, and what was lost of it.
+    fn warn(&mut self, warnings: &[Warning], lost: Option<&Warning>) {
+        self.is_lossy |= lost.is_some();
+        self.warnings
+            .extend(lost.into_iter().chain(warnings).cloned());
+    }
+}
 
 /// Text of the stand file that declared values come from, with its name.
 fn stand_text(findings: &Findings) -> Result<Option<(String, String)>, Failure> {
@@ -64,59 +93,88 @@ fn declared(
     }
 }
 
-/// Prints the report, writes the stand file and the page.
-fn deliver(
-    report: &Report,
-    findings: &Findings,
-    inputs: &[&str],
-    entries: &[Entry],
-    is_lossy: bool,
-) -> Result<Outcome, Failure> {
-    let result = &findings.result;
-    let taken: Vec<&Path> = inputs.iter().map(Path::new).collect();
-    if let Some(place) = result.output.as_deref() {
-        if place == "-" && findings.json {
-            return Err(Failure::usage(
-                "the stand file and the JSON document cannot both go to standard output; give -o FILE",
-            ));
-        }
-        // An existing stand file is a basis for the new one, whoever it came from; so is the one that declared values
-        // come from.
-        let existing = existing(findings);
-        let basis = existing.or(findings.stand.as_deref());
-        let basis = basis.map(stand::text).transpose()?;
-        let text = match &basis {
-            Some((name, text)) => update::update(name, Some(text), entries),
-            None => update::update(place, None, entries),
-        }?;
-        let force = result.force || existing.is_some();
-        output::write_all(Some(place), force, &taken, &text)?;
+/// Entry of a stand file for a constant.
+fn entry(
+    section: &'static str,
+    key: &'static str,
+    constant: &NamedEstimate,
+    source: &str,
+) -> Entry {
+    Entry {
+        section,
+        key,
+        value: constant.value(),
+        std: constant.std(),
+        unit: constant.estimate.unit().to_owned(),
+        source: source.to_owned(),
     }
-    if let Some(place) = findings.html.as_deref() {
-        let beside: Vec<&Path> = taken
-            .iter()
-            .copied()
-            .chain(result.output.as_deref().map(Path::new))
-            .collect();
-        output::write_all(Some(place), result.force, &beside, &report.page())?;
-    }
-    let printed = match (findings.json, result.output.as_deref()) {
-        (true, _) => print::json(report),
-        // The stand file is there already.
-        (false, Some("-")) => String::new(),
-        (false, _) => report.text(),
-    };
-    output::write_all(None, false, &[], &printed)?;
-    Ok(conclude(&report.warnings, is_lossy, findings.strict))
 }
 
-/// Reads one file: all of a text, the signals that are named of an MCAP file.
+/// Completes the result, writes the stand file and the HTML page, and prints the result.
+fn deliver(
+    mut result: Identification,
+    recorded: Recorded,
+    findings: &Findings,
+    entries: &[Entry],
+) -> Result<Outcome, Failure> {
+    result.inputs = recorded.inputs;
+    result.samples = recorded.samples;
+    result.rate_hz = recorded.rate_hz;
+    result.warnings.extend(recorded.warnings);
+    result.convert(UnitSystem::from(findings.units));
+    let target = &findings.result;
+    let output = target.output.as_deref();
+    let read: Vec<&Path> = result.inputs.iter().map(Path::new).collect();
+    if let Some(output) = output {
+        write_stand(output, findings, &read, entries)?;
+    }
+    if let Some(page) = findings.html.as_deref() {
+        let others: Vec<&Path> = read.into_iter().chain(output.map(Path::new)).collect();
+        output::write_all(Some(page), target.force, &others, &result.page())?;
+    }
+    let printed = match (findings.json, output) {
+        (true, _) => print::json(&result),
+        // Standard output has the stand file.
+        (false, Some("-")) => String::new(),
+        (false, _) => result.text(),
+    };
+    output::write_all(None, false, &[], &printed)?;
+    Ok(conclude(
+        &result.warnings,
+        recorded.is_lossy,
+        findings.strict,
+    ))
+}
+
+/// Writes the entries into a stand file: the existing one, a copy of that of `--stand`, or a new one.
+fn write_stand(
+    output: &str,
+    findings: &Findings,
+    read: &[&Path],
+    entries: &[Entry],
+) -> Result<(), Failure> {
+    if output == "-" && findings.json {
+        return Err(Failure::usage(
+            "the stand file and the JSON document cannot both go to standard output; give -o FILE",
+        ));
+    }
+    let existing = existing(findings);
+    let basis = existing.or(findings.stand.as_deref());
+    let text = match basis.map(stand::text).transpose()? {
+        Some((name, text)) => update::update(&name, Some(&text), entries),
+        None => update::update(output, None, entries),
+    }?;
+    let force = findings.result.force || existing.is_some();
+    output::write_all(Some(output), force, read, &text)
+}
+
+/// Reads one file: all of a text, the named signals of an MCAP file.
 fn read(input: &str, wanted: &[Options]) -> Result<Recording, Failure> {
     crate::recording::read_channels(&Input::of(input), wanted)
 }
 
-/// Reads channels of one file that are to lie on one time axis. Stamps of a text must be uniform, those
-/// of messages never are and are brought onto a grid.
+/// Reads channels of one file onto one time axis. Stamps of a text must be uniform; those of messages never are and are
+/// resampled.
 fn together(input: &str, wanted: &[Options]) -> Result<Together, Failure> {
     let recording = read(input, wanted)?;
     if recording.format != "mcap" {
@@ -134,12 +192,7 @@ fn together(input: &str, wanted: &[Options]) -> Result<Together, Failure> {
     Together::of(recording, wanted)
 }
 
-/// What was lost of a file, and what else should be known of it.
-fn said(warnings: &[Warning], lost: Option<&Warning>) -> Vec<Warning> {
-    lost.into_iter().chain(warnings).cloned().collect()
-}
-
-/// The unit of a channel, or what to do to have one.
+/// The unit of a channel, or a hint how to give it.
 fn unit_of(selection: &Selection, flag: &str) -> Result<NamedUnit, Failure> {
     unit_or(selection.unit.as_ref(), &selection.channel.name, flag)
 }
@@ -148,7 +201,7 @@ fn unit_of(selection: &Selection, flag: &str) -> Result<NamedUnit, Failure> {
 fn unit_or(unit: Option<&NamedUnit>, name: &str, flag: &str) -> Result<NamedUnit, Failure> {
     unit.cloned().ok_or_else(|| {
         Failure::failed(format_args!(
-            "the channel \"{name}\" does not say its unit; give it with {flag}"
+            "channel \"{name}\" has no unit; give it with {flag}"
         ))
     })
 }

@@ -2,17 +2,15 @@
 
 use torqcomp_model::{Dimension, Kind, Unit};
 
-use super::{deliver, quantity, said, together, unit_or};
+use super::{FORCE, Recorded, TORQUE, deliver, entry, quantity, together, unit_or};
 use crate::cli::identify::Runup;
 use crate::commands::Outcome;
 use crate::failure::Failure;
-use crate::identify::runup::{Body, Motion, Options, Run, identify};
-use crate::report::identify::Report;
+use crate::identify::runup::{Body, FreeRun, RunupOptions, identify};
+use crate::identify::{Identification, Motion};
+use crate::print::short;
 use crate::signal::together::Track;
 use crate::stand::update::Entry;
-
-const TORQUE: Dimension = Dimension::new([1, 2, -2, 0, 0, 0]);
-const FORCE: Dimension = Dimension::new([1, 1, -2, 0, 0, 0]);
 
 /// Runs the test.
 pub fn run(args: &Runup) -> Result<Outcome, Failure> {
@@ -24,10 +22,9 @@ pub fn run(args: &Runup) -> Result<Outcome, Failure> {
     let read = together(&args.input, &wanted)?;
     let (motion, torque) = (&read.tracks[0], &read.tracks[1]);
     let motion_unit = unit_or(motion.unit.as_ref(), &motion.name, "--motion-unit")?;
-    let (kind, turning) = motion_of(motion_unit.unit.dimension()).ok_or_else(|| {
+    let (kind, turning) = Motion::of(motion_unit.unit.dimension()).ok_or_else(|| {
         Failure::failed(format_args!(
-            "the motion \"{}\" is in \"{}\"; expected an angle, a length, or one per second or second \
-             squared",
+            "the unit of the motion \"{}\" is \"{}\"; expected an angle, a length, or their first or second derivative",
             motion.name, motion_unit.text
         ))
     })?;
@@ -35,7 +32,7 @@ pub fn run(args: &Runup) -> Result<Outcome, Failure> {
         |samples: &[f64], factor: f64| samples.iter().map(|v| v * factor).collect::<Vec<f64>>();
     let positions = scaled(&motion.samples, motion_unit.unit.factor());
     let efforts = scaled(&torque.samples, effort_factor(args, torque, turning)?);
-    let run = Run {
+    let run = FreeRun {
         rate_hz: read.rate_hz,
         motion: &positions,
         kind,
@@ -46,70 +43,40 @@ pub fn run(args: &Runup) -> Result<Outcome, Failure> {
             Body::Sliding
         },
     };
-    let options = Options {
+    let options = RunupOptions {
         by_direction: args.by_direction,
         half_window_s: args.window,
     };
-    let outcome = identify(&run, &options)?;
-    let entries = entries(args, &outcome)?;
-    let mut report = Report::new("runup", &[&args.input], &outcome, args.findings.units);
-    report.samples = positions.len();
-    report.rate_hz = Some(read.rate_hz);
-    let warnings = said(&read.warnings, read.lost.as_ref());
-    report.warnings.extend(warnings);
-    let is_lossy = read.lost.is_some();
-    deliver(&report, &args.findings, &[&args.input], &entries, is_lossy)
+    let result = identify(&run, &options)?;
+    let entries = entries(args, &result)?;
+    let mut recorded = Recorded::default();
+    recorded.add(&args.input, positions.len(), Some(read.rate_hz));
+    recorded.warn(&read.warnings, read.lost.as_ref());
+    deliver(result, recorded, &args.findings, &entries)
 }
 
-/// The inertia for the stand file.
-fn entries(args: &Runup, outcome: &crate::identify::Outcome) -> Result<Vec<Entry>, Failure> {
-    let negative = outcome.get("inertia").filter(|found| found.value <= 0.0);
-    if let (Some(found), Some(_)) = (negative, &args.findings.result.output) {
-        return Err(Failure::failed(format_args!(
-            "the inertia came out as {} kg m^2, which no body has, and is not written: check the sign of \"{}\" and \
-             \"{}\"",
-            crate::print::short(found.value),
-            args.motion,
-            args.torque
-        )));
-    }
+/// The entry of the stand file: the inertia.
+fn entries(args: &Runup, result: &Identification) -> Result<Vec<Entry>, Failure> {
+    let is_written = args.findings.result.output.is_some();
     let source = format!("identify runup: {}", args.input);
-    let entries: Vec<Entry> = outcome
-        .get("inertia")
-        .map(|found| Entry {
-            section: "mechanics",
-            key: "inertia",
-            value: found.value,
-            std: found.std,
-            unit: found.unit.clone(),
-            source,
-        })
-        .into_iter()
-        .collect();
-    if entries.is_empty() && args.findings.result.output.is_some() {
-        return Err(Failure::failed(
-            "a mass has no place in a stand file; leave -o out, or record an angle and a torque",
-        ));
-    }
-    Ok(entries)
-}
-
-/// What a unit says of the motion: its derivative, and whether it turns.
-fn motion_of(dimension: Dimension) -> Option<(Motion, bool)> {
-    let orders = [
-        (0, Motion::Position),
-        (-1, Motion::Speed),
-        (-2, Motion::Acceleration),
-    ];
-    orders.into_iter().find_map(|(seconds, motion)| {
-        if dimension == Dimension::new([0, 0, seconds, 0, 0, 1]) {
-            return Some((motion, true));
+    match result.get("inertia") {
+        Some(inertia) if inertia.value() <= 0.0 && is_written => {
+            Err(Failure::failed(format_args!(
+                "the fitted inertia is negative ({} kg m²) and is not written: check the sign of \"{}\" and \"{}\"",
+                short(inertia.value()),
+                args.motion,
+                args.torque
+            )))
         }
-        (dimension == Dimension::new([0, 1, seconds, 0, 0, 0])).then_some((motion, false))
-    })
+        Some(inertia) => Ok(vec![entry("mechanics", "inertia", inertia, &source)]),
+        None if is_written => Err(Failure::failed(
+            "a stand file has no place for a mass; omit -o, or record an angle and a torque",
+        )),
+        None => Ok(Vec::new()),
+    }
 }
 
-/// SI units of torque (turning) or force (sliding) for one unit of the channel.
+/// SI units of torque (rotation) or force per unit of the channel.
 fn effort_factor(args: &Runup, torque: &Track, turning: bool) -> Result<f64, Failure> {
     let (factor, dimension) = match &args.torque_factor {
         Some(text) => factor_of(text)?,
@@ -126,17 +93,17 @@ fn effort_factor(args: &Runup, torque: &Track, turning: bool) -> Result<f64, Fai
         (true, TORQUE, None) | (false, FORCE, None) => Ok(factor),
         (true, FORCE, Some(radius)) => Ok(factor * radius),
         (true, FORCE, None) => Err(Failure::failed(
-            "a force drives a turning body at a radius; give it with --radius",
+            "a force on a rotating body needs a radius; give it with --radius",
         )),
         (_, other, _) => Err(Failure::failed(format_args!(
-            "the channel \"{}\" is no {} ({other}); give --torque-factor, such as \"35.15 N/V\"",
+            "channel \"{}\" is not a {} ({other}); give --torque-factor, such as \"35.15 N/V\"",
             torque.name,
             if turning { "torque" } else { "force" }
         ))),
     }
 }
 
-/// `"35.15 N/V"`: SI units of the first for one volt, and what the first is.
+/// `"35.15 N/V"`: SI units of torque or force per unit of the channel, and their dimension.
 fn factor_of(text: &str) -> Result<(f64, Dimension), Failure> {
     let wrong = || {
         Failure::usage(format_args!(
@@ -148,7 +115,7 @@ fn factor_of(text: &str) -> Result<(f64, Dimension), Failure> {
     let number: f64 = number.parse().map_err(|_| wrong())?;
     let (effort, channel) = units.rsplit_once('/').ok_or_else(wrong)?;
     let effort = Unit::parse(effort).map_err(|_| wrong())?;
-    // The channel's numbers are taken as they stand, so its own prefix must not count.
+    // The factor applies to the channel's numbers as they are, so the prefix of their unit does not count.
     Unit::parse(channel).map_err(|_| wrong())?;
     if !number.is_finite() || number == 0.0 {
         return Err(wrong());

@@ -2,51 +2,37 @@
 
 use torqcomp_model::{Dimension, Kind};
 
-use super::{deliver, quantity, read, said, unit_of, whole};
+use super::{FORCE, Recorded, TORQUE, deliver, entry, quantity, read, unit_of, whole};
 use crate::cli::identify::Static;
 use crate::commands::Outcome;
 use crate::failure::Failure;
-use crate::identify::static_load::{Options, Point, Units, identify, series_of};
+use crate::identify::Identification;
+use crate::identify::static_load::{LoadUnits, Point, identify, series_of};
 use crate::io::csv::{self, NamedUnit};
 use crate::recording::Recording;
-use crate::report::identify::{Report, Term};
 use crate::stand::update::Entry;
 
-const TORQUE: Dimension = Dimension::new([1, 2, -2, 0, 0, 0]);
-const FORCE: Dimension = Dimension::new([1, 1, -2, 0, 0, 0]);
 const VOLTAGE: Dimension = Dimension::new([1, 2, -3, -1, 0, 0]);
 
 /// Runs the test.
 pub fn run(args: &Static) -> Result<Outcome, Failure> {
     let mut options = args.table.options(None, None);
-    // A table of loads has no time axis; a rate keeps it from being looked for.
+    // A table of loads has no time axis; with a rate none is searched for.
     options.rate_hz = options.rate_hz.or(Some(1.0));
     let recording = read(&args.input, &wanted(args, &options))?;
     let (points, units) = points(args, &recording)?;
-    let options = Options {
-        degree: args.degree,
-    };
-    let found = identify(&points, options, &units)?;
-    let entries = entries(args, &found.outcome);
+    let result = identify(&points, args.degree, &units)?;
+    let entries = entries(args, &result);
     if entries.is_empty() && args.findings.result.output.is_some() {
         return Err(Failure::failed(
-            "only a torque over a voltage has a place in a stand file; leave -o out, or give the load as a \
-             torque and the reading in volts",
+            "a stand file has a place only for torque per volt; omit -o, or give the load as a torque and the reading \
+             in volts",
         ));
     }
-    let inputs = [args.input.as_str()];
-    let mut report = Report::new("static", &inputs, &found.outcome, args.findings.units);
-    report.samples = points.len();
-    let term = |t: &crate::identify::static_load::Term| Term {
-        name: t.name,
-        formula: t.formula,
-        percent: t.percent,
-    };
-    report.terms = found.terms.iter().map(term).collect();
-    let warnings = said(&recording.warnings, recording.lost.as_ref());
-    report.warnings.extend(warnings);
-    let is_lossy = recording.lost.is_some();
-    deliver(&report, &args.findings, &inputs, &entries, is_lossy)
+    let mut recorded = Recorded::default();
+    recorded.add(&args.input, points.len(), None);
+    recorded.warn(&recording.warnings, recording.lost.as_ref());
+    deliver(result, recorded, &args.findings, &entries)
 }
 
 /// The columns that are read.
@@ -65,8 +51,8 @@ fn wanted(args: &Static, options: &csv::Options) -> Vec<csv::Options> {
     names.into_iter().flatten().map(one).collect()
 }
 
-/// Loads and readings in SI units, with what they are called.
-fn points(args: &Static, recording: &Recording) -> Result<(Vec<Point>, Units), Failure> {
+/// Loads and readings in SI units, with the units' names.
+fn points(args: &Static, recording: &Recording) -> Result<(Vec<Point>, LoadUnits), Failure> {
     let load_flag = args.load_unit.as_deref();
     let (loads, load_unit) = column(recording, &args.load, load_flag, "--load-unit")?;
     let flag = args.reading_unit.as_deref();
@@ -99,7 +85,7 @@ fn points(args: &Static, recording: &Recording) -> Result<(Vec<Point>, Units), F
         .any(|count| count != loads.len())
     {
         return Err(Failure::failed(format_args!(
-            "{}: the columns have different numbers of rows; each load needs a reading",
+            "{}: the columns differ in length; each load needs a reading",
             args.input
         )));
     }
@@ -111,10 +97,10 @@ fn points(args: &Static, recording: &Recording) -> Result<(Vec<Point>, Units), F
         position: positions.as_ref().map_or(0, |p| p[i]),
     };
     let points = (0..loads.len()).map(point).collect();
-    Ok((points, Units { load, reading }))
+    Ok((points, LoadUnits { load, reading }))
 }
 
-/// Standard uncertainties of the readings as they stand in their column.
+/// Standard uncertainties of the readings, in the unit of their column.
 fn stds(args: &Static, recording: &Recording) -> Result<Option<Vec<f64>>, Failure> {
     let Some(name) = &args.std else {
         return Ok(None);
@@ -130,7 +116,7 @@ fn stds(args: &Static, recording: &Recording) -> Result<Option<Vec<f64>>, Failur
     }
 }
 
-/// A column's different values, numbered in the order they come.
+/// Values of a column, numbered by first appearance.
 fn numbers(recording: &Recording, name: Option<&String>) -> Result<Option<Vec<usize>>, Failure> {
     let Some(name) = name else { return Ok(None) };
     let channel = recording.channel(Some(name))?;
@@ -155,7 +141,7 @@ fn column(
     Ok((selection.samples.to_vec(), unit))
 }
 
-/// SI units for one unit of the load, and what they are called.
+/// SI units per unit of the load, and their name.
 fn load_of(args: &Static, unit: &NamedUnit) -> Result<(f64, String), Failure> {
     let factor = unit.unit.factor();
     let radius = args
@@ -175,7 +161,7 @@ fn load_of(args: &Static, unit: &NamedUnit) -> Result<(f64, String), Failure> {
     }
 }
 
-/// Numbers the different values from 0 in the order they come.
+/// Numbers the different values from 0, by first appearance.
 fn ranks(values: &[f64]) -> Vec<usize> {
     let mut seen: Vec<f64> = Vec::new();
     values
@@ -189,31 +175,14 @@ fn ranks(values: &[f64]) -> Vec<usize> {
         .collect()
 }
 
-fn entries(args: &Static, outcome: &crate::identify::Outcome) -> Vec<Entry> {
+/// The entries of the stand file: torque per volt, and the zero.
+fn entries(args: &Static, result: &Identification) -> Vec<Entry> {
     let source = format!("identify static: {}", args.input);
-    outcome
-        .get("torque_per_volt")
-        .map(|found| Entry {
-            section: "calibration",
-            key: "torque_per_volt",
-            value: found.value,
-            std: found.std,
-            unit: found.unit.clone(),
-            source: source.clone(),
-        })
-        .into_iter()
-        .chain(
-            outcome
-                .get("torque_per_volt")
-                .and(outcome.get("zero"))
-                .map(|zero| Entry {
-                    section: "recorder",
-                    key: "zero",
-                    value: zero.value,
-                    std: zero.std,
-                    unit: "V".to_owned(),
-                    source: source.clone(),
-                }),
-        )
-        .collect()
+    let Some(constant) = result.get("torque_per_volt") else {
+        return Vec::new();
+    };
+    let constant = entry("calibration", "torque_per_volt", constant, &source);
+    let zero = result.get("zero");
+    let zero = zero.map(|zero| entry("recorder", "zero", zero, &source));
+    [constant].into_iter().chain(zero).collect()
 }

@@ -1,19 +1,18 @@
-//! What one reads from a decay by hand: logarithmic decrement and half-power width.
+//! Frequency and damping read from a decay by hand: logarithmic decrement and half-power width.
 
 use std::f64::consts::{PI, TAU};
 
 use torqcomp_dsp::peaks;
 
 use super::modes::{ModesFit, Stretch};
-use crate::identify::{Comparison, Found, Outcome};
+use crate::identify::{Comparison, Identification, NamedEstimate};
 
-/// Peaks smaller than this part of the first are left out.
+/// Peaks smaller than this part of the first are ignored.
 const SMALLEST: f64 = 0.05;
 
 /// Damped frequency in Hz and decay rate in 1/s from the heights of successive peaks: the slope of
 /// ln|peak| over time through all of them, by plain regression. `None` with fewer than three peaks.
-#[must_use]
-pub fn log_decrement(stretch: &Stretch, offset: f64, omega: f64) -> Option<(f64, f64)> {
+pub(super) fn log_decrement(stretch: &Stretch, offset: f64, omega: f64) -> Option<(f64, f64)> {
     let peaks = peaks_of(stretch, offset, PI / omega);
     if peaks.len() < 3 {
         return None;
@@ -33,8 +32,8 @@ pub fn log_decrement(stretch: &Stretch, offset: f64, omega: f64) -> Option<(f64,
     Some((frequency_hz, -top / bottom))
 }
 
-/// Time and size of the largest value in every half cycle, a parabola through three samples each, down
-/// to a part of the first.
+/// Time and size of the peak of every half cycle, from a parabola through three samples, down to [`SMALLEST`] times
+/// the first.
 fn peaks_of(stretch: &Stretch, offset: f64, half_period_s: f64) -> Vec<(f64, f64)> {
     let values: Vec<f64> = stretch.values.iter().map(|v| v - offset).collect();
     let times = &stretch.times_s;
@@ -54,7 +53,7 @@ fn peaks_of(stretch: &Stretch, offset: f64, half_period_s: f64) -> Vec<(f64, f64
         let t = times[i] + shift * 0.5 * (times[i + 1] - times[i - 1]);
         let size = here - 0.25 * (before - after) * shift;
         match found.last_mut() {
-            // Noise makes several peaks of one: the largest.
+            // Noise splits a peak into several; keep the largest.
             Some(last) if t - last.0 < 0.6 * half_period_s => {
                 if size > last.1 {
                     *last = (t, size);
@@ -74,8 +73,7 @@ fn peaks_of(stretch: &Stretch, offset: f64, half_period_s: f64) -> Vec<(f64, f64
 
 /// Frequency in Hz and damping ratio from the width of the spectrum's peak at half its power,
 /// ζ = Δf/2f. Too large where the record ends before the decay does. `None` without a peak.
-#[must_use]
-pub fn half_power(stretch: &Stretch, offset: f64, omega: f64) -> Option<(f64, f64)> {
+pub(super) fn half_power(stretch: &Stretch, offset: f64, omega: f64) -> Option<(f64, f64)> {
     let length = *stretch.times_s.last()?;
     let rate_hz = (stretch.times_s.len() - 1) as f64 / length;
     let values: Vec<f64> = stretch.values.iter().map(|v| v - offset).collect();
@@ -92,30 +90,36 @@ pub fn half_power(stretch: &Stretch, offset: f64, omega: f64) -> Option<(f64, f6
     Some((peak.frequency_hz, 0.5 * peak.width_hz / peak.frequency_hz))
 }
 
-/// Puts both figures beside those of the fit.
-pub(super) fn compare(outcome: &mut Outcome, fit: &ModesFit, stretches: &[Stretch], main: usize) {
-    let pole = fit.poles[main];
+/// Adds both for comparison.
+pub(super) fn compare(
+    result: &mut Identification,
+    fit: &ModesFit,
+    stretches: &[Stretch],
+    main: usize,
+) {
+    let omega = fit.poles[main].omega_rad_per_s;
     let (offset, _) = fit.trend(0);
-    if let Some((frequency_hz, rate)) = log_decrement(&stretches[0], offset, pole.omega_rad_per_s) {
+    let mut add = |method: &str, parameters: Vec<NamedEstimate>| {
+        result.comparisons.push(Comparison {
+            method: method.to_owned(),
+            parameters,
+            fit: None,
+        });
+    };
+    if let Some((frequency_hz, rate)) = log_decrement(&stretches[0], offset, omega) {
         let natural = rate.hypot(TAU * frequency_hz);
-        outcome.comparisons.push(Comparison {
-            method: "logarithmic decrement of successive peaks".to_owned(),
-            found: vec![
-                Found::new("damped_frequency", frequency_hz, None, "Hz"),
-                Found::new("decay_rate", rate, None, "1/s"),
-                Found::new("damping_ratio", rate / natural, None, ""),
-            ],
-            quality: None,
-        });
+        let parameters = vec![
+            NamedEstimate::new("damped_frequency", "Hz", frequency_hz, None),
+            NamedEstimate::new("decay_rate", "1/s", rate, None),
+            NamedEstimate::new("damping_ratio", "", rate / natural, None),
+        ];
+        add("logarithmic decrement of successive peaks", parameters);
     }
-    if let Some((frequency_hz, ratio)) = half_power(&stretches[0], offset, pole.omega_rad_per_s) {
-        outcome.comparisons.push(Comparison {
-            method: "half-power width of the spectrum".to_owned(),
-            found: vec![
-                Found::new("natural_frequency", frequency_hz, None, "Hz"),
-                Found::new("damping_ratio", ratio, None, ""),
-            ],
-            quality: None,
-        });
+    if let Some((frequency_hz, ratio)) = half_power(&stretches[0], offset, omega) {
+        let parameters = vec![
+            NamedEstimate::new("natural_frequency", "Hz", frequency_hz, None),
+            NamedEstimate::new("damping_ratio", "", ratio, None),
+        ];
+        add("half-power width of the spectrum", parameters);
     }
 }

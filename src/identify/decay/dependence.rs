@@ -1,24 +1,25 @@
-//! Whether one damping ratio describes a decay: the law of its envelope, and its change with amplitude.
+//! Checks whether one damping ratio describes a decay: the law of its envelope, and its change with amplitude.
 
-use super::laws::{self, Law, LawFit};
+use super::laws::{self, Law};
 use super::modes::{self, ModesFit, Stretch};
 use crate::failure::Failure;
-use crate::identify::Outcome;
+use crate::identify::Identification;
 use crate::print::rounded;
 
-/// A law is preferred if its criterion is lower by that much.
+/// Minimum reduction of the criterion for another law than viscous damping.
 const CLEARLY: f64 = 10.0;
 
-/// … and what it leaves is less by this part.
+/// Minimum relative reduction of the residual, besides.
 const WORTHWHILE: f64 = 0.01;
 
+/// Fits the laws of damping to the longest stretch and warns if viscous damping is clearly not the best.
 pub(super) fn damping_law(
-    outcome: &mut Outcome,
+    result: &mut Identification,
     fit: &ModesFit,
     stretches: &[Stretch],
-) -> Result<Vec<LawFit>, Failure> {
+) -> Result<(), Failure> {
     let [pole] = fit.poles[..] else {
-        return Ok(Vec::new());
+        return Ok(());
     };
     let longest = (0..stretches.len())
         .max_by_key(|s| stretches[*s].values.len())
@@ -32,26 +33,27 @@ pub(super) fn damping_law(
         && best.criterion < viscous.criterion - CLEARLY
         && best.rms < (1.0 - WORTHWHILE) * viscous.rms
     {
-        outcome.warn(
+        result.warn(
             "not-viscous",
             format!(
-                "the envelope follows {} damping better than viscous damping (what is left falls from {} to \
-                 {}): one damping ratio does not describe it",
+                "{} damping describes the envelope better than viscous damping (residual {} instead of {}): one \
+                 damping ratio does not describe this decay",
                 best.law.name(),
-                rounded(viscous.rms, 3),
-                rounded(best.rms, 3)
+                rounded(best.rms, 3),
+                rounded(viscous.rms, 3)
             ),
         );
     }
-    Ok(laws)
+    result.laws = laws;
+    Ok(())
 }
 
-/// Change of the damping between the halves of a decay that is said.
-const NOTABLE: f64 = 0.02;
+/// Smallest relative change of decay rate and of frequency between the halves of a decay that is reported.
+const NOTABLE: [f64; 2] = [0.02, 1e-4];
 
-/// Fits the early and the late half (in amplitude) on their own and compares.
+/// Fits the early and the late half (in amplitude) separately and compares them.
 pub(super) fn amplitude_dependence(
-    outcome: &mut Outcome,
+    result: &mut Identification,
     fit: &ModesFit,
     stretches: &[Stretch],
     main: usize,
@@ -63,7 +65,7 @@ pub(super) fn amplitude_dependence(
     let Some(stretch) = stretches.iter().max_by_key(|s| s.values.len()) else {
         return;
     };
-    // Half way down to where the decay drowns in the noise.
+    // Half way (in decibels) from the first amplitude to the noise.
     let noise = fit.fit.rms.max(1e-300);
     let amplitude = fit.amplitude(main, 0).max(noise);
     let down = 0.5 * (amplitude / noise).ln().clamp(0.5, 3.0) / pole.rate_per_s.max(1e-12);
@@ -72,37 +74,32 @@ pub(super) fn amplitude_dependence(
         return;
     }
     let part = |from: usize, to: usize| {
-        let start = stretch.times_s[from];
-        let half = Stretch {
-            times_s: stretch.times_s[from..to]
-                .iter()
-                .map(|t| t - start)
-                .collect(),
-            values: stretch.values[from..to].to_vec(),
-        };
+        let half = Stretch::new(
+            &stretch.times_s[from..to],
+            stretch.values[from..to].to_vec(),
+        );
         modes::fit(&[half], &[pole]).ok()
     };
     let halves = (part(0, middle), part(middle, stretch.times_s.len()));
     let (Some(early), Some(late)) = halves else {
         return;
     };
-    compare_halves(outcome, &early, &late);
+    compare_halves(result, &early, &late);
 }
 
-/// Says what differs between the halves by more than their uncertainties.
-fn compare_halves(outcome: &mut Outcome, early: &ModesFit, late: &ModesFit) {
-    for (i, what, notable) in [(0, "decay rate", NOTABLE), (1, "frequency", 1e-4)] {
+/// Warns about differences between the halves that their uncertainties do not explain.
+fn compare_halves(result: &mut Identification, early: &ModesFit, late: &ModesFit) {
+    for (i, what) in ["decay rate", "frequency"].into_iter().enumerate() {
         let (Some(a), Some(b)) = (early.fit.std[i], late.fit.std[i]) else {
             continue;
         };
         let (first, second) = (early.fit.values[i], late.fit.values[i]);
         let change = second / first - 1.0;
-        if (second - first).abs() > 4.0 * a.hypot(b) && change.abs() > notable {
-            outcome.warn(
+        if (second - first).abs() > 4.0 * a.hypot(b) && change.abs() > NOTABLE[i] {
+            result.warn(
                 "amplitude-dependent",
                 format!(
-                    "the {what} changes by {} % from large to small amplitudes: one number holds for one \
-                     amplitude only",
+                    "the {what} changes by {} % from large to small amplitudes: state the amplitude with it",
                     rounded(100.0 * change, 2)
                 ),
             );

@@ -1,4 +1,4 @@
-//! Which damping law the envelope of a single mode follows.
+//! The damping law that the envelope of a single mode follows.
 //!
 //! Slowly falling amplitude of x'' + ω² x = −(damping) (A. H. Nayfeh, D. T. Mook, Nonlinear
 //! Oscillations, 1979, 3.3; averaging over a cycle):
@@ -12,29 +12,31 @@
 //! | viscous and quadratic | `A' = −σ A − β A²` |
 
 use nalgebra::DMatrix;
+use serde::{Serialize, Serializer};
 use torqcomp_model::fit::{Fit, FitError, Options, Parameter, WithJacobian, minimize};
 
-use super::modes::{Pole, Stretch};
+use super::modes::Stretch;
+use crate::identify::Pole;
 
 /// A law of damping.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Law {
-    /// Proportional to the speed, or lost per cycle in proportion to the square of the amplitude:
-    /// one frequency cannot tell the two apart.
+    /// Proportional to speed; or structural, with a loss per cycle proportional to the square of the amplitude, which
+    /// looks the same at one frequency.
     Viscous,
-    /// Of constant size against the speed.
+    /// Of constant magnitude.
     Dry,
-    /// Proportional to the square of the speed.
+    /// Proportional to the square of speed.
     Quadratic,
-    /// The first and the second.
+    /// Viscous and dry.
     ViscousAndDry,
-    /// The first and the third.
+    /// Viscous and quadratic.
     ViscousAndQuadratic,
 }
 
 impl Law {
     /// All laws, simple ones first.
-    pub const ALL: [Self; 5] = [
+    const ALL: [Self; 5] = [
         Self::Viscous,
         Self::Dry,
         Self::Quadratic,
@@ -54,18 +56,25 @@ impl Law {
         }
     }
 
-    fn parts(self) -> (bool, bool, bool) {
+    /// Whether it has a viscous, a dry and a quadratic part.
+    fn parts(self) -> [bool; 3] {
         match self {
-            Self::Viscous => (true, false, false),
-            Self::Dry => (false, true, false),
-            Self::Quadratic => (false, false, true),
-            Self::ViscousAndDry => (true, true, false),
-            Self::ViscousAndQuadratic => (true, false, true),
+            Self::Viscous => [true, false, false],
+            Self::Dry => [false, true, false],
+            Self::Quadratic => [false, false, true],
+            Self::ViscousAndDry => [true, true, false],
+            Self::ViscousAndQuadratic => [true, false, true],
         }
     }
 }
 
-/// Amplitude at time t from a start A₀ under rates σ (1/s), s (units/s) and β (1/(unit s)).
+impl Serialize for Law {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
+/// Amplitude at time t from a start A₀ with rates σ (1/s), s (units/s) and β (1/(unit s)).
 ///
 /// With s: `A = (A₀ + s/σ) e^{−σt} − s/σ`, until it is 0; with β: `A = A₀ e^{−σt} / (1 + βA₀ (1 −
 /// e^{−σt})/σ)`; limits for σ → 0.
@@ -120,25 +129,21 @@ fn envelope_slopes([start, sigma, dry, quadratic]: [f64; 4], time_s: f64) -> (f6
 }
 
 /// One law fitted to the data.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LawFit {
     /// The law.
     pub law: Law,
-    /// σ, s, β, ω; those the law does not have are 0.
-    pub rates: [f64; 3],
-    /// Root mean square of what is left.
+    /// Root mean square of the residual.
     pub rms: f64,
-    /// Bayesian information criterion.
+    /// Bayesian information criterion: less is better.
     pub criterion: f64,
-    /// Whether every part of the law is there: none ended at zero.
-    pub complete: bool,
+    /// Whether no part of the law was fitted as zero.
+    #[serde(skip)]
+    is_complete: bool,
 }
 
-/// Fits a law to a stretch with one mode; the start comes from the viscous fit.
-///
-/// # Errors
-/// [`FitError`] if the fit cannot be made.
-pub fn fit(law: Law, stretch: &Stretch, pole: Pole, start: [f64; 4]) -> Result<LawFit, FitError> {
+/// Fits a law to a stretch with one mode, starting from the viscous fit.
+fn fit(law: Law, stretch: &Stretch, pole: Pole, start: [f64; 4]) -> Result<LawFit, FitError> {
     let parameters = parameters(law, stretch, pole, start);
     let residuals = |p: &[f64], out: &mut Vec<f64>| {
         let pairs = stretch.times_s.iter().zip(&stretch.values);
@@ -187,64 +192,57 @@ fn parameters(law: Law, stretch: &Stretch, pole: Pole, start: [f64; 4]) -> [Para
     let [a, b, offset, drift] = start;
     let amplitude = a.hypot(b).max(f64::MIN_POSITIVE);
     let phase = (-b).atan2(a);
-    let (has_viscous, has_dry, has_quadratic) = law.parts();
+    let parts = law.parts();
     let rate = pole.rate_per_s.max(1e-6 * pole.omega_rad_per_s);
     let length = stretch.times_s.last().copied().unwrap_or(1.0);
-    let part = |has: bool, value: f64, scale: f64, name: &str| {
-        let parameter = Parameter::new(name, if has { value } else { 0.0 })
-            .at_least(0.0)
-            .scaled(scale);
+    let share = match parts.iter().filter(|has| **has).count() {
+        1 => 1.0,
+        _ => 0.5,
+    };
+    let part = |has: bool, name: &str, value: f64, scale: f64| {
+        let start = if has { value } else { 0.0 };
+        let parameter = Parameter::new(name, start).at_least(0.0).scaled(scale);
         if has { parameter } else { parameter.fixed() }
     };
-    let alone = !(has_viscous && (has_dry || has_quadratic));
-    let share = if alone { 1.0 } else { 0.5 };
+    let dry = 0.5 * share * rate * amplitude;
+    let quadratic = share * rate / amplitude;
     [
         Parameter::new("amplitude", amplitude).at_least(0.0),
         Parameter::new("omega", pole.omega_rad_per_s),
         Parameter::new("phase", phase).scaled(1.0),
         Parameter::new("offset", offset).scaled(amplitude),
         Parameter::new("drift", drift).scaled(amplitude / length),
-        part(has_viscous, share * rate, rate, "viscous"),
-        part(
-            has_dry,
-            0.5 * share * rate * amplitude,
-            rate * amplitude,
-            "dry",
-        ),
-        part(
-            has_quadratic,
-            share * rate / amplitude,
-            rate / amplitude,
-            "quadratic",
-        ),
+        part(parts[0], "viscous", share * rate, rate),
+        part(parts[1], "dry", dry, rate * amplitude),
+        part(parts[2], "quadratic", quadratic, rate / amplitude),
     ]
 }
 
 fn summed(law: Law, fit: &Fit) -> LawFit {
     let n = fit.residuals.len() as f64;
-    let free = fit.values.len()
-        - [law.parts().0, law.parts().1, law.parts().2]
-            .iter()
-            .filter(|h| !**h)
-            .count();
+    let fixed = law.parts().iter().filter(|has| !**has).count();
+    let free = (fit.values.len() - fixed) as f64;
     LawFit {
         law,
-        rates: [fit.values[5], fit.values[6], fit.values[7]],
         rms: fit.rms,
-        criterion: n * fit.rms.powi(2).max(f64::MIN_POSITIVE).ln() + free as f64 * n.ln(),
-        complete: !fit.at_bound[5..8].iter().any(|b| *b),
+        criterion: n * fit.rms.powi(2).max(f64::MIN_POSITIVE).ln() + free * n.ln(),
+        is_complete: !fit.at_bound[5..8].iter().any(|b| *b),
     }
 }
 
-/// The laws in order of what speaks for them; one whose parts vanish is left to the simpler one.
+/// The laws by rising criterion, without those of which a part vanishes: a simpler law is the same.
 ///
 /// # Errors
-/// [`FitError`] if no law can be fitted.
-pub fn compare(stretch: &Stretch, pole: Pole, start: [f64; 4]) -> Result<Vec<LawFit>, FitError> {
+/// [`FitError`] if a law cannot be fitted.
+pub(super) fn compare(
+    stretch: &Stretch,
+    pole: Pole,
+    start: [f64; 4],
+) -> Result<Vec<LawFit>, FitError> {
     let mut all = Vec::new();
     for law in Law::ALL {
         let fitted = fit(law, stretch, pole, start)?;
-        if fitted.complete {
+        if fitted.is_complete {
             all.push(fitted);
         }
     }

@@ -4,122 +4,114 @@ mod by_hand;
 mod dependence;
 mod laws;
 mod modes;
+mod present;
 mod stretches;
-mod words;
 
 use torqcomp_dsp::decimate;
 
-use super::{Outcome, Quality, rms};
+use super::{FitQuality, Identification, ModalPole, rms};
 use crate::failure::Failure;
 
 pub use laws::{Law, LawFit, envelope};
-use modes::Wanted;
-pub use modes::{ModesFit, Pole, Stretch};
+pub use modes::Stretch;
+use modes::{ModeSearch, ModesFit};
 
-/// A record with decays in it.
+/// A recording with decays in it.
 #[derive(Debug, Clone, Copy)]
 pub struct Ringing<'a> {
-    /// Name of the record, for messages.
+    /// Name of the recording, for messages.
     pub name: &'a str,
     /// Times in seconds, rising; they need not be uniform.
     pub times_s: &'a [f64],
-    /// Samples a second, if the times are uniform.
+    /// Sampling rate, if the times are uniform.
     pub rate_hz: Option<f64>,
-    /// Values.
+    /// Samples.
     pub values: &'a [f64],
 }
 
 /// How decays are evaluated.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Options {
-    /// Number of modes; found from the data if not given.
+pub struct DecayOptions {
+    /// Number of modes; chosen from the data if not given.
     pub modes: Option<usize>,
     /// Part of the time axis to use, in seconds.
     pub range_s: Option<(f64, f64)>,
-    /// Lowest and highest frequency of the modes looked for, in Hz. What lies above is filtered away.
+    /// Lowest and highest frequency of the modes, in Hz. Higher frequencies are filtered out.
     pub band_hz: Option<(f64, f64)>,
 }
 
-/// A decay that was evaluated, with what is needed to draw it.
-#[derive(Debug, Clone)]
-pub struct Evaluated {
-    /// The numbers.
-    pub outcome: Outcome,
-    /// The stretches that were fitted.
-    pub stretches: Vec<Stretch>,
-    /// Start of each stretch on its record's time axis, in seconds.
-    pub starts_s: Vec<f64>,
-    /// The fit.
-    pub fit: ModesFit,
-    /// The laws of damping in order of what speaks for them; empty for several modes.
-    pub laws: Vec<LawFit>,
-}
-
-/// Most modes looked for.
+/// Most modes searched for.
 const MOST_MODES: usize = 12;
 
-/// Evaluates one or several records of the same free ringing.
+/// Evaluates one or several recordings of the free ringing of one stand; the result, and the stretches that were
+/// fitted.
 ///
 /// # Errors
-/// If nothing rings, or there is too little of it.
-pub fn identify(records: &[Ringing], options: &Options) -> Result<Evaluated, Failure> {
-    let mut outcome = Outcome::default();
-    let (stretches, starts_s, slowed) = stretches::stretches(records, options, &mut outcome)?;
-    let wanted = Wanted {
+/// If nothing rings, or the decays are too short.
+pub fn identify(
+    records: &[Ringing],
+    options: &DecayOptions,
+) -> Result<(Identification, Vec<Stretch>), Failure> {
+    let mut result = Identification::new("decay");
+    let (stretches, is_decimated) = stretches::stretches(records, options, &mut result)?;
+    let search = ModeSearch {
         count: options.modes,
         most: MOST_MODES,
         band_hz: options.band_hz.unwrap_or((0.0, f64::INFINITY)),
-        worth: if slowed { decimate::NOISE } else { 1.0 },
+        worth: if is_decimated { decimate::NOISE } else { 1.0 },
     };
-    let mut fit = modes::search(&stretches, &wanted)?;
-    if slowed {
+    let mut fit = modes::search(&stretches, &search)?;
+    if is_decimated {
         fit.allow_for(decimate::NOISE);
     }
     if fit.poles.is_empty() {
         return Err(Failure::failed(
-            "nothing in the record rings: no decaying sine stands out of the noise; check the channel, \
-             or cut the record to the decay with --range",
+            "no decaying sine stands out of the noise; check the channel, or cut the record to the decay with \
+             --range",
         ));
     }
-    words::doubts(&mut outcome, &fit);
+    present::fit_warnings(&mut result, &fit);
     let order = fit.by_strength(stretches.len());
     for (place, k) in order.iter().enumerate() {
-        words::name_mode(&mut outcome, &fit, *k, place, order.len());
+        let mode = ModalPole::new(
+            fit.poles[*k],
+            fit.fit.covariance.select(&[2 * k, 2 * k + 1]),
+        );
+        let prefix = match order.len() {
+            1 => String::new(),
+            _ => format!("mode_{}_", place + 1),
+        };
+        let names = [
+            "damped_frequency",
+            "decay_rate",
+            "damping_ratio",
+            "natural_frequency",
+        ];
+        let constants = mode.modal_constants().only(&names, &prefix);
+        result.parameters.extend(constants.list);
+        result.modes.push(mode);
     }
     let quality = quality(&fit, &stretches);
-    words::poor(&mut outcome, quality.relative);
-    outcome.quality = Some(quality);
-    outcome.method.push(format!(
-        "nonlinear least squares over {} stretch(es), {} samples: {} decaying sine(s), with an offset and a \
-         drift of each stretch",
-        stretches.len(),
-        fit.fit.residuals.len(),
-        fit.poles.len()
-    ));
-    words::correlations(&mut outcome, &fit);
-    let main = order[0];
-    let laws = dependence::damping_law(&mut outcome, &fit, &stretches)?;
-    dependence::amplitude_dependence(&mut outcome, &fit, &stretches, main);
-    by_hand::compare(&mut outcome, &fit, &stretches, main);
-    words::draw(&mut outcome, &fit, &stretches, &starts_s);
-    Ok(Evaluated {
-        outcome,
-        stretches,
-        starts_s,
-        fit,
-        laws,
-    })
+    present::poor(&mut result, quality.relative);
+    result.fit = Some(quality);
+    result.method.push(present::method(&fit, stretches.len()));
+    present::correlations(&mut result, &fit);
+    dependence::damping_law(&mut result, &fit, &stretches)?;
+    dependence::amplitude_dependence(&mut result, &fit, &stretches, order[0]);
+    by_hand::compare(&mut result, &fit, &stretches, order[0]);
+    present::draw(&mut result, &fit, &stretches);
+    Ok((result, stretches))
 }
 
-/// What the fit leaves of the swing about offset and drift.
-fn quality(fit: &ModesFit, stretches: &[Stretch]) -> Quality {
+/// The residual, over the swing about offset and drift.
+fn quality(fit: &ModesFit, stretches: &[Stretch]) -> FitQuality {
     let mut swing = Vec::new();
     for (s, stretch) in stretches.iter().enumerate() {
         let (c, d) = fit.trend(s);
         let pairs = stretch.times_s.iter().zip(&stretch.values);
         swing.extend(pairs.map(|(t, y)| y - c - d * t));
     }
-    Quality {
+    FitQuality {
         rms: fit.fit.rms,
         unit: String::new(),
         relative: fit.fit.rms / rms(&swing),

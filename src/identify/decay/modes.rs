@@ -11,27 +11,34 @@ use nalgebra::DMatrix;
 use torqcomp_dsp::peaks;
 use torqcomp_model::fit::{Fit, FitError, Options, Parameter, Residuals, linear, minimize};
 
-/// A stretch of free ringing: times from its own start, in seconds, and values.
+use crate::identify::Pole;
+
+/// A stretch of free ringing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stretch {
-    /// Times, rising from 0.
+    /// Start on the time axis of the recording, in seconds.
+    pub start_s: f64,
+    /// Times from the start, in seconds.
     pub times_s: Vec<f64>,
-    /// Values.
+    /// Samples.
     pub values: Vec<f64>,
 }
 
-/// Decay rate and angular frequency of a mode.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pole {
-    /// σ in 1/s.
-    pub rate_per_s: f64,
-    /// ω_d in rad/s.
-    pub omega_rad_per_s: f64,
+impl Stretch {
+    /// Samples at these times, of which there is at least one.
+    pub(super) fn new(times_s: &[f64], values: Vec<f64>) -> Self {
+        let start_s = times_s[0];
+        Self {
+            start_s,
+            times_s: times_s.iter().map(|t| t - start_s).collect(),
+            values,
+        }
+    }
 }
 
 /// A fit of a number of modes.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ModesFit {
+pub(super) struct ModesFit {
     /// The modes, the strongest first.
     pub poles: Vec<Pole>,
     /// The fit; parameters are σ and ω of each mode, then for each stretch a and b of each mode, c, d.
@@ -40,37 +47,37 @@ pub struct ModesFit {
     pub residuals: Vec<Vec<f64>>,
     /// Bayesian information criterion: n ln(S/n) + p ln n.
     pub criterion: f64,
-    /// Frequency in Hz of a line that was left out because it lies close to one that was taken.
+    /// Frequency in Hz of a line that was rejected as too close to a mode.
     pub close_hz: Option<f64>,
 }
 
-/// Which modes are looked for.
+/// Which modes are searched for.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Wanted {
+pub(super) struct ModeSearch {
     /// Their number, if it is known.
     pub count: Option<usize>,
-    /// Most of them otherwise.
+    /// Maximum number otherwise.
     pub most: usize,
     /// Lowest and highest frequency in Hz.
     pub band_hz: (f64, f64),
-    /// Part of the samples that are worth as much as samples with white noise.
+    /// Effective number of independent samples over their number.
     pub worth: f64,
 }
 
-/// Lines closer than this part of their frequency are not taken for two modes unasked: a frequency or a
-/// damping that changes with amplitude or time looks the same.
+/// Relative distance in frequency below which two lines are one mode, unless the number of modes is given: a frequency
+/// or damping that changes with amplitude or time looks the same.
 const CLOSE: f64 = 0.03;
 
-/// Linear numbers of a stretch besides amplitudes: offset and drift.
+/// Linear parameters of a stretch besides amplitudes: offset and drift.
 const TREND: usize = 2;
 
 /// The problem for the nonlinear fit.
-struct Problem<'a> {
+struct SineSum<'a> {
     stretches: &'a [Stretch],
     modes: usize,
 }
 
-impl Problem<'_> {
+impl SineSum<'_> {
     fn amplitudes_at(&self, stretch: usize) -> usize {
         2 * self.modes + stretch * (2 * self.modes + TREND)
     }
@@ -86,7 +93,7 @@ impl Problem<'_> {
     }
 }
 
-impl Residuals for Problem<'_> {
+impl Residuals for SineSum<'_> {
     fn residuals(&self, p: &[f64], out: &mut Vec<f64>) -> Result<(), FitError> {
         for (s, stretch) in self.stretches.iter().enumerate() {
             let pairs = stretch.times_s.iter().zip(&stretch.values);
@@ -122,7 +129,7 @@ impl Residuals for Problem<'_> {
     }
 }
 
-/// Amplitudes, offset and drift of a stretch for given poles, and what is left.
+/// Amplitudes, offset and drift of a stretch for given poles, and the residuals.
 fn linear_part(stretch: &Stretch, poles: &[Pole]) -> Result<(Vec<f64>, Vec<f64>), FitError> {
     let columns = 2 * poles.len() + TREND;
     let length = stretch
@@ -152,8 +159,8 @@ fn linear_part(stretch: &Stretch, poles: &[Pole]) -> Result<(Vec<f64>, Vec<f64>)
 ///
 /// # Errors
 /// [`FitError`] if there are too few samples.
-pub fn fit(stretches: &[Stretch], starts: &[Pole]) -> Result<ModesFit, FitError> {
-    let problem = Problem {
+pub(super) fn fit(stretches: &[Stretch], starts: &[Pole]) -> Result<ModesFit, FitError> {
+    let problem = SineSum {
         stretches,
         modes: starts.len(),
     };
@@ -203,17 +210,11 @@ fn sorted(fit: Fit, stretches: &[Stretch], modes: usize) -> ModesFit {
         residuals.push(fit.residuals[from..from + stretch.values.len()].to_vec());
         from += stretch.values.len();
     }
-    let poles = (0..modes)
-        .map(|k| Pole {
-            rate_per_s: fit.values[2 * k],
-            omega_rad_per_s: fit.values[2 * k + 1],
-        })
-        .collect();
     let n = fit.residuals.len() as f64;
     let mean = (fit.sum_of_squares / n).max(f64::MIN_POSITIVE);
     let criterion = n * mean.ln() + fit.values.len() as f64 * n.ln();
     ModesFit {
-        poles,
+        poles: Pole::all(&fit.values[..2 * modes]),
         fit,
         residuals,
         criterion,
@@ -222,7 +223,7 @@ fn sorted(fit: Fit, stretches: &[Stretch], modes: usize) -> ModesFit {
 }
 
 impl ModesFit {
-    /// Makes the uncertainties those of noise of which the residuals show only that part.
+    /// Enlarges the uncertainties where the residuals show only a part of the noise's power.
     pub(super) fn allow_for(&mut self, shown: f64) {
         self.fit.covariance = self.fit.covariance.clone().times(1.0 / shown);
         for std in self.fit.std.iter_mut().flatten() {
@@ -231,7 +232,6 @@ impl ModesFit {
     }
 
     /// Initial amplitude of a mode in a stretch.
-    #[must_use]
     pub fn amplitude(&self, mode: usize, stretch: usize) -> f64 {
         let modes = self.poles.len();
         let at = 2 * modes + stretch * (2 * modes + TREND) + 2 * mode;
@@ -239,7 +239,6 @@ impl ModesFit {
     }
 
     /// Offset and drift per second of a stretch.
-    #[must_use]
     pub fn trend(&self, stretch: usize) -> (f64, f64) {
         let modes = self.poles.len();
         let at = 2 * modes + stretch * (2 * modes + TREND) + 2 * modes;
@@ -247,7 +246,6 @@ impl ModesFit {
     }
 
     /// The fitted curve of a stretch.
-    #[must_use]
     pub fn curve(&self, stretches: &[Stretch], stretch: usize) -> Vec<f64> {
         let data = &stretches[stretch].values;
         data.iter()
@@ -257,7 +255,6 @@ impl ModesFit {
     }
 
     /// Modes by falling energy, amplitude²/σ, over all stretches.
-    #[must_use]
     pub fn by_strength(&self, stretches: usize) -> Vec<usize> {
         let energy = |k: usize| -> f64 {
             (0..stretches)
@@ -271,12 +268,11 @@ impl ModesFit {
     }
 }
 
-/// Adds modes one after another as long as the data pay for them, each started at the strongest line
-/// of what is left.
+/// Adds modes one by one as long as the criterion falls enough, each starting at the strongest line of the residual.
 ///
 /// # Errors
-/// [`FitError`] if there are too few samples; nothing found is an empty fit.
-pub fn search(stretches: &[Stretch], wanted: &Wanted) -> Result<ModesFit, FitError> {
+/// [`FitError`] if there are too few samples. Without a significant mode the fit is empty.
+pub(super) fn search(stretches: &[Stretch], wanted: &ModeSearch) -> Result<ModesFit, FitError> {
     let mut best = fit(stretches, &[])?;
     while best.poles.len() < wanted.count.unwrap_or(wanted.most) {
         let Some(pole) = next_pole(stretches, &best, wanted.band_hz) else {
@@ -302,22 +298,22 @@ pub fn search(stretches: &[Stretch], wanted: &Wanted) -> Result<ModesFit, FitErr
     Ok(best)
 }
 
-/// By how much the criterion falls from one fit to another if only that part of the samples counts.
+/// Reduction of the criterion from one fit to another if only a part `worth` of the samples counts.
 fn gain(before: &ModesFit, after: &ModesFit, worth: f64) -> f64 {
     let n = before.fit.residuals.len() as f64;
     let more = (after.fit.values.len() - before.fit.values.len()) as f64;
     worth * n * (before.fit.sum_of_squares / after.fit.sum_of_squares).ln() - more * n.ln()
 }
 
-/// Frequency in Hz of two modes that lie close together, if any do.
+/// Frequency in Hz of a mode that is too close to the last one, if there is one.
 fn close(poles: &[Pole]) -> Option<f64> {
     let last = poles.last()?;
     let near = |p: &&Pole| (p.omega_rad_per_s / last.omega_rad_per_s - 1.0).abs() < CLOSE;
     let found = poles[..poles.len() - 1].iter().find(near)?;
-    Some(found.omega_rad_per_s / std::f64::consts::TAU)
+    Some(found.frequency_hz())
 }
 
-/// Whether every mode decays, rings at least once before it is gone, and differs from the others.
+/// Whether every mode decays significantly, swings more than once, and differs from the others.
 fn physical(found: &ModesFit, stretches: &[Stretch]) -> bool {
     let length = stretches
         .iter()
@@ -325,7 +321,7 @@ fn physical(found: &ModesFit, stretches: &[Stretch]) -> bool {
         .fold(0.0_f64, |m, t| m.max(*t));
     let one = |(k, pole): (usize, &Pole)| {
         let rate_std = found.fit.std[2 * k];
-        let turns = pole.omega_rad_per_s * length / std::f64::consts::TAU;
+        let turns = pole.frequency_hz() * length;
         let known = rate_std.is_some_and(|std| pole.rate_per_s > 2.0 * std);
         let rings = pole.omega_rad_per_s > pole.rate_per_s && turns > 1.5;
         let apart = found.poles[..k].iter().all(|other| {
@@ -355,10 +351,7 @@ fn next_pole(stretches: &[Stretch], so_far: &ModesFit, band_hz: (f64, f64)) -> O
         band_hz.1.min(0.49 * rate_hz),
     )?;
     let omega = std::f64::consts::TAU * peak.frequency_hz;
-    let rest = Stretch {
-        times_s: stretch.times_s.clone(),
-        values: left,
-    };
+    let rest = Stretch::new(&stretch.times_s, left);
     let wide = std::f64::consts::PI * peak.width_hz;
     let rates = [0.05, 0.15, 0.4, 1.0, 2.0].map(|f| f * wide);
     let shifts = [-0.5, 0.0, 0.5].map(|f| f * wide);
@@ -382,7 +375,7 @@ fn next_pole(stretches: &[Stretch], so_far: &ModesFit, band_hz: (f64, f64)) -> O
     best.map(|(_, pole)| pole)
 }
 
-/// Values at equal steps, by straight lines between those there are; enough for a start.
+/// Values interpolated linearly at equal steps; good enough for a start.
 fn on_grid(times_s: &[f64], values: &[f64], rate_hz: f64) -> Vec<f64> {
     let mut out = Vec::with_capacity(values.len());
     let mut k = 0;

@@ -1,88 +1,79 @@
-//! Records cut into stretches of free ringing, at the rate they need.
+//! Records cut into stretches of free ringing, decimated where they have more samples than needed.
 
 use torqcomp_dsp::{decimate, onset, peaks};
 
 use super::modes::Stretch;
-use super::{Options, Ringing};
+use super::{DecayOptions, Ringing};
 use crate::failure::Failure;
-use crate::identify::Outcome;
+use crate::identify::Identification;
 use crate::print::short;
 
-/// Most samples of all stretches together that are fitted at once.
+/// Most samples that are fitted, of all stretches together.
 const MOST_SAMPLES: usize = 20_000;
 
-/// Stretches beyond that number are left out.
+/// Most stretches that are used.
 const MOST_STRETCHES: usize = 12;
 
-/// Power of a line relative to the strongest from which on it counts when the rate is lowered.
+/// Power of the weakest line that decimation must keep, over that of the strongest.
 const WORTH: f64 = 1e-6;
 
 /// Fewest samples of a record.
 const LEAST_SAMPLES: usize = 40;
 
-/// Cuts all records into stretches of free ringing and lowers their rate where nothing is lost; their starts,
-/// and whether a rate was lowered.
+/// Cuts all records into stretches of free ringing and decimates them where nothing is lost; also whether any was
+/// decimated.
 pub(super) fn stretches(
     records: &[Ringing],
-    options: &Options,
-    outcome: &mut Outcome,
-) -> Result<(Vec<Stretch>, Vec<f64>, bool), Failure> {
-    let cut = cut(records, options, outcome)?;
-    let total: usize = cut.iter().map(|(_, stretch, _)| stretch.values.len()).sum();
+    options: &DecayOptions,
+    result: &mut Identification,
+) -> Result<(Vec<Stretch>, bool), Failure> {
+    let cut = cut(records, options, result)?;
+    let total: usize = cut.iter().map(|(stretch, _)| stretch.values.len()).sum();
     let mut all = Vec::new();
-    let mut starts = Vec::new();
-    let mut slowed = is_low_passed(records, options);
-    for (start, stretch, rate_hz) in cut {
+    let mut is_decimated = is_low_passed(records, options);
+    for (stretch, rate_hz) in cut {
         let share = MOST_SAMPLES * stretch.values.len() / total;
         let factor = match (rate_hz, options.band_hz) {
             (Some(rate), None) => factor(&stretch.values, rate, share),
             _ => 1,
         };
-        let (later, stretch) = slower(&stretch, factor)?;
-        slowed |= factor > 1;
         if factor > 1 {
-            outcome.method.push(format!(
-                "the rate was lowered to one sample in {factor}: nothing rings above {} Hz",
+            is_decimated = true;
+            result.method.push(format!(
+                "decimated to one sample in {factor}: there are no modes above {} Hz",
                 short(decimate::PASS * rate_hz.unwrap_or(0.0) / factor as f64)
             ));
         }
-        starts.push(start + later);
-        all.push(stretch);
+        all.push(decimated(&stretch, factor)?);
     }
-    outcome.method.dedup();
-    Ok((all, starts, slowed))
+    result.method.dedup();
+    Ok((all, is_decimated))
 }
 
-/// A stretch, its start in s on the record's axis, and the record's rate.
-type Cut = (f64, Stretch, Option<f64>);
-
-/// All stretches at the rate they were recorded with.
-fn cut(records: &[Ringing], options: &Options, outcome: &mut Outcome) -> Result<Vec<Cut>, Failure> {
+/// All stretches as recorded, with the sampling rate of their record.
+fn cut(
+    records: &[Ringing],
+    options: &DecayOptions,
+    result: &mut Identification,
+) -> Result<Vec<(Stretch, Option<f64>)>, Failure> {
     let mut cut = Vec::new();
     for record in records {
-        let (times, values) = prepared(record, options, outcome)?;
+        let (times, values) = prepared(record, options, result)?;
         for range in onset::decays(&values) {
-            let start = times[range.start];
-            cut.push((
-                start,
-                Stretch {
-                    times_s: times[range.clone()].iter().map(|t| t - start).collect(),
-                    values: values[range].to_vec(),
-                },
-                record.rate_hz,
-            ));
+            let stretch = Stretch::new(&times[range.clone()], values[range].to_vec());
+            cut.push((stretch, record.rate_hz));
         }
     }
     if cut.is_empty() {
         return Err(Failure::failed(
-            "the record does not swing; choose another channel or range",
+            "no free decay found; try another channel or --range",
         ));
     }
     if cut.len() > MOST_STRETCHES {
-        outcome.warn(
+        result.warn(
             "decays-left-out",
             format!(
-                "{} decays were found; the first {MOST_STRETCHES} are used",
+                "only the first {MOST_STRETCHES} of {} decays are used",
                 cut.len()
             ),
         );
@@ -91,15 +82,15 @@ fn cut(records: &[Ringing], options: &Options, outcome: &mut Outcome) -> Result<
     Ok(cut)
 }
 
-/// The part of a record that is asked for, low-passed and slower if a band is given.
+/// Times and samples of the range, low-passed and decimated if a band is given.
 fn prepared(
     record: &Ringing,
-    options: &Options,
-    outcome: &mut Outcome,
+    options: &DecayOptions,
+    result: &mut Identification,
 ) -> Result<(Vec<f64>, Vec<f64>), Failure> {
     if let Some(i) = record.values.iter().position(|v| !v.is_finite()) {
         return Err(Failure::failed(format_args!(
-            "{}: sample {} is not a number; cut the record there with --range",
+            "{}: sample {} is not a finite number; exclude it with --range",
             record.name,
             i + 1
         )));
@@ -111,40 +102,37 @@ fn prepared(
     let last = record.times_s.partition_point(|t| *t <= to);
     if last < first + LEAST_SAMPLES {
         return Err(Failure::failed(format_args!(
-            "{}: {} samples are too few for a decay; {LEAST_SAMPLES} are needed",
+            "{}: {} samples are too few for a decay; at least {LEAST_SAMPLES} are needed",
             record.name,
             last.saturating_sub(first)
         )));
     }
-    let whole = Stretch {
-        times_s: record.times_s[first..last].to_vec(),
-        values: record.values[first..last].to_vec(),
-    };
+    let (times, values) = (&record.times_s[first..last], &record.values[first..last]);
     let (Some((_, highest)), Some(rate_hz)) = (options.band_hz, record.rate_hz) else {
-        return Ok((whole.times_s, whole.values));
+        return Ok((times.to_vec(), values.to_vec()));
     };
     let factor = band_factor(rate_hz, highest);
     if factor > 1 {
-        outcome.method.push(format!(
-            "low-passed above {} Hz, one sample in {factor} kept",
+        result.method.push(format!(
+            "low-passed at {} Hz and decimated to one sample in {factor}",
             short(highest)
         ));
     }
-    let few = decimate::decimate(&whole.values, factor)?;
-    let times = whole.times_s[few.first..].iter().step_by(factor);
+    let few = decimate::decimate(values, factor)?;
+    let times = times[few.first..].iter().step_by(factor);
     Ok((
         times.take(few.samples.len()).copied().collect(),
         few.samples,
     ))
 }
 
-/// How many samples become one for a band.
+/// Decimation factor for a band.
 fn band_factor(rate_hz: f64, highest_hz: f64) -> usize {
     ((decimate::PASS * rate_hz / highest_hz).floor() as usize).max(1)
 }
 
-/// Whether the band that is asked for takes a lower rate.
-fn is_low_passed(records: &[Ringing], options: &Options) -> bool {
+/// Whether the band leads to decimation of a record.
+fn is_low_passed(records: &[Ringing], options: &DecayOptions) -> bool {
     let Some((_, highest_hz)) = options.band_hz else {
         return false;
     };
@@ -152,24 +140,19 @@ fn is_low_passed(records: &[Ringing], options: &Options) -> bool {
     rates.any(|rate_hz| band_factor(rate_hz, highest_hz) > 1)
 }
 
-/// A stretch at a lower rate, and how much later it starts.
-fn slower(stretch: &Stretch, factor: usize) -> Result<(f64, Stretch), Failure> {
+/// A stretch with one sample in `factor`.
+fn decimated(stretch: &Stretch, factor: usize) -> Result<Stretch, Failure> {
     let few = decimate::decimate(&stretch.values, factor)?;
     let later = stretch.times_s[few.first];
-    let kept = stretch.times_s[few.first..]
-        .iter()
-        .step_by(factor)
-        .take(few.samples.len());
-    Ok((
-        later,
-        Stretch {
-            times_s: kept.map(|t| t - later).collect(),
-            values: few.samples,
-        },
-    ))
+    let kept = stretch.times_s[few.first..].iter().step_by(factor);
+    Ok(Stretch {
+        start_s: stretch.start_s + later,
+        times_s: kept.take(few.samples.len()).map(|t| t - later).collect(),
+        values: few.samples,
+    })
 }
 
-/// How many samples can become one: as far as the highest line allows, and only where there are many.
+/// Decimation factor that the highest significant line allows, for records with many samples.
 fn factor(values: &[f64], rate_hz: f64, enough: usize) -> usize {
     if values.len() <= enough.max(1000) {
         return 1;

@@ -2,50 +2,70 @@
 
 use std::ops::Range;
 
+use num_complex::Complex64;
 use torqcomp_dsp::frf::{self, Block, Powers, Window};
 
-use super::{Driven, Excitation, Options, check};
+use super::{Driven, Excitation, ResponseOptions, check};
 use crate::failure::Failure;
-use crate::identify::{Outcome, rms};
-use crate::print::{rounded, short};
+use crate::identify::{Identification, rms};
+use crate::print::{plural, rounded, short};
 
 /// Blocks of all records, on one grid of frequencies.
 pub(super) struct Set {
     pub blocks: Vec<Block>,
-    /// Powers of all blocks together.
+    /// Powers summed over all blocks.
     pub powers: Powers,
-    /// Record that each block is from.
+    /// Record of each block.
     pub record: Vec<usize>,
     pub step_hz: f64,
-    /// Decay rate that the window adds, 1/s.
+    /// Decay rate in 1/s that the window adds to every mode.
     pub added_rate: f64,
-    /// What the blocks are weighted with.
     pub window: Window,
 }
 
-/// Part of the samples that a hammer leaves at rest.
+impl Set {
+    fn new(cut: Vec<(usize, Block)>, step_hz: f64, window: Window) -> Self {
+        let (record, blocks): (Vec<usize>, Vec<Block>) = cut.into_iter().unzip();
+        Self {
+            powers: Powers::of(blocks.iter(), 0..usize::MAX),
+            blocks,
+            record,
+            step_hz,
+            added_rate: 0.0,
+            window,
+        }
+    }
+
+    /// Mean relative error of a response, given at the lines, over all blocks.
+    pub fn error(&self, response: &[Complex64], lines: &Range<usize>) -> f64 {
+        let error = |block| frf::prediction_error(response, block, lines.clone());
+        self.blocks.iter().map(error).sum::<f64>() / self.blocks.len() as f64
+    }
+}
+
+/// Part of the samples at rest from which the excitation is a hammer.
 const AT_REST: f64 = 0.95;
 
-/// Swing at the end of a hit's record, over the largest, from which on a window is needed.
+/// Swing at the end of a hit, over the largest, from which a window is needed.
 const RINGING: f64 = 5e-3;
 
-/// The window falls to this at the end.
+/// Value of the window at the end.
 const WINDOW_END: f64 = 1e-2;
 
 /// Cuts all records.
 pub(super) fn blocks(
     records: &[Driven],
-    options: &Options,
-    outcome: &mut Outcome,
+    options: &ResponseOptions,
+    result: &mut Identification,
 ) -> Result<Set, Failure> {
     check::records(records)?;
     let excitation = options
         .excitation
         .unwrap_or_else(|| guess(records[0].applied));
     match excitation {
-        Excitation::Impact => impacts(records, outcome),
-        Excitation::Random => random(records, options, outcome),
-        Excitation::Periodic => periodic(records, options, outcome),
+        Excitation::Impact => impacts(records, result),
+        Excitation::Random => random(records, options, result),
+        Excitation::Periodic => periodic(records, options, result),
     }
 }
 
@@ -61,15 +81,15 @@ fn guess(applied: &[f64]) -> Excitation {
     }
 }
 
-fn impacts(records: &[Driven], outcome: &mut Outcome) -> Result<Set, Failure> {
+fn impacts(records: &[Driven], result: &mut Identification) -> Result<Set, Failure> {
     let rate_hz = records[0].rate_hz;
-    let good = good_hits(records, outcome)?;
+    let good = good_hits(records, result)?;
     let length = good.iter().map(|(_, range)| range.len()).min().unwrap_or(0);
     let window = window_for(records, &good, length);
     let added_rate = match window {
         Window::Exponential(tau) => {
-            outcome.method.push(format!(
-                "exponential window with a time constant of {} s on both channels, taken out of the damping",
+            result.method.push(format!(
+                "exponential window with a time constant of {} s on both channels, its damping subtracted",
                 short(tau / rate_hz)
             ));
             rate_hz / tau
@@ -79,27 +99,24 @@ fn impacts(records: &[Driven], outcome: &mut Outcome) -> Result<Set, Failure> {
     let block = |(r, range): &(usize, Range<usize>)| {
         let range = range.start..range.start + length;
         let record = &records[*r];
-        // What stands before the hit is offset.
+        // The level before the hit is offset.
         let level = |v: &[f64]| v[..8].iter().sum::<f64>() / 8.0;
         let without = |v: &[f64]| v.iter().map(|x| x - level(v)).collect::<Vec<f64>>();
         let applied = without(&record.applied[range.clone()]);
-        frf::transform(&applied, &without(&record.measured[range]), window)
+        let measured = without(&record.measured[range]);
+        (*r, frf::transform(&applied, &measured, window))
     };
-    let blocks: Vec<Block> = good.iter().map(block).collect();
+    let cut = good.iter().map(block).collect();
     Ok(Set {
-        powers: Powers::of(blocks.iter(), 0..usize::MAX),
-        blocks,
-        record: good.iter().map(|(r, _)| *r).collect(),
-        step_hz: rate_hz / length as f64,
         added_rate,
-        window,
+        ..Set::new(cut, rate_hz / length as f64, window)
     })
 }
 
-/// Record and samples of each hit that can be used; the others are named.
+/// Record and samples of each usable hit; the others are reported.
 fn good_hits(
     records: &[Driven],
-    outcome: &mut Outcome,
+    result: &mut Identification,
 ) -> Result<Vec<(usize, Range<usize>)>, Failure> {
     let rate_hz = records[0].rate_hz;
     let apart = (0.05 * rate_hz) as usize;
@@ -110,14 +127,14 @@ fn good_hits(
         for (k, hit) in hits.into_iter().enumerate() {
             if hit.faults.is_empty() {
                 if let Some(part) = hit.second {
-                    outcome.warn("second-stroke", second_stroke(record, k, part));
+                    result.warn("second-stroke", second_stroke(record, k, part));
                 }
                 good.push((r, hit.range));
                 continue;
             }
             let why: Vec<String> = hit.faults.iter().map(ToString::to_string).collect();
             bad.push(format!(
-                "{}, hit {} at {} s was left out: {}",
+                "{}, hit {} at {} s is not used: {}",
                 record.name,
                 k + 1,
                 short(hit.peak as f64 / rate_hz),
@@ -127,29 +144,28 @@ fn good_hits(
     }
     if good.is_empty() {
         bad.push(
-            "no usable hit is in the records; hit again, once, without overdriving the inputs, or choose \
-             another --excitation"
+            "no usable hit; hit once, without overdriving the inputs, or choose another --excitation"
                 .to_owned(),
         );
         return Err(Failure::failed(bad.join("; ")));
     }
     for message in bad {
-        outcome.warn("hit-left-out", message);
+        result.warn("hit-left-out", message);
     }
     Ok(good)
 }
 
 fn second_stroke(record: &Driven, k: usize, part: f64) -> String {
     format!(
-        "{}, hit {}: the hammer struck again with {} % of the force; both strokes are in the force, so that the hit \
-         is used, but a clean one is better",
+        "{}, hit {}: second stroke with {} % of the force; the hit is used, as the recorded force includes both, but a \
+         clean one is better",
         record.name,
         k + 1,
         rounded(100.0 * part, 2)
     )
 }
 
-/// An exponential window, if a response still rings at its end.
+/// An exponential window, if a response still rings at the end.
 fn window_for(records: &[Driven], good: &[(usize, Range<usize>)], length: usize) -> Window {
     let still_rings = good.iter().any(|(r, range)| {
         let part = &records[*r].measured[range.start..range.start + length];
@@ -163,85 +179,79 @@ fn window_for(records: &[Driven], good: &[(usize, Range<usize>)], length: usize)
     }
 }
 
-fn random(records: &[Driven], options: &Options, outcome: &mut Outcome) -> Result<Set, Failure> {
+fn random(
+    records: &[Driven],
+    options: &ResponseOptions,
+    result: &mut Identification,
+) -> Result<Set, Failure> {
     let rate_hz = records[0].rate_hz;
     let total: usize = records.iter().map(|r| r.applied.len()).sum();
-    // Some thirty segments: enough to average, long enough to resolve.
+    // About thirty segments: enough to average, long enough to resolve modes.
     let length = options
         .segment
         .unwrap_or_else(|| (total / 16).clamp(64, 1 << 14) & !1);
-    let mut blocks = Vec::new();
-    let mut of = Vec::new();
+    let mut all = Vec::new();
     for (r, record) in records.iter().enumerate() {
         let cut = frf::segments(record.applied, record.measured, length);
-        of.extend(std::iter::repeat_n(r, cut.len()));
-        blocks.extend(cut);
+        all.extend(cut.into_iter().map(|block| (r, block)));
     }
-    if blocks.len() < 4 {
+    if all.len() < 4 {
         return Err(Failure::failed(format_args!(
-            "segments of {length} samples fit only {} times into the records; make them shorter with \
-             --segment, or record longer",
-            blocks.len()
+            "only {} of {length} samples in the records, at least 4 are needed; choose a shorter --segment, or record \
+             longer",
+            plural(all.len(), "segment")
         )));
     }
-    outcome.method.push(format!(
-        "Hann-weighted segments of {length} samples, half overlapping"
+    result.method.push(format!(
+        "Hann-weighted segments of {length} samples, 50 % overlap"
     ));
-    Ok(Set {
-        powers: Powers::of(blocks.iter(), 0..usize::MAX),
-        blocks,
-        record: of,
-        step_hz: rate_hz / length as f64,
-        added_rate: 0.0,
-        window: Window::Hann,
-    })
+    Ok(Set::new(all, rate_hz / length as f64, Window::Hann))
 }
 
-fn periodic(records: &[Driven], options: &Options, outcome: &mut Outcome) -> Result<Set, Failure> {
+fn periodic(
+    records: &[Driven],
+    options: &ResponseOptions,
+    result: &mut Identification,
+) -> Result<Set, Failure> {
     let rate_hz = records[0].rate_hz;
-    let period = options.period.or_else(|| frf::find_period(records[0].applied)).ok_or_else(|| {
-        Failure::failed("no period is found in the applied signal; give it with --period, or --excitation random")
+    let period = options
+        .period
+        .or_else(|| frf::find_period(records[0].applied));
+    let period = period.ok_or_else(|| {
+        Failure::failed(
+            "no period found in the applied signal; give it with --period, or --excitation random",
+        )
     })?;
-    let mut blocks = Vec::new();
-    let mut of = Vec::new();
+    let mut all = Vec::new();
     for (r, record) in records.iter().enumerate() {
-        let cut: Vec<Block> = (0..record.applied.len() / period)
-            .map(|k| k * period..(k + 1) * period)
-            .map(|p| {
-                frf::transform(
-                    &record.applied[p.clone()],
-                    &record.measured[p],
-                    Window::None,
-                )
-            })
-            .collect();
-        // The first period still holds what went before.
-        let steady = if cut.len() > 2 { &cut[1..] } else { &cut[..] };
-        if let Some(found) = frf::average_periods(steady) {
-            say_noise(outcome, record.name, &found);
+        let block = |k: usize| {
+            let samples = k * period..(k + 1) * period;
+            let applied = &record.applied[samples.clone()];
+            frf::transform(applied, &record.measured[samples], Window::None)
+        };
+        let mut cut: Vec<Block> = (0..record.applied.len() / period).map(block).collect();
+        // The first period still shows the transient.
+        if cut.len() > 2 {
+            cut.remove(0);
         }
-        of.extend(std::iter::repeat_n(r, steady.len()));
-        blocks.extend_from_slice(steady);
+        if let Some(averaged) = frf::average_periods(&cut) {
+            report_noise(result, record.name, &averaged);
+        }
+        all.extend(cut.into_iter().map(|block| (r, block)));
     }
-    if blocks.is_empty() {
+    if all.is_empty() {
         return Err(Failure::failed(format_args!(
-            "no period of {period} samples fits into the records"
+            "the records are shorter than one period of {period} samples"
         )));
     }
-    outcome.method.push(format!(
-        "periods of {period} samples, the first one left out"
+    result.method.push(format!(
+        "periods of {period} samples, without the first one"
     ));
-    Ok(Set {
-        powers: Powers::of(blocks.iter(), 0..usize::MAX),
-        blocks,
-        record: of,
-        step_hz: rate_hz / period as f64,
-        added_rate: 0.0,
-        window: Window::None,
-    })
+    Ok(Set::new(all, rate_hz / period as f64, Window::None))
 }
 
-fn say_noise(outcome: &mut Outcome, name: &str, found: &frf::Periodic) {
+/// Says how large noise and distortion are.
+fn report_noise(result: &mut Identification, name: &str, found: &frf::Periodic) {
     let lines = found.excited.len();
     let sum = |keep: &dyn Fn(usize) -> bool, of: &dyn Fn(usize) -> f64| -> f64 {
         (1..lines).filter(|k| keep(*k)).map(of).sum()
@@ -254,8 +264,8 @@ fn say_noise(outcome: &mut Outcome, name: &str, found: &frf::Periodic) {
         found.mean.measured[k].norm_sqr() - found.noise_power[k]
     });
     let decibel = |power: f64| rounded(10.0 * (power.max(1e-300) / signal).log10(), 3);
-    outcome.method.push(format!(
-        "{name}: noise {} dB below the response, distortion at lines that are not excited {}",
+    result.method.push(format!(
+        "{name}: relative to the response, noise {} dB, distortion at lines that are not excited {}",
         decibel(noise),
         if others > 0.0 {
             format!("{} dB", decibel(others))
@@ -264,11 +274,11 @@ fn say_noise(outcome: &mut Outcome, name: &str, found: &frf::Periodic) {
         }
     ));
     if others > 4.0 * noise && others > 1e-4 * signal {
-        outcome.warn(
+        result.warn(
             "nonlinear",
             format!(
-                "{name}: the response has power at frequencies that were not applied, more than noise explains \
-                 ({} dB): the stand is not linear at this level",
+                "{name}: the response has more power at frequencies that were not applied than noise explains ({} dB): \
+                 the stand is nonlinear at this level",
                 decibel(others)
             ),
         );

@@ -1,23 +1,23 @@
-//! Records that no response can be read from, and channels that look swapped.
+//! Refusal of records that show no response, and signs of swapped channels and poor fits.
 
 use super::Driven;
 use super::Modal;
 use super::blocks::Set;
 use super::lines::Lines;
 use crate::failure::Failure;
-use crate::identify::Outcome;
-use crate::print::{rounded, short};
+use crate::identify::Identification;
+use crate::print::{plural, rounded, short};
 use torqcomp_dsp::frf::{Estimator, Window};
 
-/// Refuses records that differ in rate, have holes, or do not move.
+/// Refuses records that differ in rate, have gaps, or do not change.
 pub(super) fn records(records: &[Driven]) -> Result<(), Failure> {
     let first = records
         .first()
-        .ok_or_else(|| Failure::failed("there is no record"))?;
+        .ok_or_else(|| Failure::failed("no record given"))?;
     for record in records {
         if (record.rate_hz / first.rate_hz - 1.0).abs() > 1e-6 {
             return Err(Failure::failed(format_args!(
-                "{} has {} samples a second and {} has {}; records of one response must have one rate",
+                "{} was sampled at {} Hz and {} at {} Hz; records of one response need the same rate",
                 first.name,
                 short(first.rate_hz),
                 record.name,
@@ -34,15 +34,14 @@ pub(super) fn records(records: &[Driven]) -> Result<(), Failure> {
         for (what, samples) in [("applied", record.applied), ("measured", record.measured)] {
             if samples.iter().all(|v| *v == samples[0]) {
                 return Err(Failure::failed(format_args!(
-                    "{}: the {what} channel does not change, so that there is no response; check --{what} and \
-                     whether the recorder was connected",
+                    "{}: the {what} channel does not change; check --{what} and whether the recorder was connected",
                     record.name
                 )));
             }
         }
         if record.applied == record.measured {
             return Err(Failure::failed(format_args!(
-                "{}: the applied and the measured channel hold the same numbers; check --applied and --measured",
+                "{}: the applied and the measured channel are the same numbers; check --applied and --measured",
                 record.name
             )));
         }
@@ -50,14 +49,13 @@ pub(super) fn records(records: &[Driven]) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Part of the lines whose phase leads that is said.
+/// Part of the lines with leading phase from which the response leads.
 const LEADING: f64 = 0.9;
-/// Imaginary part over the magnitude below which a line tells no side.
+/// Imaginary part over the magnitude below which a line neither leads nor lags.
 const IN_PHASE: f64 = 0.02;
 
-/// What is measured lags what is applied: ω^−m j^−m H has its imaginary part below zero where one point is
-/// driven and measured. Where it leads nearly throughout, the channels are swapped or one has the
-/// wrong sign.
+/// Whether the measured signal leads at nearly all lines. Where one point is driven and measured it lags: the imaginary
+/// part of ω^−m j^−m H is negative. Otherwise the channels are swapped or one has the wrong sign.
 pub(super) fn leads(set: &Set, lines: &Lines, order: i32) -> bool {
     let h1 = set.powers.response(Estimator::H1);
     let turn = num_complex::Complex64::I.powi(-order);
@@ -72,24 +70,23 @@ pub(super) fn leads(set: &Set, lines: &Lines, order: i32) -> bool {
     sides.len() > 10 && leading as f64 > LEADING * sides.len() as f64
 }
 
-/// Text for a response that leads.
-pub(super) const LEADS: &str = "the measured signal leads the applied one at nearly all frequencies, which no driven stand does: the \
-     channels may be swapped (--applied is what acts, --measured what answers), or one has the wrong sign";
+pub(super) const LEADS: &str = "the measured signal leads the applied one at nearly all frequencies, which is impossible: --applied and --measured \
+     are swapped, or one channel has the wrong sign";
 
-/// Whether a mode lies above all frequencies of the record: swapped channels have none to show below.
+/// Whether a mode lies above all frequencies of the record, as with swapped channels.
 pub(super) fn is_out_of_reach(set: &Set, fitted: &Modal) -> bool {
     let highest = std::f64::consts::TAU * set.step_hz * (set.blocks[0].applied.len() - 1) as f64;
-    let natural = |pole: &crate::identify::decay::Pole| pole.rate_per_s.hypot(pole.omega_rad_per_s);
-    fitted.poles.iter().any(|pole| natural(pole) > highest)
+    let mut poles = fitted.poles.iter();
+    poles.any(|pole| pole.rate_per_s.hypot(pole.omega_rad_per_s) > highest)
 }
 
-/// Widening of a resonance by Hann's window, over its width, that is said.
+/// Relative widening of a resonance by Hann's window from which there is a warning.
 const WIDER: f64 = 0.01;
 
-/// Says where Hann's window widens a resonance. Smoothing by the squared window is multiplying what rings by its
-/// autocorrelation, 1 − (2πt/L)²/6 for short times; over a decay time 1/σ the damping grows by about twice
-/// that, `(2π/σL)²/3`.
-pub(super) fn leakage(outcome: &mut Outcome, set: &Set, fitted: &Modal) {
+/// Warns where Hann's window widens a resonance. Smoothing by the squared window multiplies the decay by its
+/// autocorrelation, 1 − (2πt/L)²/6 for short times; over a decay time 1/σ the damping grows by about twice that,
+/// `(2π/σL)²/3`.
+pub(super) fn leakage(result: &mut Identification, set: &Set, fitted: &Modal) {
     if set.window != Window::Hann {
         return;
     }
@@ -97,12 +94,12 @@ pub(super) fn leakage(outcome: &mut Outcome, set: &Set, fitted: &Modal) {
     for pole in &fitted.poles {
         let wider = (std::f64::consts::TAU / (pole.rate_per_s * length_s)).powi(2) / 3.0;
         if wider > WIDER {
-            outcome.warn(
+            result.warn(
                 "leakage",
                 format!(
-                    "the mode at {} Hz is narrow for segments of {} s: its damping comes out too large by some {} %, \
-                     which its uncertainty does not hold; make segments longer with --segment",
-                    rounded(pole.omega_rad_per_s / std::f64::consts::TAU, 5),
+                    "the mode at {} Hz is narrow for segments of {} s: its damping is about {} % too large, which its \
+                     uncertainty does not include; choose a longer --segment",
+                    rounded(pole.frequency_hz(), 5),
                     short(length_s),
                     rounded(100.0 * wider, 1)
                 ),
@@ -111,21 +108,21 @@ pub(super) fn leakage(outcome: &mut Outcome, set: &Set, fitted: &Modal) {
     }
 }
 
-/// Part of the measured signal that may be left.
+/// Residual over the measured signal above which the fit is poor.
 const POOR: f64 = 0.5;
 
-/// Says what makes the fit doubtful.
-pub(super) fn doubts(outcome: &mut Outcome, relative: f64, leads: bool, fitted: &Modal) {
+/// Warns about what makes the fit doubtful.
+pub(super) fn doubts(result: &mut Identification, relative: f64, leads: bool, modes: usize) {
     if leads {
-        outcome.warn("leads", LEADS);
+        result.warn("leads", LEADS);
     }
     if relative > POOR {
-        outcome.warn(
+        result.warn(
             "poor-fit",
             format!(
-                "{} mode(s) leave {} % of the measured signal: what was applied does not explain it; look at the \
-                 coherence, and choose another --band",
-                fitted.poles.len(),
+                "the residual of {} is {} % of the measured signal: the applied signal does not explain it; check the \
+                 coherence (--html) and choose another --band",
+                plural(modes, "mode"),
                 rounded(100.0 * relative, 2)
             ),
         );

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-/// Inverse of a matrix that is symmetric and positive, its diagonal brought to 1 and so much added to it.
+/// Inverse of a symmetric positive matrix, after scaling its diagonal to 1 and adding `added` to it.
 pub(super) fn invert(matrix: &DMatrix<f64>, added: f64) -> Option<DMatrix<f64>> {
     let sizes: Vec<f64> = matrix.diagonal().iter().map(|d| d.sqrt()).collect();
     let mut scaled = matrix.clone();

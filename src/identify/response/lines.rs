@@ -1,22 +1,22 @@
-//! Which lines of a response are fitted, and with which weights.
+//! The lines of a response that are fitted, and their weights.
 
 use std::f64::consts::TAU;
 
 use torqcomp_dsp::frf::{Estimator, Powers};
 
 use super::blocks::Set;
-use super::{Data, Options};
+use super::{Data, ResponseOptions};
 use crate::failure::Failure;
-use crate::print::short;
+use crate::print::{plural, short};
 
-/// Numbers of lines in a band.
+/// Lines of a band.
 pub(super) type Lines = std::ops::Range<usize>;
 
-/// Power of the applied signal, over its largest, that excites.
+/// Power of an excited line, over that of the strongest.
 const EXCITES: f64 = 1e-3;
 
-/// The band that is asked for, or where the excitation has power.
-pub(super) fn band(set: &Set, options: &Options) -> Result<Lines, Failure> {
+/// The given band, or the excited lines.
+pub(super) fn band(set: &Set, options: &ResponseOptions) -> Result<Lines, Failure> {
     let lines = set.blocks[0].applied.len();
     let frf = set.powers.response(Estimator::H1);
     let (from, to) = match options.band_hz {
@@ -38,19 +38,19 @@ pub(super) fn band(set: &Set, options: &Options) -> Result<Lines, Failure> {
     let range = from.max(1)..to.min(lines - 1);
     if range.len() < 12 {
         return Err(Failure::failed(format_args!(
-            "the band holds {} lines {} Hz apart, too few to fit modes; widen --band or record longer",
-            range.len(),
+            "only {} in the band, {} Hz apart: too few to fit modes; widen --band or record longer",
+            plural(range.len(), "line"),
             short(set.step_hz)
         )));
     }
     Ok(range)
 }
 
-/// Most lines that are fitted; more are thinned out evenly.
+/// Most lines that are fitted.
 pub(super) const MOST_LINES: usize = 6000;
 
-/// H1 of those powers, a line's weight being the root of its applied power.
-pub(super) fn data(powers: &Powers, set: &Set, lines: &Lines, options: &Options) -> Data {
+/// H1, each line weighted with the root of its applied power.
+pub(super) fn data(powers: &Powers, set: &Set, lines: &Lines, options: &ResponseOptions) -> Data {
     let frf = powers.response(Estimator::H1);
     let response = frf.response[lines.clone()].to_vec();
     let powers = &frf.applied_power[lines.clone()];

@@ -4,10 +4,9 @@
 //! H(s) = s^m [ Σ R_k/(s − p_k) + R_k*/(s − p_k*) + c_1 + c_2/s² ] e^{−sτ},   p_k = −σ_k + jω_k
 //! ```
 //!
-//! m is 0 for displacement, 1 for speed, 2 for acceleration; c_1 stands for modes above the band, c_2
-//! for those below and for free motion. Residues and c are linear; for given poles they follow at once, so
-//! that only poles and delay are searched for (G. H. Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973),
-//! 413, variable projection).
+//! m is 0 for displacement, 1 for speed, 2 for acceleration; c_1 is the effect of modes above the band, c_2 of those below
+//! and of free motion. Residues and c are linear and follow from the poles, so only poles and delay are searched for
+//! (variable projection: G. H. Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973), 413).
 
 use std::sync::Mutex;
 
@@ -15,11 +14,11 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 use torqcomp_model::fit::{Fit, FitError, Options, Parameter, Residuals, linear, minimize};
 
-use crate::identify::decay::Pole;
+use crate::identify::Pole;
 
 /// A response at lines of a band, with weights.
 #[derive(Debug, Clone)]
-pub struct Data {
+pub(super) struct Data {
     /// Angular frequency of each line in rad/s.
     pub omega: Vec<f64>,
     /// Response at each line.
@@ -28,31 +27,31 @@ pub struct Data {
     pub weight: Vec<f64>,
     /// m.
     pub order: i32,
-    /// Decay rate that a window added to every mode, in 1/s.
+    /// Decay rate in 1/s that the window adds to every mode.
     pub added_rate: f64,
     /// Whether a delay is fitted.
     pub with_delay: bool,
 }
 
-/// How exactly a fit is made.
+/// Precision of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Effort {
-    /// Enough to choose by.
+pub(super) enum Effort {
+    /// Enough to choose the number of modes.
     Coarse,
-    /// To the end.
+    /// Full.
     Fine,
 }
 
 /// A modal model.
 #[derive(Debug, Clone)]
-pub struct Modal {
-    /// Poles as they are without the window.
+pub(super) struct Modal {
+    /// Poles without the effect of the window.
     pub poles: Vec<Pole>,
     /// τ in s.
     pub delay_s: f64,
-    /// Linear numbers: real and imaginary part of each residue, then c₁ and c₂.
+    /// Linear parameters: real and imaginary part of each residue, then c₁ and c₂.
     linear: Vec<f64>,
-    /// Standard uncertainty of τ in s, if it was fitted and the data tell it.
+    /// Standard uncertainty of τ in s, if it was fitted and is identifiable.
     pub delay_std_s: Option<f64>,
     /// The fit of poles and delay to the averaged response.
     pub fit: Option<Fit>,
@@ -63,7 +62,7 @@ pub struct Modal {
 }
 
 impl Data {
-    /// What frequencies are divided by, in rad/s.
+    /// Scale of frequencies in rad/s.
     pub(super) fn scale(&self) -> f64 {
         self.omega[self.omega.len() / 2]
     }
@@ -73,7 +72,7 @@ impl Data {
         (self.omega[0], self.omega[self.omega.len() - 1])
     }
 
-    /// The columns at a frequency, instead of what `all` held.
+    /// The columns at a frequency; `all` is overwritten.
     fn columns(&self, omega: f64, poles: &[Pole], delay_s: f64, all: &mut Vec<Complex64>) {
         let scale = self.scale();
         let (front, s) = self.front(omega, delay_s, scale);
@@ -87,7 +86,7 @@ impl Data {
         all.push(front / (s * s));
     }
 
-    /// What stands before the sum, and s.
+    /// The factor of the sum, and s.
     pub(super) fn front(&self, omega: f64, delay_s: f64, scale: f64) -> (Complex64, Complex64) {
         let s = Complex64::new(0.0, omega / scale);
         let late = match delay_s == 0.0 {
@@ -108,7 +107,7 @@ impl Data {
         (1.0 / (s - p), 1.0 / (s - p.conj()))
     }
 
-    /// Linear numbers for given poles, and weighted residuals, real and imaginary one after another.
+    /// Linear parameters for given poles, and weighted residuals, real and imaginary parts alternating.
     fn solve(&self, poles: &[Pole], delay_s: f64) -> Result<linear::LinearFit, FitError> {
         let count = 2 * poles.len() + 2;
         let lines = self.omega.len();
@@ -134,7 +133,7 @@ impl Data {
     /// [`FitError`] if there are too few lines.
     pub fn fit(&self, starts: &[Pole], effort: Effort) -> Result<Modal, FitError> {
         let parameters = self.parameters(starts);
-        let problem = Problem {
+        let problem = PoleSearch {
             data: self,
             modes: starts.len(),
             solved: Mutex::default(),
@@ -164,8 +163,7 @@ impl Data {
         Ok(Modal { fit, ..modal })
     }
 
-    /// A modal model of these numbers: the delay with its standard uncertainty, real and imaginary part of each
-    /// residue, c₁ and c₂.
+    /// The model with these poles, delay (with its standard uncertainty) and linear parameters.
     pub(super) fn modal_of(
         &self,
         poles: &[Pole],
@@ -208,13 +206,13 @@ impl Data {
         parameters
     }
 
-    /// Derivatives of the weighted model by poles and delay at a fit, then by so many of the linear numbers, real and
-    /// imaginary parts one after another, with what the other linear numbers can make up for taken out.
+    /// Derivatives of the weighted model by poles and delay at a fit, then by the first `linear` linear parameters, real
+    /// and imaginary parts alternating, projected off the other linear parameters.
     ///
     /// # Errors
     /// [`FitError`] if there are too few lines.
     pub fn slopes_at(&self, fitted: &Modal, linear: usize) -> Result<DMatrix<f64>, FitError> {
-        let problem = Problem {
+        let problem = PoleSearch {
             data: self,
             modes: fitted.poles.len(),
             solved: Mutex::default(),
@@ -225,9 +223,8 @@ impl Data {
         Ok(slopes)
     }
 
-    /// A start for one more mode: the strongest line of what is left, not within `apart` (a part of the
-    /// frequency) of the modes there are.
-    #[must_use]
+    /// A start for one more mode: the strongest line of the residual that is not within a relative distance `apart` of a
+    /// mode.
     pub fn next_pole(&self, so_far: &Modal, apart: f64) -> Option<Pole> {
         let left: Vec<f64> = (0..self.omega.len())
             .map(|i| self.weight[i] * (self.response[i] - so_far.response[i]).norm())
@@ -273,22 +270,17 @@ impl Data {
     }
 }
 
-/// The search for poles and delay, the linear numbers following at once.
-struct Problem<'a> {
+/// The search for poles and delay, from which the linear parameters follow.
+struct PoleSearch<'a> {
     data: &'a Data,
     modes: usize,
-    /// Poles and delay that were solved for last, and the linear numbers: derivatives are taken there.
+    /// Poles and delay of the last solution, and its linear parameters, at which derivatives are taken.
     solved: Mutex<(Vec<f64>, Vec<f64>)>,
 }
 
-impl Problem<'_> {
+impl PoleSearch<'_> {
     fn poles(&self, p: &[f64]) -> Vec<Pole> {
-        (0..self.modes)
-            .map(|k| Pole {
-                rate_per_s: p[2 * k],
-                omega_rad_per_s: p[2 * k + 1],
-            })
-            .collect()
+        Pole::all(&p[..2 * self.modes])
     }
 
     fn delay(&self, p: &[f64]) -> f64 {
@@ -299,8 +291,8 @@ impl Problem<'_> {
         }
     }
 
-    /// Derivatives of the model with the linear numbers held, by σ and ω of each mode and the delay, instead of
-    /// what `all` held; the columns at this frequency are known.
+    /// Derivatives of the model by σ and ω of each mode and the delay, with constant linear parameters; `all` is
+    /// overwritten.
     fn slopes(
         &self,
         omega: f64,
@@ -328,7 +320,7 @@ impl Problem<'_> {
     }
 }
 
-impl Residuals for Problem<'_> {
+impl Residuals for PoleSearch<'_> {
     fn residuals(&self, p: &[f64], out: &mut Vec<f64>) -> Result<(), FitError> {
         let solved = self.data.solve(&self.poles(p), self.delay(p))?;
         if let Ok(mut last) = self.solved.lock() {
@@ -347,8 +339,8 @@ impl Residuals for Problem<'_> {
     }
 }
 
-impl Problem<'_> {
-    /// The linear numbers for these poles and this delay.
+impl PoleSearch<'_> {
+    /// The linear parameters for these poles and this delay.
     fn linear(&self, p: &[f64]) -> Result<Vec<f64>, FitError> {
         match self.solved.lock() {
             Ok(last) if last.0 == p => Ok(last.1.clone()),
@@ -356,8 +348,8 @@ impl Problem<'_> {
         }
     }
 
-    /// The slopes and the first `kept` columns of the linear numbers, with what the other linear numbers can make up
-    /// for taken out (L. Kaufman, BIT 15 (1975), 49).
+    /// The slopes and the columns of the first `kept` linear parameters, projected off the columns of the others
+    /// (L. Kaufman, BIT 15 (1975), 49).
     fn tangent(&self, p: &[f64], kept: usize, out: &mut DMatrix<f64>) -> Result<(), FitError> {
         let (poles, delay_s) = (self.poles(p), self.delay(p));
         let linear = self.linear(p)?;
@@ -402,23 +394,14 @@ impl Modal {
         &self.linear
     }
 
-    /// R of a mode, in the units of the response times s^(m−1), and what a linear number of it counts in these units.
-    #[must_use]
+    /// R of a mode, in the units of the response times s^(m−1), and the size of a unit of its linear parameters.
     pub fn residue(&self, k: usize) -> (Complex64, f64) {
         let unit = self.scale.powi(1 - self.order);
         let residue = Complex64::new(self.linear[2 * k], self.linear[2 * k + 1]);
         (residue * unit, unit)
     }
 
-    /// Size of the residue of a mode: how strongly it takes part.
-    #[must_use]
-    pub fn strength(&self, k: usize) -> f64 {
-        self.linear[2 * k].hypot(self.linear[2 * k + 1]) / self.poles[k].rate_per_s.max(1e-12)
-    }
-
-    /// Response at rest per applied unit, from the modes and c₁; for displacement only, and without
-    /// free motion.
-    #[must_use]
+    /// Static response per applied unit, from the modes and c₁; for displacement without free motion.
     pub fn at_rest(&self) -> f64 {
         let one = |(k, pole): (usize, &Pole)| {
             let p = Complex64::new(-pole.rate_per_s, pole.omega_rad_per_s) / self.scale;

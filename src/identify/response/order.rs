@@ -1,26 +1,27 @@
-//! How many modes the data pay for, tried on blocks held out.
+//! The number of modes, chosen by the error on held-out blocks.
 
 use torqcomp_dsp::frf::{self, Estimator, Powers};
 
 use super::blocks::Set;
 use super::lines::{Lines, MOST_LINES, data};
-use super::{Data, Effort, Modal, Options};
+use super::{Data, Effort, Modal, ResponseOptions};
 use crate::failure::Failure;
 
-/// Modes closer than this part of their frequency are not looked for unless their number is given: a
-/// mode that is not quite linear leaves something beside its line.
+/// Relative distance in frequency below which no second mode is searched for, unless the number of modes is given: the
+/// residual of a slightly nonlinear mode lies beside its line.
 const APART: f64 = 0.03;
 
 /// Most modes tried.
 const MOST_MODES: usize = 24;
 
-/// Modes without gain after which no more are tried.
+/// Modes without improvement after which no more are tried.
 const PATIENCE: usize = 3;
 
-/// Fewer modes are preferred if the error held out is no more than this much larger.
+/// Hold-out error of fewer modes, over the least, up to which they are preferred.
 const SLACK: f64 = 1.05;
 
-fn grow(data: &Data, so_far: &Modal, options: &Options) -> Result<Option<Modal>, Failure> {
+/// One mode more; `None` if there is no line left to start it at.
+fn grow(data: &Data, so_far: &Modal, options: &ResponseOptions) -> Result<Option<Modal>, Failure> {
     let apart = if options.modes.is_some() { 0.0 } else { APART };
     let Some(pole) = data.next_pole(so_far, apart) else {
         return Ok(None);
@@ -40,18 +41,18 @@ pub(super) fn folds(set: &Set) -> Vec<Vec<usize>> {
         .collect()
 }
 
-/// Modes through all blocks, not to the end yet, and the error on held-out blocks for 0, 1, 2, … modes, which chooses
-/// their number; if that is given, the error for it alone.
+/// A coarse fit to all blocks, and the error on held-out blocks with 0, 1, 2, … modes, which chooses their number; if
+/// that is given, the error with it alone.
 pub(super) fn order(
     set: &Set,
     lines: &Lines,
-    options: &Options,
+    options: &ResponseOptions,
     data: &Data,
 ) -> Result<(Modal, Vec<f64>), Failure> {
     let folds = folds(set);
     if lines.len() > MOST_LINES {
         return Err(Failure::failed(format_args!(
-            "{} lines lie in the band, more than {MOST_LINES}; narrow it with --band",
+            "{} lines in the band, more than {MOST_LINES}; narrow it with --band",
             lines.len()
         )));
     }
@@ -65,8 +66,7 @@ pub(super) fn order(
     }
     if folds.len() < 2 {
         return Err(Failure::failed(
-            "a single block leaves nothing to try the number of modes on; give it with --modes, or record \
-             more",
+            "one block is not enough to choose the number of modes; give it with --modes, or record more",
         ));
     }
     let errors = tried(set, lines, options, &folds)?;
@@ -74,15 +74,20 @@ pub(super) fn order(
     let best = errors.iter().position(|e| *e <= SLACK * least).unwrap_or(0);
     if best == 0 {
         return Err(Failure::failed(
-            "no mode explains data that were held out: the measured signal does not follow the applied one; check \
-             --applied, --measured and --band",
+            "no mode explains held-out data: the measured signal does not follow the applied one; check --applied, \
+             --measured and --band",
         ));
     }
     Ok((grown(data, options, best)?, errors))
 }
 
 /// Data of each fold: all blocks but those held out.
-fn training(set: &Set, lines: &Lines, options: &Options, folds: &[Vec<usize>]) -> Vec<Data> {
+fn training(
+    set: &Set,
+    lines: &Lines,
+    options: &ResponseOptions,
+    folds: &[Vec<usize>],
+) -> Vec<Data> {
     folds
         .iter()
         .map(|fold| {
@@ -92,7 +97,7 @@ fn training(set: &Set, lines: &Lines, options: &Options, folds: &[Vec<usize>]) -
         .collect()
 }
 
-/// Error of models on the blocks that each has not seen.
+/// Mean error of each fold's model on the blocks held out from it.
 fn held_out(set: &Set, lines: &Lines, folds: &[Vec<usize>], models: &[Modal]) -> f64 {
     let each = models.iter().zip(folds).flat_map(|(model, fold)| {
         fold.iter()
@@ -101,11 +106,11 @@ fn held_out(set: &Set, lines: &Lines, folds: &[Vec<usize>], models: &[Modal]) ->
     each.sum::<f64>() / set.blocks.len() as f64
 }
 
-/// Error on held-out blocks with the modes of all blocks, fitted without those.
+/// Error on held-out blocks with the number of modes of the fit to all blocks.
 fn of_given(
     set: &Set,
     lines: &Lines,
-    options: &Options,
+    options: &ResponseOptions,
     folds: &[Vec<usize>],
     all: &Modal,
 ) -> Result<f64, Failure> {
@@ -120,7 +125,7 @@ fn of_given(
 fn tried(
     set: &Set,
     lines: &Lines,
-    options: &Options,
+    options: &ResponseOptions,
     folds: &[Vec<usize>],
 ) -> Result<Vec<f64>, Failure> {
     let most = MOST_MODES.min(lines.len() / 6);
@@ -132,8 +137,10 @@ fn tried(
     let error = |models: &[Modal]| held_out(set, lines, folds, models);
     let mut errors = vec![error(&models)];
     let mut since = 0;
-    let floor = floor(set, lines);
-    // Whatever more modes did, this number would be chosen: none comes below the floor.
+    // The error of the response itself, one number for each line, is a lower bound: once it is reached, more modes would
+    // not be chosen.
+    let raw = &set.powers.response(Estimator::H1).response[lines.clone()];
+    let floor = set.error(raw, lines);
     let settled = |errors: &[f64]| errors.iter().any(|e| *e <= SLACK * floor);
     while errors.len() <= most && since < PATIENCE && !settled(&errors) {
         models = side_by_side(&training, |data, fold| {
@@ -148,14 +155,7 @@ fn tried(
     Ok(errors)
 }
 
-/// Error of the response that leaves least of all blocks, with a number of its own for every line.
-fn floor(set: &Set, lines: &Lines) -> f64 {
-    let raw = &set.powers.response(Estimator::H1).response[lines.clone()];
-    let error = |block| frf::prediction_error(raw, block, lines.clone());
-    set.blocks.iter().map(error).sum::<f64>() / set.blocks.len() as f64
-}
-
-/// A model of each fold, each on a thread of its own: none knows of the others.
+/// A model for each fold, each on a thread of its own.
 fn side_by_side(
     training: &[Data],
     fit: impl Fn(&Data, usize) -> Result<Modal, Failure> + Sync,
@@ -174,8 +174,8 @@ fn side_by_side(
     })
 }
 
-/// So many modes through all blocks, one after another, and not to the end yet.
-fn grown(data: &Data, options: &Options, count: usize) -> Result<Modal, Failure> {
+/// A coarse fit with so many modes, added one by one.
+fn grown(data: &Data, options: &ResponseOptions, count: usize) -> Result<Modal, Failure> {
     let mut fitted = data.fit(&[], Effort::Coarse)?;
     for _ in 0..count {
         fitted = grow(data, &fitted, options)?.unwrap_or(fitted);

@@ -1,33 +1,31 @@
-//! How sure the poles of a response are.
+//! Covariance of the poles of a response.
 //!
 //! ```text
 //! Cov p = (JᵀJ)⁻¹ · ½ Re(J̄ᵀ Γ J) · (JᵀJ)⁻¹,   Γ_kl = s_k s_l d(k − l) Σ_b X̄_kb X_lb / √(S_k S_l)
 //! ```
 //!
-//! J: derivatives of the weighted model, lines down, with what the residues make up for taken out; Γ:
-//! covariance of the weighted errors of H1 at lines k and l where the noise of the measured signal changes
-//! little from line to line; X_kb: applied signal at line k of block b, S_k = Σ_b |X_kb|²; d:
-//! transform of the squared window over its value at 0, which makes neighbouring lines err together; s_k²:
-//! power of the weighted errors, from what of the measured signal does not go with the applied one from block
-//! to block, or from the residuals where that is more or there is one block alone. (R. Pintelon, J. Schoukens,
-//! System Identification, 2nd ed., 2012, 2.6 and 9; J. S. Bendat, A. G. Piersol, Random Data, 4th ed.,
-//! 2010, 9.2.)
+//! J: derivatives of the weighted model at each line, projected off those by the other residues; Γ: covariance of the
+//! weighted errors of H1 at lines k and l, where the noise of the measured signal changes little from line to line;
+//! X_kb: applied signal at line k of block b, S_k = Σ_b |X_kb|²; d: transform of the squared window over its value at 0,
+//! which correlates neighbouring lines; s_k²: power of the weighted errors, from the scatter of the response between
+//! blocks, or from the residuals where they are larger or there is only one block. (R. Pintelon, J. Schoukens, System
+//! Identification, 2nd ed., 2012, 2.6 and 9; J. S. Bendat, A. G. Piersol, Random Data, 4th ed., 2010, 9.2.)
 //!
-//! Beside it, from what each block for itself would change:
+//! Besides, from the change that each block makes:
 //!
 //! ```text
 //! Cov p = (JᵀJ)⁻¹ Σ_b u_b u_bᵀ (JᵀJ)⁻¹ n/(n − 1),   u_b = Re Σ_k J̄_k w_k X̄_kb (Y_kb − H1_k X_kb)/S_k
 //! ```
 //!
-//! (the jackknife for small changes: B. Efron, The Jackknife, 1982, 6.3; segments that overlap are taken
-//! with their neighbours). It needs no picture of the noise, sees leakage and what differs from hit to
-//! hit, but is badly known from few blocks. So it counts alone from [`MANY`] blocks on, and before that where
-//! it is larger than chance allows.
+//! (the jackknife for small changes: B. Efron, The Jackknife, 1982, 6.3; overlapping segments together with their
+//! neighbours). It needs no model of the noise and includes leakage and differences between hits, but scatters with few
+//! blocks. So it is used alone from [`MANY`] blocks on, and before that where it is significantly larger.
 
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use torqcomp_dsp::frf::Window;
+use torqcomp_model::Covariance;
 
 use super::blocks::Set;
 use super::inverse::invert;
@@ -35,42 +33,37 @@ use super::lines::Lines;
 use super::{Data, Modal};
 use crate::failure::Failure;
 
-/// Covariance of σ and ω of each mode.
-pub(super) type Spread = Vec<Option<[[f64; 2]; 2]>>;
-/// Covariance of σ, ω and the residue's real and imaginary linear number.
-pub(super) type OfMode = [[f64; 4]; 4];
-
-/// Blocks from which on their scatter alone tells the uncertainty.
+/// Fewest blocks for their scatter alone to give the uncertainty.
 const MANY: usize = 20;
-/// Fewest blocks to tell anything from.
+/// Fewest blocks whose scatter is used.
 const FEW: usize = 3;
-/// Chance with which blocks that differ by noise alone are taken to differ by more.
+/// Significance level of the test for scatter between blocks.
 const CHANCE: f64 = 0.05;
-/// Lines apart beyond which errors are taken as independent.
+/// Distance in lines beyond which errors count as independent.
 const REACH: usize = 40;
-/// Weight over the largest below which a line tells nothing.
+/// Weight over the largest below which a line does not count.
 const SILENT: f64 = 1e-3;
-/// Lines to both sides over which the power of the errors is averaged.
+/// Lines on each side over which the power of the errors is averaged.
 const NEIGHBOURS: usize = 5;
 /// Part of the noise's amplitude that half-overlapping Hann-weighted segments share.
 const SHARED: f64 = 1.0 / 6.0;
 
-/// Covariance of the poles, and that of a single mode with its residue.
+/// Covariance of poles and delay and, for a single mode, of the real and imaginary part of its residue.
 ///
 /// # Errors
-/// If the derivatives cannot be taken.
+/// If the derivatives cannot be computed.
 pub(super) fn of_poles(
     set: &Set,
     lines: &Lines,
     whole: &Data,
     fitted: &Modal,
-) -> Result<(Spread, Option<OfMode>), Failure> {
-    Ok(match Solved::of(whole, fitted)? {
-        Some(solved) => {
-            let covariance = covariance(set, lines, whole, fitted, &solved);
-            (solved.of_modes(&covariance), solved.of_mode(&covariance))
+) -> Result<Covariance, Failure> {
+    Ok(match Linearised::of(whole, fitted)? {
+        Some(fit) => {
+            let matrix = covariance(set, lines, whole, fitted, &fit);
+            Covariance::of_some(&fit.free, fit.searched + 2, matrix)
         }
-        None => (vec![None; fitted.poles.len()], None),
+        None => Covariance::independent(&vec![None; 2 * fitted.poles.len() + 3]),
     })
 }
 
@@ -79,7 +72,7 @@ fn covariance(
     lines: &Lines,
     whole: &Data,
     fitted: &Modal,
-    solved: &Solved,
+    solved: &Linearised,
 ) -> DMatrix<f64> {
     let noise = from_noise(set, lines, whole, fitted, solved);
     let blocks = set.blocks.len();
@@ -103,20 +96,20 @@ fn covariance(
     })
 }
 
-/// The fit as a linear one around its end.
-struct Solved {
-    /// Parameters that are not at a bound; behind the searched ones the residue of a single mode.
+/// The fit, linearised at its minimum.
+struct Linearised {
+    /// Parameters that are not at a bound: poles and delay, then the residue of a single mode.
     free: Vec<usize>,
-    /// Number of the searched parameters.
+    /// Number of poles and delay.
     searched: usize,
-    /// J of those.
+    /// J of the free parameters.
     slopes: DMatrix<f64>,
     /// (JᵀJ)⁻¹.
     inverse: DMatrix<f64>,
     modes: usize,
 }
 
-impl Solved {
+impl Linearised {
     fn of(data: &Data, fitted: &Modal) -> Result<Option<Self>, Failure> {
         let Some(fit) = &fitted.fit else {
             return Ok(None);
@@ -140,49 +133,26 @@ impl Solved {
     fn slope(&self, k: usize, p: usize) -> Complex64 {
         Complex64::new(self.slopes[(2 * k, p)], self.slopes[(2 * k + 1, p)])
     }
-
-    /// Column of a parameter, if it is free.
-    fn place(&self, i: usize) -> Option<usize> {
-        self.free.iter().position(|f| *f == i)
-    }
-
-    /// The part of a covariance that belongs to a single mode and its residue.
-    fn of_mode(&self, covariance: &DMatrix<f64>) -> Option<OfMode> {
-        let residue = self.searched;
-        let places = [0, 1, residue, residue + 1].map(|i| self.place(i));
-        let [Some(a), Some(b), Some(c), Some(d)] = places else {
-            return None;
-        };
-        Some([a, b, c, d].map(|i| [a, b, c, d].map(|j| covariance[(i, j)])))
-    }
-
-    /// The parts of a covariance that belong to each mode.
-    fn of_modes(&self, covariance: &DMatrix<f64>) -> Spread {
-        let one = |k: usize| {
-            let places = [self.place(2 * k)?, self.place(2 * k + 1)?];
-            Some(places.map(|i| places.map(|j| covariance[(i, j)])))
-        };
-        (0..self.modes).map(one).collect()
-    }
 }
 
-/// From what each block would change.
-fn from_blocks(set: &Set, lines: &Lines, data: &Data, solved: &Solved) -> DMatrix<f64> {
+/// Power of the applied signal at each line, summed over blocks.
+fn applied_power(set: &Set, lines: &Lines) -> Vec<f64> {
+    let power = |k: usize| set.blocks.iter().map(|b| b.applied[k].norm_sqr()).sum();
+    lines.clone().map(power).collect()
+}
+
+/// From the change that each block makes.
+fn from_blocks(set: &Set, lines: &Lines, data: &Data, solved: &Linearised) -> DMatrix<f64> {
     let (count, columns) = (lines.len(), solved.free.len());
     let h1 = &data.response;
-    let power: Vec<f64> = lines
-        .clone()
-        .map(|k| set.blocks.iter().map(|b| b.applied[k].norm_sqr()).sum())
-        .collect();
+    let power = applied_power(set, lines);
     let scores = DMatrix::from_fn(set.blocks.len(), columns, |b, p| {
         let block = &set.blocks[b];
         (0..count)
             .filter(|k| power[*k] > 0.0)
             .map(|k| {
-                let (x, y) = (
-                    block.applied[lines.start + k],
-                    block.measured[lines.start + k],
-                );
+                let at = lines.start + k;
+                let (x, y) = (block.applied[at], block.measured[at]);
                 let error = x.conj() * (y - h1[k] * x) * (data.weight[k] / power[k]);
                 (solved.slope(k, p).conj() * error).re
             })
@@ -194,35 +164,35 @@ fn from_blocks(set: &Set, lines: &Lines, data: &Data, solved: &Solved) -> DMatri
         let both = scores
             .rows(1, blocks - 1)
             .tr_mul(&scores.rows(0, blocks - 1));
-        // Bartlett's weight keeps variances above zero.
+        // Bartlett's weight keeps variances positive.
         sum += (&both + both.transpose()) * 0.5;
     }
     let freedom = blocks as f64 / (blocks - 1) as f64;
     &solved.inverse * sum * &solved.inverse * freedom
 }
 
-/// From the size of the errors and the window.
+/// From the power of the errors and the window.
 fn from_noise(
     set: &Set,
     lines: &Lines,
     data: &Data,
     fitted: &Modal,
-    solved: &Solved,
+    solved: &Linearised,
 ) -> DMatrix<f64> {
     let squares = fitted.fit.as_ref().map_or(0.0, |f| f.sum_of_squares);
     let top = data.weight.iter().copied().fold(0.0, f64::max);
-    let heard = data.weight.iter().filter(|w| **w > SILENT * top).count();
+    let counted = data.weight.iter().filter(|w| **w > SILENT * top).count();
     let linear = 2 * solved.modes + 2;
     let searched = solved.free.iter().filter(|i| **i < solved.searched).count();
-    let freedom = (2 * heard).saturating_sub(searched + linear).max(1);
+    let freedom = (2 * counted).saturating_sub(searched + linear).max(1);
     let power = 2.0 * squares / freedom as f64;
-    let sizes = error_sizes(set, lines, &data.weight, power, heard);
+    let sizes = error_sizes(set, lines, &data.weight, power, counted);
     let middle = gathered(set, lines, solved, &sizes) * 0.5;
     &solved.inverse * middle * &solved.inverse
 }
 
-/// s_k of each line; `power` is that of the residuals, over the lines that are heard.
-fn error_sizes(set: &Set, lines: &Lines, weight: &[f64], power: f64, heard: usize) -> Vec<f64> {
+/// s_k of each line; `power` is the mean power of the residuals over the lines that count.
+fn error_sizes(set: &Set, lines: &Lines, weight: &[f64], power: f64, counted: usize) -> Vec<f64> {
     let blocks = set.blocks.len();
     if blocks < 2 {
         return vec![power.sqrt(); weight.len()];
@@ -239,12 +209,12 @@ fn error_sizes(set: &Set, lines: &Lines, weight: &[f64], power: f64, heard: usiz
             part.iter().sum::<f64>() / part.len() as f64
         })
         .collect();
-    let mean = smooth.iter().sum::<f64>() / heard.max(1) as f64;
+    let mean = smooth.iter().sum::<f64>() / counted.max(1) as f64;
     let overlap = match set.window {
         Window::Hann => 1.0 + 2.0 * SHARED * SHARED,
         _ => 1.0,
     };
-    // What the model leaves may be more than the scatter from block to block.
+    // The residual may be larger than the scatter between blocks.
     let more = if mean > 0.0 {
         (power / mean).max(overlap)
     } else {
@@ -257,7 +227,7 @@ fn error_sizes(set: &Set, lines: &Lines, weight: &[f64], power: f64, heard: usiz
         .collect()
 }
 
-/// Variance of H1 at a line from the scatter of its blocks.
+/// Variance of H1 at a line from the scatter between blocks.
 fn variance(set: &Set, line: usize) -> f64 {
     let (mut xx, mut yy, mut xy) = (0.0, 0.0, Complex64::ZERO);
     for block in &set.blocks {
@@ -274,7 +244,7 @@ fn variance(set: &Set, line: usize) -> f64 {
 }
 
 /// Re(J̄ᵀ Γ J).
-fn gathered(set: &Set, lines: &Lines, solved: &Solved, sizes: &[f64]) -> DMatrix<f64> {
+fn gathered(set: &Set, lines: &Lines, solved: &Linearised, sizes: &[f64]) -> DMatrix<f64> {
     let (count, columns) = (lines.len(), solved.free.len());
     let slope = |k: usize, p: usize| solved.slope(k, p);
     let length = 2 * (set.blocks[0].applied.len() - 1);
@@ -283,14 +253,11 @@ fn gathered(set: &Set, lines: &Lines, solved: &Solved, sizes: &[f64]) -> DMatrix
         Window::Hann => 2,
         Window::Exponential(_) => REACH.min(count - 1),
     };
-    let power: Vec<f64> = lines
-        .clone()
-        .map(|k| set.blocks.iter().map(|b| b.applied[k].norm_sqr()).sum())
-        .collect();
+    let power = applied_power(set, lines);
     let mut sum = DMatrix::zeros(columns, columns);
     for lag in 0..=reach {
         // E[z_k z̄_l] for l = k + lag; the other side is its conjugate.
-        let window = together(set.window, lag, length).conj();
+        let window = line_correlation(set.window, lag, length).conj();
         for k in 0..count - lag {
             let (at, l) = (lines.start + k, k + lag);
             let size = (power[k] * power[l]).sqrt();
@@ -318,7 +285,7 @@ fn gathered(set: &Set, lines: &Lines, solved: &Solved, sizes: &[f64]) -> DMatrix
 }
 
 /// d(lag): Σ w² e^{−j2π lag i/n} over Σ w².
-fn together(window: Window, lag: usize, length: usize) -> Complex64 {
+fn line_correlation(window: Window, lag: usize, length: usize) -> Complex64 {
     match (window, lag) {
         (_, 0) => Complex64::ONE,
         (Window::Hann, 1) => Complex64::new(-2.0 / 3.0, 0.0),
@@ -338,7 +305,7 @@ mod tests {
 
     /// The transform of the squared window, by its sum.
     #[test]
-    fn lines_err_together_as_the_window_says() {
+    fn lines_are_correlated_by_the_window() {
         let n = 512;
         let turn = |lag: usize, i: usize| -std::f64::consts::TAU * (lag * i) as f64 / n as f64;
         let sum = |lag: usize, w: &dyn Fn(usize) -> f64| -> Complex64 {
@@ -352,12 +319,12 @@ mod tests {
         for lag in 0..4 {
             let want = sum(lag, &hann) / sum(0, &hann);
             assert!(
-                (together(Window::Hann, lag, n) - want).norm() < 1e-9,
+                (line_correlation(Window::Hann, lag, n) - want).norm() < 1e-9,
                 "{lag}"
             );
             let want = sum(lag, &fall) / sum(0, &fall);
             // The window is cut off at 1 %, so at 1e-4 of the power.
-            let got = together(Window::Exponential(tau), lag, n);
+            let got = line_correlation(Window::Exponential(tau), lag, n);
             assert!((got - want).norm() < 3e-4, "{lag}: {got} {want}");
         }
     }

@@ -1,26 +1,27 @@
-//! Which way a body moves at each sample, and where that is not known.
+//! Direction of motion at each sample, and where it is uncertain.
 
 use torqcomp_dsp::weak::{Window, white_noise_variance};
 
 use super::turns::{Speeds, Turn};
-use super::{Motion, Run, SHORTEST_HALF};
+use super::{FreeRun, SHORTEST_HALF};
 use crate::failure::Failure;
+use crate::identify::Motion;
 
-/// Part of a record that goes one way before it counts as a direction.
+/// Smallest part of a record that counts as motion in a direction.
 const DIRECTION: f64 = 0.02;
 
-/// Samples next to a doubtful stretch that smoothing may have moved across the turn.
+/// Samples next to an uncertain stretch whose direction smoothing may have changed.
 const NEAR: usize = 2;
 
 /// Speed at every sample and its direction.
 pub(in crate::identify) struct Directions {
-    /// Speed, if the motion tells it absolutely.
+    /// Speed; `None` for an acceleration, which gives it only up to a constant.
     pub speed: Option<Vec<f64>>,
-    /// −1 to 1 at each sample: the sign of the speed over the sample's share of time, with a slope
-    /// where it drowns in noise.
+    /// Mean sign of the speed over a sample's interval, −1 to 1; proportional to the speed where that is within the
+    /// noise.
     pub sign: Vec<f64>,
-    /// Whether the body stands, turns round or moves too slowly to tell at a sample, or so near to it
-    /// that the smoothing of the speed cannot tell.
+    /// Whether the body stands, reverses or moves too slowly at a sample, or within the smoothing of the speed
+    /// around it.
     pub unsure: Vec<bool>,
     forward: bool,
     backward: bool,
@@ -30,8 +31,8 @@ impl Directions {
     /// Directions in a run.
     ///
     /// # Errors
-    /// If the window of the speed cannot be made.
-    pub fn of(run: &Run) -> Result<Self, Failure> {
+    /// If the record is too short for the window of the speed.
+    pub fn of(run: &FreeRun) -> Result<Self, Failure> {
         let count = run.motion.len();
         if run.kind == Motion::Acceleration {
             return Ok(Self {
@@ -48,15 +49,15 @@ impl Directions {
         let (forward, backward) = (share(1.0) > DIRECTION, share(-1.0) > DIRECTION);
         let speeds = Speeds {
             motion: run.motion,
-            is_position: run.kind == Motion::Position,
+            is_position: run.kind == Motion::Displacement,
             reach: 2 * half,
         };
-        let doubtful = doubtful(&sign);
+        let uncertain = uncertain(&sign);
         let mut unsure = vec![false; count];
-        for (from, to) in doubtful {
+        for (from, to) in uncertain {
             let (first, last) = (from.saturating_sub(half), (to + half).min(count - 1));
             unsure[first..=last].fill(true);
-            // Where it goes the other way afterwards, it turned in between or stood.
+            // If it moves the other way afterwards, it reversed or stood in between.
             let turns = from > 0 && to < count && sign[from - 1] * sign[to.min(count - 1)] < 0.0;
             if turns && let Turn::At(place) = speeds.turn(from.saturating_sub(NEAR), to + NEAR) {
                 let way = sign[from - 1];
@@ -78,10 +79,10 @@ impl Directions {
     }
 }
 
-/// Speed at every sample, and its sign with a slope where noise could have made it.
-fn smoothed(run: &Run, half: usize) -> Result<(Vec<f64>, Vec<f64>), Failure> {
+/// Speed at every sample, and its sign, proportional to the speed within the noise.
+fn smoothed(run: &FreeRun, half: usize) -> Result<(Vec<f64>, Vec<f64>), Failure> {
     let count = run.motion.len();
-    let order = run.kind.to_acceleration() - 1;
+    let order = 1 - run.kind.order() as usize;
     let window = Window::new(half, run.rate_hz)?;
     let mut speed = window.slide(run.motion, order);
     let (first, last) = (speed[0], speed[speed.len() - 1]);
@@ -95,9 +96,9 @@ fn smoothed(run: &Run, half: usize) -> Result<(Vec<f64>, Vec<f64>), Failure> {
     Ok((speed, sign))
 }
 
-/// Stretches without a certain direction: their first sample and the first one after them. Between
-/// two samples that go opposite ways the stretch is empty.
-fn doubtful(sign: &[f64]) -> Vec<(usize, usize)> {
+/// Stretches of uncertain direction: the first sample, and the first one after. Between two samples of opposite
+/// direction the stretch is empty.
+fn uncertain(sign: &[f64]) -> Vec<(usize, usize)> {
     let mut found = Vec::new();
     let mut i = 0;
     while i < sign.len() {
@@ -114,9 +115,9 @@ fn doubtful(sign: &[f64]) -> Vec<(usize, usize)> {
     found
 }
 
-/// Writes a step from one way to the other at a place between two samples: averaged with the weights
-/// 1 − x and x of the neighbours, a of the interval being before the step, it adds
-/// a − a²/2 − (½ − a + a²/2) to the one and a²/2 − (½ − a²/2) to the other.
+/// Writes a step of the sign at a place between two samples: averaged with the weights 1 − x and x of the neighbours,
+/// a part a of the interval being before the step, it adds a − a²/2 − (½ − a + a²/2) to the one and
+/// a²/2 − (½ − a²/2) to the other.
 fn step(sign: &mut [f64], way: f64, place: f64, from: usize, to: usize) {
     for (i, s) in sign.iter_mut().enumerate().take(to + 1).skip(from) {
         *s = if (i as f64) <= place { way } else { -way };
@@ -148,7 +149,7 @@ mod tests {
     #[test]
     fn turns_and_stops_are_doubtful() {
         let signs = [1.0, 1.0, -1.0, -1.0, 0.0, 0.3, 1.0, 1.0, -0.5];
-        assert_eq!(doubtful(&signs), [(2, 2), (4, 6), (8, 9)]);
-        assert_eq!(doubtful(&[1.0; 5]), []);
+        assert_eq!(uncertain(&signs), [(2, 2), (4, 6), (8, 9)]);
+        assert_eq!(uncertain(&[1.0; 5]), []);
     }
 }

@@ -4,49 +4,26 @@
 //! T = J θ'' + f θ' + F_c sgn θ' + C          (C1) with dry friction
 //! ```
 //!
-//! The equation is averaged over smooth windows ([`torqcomp_dsp::weak`]), which takes derivatives
-//! without differences, and solved by least squares with the noise of the motion taken out of the
-//! normal equations. Beside it stands the classical way of robot identification: zero-phase
-//! low-pass, central differences, least squares (M. Gautier, Dynamic identification of robots with
-//! power model, ICRA 1997).
+//! The equation is averaged over smooth windows ([`torqcomp_dsp::weak`]), which gives derivatives without differences,
+//! and solved by least squares, the bias from noise of the motion being removed from the normal equations. For
+//! comparison, the classical method of robot identification: zero-phase low-pass, central differences, least squares
+//! (M. Gautier, Dynamic identification of robots with power model, ICRA 1997).
 
 mod check;
 mod classical;
 mod directions;
+mod present;
 mod regression;
 mod scatter;
 mod turns;
 mod windows;
-mod words;
 
-use super::{Correlated, Outcome, Quality, STRONG, rms};
+use super::{FitQuality, Identification, Motion, NamedEstimates, rms};
 use crate::failure::Failure;
 use directions::Directions;
-use windows::{Fitted, Rows, plateau};
+use windows::{WindowRows, plateau};
 
-/// What the motion channel holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Motion {
-    /// Angle or position.
-    Position,
-    /// Speed.
-    Speed,
-    /// Acceleration.
-    Acceleration,
-}
-
-impl Motion {
-    /// Derivatives still to be taken to reach the acceleration.
-    fn to_acceleration(self) -> usize {
-        match self {
-            Self::Position => 2,
-            Self::Speed => 1,
-            Self::Acceleration => 0,
-        }
-    }
-}
-
-/// Names and units of what comes out, which differ between turning and sliding.
+/// How the body moves, which decides names and units of the constants.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Body {
     /// Angles and torques.
@@ -80,7 +57,7 @@ impl Body {
 
 /// A record of a run, in SI units.
 #[derive(Debug, Clone, Copy)]
-pub struct Run<'a> {
+pub struct FreeRun<'a> {
     /// Samples a second.
     pub rate_hz: f64,
     /// The motion.
@@ -95,16 +72,16 @@ pub struct Run<'a> {
 
 /// How a run is evaluated.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Options {
+pub struct RunupOptions {
     /// Whether viscous friction may differ by direction.
     pub by_direction: bool,
     /// Half of the averaging window in seconds; chosen from the data if not given.
     pub half_window_s: Option<f64>,
 }
 
-/// Growth of an uncertainty by colour that is said.
+/// Growth of an uncertainty by autocorrelation that is reported.
 const COLOURED: f64 = 1.3;
-/// Fewest windows that fit into a record.
+/// Fewest windows in a record.
 const LEAST_WINDOWS: usize = 12;
 /// Half of the shortest window tried, in samples.
 const SHORTEST_HALF: usize = 8;
@@ -112,8 +89,8 @@ const SHORTEST_HALF: usize = 8;
 /// Evaluates a run.
 ///
 /// # Errors
-/// If the record is too short, holds no motion, or the channels do not have one length.
-pub fn identify(run: &Run, options: &Options) -> Result<Outcome, Failure> {
+/// If the record is too short, holds no motion, or the channels differ in length.
+pub fn identify(run: &FreeRun, options: &RunupOptions) -> Result<Identification, Failure> {
     check::check(run)?;
     let directions = Directions::of(run)?;
     let split = options.by_direction && directions.both();
@@ -121,66 +98,20 @@ pub fn identify(run: &Run, options: &Options) -> Result<Outcome, Failure> {
         Some(seconds) => ((seconds * run.rate_hz).round() as usize).max(4),
         None => plateau(run, &directions),
     };
-    let fitted = Rows::of(run, &directions, half, split)?.fit()?;
-    let mut outcome = Outcome {
-        found: words::named(run, &directions, split, &fitted.fit),
-        quality: Some(quality(run, &fitted)),
-        ..Outcome::default()
-    };
-    outcome.method.push(method(run, &fitted));
-    if fitted.fit.coloured > COLOURED {
-        outcome.method.push(format!(
-            "what is left is not white noise, so the equation lacks something: the uncertainties are taken from \
-             how it hangs together, up to {} times those of noise",
-            crate::print::rounded(fitted.fit.coloured, 2)
-        ));
-    }
-    correlations(&mut outcome, &fitted);
-    words::draw(&mut outcome, run, &fitted);
-    words::say(&mut outcome, run, &directions, options, &fitted);
-    if let Some(classical) = classical::identify(run, &directions, half, split)? {
-        outcome.comparisons.push(classical);
-    }
-    Ok(outcome)
-}
-
-/// What is left of the torque over all windows, those that were not fitted included.
-fn quality(run: &Run, fitted: &Fitted) -> Quality {
+    let fitted = WindowRows::of(run, &directions, half, split)?.fit()?;
+    let mut result = Identification::new("runup");
+    let names = present::names(run, &directions, split);
+    result.add(NamedEstimates::new(&names, &fitted.fit.numbers));
     let left = rms(&fitted.fit.residuals);
-    Quality {
+    result.fit = Some(FitQuality {
         rms: left,
         unit: run.body.effort().to_owned(),
         relative: left / rms(&fitted.rows.right),
-    }
-}
-
-fn method(run: &Run, fitted: &Fitted) -> String {
-    let all = fitted.used.len();
-    let used = fitted.used.iter().filter(|u| **u).count();
-    let which = if used < all {
-        format!("{used} of {all} windows; in the others the body turns round or stands")
-    } else {
-        format!("{all} windows")
-    };
-    format!(
-        "weighted averages of the equation of motion over windows of ±{} s ({which}), derivatives taken \
-         from the weight",
-        crate::print::short(fitted.rows.half as f64 / run.rate_hz),
-    )
-}
-
-fn correlations(outcome: &mut Outcome, fitted: &Fitted) {
-    let names: Vec<String> = outcome.found.iter().map(|f| f.name.clone()).collect();
-    for i in 0..names.len() {
-        for j in i + 1..names.len() {
-            let coefficient = fitted.fit.correlation(i, j);
-            if coefficient.abs() >= STRONG {
-                outcome.correlated.push(Correlated {
-                    first: names[i].clone(),
-                    second: names[j].clone(),
-                    coefficient,
-                });
-            }
-        }
-    }
+    });
+    present::method(&mut result, run, &fitted);
+    present::draw(&mut result, run, &fitted);
+    present::warnings(&mut result, run, &directions, options, &fitted);
+    let classical = classical::identify(run, &directions, half, split, &names)?;
+    result.comparisons.extend(classical);
+    Ok(result)
 }

@@ -1,12 +1,13 @@
 //! Least squares whose regressors carry noise of known covariance, over rows that overlap.
 
 use nalgebra::{DMatrix, DVector};
+use torqcomp_model::{Covariance, Estimates};
 
 use super::scatter;
 use crate::failure::Failure;
 
-/// What is known of the errors of the rows.
-pub struct Errors<'a> {
+/// Errors of the rows.
+pub(super) struct Errors<'a> {
     /// Covariance of the errors of two columns in one row.
     pub noise: &'a dyn Fn(usize, usize) -> f64,
     /// Covariance between rows so far apart of errors of the right side, of variance 1 a sample.
@@ -17,40 +18,26 @@ pub struct Errors<'a> {
     pub overlap: usize,
 }
 
-/// A regression with the noise of its regressors taken out.
+/// A regression without the bias from noise in its regressors.
 #[derive(Debug, Clone)]
-pub struct Corrected {
+pub(super) struct Corrected {
     /// The parameters.
-    pub values: Vec<f64>,
-    covariance: DMatrix<f64>,
+    pub numbers: Estimates,
     /// Left side minus right side, of all rows.
     pub residuals: Vec<f64>,
     columns: DMatrix<f64>,
     right_norm: f64,
-    /// Largest part of a column's power that is noise.
+    /// Noise in a column, as a part of its power; the largest.
     pub noise_share: f64,
-    /// How much larger the standard uncertainties are than white noise would make them, at most.
+    /// Largest ratio of a standard uncertainty to that for white noise.
     pub coloured: f64,
 }
 
 impl Corrected {
-    /// Standard uncertainty of a parameter.
-    pub fn std(&self, i: usize) -> Option<f64> {
-        Some(self.covariance[(i, i)].sqrt()).filter(|std| std.is_finite())
-    }
-
-    /// Correlation coefficient of two parameters.
-    pub fn correlation(&self, i: usize, j: usize) -> f64 {
-        let c = &self.covariance;
-        c[(i, j)] / (c[(i, i)] * c[(j, j)]).sqrt()
-    }
-
-    /// How far other values would move the left side, as a part of the right side.
-    pub fn change_to(&self, values: &[f64]) -> f64 {
-        let change = DVector::from_iterator(
-            values.len(),
-            values.iter().zip(&self.values).map(|(a, b)| a - b),
-        );
+    /// Change of the left side from these parameters to those of another regression, over the right side.
+    pub fn change_to(&self, other: &Self) -> f64 {
+        let pairs = other.numbers.values().iter().zip(self.numbers.values());
+        let change = DVector::from_vec(pairs.map(|(a, b)| a - b).collect());
         (&self.columns * change).norm() / self.right_norm
     }
 }
@@ -59,7 +46,7 @@ impl Corrected {
 /// every row: `(AᵀA − n N) x = Aᵀb` (T. Söderström, Errors-in-variables methods in system
 /// identification, Automatica 43 (2007), 939, bias-compensating least squares). Its covariance is
 /// that of [`scatter`].
-pub fn solve(
+pub(super) fn solve(
     columns: &[Vec<f64>],
     right: &[f64],
     chosen: &[bool],
@@ -67,14 +54,14 @@ pub fn solve(
 ) -> Result<Corrected, Failure> {
     let rows = chosen.iter().filter(|c| **c).count();
     let (all, count) = (right.len(), columns.len());
-    // Rows that are left out stay as zeros, so that places in time are kept.
+    // Rows that are not chosen become zeros, so that distances in time stay.
     let kept = |r: usize, v: f64| if chosen[r] { v } else { 0.0 };
     let a = DMatrix::from_fn(all, count, |r, c| kept(r, columns[c][r]));
     let b = DVector::from_fn(all, |r, _| kept(r, right[r]));
     let sizes: Vec<f64> = a.column_iter().map(|c| c.norm()).collect();
     if let Some(i) = sizes.iter().position(|s| *s == 0.0 || !s.is_finite()) {
         return Err(Failure::failed(format_args!(
-            "term {} of the equation of motion is zero throughout; the record does not show it",
+            "term {} of the equation of motion is zero in the whole record",
             i + 1
         )));
     }
@@ -85,21 +72,20 @@ pub fn solve(
     let noise_share = (0..count).map(|i| part[(i, i)]).fold(0.0, f64::max);
     let inverse = (scaled.tr_mul(&scaled) - part)
         .cholesky()
-        .ok_or_else(cannot_be_told)?
+        .ok_or_else(not_identifiable)?
         .inverse();
     let x = &inverse * scaled.tr_mul(&b);
     let values: Vec<f64> = x.iter().zip(&sizes).map(|(x, s)| x / s).collect();
     let kept_residuals = &scaled * &x - &b;
     let (covariance, coloured) =
         scatter::covariance(&scaled, &inverse, &kept_residuals, &values, rows, errors);
+    let unscaled = |i, j| covariance[(i, j)] / (sizes[i] * sizes[j]);
+    let covariance = Covariance::of(DMatrix::from_fn(count, count, unscaled));
     let full = DMatrix::from_fn(all, count, |r, c| columns[c][r]);
     let model = &full * DVector::from_column_slice(&values);
     Ok(Corrected {
-        covariance: DMatrix::from_fn(count, count, |i, j| {
-            covariance[(i, j)] / (sizes[i] * sizes[j])
-        }),
+        numbers: Estimates::new(values, covariance),
         residuals: model.iter().zip(right).map(|(m, b)| m - b).collect(),
-        values,
         columns: full,
         right_norm: right.iter().map(|v| v * v).sum::<f64>().sqrt(),
         noise_share,
@@ -107,9 +93,9 @@ pub fn solve(
     })
 }
 
-fn cannot_be_told() -> Failure {
+fn not_identifiable() -> Failure {
     Failure::failed(
-        "the terms of the equation of motion cannot be told apart in this record: it needs speeds and \
+        "the terms of the equation of motion are not separately identifiable from this record: it needs speeds and \
          accelerations that vary, and less noise",
     )
 }

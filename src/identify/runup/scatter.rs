@@ -4,19 +4,18 @@
 //! Cov x = B Aᵀ Ω A B,   B = (AᵀA − nN)⁻¹,   Ω = covariance of the rows' errors
 //! ```
 //!
-//! Ω is taken twice. *White*: noise of the torque and of the motion is white from sample to sample, and
-//! the windows' shape says how rows that overlap hang together; only the size of the noise comes from
-//! the residuals. *Coloured*: from the residuals themselves (W. K. Newey, K. D. West, Econometrica 55
-//! (1987), 703), which also sees what the equation lacks. The coloured one is scattered, and too small
-//! on average: it counts where it is the larger one.
+//! Ω is estimated twice. *White*: noise of torque and motion is white from sample to sample, and the shape of the
+//! window gives the correlation of rows that overlap; only the variance of the noise comes from the residuals.
+//! *Coloured*: from the residuals themselves (W. K. Newey, K. D. West, Econometrica 55 (1987), 703), which includes
+//! the error of an incomplete model. The coloured estimate scatters more and is too small on average, so it is used
+//! where it is the larger one.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::regression::Errors;
 
-/// Covariance of the (scaled) parameters, and the largest factor by which colour made an uncertainty
-/// larger.
-pub fn covariance(
+/// Covariance of the (scaled) parameters, and the largest ratio of an uncertainty to that for white noise.
+pub(super) fn covariance(
     a: &DMatrix<f64>,
     inverse: &DMatrix<f64>,
     residuals: &DVector<f64>,
@@ -29,8 +28,8 @@ pub fn covariance(
     let power = residuals.norm_squared() / rows as f64;
     let shape = shape(power, values, errors);
     let white = inverse * gathered(a, &shape) * inverse;
-    // The residuals are smaller than the errors by what the fit takes up, windows that overlap
-    // counting less than rows that do not.
+    // The residuals are smaller than the errors by what the fit absorbs; overlapping windows count less than
+    // independent rows.
     let mean: f64 = trace_of_fit(a, inverse, &shape) / (rows as f64 * shape[0]);
     let white = white / (1.0 - mean).max(0.1);
     let coloured = inverse * scores(a, residuals, rows, errors.overlap) * inverse * freedom;
@@ -43,8 +42,8 @@ pub fn covariance(
     (joined, largest)
 }
 
-/// Covariance of rows 0, 1, … windows apart: what the motion's noise makes, the rest of the residuals'
-/// power being the torque's.
+/// Covariance of rows 0, 1, … windows apart: from noise of the motion, and of the torque for the rest of the power of
+/// the residuals.
 fn shape(power: f64, values: &[f64], errors: &Errors) -> Vec<f64> {
     let motion: Vec<f64> = (0..=errors.overlap)
         .map(|lag| (errors.motion)(lag, values))
@@ -65,7 +64,7 @@ fn shape(power: f64, values: &[f64], errors: &Errors) -> Vec<f64> {
         .collect()
 }
 
-/// AᵀΩA for a covariance that depends on the distance of rows alone.
+/// AᵀΩA for a covariance that depends only on the distance of rows.
 fn gathered(a: &DMatrix<f64>, shape: &[f64]) -> DMatrix<f64> {
     let rows = a.nrows();
     let mut sum = a.tr_mul(a) * shape[0];
@@ -76,12 +75,12 @@ fn gathered(a: &DMatrix<f64>, shape: &[f64]) -> DMatrix<f64> {
     sum
 }
 
-/// Mean of the residuals' power that the fit takes up: trace of B AᵀΩA.
+/// Power of the errors that the fit absorbs: trace of B AᵀΩA.
 fn trace_of_fit(a: &DMatrix<f64>, inverse: &DMatrix<f64>, shape: &[f64]) -> f64 {
     (inverse * gathered(a, shape)).trace()
 }
 
-/// Covariance of Σ aᵢ rᵢ with Bartlett's weights over neighbouring rows.
+/// Covariance of Σ aᵢ rᵢ, with Bartlett's weights for neighbouring rows.
 fn scores(a: &DMatrix<f64>, residuals: &DVector<f64>, rows: usize, overlap: usize) -> DMatrix<f64> {
     let (all, count) = a.shape();
     let scores = DMatrix::from_fn(all, count, |r, c| a[(r, c)] * residuals[r]);

@@ -1,33 +1,32 @@
-//! Moments at which a body turns round, from the motion on either side.
+//! Moments at which a body reverses, from the motion on either side.
 //!
-//! Dry friction jumps where the speed goes through zero, and with it the acceleration: the speed has
-//! a kink there, which smoothing across it would shift. So a parabola is laid through the speed before
-//! and another through the speed after; both meet zero at one moment if the body turns, and at two if it
-//! stands in between.
+//! Dry friction jumps where the speed crosses zero, and with it the acceleration: the speed has a kink there, which
+//! smoothing would shift. So one parabola is fitted to the speed before and another to the speed after; both reach zero
+//! at one moment if the body reverses, and at two if it stands in between.
 
 use nalgebra::{DMatrix, DVector};
 
-/// What a body does where its speed is not clearly of one sign.
+/// Motion of a body where the sign of its speed is uncertain.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Turn {
-    /// It turns round at that place, in samples.
+pub(super) enum Turn {
+    /// It reverses at that place, in samples.
     At(f64),
-    /// It stands, or moves too slowly to tell.
+    /// It stands, or moves too slowly to locate a reversal.
     Stands,
 }
 
-/// Moments of zero further apart than this, in samples, beyond what noise explains, are a stop.
+/// Distance of both zeros, in samples and beyond what noise explains, from which the body stands.
 const APART: f64 = 0.2;
 /// Standard deviations that noise explains.
 const CERTAIN: f64 = 4.0;
 
-/// Places and speeds of a record near a turn.
-pub struct Speeds<'a> {
+/// Speeds of a record near a reversal.
+pub(super) struct Speeds<'a> {
     /// Position, or speed itself.
     pub motion: &'a [f64],
     /// Whether the motion is a position.
     pub is_position: bool,
-    /// Samples that a parabola is laid through.
+    /// Samples on each side that a parabola is fitted to.
     pub reach: usize,
 }
 
@@ -41,7 +40,7 @@ impl Speeds<'_> {
         }
     }
 
-    /// What happens between samples `from` and `to`, up to and from which the direction is certain.
+    /// Motion between samples `from` and `to`, before and after which the direction is certain.
     pub fn turn(&self, from: usize, to: usize) -> Turn {
         let last = self.motion.len() - 1 - usize::from(self.is_position);
         let before: Vec<usize> = (from.saturating_sub(self.reach)..from).collect();
@@ -53,13 +52,13 @@ impl Speeds<'_> {
         if (left.0 - right.0).abs() > APART + noise {
             return Turn::Stands;
         }
-        // The better known one counts for more.
+        // Weighted with their uncertainties.
         let floor = 1e-9;
         let (a, b) = ((left.1 + floor).powi(-2), (right.1 + floor).powi(-2));
         Turn::At((a * left.0 + b * right.0) / (a + b))
     }
 
-    /// Where a parabola through those speeds meets zero near a place, and its standard uncertainty.
+    /// Zero near a place of a parabola fitted to these speeds, and its standard uncertainty.
     fn zero(&self, samples: &[usize], near: usize) -> Option<(f64, f64)> {
         if samples.len() < 6 {
             return None;

@@ -1,25 +1,26 @@
-//! The equation of motion averaged over windows: a row each window, a column each term.
+//! The equation of motion averaged over windows, with a row for each window and a column for each term.
 
 use statrs::distribution::{ContinuousCDF, Normal};
 use torqcomp_dsp::weak::{Window, white_noise_variance};
 
 use super::directions::Directions;
 use super::regression::{Corrected, Errors, solve};
-use super::{COLOURED, LEAST_WINDOWS, Run, SHORTEST_HALF};
+use super::{COLOURED, FreeRun, LEAST_WINDOWS, SHORTEST_HALF};
 use crate::failure::Failure;
 use crate::identify::rms;
+use crate::print::plural;
 
 /// Rows of the regression.
-pub(super) struct Rows {
+pub(super) struct WindowRows {
     /// Half of the window, in samples.
     pub half: usize,
     /// Samples from one window to the next.
     pub stride: usize,
-    /// Terms of the equation, a value each window.
+    /// Terms of the equation, one value for each window.
     pub columns: Vec<Vec<f64>>,
     /// Averaged torque or force.
     pub right: Vec<f64>,
-    /// Windows in which the body goes one way throughout.
+    /// Whether the body moves one way throughout a window.
     pub clean: Vec<bool>,
     /// Order of the derivative of the motion that a column is, if its noise is known.
     orders: Vec<Option<usize>>,
@@ -28,22 +29,22 @@ pub(super) struct Rows {
 }
 
 /// A fit of the rows.
-pub(super) struct Fitted {
+pub(super) struct FittedRows {
     /// The parameters.
     pub fit: Corrected,
     /// All rows.
-    pub rows: Rows,
+    pub rows: WindowRows,
     /// Rows that were fitted.
     pub used: Vec<bool>,
 }
 
-impl Rows {
+impl WindowRows {
     /// Averages over windows of that half-length.
     ///
     /// # Errors
-    /// If the record holds too few windows.
+    /// If too few windows fit into the record.
     pub fn of(
-        run: &Run,
+        run: &FreeRun,
         directions: &Directions,
         half: usize,
         split: bool,
@@ -54,8 +55,8 @@ impl Rows {
         let centres: Vec<usize> = (half..count.saturating_sub(half)).step_by(stride).collect();
         if centres.len() < LEAST_WINDOWS {
             return Err(Failure::failed(format_args!(
-                "windows of ±{half} samples fit only {} times into the record; make them shorter",
-                centres.len()
+                "the record has only {} for windows of ±{half} samples; choose a shorter --window",
+                plural(centres.len(), "place")
             )));
         }
         let column = |samples: &[f64], order: usize| -> Vec<f64> {
@@ -76,17 +77,17 @@ impl Rows {
         })
     }
 
-    /// Whether there are enough windows in which the body goes one way.
+    /// Whether there are enough windows in which the body moves one way.
     fn enough_clean(&self) -> bool {
         let clean = self.clean.iter().filter(|c| **c).count();
         clean >= LEAST_WINDOWS && 3 * clean >= self.clean.len()
     }
 
-    /// The clean windows. Where noise is not all that they leave, also those others that follow the same
-    /// equation as closely: at a stop dry friction is whatever it takes to hold the body, which the equation does
-    /// not say. A turn is placed to a few hundredths of a sample at best, which may be more than the noise: such
-    /// windows would move the answer further than the noise's uncertainty says, but no further than what it is
-    /// grown by where the equation lacks something anyhow.
+    /// The clean windows and, where the residual of the clean ones is more than noise, those others that follow the
+    /// same equation as closely. At a stop dry friction balances whatever acts, which the equation does not describe.
+    /// A reversal is located to a few hundredths of a sample at best, which may be more than the noise: such windows
+    /// would bias the result by more than the noise's uncertainty, but by no more than that is enlarged where the
+    /// model is incomplete anyway.
     fn following(&self, fit: &Corrected) -> Vec<bool> {
         if fit.coloured <= COLOURED {
             return self.clean.clone();
@@ -110,13 +111,12 @@ impl Rows {
         }
     }
 
-    /// Covariance of the errors of two rows so many windows apart, for white noise of the torque of
-    /// variance 1.
+    /// Covariance of the errors of two rows `lag` windows apart, for white noise of the torque of variance 1.
     fn torque_errors(&self, lag: usize) -> f64 {
         self.window.noise_apart(0, 0, lag * self.stride)
     }
 
-    /// The same for the noise of the motion, whose terms have those factors.
+    /// The same for noise of the motion, its terms multiplied by `factors`.
     fn motion_errors(&self, lag: usize, factors: &[f64]) -> f64 {
         let mut sum = 0.0;
         for (i, a) in self.orders.iter().enumerate() {
@@ -133,16 +133,16 @@ impl Rows {
     /// Fits the rows.
     ///
     /// # Errors
-    /// If the terms cannot be told apart.
-    pub fn fit(self) -> Result<Fitted, Failure> {
+    /// If the terms are not separately identifiable.
+    pub fn fit(self) -> Result<FittedRows, Failure> {
         let mut used = vec![true; self.clean.len()];
         if self.enough_clean() && self.clean.contains(&false) {
-            // The clean windows alone may not tell all terms apart.
+            // The clean windows alone may not determine all terms.
             if let Ok(fit) = self.solve(&self.clean) {
                 used = self.following(&fit);
             }
         }
-        Ok(Fitted {
+        Ok(FittedRows {
             fit: self.solve(&used)?,
             rows: self,
             used,
@@ -166,15 +166,15 @@ fn chauvenet(count: usize) -> f64 {
     Normal::standard().inverse_cdf(1.0 - 0.25 / count.max(1) as f64)
 }
 
-/// Terms of the equation of motion, and the order of the derivative that each is of the motion.
+/// Terms of the equation of motion, and which derivative of the motion each is.
 fn terms(
-    run: &Run,
+    run: &FreeRun,
     directions: &Directions,
     split: bool,
     rows: usize,
     column: &dyn Fn(&[f64], usize) -> Vec<f64>,
 ) -> (Vec<Vec<f64>>, Vec<Option<usize>>) {
-    let top = run.kind.to_acceleration();
+    let top = 2 - run.kind.order() as usize;
     let mut columns = vec![column(run.motion, top)];
     let mut orders = vec![Some(top)];
     match (&directions.speed, split) {
@@ -190,7 +190,7 @@ fn terms(
             orders.push(Some(top - 1));
         }
         (None, _) => {
-            // Speed but for a constant, which the offset takes up.
+            // Speed up to a constant, which becomes part of the offset.
             columns.push(column(&integral(run.motion, run.rate_hz), 0));
             orders.push(None);
         }
@@ -217,15 +217,14 @@ fn integral(samples: &[f64], rate_hz: f64) -> Vec<f64> {
         .collect()
 }
 
-/// The first window from which the answer changes less than from those around it: shorter ones are
-/// noisy, longer ones average over what the equation does not hold for. Told with one viscous
-/// friction, whatever is asked for.
-pub(super) fn plateau(run: &Run, directions: &Directions) -> usize {
+/// Half-length of the first window at which the result changes least: shorter ones are noisy, longer ones average over
+/// what the equation does not describe. Always found with one viscous friction.
+pub(super) fn plateau(run: &FreeRun, directions: &Directions) -> usize {
     let longest = (run.motion.len() / (LEAST_WINDOWS / 2 + 2)).max(SHORTEST_HALF);
     let mut tried: Vec<(usize, Corrected)> = Vec::new();
     let mut half = SHORTEST_HALF;
     while half <= longest {
-        let fitted = Rows::of(run, directions, half, false).and_then(Rows::fit);
+        let fitted = WindowRows::of(run, directions, half, false).and_then(WindowRows::fit);
         if let Ok(fitted) = fitted {
             tried.push((half, fitted.fit));
         }
@@ -233,7 +232,7 @@ pub(super) fn plateau(run: &Run, directions: &Directions) -> usize {
     }
     let changes: Vec<f64> = tried
         .windows(2)
-        .map(|pair| pair[0].1.change_to(&pair[1].1.values))
+        .map(|pair| pair[0].1.change_to(&pair[1].1))
         .collect();
     let first = changes.windows(2).position(|pair| pair[0] < pair[1]);
     let best = first.unwrap_or(changes.len().saturating_sub(1));

@@ -3,9 +3,10 @@
 mod terms;
 
 use nalgebra::DMatrix;
+use serde::Serialize;
 use torqcomp_model::fit::linear::{self, LinearFit};
 
-use super::{Found, Outcome, Quality, rms};
+use super::{FitQuality, Identification, NamedEstimate, rms};
 use crate::failure::Failure;
 use crate::print::rounded;
 use crate::report::chart::{Chart, Series};
@@ -25,16 +26,9 @@ pub struct Point {
     pub position: usize,
 }
 
-/// How loads are evaluated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Options {
-    /// Highest power of the load: 1 or 3.
-    pub degree: usize,
-}
-
-/// Units of the loads and readings, as text.
+/// Units of loads and readings, as text.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Units {
+pub struct LoadUnits {
     /// Of the load, such as `N m`.
     pub load: String,
     /// Of the reading, such as `V`.
@@ -42,37 +36,22 @@ pub struct Units {
 }
 
 /// A term of a calibration standard; the formulas are those of `terms`.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Term {
     /// Name, such as `repeatability`.
     pub name: &'static str,
-    /// Whose formula it is, and the formula.
+    /// The formula, and the standards that define it.
     pub formula: &'static str,
-    /// Largest value over the loads in per cent; `None` where the record does not hold what it
-    /// takes.
+    /// Largest value over the loads in per cent; `None` if the record lacks the readings for it.
     pub percent: Option<f64>,
 }
 
-/// A calibration that was evaluated.
-#[derive(Debug, Clone)]
-pub struct Evaluated {
-    /// The numbers.
-    pub outcome: Outcome,
-    /// The terms of the standards.
-    pub terms: Vec<Term>,
-    /// The points.
-    pub points: Vec<Point>,
-    /// Coefficients of the reading over powers of the load, from 0.
-    pub coefficients: Vec<f64>,
-}
-
-/// Loads closer than this part of the largest are one step.
+/// Distance of loads that count as one step, over the largest load.
 const SAME: f64 = 2e-3;
-/// Loads below this part of the largest count as none.
+/// Load that counts as none, over the largest load.
 const NONE: f64 = 1e-3;
 
-/// Numbers the series of points: a new one begins with each return to no load, if the user does not
-/// number them.
+/// Number of the series of each point, for tables that do not number them: a series ends with the return to no load.
 #[must_use]
 pub fn series_of(loads: &[f64]) -> Vec<usize> {
     let largest = loads.iter().fold(0.0_f64, |m, l| m.max(l.abs()));
@@ -81,7 +60,7 @@ pub fn series_of(loads: &[f64]) -> Vec<usize> {
     let mut loaded = false;
     let mut numbers = Vec::with_capacity(loads.len());
     for (i, load) in loads.iter().enumerate() {
-        // The zero after a series closes it; one more zero, or the next load, opens a new one.
+        // The zero after a series closes it; another zero, or the next load, opens a new one.
         let closed = loaded && i > 0 && zero(loads[i - 1]);
         if closed {
             series += 1;
@@ -93,92 +72,79 @@ pub fn series_of(loads: &[f64]) -> Vec<usize> {
     numbers
 }
 
-/// Evaluates the points.
+/// Evaluates the points with a curve of that degree, 1 or 3.
 ///
 /// # Errors
-/// If there are too few loads for the degree.
-pub fn identify(points: &[Point], options: Options, units: &Units) -> Result<Evaluated, Failure> {
+/// If there are too few loads for the degree, or the reading does not change.
+pub fn identify(
+    points: &[Point],
+    degree: usize,
+    units: &LoadUnits,
+) -> Result<Identification, Failure> {
     let largest = points.iter().fold(0.0_f64, |m, p| m.max(p.load.abs()));
     let steps = steps(points, largest);
-    if steps.len() < options.degree + 2 {
+    if steps.len() < degree + 2 {
         return Err(Failure::failed(format_args!(
-            "{} different loads cannot determine a curve of degree {} and how far it is off; load at least \
-             {} steps, the empty stand included",
+            "{} different loads are too few for a curve of degree {degree} and its error; apply at least {}, the empty \
+             stand included",
             steps.len(),
-            options.degree,
-            options.degree + 2
+            degree + 2
         )));
     }
     if points.iter().all(|p| p.reading == points[0].reading) {
         return Err(Failure::failed(
-            "the reading is the same under every load; check --reading and whether the bridge was supplied",
+            "the reading does not change with load; check --reading and the bridge supply",
         ));
     }
-    let design = DMatrix::from_fn(points.len(), options.degree + 1, |r, c| {
+    let design = DMatrix::from_fn(points.len(), degree + 1, |r, c| {
         (points[r].load / largest).powi(c as i32)
     });
     let readings: Vec<f64> = points.iter().map(|p| p.reading).collect();
     let weights: Option<Vec<f64>> = points.iter().map(|p| p.std.map(|s| 1.0 / s)).collect();
     let fit = linear::solve(&design, &readings, weights.as_deref(), weights.is_some())?;
-    let mut evaluated = Evaluated {
-        outcome: outcome(&fit, points, &weights, largest, units),
-        terms: Vec::new(),
-        points: points.to_vec(),
-        coefficients: scaled(&fit, largest),
-    };
-    evaluated.terms = terms::terms(points, &steps, &evaluated.coefficients, largest);
-    draw(&mut evaluated, units);
-    poor(&mut evaluated.outcome);
-    say(&mut evaluated.outcome, points, options);
-    Ok(evaluated)
-}
-
-/// Coefficients over the load itself.
-fn scaled(fit: &LinearFit, largest: f64) -> Vec<f64> {
     let unscale = |(k, v): (usize, &f64)| v / largest.powi(k as i32);
-    fit.values.iter().enumerate().map(unscale).collect()
-}
-
-fn outcome(
-    fit: &LinearFit,
-    points: &[Point],
-    weights: &Option<Vec<f64>>,
-    largest: f64,
-    units: &Units,
-) -> Outcome {
-    let mut outcome = Outcome {
-        found: constants(fit, largest, units),
-        ..Outcome::default()
-    };
-    let left: Vec<f64> = match weights {
-        Some(weights) => fit
-            .residuals
-            .iter()
-            .zip(weights)
-            .map(|(r, w)| r / w)
-            .collect(),
-        None => fit.residuals.clone(),
-    };
-    let swing: Vec<f64> = points.iter().map(|p| p.reading - fit.values[0]).collect();
-    outcome.quality = Some(Quality {
-        rms: rms(&left),
-        unit: units.reading.clone(),
-        relative: rms(&left) / rms(&swing),
-    });
-    outcome.method.push(format!(
+    let curve: Vec<f64> = fit.values.iter().enumerate().map(unscale).collect();
+    let mut result = Identification::new("static");
+    result.parameters = constants(&fit, largest, units);
+    let quality = quality(&fit, points, weights.as_deref(), units);
+    poor(&mut result, quality.relative);
+    result.fit = Some(quality);
+    result.method.push(format!(
         "{} regression of the reading on the load over {} points, loading and unloading together",
         if weights.is_some() {
             "weighted"
         } else {
-            "plain"
+            "unweighted"
         },
         points.len()
     ));
-    outcome
+    result.terms = terms::terms(points, &steps, &curve, largest);
+    draw(&mut result, points, &curve, units);
+    warnings(&mut result, points, degree);
+    Ok(result)
+}
+
+/// The unweighted residual, over the swing of the readings.
+fn quality(
+    fit: &LinearFit,
+    points: &[Point],
+    weights: Option<&[f64]>,
+    units: &LoadUnits,
+) -> FitQuality {
+    let mut left = fit.residuals.clone();
+    if let Some(weights) = weights {
+        left.iter_mut().zip(weights).for_each(|(r, w)| *r /= w);
+    }
+    let swing: Vec<f64> = points.iter().map(|p| p.reading - fit.values[0]).collect();
+    FitQuality {
+        rms: rms(&left),
+        unit: units.reading.clone(),
+        relative: rms(&left) / rms(&swing),
+    }
 }
 
 /// Sensitivity, its inverse, zero, and the higher powers of the curve.
-fn constants(fit: &LinearFit, largest: f64, units: &Units) -> Vec<Found> {
+fn constants(fit: &LinearFit, largest: f64, units: &LoadUnits) -> Vec<NamedEstimate> {
     let (load, reading) = (&units.load, &units.reading);
     let slope = fit.values[1] / largest;
     let slope_std = fit.std[1].map(|s| s / largest);
@@ -188,65 +154,52 @@ fn constants(fit: &LinearFit, largest: f64, units: &Units) -> Vec<Found> {
         true => format!("{a}/({b})"),
         false => format!("{a}/{b}"),
     };
+    let inverse = match (load.as_str(), reading.as_str()) {
+        ("N m", "V") => "torque_per_volt",
+        _ => "load_per_reading",
+    };
     let mut found = vec![
-        Found::new(
-            constant_name(units),
-            1.0 / slope,
-            constant_std,
-            per(load, reading),
-        ),
-        Found::new("sensitivity", slope, slope_std, per(reading, load)),
-        Found::new("zero", fit.values[0], fit.std[0], reading),
+        NamedEstimate::new(inverse, per(load, reading), 1.0 / slope, constant_std),
+        NamedEstimate::new("sensitivity", per(reading, load), slope, slope_std),
+        NamedEstimate::new("zero", reading.clone(), fit.values[0], fit.std[0]),
     ];
     for (k, name) in [(2, "quadratic"), (3, "cubic")] {
         if let Some(value) = fit.values.get(k) {
             let size = largest.powi(k as i32);
             let unit = format!("{reading}/({load})^{k}");
-            found.push(Found::new(
-                name,
-                value / size,
-                fit.std[k].map(|s| s / size),
-                unit,
-            ));
+            let std = fit.std[k].map(|s| s / size);
+            found.push(NamedEstimate::new(name, unit, value / size, std));
         }
     }
     found
 }
 
-/// Readings with the curve through them, and how far they are off.
-fn draw(evaluated: &mut Evaluated, units: &Units) {
-    let mut points = evaluated.points.clone();
+/// Readings with the curve through them, and the residual.
+fn draw(result: &mut Identification, points: &[Point], curve: &[f64], units: &LoadUnits) {
+    let mut points = points.to_vec();
     points.sort_by(|a, b| a.load.total_cmp(&b.load));
     let loads: Vec<f64> = points.iter().map(|p| p.load).collect();
     let readings: Vec<f64> = points.iter().map(|p| p.reading).collect();
     let value = |load: &f64| -> f64 {
         let power = |(k, c): (usize, &f64)| c * load.powi(k as i32);
-        evaluated.coefficients.iter().enumerate().map(power).sum()
+        curve.iter().enumerate().map(power).sum()
     };
-    let curve: Vec<f64> = loads.iter().map(value).collect();
-    let left: Vec<f64> = readings.iter().zip(&curve).map(|(r, c)| r - c).collect();
+    let fitted: Vec<f64> = loads.iter().map(value).collect();
+    let left: Vec<f64> = readings.iter().zip(&fitted).map(|(r, c)| r - c).collect();
     let x = format!("load, {}", units.load);
     let y = format!("reading, {}", units.reading);
     let both = vec![
         Series::dots("readings", &loads, &readings),
-        Series::line("fit", &loads, &curve),
+        Series::line("fit", &loads, &fitted),
     ];
-    let rest = vec![Series::dots("reading less fit", &loads, &left)];
-    let charts = [
+    let rest = vec![Series::dots("reading − fit", &loads, &left)];
+    result.charts.extend([
         Chart::new("Readings and fit", &x, &y, both),
         Chart::new("Residual", &x, &y, rest),
-    ];
-    evaluated.outcome.charts.extend(charts);
+    ]);
 }
 
-fn constant_name(units: &Units) -> &'static str {
-    match (units.load.as_str(), units.reading.as_str()) {
-        ("N m", "V") => "torque_per_volt",
-        _ => "load_per_reading",
-    }
-}
-
-/// The different loads, without the empty stand, rising in size.
+/// The different loads, none included, rising.
 fn steps(points: &[Point], largest: f64) -> Vec<f64> {
     let mut loads: Vec<f64> = points.iter().map(|p| p.load).collect();
     loads.sort_by(f64::total_cmp);
@@ -254,41 +207,40 @@ fn steps(points: &[Point], largest: f64) -> Vec<f64> {
     loads
 }
 
-/// Part of the readings' swing that a calibration may leave.
+/// Residual of a calibration, over the swing of the readings, above which the fit is poor.
 const POOR: f64 = 0.05;
 
-fn poor(outcome: &mut Outcome) {
-    let relative = outcome.quality.as_ref().map_or(0.0, |q| q.relative);
+fn poor(result: &mut Identification, relative: f64) {
     if relative > POOR {
-        outcome.warn(
+        result.warn(
             "poor-fit",
             format!(
-                "the curve leaves {} % of the readings' swing: check that the columns are the right ones and the rows \
-                 in the order they were taken, or use --degree 3",
+                "the residual is {} % of the readings' swing: check that the columns are the right ones and the rows in \
+                 the order in which they were taken, or use --degree 3",
                 rounded(100.0 * relative, 2)
             ),
         );
     }
 }
 
-fn say(outcome: &mut Outcome, points: &[Point], options: Options) {
-    let series = points.iter().map(|p| p.series).max().map_or(0, |m| m + 1);
-    if series < 2 {
-        outcome.warn(
+/// Warns about terms that the record cannot show, and the validity of the constants.
+fn warnings(result: &mut Identification, points: &[Point], degree: usize) {
+    if points.iter().all(|p| p.series == 0) {
+        result.warn(
             "one-series",
-            "the loads were applied once: how far the readings repeat is not known",
+            "the loads were applied only once: repeatability is unknown",
         );
     }
     if (0..points.len()).all(|i| terms::rising(points, i)) {
-        outcome.warn(
+        result.warn(
             "no-unloading",
-            "there are no readings while unloading: hysteresis is not known",
+            "there are no readings during unloading: hysteresis is unknown",
         );
     }
-    if options.degree > 1 {
-        outcome.warn(
+    if degree > 1 {
+        result.warn(
             "curve",
-            "the constants are the slope of the curve at no load; at large loads the curve is to be used",
+            "the constants are the slope of the curve at no load; at large loads use the curve",
         );
     }
 }
@@ -335,11 +287,11 @@ mod tests {
 
     #[test]
     fn terms_are_those_worked_by_hand() {
-        let units = Units {
+        let units = LoadUnits {
             load: "N m".to_owned(),
             reading: "V".to_owned(),
         };
-        let found = identify(&points(&ROWS, &[]), Options { degree: 1 }, &units).unwrap();
+        let found = identify(&points(&ROWS, &[]), 1, &units).unwrap();
         let percent = |name: &str| found.terms.iter().find(|t| t.name == name).unwrap().percent;
         // At 10 N m: (1.02 − 1.00)/1.01; at 5 N m: 0.
         assert!((percent("repeatability").unwrap() - 100.0 * 0.02 / 1.01).abs() < 1e-9);
@@ -348,19 +300,19 @@ mod tests {
         assert_eq!(percent("reproducibility"), None);
         assert_eq!(percent("creep"), None);
         // 0.01 V over 10 N m times the slope.
-        let slope = found.outcome.get("sensitivity").unwrap().value;
+        let slope = found.get("sensitivity").unwrap().value();
         assert!((percent("zero return").unwrap() - 1.0 / (10.0 * slope)).abs() < 1e-9);
-        assert_eq!(found.outcome.found[0].name, "torque_per_volt");
-        assert!((found.outcome.found[0].value * slope - 1.0).abs() < 1e-12);
+        assert_eq!(found.parameters[0].name, "torque_per_volt");
+        assert!((found.parameters[0].value() * slope - 1.0).abs() < 1e-12);
     }
 
     #[test]
     fn mountings_tell_reproducibility() {
-        let units = Units {
+        let units = LoadUnits {
             load: "N m".to_owned(),
             reading: "V".to_owned(),
         };
-        let found = identify(&points(&ROWS, &[0, 1]), Options { degree: 1 }, &units).unwrap();
+        let found = identify(&points(&ROWS, &[0, 1]), 1, &units).unwrap();
         let percent = |name: &str| found.terms.iter().find(|t| t.name == name).unwrap().percent;
         assert!((percent("reproducibility").unwrap() - 100.0 * 0.02 / 1.01).abs() < 1e-9);
         assert_eq!(percent("repeatability"), None);
@@ -368,7 +320,7 @@ mod tests {
 
     #[test]
     fn a_cubic_is_found_and_too_few_loads_are_refused() {
-        let units = Units {
+        let units = LoadUnits {
             load: "N".to_owned(),
             reading: "V".to_owned(),
         };
@@ -376,10 +328,16 @@ mod tests {
         let rows: Vec<(f64, f64)> = (0..7)
             .map(|i| (f64::from(i), curve(f64::from(i))))
             .collect();
-        let found = identify(&points(&rows, &[]), Options { degree: 3 }, &units).unwrap();
-        for (got, want) in found.coefficients.iter().zip([0.1, 2.0, 0.03, -0.004]) {
+        let found = identify(&points(&rows, &[]), 3, &units).unwrap();
+        for (name, want) in [
+            ("zero", 0.1),
+            ("sensitivity", 2.0),
+            ("quadratic", 0.03),
+            ("cubic", -0.004),
+        ] {
+            let got = found.get(name).unwrap().value();
             assert!((got - want).abs() < 1e-9, "{got} {want}");
         }
-        assert!(identify(&points(&rows[..3], &[]), Options { degree: 3 }, &units).is_err());
+        assert!(identify(&points(&rows[..3], &[]), 3, &units).is_err());
     }
 }

@@ -3,7 +3,7 @@
 //! X: deflection, a reading less the zero of its series; X': the same while unloading; X_a: deflection of
 //! the fitted curve; X_N: that at the largest load; i: readings.
 //!
-//! | term | formula | whose |
+//! | term | formula | standards |
 //! |---|---|---|
 //! | repeatability | `(X_max − X_min)/mean X`, series at one mounting, loading | ISO 376 b', DIN 51309 b', VDI/VDE 2646 b' |
 //! | reproducibility | `(X_max − X_min)/mean X`, first series of each mounting, loading | ISO 376 b, DIN 51309 b |
@@ -12,12 +12,12 @@
 //! | zero return | `\|i_after − i_before\|/X_N` | ISO 376 f_0, DIN 51309 f_0, VDI/VDE 2646 f_0 |
 //! | creep | `\|i_last − i_first\|/X_N`, largest load held | ISO 376 c (readings 30 s and 300 s after loading) |
 //!
-//! Of each the largest value over loads or series, in per cent. ISO 376:2011 fits X_a to loading alone; here
+//! The largest value of each over loads or series, in per cent. ISO 376:2011 fits X_a to loading alone; here
 //! it is the curve through loading and unloading, as in case II of DIN 51309:2005.
 
 use super::{NONE, Point, SAME, Term};
 
-/// Whether a point was reached by raising (in size) or lowering the load.
+/// Whether the load (in size) was raised to a point, not lowered.
 pub(super) fn rising(points: &[Point], i: usize) -> bool {
     let before = (0..i).rev().find(|j| points[*j].series == points[i].series);
     before.is_none_or(|j| points[i].load.abs() >= points[j].load.abs())
@@ -26,13 +26,13 @@ pub(super) fn rising(points: &[Point], i: usize) -> bool {
 /// Deflections of a set of points.
 struct Deflections<'a> {
     points: &'a [Point],
-    /// Reading of the empty stand before each series, or that of the curve.
+    /// Reading of the empty stand before each series, or the zero of the curve.
     zeros: Vec<f64>,
     largest: f64,
 }
 
 impl Deflections<'_> {
-    /// Deflections at a load, going up or down, in the series that are wanted; series and value.
+    /// Series and deflection of each point at a load, during loading (`up`) or unloading, in the wanted series.
     fn at(&self, step: f64, up: bool, wanted: &dyn Fn(usize) -> bool) -> Vec<(usize, f64)> {
         (0..self.points.len())
             .filter(|i| (self.points[*i].load - step).abs() <= SAME * self.largest)
@@ -44,7 +44,7 @@ impl Deflections<'_> {
             .collect()
     }
 
-    /// One value a series: their mean where a load was applied more than once in it.
+    /// The same with one value for each series: the mean if the load was applied repeatedly.
     fn by_series(&self, step: f64, up: bool, wanted: &dyn Fn(usize) -> bool) -> Vec<(usize, f64)> {
         let all = self.at(step, up, wanted);
         let of = |part: &[(usize, f64)]| {
@@ -87,7 +87,7 @@ pub(super) fn terms(points: &[Point], steps: &[f64], curve: &[f64], largest: f64
         of.map_or(0, |p| p.position)
     };
     let first = position(points[0].series);
-    // The first series of each mounting: those with a position that no series before has.
+    // The first series of each mounting.
     let opens = |series: usize| (0..series).all(|s| position(s) != position(series));
     let loaded = || steps.iter().filter(|s| s.abs() > NONE * largest);
     let value = |load: f64| -> f64 {
@@ -125,7 +125,7 @@ pub(super) fn terms(points: &[Point], steps: &[f64], curve: &[f64], largest: f64
         .collect()
 }
 
-/// The terms in the order of the report, with what they are and whose.
+/// Names and formulas of the terms, in the order of the report.
 const NAMES: [(&str, &str); 6] = [
     (
         "repeatability",
@@ -170,7 +170,7 @@ fn zeros(points: &[Point], largest: f64) -> Vec<(Option<f64>, Option<f64>)> {
         .collect()
 }
 
-/// Readings one after another at the largest load: the first and the last.
+/// Difference between the first and the last of consecutive readings at the largest load.
 fn creep(points: &[Point], largest: f64, full: f64) -> Option<f64> {
     let held = |p: &Point| (p.load.abs() - largest).abs() <= SAME * largest;
     let runs = points.chunk_by(|a, b| a.series == b.series && held(a) == held(b));
@@ -200,7 +200,7 @@ fn ends(values: &[f64]) -> (f64, f64) {
         })
 }
 
-/// The largest of those that are known.
+/// The largest of the known values.
 fn worst(values: impl Iterator<Item = Option<f64>>) -> Option<f64> {
     values
         .flatten()

@@ -5,19 +5,19 @@ use realfft::RealFftPlanner;
 
 use super::Block;
 
-/// What a block is weighted with.
+/// Weight of the samples of a block.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Window {
-    /// Nothing: whole periods, or transients that die out.
+    /// None: whole periods, or transients that die out.
     None,
-    /// Hann's, for noise.
+    /// Hann window, for noise.
     Hann,
-    /// e^{−i/τ} over samples i, on both signals: transients that do not die out. Every decay rate
-    /// appears larger by 1/τ, exactly.
+    /// e^{−i/τ} over samples i, on both signals, for transients that do not die out. It adds exactly 1/τ to every
+    /// decay rate.
     Exponential(f64),
 }
 
-/// Spectra of an applied and a measured block of one length.
+/// Spectra of an applied and a measured block of the same length.
 #[must_use]
 pub fn transform(applied: &[f64], measured: &[f64], window: Window) -> Block {
     let transform = Transform::new(applied.len(), window);
@@ -25,10 +25,10 @@ pub fn transform(applied: &[f64], measured: &[f64], window: Window) -> Block {
     Block { applied, measured }
 }
 
-/// Samples from which on both channels are worked on at the same time.
+/// Fewest samples for which both channels are processed in parallel.
 const WORTH_A_THREAD: usize = 1 << 17;
 
-/// The same work for both channels.
+/// The same function of both channels.
 fn of_both<T: Send>(
     applied: &[f64],
     measured: &[f64],
@@ -44,10 +44,10 @@ fn of_both<T: Send>(
     })
 }
 
-/// A transform of blocks of one length, with what does not change from block to block.
+/// A transform for blocks of one length, with its plan and weights.
 struct Transform {
     plan: std::sync::Arc<dyn realfft::RealToComplex<f64>>,
-    /// None for no window.
+    /// Empty without a window.
     weights: Vec<f64>,
     without_mean: bool,
 }
@@ -105,24 +105,23 @@ pub fn segments(applied: &[f64], measured: &[f64], length: usize) -> Vec<Block> 
         .collect()
 }
 
-/// Power of noise and of distortion of a signal that is periodic but for noise.
+/// Noise and distortion of the response to a periodic signal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Periodic {
     /// Mean spectrum of a period.
     pub mean: Block,
-    /// Power at each line of the measured mean that noise explains: the variance from period to
-    /// period over their number.
+    /// Power of the noise in the measured mean at each line: the variance between periods over their number.
     pub noise_power: Vec<f64>,
     /// Lines that the applied signal excites.
     pub excited: Vec<bool>,
 }
 
-/// Part of the strongest line from which on a line counts as excited (in amplitude).
+/// Amplitude of an excited line, over that of the strongest.
 const EXCITED: f64 = 1e-2;
 
 /// Averages whole periods (J. Schoukens, R. Pintelon, Y. Rolain, Mastering System Identification in 100
-/// Exercises, 2012, 5.2): what changes from period to period is noise, what the mean has at lines that
-/// are not excited is distortion. `None` for fewer than two blocks.
+/// Exercises, 2012, 5.2): differences between periods are noise, power of the mean at lines that are not excited is
+/// distortion. `None` for fewer than two blocks.
 #[must_use]
 pub fn average_periods(periods: &[Block]) -> Option<Periodic> {
     let count = periods.len();
@@ -161,10 +160,10 @@ pub fn average_periods(periods: &[Block]) -> Option<Periodic> {
     })
 }
 
-/// Correlation of a signal with itself a period later that tells a period.
+/// Smallest autocorrelation at the lag of a period.
 const ALIKE: f64 = 0.98;
 
-/// The period of a signal in samples, if at least two fit into it.
+/// The period of a signal in samples, if the signal has at least two of them.
 #[must_use]
 pub fn find_period(samples: &[f64]) -> Option<usize> {
     let count = samples.len();
@@ -201,7 +200,7 @@ pub fn find_period(samples: &[f64]) -> Option<usize> {
             0.0
         }
     };
-    // Not the slope around lag 0: first the correlation has to fall.
+    // Skip the peak at lag 0.
     let fallen = (1..count / 2).find(|lag| alike(*lag) < 0.5)?;
     let peak = |lag: &usize| {
         alike(*lag) > ALIKE && alike(*lag) >= alike(lag - 1) && alike(*lag) >= alike(lag + 1)

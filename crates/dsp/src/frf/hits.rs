@@ -1,4 +1,4 @@
-//! Hits of a hammer in a record, and what is wrong with them.
+//! Hammer hits in a record, and their faults.
 
 use std::fmt;
 use std::ops::Range;
@@ -6,22 +6,22 @@ use std::ops::Range;
 /// A hit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hit {
-    /// Its samples: from a little before the force rises to the next hit or the end.
+    /// Its samples, from shortly before the force rises to the next hit or the end.
     pub range: Range<usize>,
     /// Sample with the largest force.
     pub peak: usize,
     /// Why it should not be used.
     pub faults: Vec<HitFault>,
-    /// Force of a second stroke over that of the first, if the hammer came back.
+    /// Force of a second stroke over that of the first, if there is one.
     pub second: Option<f64>,
 }
 
-/// What is wrong with a hit.
+/// A fault of a hit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum HitFault {
-    /// The force stays at its largest value: the input was overdriven.
+    /// The force is clipped: the input was overdriven.
     ForceClipped,
-    /// The measured signal stays at its largest or smallest value.
+    /// The measured signal is clipped.
     MeasuredClipped,
     /// The hammer struck twice.
     Doubled,
@@ -40,29 +40,28 @@ impl fmt::Display for HitFault {
     }
 }
 
-/// Force of a hit over the largest one; what is weaker belongs to the hit before it.
+/// Smallest force of a hit over the largest one; weaker pulses belong to the hit before.
 const STRONG: f64 = 0.3;
-/// Force of a second stroke over the first from which on it is named.
+/// Smallest force of a second stroke, over the first, that is reported.
 const SECOND: f64 = 0.05;
-/// … and from which on it makes a hit useless, as the spectrum of the force then has deep notches. A weaker
-/// stroke is part of the recorded force and does little harm.
+/// Force of a second stroke, over the first, from which the hit is unusable: the spectrum of the force then has deep
+/// notches. A weaker one is part of the recorded force and does little harm.
 const USELESS: f64 = 0.3;
-/// The same over the standard deviation of the force at rest, which noise does not reach.
+/// Smallest force of a second stroke, in standard deviations of the force at rest.
 const ABOVE_NOISE: f64 = 8.0;
-/// Part of its extreme within which a signal counts as standing there.
+/// Distance from its extreme, over it, within which a signal counts as clipped.
 const LEVEL: f64 = 0.01;
-/// Samples that stand at the extreme over those beyond half of it, in a row: 0.13 for half a sine and 0.12
-/// for a bell; more means that an amplifier could not follow.
+/// Consecutive samples at the extreme over those beyond half of it: 0.13 for half a sine and 0.12 for a bell; more means
+/// that an amplifier saturated.
 const STANDING: f64 = 0.3;
-/// Fewest samples to tell that from.
+/// Fewest such samples.
 const LEAST_STANDING: usize = 4;
-/// Samples in a row of one value that mean clipping.
+/// Equal consecutive samples that mean clipping.
 const FLAT: usize = 3;
 /// Samples kept before the force rises.
 const BEFORE: usize = 16;
 
-/// Finds the hits. A second stroke that comes within `apart` samples belongs to the first hit, as its
-/// fault; later ones are hits of their own.
+/// Finds the hits. A second stroke within `apart` samples is a fault of the first hit; later ones are separate hits.
 #[must_use]
 pub fn find_hits(force: &[f64], measured: &[f64], apart: usize) -> Vec<Hit> {
     let rest = median(force);
@@ -98,8 +97,7 @@ pub fn find_hits(force: &[f64], measured: &[f64], apart: usize) -> Vec<Hit> {
         .collect()
 }
 
-/// Where the force is largest in each pulse of so many samples; one that comes within `apart` samples of another
-/// belongs to it.
+/// Sample with the largest force of each pulse, except pulses within `apart` samples of the one before.
 fn peaks(size: &dyn Fn(usize) -> f64, count: usize, largest: f64, apart: usize) -> Vec<usize> {
     let mut peaks: Vec<usize> = Vec::new();
     let mut i = 0;
@@ -108,7 +106,7 @@ fn peaks(size: &dyn Fn(usize) -> f64, count: usize, largest: f64, apart: usize) 
             i += 1;
             continue;
         }
-        // The whole pulse, until the force has nearly gone.
+        // The whole pulse, until the force is nearly zero.
         let end = (i..count)
             .find(|k| size(*k) < 0.05 * largest)
             .unwrap_or(count);
@@ -124,7 +122,7 @@ fn peaks(size: &dyn Fn(usize) -> f64, count: usize, largest: f64, apart: usize) 
     peaks
 }
 
-/// Signals of a hit that stand at their extremes.
+/// Clipped signals of a hit.
 fn faults(
     force: &[f64],
     measured: &[f64],
@@ -145,7 +143,7 @@ fn faults(
     faults
 }
 
-/// Where the pulse with that peak begins.
+/// Start of the pulse with that peak.
 fn start_of(size: &impl Fn(usize) -> f64, peak: usize, largest: f64) -> usize {
     let quiet = (0..peak)
         .rev()
@@ -154,7 +152,7 @@ fn start_of(size: &impl Fn(usize) -> f64, peak: usize, largest: f64) -> usize {
     quiet.saturating_sub(BEFORE)
 }
 
-/// Whether the largest or smallest value stands several times in a row.
+/// Whether the largest or smallest value occurs several times in a row.
 fn flat(samples: &[f64], rest: f64) -> bool {
     let far = |v: f64| (v - rest).abs();
     [f64::max as fn(f64, f64) -> f64, f64::min]
@@ -170,8 +168,8 @@ fn flat(samples: &[f64], rest: f64) -> bool {
         })
 }
 
-/// Whether a signal stands near its largest or smallest value for longer than a pulse or a swing does:
-/// an amplifier that saturates before the converter leaves noise on its limit.
+/// Whether a signal stays near its largest or smallest value longer than a pulse or a swing does: an amplifier that
+/// saturates before the converter has noise on its limit.
 fn stands(samples: &[f64], rest: f64) -> bool {
     [1.0, -1.0].into_iter().any(|side| {
         let size = |i: usize| side * (samples[i] - rest);
@@ -192,7 +190,7 @@ fn stands(samples: &[f64], rest: f64) -> bool {
     })
 }
 
-/// Largest force over that of the peak, if it comes back to more than `second` after it had gone.
+/// Largest force of a second stroke over that of the peak, if it exceeds `second` after the force had vanished.
 fn second_stroke(
     size: &impl Fn(usize) -> f64,
     peak: usize,
@@ -204,7 +202,7 @@ fn second_stroke(
     (largest > second).then(|| largest / size(peak))
 }
 
-/// Standard deviation of a signal that is mostly at rest, by the median of its distances.
+/// Standard deviation of a signal that is mostly at rest, from the median deviation.
 fn spread(samples: &[f64], rest: f64) -> f64 {
     let distances: Vec<f64> = samples.iter().map(|v| (v - rest).abs()).collect();
     median(&distances) / 0.674_489_75

@@ -1,7 +1,7 @@
 //! Frequency responses from blocks of an applied and a measured signal.
 //!
-//! Blocks are segments of noise, periods of a periodic signal, or hits. Their spectra are kept one by
-//! one, so that a response can be taken from some of them and tried on the others.
+//! Blocks are segments of noise, periods of a periodic signal, or hits. Each keeps its spectra, so that a response can be
+//! estimated from some blocks and tested on the others.
 //!
 //! Estimators and bounds: J. S. Bendat, A. G. Piersol, Random Data, 4th ed., 2010, chapters 6 and 9.
 
@@ -22,7 +22,7 @@ pub struct Block {
     pub measured: Vec<Complex64>,
 }
 
-/// How a response is estimated.
+/// Estimator of a response.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Estimator {
     /// S_xy/S_xx: noise in the measured signal does not bias it.
@@ -33,7 +33,7 @@ pub enum Estimator {
     Hv,
 }
 
-/// Power of each signal and cross-power, summed over blocks, from which every estimate follows.
+/// Power of each signal and cross-power, summed over blocks; every estimate follows from them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Powers {
     /// S_xx, S_yy and S_xy at each line.
@@ -42,7 +42,7 @@ pub struct Powers {
 }
 
 impl Powers {
-    /// Those of the blocks at a part of the lines.
+    /// Powers of the blocks at a range of lines.
     #[must_use]
     pub fn of<'a>(blocks: impl Iterator<Item = &'a Block>, lines: std::ops::Range<usize>) -> Self {
         let mut all = Self {
@@ -65,13 +65,13 @@ impl Powers {
         all
     }
 
-    /// Those of the other blocks, `some` being those of a part of them.
+    /// Powers of the other blocks, where `some` are those of some of them.
     #[must_use]
     pub fn without(&self, some: &Self) -> Self {
         let pairs = self.sums.iter().zip(&some.sums);
         Self {
             sums: pairs
-                // Rounding must not make a power of nothing negative.
+                // Rounding must not make a power negative.
                 .map(|(all, some)| {
                     let powers = ((all.0 - some.0).max(0.0), (all.1 - some.1).max(0.0));
                     (powers.0, powers.1, all.2 - some.2)
@@ -81,7 +81,7 @@ impl Powers {
         }
     }
 
-    /// The response that follows from them.
+    /// The response.
     #[must_use]
     pub fn response(&self, estimator: Estimator) -> Frf {
         let n = self.blocks.max(1) as f64;
@@ -103,7 +103,7 @@ impl Powers {
 pub struct Frf {
     /// Response at each line.
     pub response: Vec<Complex64>,
-    /// Ordinary coherence at each line, 0 to 1; 1 throughout for a single block, which tells nothing.
+    /// Ordinary coherence at each line, 0 to 1; always 1 for a single block.
     pub coherence: Vec<f64>,
     /// Power of the applied signal at each line.
     pub applied_power: Vec<f64>,
@@ -112,7 +112,7 @@ pub struct Frf {
 }
 
 impl Frf {
-    /// The response from those blocks.
+    /// The response of these blocks.
     ///
     /// ```
     /// use num_complex::Complex64;
@@ -130,7 +130,7 @@ impl Frf {
         Self::between(blocks, estimator, 0..usize::MAX)
     }
 
-    /// The same at a part of the lines, of which the first is that of the range.
+    /// The same at a range of lines, counted from its start.
     #[must_use]
     pub fn between<'a>(
         blocks: impl Iterator<Item = &'a Block>,
@@ -166,8 +166,8 @@ fn estimate(&(xx, yy, xy): &(f64, f64, Complex64), estimator: Estimator) -> Comp
         Estimator::H2 if xy.norm_sqr() == 0.0 => Complex64::ZERO,
         Estimator::H2 => yy / xy.conj(),
         Estimator::Hv => {
-            // The eigenvector of [[xx, xy*], [xy, yy]] with the larger eigenvalue, both signals brought
-            // to one power first, as their units differ.
+            // The eigenvector of [[xx, xy*], [xy, yy]] with the larger eigenvalue, after scaling both signals to the
+            // same power, as their units differ.
             let scale = (yy / xx).sqrt();
             if scale == 0.0 || xy.norm() == 0.0 {
                 return Complex64::ZERO;

@@ -1,13 +1,13 @@
-//! Uncertainty of the parameters, and the directions that the data do not determine.
+//! Covariance of the parameters, and the directions that the data do not determine.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::quantity::Covariance;
 
-/// Singular values below this part of the largest, after scaling of the columns, count as zero:
-/// derivatives by differences have about ten digits.
+/// Singular values below this part of the largest, after scaling of the columns, count as zero: derivatives by differences
+/// have about ten digits.
 const RANK_TOLERANCE: f64 = 1e-9;
-/// Share of a parameter in an undetermined direction from which on it is undetermined itself.
+/// Share of a parameter in an undetermined direction from which it is undetermined itself.
 const SHARE: f64 = 1e-3;
 
 /// A combination of parameters along which the fit does not change.
@@ -62,16 +62,13 @@ pub(super) fn covariance(
     }
     let variance = variance(n - undetermined.len());
     let kept: Vec<usize> = (0..n).filter(|j| !open[*j] && variance.is_some()).collect();
-    let mut places = vec![None; count];
-    kept.iter()
-        .enumerate()
-        .for_each(|(place, j)| places[indices[*j]] = Some(place));
+    let known: Vec<usize> = kept.iter().map(|j| indices[*j]).collect();
     let variance = variance.unwrap_or(0.0);
     let matrix = DMatrix::from_fn(kept.len(), kept.len(), |a, b| {
         let (i, j) = (kept[a], kept[b]);
         variance * inverse[(i, j)] / (norms[i] * norms[j])
     });
-    (Covariance { places, matrix }, undetermined)
+    (Covariance::of_some(&known, count, matrix), undetermined)
 }
 
 /// A null direction in relative changes of the parameters, its largest being 1.

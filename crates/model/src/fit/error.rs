@@ -1,38 +1,38 @@
-//! What can keep a fit from being made.
+//! Errors of a fit.
 
 use thiserror::Error;
 
-/// Why there is no fit.
+/// Why a fit failed.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum FitError {
-    /// A parameter's start, bounds or scale cannot be.
+    /// A parameter's start, bounds or scale are invalid.
     #[error("parameter {name}: {problem}")]
     Parameter {
         /// Its name.
         name: String,
-        /// What is wrong, what was expected.
+        /// The problem, and what was expected.
         problem: String,
     },
-    /// Nothing is left to be found.
+    /// No parameter is free.
     #[error("every parameter is fixed; free at least one")]
     NothingFree,
-    /// There are fewer residuals than parameters to find.
+    /// There are fewer residuals than free parameters.
     #[error(
         "{residuals} residuals cannot determine {free} parameters; record more, or fix some of them"
     )]
     TooFewResiduals {
-        /// Residuals there are.
+        /// Number of residuals.
         residuals: usize,
-        /// Parameters to be found.
+        /// Number of free parameters.
         free: usize,
     },
-    /// The number of residuals is not that of the first evaluation, or of the weights.
+    /// The number of residuals differs from that of the first evaluation, or of the weights.
     #[error("{got} residuals where {expected} were expected; their number must not change")]
     Length {
         /// Number expected.
         expected: usize,
-        /// Number got.
+        /// Actual number.
         got: usize,
     },
     /// A residual or derivative is not a finite number.
@@ -43,7 +43,7 @@ pub enum FitError {
         /// Its value.
         value: f64,
     },
-    /// The model cannot be evaluated there.
+    /// The model cannot be evaluated at these parameters.
     #[error("the model cannot be evaluated: {0}")]
     Model(String),
 }

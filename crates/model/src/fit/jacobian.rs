@@ -8,7 +8,7 @@ use nalgebra::DMatrix;
 use super::problem::Evaluated;
 use super::{Differences, FitError, Parameter};
 
-/// What the derivatives are taken of, and how.
+/// Parameters and method of the derivatives.
 pub(super) struct Derivatives<'a> {
     pub parameters: &'a [Parameter],
     /// Indices of the parameters that are not fixed.
@@ -17,7 +17,7 @@ pub(super) struct Derivatives<'a> {
     pub threads: usize,
 }
 
-/// Columns of the free parameters, and how many evaluations they took.
+/// Columns of the free parameters, and the number of evaluations.
 pub(super) fn jacobian(
     evaluated: &Evaluated,
     how: &Derivatives,
@@ -56,7 +56,7 @@ fn finite(matrix: DMatrix<f64>) -> Result<DMatrix<f64>, FitError> {
 
 type Column = (Vec<f64>, usize);
 
-/// All columns; each is a function of its index alone, so the threads do not show in the result.
+/// All columns; each depends only on its index, so the result does not depend on the threads.
 fn columns(
     evaluated: &Evaluated,
     how: &Derivatives,
@@ -120,7 +120,7 @@ fn column(
         let slope = above.iter().zip(&below).map(|(a, b)| (a - b) / width);
         return Ok((slope.collect(), 2));
     }
-    // At a bound, or as asked: one-sided, with the step that suits it.
+    // At a bound, or forward differences: one-sided, with a suitable step.
     let step = f64::EPSILON.sqrt() * size;
     let to = if value + step <= parameter.upper {
         value + step

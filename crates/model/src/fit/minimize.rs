@@ -9,21 +9,20 @@ use super::reduce::{Reduced, reduce};
 use super::step::{Room, step};
 use super::{Differences, Fit, FitError, Parameter, Residuals, StopReason};
 
-/// How a fit is made.
+/// Options of a fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Options {
-    /// Derivatives where the problem gives none.
+    /// Differences for problems without derivatives.
     pub differences: Differences,
     /// Threads for differences.
     pub threads: usize,
     /// Most evaluations of the residuals.
     pub most_evaluations: usize,
-    /// Relative reduction of the sum of squares, and relative step, that count as none.
+    /// Relative reduction of the sum of squares, and relative step, below which the fit has converged.
     pub tolerance: f64,
     /// Factors of the residuals: 1/σ makes them comparable.
     pub weights: Option<Vec<f64>>,
-    /// Whether the weighted residuals have variance 1 by what is known of the noise. If not, the
-    /// variance is taken from the residuals.
+    /// Whether the weighted residuals are known to have variance 1. If not, the variance is estimated from the residuals.
     pub variance_known: bool,
 }
 
@@ -40,18 +39,18 @@ impl Default for Options {
     }
 }
 
-/// Start of the damping, as a part of the scaling.
+/// First damping, relative to the scaling.
 const FIRST_DAMPING: f64 = 1e-3;
-/// Damping at which no step is left.
+/// Damping at which steps become zero.
 const MOST_DAMPING: f64 = 1e24;
-/// Cosine of the angle between residuals and any column that counts as a right angle.
+/// Cosine of the angle between residuals and a column below which they are orthogonal.
 const RIGHT_ANGLE: f64 = 1e-10;
 
-/// Finds the parameters that make the sum of the squares of the residuals least.
+/// Finds the parameters that minimise the sum of squares of the residuals.
 ///
 /// # Errors
-/// [`FitError`] if a parameter's numbers cannot be, nothing is free, there are too few residuals, or
-/// the model cannot be evaluated at the start.
+/// [`FitError`] if a parameter is invalid, none is free, there are too few residuals, or the model cannot be evaluated at
+/// the start.
 ///
 /// # Examples
 /// See [the module](super).
@@ -72,7 +71,7 @@ pub fn minimize(
     state.finish(stop)
 }
 
-/// Where the search stands.
+/// State of the search.
 struct State<'a> {
     evaluated: Evaluated<'a>,
     how: Derivatives<'a>,
@@ -88,7 +87,7 @@ struct State<'a> {
     evaluations: usize,
 }
 
-/// What came of a step.
+/// Outcome of a step.
 enum Progress {
     Moved,
     Refused,
@@ -146,7 +145,7 @@ impl<'a> State<'a> {
             let norm = self.reduced.r.column(j).norm();
             *scale = scale.max(norm);
         }
-        // A column without effect still needs some damping to be solvable.
+        // A parameter without effect needs some damping, too.
         let floor = self.scaling.iter().fold(0.0_f64, |m, s| m.max(*s)) * 1e-30;
         let parameters = self.how.parameters;
         for (scale, index) in self.scaling.iter_mut().zip(self.how.free) {
@@ -174,7 +173,7 @@ impl<'a> State<'a> {
         }
     }
 
-    /// Whether no free direction that its bounds leave open lowers the sum of squares.
+    /// Whether no direction within the bounds lowers the sum of squares.
     fn at_right_angles(&self) -> bool {
         let gradient = self.reduced.r.tr_mul(&self.reduced.c);
         let size = self.cost.sqrt();
@@ -241,7 +240,7 @@ impl<'a> State<'a> {
         })
     }
 
-    /// More damping, after a step that did not help.
+    /// More damping, after a step that did not lower the sum of squares.
     fn refuse(&mut self) -> Progress {
         self.lambda = self.lambda.max(1e-15) * self.rise;
         self.rise *= 2.0;
@@ -252,7 +251,7 @@ impl<'a> State<'a> {
         }
     }
 
-    /// Takes a step, with less damping the better the model predicted its gain.
+    /// Takes a step; the better the model predicted its gain, the lower the damping becomes.
     fn accept(
         &mut self,
         values: Vec<f64>,

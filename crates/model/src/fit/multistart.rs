@@ -1,11 +1,11 @@
-//! Fits from many starts, against local minima.
+//! Fits from many starts, to avoid local minima.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
 use super::{Fit, FitError, Options, Parameter, Residuals, minimize};
 
-/// What fits from many starts found.
+/// Result of fits from many starts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MultiStart {
     /// The fit with the least sum of squares.
@@ -14,7 +14,7 @@ pub struct MultiStart {
     pub sums_of_squares: Vec<Option<f64>>,
 }
 
-/// Bases of the spread of starts, one each parameter.
+/// Bases of Halton's sequence, one per parameter.
 const PRIMES: [usize; 16] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53];
 
 /// Fits from the given start and `more` others, spread evenly (Halton's sequence) over the bounds, or

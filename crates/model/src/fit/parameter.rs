@@ -1,4 +1,4 @@
-//! What is looked for, and within which bounds.
+//! Parameters of a fit and their bounds.
 
 use super::FitError;
 
@@ -13,15 +13,14 @@ pub struct Parameter {
     pub lower: f64,
     /// Greatest value, or +∞.
     pub upper: f64,
-    /// Size of a change that matters, greater than 0: sets the steps of differences where the
-    /// value itself is small.
+    /// Size of a relevant change, greater than 0; sets the steps of differences where the value is small.
     pub scale: f64,
     /// Whether it keeps its start.
     pub fixed: bool,
 }
 
 impl Parameter {
-    /// A free parameter without bounds, its scale being the size of its start (or 1).
+    /// A free parameter without bounds, with the size of its start (or 1) as scale.
     ///
     /// ```
     /// use torqcomp_model::fit::Parameter;
@@ -69,7 +68,7 @@ impl Parameter {
         self
     }
 
-    /// Whether all its numbers make sense together.
+    /// Refuses numbers that contradict each other.
     pub(super) fn check(&self) -> Result<(), FitError> {
         let wrong = |problem: String| {
             Err(FitError::Parameter {

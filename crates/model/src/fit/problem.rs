@@ -1,13 +1,12 @@
-//! What is fitted: residuals as a function of parameters.
+//! Residuals as a function of parameters.
 
 use nalgebra::DMatrix;
 
 use super::FitError;
 
-/// Residuals to be made small, and if known their derivatives.
+/// Residuals and, optionally, their derivatives.
 ///
-/// A closure `Fn(&[f64], &mut Vec<f64>) -> Result<(), FitError>` is one whose derivatives are taken
-/// by differences.
+/// A closure `Fn(&[f64], &mut Vec<f64>) -> Result<(), FitError>` has no derivatives; differences are used.
 pub trait Residuals: Sync {
     /// Writes the residuals at `values` (all parameters, fixed ones too) into `out`, which is empty.
     ///
@@ -15,7 +14,7 @@ pub trait Residuals: Sync {
     /// [`FitError::Model`] where the model cannot be evaluated: the fit then takes a smaller step.
     fn residuals(&self, values: &[f64], out: &mut Vec<f64>) -> Result<(), FitError>;
 
-    /// Whether [`Residuals::jacobian`] is there; otherwise differences are taken.
+    /// Whether [`Residuals::jacobian`] is implemented; otherwise differences are used.
     fn has_jacobian(&self) -> bool {
         false
     }
@@ -66,16 +65,16 @@ where
     }
 }
 
-/// How derivatives are taken where the problem does not give them.
+/// Differences for problems without derivatives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Differences {
-    /// (r(p + h) − r(p))/h: one evaluation a parameter, seven to eight digits.
+    /// (r(p + h) − r(p))/h: one evaluation per parameter, seven to eight digits.
     Forward,
-    /// (r(p + h) − r(p − h))/2h: two evaluations a parameter, ten to eleven digits.
+    /// (r(p + h) − r(p − h))/2h: two evaluations per parameter, ten to eleven digits.
     Central,
 }
 
-/// A problem with the weights of its residuals and the count of its evaluations.
+/// A problem with the weights of its residuals and their number.
 pub(super) struct Evaluated<'a> {
     pub problem: &'a dyn Residuals,
     /// Factors of the residuals, or none.

@@ -1,20 +1,20 @@
-//! A tall least-squares problem brought to a small one without squaring its condition number.
+//! Reduction of a tall least-squares problem to a small one without squaring its condition number.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Rows taken at once: large enough for few rounds, small enough to stay in cache.
+/// Rows of a block: large enough for few rounds, small enough for the cache.
 const BLOCK: usize = 2048;
 
 /// The problem min |A x − b| as min |R x − c|² + rest², with R square and upper triangular.
 pub(super) struct Reduced {
     /// Upper triangular factor of A.
     pub r: DMatrix<f64>,
-    /// The part of b that A can reach.
+    /// The part of b in the range of A.
     pub c: DVector<f64>,
 }
 
-/// Reduces [A | b] by orthogonal transformations, block after block of rows (Householder; Golub & Van
-/// Loan, Matrix Computations, 4th ed., 5.2 and 6.5.3 for the joining of blocks).
+/// Reduces [A | b] by Householder transformations, one block of rows after another (Golub & Van Loan, Matrix Computations,
+/// 4th ed., 5.2, and 6.5.3 for joining blocks).
 pub(super) fn reduce(a: &DMatrix<f64>, b: &[f64]) -> Reduced {
     let (rows, columns) = a.shape();
     let width = columns + 1;

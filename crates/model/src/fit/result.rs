@@ -1,4 +1,4 @@
-//! What a fit found, how sure it is, and why it stopped.
+//! Result of a fit.
 
 use super::Undetermined;
 use crate::quantity::{Covariance, Estimates};
@@ -7,17 +7,17 @@ use crate::quantity::{Covariance, Estimates};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum StopReason {
-    /// The residuals are at right angles to every direction in which the model can move.
+    /// The residuals are orthogonal to every direction in which the model can move.
     Gradient,
     /// The sum of squares fell, and would fall, by less than the tolerance.
     Reduction,
     /// The parameters moved by less than the tolerance.
     Step,
-    /// The residuals are zero as far as numbers go.
+    /// The residuals are zero.
     Exact,
-    /// No step lowers the sum of squares any more: the digits are used up.
+    /// No step lowers the sum of squares any more: limited by rounding.
     NoProgress,
-    /// The greatest number of evaluations was reached before that: not a minimum yet.
+    /// The maximum number of evaluations was reached before a minimum.
     Evaluations,
 }
 

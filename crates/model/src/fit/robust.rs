@@ -1,24 +1,24 @@
-//! Fits that outliers do not pull.
+//! Fits that are robust against outliers.
 
 use super::{Fit, FitError, Options, Parameter, Residuals, minimize};
 
-/// How a residual counts the larger it is, in units of its robust standard deviation.
+/// Loss as a function of a residual in robust standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Loss {
     /// Huber: squares up to `k` (1.345 keeps 95 % efficiency), linear beyond.
     Huber {
-        /// Where it turns linear.
+        /// Where it becomes linear.
         k: f64,
     },
-    /// Tukey's biweight: nothing beyond `k` (4.685 keeps 95 % efficiency).
+    /// Tukey's biweight: weight 0 beyond `k` (4.685 keeps 95 % efficiency).
     Biweight {
-        /// Where it ends.
+        /// Where the weight becomes 0.
         k: f64,
     },
 }
 
 impl Loss {
-    /// Weight of the square of a residual that is `u` standard deviations large.
+    /// Weight of the square of a residual of `u` standard deviations.
     ///
     /// P. J. Huber, E. M. Ronchetti, Robust Statistics, 2nd ed., 4.5 and 4.8.
     ///
@@ -39,7 +39,7 @@ impl Loss {
     }
 }
 
-/// A fit with the weights that it gave the residuals.
+/// A fit with the weights of its residuals.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Robust {
     /// The fit; its residuals are weighted.
@@ -52,11 +52,10 @@ pub struct Robust {
 
 /// Most rounds of reweighting.
 const ROUNDS: usize = 30;
-/// Change of the weights that counts as none.
+/// Change of the weights at convergence.
 const SETTLED: f64 = 1e-4;
 
-/// Fits with weights that follow from the residuals, round after round until they settle
-/// (iteratively reweighted least squares). The uncertainties are those of the last weighted fit.
+/// Iteratively reweighted least squares. The uncertainties are those of the last weighted fit.
 ///
 /// # Errors
 /// As [`minimize`].

@@ -4,17 +4,17 @@ use nalgebra::{DMatrix, DVector};
 
 use super::reduce::{Reduced, back_substitute, reduce};
 
-/// Room of a parameter to both sides, as a step.
+/// Distances of a parameter from its bounds.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Room {
     pub down: f64,
     pub up: f64,
 }
 
-/// The step d that makes |R d + c|² + λ|D d|² least, each part of it within its room.
+/// The step d that minimises |R d + c|² + λ|D d|² within the bounds.
 ///
-/// Parts that would leave it are set to its edge and the others solved for again, until all fit:
-/// an active-set rule on the small reduced problem. `None` if the problem is singular at this λ.
+/// Components beyond a bound are set to it and the others solved again until all are within (an active set on the reduced
+/// problem). `None` if the problem is singular at this λ.
 pub(super) fn step(
     reduced: &Reduced,
     scaling: &[f64],
@@ -24,7 +24,7 @@ pub(super) fn step(
     let n = scaling.len();
     let gradient = reduced.r.tr_mul(&reduced.c);
     let mut found = DVector::zeros(n);
-    // At an edge and pushed outwards: stays there.
+    // A component at a bound that is pushed outwards stays there.
     let mut open: Vec<usize> = (0..n)
         .filter(|i| {
             let downhill = -gradient[*i];
@@ -52,7 +52,7 @@ pub(super) fn step(
     Some(found)
 }
 
-/// The damped step of the open parts, the others having the steps in `taken`.
+/// The damped step of the open components; the others have the steps in `taken`.
 fn solve(
     reduced: &Reduced,
     scaling: &[f64],

@@ -35,6 +35,23 @@ impl Covariance {
         }
     }
 
+    /// From the matrix over all numbers.
+    #[must_use]
+    pub fn of(matrix: DMatrix<f64>) -> Self {
+        let all: Vec<usize> = (0..matrix.nrows()).collect();
+        Self::of_some(&all, all.len(), matrix)
+    }
+
+    /// From the matrix over some of `count` numbers, those at `indices`; the others have no uncertainty.
+    #[must_use]
+    pub fn of_some(indices: &[usize], count: usize, matrix: DMatrix<f64>) -> Self {
+        let mut places = vec![None; count];
+        for (place, index) in indices.iter().enumerate() {
+            places[*index] = Some(place);
+        }
+        Self { places, matrix }
+    }
+
     /// Of numbers that are not correlated; those without an uncertainty have no covariance.
     #[must_use]
     pub fn independent(std: &[Option<f64>]) -> Self {

@@ -1,41 +1,41 @@
-//! The equation of one line, and its derivatives by all numbers that are looked for.
+//! The equation of one line, and its derivatives by all parameters.
 
 use num_complex::Complex64;
 
 use super::super::{Data, Modal};
 use super::Spectra;
 use super::normal::Solved;
-use crate::identify::decay::Pole;
+use crate::identify::Pole;
 
 /// Degree of the smooth part of the transient.
 const DEGREE: usize = 3;
 
-/// Which number stands where: first those of a record's transient (residues, then the smooth part, real and
-/// imaginary one after another), then those of all records (σ and ω of each mode, the delay, the linear
-/// numbers of the response), then what is left.
-pub(super) struct Layout<'a> {
+/// Order of the parameters: first those of a record's transient (residues, then the smooth part, real and imaginary parts
+/// alternating), then the shared ones (σ and ω of each mode, the delay, the linear parameters of the response); the
+/// residual comes last.
+pub(super) struct Parameters<'a> {
     shape: &'a Data,
     /// Number of modes.
     pub modes: usize,
     band_rad_per_s: (f64, f64),
 }
 
-/// All numbers.
+/// Values of all parameters.
 #[derive(Clone)]
-pub(super) struct State {
+pub(super) struct ParameterValues {
     /// Modes.
     pub poles: Vec<Pole>,
     /// Delay in s.
     pub delay_s: f64,
     /// Residues, c₁ and c₂ of the response.
     pub linear: Vec<f64>,
-    /// Numbers of each record's transient.
+    /// Parameters of each record's transient.
     pub transients: Vec<Vec<f64>>,
 }
 
-impl State {
-    /// The averaged response, and no transients.
-    pub fn start(layout: &Layout, modal: &Modal, records: usize) -> Self {
+impl ParameterValues {
+    /// The averaged response, without transients.
+    pub fn start(layout: &Parameters, modal: &Modal, records: usize) -> Self {
         Self {
             poles: modal.poles.clone(),
             delay_s: modal.delay_s,
@@ -45,7 +45,7 @@ impl State {
     }
 }
 
-impl<'a> Layout<'a> {
+impl<'a> Parameters<'a> {
     pub fn of(shape: &'a Data, modes: usize) -> Self {
         let band_rad_per_s = shape.band_rad_per_s();
         Self {
@@ -55,27 +55,27 @@ impl<'a> Layout<'a> {
         }
     }
 
-    /// Numbers of a record's transient.
+    /// Number of parameters of a record's transient.
     pub fn own(&self) -> usize {
         2 * self.modes + 2 * (DEGREE + 1)
     }
 
-    /// Numbers of poles and delay.
+    /// Number of poles' parameters and delay.
     pub fn searched(&self) -> usize {
         2 * self.modes + usize::from(self.shape.with_delay)
     }
 
-    /// Numbers of all records.
+    /// Number of shared parameters.
     pub fn shared(&self) -> usize {
         self.searched() + 2 * self.modes + 2
     }
 
-    /// All numbers that a record tells.
+    /// Number of parameters of a record, shared ones included.
     pub fn columns(&self) -> usize {
         self.own() + self.shared()
     }
 
-    /// Legendre's polynomials at a place in the band.
+    /// Legendre polynomials at a place in the band.
     fn smooth(&self, omega: f64) -> [f64; DEGREE + 1] {
         let (low, high) = self.band_rad_per_s;
         let x = (2.0 * omega - low - high) / (high - low);
@@ -88,8 +88,14 @@ impl<'a> Layout<'a> {
         all
     }
 
-    /// What the equation leaves of a line.
-    pub fn left(&self, spectra: &Spectra, state: &State, record: usize, k: usize) -> Complex64 {
+    /// The residual of a line.
+    pub fn left(
+        &self,
+        spectra: &Spectra,
+        state: &ParameterValues,
+        record: usize,
+        k: usize,
+    ) -> Complex64 {
         let omega = spectra.omega[k];
         let scale = self.shape.scale();
         let (front, s) = self.shape.front(omega, state.delay_s, scale);
@@ -112,11 +118,11 @@ impl<'a> Layout<'a> {
         spectra.measured[k] - front * response * spectra.applied[k] - transient
     }
 
-    /// Derivatives of the model at a line, then what it leaves.
+    /// Derivatives of the model at a line, then the residual.
     pub fn fill(
         &self,
         spectra: &Spectra,
-        state: &State,
+        state: &ParameterValues,
         record: usize,
         k: usize,
         out: &mut [Complex64],
@@ -161,8 +167,13 @@ impl<'a> Layout<'a> {
 }
 
 impl Solved {
-    /// The numbers after a part of the step.
-    pub fn moved(&self, layout: &Layout, state: &State, part: f64) -> State {
+    /// The parameters after a part of the step.
+    pub fn moved(
+        &self,
+        layout: &Parameters,
+        state: &ParameterValues,
+        part: f64,
+    ) -> ParameterValues {
         let mut next = state.clone();
         let n = 2 * layout.modes;
         for (j, pole) in next.poles.iter_mut().enumerate() {
@@ -185,7 +196,7 @@ impl Solved {
     }
 
     /// Standard uncertainty of the delay, if there is one.
-    pub fn delay_std(&self, layout: &Layout) -> Option<f64> {
+    pub fn delay_std(&self, layout: &Parameters) -> Option<f64> {
         let at = 2 * layout.modes;
         layout
             .shape
@@ -216,7 +227,7 @@ mod tests {
         }
     }
 
-    /// Every derivative against a difference of what is left.
+    /// Every derivative against a difference of the residual.
     #[test]
     fn derivatives_are_those_of_the_equation() {
         let spectra = Spectra {
@@ -227,9 +238,9 @@ mod tests {
         };
         for order in 0..3 {
             let shape = shape(order);
-            let layout = Layout::of(&shape, 2);
+            let layout = Parameters::of(&shape, 2);
             let number = |i: usize| ((i * i + 3) as f64 * 0.7).sin();
-            let state = State {
+            let state = ParameterValues {
                 poles: vec![pole(4.0, 130.0), pole(9.0, 180.0)],
                 delay_s: 2e-3,
                 linear: (0..6).map(number).collect(),
@@ -250,7 +261,7 @@ mod tests {
     }
 
     /// The numbers after a step of one of them.
-    fn stepped(layout: &Layout, state: &State, i: usize, by: f64) -> State {
+    fn stepped(layout: &Parameters, state: &ParameterValues, i: usize, by: f64) -> ParameterValues {
         let (own, shared) = (layout.own(), layout.shared());
         let mut solved = Solved {
             step: nalgebra::DVector::zeros(shared),

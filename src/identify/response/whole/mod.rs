@@ -1,21 +1,20 @@
-//! The final fit of noise-driven records: leakage is part of the model.
+//! The final fit of noise-driven records, with leakage as part of the model.
 //!
 //! ```text
 //! Y(k) = H(jω_k) U(k) + T(k) + E(k),   T(k) = Σ r/(jω_k − p) + r*/(jω_k − p*) + Σ_l t_l P_l(x_k)
 //! ```
 //!
-//! Y, U: discrete Fourier transforms of a whole record without a window; H: the response, with its modes at p;
-//! T: what the record's two ends make of what went before and comes after, a sum of the same modes with
-//! residues r of their own, and a smooth part in Legendre's polynomials P_l of the place x_k in the band, for the
-//! modes outside it and the samples in between; E: noise of the measured signal, its lines independent, with a
-//! variance that changes slowly from line to line. The equation is exact for whatever acts, so that no
-//! resonance is widened, however short the record. (R. Pintelon, J. Schoukens, G. Vandersteen, Frequency domain
-//! system identification using arbitrary signals, IEEE Trans. Automatic Control 42 (1997), 1717;
-//! Pintelon & Schoukens, System Identification, 2nd ed., 2012, 6.3.2 and 9.)
+//! Y, U: discrete Fourier transforms of a whole record without a window; H: the response, with modes at p; T: transient
+//! of both ends of the record, a sum of the same modes with other residues r and a smooth part in Legendre polynomials P_l
+//! of the place x_k in the band, for modes outside it and the motion between samples; E: noise of the measured signal,
+//! independent from line to line, with a slowly varying variance. The equation is exact for any excitation, so no
+//! resonance is widened, however short the record. (R. Pintelon, J. Schoukens, G. Vandersteen, Frequency domain system
+//! identification using arbitrary signals, IEEE Trans. Automatic Control 42 (1997), 1717; Pintelon & Schoukens, System
+//! Identification, 2nd ed., 2012, 6.3.2 and 9.)
 //!
-//! Least squares weighted with the noise, which makes it the maximum-likelihood estimate: steps of Gauss and
-//! Newton in all numbers at once, from the fit of the averaged response. The variance of the noise is that of what
-//! is left, smoothed over neighbouring lines; the covariance is the inverse of the information.
+//! Weighted least squares (the maximum-likelihood estimate), by Gauss-Newton steps in all parameters from the fit of the
+//! averaged response. The variance of the noise is that of the residual, smoothed over neighbouring lines; the covariance
+//! is the inverse of the information.
 
 mod line;
 mod normal;
@@ -24,12 +23,13 @@ use std::ops::Range;
 
 use num_complex::Complex64;
 use torqcomp_dsp::frf::{Block, Window, transform};
+use torqcomp_model::Covariance;
 
 use super::blocks::Set;
-use super::{Data, Driven, Modal, Settled};
-use crate::identify::decay::Pole;
+use super::{Data, Driven, FinalFit, Modal};
+use crate::identify::Pole;
 use crate::parallel::{in_parts, threads};
-use line::{Layout, State};
+use line::{ParameterValues, Parameters};
 use normal::{Gram, PART, Solved};
 
 /// The lines of a record in the band.
@@ -37,25 +37,25 @@ struct Spectra {
     omega: Vec<f64>,
     applied: Vec<Complex64>,
     measured: Vec<Complex64>,
-    /// One over the standard deviation of the real and of the imaginary part of the noise.
+    /// Inverse standard deviation of the real and of the imaginary part of the noise.
     weight: Vec<f64>,
 }
 
-/// Most steps before and after the noise is known.
+/// Most steps, before and after the noise is estimated.
 const MOST_STEPS: usize = 12;
 /// Times a step is halved.
 const HALVINGS: usize = 8;
-/// Largest next step over its standard uncertainty that is taken without looking for another one, while the noise is
-/// not known and when it is: a step leaves a small part of itself to be done.
+/// Largest step, over its standard uncertainty, that is the last one, before and after the noise is estimated: the error
+/// after a step is a small part of it.
 const LAST_STEP: (f64, f64) = (1.0, 0.1);
-/// Part of the lines over which the noise is smoothed, to both sides, and fewest and most of them.
+/// Part of the lines, on each side, over which the noise is smoothed; and the fewest and most of them.
 const SMOOTHED: f64 = 0.04;
 const NEIGHBOURS: (usize, usize) = (20, 400);
-/// Lines for each number that is looked for.
+/// Fewest lines for each parameter.
 const LEAST_LINES: usize = 2;
-/// Lines for each number with which the search begins.
+/// Lines for each parameter in the first search.
 const ENOUGH: usize = 500;
-/// Lines in half the width of a mode with which the search begins.
+/// Lines within half the width of a mode in the first search.
 const WITHIN: f64 = 25.0;
 
 /// Whole records as they are fitted.
@@ -64,8 +64,7 @@ pub(super) struct Whole {
 }
 
 impl Whole {
-    /// The records of noise at the lines of the averaged response; none of records that are not weighted with Hann's
-    /// window, which have no leakage.
+    /// The records at the lines of the averaged response; `None` unless that has Hann's window and so leakage.
     pub fn of(records: &[Driven], set: &Set, shape: &Data) -> Option<Self> {
         let spectra = |r| Spectra::of(r, shape.band_rad_per_s());
         (set.window == Window::Hann).then(|| Self {
@@ -73,31 +72,28 @@ impl Whole {
         })
     }
 
-    /// Fits them from a fit of their averaged response; none if that does not come to an end, or if there are
-    /// too few lines.
-    pub fn refine(self, shape: &Data, start: &Modal) -> Option<Settled> {
+    /// Fits them, starting from a fit of the averaged response; `None` if it does not converge or there are too few
+    /// lines.
+    pub fn refine(self, shape: &Data, start: &Modal) -> Option<FinalFit> {
         let Self { records: mut all } = self;
-        let layout = Layout::of(shape, start.poles.len());
+        let layout = Parameters::of(shape, start.poles.len());
         let enough = |s: &Spectra| s.omega.len() >= LEAST_LINES * layout.columns();
         if start.poles.is_empty() || !all.iter().all(enough) {
             return None;
         }
-        let state = State::start(&layout, start, all.len());
+        let state = ParameterValues::start(&layout, start, all.len());
         let some: Vec<Spectra> = all.iter().map(|s| s.thinned(&layout, &state)).collect();
         let (state, _) = descend(&layout, &some, state, LAST_STEP.0)?;
         for (record, spectra) in all.iter_mut().enumerate() {
             spectra.learn_noise(&layout, &state, record);
         }
         let (state, solved) = descend(&layout, &all, state, LAST_STEP.1)?;
-        Some(Settled {
-            relative: left_over(&layout, &all, &state),
-            spread: solved.of_modes(layout.modes),
-            of_mode: solved.of_mode(&layout),
-            modal: shape.modal_of(
-                &state.poles,
-                (state.delay_s, solved.delay_std(&layout)),
-                &state.linear,
-            ),
+        let delay_s = (state.delay_s, solved.delay_std(&layout));
+        Some(FinalFit {
+            relative: residual_over_measured(&layout, &all, &state),
+            modal: shape.modal_of(&state.poles, delay_s, &state.linear),
+            linear: layout.searched(),
+            covariance: Covariance::of(solved.covariance),
         })
     }
 }
@@ -123,32 +119,32 @@ impl Spectra {
         }
     }
 
-    /// Lines that are enough to come near, also within the narrowest mode.
-    fn thinned(&self, layout: &Layout, state: &State) -> Self {
+    /// Evenly thinned lines for the first search, with enough of them within the narrowest mode.
+    fn thinned(&self, layout: &Parameters, state: &ParameterValues) -> Self {
         let rates = state.poles.iter().map(|p| p.rate_per_s);
         let narrowest = rates.fold(f64::INFINITY, f64::min) / (self.omega[1] - self.omega[0]);
         let step = self.omega.len() / (ENOUGH * layout.columns());
         let step = step.min((narrowest / WITHIN) as usize).max(1);
-        fn some<T: Copy>(all: &[T], step: usize) -> Vec<T> {
+        fn thinned<T: Copy>(all: &[T], step: usize) -> Vec<T> {
             all.iter().step_by(step).copied().collect()
         }
         Self {
-            omega: some(&self.omega, step),
-            applied: some(&self.applied, step),
-            measured: some(&self.measured, step),
-            weight: some(&self.weight, step),
+            omega: thinned(&self.omega, step),
+            applied: thinned(&self.applied, step),
+            measured: thinned(&self.measured, step),
+            weight: thinned(&self.weight, step),
         }
     }
 
-    /// Power that a fit leaves of each line.
-    fn left(&self, layout: &Layout, state: &State, record: usize) -> Vec<f64> {
+    /// Power of the residual at each line.
+    fn left(&self, layout: &Parameters, state: &ParameterValues, record: usize) -> Vec<f64> {
         let left = |k: usize| layout.left(self, state, record, k).norm_sqr();
         let part = |lines: Range<usize>| lines.map(left).collect::<Vec<f64>>();
         in_parts(self.omega.len(), PART, threads(), part).concat()
     }
 
-    /// Weights from what a fit leaves, which is less than the noise by what the fit takes up.
-    fn learn_noise(&mut self, layout: &Layout, state: &State, record: usize) {
+    /// Weights from the residual, which is less than the noise by what the fit absorbs.
+    fn learn_noise(&mut self, layout: &Parameters, state: &ParameterValues, record: usize) {
         let count = self.omega.len();
         let taken = layout.columns() as f64 / (2 * count) as f64;
         let mut sums = vec![0.0; count + 1];
@@ -164,8 +160,8 @@ impl Spectra {
     }
 }
 
-/// Root of the power that is left over that of the measured signal, all lines and records together.
-fn left_over(layout: &Layout, all: &[Spectra], state: &State) -> f64 {
+/// Root of the power of the residual over that of the measured signal, over all lines and records.
+fn residual_over_measured(layout: &Parameters, all: &[Spectra], state: &ParameterValues) -> f64 {
     let (mut left, mut whole) = (0.0, 0.0);
     for (record, spectra) in all.iter().enumerate() {
         left += spectra.left(layout, state, record).iter().sum::<f64>();
@@ -174,13 +170,13 @@ fn left_over(layout: &Layout, all: &[Spectra], state: &State) -> f64 {
     (left / whole).sqrt()
 }
 
-/// Steps of Gauss and Newton until one is small beside the uncertainty, which is the last; none if they do not lead down.
+/// Gauss-Newton steps, the last of which is small compared with the uncertainty; `None` if they do not converge.
 fn descend(
-    layout: &Layout,
+    layout: &Parameters,
     all: &[Spectra],
-    start: State,
+    start: ParameterValues,
     last_step: f64,
-) -> Option<(State, Solved)> {
+) -> Option<(ParameterValues, Solved)> {
     let lines: usize = all.iter().map(|s| s.omega.len()).sum();
     let numbers = layout.own() * all.len() + layout.shared();
     let freedom = (2 * lines - numbers) as f64;
@@ -207,8 +203,8 @@ fn possible(pole: &Pole) -> bool {
     pole.rate_per_s > 0.0 && pole.omega_rad_per_s > 0.0
 }
 
-/// The largest number up to this one whose factors are 2, 3, 5 and 7: its transform takes the least time, and no
-/// more than a few samples in a hundred are lost.
+/// The largest number up to `count` with the prime factors 2, 3, 5 and 7 only: its transform is fast, and at most a few
+/// per cent of the samples are lost.
 fn easily_transformed(count: usize) -> usize {
     let easy = |n: &usize| {
         let rest = [2, 3, 5, 7].iter().fold(*n, |mut n, factor| {

@@ -1,4 +1,4 @@
-//! Normal equations over all lines, each record's transient taken out.
+//! Normal equations over all lines, with the transient of each record eliminated.
 
 use std::ops::Range;
 
@@ -6,30 +6,29 @@ use nalgebra::{DMatrix, DMatrixView, DVector, Dyn};
 use num_complex::Complex64;
 
 use super::Spectra;
-use super::line::{Layout, State};
+use super::line::{ParameterValues, Parameters};
 use crate::identify::response::inverse::invert;
-use crate::identify::response::scatter::{OfMode, Spread};
 use crate::parallel::{in_parts, threads};
 
 /// Lines that are multiplied at once.
 const AT_ONCE: usize = 256;
-/// Lines of a part that a thread takes; the parts are added in their order, whoever made them.
+/// Lines of one job; the parts are added in their order, so the result does not depend on the threads.
 pub(super) const PART: usize = 64 * AT_ONCE;
 
-/// Numbers seen as a matrix in any order.
+/// A slice of numbers as a matrix with any strides.
 type View<'a> = DMatrixView<'a, f64, Dyn, Dyn>;
 
-/// Products of the columns of a record, what is left being the last one.
+/// Products of the columns of a record; the residual is the last column.
 pub(super) struct Gram(DMatrix<f64>);
 
 impl Gram {
     /// Those of all records.
-    pub fn all(layout: &Layout, all: &[Spectra], state: &State) -> Vec<Self> {
+    pub fn all(layout: &Parameters, all: &[Spectra], state: &ParameterValues) -> Vec<Self> {
         let one = |(record, spectra)| Self::of(layout, spectra, state, record);
         all.iter().enumerate().map(one).collect()
     }
 
-    fn of(layout: &Layout, spectra: &Spectra, state: &State, record: usize) -> Self {
+    fn of(layout: &Parameters, spectra: &Spectra, state: &ParameterValues, record: usize) -> Self {
         let parts = in_parts(spectra.omega.len(), PART, threads(), |lines| {
             Self::of_lines(layout, spectra, state, record, lines)
         });
@@ -42,9 +41,9 @@ impl Gram {
     }
 
     fn of_lines(
-        layout: &Layout,
+        layout: &Parameters,
         spectra: &Spectra,
-        state: &State,
+        state: &ParameterValues,
         record: usize,
         lines: Range<usize>,
     ) -> DMatrix<f64> {
@@ -71,7 +70,7 @@ impl Gram {
         sum
     }
 
-    /// Sum of the squares of what is left.
+    /// Sum of squares of the residual.
     pub fn cost(all: &[Self]) -> f64 {
         all.iter()
             .map(|g| g.0[(g.0.nrows() - 1, g.0.nrows() - 1)])
@@ -79,29 +78,30 @@ impl Gram {
     }
 }
 
-/// A step, and how sure the numbers are.
+/// A step, and the covariance of the parameters.
 pub(super) struct Solved {
-    /// Step of the numbers of all records.
+    /// Step of the shared parameters.
     pub step: DVector<f64>,
-    /// Step of those of each record's transient.
+    /// Step of the parameters of each record's transient.
     pub own: Vec<DVector<f64>>,
-    /// Covariance of the numbers of all records, for weights that are the noise's.
+    /// Covariance of the shared parameters, if the weights are those of the noise.
     pub covariance: DMatrix<f64>,
 }
 
-/// Added to the diagonal of a transient's equations, each number being scaled to 1: a broad mode's transient looks
-/// nearly like the smooth part, which of the two it is being of no interest.
-const TELLS_APART: f64 = 1e-12;
+/// Regularisation of a transient's equations with a diagonal scaled to 1: the transient of a broad mode is nearly the same
+/// as the smooth part, and their distinction does not matter.
+const REGULARISATION: f64 = 1e-12;
 
 impl Solved {
-    /// Solves the normal equations; none if their numbers cannot be told apart.
-    pub fn of(layout: &Layout, all: &[Gram]) -> Option<Self> {
+    /// Solves the normal equations; `None` if they are singular.
+    pub fn of(layout: &Parameters, all: &[Gram]) -> Option<Self> {
         let (own, shared) = (layout.own(), layout.shared());
         let mut rest = DMatrix::zeros(shared, shared + 1);
         let mut made_up = Vec::with_capacity(all.len());
         for Gram(products) in all {
             let cross = products.view((0, own), (own, shared + 1));
-            let by_others = invert(&products.view((0, 0), (own, own)).into(), TELLS_APART)? * cross;
+            let by_others =
+                invert(&products.view((0, 0), (own, own)).into(), REGULARISATION)? * cross;
             rest += products.view((own, own), (shared, shared + 1));
             rest -= products.view((own, 0), (shared, own)) * &by_others;
             made_up.push(by_others);
@@ -117,26 +117,9 @@ impl Solved {
         })
     }
 
-    /// The largest step of a pole or the delay over its standard uncertainty, for that variance of the weighted
-    /// noise.
-    pub fn largest_step(&self, layout: &Layout, variance: f64) -> f64 {
+    /// The largest step of a pole or the delay over its standard uncertainty, for that variance of the weighted noise.
+    pub fn largest_step(&self, layout: &Parameters, variance: f64) -> f64 {
         let one = |i: usize| self.step[i].abs() / (variance * self.covariance[(i, i)]).sqrt();
         (0..layout.searched()).map(one).fold(0.0, f64::max)
-    }
-
-    /// Covariance of σ, ω and the residue of a single mode.
-    pub fn of_mode(&self, layout: &Layout) -> Option<OfMode> {
-        let residue = layout.searched();
-        let places = [0, 1, residue, residue + 1];
-        (layout.modes == 1).then(|| places.map(|i| places.map(|j| self.covariance[(i, j)])))
-    }
-
-    /// Covariance of σ and ω of each mode.
-    pub fn of_modes(&self, modes: usize) -> Spread {
-        let part = |k: usize| {
-            let of = |i: usize, j: usize| self.covariance[(2 * k + i, 2 * k + j)];
-            Some([[of(0, 0), of(0, 1)], [of(1, 0), of(1, 1)]])
-        };
-        (0..modes).map(part).collect()
     }
 }

@@ -1,0 +1,38 @@
+//! Quantity of a channel that records a motion.
+
+use clap::ValueEnum;
+use torqcomp_model::Dimension;
+
+/// What a motion channel measures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Motion {
+    /// Displacement, angle, strain, or torque of the beam
+    Displacement,
+    /// Speed
+    Speed,
+    /// Acceleration
+    Acceleration,
+}
+
+impl Motion {
+    /// Order of the derivative of displacement.
+    pub(crate) fn order(self) -> i32 {
+        match self {
+            Self::Displacement => 0,
+            Self::Speed => 1,
+            Self::Acceleration => 2,
+        }
+    }
+
+    /// The motion with a unit of this dimension, and whether it is a rotation.
+    pub(crate) fn of(dimension: Dimension) -> Option<(Self, bool)> {
+        let all = [Self::Displacement, Self::Speed, Self::Acceleration];
+        let found = all
+            .into_iter()
+            .flat_map(|motion| [(motion, true), (motion, false)]);
+        found.into_iter().find(|(motion, is_rotation)| {
+            let (length, angle) = if *is_rotation { (0, 1) } else { (1, 0) };
+            dimension == Dimension::new([0, length, -motion.order(), 0, 0, angle])
+        })
+    }
+}

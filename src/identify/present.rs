@@ -1,0 +1,173 @@
+//! The result of an identification as text and as an HTML page.
+
+use std::fmt::Write;
+
+use super::{Correlation, FitQuality, Identification, NamedEstimate};
+use crate::print::{columns, rounded, short, value_and_std};
+use crate::report::page::Page;
+
+/// A table under its heading, and a sentence below it.
+struct ResultTable {
+    heading: String,
+    rows: Vec<Vec<String>>,
+    note: Option<String>,
+}
+
+impl Identification {
+    /// The result as text.
+    pub(crate) fn text(&self) -> String {
+        let mut text = format!("{}, {}\n", self.title(), self.recording());
+        for line in &self.method {
+            let _ = writeln!(text, "{line}");
+        }
+        text.push('\n');
+        text.push_str(&columns(&constant_rows(&self.parameters)));
+        if let Some(fit) = &self.fit {
+            let _ = writeln!(text, "\n{}", fit.text());
+        }
+        for section in self.sections() {
+            let table = columns(&section.rows);
+            let _ = write!(text, "\n{}:\n\n{table}", section.heading);
+            if let Some(note) = section.note {
+                let _ = writeln!(text, "{note}");
+            }
+        }
+        if !self.terms.is_empty() {
+            let _ = writeln!(text, "\n{TERMS}:\n");
+        }
+        for term in &self.terms {
+            let value = percent(term.percent);
+            let _ = writeln!(text, "{:<20} {value:>10}  {}", term.name, term.formula);
+        }
+        for pair in &self.correlations {
+            let _ = writeln!(text, "\n{}", pair.text());
+        }
+        text
+    }
+
+    /// The result as an HTML page that needs no other file.
+    pub(crate) fn page(&self) -> String {
+        let mut page = Page::new(&self.title());
+        page.text(&self.recording());
+        page.heading("Constants");
+        page.table(&constant_rows(&self.parameters));
+        if let Some(fit) = &self.fit {
+            page.text(&fit.text());
+        }
+        for warning in &self.warnings {
+            page.warning(warning.code, &warning.message);
+        }
+        if !self.charts.is_empty() {
+            page.heading("Data and fit");
+        }
+        for chart in &self.charts {
+            page.chart(chart);
+        }
+        for pair in &self.correlations {
+            page.text(&pair.text());
+        }
+        for section in self.sections() {
+            page.heading(&section.heading);
+            page.table(&section.rows);
+            if let Some(note) = section.note {
+                page.text(&note);
+            }
+        }
+        if !self.terms.is_empty() {
+            page.heading(TERMS);
+            let rows = self
+                .terms
+                .iter()
+                .map(|t| vec![t.name.to_owned(), percent(t.percent), t.formula.to_owned()]);
+            page.table(&with_head(&["term", "value", "formula"], rows));
+        }
+        page.heading("Method");
+        for line in &self.method {
+            page.text(line);
+        }
+        page.text(&format!("torqcomp {}", self.version));
+        page.html()
+    }
+
+    fn title(&self) -> String {
+        let (first, rest) = self.test.split_at(1);
+        format!("{}{rest} test", first.to_uppercase())
+    }
+
+    fn recording(&self) -> String {
+        let rate = self
+            .rate_hz
+            .map_or_else(String::new, |r| format!(" at {} Hz", short(r)));
+        format!("{}: {} samples{rate}", self.inputs.join(", "), self.samples)
+    }
+
+    /// Results of other methods, and the laws of damping.
+    fn sections(&self) -> Vec<ResultTable> {
+        let compared = self.comparisons.iter().map(|other| ResultTable {
+            heading: format!("For comparison, {}", other.method),
+            rows: constant_rows(&other.parameters),
+            note: other.fit.as_ref().map(FitQuality::text),
+        });
+        let rows = self.laws.iter().map(|l| {
+            let law = l.law.name().to_owned();
+            vec![law, rounded(l.rms, 4), rounded(l.criterion, 7)]
+        });
+        let laws = (!self.laws.is_empty()).then(|| ResultTable {
+            heading: "Damping laws, the best first".to_owned(),
+            rows: with_head(&["law", "residual rms", "BIC"], rows),
+            note: None,
+        });
+        compared.chain(laws).collect()
+    }
+}
+
+const TERMS: &str = "Terms of the calibration standards, largest over the loads";
+
+impl FitQuality {
+    fn text(&self) -> String {
+        format!(
+            "residual: {} {} rms, {} % of the data",
+            rounded(self.rms, 4),
+            self.unit,
+            rounded(100.0 * self.relative, 3)
+        )
+    }
+}
+
+impl Correlation {
+    fn text(&self) -> String {
+        format!(
+            "{} and {} are strongly correlated ({}): these data hardly separate them",
+            self.first,
+            self.second,
+            rounded(self.coefficient, 4)
+        )
+    }
+}
+
+fn constant_rows(constants: &[NamedEstimate]) -> Vec<Vec<String>> {
+    let row = |constant: &NamedEstimate| {
+        let value = constant.value();
+        let [text, std] = match constant.std() {
+            Some(std) => value_and_std(value, std),
+            None => [short(value), "unknown".to_owned()],
+        };
+        let relative = match constant.std() {
+            Some(std) if value != 0.0 => format!("{} %", rounded(100.0 * (std / value).abs(), 2)),
+            _ => String::new(),
+        };
+        let unit = constant.estimate.unit().to_owned();
+        vec![constant.name.replace('_', " "), text, std, unit, relative]
+    };
+    let head = ["", "value", "std", "unit", "relative"];
+    with_head(&head, constants.iter().map(row))
+}
+
+fn with_head(head: &[&str], rows: impl Iterator<Item = Vec<String>>) -> Vec<Vec<String>> {
+    let head = head.iter().map(|cell| (*cell).to_owned()).collect();
+    std::iter::once(head).chain(rows).collect()
+}
+
+fn percent(value: Option<f64>) -> String {
+    value.map_or_else(|| "unknown".to_owned(), |p| format!("{} %", rounded(p, 3)))
+}

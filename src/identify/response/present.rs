@@ -1,0 +1,244 @@
+//! Names, method, charts and warnings of a response.
+
+use num_complex::Complex64;
+use torqcomp_dsp::frf::{self, Estimator, Frf, Window};
+
+use super::blocks::Set;
+use super::lines::Lines;
+use super::order::folds;
+use super::{FinalFit, Modal, ResponseOptions};
+use crate::identify::{Comparison, Identification, NamedEstimate};
+use crate::print::{plural, rounded, short};
+use crate::report::chart::{Chart, Series};
+
+/// Adds every mode with its natural frequency and damping ratio, by rising frequency.
+pub(super) fn add_modes(result: &mut Identification, fitted: &FinalFit) {
+    let modal = &fitted.modal;
+    let mut order: Vec<usize> = (0..modal.poles.len()).collect();
+    let omega = |k: usize| modal.poles[k].omega_rad_per_s;
+    order.sort_by(|a, b| omega(*a).total_cmp(&omega(*b)));
+    for (place, k) in order.iter().enumerate() {
+        let mode = fitted.mode(*k);
+        let prefix = match order.len() {
+            1 => String::new(),
+            _ => format!("mode_{}_", place + 1),
+        };
+        let names = ["natural_frequency", "damping_ratio"];
+        let constants = mode.modal_constants().only(&names, &prefix);
+        if modal.fit.as_ref().is_some_and(|f| f.at_bound[2 * k]) {
+            result.warn(
+                "at-bound",
+                format!(
+                    "the damping of the mode at {} Hz is not identifiable from these data (fitted: 0)",
+                    rounded(constants.list[0].value(), 5)
+                ),
+            );
+        }
+        result.add(constants);
+        result.modes.push(mode);
+    }
+}
+
+/// Says what was fitted.
+pub(super) fn method(
+    result: &mut Identification,
+    set: &Set,
+    lines: &Lines,
+    options: &ResponseOptions,
+    fitted: &Modal,
+) {
+    result.method.push(format!(
+        "{} fitted to {} lines from {} to {} Hz, H1 over {}, residual terms for modes outside the band{}",
+        plural(fitted.poles.len(), "mode"),
+        lines.len(),
+        short(lines.start as f64 * set.step_hz),
+        short((lines.end - 1) as f64 * set.step_hz),
+        plural(set.blocks.len(), "block"),
+        if options.with_delay { ", a delay" } else { "" }
+    ));
+}
+
+/// Adds hold-out error, static gain and delay.
+pub(super) fn other_constants(
+    result: &mut Identification,
+    set: &Set,
+    options: &ResponseOptions,
+    fitted: &Modal,
+) {
+    let held_out = result.held_out_errors.get(fitted.poles.len()).copied();
+    if let Some(error) = held_out.filter(|e| e.is_finite()) {
+        let leakage = match set.window {
+            Window::Hann => ", leakage of the segments included",
+            _ => "",
+        };
+        result.method.push(format!(
+            "hold-out error: {} % of the measured signal{leakage}",
+            rounded(100.0 * error, 3)
+        ));
+        let error = NamedEstimate::new("held_out_error", "%", 100.0 * error, None);
+        result.parameters.push(error);
+    }
+    if options.order == 0 {
+        let gain = NamedEstimate::new("static_gain", "", fitted.at_rest(), None);
+        result.parameters.push(gain);
+    }
+    if options.with_delay {
+        let delay = NamedEstimate::new("delay", "s", fitted.delay_s, fitted.delay_std_s);
+        result.parameters.push(delay);
+    }
+}
+
+/// Root mean square of the measured signal in the band, over all blocks.
+pub(super) fn output_rms(set: &Set, lines: &Lines) -> f64 {
+    let power: f64 = set
+        .blocks
+        .iter()
+        .map(|b| {
+            b.measured[lines.clone()]
+                .iter()
+                .map(|y| y.norm_sqr())
+                .sum::<f64>()
+        })
+        .sum();
+    let length = 2.0 * (set.blocks[0].applied.len() as f64 - 1.0);
+    (2.0 * power / set.blocks.len() as f64).sqrt() / length
+}
+
+/// Adds the hold-out error of the measured response itself, without a model.
+pub(super) fn raw_error(result: &mut Identification, set: &Set, lines: &Lines) {
+    let folds = folds(set);
+    if folds.len() < 2 {
+        return;
+    }
+    let mut sum = 0.0;
+    for fold in &folds {
+        let others = (0..set.blocks.len())
+            .filter(|i| !fold.contains(i))
+            .map(|i| &set.blocks[i]);
+        let raw = Frf::between(others, Estimator::H1, lines.clone()).response;
+        sum += fold
+            .iter()
+            .map(|i| frf::prediction_error(&raw, &set.blocks[*i], lines.clone()))
+            .sum::<f64>();
+    }
+    let percent = 100.0 * sum / set.blocks.len() as f64;
+    result.comparisons.push(Comparison {
+        method: "the measured response itself, without a model, on held-out data".to_owned(),
+        parameters: vec![NamedEstimate::new("held_out_error", "%", percent, None)],
+        fit: None,
+    });
+}
+
+/// Relative difference between the responses of records from which there is a warning.
+const DIFFERENT: f64 = 0.1;
+
+/// Compares the responses of records at different levels, which are the same for a linear stand.
+pub(super) fn levels(result: &mut Identification, set: &Set, lines: &Lines) {
+    let mut records = set.record.clone();
+    records.dedup();
+    let of = |r: usize| {
+        let pairs = set.blocks.iter().zip(&set.record);
+        let blocks = pairs.filter(|(_, record)| **record == r).map(|(b, _)| b);
+        Frf::of(blocks, Estimator::H1)
+    };
+    let [first, others @ ..] = &records[..] else {
+        return;
+    };
+    let first = of(*first);
+    for r in others {
+        let other = of(*r);
+        let level = |f: &Frf| f.applied_power[lines.clone()].iter().sum::<f64>().sqrt();
+        let ratio = level(&other) / level(&first);
+        if (0.7..1.4).contains(&ratio) {
+            continue;
+        }
+        let (mut change, mut all) = (0.0, 0.0);
+        for k in lines.clone() {
+            change += (other.response[k] - first.response[k]).norm_sqr() * first.applied_power[k];
+            all += first.response[k].norm_sqr() * first.applied_power[k];
+        }
+        let change = (change / all).sqrt();
+        if change > DIFFERENT {
+            result.warn(
+                "level-dependent",
+                format!(
+                    "at {} times the level of the first record the response differs by {} %: the stand is nonlinear, or \
+                     the noise is large",
+                    rounded(ratio, 3),
+                    rounded(100.0 * change, 2)
+                ),
+            );
+        }
+    }
+}
+
+/// Magnitude with its bounds, phase and coherence, the model, and the error against the number of modes if that was chosen.
+pub(super) fn draw(result: &mut Identification, set: &Set, lines: &Lines, fitted: &Modal) {
+    let h1 = set.powers.response(Estimator::H1);
+    let hz: Vec<f64> = lines.clone().map(|k| k as f64 * set.step_hz).collect();
+    let part = &h1.response[lines.clone()];
+    let sizes = |values: &[Complex64]| values.iter().map(|c| c.norm()).collect::<Vec<f64>>();
+    let both = vec![
+        Series::line("H1", &hz, &sizes(part)),
+        Series::line("model", &hz, &sizes(&fitted.response)),
+    ];
+    let frequency = "frequency, Hz";
+    let mut magnitude = Chart::new("Response", frequency, "measured over applied", both);
+    magnitude.y_log = true;
+    magnitude.band = bounds(&h1, lines, set.step_hz);
+    let coherence = vec![Series::line("coherence", &hz, &h1.coherence[lines.clone()])];
+    result.charts.extend([
+        magnitude,
+        phase(&hz, part, &fitted.response),
+        Chart::new("Coherence", frequency, "", coherence),
+    ]);
+    let errors = &result.held_out_errors;
+    if errors.iter().filter(|e| e.is_finite()).count() < 2 {
+        return;
+    }
+    let counts: Vec<f64> = (0..errors.len()).map(|n| n as f64).collect();
+    let percent: Vec<f64> = errors.iter().map(|e| 100.0 * e).collect();
+    let error = vec![Series::dots("hold-out error", &counts, &percent)];
+    let chart = Chart::new("Error and number of modes", "modes", "per cent", error);
+    result.charts.push(chart);
+}
+
+/// Unwrapped phase of the model, and of H1.
+fn phase(hz: &[f64], h1: &[Complex64], model: &[Complex64]) -> Chart {
+    let turns = unwrapped(model);
+    let measured: Vec<f64> = h1
+        .iter()
+        .zip(model)
+        .zip(&turns)
+        .map(|((h, m), turn)| turn + (h * m.conj()).arg().to_degrees())
+        .collect();
+    let both = vec![
+        Series::line("H1", hz, &measured),
+        Series::line("model", hz, &turns),
+    ];
+    Chart::new("Phase", "frequency, Hz", "degrees", both)
+}
+
+/// The magnitude ± twice its standard uncertainty: x, low, high.
+fn bounds(h1: &Frf, lines: &Lines, step_hz: f64) -> Vec<(f64, f64, f64)> {
+    let one = |k: usize| {
+        let (middle, std) = (h1.response[k].norm(), 2.0 * h1.relative_std(k)?);
+        let place = k as f64 * step_hz;
+        (std < 1.0).then_some((place, middle * (1.0 - std), middle * (1.0 + std)))
+    };
+    lines.clone().filter_map(one).collect()
+}
+
+/// Unwrapped phase in degrees.
+fn unwrapped(response: &[Complex64]) -> Vec<f64> {
+    let mut turn = response.first().map_or(0.0, |c| c.arg().to_degrees());
+    let mut last = response.first().copied().unwrap_or_default();
+    response
+        .iter()
+        .map(|c| {
+            turn += (c * last.conj()).arg().to_degrees();
+            last = *c;
+            turn
+        })
+        .collect()
+}

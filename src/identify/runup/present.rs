@@ -1,0 +1,137 @@
+//! Names, method, charts and warnings of a run-up.
+
+use super::directions::Directions;
+use super::windows::FittedRows;
+use super::{COLOURED, FreeRun, RunupOptions};
+use crate::identify::{Identification, Motion};
+use crate::print::{rounded, short};
+use crate::report::chart::{Chart, Series};
+
+/// Noise in a regressor, as a part of its power, above which there is a warning.
+const NOISY: f64 = 0.2;
+
+/// Names and units of the columns.
+pub(super) fn names(
+    run: &FreeRun,
+    directions: &Directions,
+    split: bool,
+) -> Vec<(&'static str, &'static str)> {
+    let body = run.body;
+    let mut names = vec![body.inertia()];
+    if split {
+        names.push(("viscous_friction_forward", body.viscous()));
+        names.push(("viscous_friction_backward", body.viscous()));
+    } else {
+        names.push(("viscous_friction", body.viscous()));
+    }
+    if directions.both() {
+        names.push(("dry_friction", body.effort()));
+        names.push(("offset", body.effort()));
+    } else {
+        names.push(("dry_friction_and_offset", body.effort()));
+    }
+    names
+}
+
+/// Says how the run was evaluated.
+pub(super) fn method(result: &mut Identification, run: &FreeRun, fitted: &FittedRows) {
+    let all = fitted.used.len();
+    let used = fitted.used.iter().filter(|u| **u).count();
+    let which = if used < all {
+        format!("{used} of {all} windows; in the others the body reverses or stands")
+    } else {
+        format!("{all} windows")
+    };
+    result.method.push(format!(
+        "least squares on the equation of motion averaged over windows of ±{} s ({which}); the derivatives are those of \
+         the window's weight",
+        short(fitted.rows.half as f64 / run.rate_hz),
+    ));
+    if fitted.fit.coloured > COLOURED {
+        result.method.push(format!(
+            "the residual is autocorrelated, so the model is incomplete; uncertainties allow for it (up to {} times those \
+             for white noise)",
+            rounded(fitted.fit.coloured, 2)
+        ));
+    }
+}
+
+/// Torque as measured and from the motion, and the residual.
+pub(super) fn draw(result: &mut Identification, run: &FreeRun, fitted: &FittedRows) {
+    let (half, stride) = (fitted.rows.half, fitted.rows.stride);
+    let right = &fitted.rows.right;
+    let time = |k: usize| (half + k * stride) as f64 / run.rate_hz;
+    let times: Vec<f64> = (0..right.len()).map(time).collect();
+    let residuals = &fitted.fit.residuals;
+    let model: Vec<f64> = right.iter().zip(residuals).map(|(b, r)| b + r).collect();
+    let left: Vec<f64> = residuals.iter().map(|r| -r).collect();
+    let unit = run.body.effort();
+    let both = vec![
+        Series::line("measured", &times, right),
+        Series::line("from the motion", &times, &model),
+    ];
+    let rest = vec![Series::line("measured − model", &times, &left)];
+    let time = "time from the start, s";
+    result.charts.extend([
+        Chart::new("Torque or force, averaged", time, unit, both),
+        Chart::new("Residual", time, unit, rest),
+    ]);
+}
+
+/// Warns about what the run cannot show, noise, and negative constants.
+pub(super) fn warnings(
+    result: &mut Identification,
+    run: &FreeRun,
+    directions: &Directions,
+    options: &RunupOptions,
+    fitted: &FittedRows,
+) {
+    if run.kind == Motion::Acceleration {
+        result.warn(
+            "speed-unknown",
+            "an acceleration gives the speed only up to a constant, so the offset includes dry friction and part of \
+             the viscous friction; record position or speed to separate them",
+        );
+    } else if !directions.both() {
+        result.warn(
+            "one-direction",
+            "the body moves in one direction only, so dry friction and offset are one number; run it in both \
+             directions to separate them",
+        );
+    }
+    if options.by_direction && directions.both() {
+        result.warn(
+            "dry-friction-by-direction",
+            "dry friction that differs by direction looks the same as an offset of the torque: if the torque has no \
+             offset, dry_friction ± offset is the dry friction in each direction",
+        );
+    }
+    if fitted.fit.noise_share > NOISY {
+        result.warn(
+            "noisy-motion",
+            format!(
+                "{} % of a regressor's power is noise; its bias was removed, but a longer --window or a better sensor \
+                 is safer",
+                rounded(100.0 * fitted.fit.noise_share, 2)
+            ),
+        );
+    }
+    impossible(result);
+}
+
+/// Warns about constants that are significantly negative.
+fn impossible(result: &mut Identification) {
+    let constants = result.parameters.iter();
+    let impossible: Vec<&str> = constants
+        .filter(|c| c.name != "offset" && c.name != "dry_friction_and_offset")
+        .filter(|c| c.value() + 3.0 * c.std().unwrap_or(0.0) < 0.0)
+        .map(|c| c.name.as_str())
+        .collect();
+    if !impossible.is_empty() {
+        let message = format!(
+            "negative: {}; check the signs of both channels and whether something else drives the body",
+            impossible.join(", ")
+        );
+        result.warn("impossible", message);
+    }
+}
