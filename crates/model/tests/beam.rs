@@ -1,9 +1,7 @@
 //! The beam against slow oracles: a time-free march along the beam, and superposition.
 
-mod util;
-
+use crate::util::assert_close;
 use torqcomp_model::{Beam, ModelError, Section, Segment};
-use util::assert_close;
 
 const MODULUS: f64 = 2.07e11;
 const SHEAR_MODULUS: f64 = 7.93e10;

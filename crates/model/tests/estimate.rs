@@ -1,9 +1,7 @@
 //! Propagation of uncertainty against closed forms and sampling, and the text of estimates.
 
-mod util;
-
+use crate::util::{Random, assert_close, mean_and_std};
 use torqcomp_model::{Estimate, Kind, QuantityError, UnitSystem};
-use util::{Random, assert_close, mean_and_std};
 
 fn estimate(kind: Kind, value: f64, std: Option<f64>) -> Estimate {
     Estimate::new(kind, value, std, "test").unwrap()

@@ -1,11 +1,9 @@
 //! Units and kinds: good and bad text.
 
-mod util;
-
 use std::f64::consts::{PI, TAU};
 
+use crate::util::{Random, assert_close};
 use torqcomp_model::{Kind, QuantityError, Unit, UnitSystem};
-use util::{Random, assert_close};
 
 /// (kind, text, SI value worked from the definitions of the units)
 const GOOD: &[(Kind, &str, f64)] = &[

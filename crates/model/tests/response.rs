@@ -1,12 +1,10 @@
 //! The transfer function against time stepping, and its uncertainty against sampling.
 
-mod util;
-
 use std::f64::consts::TAU;
 
+use crate::util::{Random, assert_close, mean_and_std, step};
 use num_complex::Complex64;
 use torqcomp_model::{FreeDecay, ModelError, ParameterStd, SecondOrder};
-use util::{Random, assert_close, mean_and_std, step};
 
 /// J, f and K of the measured stand, in the units of the thesis: the response is a ratio.
 const STAND: [f64; 3] = [5.85e-3, 3.07, 8.1e4];

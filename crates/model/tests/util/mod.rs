@@ -1,5 +1,4 @@
-//! Helpers shared by the integration tests.
-#![allow(dead_code)] // Each test target uses its own part.
+//! Helpers shared by the tests.
 
 /// Fails with got, want and difference unless both agree to a relative tolerance.
 #[track_caller]
