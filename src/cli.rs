@@ -6,14 +6,16 @@ pub mod reading;
 pub mod simulate;
 mod values;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use torqcomp_model::UnitSystem;
 
+use crate::failure::Failure;
 use crate::io::csv;
 use crate::io::digits::Digits;
 use crate::io::mcap::{Selection, TimeChoice};
+use crate::io::output::Output;
 use crate::signal::{self, MessageOptions};
 
 pub use diagnose::Diagnose;
@@ -174,13 +176,24 @@ impl Record {
 
 /// Where a result goes.
 #[derive(Debug, Args)]
-pub struct Result {
+pub struct OutputArgs {
     /// File to write, or - for standard output
     #[arg(short, long, value_name = "OUT")]
     pub output: Option<String>,
     /// Replace the output if it exists
     #[arg(long)]
     pub force: bool,
+}
+
+impl OutputArgs {
+    /// Opens the output; `inputs` are the files that it must not replace.
+    pub(crate) fn open(&self, inputs: &[&Path]) -> Result<Output, Failure> {
+        Output::open(self.output.as_deref(), self.force, inputs)
+    }
+
+    pub(crate) fn is_stdout(&self) -> bool {
+        matches!(self.output.as_deref(), None | Some("-"))
+    }
 }
 
 /// How a verb works on.
@@ -211,7 +224,7 @@ pub struct Compensate {
     pub record: Record,
     /// The result.
     #[command(flatten)]
-    pub result: Result,
+    pub result: OutputArgs,
     /// Stand file
     #[arg(long, value_name = "FILE")]
     pub stand: PathBuf,
@@ -261,7 +274,7 @@ pub struct Extract {
     pub record: Record,
     /// The result.
     #[command(flatten)]
-    pub result: Result,
+    pub result: OutputArgs,
     /// Significant digits, 1 to 15, or "shortest" for as many as bring back every bit
     #[arg(long, value_name = "N", default_value = "shortest", value_parser = digits)]
     pub digits: Digits,
@@ -281,7 +294,7 @@ pub struct Harmonics {
     pub record: Record,
     /// The result.
     #[command(flatten)]
-    pub result: Result,
+    pub result: OutputArgs,
     /// Stand file
     #[arg(long, value_name = "FILE")]
     pub stand: PathBuf,
@@ -313,7 +326,7 @@ pub struct Harmonics {
 pub struct Table {
     /// The result.
     #[command(flatten)]
-    pub result: Result,
+    pub result: OutputArgs,
     /// Stand file
     #[arg(long, value_name = "FILE")]
     pub stand: PathBuf,
@@ -340,7 +353,7 @@ pub struct Table {
 pub struct Predict {
     /// The result.
     #[command(flatten)]
-    pub result: Result,
+    pub result: OutputArgs,
     /// Stand file
     #[arg(long, value_name = "FILE")]
     pub stand: PathBuf,
@@ -360,7 +373,7 @@ pub struct Inspect {
     pub files: Vec<String>,
     /// The result.
     #[command(flatten)]
-    pub result: Result,
+    pub result: OutputArgs,
     /// How the files are read.
     #[command(flatten)]
     pub reading: Reading,

@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod chart;
 pub mod cli;
 pub mod commands;
 mod diagnose;

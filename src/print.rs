@@ -16,6 +16,35 @@ pub fn json(report: &impl Serialize) -> String {
     text
 }
 
+/// What a verb found, printed as text for people or as a JSON document.
+pub(crate) trait Report: Serialize + Sized {
+    /// Name and version of the document.
+    const SCHEMA: &'static str;
+
+    /// The report for people.
+    fn text(&self) -> String;
+
+    /// The report in the form asked for; the document begins with its schema and the version of torqcomp.
+    fn document(&self, as_json: bool) -> String {
+        match as_json {
+            true => json(&Document {
+                schema: Self::SCHEMA,
+                version: env!("CARGO_PKG_VERSION"),
+                report: self,
+            }),
+            false => self.text(),
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct Document<'a, R> {
+    schema: &'static str,
+    version: &'static str,
+    #[serde(flatten)]
+    report: &'a R,
+}
+
 /// Says something to a person on standard error. Nobody may be there to read it: that is no failure.
 pub fn say(text: &str) {
     use std::io::Write;

@@ -269,7 +269,7 @@ fn text_plot_and_exit_codes() {
         assert!(ran.stdout.contains(said), "{said} in {}", ran.stdout);
     }
     let svg = folder.read("out.svg");
-    assert_eq!(svg.matches("class=\"trace\"").count(), 2);
+    assert_eq!(svg.matches("class=\"line ").count(), 2);
     assert_eq!(svg.matches("class=\"rail\"").count(), 1);
     let again = folder.run(&["inspect", "in.csv", "--plot", "out.svg"]);
     assert_eq!(again.code, 1, "an existing file is kept: {}", again.stderr);

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use super::{Reading, Result, Units, range};
+use super::{OutputArgs, Reading, Units, range};
 use crate::identify::Motion;
 use crate::identify::response::Excitation;
 
@@ -34,7 +34,7 @@ pub enum Test {
 pub struct Findings {
     /// The stand file.
     #[command(flatten)]
-    pub result: Result,
+    pub result: OutputArgs,
     /// Stand file with declared constants [default: that of -o, if it exists]
     #[arg(long, value_name = "FILE")]
     pub stand: Option<PathBuf>,

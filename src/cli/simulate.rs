@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use torqcomp_model::simulate;
 
-use super::{Result, TimeAxis, digits};
+use super::{OutputArgs, TimeAxis, digits};
 use crate::io::digits::Digits;
 
 /// Arguments of `simulate`.
@@ -16,7 +16,7 @@ pub struct Simulate {
     pub input: String,
     /// The result.
     #[command(flatten)]
-    pub result: Result,
+    pub result: OutputArgs,
     /// Stand file
     #[arg(long, value_name = "FILE")]
     pub stand: PathBuf,

@@ -1,6 +1,7 @@
 //! `compensate`: a recorded signal in, the torque that acted out.
 
 mod deliver;
+mod plot;
 mod refined;
 mod sink;
 mod stream;
@@ -13,8 +14,9 @@ use torqcomp_dsp::compensate::InverseFilter;
 use torqcomp_dsp::noise::NoiseGain;
 use torqcomp_dsp::resample;
 
+use self::plot::Traces;
 use self::sink::Sink;
-use super::{Outcome, conclude, uncertainty};
+use super::{Outcome, conclude, open_plot, uncertainty};
 use crate::cli::Compensate;
 use crate::failure::Failure;
 use crate::io::Input;
@@ -22,7 +24,6 @@ use crate::io::output::Output;
 use crate::print::{self};
 use crate::quality::excerpt;
 use crate::report::compensate::{Ends, Gain, Noise, RecordNoise, Report, SCHEMA};
-use crate::report::svg::Traces;
 use crate::signal::{Signal, Summary};
 use crate::stand::{self, Chain, Stand};
 use crate::undo::Undo;
@@ -133,8 +134,7 @@ impl Extent {
 
 /// Runs the verb.
 pub fn run(args: &Compensate) -> Result<Outcome, Failure> {
-    let to_stdout = args.result.output.as_deref().is_none_or(|o| o == "-");
-    if args.json && to_stdout {
+    if args.json && args.result.is_stdout() {
         return Err(Failure::usage(
             "--json and the samples both want standard output; give the samples a file with -o",
         ));
@@ -142,12 +142,8 @@ pub fn run(args: &Compensate) -> Result<Outcome, Failure> {
     let plan = plan(args)?;
     let input = Path::new(&args.record.input);
     let inputs = [input, args.stand.as_path()];
-    let output = Output::open(args.result.output.as_deref(), args.result.force, &inputs)?;
-    let plot = args
-        .plot
-        .as_deref()
-        .map(|path| open_plot(path, args, &inputs))
-        .transpose()?;
+    let output = args.result.open(&inputs)?;
+    let plot = open_plot(args.plot.as_deref(), &args.result, &inputs)?;
     let mut report = describe(args, &plan, output.name());
     let mut sink = Sink::open(args, &plan, output)?;
     report.output_signal = sink.describe();
@@ -179,16 +175,6 @@ pub fn run(args: &Compensate) -> Result<Outcome, Failure> {
         run.summary.lost.is_some(),
         args.strict,
     ))
-}
-
-fn open_plot(path: &Path, args: &Compensate, inputs: &[&Path]) -> Result<Output, Failure> {
-    let text = path
-        .to_str()
-        .filter(|text| *text != "-")
-        .ok_or_else(|| Failure::usage("--plot needs the name of a file, in UTF-8"))?;
-    let mut taken = inputs.to_vec();
-    taken.extend(args.result.output.as_deref().map(Path::new));
-    Output::open(Some(text), args.result.force, &taken)
 }
 
 fn plan(args: &Compensate) -> Result<Plan, Failure> {

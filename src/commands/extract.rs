@@ -1,6 +1,6 @@
 //! `extract`: one channel of a recording as plain rows, for other programs.
 
-use super::rows::{Rows, Times};
+use super::rows::{self, Rows, Times};
 use super::{Outcome, conclude};
 use crate::cli::Extract;
 use crate::failure::Failure;
@@ -10,16 +10,13 @@ use crate::io::text::Text;
 use crate::print;
 use crate::signal::{Batch, Record, Signal, Summary};
 
-/// Rows that are written at once.
-const ROWS_AT_ONCE: usize = 1 << 14;
-
 /// Runs the verb.
 pub fn run(args: &Extract) -> Result<Outcome, Failure> {
     let mut options = args.record.options();
     options.table.any_steps = true;
     let signal = Signal::open(&Input::of(&args.record.input), &options)?;
     let inputs = [args.record.input.as_ref()];
-    let mut output = Output::open(args.result.output.as_deref(), args.result.force, &inputs)?;
+    let mut output = args.result.open(&inputs)?;
     output.write(&heading(&signal))?;
     let said = format!(
         "{}: {}; {} Hz {}\n",
@@ -83,21 +80,7 @@ fn write_resampled(
     output: &mut Output,
 ) -> Result<Summary, Failure> {
     let record = Record::read(signal, |_| Ok(()))?;
-    let mut text = Text::default();
-    let parts = record.samples.chunks(ROWS_AT_ONCE);
-    for (part, first) in parts.zip((0..).step_by(ROWS_AT_ONCE)) {
-        let rows = Rows {
-            digits: args.digits,
-            scale: 1.0,
-            rate_hz: record.rate_hz,
-            times: Times::Grid {
-                start_s: record.start_s,
-                first,
-            },
-        };
-        text.clear();
-        rows.write(&mut text, part, &[]);
-        output.write(text.as_bytes())?;
-    }
+    let axis = (record.rate_hz, record.start_s);
+    rows::write_uniform(output, args.digits, axis, &record.samples)?;
     Ok(record.summary)
 }

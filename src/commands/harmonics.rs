@@ -1,16 +1,18 @@
 //! `harmonics`: component torques at a fundamental and its orders.
 
+use std::fmt::Write;
+
 use num_complex::Complex64;
+use serde::Serialize;
 use torqcomp_dsp::harmonics::{self, Fundamental, refine_fundamental};
 
-use super::{Outcome, conclude};
-use crate::cli::Harmonics;
+use super::{Outcome, conclude, publish, unit_text};
+use crate::cli;
 use crate::failure::Failure;
 use crate::io::Input;
-use crate::io::output::Output;
-use crate::print::{self};
+use crate::io::csv::Column;
+use crate::print::{Report, columns, rounded, short};
 use crate::quality::excerpt;
-use crate::report::harmonics::{Component, Report, SCHEMA};
 use crate::signal::{Record, Signal};
 use crate::stand::{self, Chain, Stand};
 use crate::warning::Warning;
@@ -21,8 +23,60 @@ const FAR_FROM_ZERO: f64 = 10.0;
 /// Orders of the mains that are looked at.
 const MAINS_LINES: f64 = 5.0;
 
+/// Report of a fit.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct HarmonicsReport {
+    input: String,
+    channel: String,
+    /// Its unit in the file.
+    channel_unit: String,
+    stand: String,
+    /// How the record became torque at rest.
+    calibration: String,
+    /// Unit of `mean`, `recorded`, `torque`, `std` and `residual_rms`.
+    unit: String,
+    samples: usize,
+    rate_hz: f64,
+    duration_s: f64,
+    fundamental_hz: f64,
+    /// Its standard uncertainty, if it was found from the data.
+    fundamental_std_hz: Option<f64>,
+    /// Time that phases refer to, on the time axis of the record.
+    phase_reference_s: f64,
+    /// The constant part of the torque.
+    mean: f64,
+    components: Vec<ComponentTorque>,
+    /// What the fit leaves over, rms, as recorded.
+    residual_rms: f64,
+    warnings: Vec<Warning>,
+}
+
+/// A component torque `A cos(2πft + φ)`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct ComponentTorque {
+    /// Frequency over the fundamental.
+    order: f64,
+    frequency_hz: f64,
+    recorded: f64,
+    recorded_phase_deg: f64,
+    /// Amplitude that acted over the recorded one.
+    factor: f64,
+    /// Amplitude of the torque that acted.
+    torque: f64,
+    /// Phase of the torque that acted.
+    phase_deg: f64,
+    /// Standard uncertainty of `torque` from the noise of the record.
+    std: f64,
+    /// Standard uncertainty of `phase_deg` from the noise; `null` if the component is lost in it.
+    phase_std_deg: Option<f64>,
+    /// Standard uncertainty of `torque` from the stand's constants; `null` if they have none.
+    std_stand: Option<f64>,
+    /// Standard uncertainty of `phase_deg` from the stand's constants; `null` if they have none.
+    phase_std_stand_deg: Option<f64>,
+}
+
 /// Runs the verb.
-pub fn run(args: &Harmonics) -> Result<Outcome, Failure> {
+pub fn run(args: &cli::Harmonics) -> Result<Outcome, Failure> {
     let stand = stand::read(&args.stand)?;
     stand.mechanics()?;
     let signal = Signal::open(&Input::of(&args.record.input), &args.record.options())?;
@@ -32,19 +86,12 @@ pub fn run(args: &Harmonics) -> Result<Outcome, Failure> {
         args.units.into(),
     )?;
     let inputs = [args.record.input.as_ref(), args.stand.as_path()];
-    let mut output = Output::open(args.result.output.as_deref(), args.result.force, &inputs)?;
-    let mut report = describe(&signal, &stand, &chain);
-    let source = signal.source.clone();
+    let output = args.result.open(&inputs)?;
+    let (source, channel) = (signal.source.clone(), signal.channel.clone());
     let record = Record::read(signal, |values| super::convert(&chain, values))?;
-    let fitted = fit(args, &stand, &chain, &record, &mut report);
-    fitted.map_err(|failure| failure.at(&source))?;
-    let text = if args.json {
-        print::json(&report)
-    } else {
-        report.text()
-    };
-    output.write(text.as_bytes())?;
-    output.finish()?;
+    let report = fit(args, &stand, &chain, &record, &source, &channel);
+    let report = report.map_err(|failure| failure.at(&source))?;
+    publish(&report, args.json, output)?;
     Ok(conclude(
         &report.warnings,
         record.summary.lost.is_some(),
@@ -52,46 +99,19 @@ pub fn run(args: &Harmonics) -> Result<Outcome, Failure> {
     ))
 }
 
-/// The report as far as it is known before the record is read.
-fn describe(signal: &Signal, stand: &Stand, chain: &Chain) -> Report {
-    Report {
-        schema: SCHEMA,
-        version: env!("CARGO_PKG_VERSION"),
-        input: signal.source.clone(),
-        channel: signal.channel.name.clone(),
-        channel_unit: signal
-            .channel
-            .unit
-            .as_ref()
-            .map_or_else(String::new, |u| u.text.clone()),
-        stand: stand.file.clone(),
-        calibration: chain.described.clone(),
-        unit: chain.applied.unit.clone(),
-        samples: 0,
-        rate_hz: signal.time.rate_hz,
-        duration_s: 0.0,
-        fundamental_hz: 0.0,
-        fundamental_std_hz: None,
-        phase_reference_s: 0.0,
-        mean: 0.0,
-        components: Vec::new(),
-        residual_rms: 0.0,
-        warnings: Vec::new(),
-    }
-}
-
 fn fit(
-    args: &Harmonics,
+    args: &cli::Harmonics,
     stand: &Stand,
     chain: &Chain,
     record: &Record,
-    report: &mut Report,
-) -> Result<(), Failure> {
+    source: &str,
+    channel: &Column,
+) -> Result<HarmonicsReport, Failure> {
     let samples = &record.samples;
     let duration_s = samples.len() as f64 / record.rate_hz;
-    report.warnings.extend(record.summary.lost.clone());
-    report.warnings.extend(record.summary.warnings.clone());
-    let orders = visible_orders(args, record.rate_hz, &mut report.warnings)?;
+    let mut warnings: Vec<Warning> = record.summary.lost.iter().cloned().collect();
+    warnings.extend(record.summary.warnings.clone());
+    let orders = visible_orders(args, record.rate_hz, &mut warnings)?;
     let fundamental = if args.refine {
         let span = 0.01 * args.refine_span;
         refine_fundamental(samples, record.rate_hz, args.fundamental, span, &orders)?
@@ -109,44 +129,48 @@ fn fit(
 
     let inverse = stand.inverse()?;
     let printed = 1.0 / chain.applied.factor;
-    report.samples = samples.len();
-    report.duration_s = duration_s;
-    report.fundamental_hz = fundamental.frequency_hz;
-    report.fundamental_std_hz = fundamental.std_hz;
-    report.phase_reference_s = reference_s;
-    report.mean = found.mean * inverse(0.0).re * printed;
-    report.residual_rms = found.residual_rms * printed;
-    report.components = found
+    let components: Vec<ComponentTorque> = found
         .components
         .iter()
         .map(|c| component(c, inverse(c.frequency_hz), printed, stand, chain))
         .collect();
-    report.warnings.extend(lost_warning(&report.components));
-    report
-        .warnings
-        .extend(mains_warning(&report.components, duration_s));
-    let wrong = wrong(record, printed, report);
-    report.warnings.extend(wrong);
-    Ok(())
-}
-
-/// What is wrong with the record.
-fn wrong(record: &Record, printed: f64, report: &Report) -> Vec<Warning> {
-    let samples = &record.samples;
-    let of = excerpt::Of {
-        name: &report.channel,
-        unit: &report.unit,
-        scale: printed,
-        rate_hz: record.rate_hz,
-        start_s: record.start_s,
+    warnings.extend(lost_warning(&components));
+    warnings.extend(mains_warning(&components, duration_s));
+    let seen = &samples[..samples.len().min(excerpt::OF_MEMORY)];
+    warnings.extend(excerpt::warnings(
+        seen,
+        excerpt::Of {
+            name: &channel.name,
+            unit: &chain.applied.unit,
+            scale: printed,
+            rate_hz: record.rate_hz,
+            start_s: record.start_s,
+            samples: samples.len(),
+        },
+    ));
+    Ok(HarmonicsReport {
+        input: source.to_owned(),
+        channel: channel.name.clone(),
+        channel_unit: unit_text(channel.unit.as_ref()).to_owned(),
+        stand: stand.file.clone(),
+        calibration: chain.described.clone(),
+        unit: chain.applied.unit.clone(),
         samples: samples.len(),
-    };
-    excerpt::warnings(&samples[..samples.len().min(excerpt::OF_MEMORY)], of)
+        rate_hz: record.rate_hz,
+        duration_s,
+        fundamental_hz: fundamental.frequency_hz,
+        fundamental_std_hz: fundamental.std_hz,
+        phase_reference_s: reference_s,
+        mean: found.mean * inverse(0.0).re * printed,
+        components,
+        residual_rms: found.residual_rms * printed,
+        warnings,
+    })
 }
 
 /// Orders below half the sampling rate; those above are said.
 fn visible_orders(
-    args: &Harmonics,
+    args: &cli::Harmonics,
     rate_hz: f64,
     warnings: &mut Vec<Warning>,
 ) -> Result<Vec<f64>, Failure> {
@@ -160,8 +184,8 @@ fn visible_orders(
         return Err(Failure::failed(format_args!(
             "no order of {} Hz lies below half the sampling rate of {} Hz; ask for lower orders or \
              record faster",
-            print::short(args.fundamental),
-            print::short(rate_hz)
+            short(args.fundamental),
+            short(rate_hz)
         )));
     }
     if let (Some(first), Some(last)) = (unseen.first(), unseen.last()) {
@@ -169,9 +193,9 @@ fn visible_orders(
             "orders-above-nyquist",
             format!(
                 "orders {} to {} were left out: they lie above half the sampling rate of {} Hz",
-                print::short(*first),
-                print::short(*last),
-                print::short(rate_hz)
+                short(*first),
+                short(*last),
+                short(rate_hz)
             ),
         ));
     }
@@ -184,12 +208,12 @@ fn component(
     printed: f64,
     stand: &Stand,
     chain: &Chain,
-) -> Component {
+) -> ComponentTorque {
     let factor = inverse.norm();
     let recorded = fitted.phasor.norm() * printed;
     let torque = recorded * factor;
     let of_stand = super::uncertainty(stand, chain, fitted.frequency_hz);
-    Component {
+    ComponentTorque {
         order: fitted.order,
         frequency_hz: fitted.frequency_hz,
         recorded,
@@ -205,7 +229,7 @@ fn component(
 }
 
 /// Orders of a slower shaft that lie where lines of the mains lie: one record cannot tell them apart.
-fn mains_warning(components: &[Component], duration_s: f64) -> Option<Warning> {
+fn mains_warning(components: &[ComponentTorque], duration_s: f64) -> Option<Warning> {
     let doubtful: Vec<String> = components
         .iter()
         .filter(|c| c.order > 1.0 && c.torque > 5.0 * c.std)
@@ -216,7 +240,7 @@ fn mains_warning(components: &[Component], duration_s: f64) -> Option<Warning> {
                 slower && (c.frequency_hz - line).abs() < 1.0 / duration_s
             })
         })
-        .map(|c| format!("{} ({:.2} Hz)", print::short(c.order), c.frequency_hz))
+        .map(|c| format!("{} ({:.2} Hz)", short(c.order), c.frequency_hz))
         .collect();
     (!doubtful.is_empty()).then(|| {
         Warning::new(
@@ -230,11 +254,11 @@ fn mains_warning(components: &[Component], duration_s: f64) -> Option<Warning> {
     })
 }
 
-fn lost_warning(components: &[Component]) -> Option<Warning> {
+fn lost_warning(components: &[ComponentTorque]) -> Option<Warning> {
     let lost: Vec<String> = components
         .iter()
         .filter(|c| c.torque < 2.0 * c.std)
-        .map(|c| print::short(c.order))
+        .map(|c| short(c.order))
         .collect();
     (!lost.is_empty()).then(|| {
         Warning::new(
@@ -245,4 +269,77 @@ fn lost_warning(components: &[Component]) -> Option<Warning> {
             ),
         )
     })
+}
+
+impl Report for HarmonicsReport {
+    const SCHEMA: &'static str = "torqcomp.harmonics/1";
+
+    fn text(&self) -> String {
+        let std = self
+            .fundamental_std_hz
+            .map_or_else(String::new, |std| format!(" ± {}", rounded(std, 2)));
+        let mut text = format!(
+            "{}, {} in {}: {} samples at {} Hz, {} s\n\
+             torque = mean + sum of A cos(2 pi f t + phase), A being the peak, t = 0 at {} s\n\
+             fundamental {}{std} Hz, mean {} {}, residual {} {} rms\n\n",
+            self.input,
+            self.channel,
+            self.channel_unit,
+            self.samples,
+            short(self.rate_hz),
+            rounded(self.duration_s, 5),
+            short(self.phase_reference_s),
+            rounded(self.fundamental_hz, 9),
+            rounded(self.mean, 5),
+            self.unit,
+            rounded(self.residual_rms, 3),
+            self.unit
+        );
+        let with_stand = self.components.iter().any(|c| c.std_stand.is_some());
+        let unit = &self.unit;
+        let mut head: Vec<String> = ["order", "Hz"].map(str::to_owned).to_vec();
+        head.extend([
+            format!("recorded {unit}"),
+            "factor".to_owned(),
+            format!("torque {unit}"),
+            "± noise".to_owned(),
+        ]);
+        if with_stand {
+            head.push("± stand".to_owned());
+        }
+        head.extend(["phase deg".to_owned(), "± noise".to_owned()]);
+        if with_stand {
+            head.push("± stand".to_owned());
+        }
+        let mut rows = vec![head];
+        rows.extend(self.components.iter().map(|c| c.cells(with_stand)));
+        let _ = write!(text, "{}", columns(&rows));
+        text
+    }
+}
+
+impl ComponentTorque {
+    fn cells(&self, with_stand: bool) -> Vec<String> {
+        let mut cells = vec![
+            short(self.order),
+            rounded(self.frequency_hz, 6),
+            rounded(self.recorded, 5),
+            rounded(self.factor, 5),
+            rounded(self.torque, 5),
+            rounded(self.std, 2),
+        ];
+        if with_stand {
+            cells.push(self.std_stand.map_or_else(String::new, |s| rounded(s, 2)));
+        }
+        cells.push(format!("{:.2}", self.phase_deg));
+        cells.push(
+            self.phase_std_deg
+                .map_or_else(|| "lost".to_owned(), |s| rounded(s, 2)),
+        );
+        if with_stand {
+            let std = self.phase_std_stand_deg;
+            cells.push(std.map_or_else(String::new, |s| rounded(s, 2)));
+        }
+        cells
+    }
 }

@@ -1,4 +1,4 @@
-//! One file for each verb.
+//! The verbs, each a page: what it was asked, what it plans, what it computes, what it reports.
 
 mod compensate;
 mod diagnose;
@@ -11,12 +11,16 @@ mod rows;
 mod simulate;
 mod table;
 
+use std::path::Path;
+
 use torqcomp_dsp::conversion::ConversionError;
 use torqcomp_model::InverseUncertainty;
 
-use crate::cli::{Cli, Verb};
+use crate::cli::{Cli, OutputArgs, Verb};
 use crate::failure::Failure;
-use crate::print::{self};
+use crate::io::csv::NamedUnit;
+use crate::io::output::{self, Output};
+use crate::print::{self, Report};
 use crate::stand::{Chain, Stand};
 use crate::warning::Warning;
 
@@ -47,7 +51,24 @@ pub fn run(cli: Cli) -> Result<Outcome, Failure> {
     }
 }
 
-/// Says the warnings and what was lost, and tells how the command ended.
+/// Writes a report and completes its output.
+fn publish(report: &impl Report, as_json: bool, mut output: Output) -> Result<(), Failure> {
+    output.write(report.document(as_json).as_bytes())?;
+    output.finish()
+}
+
+/// Gives the report of a verb whose result is a record: the document to standard output, the text to a person.
+fn report_beside(report: &impl Report, as_json: bool, quiet: bool) -> Result<(), Failure> {
+    if as_json {
+        output::write_all(None, false, &[], &report.document(true))?;
+    }
+    if !quiet {
+        print::say(&report.text());
+    }
+    Ok(())
+}
+
+/// Says the warnings, what was lost among them, and how the command ended.
 fn conclude(warnings: &[Warning], lost: bool, strict: bool) -> Outcome {
     for warning in warnings {
         print::say(&format!(
@@ -55,11 +76,33 @@ fn conclude(warnings: &[Warning], lost: bool, strict: bool) -> Outcome {
             warning.code, warning.message
         ));
     }
-    if lost || (strict && !warnings.is_empty()) {
-        Outcome::WithLoss
-    } else {
-        Outcome::Done
+    match lost || (strict && !warnings.is_empty()) {
+        true => Outcome::WithLoss,
+        false => Outcome::Done,
     }
+}
+
+/// Opens the file for a picture.
+fn open_plot(
+    path: Option<&Path>,
+    result: &OutputArgs,
+    inputs: &[&Path],
+) -> Result<Option<Output>, Failure> {
+    let Some(path) = path else {
+        return Ok(None);
+    };
+    let text = path
+        .to_str()
+        .filter(|text| *text != "-")
+        .ok_or_else(|| Failure::usage("--plot needs the name of a file, in UTF-8"))?;
+    let mut taken = inputs.to_vec();
+    taken.extend(result.output.as_deref().map(Path::new));
+    Output::open(Some(text), result.force, &taken).map(Some)
+}
+
+/// A unit as written in the file; empty if there is none.
+fn unit_text(unit: Option<&NamedUnit>) -> &str {
+    unit.map_or("", |unit| &unit.text)
 }
 
 /// Standard uncertainty of the compensated torque that the stand's constants bring, its calibration

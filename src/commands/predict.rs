@@ -1,16 +1,17 @@
 //! `predict`: what follows from the drawing, beside what was measured.
 
+mod report;
+
 use torqcomp_dsp::bridge::BridgeLayout;
 use torqcomp_dsp::conversion::Conversion;
 use torqcomp_model::damping::viscous_from_friction_slope_n_m_s_per_rad;
 use torqcomp_model::{Estimate, Kind, SecondOrder, UnitSystem};
 
-use super::Outcome;
+use self::report::{PredictReport, PredictedConstant, Refinement, residual_percent};
+use super::{Outcome, publish};
 use crate::cli::Predict;
 use crate::failure::Failure;
-use crate::io::output;
-use crate::print::{self, rounded};
-use crate::report::predict::{Constant, Refinement, Report, SCHEMA, residual_percent};
+use crate::print::rounded;
 use crate::stand::{self, BeamDrawing, Given, Stand};
 
 /// Part of a residual that must be left at most for an effect to explain it.
@@ -32,23 +33,12 @@ pub fn run(args: &Predict) -> Result<Outcome, Failure> {
             stand.file
         )));
     }
-    let report = Report {
-        schema: SCHEMA,
-        version: env!("CARGO_PKG_VERSION"),
+    let output = args.result.open(&[args.stand.as_path()])?;
+    let report = PredictReport {
         stand: stand.file.clone(),
         constants,
     };
-    let text = if args.json {
-        print::json(&report)
-    } else {
-        report.text()
-    };
-    output::write_all(
-        args.result.output.as_deref(),
-        args.result.force,
-        &[args.stand.as_path()],
-        &text,
-    )?;
+    publish(&report, args.json, output)?;
     Ok(Outcome::Done)
 }
 
@@ -109,7 +99,7 @@ impl<'a> Drawing<'a> {
         })
     }
 
-    fn constants(&self, units: UnitSystem) -> Result<Vec<Constant>, Failure> {
+    fn constants(&self, units: UnitSystem) -> Result<Vec<PredictedConstant>, Failure> {
         let measured = &self.measured;
         let slender = self.stiffness.as_ref().map(|s| &s.slender);
         let inertia = self.inertia.as_ref();
@@ -192,7 +182,7 @@ impl<'a> Drawing<'a> {
     }
 
     /// Adds what each effect of the drawing makes of a constant that follows from the stiffness.
-    fn refine(&self, constant: &mut Constant, by_stiffness: impl Fn(f64) -> Option<f64>) {
+    fn refine(&self, constant: &mut PredictedConstant, by_stiffness: impl Fn(f64) -> Option<f64>) {
         let refined = self.stiffness.as_ref().map_or(&[][..], |s| &s.refined);
         for (effect, stiffness) in refined {
             let Some(predicted) = by_stiffness(*stiffness) else {
@@ -220,7 +210,7 @@ impl<'a> Drawing<'a> {
         }
     }
 
-    fn torque_per_volt(&self, units: UnitSystem) -> Result<Constant, Failure> {
+    fn torque_per_volt(&self, units: UnitSystem) -> Result<PredictedConstant, Failure> {
         let stand = self.stand;
         let given = stand.gage.is_some() && stand.bridge.is_some();
         let placed = stand
@@ -365,11 +355,11 @@ fn constant(
     measured: &Option<Estimate>,
     kind: Kind,
     units: UnitSystem,
-) -> Constant {
+) -> PredictedConstant {
     let value = |e: &Estimate| kind.to(units, e.value());
     let std = |e: &Estimate| Some(kind.difference_to(units, e.std_uncertainty()?));
     let (predicted_value, measured_value) = (predicted.map(value), measured.as_ref().map(value));
-    Constant {
+    PredictedConstant {
         name,
         unit: kind.unit(units).to_owned(),
         predicted: predicted_value,
@@ -385,7 +375,7 @@ fn constant(
     }
 }
 
-fn damping_note(damping: &Constant) -> Option<String> {
+fn damping_note(damping: &PredictedConstant) -> Option<String> {
     let ratio = damping.predicted? / damping.measured?;
     (ratio < FAR_TOO_SMALL).then(|| {
         format!(

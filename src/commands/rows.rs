@@ -1,7 +1,11 @@
 //! The rows of a result as text.
 
-use crate::io::csv::{TimeAxis, TimeSource};
+use std::ops::Range;
+
+use crate::failure::Failure;
+use crate::io::csv::{TimeAxis, TimeSource, place_of};
 use crate::io::digits::{self, Decimal, Digits};
+use crate::io::output::Output;
 use crate::io::text::Text;
 use crate::signal::Batch;
 
@@ -27,6 +31,42 @@ pub(super) enum Times<'a> {
     Nanoseconds { times: &'a [f64], origin: i64 },
     /// A grid: start, index of the first sample, rate.
     Grid { start_s: f64, first: usize },
+}
+
+/// Rows that are written at once.
+const ROWS_AT_ONCE: usize = 1 << 14;
+
+/// The parts of a record that is in memory on a uniform time axis, each with the range of its samples.
+pub(super) fn uniform_parts(
+    (digits, scale): (Digits, f64),
+    (rate_hz, start_s): (f64, f64),
+    samples: usize,
+) -> impl Iterator<Item = (Rows<'static>, Range<usize>)> {
+    (0..samples).step_by(ROWS_AT_ONCE).map(move |first| {
+        let rows = Rows {
+            digits,
+            scale,
+            rate_hz,
+            times: Times::Grid { start_s, first },
+        };
+        (rows, first..samples.min(first + ROWS_AT_ONCE))
+    })
+}
+
+/// Writes a record that is in memory on a uniform time axis.
+pub(super) fn write_uniform(
+    output: &mut Output,
+    digits: Digits,
+    axis: (f64, f64),
+    samples: &[f64],
+) -> Result<(), Failure> {
+    let mut text = Text::default();
+    for (rows, range) in uniform_parts((digits, 1.0), axis, samples.len()) {
+        text.clear();
+        rows.write(&mut text, &samples[range], &[]);
+        output.write(text.as_bytes())?;
+    }
+    Ok(())
 }
 
 impl<'a> Times<'a> {
@@ -111,7 +151,7 @@ impl Rows<'_> {
             let decimals = &decimals[..values.len()];
             if let (Times::Copied { text, spans }, true) = (&self.times, recorded.is_empty()) {
                 for (decimal, span) in decimals.iter().zip(&spans[first..]) {
-                    let (offset, length) = crate::io::csv::place_of(*span);
+                    let (offset, length) = place_of(*span);
                     out.row(text, offset, length, decimal);
                 }
                 continue;
@@ -128,7 +168,7 @@ impl Rows<'_> {
     fn write_time(&self, out: &mut Text, i: usize, digits: Digits) {
         match &self.times {
             Times::Copied { text, spans } => {
-                let (offset, length) = crate::io::csv::place_of(spans[i]);
+                let (offset, length) = place_of(spans[i]);
                 out.copy(text, offset, length);
             }
             Times::Stamps { times, seconds } => out.number(times[i] * seconds, digits),
@@ -162,7 +202,7 @@ impl Rows<'_> {
     pub(super) fn time_s(&self, i: usize) -> f64 {
         match &self.times {
             Times::Copied { text, spans } => {
-                let (offset, _) = crate::io::csv::place_of(spans[i]);
+                let (offset, _) = place_of(spans[i]);
                 crate::io::number::read(text, offset, b'.').map_or(f64::NAN, |(value, _)| value)
             }
             Times::Stamps { times, seconds } => times[i] * seconds,

@@ -1,18 +1,16 @@
 //! `simulate`: the stand's answer to a given input.
 
+use serde::Serialize;
 use torqcomp_model::effects::Action;
 use torqcomp_model::simulate::{Excitation, Fixed, Model, State, substeps};
 use torqcomp_model::{Estimate, Kind, Unit};
 
-use super::{Outcome, conclude};
-use crate::cli::Simulate;
+use super::{Outcome, conclude, report_beside, rows};
+use crate::cli;
 use crate::failure::Failure;
 use crate::io::Input;
 use crate::io::csv::NamedUnit;
-use crate::io::digits;
-use crate::io::output::{self, Output};
-use crate::print::{self};
-use crate::report::simulate::{Report, SCHEMA};
+use crate::print::{Report, short};
 use crate::signal::Together;
 use crate::signal::together::Track;
 use crate::stand::{self, Given, Stand};
@@ -23,15 +21,34 @@ const FINE: f64 = 1e-5;
 /// Most steps from sample to sample.
 const MOST_SUBSTEPS: usize = 256;
 
+/// A simulated record.
+#[derive(Debug, Serialize)]
+struct SimulateReport {
+    input: String,
+    stand: String,
+    applied: String,
+    applied_unit: String,
+    measured_unit: String,
+    /// Course of the input between its samples.
+    input_between_samples: &'static str,
+    samples: usize,
+    rate_hz: f64,
+    start_s: f64,
+    /// Steps of integration from sample to sample.
+    steps_per_sample: usize,
+    effects: Vec<&'static str>,
+    warnings: Vec<Warning>,
+}
+
 /// Runs the verb.
-pub fn run(args: &Simulate) -> Result<Outcome, Failure> {
+pub fn run(args: &cli::Simulate) -> Result<Outcome, Failure> {
     let stand = stand::read(&args.stand)?;
     let options = args
         .axis
         .options(args.applied.as_deref(), args.unit.as_deref());
     let read = Together::read(&Input::of(&args.input), &[options])?;
     let chosen = &read.tracks[0];
-    if args.json && matches!(args.result.output.as_deref(), None | Some("-")) {
+    if args.json && args.result.is_stdout() {
         return Err(Failure::usage(
             "the record and the JSON document cannot both go to standard output; give -o FILE",
         ));
@@ -42,21 +59,22 @@ pub fn run(args: &Simulate) -> Result<Outcome, Failure> {
         ));
     }
     let inputs = [args.input.as_ref(), args.stand.as_path()];
-    let mut output = Output::open(args.result.output.as_deref(), args.result.force, &inputs)?;
+    let mut output = args.result.open(&inputs)?;
     let mut warnings: Vec<Warning> = read.lost.iter().chain(&read.warnings).cloned().collect();
-    let units = Units::of(&stand, chosen, &mut warnings)?;
+    let units = ChannelUnits::of(&stand, chosen, &mut warnings)?;
     let applied: Vec<f64> = chosen.samples.iter().map(|u| u * units.applied).collect();
     let model = model(&stand, units.gain)?;
     let between = args.between.into();
     let input = Excitation::new(applied, read.rate_hz, read.start_s, 1).with_between(between);
-    let (simulated, steps) = refined(&model, &input)?;
-    write(&mut output, args, &read, &simulated, |value| {
-        (value + stand.diagnosed.offset) / units.measured
-    })?;
+    let (mut simulated, steps) = refined(&model, &input)?;
+    for value in &mut simulated {
+        *value = (*value + stand.diagnosed.offset) / units.measured;
+    }
+    output.write(b"time_s,measured\n")?;
+    let axis = (read.rate_hz, read.start_s);
+    rows::write_uniform(&mut output, args.digits, axis, &simulated)?;
     output.finish()?;
-    let report = Report {
-        schema: SCHEMA,
-        version: env!("CARGO_PKG_VERSION"),
+    let report = SimulateReport {
         input: args.input.clone(),
         stand: args.stand.display().to_string(),
         applied: chosen.name.clone(),
@@ -70,36 +88,34 @@ pub fn run(args: &Simulate) -> Result<Outcome, Failure> {
         effects: stand.effects.iter().map(|e| e.effect.name).collect(),
         warnings,
     };
-    if args.json {
-        output::write_all(None, false, &[], &print::json(&report))?;
-    } else if !args.quiet {
-        print::say(&report.text());
-    }
+    report_beside(&report, args.json, args.quiet || args.json)?;
     Ok(conclude(&report.warnings, read.lost.is_some(), args.strict))
 }
 
-fn write(
-    output: &mut Output,
-    args: &Simulate,
-    read: &Together,
-    simulated: &[f64],
-    printed: impl Fn(f64) -> f64,
-) -> Result<(), Failure> {
-    let mut text = String::from("time_s,measured\n");
-    for (i, value) in simulated.iter().enumerate() {
-        let time_s = read.start_s + i as f64 / read.rate_hz;
-        text.push_str(&digits::text(time_s, 12));
-        text.push(',');
-        let mut cell = Vec::new();
-        digits::write(&mut cell, printed(*value), args.digits);
-        text.push_str(&String::from_utf8_lossy(&cell));
-        text.push('\n');
+impl Report for SimulateReport {
+    const SCHEMA: &'static str = "torqcomp.simulate/1";
+
+    fn text(&self) -> String {
+        let effects = match self.effects.as_slice() {
+            [] => "no effects".to_owned(),
+            some => some.join(", "),
+        };
+        format!(
+            "simulated {} samples at {} Hz, {} steps a sample, with {effects}; applied {} in {}, {} between samples; \
+             measured in {}\n",
+            self.samples,
+            short(self.rate_hz),
+            self.steps_per_sample,
+            self.applied,
+            self.applied_unit,
+            self.input_between_samples,
+            self.measured_unit,
+        )
     }
-    output.write(text.as_bytes())
 }
 
 /// Units of both quantities, and the gain between them.
-struct Units {
+struct ChannelUnits {
     /// SI units per unit of the file.
     applied: f64,
     applied_text: String,
@@ -110,7 +126,7 @@ struct Units {
     gain: f64,
 }
 
-impl Units {
+impl ChannelUnits {
     fn of(stand: &Stand, chosen: &Track, warnings: &mut Vec<Warning>) -> Result<Self, Failure> {
         let gain = match &stand.mechanics()?.given {
             Given::Modal {

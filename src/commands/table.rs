@@ -1,16 +1,13 @@
 //! `table`: the inverse transfer function over frequency, Appendix D of the thesis for any stand.
 
-use std::fmt::Write;
-
 use num_complex::Complex64;
 use serde::Serialize;
 use torqcomp_dsp::compensate::Inverse;
 
-use super::Outcome;
+use super::{Outcome, publish};
 use crate::cli;
 use crate::failure::Failure;
-use crate::io::output;
-use crate::print::{self, rounded};
+use crate::print::{Report, rounded};
 use crate::stand::{self, Mechanics, Stand};
 
 /// Most rows of a table.
@@ -18,18 +15,19 @@ const MOST_ROWS: f64 = 1e7;
 /// Significant digits of the table.
 const DIGITS: u32 = 10;
 
-/// JSON document.
+/// The inverse transfer function.
 #[derive(Debug, Serialize)]
-struct Report {
-    schema: &'static str,
-    version: &'static str,
+struct TableReport {
     stand: String,
-    rows: Vec<Row>,
+    rows: Vec<TableRow>,
+    /// Whether the text has columns of uncertainties.
+    #[serde(skip)]
+    with_uncertainty: bool,
 }
 
-/// Torque that acted over the torque recorded, at one frequency.
+/// Applied over recorded torque at one frequency.
 #[derive(Debug, Serialize)]
-struct Row {
+struct TableRow {
     frequency_hz: f64,
     magnitude: f64,
     phase_deg: f64,
@@ -58,31 +56,26 @@ pub fn run(args: &cli::Table) -> Result<Outcome, Failure> {
         true => None,
         false => Some(stand.inverse()?),
     };
-    let rows: Vec<Row> = (0..=steps as u64)
-        .map(|i| args.from + i as f64 * args.step)
-        .map(|hz| row(&stand, mechanics, refined.as_ref(), hz))
-        .collect();
-    let text = if args.json {
-        print::json(&Report {
-            schema: "torqcomp.table/1",
-            version: env!("CARGO_PKG_VERSION"),
-            stand: stand.file.clone(),
-            rows,
-        })
-    } else {
-        csv(&rows, args.uncertainty)
+    let output = args.result.open(&[args.stand.as_path()])?;
+    let report = TableReport {
+        rows: (0..=steps as u64)
+            .map(|i| args.from + i as f64 * args.step)
+            .map(|hz| row(&stand, mechanics, refined.as_ref(), hz))
+            .collect(),
+        stand: stand.file.clone(),
+        with_uncertainty: args.uncertainty,
     };
-    output::write_all(
-        args.result.output.as_deref(),
-        args.result.force,
-        &[args.stand.as_path()],
-        &text,
-    )?;
+    publish(&report, args.json, output)?;
     Ok(Outcome::Done)
 }
 
-/// A row, of the refined stand if there is one: then its uncertainty is not known, as that of the effects is not.
-fn row(stand: &Stand, mechanics: &Mechanics, refined: Option<&Inverse>, frequency_hz: f64) -> Row {
+/// A row, of the refined stand if there is one. Its uncertainty is then unknown, since that of the effects is.
+fn row(
+    stand: &Stand,
+    mechanics: &Mechanics,
+    refined: Option<&Inverse>,
+    frequency_hz: f64,
+) -> TableRow {
     let recorder = &stand.recorder.recorder;
     let mechanical = mechanics.response.inverse(frequency_hz);
     let recorded = recorder.response(frequency_hz);
@@ -97,7 +90,7 @@ fn row(stand: &Stand, mechanics: &Mechanics, refined: Option<&Inverse>, frequenc
         .ok()
         .flatten()
         .filter(|_| refined.is_none());
-    Row {
+    TableRow {
         frequency_hz,
         magnitude,
         phase_deg: phase_rad.to_degrees(),
@@ -106,36 +99,34 @@ fn row(stand: &Stand, mechanics: &Mechanics, refined: Option<&Inverse>, frequenc
     }
 }
 
-fn csv(rows: &[Row], uncertainty: bool) -> String {
-    let mut text = "frequency_hz,magnitude,phase_deg".to_owned();
-    if uncertainty {
-        text.push_str(",magnitude_relative_std,phase_std_deg");
-    }
-    text.push('\n');
-    for row in rows {
-        // Where nothing passes, there is no inverse: an empty cell.
-        let cell = |value: f64| match value.is_finite() {
-            true => rounded(value, DIGITS),
-            false => String::new(),
-        };
-        let _ = write!(
-            text,
-            "{},{},{}",
-            rounded(row.frequency_hz, DIGITS),
-            cell(row.magnitude),
-            cell(row.phase_deg)
-        );
-        if uncertainty {
-            // An unknown uncertainty is an empty cell, never 0.
-            let cell = |std: Option<f64>| std.map_or_else(String::new, |s| rounded(s, 4));
-            let _ = write!(
-                text,
-                ",{},{}",
-                cell(row.magnitude_relative_std),
-                cell(row.phase_std_deg)
-            );
+impl Report for TableReport {
+    const SCHEMA: &'static str = "torqcomp.table/1";
+
+    fn text(&self) -> String {
+        let mut text = "frequency_hz,magnitude,phase_deg".to_owned();
+        if self.with_uncertainty {
+            text.push_str(",magnitude_relative_std,phase_std_deg");
         }
         text.push('\n');
+        for row in &self.rows {
+            // Where nothing passes, there is no inverse: an empty cell.
+            let cell = |value: f64| match value.is_finite() {
+                true => rounded(value, DIGITS),
+                false => String::new(),
+            };
+            let mut cells = vec![
+                rounded(row.frequency_hz, DIGITS),
+                cell(row.magnitude),
+                cell(row.phase_deg),
+            ];
+            if self.with_uncertainty {
+                // An unknown uncertainty is an empty cell, never 0.
+                let std = |std: Option<f64>| std.map_or_else(String::new, |s| rounded(s, 4));
+                cells.extend([std(row.magnitude_relative_std), std(row.phase_std_deg)]);
+            }
+            text.push_str(&cells.join(","));
+            text.push('\n');
+        }
+        text
     }
-    text
 }

@@ -11,7 +11,7 @@ pub mod static_load;
 use serde::Serialize;
 use torqcomp_model::{Covariance, Estimate, Estimates, Kind, Measure, UnitSystem};
 
-use crate::report::chart::Chart;
+use crate::chart::Chart;
 use crate::warning::Warning;
 pub use mode::{KnownConstant, ModalPole, Pole};
 pub use motion::Motion;

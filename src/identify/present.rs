@@ -3,8 +3,8 @@
 use std::fmt::Write;
 
 use super::{Correlation, FitQuality, Identification, NamedEstimate};
+use crate::chart::Page;
 use crate::print::{columns, rounded, short, value_and_std};
-use crate::report::page::Page;
 
 /// A table under its heading, and a sentence below it.
 struct ResultTable {

@@ -2,9 +2,8 @@
 
 use std::path::Path;
 
-use super::chart::{Chart, Series};
 use super::diagnose::{cells, constant_rows, error_rows, error_sentences, suspected};
-use super::page::Page;
+use crate::chart::{Chart, Page, Series};
 use crate::diagnose::{
     CandidateFit, Diagnosis, MotionAxis, RecordResidual, Status, Verdict, autocorrelation, binned,
     density, response,

@@ -1,11 +1,11 @@
 //! A result that is there as a whole, written in parts.
 
+use super::plot::Traces;
 use super::sink::Sink;
 use crate::cli::Compensate;
 use crate::commands::rows::{Rows, Times};
 use crate::failure::Failure;
 use crate::io::text::Text;
-use crate::report::svg::Traces;
 use crate::signal::Record;
 
 /// Rows that are written at once.

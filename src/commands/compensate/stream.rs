@@ -7,6 +7,7 @@ use torqcomp_dsp::noise::RecordNoise;
 use torqcomp_dsp::resample::Resampler;
 use torqcomp_dsp::spectrum::{PowerSum, welch};
 
+use super::plot::Traces;
 use super::sink::Sink;
 use super::{Extent, Plan, Run};
 use crate::cli::Compensate;
@@ -17,7 +18,6 @@ use crate::io::csv::{TimeAxis, TimeSource};
 use crate::io::text::Text;
 use crate::pipeline::{self, Stages};
 use crate::quality::excerpt;
-use crate::report::svg::Traces;
 use crate::signal::Batch;
 
 /// Jobs under way beside those that the threads hold.

@@ -7,10 +7,10 @@ mod plot;
 mod same;
 mod whole;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use self::content::Content;
-use super::Outcome;
+use super::{Outcome, open_plot};
 use crate::cli::Inspect;
 use crate::failure::Failure;
 use crate::io::Input;
@@ -23,15 +23,9 @@ use crate::report::inspect::{Entry, Report, Said};
 /// Runs the verb.
 pub fn run(args: &Inspect) -> Result<Outcome, Failure> {
     check(args)?;
-    let inputs: Vec<PathBuf> = args.files.iter().map(PathBuf::from).collect();
-    let mut taken: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
-    let output = Output::open(args.result.output.as_deref(), args.result.force, &taken)?;
-    taken.extend(args.result.output.as_deref().map(Path::new));
-    let plot = args
-        .plot
-        .as_deref()
-        .map(|path| plot::open(path, args.result.force, &taken))
-        .transpose()?;
+    let inputs: Vec<&Path> = args.files.iter().map(Path::new).collect();
+    let output = args.result.open(&inputs)?;
+    let plot = open_plot(args.plot.as_deref(), &args.result, &inputs)?;
 
     let read: Vec<Result<Content, Failure>> = args
         .files

@@ -1,79 +1,83 @@
 //! The picture of the channels.
 
-use std::path::Path;
+use torqcomp_dsp::quality::range;
 
-use crate::failure::Failure;
-use crate::io::output::Output;
+use crate::chart::{Chart, Series, picture};
+use crate::print::rounded;
 use crate::quality::{labels, unit_of};
 use crate::recording::{Channel, Recording};
 use crate::report::inspect::{self, Entry, Report};
-use crate::report::panels::{self, Panel, Times};
 
-/// Opens the file for the picture.
-pub fn open(path: &Path, force: bool, taken: &[&Path]) -> Result<Output, Failure> {
-    let text = path
-        .to_str()
-        .filter(|text| *text != "-")
-        .ok_or_else(|| Failure::usage("--plot needs the name of a file, in UTF-8"))?;
-    Output::open(Some(text), force, taken)
-}
+/// Height of a channel's panel, in user units.
+const HEIGHT: f64 = 120.0;
+/// Times farther from zero than this many lengths of the record are counted from its start.
+const FAR: f64 = 1e4;
 
 /// Draws every channel of every file that was read.
 pub fn svg(recordings: &[&Recording], report: &Report) -> String {
-    let found: Vec<&inspect::File> = report
-        .files
-        .iter()
-        .filter_map(|entry| match entry {
-            Entry::Read(file) => Some(file.as_ref()),
-            Entry::Failed { .. } => None,
-        })
-        .collect();
+    let found = report.files.iter().filter_map(|entry| match entry {
+        Entry::Read(file) => Some(file.as_ref()),
+        Entry::Failed { .. } => None,
+    });
     let several = recordings.len() > 1;
-    let panels: Vec<Panel> = recordings
-        .iter()
-        .zip(found)
-        .flat_map(|(recording, found)| {
-            let channels = recording.channels.iter().zip(&found.channels);
-            let named = channels.zip(labels(&recording.channels));
-            named.map(move |((channel, found), label)| {
-                let name = match several {
-                    true => format!("{}: {label}", recording.source),
-                    false => label,
-                };
-                panel(channel, found, name)
-            })
-        })
-        .collect();
+    let mut charts = Vec::new();
+    for (recording, found) in recordings.iter().zip(found) {
+        let channels = recording.channels.iter().zip(&found.channels);
+        for ((channel, found), label) in channels.zip(labels(&recording.channels)) {
+            let name = match several {
+                true => format!("{}: {label}", recording.source),
+                false => label,
+            };
+            charts.push(chart(channel, found, name));
+        }
+    }
     let title = match recordings {
         [one] => one.source.clone(),
         several => format!("{} files", several.len()),
     };
-    panels::svg(&title, &panels)
+    picture(&title, HEIGHT, &charts)
 }
 
-fn panel<'a>(channel: &'a Channel, found: &inspect::Channel, name: String) -> Panel<'a> {
-    let axis = &channel.axis;
+fn chart(channel: &Channel, found: &inspect::Channel, name: String) -> Chart {
     let drawn = channel.samples.len();
     let name = match found.samples > drawn {
         true => format!("{name} (the first {drawn} of {} samples)", found.samples),
         false => name,
     };
-    let times = match (&axis.stamps_s, axis.rate_hz) {
-        (Some(stamps), _) => Times::Stamps(stamps),
-        (None, Some(rate_hz)) => Times::Uniform {
-            start_s: axis.start_s.unwrap_or(0.0),
-            rate_hz,
-        },
-        (None, None) => Times::Numbers,
+    let (axis, last) = (&channel.axis, drawn.saturating_sub(1));
+    let uniform = |i: usize, rate_hz: f64| axis.start_s.unwrap_or(0.0) + i as f64 / rate_hz;
+    let (ends, x_label) = match (&axis.stamps_s, axis.rate_hz) {
+        (Some(stamps), _) => (range(stamps), "time, s"),
+        (None, Some(rate_hz)) => (
+            Some((uniform(0, rate_hz), uniform(last, rate_hz))),
+            "time, s",
+        ),
+        (None, None) => (Some((1.0, drawn as f64)), "sample"),
     };
-    Panel {
-        name,
-        unit: unit_of(channel).to_owned(),
-        samples: &channel.samples,
-        times,
+    let (from, to) = ends.unwrap_or((0.0, 0.0));
+    let is_far = from.abs() > FAR * (to - from) && x_label != "sample";
+    let zero = if is_far { from } else { 0.0 };
+    let x = |i: usize| match (&axis.stamps_s, axis.rate_hz) {
+        (Some(stamps), _) => stamps.get(i).copied().unwrap_or(f64::NAN) - zero,
+        (None, Some(rate_hz)) => uniform(i, rate_hz) - zero,
+        (None, None) => (i + 1) as f64,
+    };
+    let points = channel.samples.iter().enumerate().map(|(i, y)| (x(i), *y));
+    let series = Series::recorded(points, (from - zero, to - zero));
+    let x_label = match is_far {
+        true => format!("time after {} s, s", rounded(zero, 12)),
+        false => x_label.to_owned(),
+    };
+    let unit = match unit_of(channel) {
+        "" => "unit not given",
+        unit => unit,
+    };
+    Chart {
         rails: [found.clipped_low, found.clipped_high]
             .into_iter()
             .flatten()
             .collect(),
+        first_colour: 1,
+        ..Chart::new(&name, &x_label, unit, vec![series])
     }
 }

@@ -1,9 +1,9 @@
 //! Warnings, method and charts of a decay.
 
 use super::modes::{ModesFit, Stretch};
+use crate::chart::{Chart, Series};
 use crate::identify::{self, Identification};
 use crate::print::{plural, rounded};
-use crate::report::chart::{Chart, Series};
 
 /// Warns about what makes the fit doubtful.
 pub(super) fn fit_warnings(result: &mut Identification, fit: &ModesFit) {

@@ -7,9 +7,9 @@ use super::blocks::Set;
 use super::lines::Lines;
 use super::order::folds;
 use super::{FinalFit, Modal, ResponseOptions};
+use crate::chart::{Chart, Series};
 use crate::identify::{Comparison, Identification, NamedEstimate};
 use crate::print::{plural, rounded, short};
-use crate::report::chart::{Chart, Series};
 
 /// Adds every mode with its natural frequency and damping ratio, by rising frequency.
 pub(super) fn add_modes(result: &mut Identification, fitted: &FinalFit) {

@@ -3,9 +3,9 @@
 use super::directions::Directions;
 use super::windows::FittedRows;
 use super::{COLOURED, FreeRun, RunupOptions};
+use crate::chart::{Chart, Series};
 use crate::identify::{Identification, Motion};
 use crate::print::{rounded, short};
-use crate::report::chart::{Chart, Series};
 
 /// Noise in a regressor, as a part of its power, above which there is a warning.
 const NOISY: f64 = 0.2;

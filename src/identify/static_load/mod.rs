@@ -7,9 +7,9 @@ use serde::Serialize;
 use torqcomp_model::fit::linear::{self, LinearFit};
 
 use super::{FitQuality, Identification, NamedEstimate, rms};
+use crate::chart::{Chart, Series};
 use crate::failure::Failure;
 use crate::print::rounded;
-use crate::report::chart::{Chart, Series};
 
 /// One reading under a known load.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,75 +1,64 @@
-//! The report of what follows from a drawing.
+//! The constants of a drawing beside the measured ones, as they are printed.
 
 use serde::Serialize;
 
-use crate::print::{columns, rounded, with_std};
+use crate::print::{Report, columns, rounded, with_std};
 
-/// Schema of the JSON document.
-pub const SCHEMA: &str = "torqcomp.predict/1";
-
-/// Report of a prediction.
+/// Constants that follow from the drawing.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Report {
-    /// Schema of this document.
-    pub schema: &'static str,
-    /// Version of torqcomp.
-    pub version: &'static str,
-    /// Stand file.
-    pub stand: String,
-    /// The constants.
-    pub constants: Vec<Constant>,
+pub(super) struct PredictReport {
+    pub(super) stand: String,
+    pub(super) constants: Vec<PredictedConstant>,
 }
 
 /// A constant from the drawing, beside the measured one.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Constant {
-    /// Name.
-    pub name: &'static str,
+pub(super) struct PredictedConstant {
+    pub(super) name: &'static str,
     /// Unit of the values.
-    pub unit: String,
+    pub(super) unit: String,
     /// From the drawing, by the plain theory; `null` if the drawing does not give it.
-    pub predicted: Option<f64>,
+    pub(super) predicted: Option<f64>,
     /// Its standard uncertainty, from those of the drawing.
-    pub predicted_std: Option<f64>,
+    pub(super) predicted_std: Option<f64>,
     /// As measured; `null` if the stand file does not give it.
-    pub measured: Option<f64>,
+    pub(super) measured: Option<f64>,
     /// Its standard uncertainty.
-    pub measured_std: Option<f64>,
+    pub(super) measured_std: Option<f64>,
     /// Where the measured value comes from, as the stand file says.
-    pub measured_source: Option<String>,
+    pub(super) measured_source: Option<String>,
     /// `100 (predicted − measured) / measured`.
-    pub residual_percent: Option<f64>,
+    pub(super) residual_percent: Option<f64>,
     /// What in the model explains at least half of the residual; `null` if nothing does.
-    pub explained_by: Option<String>,
+    pub(super) explained_by: Option<String>,
     /// Theory by which `predicted` follows.
-    pub by: &'static str,
+    pub(super) by: &'static str,
     /// What adding each effect of the drawing makes of the prediction, one after the other.
-    pub refinements: Vec<Refinement>,
+    pub(super) refinements: Vec<Refinement>,
     /// What else is to be said about the residual.
-    pub note: Option<String>,
+    pub(super) note: Option<String>,
 }
 
 /// The prediction with one more effect.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Refinement {
+pub(super) struct Refinement {
     /// The effect.
-    pub effect: &'static str,
+    pub(super) effect: &'static str,
     /// The prediction with it and those before it.
-    pub predicted: f64,
+    pub(super) predicted: f64,
     /// The residual that is left.
-    pub residual_percent: Option<f64>,
+    pub(super) residual_percent: Option<f64>,
 }
 
 /// `100 (predicted − measured) / measured`.
-#[must_use]
-pub fn residual_percent(predicted: Option<f64>, measured: Option<f64>) -> Option<f64> {
+pub(super) fn residual_percent(predicted: Option<f64>, measured: Option<f64>) -> Option<f64> {
     Some(100.0 * (predicted? - measured?) / measured?).filter(|r| r.is_finite())
 }
 
-impl Report {
-    /// For people.
-    #[must_use]
-    pub fn text(&self) -> String {
+impl Report for PredictReport {
+    const SCHEMA: &'static str = "torqcomp.predict/1";
+
+    fn text(&self) -> String {
         let mut rows = vec![
             [
                 "constant",
@@ -116,7 +105,7 @@ fn percent(value: Option<f64>) -> String {
     }
 }
 
-impl Constant {
+impl PredictedConstant {
     fn cells(&self) -> Vec<String> {
         vec![
             self.name.to_owned(),
@@ -130,7 +119,7 @@ impl Constant {
 }
 
 impl Refinement {
-    fn cells(&self, constant: &Constant) -> Vec<String> {
+    fn cells(&self, constant: &PredictedConstant) -> Vec<String> {
         vec![
             format!("  with {}", self.effect),
             constant.unit.clone(),
