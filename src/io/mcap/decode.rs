@@ -202,7 +202,7 @@ impl Encoding {
 /// Takes wanted numbers out of messages.
 pub enum Decoder {
     /// CDR and ROS 1.
-    Cdr(cdr::CdrDecoder),
+    Cdr(Box<cdr::CdrDecoder>),
     /// Protobuf.
     Protobuf(Option<MessageDescriptor>, TreeTargets),
     /// JSON.
@@ -213,14 +213,18 @@ impl Decoder {
     /// Prepares for messages of one type.
     pub fn new(encoding: Encoding, schema: &Arc<Schema>, targets: Targets) -> Self {
         match encoding {
-            Encoding::Cdr => Self::Cdr(cdr::CdrDecoder::new(schema, targets, false)),
-            Encoding::Ros1 => Self::Cdr(cdr::CdrDecoder::new(schema, targets, true)),
+            Encoding::Cdr => Self::cdr(schema, targets, false),
+            Encoding::Ros1 => Self::cdr(schema, targets, true),
             Encoding::Protobuf => {
                 let descriptor = schema.descriptor.clone();
                 Self::Protobuf(descriptor, TreeTargets::new(schema, &targets))
             }
             Encoding::Json => Self::Json(TreeTargets::new(schema, &targets)),
         }
+    }
+
+    fn cdr(schema: &Arc<Schema>, targets: Targets, is_ros1: bool) -> Self {
+        Self::Cdr(Box::new(cdr::CdrDecoder::new(schema, targets, is_ros1)))
     }
 
     /// Reads a message; `reading` is cleared first.

@@ -2,10 +2,10 @@
 //!
 //! # Data path
 //!
-//! Bytes → [`record`] (records, chunks unpacked, damage noted) → [`channels`] (what a
-//! channel's messages are made of, by [`schema`]) → [`route`] (the way to the wanted number) →
-//! [`decode`] ([`cdr`], [`protobuf`], [`json`]) → [`blocks`] and [`order`] (times) → [`SignalReader`], or
-//! [`read_fields`] for several numbers in one pass.
+//! Bytes → `record` (records, chunks unpacked, damage noted) → `channels` (what a channel's messages
+//! are made of, by [`schema`]) → [`route`] (the way to the wanted number) → [`decode`] ([`cdr`],
+//! `protobuf`, `json`) → `blocks` and `order` (times) → [`SignalReader`], or [`read_fields`] for several
+//! numbers in one pass.
 //!
 //! # What is believed
 //!
