@@ -1,4 +1,4 @@
-use mcap::Compression;
+use mcap::{Compression, MAGIC};
 
 use super::super::super::testing::{File, float64, options, reader};
 use super::*;

@@ -7,6 +7,7 @@ use mcap::records::{ChunkHeader, ChunkIndex, MessageIndex, MessageIndexEntry, op
 
 use super::index::FileIndex;
 use super::sink::{RecordSink, body, push_record};
+use crate::io::mcap::record::chunk::pack;
 
 /// Bytes of records that a chunk is closed at.
 const FULL: usize = 1 << 20;
@@ -105,17 +106,5 @@ pub(super) fn chunk_index(header: ChunkHeader, chunk_start_offset: u64) -> Chunk
         compression: header.compression,
         compressed_size: header.compressed_size,
         uncompressed_size: header.uncompressed_size,
-    }
-}
-
-fn pack(compression: &str, records: &[u8]) -> io::Result<Vec<u8>> {
-    match compression {
-        "zstd" => zstd::bulk::compress(records, zstd::DEFAULT_COMPRESSION_LEVEL),
-        "lz4" => {
-            let mut encoder = lz4_flex::frame::FrameEncoder::new(Vec::new());
-            encoder.write_all(records)?;
-            encoder.finish().map_err(io::Error::other)
-        }
-        _ => Ok(records.to_vec()),
     }
 }
