@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::describe;
 use super::guard_models::GuardModel;
+use super::noise_floor::NoiseFloorSource;
 use super::reason::Status;
 use super::record::StandRecord;
 use super::residual_tests::ResidualTests;
@@ -12,12 +13,12 @@ use super::search::CandidateFit;
 use super::spectra::SpectralLine;
 use super::structure::{FitContext, PlainStand};
 use super::verdict::Verdict;
-use super::{Case, Found};
+use super::{Case, SearchState};
 use crate::warning::Warning;
 
 /// Files of a diagnosis.
 #[derive(Debug, Clone, Serialize)]
-pub struct Sources {
+pub struct SourceFiles {
     pub stand: Option<String>,
     pub train: Vec<String>,
     /// Empty if parts of the training records are held out.
@@ -30,7 +31,7 @@ pub struct Diagnosis {
     /// Version of torqcomp.
     pub version: &'static str,
     #[serde(flatten)]
-    pub sources: Sources,
+    pub sources: SourceFiles,
     pub verdict: Verdict,
     /// Names of the effects that were added.
     pub effects: Vec<&'static str>,
@@ -67,7 +68,7 @@ pub struct ErrorTable {
     pub improvement_ci95: Option<[f64; 2]>,
     /// Rms of the noise of the held-out records, estimated without a model.
     pub noise_floor_rms: Option<f64>,
-    pub noise_floor_from: Option<&'static str>,
+    pub noise_floor_from: Option<NoiseFloorSource>,
 }
 
 #[derive(Debug, Clone, Copy, Serialize)]
@@ -116,7 +117,7 @@ pub struct ExcitationLevels {
 }
 
 impl Diagnosis {
-    pub(super) fn of(case: Case, mut found: Found) -> Self {
+    pub(super) fn of(case: Case, mut found: SearchState) -> Self {
         let lines = found.lines();
         let verdict = found.conclude();
         let effects = found.after.effect_names();
@@ -159,7 +160,7 @@ impl Diagnosis {
     }
 }
 
-impl Found {
+impl SearchState {
     /// Lines with their amplitudes in the printed unit.
     fn printed(&self, mut lines: Vec<SpectralLine>) -> Vec<SpectralLine> {
         let unit = self.after.fitted.structure.context.units.per_printed;
@@ -196,7 +197,7 @@ impl Found {
 }
 
 impl ErrorTable {
-    fn of(found: &Found) -> Self {
+    fn of(found: &SearchState) -> Self {
         let (before, after) = (&found.before, &found.after);
         let units = &after.fitted.structure.context.units;
         let size = holdout_rms(before);
@@ -212,7 +213,7 @@ impl ErrorTable {
             after: errors(after),
             improvement_ci95: has_effects.then(|| after.against(before).improvement_ci95()),
             noise_floor_rms: found.noise_floor.map(|f| f.rms / units.per_printed),
-            noise_floor_from: found.noise_floor.map(|f| f.from.name()),
+            noise_floor_from: found.noise_floor.map(|f| f.from),
         }
     }
 }
@@ -231,7 +232,7 @@ fn holdout_rms(before: &ScoredModel) -> f64 {
 }
 
 impl ExcitationLevels {
-    fn of(found: &Found, before: &ModelErrors) -> Self {
+    fn of(found: &SearchState, before: &ModelErrors) -> Self {
         let context = &found.before.fitted.structure.context;
         let train_size = context.scales.rms / context.units.per_printed;
         Self {
@@ -250,7 +251,7 @@ fn applied_rms(records: &[StandRecord]) -> f64 {
 }
 
 /// The constants of the plain stand: declared, refitted, and refitted with the effects.
-fn constants(declared: Option<PlainStand>, found: &Found) -> Vec<StandConstant> {
+fn constants(declared: Option<PlainStand>, found: &SearchState) -> Vec<StandConstant> {
     let context = &found.before.fitted.structure.context;
     let (gain_unit, gain_scale) = context.units.gain();
     let named = [
