@@ -16,9 +16,6 @@ use crate::warning::Warning;
 pub use mode::{KnownConstant, ModalPole, Pole};
 pub use motion::Motion;
 
-/// Schema of the JSON document.
-const SCHEMA: &str = "torqcomp.identify/1";
-
 /// A number with a stable name, such as `inertia`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NamedEstimate {
@@ -103,10 +100,14 @@ impl NamedEstimates {
         }
     }
 
-    /// Those with these names, in this order; each behind the prefix.
-    pub(crate) fn only(mut self, names: &[&str], prefix: &str) -> Self {
-        let place = |name: &&str| self.list.iter().position(|c| c.name == **name);
-        let places: Vec<usize> = names.iter().filter_map(place).collect();
+    /// Those with these names, in this order, of the mode `place` out of `count`, which numbers them if there are several.
+    pub(crate) fn of_mode(mut self, (place, count): (usize, usize), names: &[&str]) -> Self {
+        let prefix = match count {
+            1 => String::new(),
+            _ => format!("mode_{}_", place + 1),
+        };
+        let index = |name: &&str| self.list.iter().position(|c| c.name == **name);
+        let places: Vec<usize> = names.iter().filter_map(index).collect();
         let renamed = |i: &usize| NamedEstimate {
             name: format!("{prefix}{}", self.list[*i].name),
             ..self.list[*i].clone()
@@ -176,10 +177,6 @@ fn correlations(names: &[&str], covariance: &Covariance) -> Vec<Correlation> {
 /// The result of an identification; serialises to the JSON document.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Identification {
-    /// Schema of the document.
-    pub schema: &'static str,
-    /// Version of torqcomp.
-    pub version: &'static str,
     /// `decay`, `response`, `runup` or `static`.
     pub test: &'static str,
     /// Files that were read.
@@ -217,8 +214,6 @@ pub struct Identification {
 impl Identification {
     fn new(test: &'static str) -> Self {
         Self {
-            schema: SCHEMA,
-            version: env!("CARGO_PKG_VERSION"),
             test,
             ..Self::default()
         }

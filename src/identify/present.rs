@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::{Correlation, FitQuality, Identification, NamedEstimate};
 use crate::chart::Page;
-use crate::print::{columns, rounded, short, value_and_std};
+use crate::print::{Report, columns, rounded, short, value_and_std};
 
 /// A table under its heading, and a sentence below it.
 struct ResultTable {
@@ -13,9 +13,10 @@ struct ResultTable {
     note: Option<String>,
 }
 
-impl Identification {
-    /// The result as text.
-    pub(crate) fn text(&self) -> String {
+impl Report for Identification {
+    const SCHEMA: &'static str = "torqcomp.identify/1";
+
+    fn text(&self) -> String {
         let mut text = format!("{}, {}\n", self.title(), self.recording());
         for line in &self.method {
             let _ = writeln!(text, "{line}");
@@ -44,7 +45,9 @@ impl Identification {
         }
         text
     }
+}
 
+impl Identification {
     /// The result as an HTML page that needs no other file.
     pub(crate) fn page(&self) -> String {
         let mut page = Page::new(&self.title());
@@ -85,7 +88,7 @@ impl Identification {
         for line in &self.method {
             page.text(line);
         }
-        page.text(&format!("torqcomp {}", self.version));
+        page.text(concat!("torqcomp ", env!("CARGO_PKG_VERSION")));
         page.html()
     }
 

@@ -52,7 +52,7 @@ pub(super) fn from_ratios(
     let Some((known, is_given)) = known(anchors, findings, ratios)? else {
         result.warn("not-anchored", not_scaled(ratios));
         let names = ["natural_frequency", "damping_ratio"];
-        let modal = mode.modal_constants().only(&names, "");
+        let modal = mode.modal_constants().of_mode((0, 1), &names);
         return Ok(entries(&modal.list, source));
     };
     let all = mode.scaled_by_known_constant(known);

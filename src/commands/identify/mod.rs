@@ -17,7 +17,7 @@ use crate::identify::{Identification, NamedEstimate};
 use crate::io::Input;
 use crate::io::csv::{NamedUnit, Options};
 use crate::io::output;
-use crate::print;
+use crate::print::Report;
 use crate::recording::{Recording, Selection};
 use crate::signal::Together;
 use crate::signal::together::{axes, uniform};
@@ -133,10 +133,9 @@ fn deliver(
         output::write_all(Some(page), target.force, &others, &result.page())?;
     }
     let printed = match (findings.json, output) {
-        (true, _) => print::json(&result),
         // Standard output has the stand file.
         (false, Some("-")) => String::new(),
-        (false, _) => result.text(),
+        (as_json, _) => result.document(as_json),
     };
     output::write_all(None, false, &[], &printed)?;
     Ok(conclude(

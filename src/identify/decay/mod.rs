@@ -77,17 +77,13 @@ pub fn identify(
             fit.poles[*k],
             fit.fit.covariance.select(&[2 * k, 2 * k + 1]),
         );
-        let prefix = match order.len() {
-            1 => String::new(),
-            _ => format!("mode_{}_", place + 1),
-        };
         let names = [
             "damped_frequency",
             "decay_rate",
             "damping_ratio",
             "natural_frequency",
         ];
-        let constants = mode.modal_constants().only(&names, &prefix);
+        let constants = mode.modal_constants().of_mode((place, order.len()), &names);
         result.parameters.extend(constants.list);
         result.modes.push(mode);
     }

@@ -19,12 +19,8 @@ pub(super) fn add_modes(result: &mut Identification, fitted: &FinalFit) {
     order.sort_by(|a, b| omega(*a).total_cmp(&omega(*b)));
     for (place, k) in order.iter().enumerate() {
         let mode = fitted.mode(*k);
-        let prefix = match order.len() {
-            1 => String::new(),
-            _ => format!("mode_{}_", place + 1),
-        };
         let names = ["natural_frequency", "damping_ratio"];
-        let constants = mode.modal_constants().only(&names, &prefix);
+        let constants = mode.modal_constants().of_mode((place, order.len()), &names);
         if modal.fit.as_ref().is_some_and(|f| f.at_bound[2 * k]) {
             result.warn(
                 "at-bound",
