@@ -9,7 +9,9 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use mcap::records::MessageHeader;
 use mcap::{Compression, WriteOptions, Writer};
 use torqcomp::io::Input;
-use torqcomp::io::mcap::{FieldChoice, Inventory, SignalReader, TimeOptions};
+use torqcomp::io::mcap::record::frames::Frames;
+use torqcomp::io::mcap::record::input::CountedInput;
+use torqcomp::io::mcap::{Inventory, Options, Selection, Source};
 
 const MESSAGES: u64 = 100_000;
 const JOINTS: u32 = 6;
@@ -86,24 +88,26 @@ fn recording(compression: Option<Compression>) -> Vec<u8> {
     writer.into_inner().into_inner()
 }
 
-fn stream(bytes: &[u8]) -> Box<Cursor<Vec<u8>>> {
-    Box::new(Cursor::new(bytes.to_vec()))
+fn frames(bytes: &[u8]) -> Frames {
+    let input = CountedInput::new(Box::new(Cursor::new(bytes.to_vec())));
+    Frames::new("bench".to_owned(), input).expect("an MCAP file")
 }
 
 fn read(bytes: &[u8], field: &str) -> u64 {
-    let choice = FieldChoice {
+    let selection = Selection {
         topic: Some("/joint_states".to_owned()),
         field: Some(field.to_owned()),
         signal: None,
     };
-    let options = TimeOptions::default();
-    let reader = SignalReader::with_stream(&Input::Stdin, stream(bytes), &choice, &options);
-    let mut reader = reader.expect("it is there");
+    let wanted = selection.check().expect("a topic and a field");
+    let options = Options::default();
+    let mut source =
+        Source::read(&Input::Stdin, frames(bytes), &wanted, &options).expect("it is there");
     let (mut times, mut values) = (Vec::new(), Vec::new());
-    while reader.next(&mut times, &mut values).expect("in memory") {
+    while source.next(&mut times, &mut values).expect("in memory") {
         black_box((&times, &values));
     }
-    reader.finish().samples
+    source.finish().samples
 }
 
 fn readers(criterion: &mut Criterion) {
@@ -123,10 +127,7 @@ fn readers(criterion: &mut Criterion) {
             });
         }
         group.bench_function(format!("{name}/inventory"), |bencher| {
-            bencher.iter(|| {
-                let inventory = Inventory::read("bench".to_owned(), stream(&bytes));
-                inventory.expect("in memory").messages
-            });
+            bencher.iter(|| Inventory::read(frames(&bytes)).expect("in memory").messages);
         });
     }
     group.finish();

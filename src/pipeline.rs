@@ -10,20 +10,34 @@
 //! so their buffers are allocated once, and their number bounds the memory.
 
 use std::collections::{BTreeMap, VecDeque};
-use std::sync::{Condvar, Mutex, MutexGuard};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
 /// The stages of a stream of jobs `J`; `E` is what stops it, `S` what each thread owns.
-pub struct Stages<Read, Prepare, Join, Work, Deliver> {
+pub struct Stages<'a, J, S, E> {
     /// Fills a job; `false` at the end of the stream.
-    pub read: Read,
+    pub read: Box<dyn FnMut(&mut J) -> Result<bool, E> + Send + 'a>,
     /// Does what needs no neighbour.
-    pub prepare: Prepare,
+    pub prepare: Box<dyn Fn(&mut J) + Sync + 'a>,
     /// Takes jobs in order (`None` at the end) and hands on those that are complete, in order.
-    pub join: Join,
+    pub join: Box<Join<'a, J, E>>,
     /// Does what needs neighbours, with the thread's own scratch.
-    pub work: Work,
+    pub work: Box<dyn Fn(&mut S, &mut J) + Sync + 'a>,
     /// Takes the finished jobs in order.
-    pub deliver: Deliver,
+    pub deliver: Box<dyn FnMut(&mut J) -> Result<(), E> + Send + 'a>,
+}
+
+/// Takes a job and hands on others.
+type Join<'a, J, E> = dyn FnMut(Option<J>, &mut dyn FnMut(J)) -> Result<(), E> + Send + 'a;
+
+/// The stages and their state, as all threads see them.
+struct SharedStages<'a, J, S, E> {
+    state: Mutex<State<J, E>>,
+    changed: Condvar,
+    read: Mutex<Box<dyn FnMut(&mut J) -> Result<bool, E> + Send + 'a>>,
+    prepare: Box<dyn Fn(&mut J) + Sync + 'a>,
+    join: Mutex<Box<Join<'a, J, E>>>,
+    work: Box<dyn Fn(&mut S, &mut J) + Sync + 'a>,
+    deliver: Mutex<Box<dyn FnMut(&mut J) -> Result<(), E> + Send + 'a>>,
 }
 
 struct State<J, E> {
@@ -59,136 +73,115 @@ enum Task<J> {
 ///
 /// More jobs are made when all of them wait in `join`; that happens only if a job needs more
 /// followers than there are jobs.
-pub fn run<J, S, E, Read, Prepare, Join, Work, Deliver>(
-    jobs: usize,
-    scratch: Vec<S>,
-    stages: Stages<Read, Prepare, Join, Work, Deliver>,
-) -> Result<(), E>
+pub fn run<J, S, E>(jobs: usize, scratch: Vec<S>, stages: Stages<J, S, E>) -> Result<(), E>
 where
     J: Default + Send,
     S: Send,
     E: Send,
-    Read: FnMut(&mut J) -> Result<bool, E> + Send,
-    Prepare: Fn(&mut J) + Sync,
-    Join: FnMut(Option<J>, &mut dyn FnMut(J)) -> Result<(), E> + Send,
-    Work: Fn(&mut S, &mut J) + Sync,
-    Deliver: FnMut(&mut J) -> Result<(), E> + Send,
 {
-    let state = Mutex::new(State {
-        free: (0..jobs).map(|_| J::default()).collect(),
-        prepared: BTreeMap::new(),
-        ready: VecDeque::new(),
-        worked: BTreeMap::new(),
-        next_read: 0,
-        next_join: 0,
-        next_ready: 0,
-        next_deliver: 0,
-        reading: false,
-        joining: false,
-        delivering: false,
-        busy: 0,
-        read_all: false,
-        joined_all: false,
-        error: None,
-        panicked: false,
-    });
-    let changed = Condvar::new();
-    let read = Mutex::new(stages.read);
-    let join = Mutex::new(stages.join);
-    let deliver = Mutex::new(stages.deliver);
-    let (prepare, work) = (&stages.prepare, &stages.work);
-
-    let worker = |mut own: S| {
-        let _release = ReleaseOthers(&state, &changed);
-        loop {
-            let task = {
-                let mut guard = lock(&state);
-                loop {
-                    match guard.take() {
-                        Some(task) => break task,
-                        None => guard = changed.wait(guard).unwrap_or_else(|e| e.into_inner()),
-                    }
-                }
-            };
-            match task {
-                Task::Leave => break,
-                Task::Deliver(mut job) => {
-                    let result = (lock(&deliver))(&mut job);
-                    let mut guard = lock(&state);
-                    guard.delivering = false;
-                    guard.next_deliver += 1;
-                    guard.free.push(job);
-                    guard.end(result);
-                }
-                Task::Join(job) => {
-                    let last = job.is_none();
-                    let mut ready = Vec::new();
-                    let result = (lock(&join))(job, &mut |job| ready.push(job));
-                    let mut guard = lock(&state);
-                    guard.joining = false;
-                    guard.joined_all = last;
-                    for job in ready {
-                        let place = guard.next_ready;
-                        guard.next_ready += 1;
-                        guard.ready.push_back((place, job));
-                    }
-                    guard.end(result);
-                }
-                Task::Work(place, mut job) => {
-                    work(&mut own, &mut job);
-                    let mut guard = lock(&state);
-                    guard.worked.insert(place, job);
-                    guard.end(Ok(()));
-                }
-                Task::Read(place, mut job) => {
-                    let result = (lock(&read))(&mut job);
-                    {
-                        let mut guard = lock(&state);
-                        guard.reading = false;
-                        match result {
-                            Ok(true) => guard.next_read += 1,
-                            Ok(false) => guard.read_all = true,
-                            Err(error) => {
-                                guard.end(Err(error));
-                                changed.notify_all();
-                                continue;
-                            }
-                        }
-                        if guard.read_all {
-                            guard.free.push(job);
-                            guard.end(Ok(()));
-                            changed.notify_all();
-                            continue;
-                        }
-                    }
-                    changed.notify_all();
-                    prepare(&mut job);
-                    let mut guard = lock(&state);
-                    guard.prepared.insert(place, job);
-                    guard.end(Ok(()));
-                }
-            }
-            changed.notify_all();
-        }
+    let line = SharedStages {
+        state: Mutex::new(State::new(jobs)),
+        changed: Condvar::new(),
+        read: Mutex::new(stages.read),
+        prepare: stages.prepare,
+        join: Mutex::new(stages.join),
+        work: stages.work,
+        deliver: Mutex::new(stages.deliver),
     };
-
     std::thread::scope(|scope| {
         let mut scratch = scratch.into_iter();
         let first = scratch.next();
         for own in scratch {
-            scope.spawn(|| worker(own));
+            let line = &line;
+            scope.spawn(move || line.run(own));
         }
         if let Some(own) = first {
-            worker(own);
+            line.run(own);
         }
     });
-    match state
-        .into_inner()
-        .unwrap_or_else(|poisoned| poisoned.into_inner())
-        .error
-    {
-        Some(error) => Err(error),
-        None => Ok(()),
+    let state = line.state.into_inner();
+    let error = state.unwrap_or_else(PoisonError::into_inner).error;
+    error.map_or(Ok(()), Err)
+}
+
+impl<J: Default, S, E> SharedStages<'_, J, S, E> {
+    /// Takes tasks until there are no more.
+    fn run(&self, mut own: S) {
+        let _release = ReleaseOthers(&self.state, &self.changed);
+        loop {
+            match self.next_task() {
+                Task::Leave => break,
+                Task::Deliver(job) => self.deliver(job),
+                Task::Join(job) => self.join(job),
+                Task::Work(place, mut job) => {
+                    (self.work)(&mut own, &mut job);
+                    let mut state = lock(&self.state);
+                    state.worked.insert(place, job);
+                    state.end(Ok(()));
+                }
+                Task::Read(place, job) => self.read(place, job),
+            }
+            self.changed.notify_all();
+        }
+    }
+
+    fn next_task(&self) -> Task<J> {
+        let mut state = lock(&self.state);
+        loop {
+            match state.take() {
+                Some(task) => return task,
+                None => {
+                    let waited = self.changed.wait(state);
+                    state = waited.unwrap_or_else(PoisonError::into_inner);
+                }
+            }
+        }
+    }
+
+    fn deliver(&self, mut job: J) {
+        let result = (lock(&self.deliver))(&mut job);
+        let mut state = lock(&self.state);
+        state.delivering = false;
+        state.next_deliver += 1;
+        state.free.push(job);
+        state.end(result);
+    }
+
+    fn join(&self, job: Option<J>) {
+        let is_last = job.is_none();
+        let mut ready = Vec::new();
+        let result = (lock(&self.join))(job, &mut |job| ready.push(job));
+        let mut state = lock(&self.state);
+        state.joining = false;
+        state.joined_all = is_last;
+        for job in ready {
+            let place = state.next_ready;
+            state.next_ready += 1;
+            state.ready.push_back((place, job));
+        }
+        state.end(result);
+    }
+
+    fn read(&self, place: usize, mut job: J) {
+        let result = (lock(&self.read))(&mut job);
+        let mut state = lock(&self.state);
+        state.reading = false;
+        match result {
+            Ok(true) => state.next_read += 1,
+            Ok(false) => {
+                state.read_all = true;
+                state.free.push(job);
+                return state.end(Ok(()));
+            }
+            Err(error) => return state.end(Err(error)),
+        }
+        drop(state);
+        // Another thread can read the next job while this one is prepared.
+        self.changed.notify_all();
+        (self.prepare)(&mut job);
+        let mut state = lock(&self.state);
+        state.prepared.insert(place, job);
+        state.end(Ok(()));
     }
 }
 
@@ -206,12 +199,31 @@ impl<J, E> Drop for ReleaseOthers<'_, J, E> {
 
 /// A panicking stage is passed on by the scope; the lock itself is not at fault.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex
-        .lock()
-        .unwrap_or_else(|poisoned| poisoned.into_inner())
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl<J: Default, E> State<J, E> {
+    fn new(jobs: usize) -> Self {
+        Self {
+            free: (0..jobs).map(|_| J::default()).collect(),
+            prepared: BTreeMap::new(),
+            ready: VecDeque::new(),
+            worked: BTreeMap::new(),
+            next_read: 0,
+            next_join: 0,
+            next_ready: 0,
+            next_deliver: 0,
+            reading: false,
+            joining: false,
+            delivering: false,
+            busy: 0,
+            read_all: false,
+            joined_all: false,
+            error: None,
+            panicked: false,
+        }
+    }
+
     /// The task nearest to the end of the line; `None` if there is nothing to do right now.
     fn take(&mut self) -> Option<Task<J>> {
         if self.panicked
@@ -289,13 +301,13 @@ mod tests {
             3,
             vec![(); threads],
             Stages {
-                read: |job: &mut Job| {
+                read: Box::new(|job: &mut Job| {
                     job.0 = vec![next];
                     next += 1;
                     Ok(next <= count)
-                },
-                prepare: |job: &mut Job| job.0.push(1),
-                join: |job: Option<Job>, ready: &mut dyn FnMut(Job)| {
+                }),
+                prepare: Box::new(|job: &mut Job| job.0.push(1)),
+                join: Box::new(|job: Option<Job>, ready: &mut dyn FnMut(Job)| {
                     let end = job.is_none();
                     if let Some(job) = &job
                         && Some(job.0[0]) == fail_at
@@ -307,12 +319,12 @@ mod tests {
                         ready(waiting.pop_front().unwrap());
                     }
                     Ok(())
-                },
-                work: |_: &mut (), job: &mut Job| job.0[0] *= job.0[0],
-                deliver: |job: &mut Job| {
+                }),
+                work: Box::new(|_: &mut (), job: &mut Job| job.0[0] *= job.0[0]),
+                deliver: Box::new(|job: &mut Job| {
                     out.push(job.0[0]);
                     Ok(())
-                },
+                }),
             },
         );
         (out, result.err())
@@ -340,21 +352,21 @@ mod tests {
         for threads in [1, 3] {
             let result = std::panic::catch_unwind(|| {
                 let mut count = 0;
-                run::<Job, (), (), _, _, _, _, _>(
+                run::<Job, (), ()>(
                     3,
                     vec![(); threads],
                     Stages {
-                        read: |_: &mut Job| {
+                        read: Box::new(|_: &mut Job| {
                             count += 1;
                             Ok(count < 100)
-                        },
-                        prepare: |_: &mut Job| {},
-                        join: |job: Option<Job>, ready: &mut dyn FnMut(Job)| {
+                        }),
+                        prepare: Box::new(|_: &mut Job| {}),
+                        join: Box::new(|job: Option<Job>, ready: &mut dyn FnMut(Job)| {
                             job.into_iter().for_each(ready);
                             Ok(())
-                        },
-                        work: |_: &mut (), _: &mut Job| panic!("a fault in a stage"),
-                        deliver: |_: &mut Job| Ok(()),
+                        }),
+                        work: Box::new(|_: &mut (), _: &mut Job| panic!("a fault in a stage")),
+                        deliver: Box::new(|_: &mut Job| Ok(())),
                     },
                 )
             });

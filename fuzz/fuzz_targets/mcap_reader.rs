@@ -5,34 +5,38 @@ use std::io::Cursor;
 
 use libfuzzer_sys::fuzz_target;
 use torqcomp::io::Input;
-use torqcomp::io::mcap::{FieldChoice, Inventory, SignalReader, TimeOptions};
+use torqcomp::io::mcap::record::frames::Frames;
+use torqcomp::io::mcap::record::input::CountedInput;
+use torqcomp::io::mcap::{Inventory, Options, Selection, Source};
 
-fn stream(bytes: &[u8]) -> Box<Cursor<Vec<u8>>> {
-    Box::new(Cursor::new(bytes.to_vec()))
+fn frames(bytes: &[u8]) -> Option<Frames> {
+    let input = CountedInput::new(Box::new(Cursor::new(bytes.to_vec())));
+    Frames::new("fuzz".to_owned(), input).ok()
 }
 
 fuzz_target!(|bytes: &[u8]| {
-    let Ok(inventory) = Inventory::read("fuzz".to_owned(), stream(bytes)) else {
+    let Some(inventory) = frames(bytes).and_then(|frames| Inventory::read(frames).ok()) else {
         return;
     };
     for channel in inventory.channels.iter().take(4) {
         for field in channel.leaves.iter().take(4) {
-            let choice = FieldChoice {
+            let selection = Selection {
                 topic: Some(channel.topic.clone()),
                 field: Some(field.path.replace("[]", "[:]")),
                 signal: None,
             };
-            let options = TimeOptions::default();
-            let reader =
-                SignalReader::with_stream(&Input::Stdin, stream(bytes), &choice, &options);
-            let Ok(mut reader) = reader else {
+            let (Ok(wanted), Some(frames)) = (selection.check(), frames(bytes)) else {
+                continue;
+            };
+            let Ok(mut source) = Source::read(&Input::Stdin, frames, &wanted, &Options::default())
+            else {
                 continue;
             };
             let (mut times, mut values) = (Vec::new(), Vec::new());
-            while reader.next(&mut times, &mut values).unwrap_or(false) {
+            while source.next(&mut times, &mut values).unwrap_or(false) {
                 assert!(times.is_sorted() && times.len() == values.len());
             }
-            let _ = reader.finish();
+            let _ = source.finish();
         }
     }
 });

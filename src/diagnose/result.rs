@@ -4,7 +4,6 @@ use serde::Serialize;
 
 use super::describe;
 use super::guard_models::GuardModel;
-use super::noise_floor::NoiseFloorSource;
 use super::reason::Status;
 use super::record::StandRecord;
 use super::residual_tests::ResidualTests;
@@ -13,12 +12,12 @@ use super::search::CandidateFit;
 use super::spectra::SpectralLine;
 use super::structure::{FitContext, PlainStand};
 use super::verdict::Verdict;
-use super::{Case, SearchState};
+use super::{Case, Found};
 use crate::warning::Warning;
 
 /// Files of a diagnosis.
 #[derive(Debug, Clone, Serialize)]
-pub struct SourceFiles {
+pub struct Sources {
     pub stand: Option<String>,
     pub train: Vec<String>,
     /// Empty if parts of the training records are held out.
@@ -31,7 +30,7 @@ pub struct Diagnosis {
     /// Version of torqcomp.
     pub version: &'static str,
     #[serde(flatten)]
-    pub sources: SourceFiles,
+    pub sources: Sources,
     pub verdict: Verdict,
     /// Names of the effects that were added.
     pub effects: Vec<&'static str>,
@@ -68,7 +67,7 @@ pub struct ErrorTable {
     pub improvement_ci95: Option<[f64; 2]>,
     /// Rms of the noise of the held-out records, estimated without a model.
     pub noise_floor_rms: Option<f64>,
-    pub noise_floor_from: Option<NoiseFloorSource>,
+    pub noise_floor_from: Option<&'static str>,
 }
 
 #[derive(Debug, Clone, Copy, Serialize)]
@@ -117,7 +116,7 @@ pub struct ExcitationLevels {
 }
 
 impl Diagnosis {
-    pub(super) fn of(case: Case, mut found: SearchState) -> Self {
+    pub(super) fn of(case: Case, mut found: Found) -> Self {
         let lines = found.lines();
         let verdict = found.conclude();
         let effects = found.after.effect_names();
@@ -160,7 +159,7 @@ impl Diagnosis {
     }
 }
 
-impl SearchState {
+impl Found {
     /// Lines with their amplitudes in the printed unit.
     fn printed(&self, mut lines: Vec<SpectralLine>) -> Vec<SpectralLine> {
         let unit = self.after.fitted.structure.context.units.per_printed;
@@ -197,7 +196,7 @@ impl SearchState {
 }
 
 impl ErrorTable {
-    fn of(found: &SearchState) -> Self {
+    fn of(found: &Found) -> Self {
         let (before, after) = (&found.before, &found.after);
         let units = &after.fitted.structure.context.units;
         let size = holdout_rms(before);
@@ -213,7 +212,7 @@ impl ErrorTable {
             after: errors(after),
             improvement_ci95: has_effects.then(|| after.against(before).improvement_ci95()),
             noise_floor_rms: found.noise_floor.map(|f| f.rms / units.per_printed),
-            noise_floor_from: found.noise_floor.map(|f| f.from),
+            noise_floor_from: found.noise_floor.map(|f| f.from.name()),
         }
     }
 }
@@ -232,7 +231,7 @@ fn holdout_rms(before: &ScoredModel) -> f64 {
 }
 
 impl ExcitationLevels {
-    fn of(found: &SearchState, before: &ModelErrors) -> Self {
+    fn of(found: &Found, before: &ModelErrors) -> Self {
         let context = &found.before.fitted.structure.context;
         let train_size = context.scales.rms / context.units.per_printed;
         Self {
@@ -251,7 +250,7 @@ fn applied_rms(records: &[StandRecord]) -> f64 {
 }
 
 /// The constants of the plain stand: declared, refitted, and refitted with the effects.
-fn constants(declared: Option<PlainStand>, found: &SearchState) -> Vec<StandConstant> {
+fn constants(declared: Option<PlainStand>, found: &Found) -> Vec<StandConstant> {
     let context = &found.before.fitted.structure.context;
     let (gain_unit, gain_scale) = context.units.gain();
     let named = [

@@ -11,7 +11,6 @@ use super::columns::Columns;
 use super::fit::{FitEffort, FittedModel, RecordResidual, raw_residual};
 use super::record::{Nuisance, NuisanceTerms, StandRecord, dot};
 use super::records::Records;
-use super::structure::EffectForm;
 
 /// A fitted model with its residuals.
 #[derive(Clone)]
@@ -206,7 +205,7 @@ impl ScoredModel {
         let mut amplitudes = fitted.amplitudes.iter();
         let effects = fitted.structure.effects.iter();
         let values = fitted.structure.effect_values(&fitted.values);
-        let of_effect = |(effect, mut values): (&EffectForm, Vec<f64>)| {
+        let of_effect = |(effect, mut values): (&super::structure::EffectForm, Vec<f64>)| {
             let moved = effect.moved();
             for (value, amplitude) in values[moved..].iter_mut().zip(&mut amplitudes) {
                 *value = *amplitude;

@@ -81,7 +81,7 @@ const FULL_FIT: FitEffort = FitEffort {
 };
 
 /// How many forms go on from one stage of fitting to the next.
-struct SearchEffort {
+struct Selection {
     /// Forms that get a first fit, by the residual that their starts leave.
     first: usize,
     /// Gain of the first fit, over the largest of all, from which on a second one follows.
@@ -90,13 +90,13 @@ struct SearchEffort {
     full: usize,
 }
 
-const FOR_FIRST_EFFECT: SearchEffort = SearchEffort {
+const FOR_FIRST_EFFECT: Selection = Selection {
     first: usize::MAX,
     second: 0.03,
     full: 12,
 };
 /// Beside an accepted effect a fit costs more and finds less.
-const FOR_SECOND_EFFECT: SearchEffort = SearchEffort {
+const FOR_SECOND_EFFECT: Selection = Selection {
     first: 12,
     second: 0.1,
     full: 4,
@@ -183,16 +183,16 @@ pub fn fit_all(
     workers: Workers,
 ) -> Vec<Option<ScoredModel>> {
     let fitted = &base.scored.fitted;
-    let limits = match fitted.structure.effects.is_empty() {
+    let selection = match fitted.structure.effects.is_empty() {
         true => FOR_FIRST_EFFECT,
         false => FOR_SECOND_EFFECT,
     };
-    let first = first_fits(base, forms, lines, records, &limits, workers);
+    let first = first_fits(base, forms, lines, records, &selection, workers);
     let gain = |fit: &FittedModel| fitted.train_sum - fit.train_sum;
     let largest = first.iter().flatten().map(gain).fold(0.0, f64::max);
     let second = parallel(forms.len(), workers.threads, |k| {
         let fits = first[k].iter().map(|fit| {
-            let is_followed = !fit.converged && gain(fit) >= limits.second * largest;
+            let is_followed = !fit.converged && gain(fit) >= selection.second * largest;
             let second = is_followed.then(|| fit.refit(&records.train, SECOND_FIT));
             second.and_then(Result::ok).unwrap_or_else(|| fit.clone())
         });
@@ -204,7 +204,7 @@ pub fn fit_all(
         .collect();
     gains.sort_by(|a, b| b.total_cmp(a));
     let least = gains
-        .get(limits.full)
+        .get(selection.full)
         .copied()
         .unwrap_or(0.0)
         .max(PROMISING * gains.first().copied().unwrap_or(0.0))
@@ -224,7 +224,7 @@ fn first_fits(
     forms: &[EffectForm],
     lines: &[SpectralLine],
     records: &Records,
-    limits: &SearchEffort,
+    selection: &Selection,
     workers: Workers,
 ) -> Vec<Vec<FittedModel>> {
     let structure = &base.scored.fitted.structure;
@@ -238,7 +238,7 @@ fn first_fits(
     };
     let mut chosen: Vec<usize> = (0..forms.len()).collect();
     chosen.sort_by(|a, b| left(*a).total_cmp(&left(*b)));
-    chosen.truncate(limits.first);
+    chosen.truncate(selection.first);
     let done = AtomicUsize::new(0);
     parallel(forms.len(), workers.threads, |k| {
         let starts = starts[k].iter().filter(|_| chosen.contains(&k));

@@ -9,6 +9,8 @@ mod part;
 mod select;
 pub mod text;
 
+use serde::Serialize;
+
 use crate::failure::Failure;
 use crate::io::Input;
 use crate::io::csv::{NamedUnit, Options};
@@ -56,13 +58,14 @@ impl Recording {
 }
 
 /// A part of a file that was recorded on its own: after a trigger, or after a pause.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Segment {
     /// Its name, for people: `segment 2`.
     pub name: String,
     /// Its start after that of the first segment, in seconds, if the file says.
     pub start_s: Option<f64>,
     /// Its date and time as written.
+    #[serde(rename = "start_time")]
     pub start_text: Option<String>,
 }
 

@@ -2,7 +2,7 @@
 
 use torqcomp_model::Estimate;
 
-use crate::diagnose::{CandidateFit, Diagnosis, GuardModel, NoiseFloorSource, Status};
+use crate::diagnose::{CandidateFit, Diagnosis, GuardModel, Status};
 use crate::print::{columns, rounded, unit_or_as_recorded, with_std};
 
 pub(crate) fn text(diagnosis: &Diagnosis) -> String {
@@ -88,7 +88,7 @@ pub(crate) fn error_sentences(diagnosis: &Diagnosis) -> Vec<String> {
         )
     });
     let from = match error.noise_floor_from {
-        Some(NoiseFloorSource::Periods) => "differences between periods of the record",
+        Some("periods") => "differences between periods of the record",
         _ => "the frequencies without signal",
     };
     let floor = match error.noise_floor_rms {

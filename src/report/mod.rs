@@ -1,6 +1,4 @@
-//! What the verbs report, as plain data: one struct for each, written as text or as JSON.
+//! What `diagnose` reports, as text and as a page.
 
-pub mod compensate;
 pub mod diagnose;
 pub mod diagnose_page;
-pub mod inspect;

@@ -5,6 +5,8 @@
 //! leaves a filter with taps `g` with `σ √Σg²`; noise of density `S(f)` leaves it with density
 //! `S(f) |W(f) H⁻¹(f)|²`.
 
+use serde::Serialize;
+
 use crate::compensate::InverseFilter;
 use crate::spectrum::Density;
 
@@ -63,14 +65,12 @@ impl NoiseGain {
 }
 
 /// Noise of one record, before and after compensation.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RecordNoise {
-    /// Density of the recorder's noise, unit²/Hz, one-sided: the median above the band.
-    pub floor_density: f64,
-    /// Where the floor was taken, in Hz.
-    pub floor_from_hz: f64,
-    /// End of that range, in Hz.
-    pub floor_to_hz: f64,
+    /// Root of the recorder's noise density, unit/√Hz, one-sided: the median above the band.
+    pub floor_per_root_hz: f64,
+    /// Range the floor was taken from, in Hz.
+    pub floor_band_hz: [f64; 2],
     /// Noise within the band as recorded, rms: `√(S₀ ∫W² df)`.
     pub recorded_rms: f64,
     /// The same noise after compensation, rms: `√(S₀ ∫|W H⁻¹|² df)`.
@@ -80,7 +80,7 @@ pub struct RecordNoise {
     /// What the record holds above the band beside its noise, rms.
     pub above_band_rms: f64,
     /// Ranges within the band where the record does not rise 3 dB above the floor, in Hz.
-    pub lost: Vec<(f64, f64)>,
+    pub lost_hz: Vec<[f64; 2]>,
 }
 
 impl RecordNoise {
@@ -120,9 +120,8 @@ impl RecordNoise {
             .map(|(_, v)| (v - floor_density) * density.step_hz)
             .sum();
         Some(Self {
-            floor_density,
-            floor_from_hz: from_hz,
-            floor_to_hz: to_hz,
+            floor_per_root_hz: floor_density.sqrt(),
+            floor_band_hz: [from_hz, to_hz],
             recorded_rms: power(&|f, _| floor_density * band.gain(f).powi(2)),
             compensated_rms: power(&|f, _| floor_density * filter.response(f).norm_sqr()),
             // The first bins hold the mean, widened by the window.
@@ -134,24 +133,37 @@ impl RecordNoise {
                 }
             }),
             above_band_rms: above_mean_square.max(0.0).sqrt(),
-            lost: lost_ranges(density, band.top_hz(), floor_density),
+            lost_hz: lost_ranges(density, band.top_hz(), floor_density),
         })
     }
 
     /// Start of the range up to the band's top in which the record is lost in noise.
     #[must_use]
     pub fn lost_from_hz(&self, band_top_hz: f64) -> Option<f64> {
-        self.lost
+        self.lost_hz
             .last()
-            .filter(|(_, to)| *to >= band_top_hz * (1.0 - 1e-9))
-            .map(|(from, _)| *from)
+            .filter(|[_, to]| *to >= band_top_hz * (1.0 - 1e-9))
+            .map(|[from, _]| *from)
+    }
+
+    /// The noise of the record times `factor`.
+    #[must_use]
+    pub fn scaled(self, factor: f64) -> Self {
+        Self {
+            floor_per_root_hz: self.floor_per_root_hz * factor.abs(),
+            recorded_rms: self.recorded_rms * factor.abs(),
+            compensated_rms: self.compensated_rms * factor.abs(),
+            in_band_rms: self.in_band_rms * factor.abs(),
+            above_band_rms: self.above_band_rms * factor.abs(),
+            ..self
+        }
     }
 }
 
 /// Sub-bands of `0..top_hz` whose mean density is within 3 dB of the floor, neighbours joined.
-fn lost_ranges(density: &Density, top_hz: f64, floor: f64) -> Vec<(f64, f64)> {
+fn lost_ranges(density: &Density, top_hz: f64, floor: f64) -> Vec<[f64; 2]> {
     let width = top_hz / SUB_BANDS as f64;
-    let mut ranges: Vec<(f64, f64)> = Vec::new();
+    let mut ranges: Vec<[f64; 2]> = Vec::new();
     for i in 0..SUB_BANDS {
         let (from, to) = (width * i as f64, width * (i + 1) as f64);
         let inside: Vec<f64> = density.between(from, to).map(|(_, v)| v).collect();
@@ -163,8 +175,8 @@ fn lost_ranges(density: &Density, top_hz: f64, floor: f64) -> Vec<(f64, f64)> {
             continue;
         }
         match ranges.last_mut() {
-            Some(last) if last.1 == from => last.1 = to,
-            _ => ranges.push((from, to)),
+            Some(last) if last[1] == from => last[1] = to,
+            _ => ranges.push([from, to]),
         }
     }
     ranges
@@ -232,7 +244,7 @@ mod tests {
             .collect();
         let density = welch(&record, RATE, 4096).unwrap();
         let stated = RecordNoise::of(&filter, &density).unwrap();
-        assert!((stated.floor_density / (2.0 * 0.09 / RATE) - 1.0).abs() < 0.05);
+        assert!((stated.floor_per_root_hz.powi(2) / (2.0 * 0.09 / RATE) - 1.0).abs() < 0.05);
         assert!(
             (stated.compensated_rms / measured - 1.0).abs() < 0.05,
             "{stated:?} {measured}"
@@ -254,7 +266,7 @@ mod tests {
             lost.lost_from_hz(2400.0),
             Some(0.0),
             "nothing but noise: {:?}",
-            lost.lost
+            lost.lost_hz
         );
         // A line in the lowest twenty-fourth of the band: all above it is lost.
         let with_signal: Vec<f64> = record
@@ -264,7 +276,12 @@ mod tests {
             .collect();
         let density = welch(&with_signal, RATE, 4096).unwrap();
         let found = RecordNoise::of(&filter, &density).unwrap();
-        assert_eq!(found.lost_from_hz(2400.0), Some(100.0), "{:?}", found.lost);
+        assert_eq!(
+            found.lost_from_hz(2400.0),
+            Some(100.0),
+            "{:?}",
+            found.lost_hz
+        );
     }
 
     #[test]

@@ -1,17 +1,8 @@
-//! The way back through a stand with effects that no filter describes: the whole record in memory.
+//! The inverse of a stand with effects that no filter describes.
 
-use torqcomp_dsp::noise::RecordNoise;
-
-use super::deliver::deliver;
-use super::sink::Sink;
-use super::whole::density;
-use super::{Extent, Plan, Run};
-use crate::cli::Compensate;
-use crate::commands::convert;
+use super::report::{CompensateReport, LostSpan, RemovedLine, UndoneEffect};
 use crate::failure::Failure;
 use crate::print::rounded;
-use crate::quality::excerpt;
-use crate::report::compensate::{Effect, Line, LostSpan, Report};
 use crate::signal::Record;
 use crate::stand::Stand;
 use crate::undo::{FoundLine, Undo, Undone, treatment};
@@ -19,75 +10,53 @@ use crate::warning::Warning;
 
 /// Most samples of a record: about 100 bytes of memory each are needed.
 const MOST_SAMPLES: usize = 1 << 24;
-/// Spans that a warning tells the times of.
+/// Spans whose times a warning gives.
 const SPANS_TOLD: usize = 5;
 /// Weight of the filter's taps, relative to all, beyond which a lost sample no longer matters.
 const REACH: f64 = 0.01;
-/// Share of a line's amplitude below which its phase is not told by the record: from 0.2 rad on.
+/// Share of a line's amplitude below which its phase is uncertain: by more than 0.2 rad.
 const SURE: f64 = 0.98;
 /// Part of the record in which the direction of the motion is not known, from which it is worth a warning.
 const STILL: f64 = 0.02;
 
-/// What was found on the way.
-pub struct Found {
-    undone: Undone,
-    /// Rms of the noise in the result, in printed units.
-    noise_rms: Option<f64>,
-    /// Time on both sides of a lost sample in which the result leans on it.
-    reach_s: f64,
+/// The scales of a record whose inverse is reported.
+struct Scales {
     start_s: f64,
     rate_hz: f64,
+    /// Time on both sides of a lost sample in which the result depends on it.
+    reach_s: f64,
     /// Printed units per SI unit of the record.
-    scale: f64,
+    printed: f64,
 }
 
-/// Reads the record, takes it back and writes what came out.
-pub fn run(args: &Compensate, plan: Plan, sink: &mut Sink) -> Result<Run, Failure> {
-    let Plan {
-        signal,
-        stand,
-        chain,
-        filter,
-        undo,
-    } = plan;
-    let Some(undo) = undo else {
-        return Err(Failure::failed("there is no effect to take back"));
-    };
-    let record = Record::read(signal, |values| convert(&chain, values))?;
-    check(&record)?;
-    let scale = 1.0 / chain.applied.factor;
-    let noise = density(&record, scale).and_then(|d| RecordNoise::of(&filter, &d));
+/// The torque behind a record; what was found on the way goes into the report.
+pub(super) fn torque(
+    undo: &Undo,
+    stand: &Stand,
+    record: &Record,
+    report: &mut CompensateReport,
+) -> Result<Vec<f64>, Failure> {
+    check(record)?;
     // From the density in printed units to the deviation of a sample of the record in SI units.
-    let noise_std = noise.as_ref().map_or(0.0, |noise| {
-        (0.5 * noise.floor_density * record.rate_hz).sqrt() * stand.gain() / scale
+    let noise_std = report.noise.record.as_ref().map_or(0.0, |noise| {
+        let density = noise.floor_per_root_hz.powi(2);
+        (0.5 * density * record.rate_hz).sqrt() * stand.gain() / report.scale
     });
     let recorded: Vec<f64> = record.samples.iter().map(|x| x * stand.gain()).collect();
     let mut undone = undo.run(&recorded, record.rate_hz, noise_std)?;
     let torque = std::mem::take(&mut undone.applied);
-    let noise_rms = if noise_std > 0.0 {
-        Some(scale * spread(&undo, &record, (&recorded, &torque), noise_std)?)
-    } else {
-        None
-    };
-    let traces = deliver(args, sink, &record, &torque, scale)?;
-    Ok(Run {
-        samples: torque.len(),
+    if let (Some(noise), true) = (&mut report.noise.record, noise_std > 0.0) {
+        let spread = spread(undo, record, (&recorded, &torque), noise_std)?;
+        noise.compensated_rms = report.scale * spread;
+    }
+    let scales = Scales {
         start_s: record.start_s,
-        extent: Extent::of(&torque).scaled(scale),
-        refined: Some(Found {
-            undone,
-            noise_rms,
-            reach_s: reach(filter.taps()) as f64 / record.rate_hz,
-            start_s: record.start_s,
-            rate_hz: record.rate_hz,
-            scale: scale / stand.gain(),
-        }),
-        resampled: record.resampled,
-        noise,
-        summary: record.summary,
-        excerpt: excerpt::of_memory(record.samples),
-        traces,
-    })
+        rate_hz: record.rate_hz,
+        reach_s: reach(undo.filter().taps()) as f64 / record.rate_hz,
+        printed: report.scale / stand.gain(),
+    };
+    describe(report, &undone, &scales);
+    Ok(torque)
 }
 
 fn check(record: &Record) -> Result<(), Failure> {
@@ -99,7 +68,7 @@ fn check(record: &Record) -> Result<(), Failure> {
     }
     if count > MOST_SAMPLES {
         return Err(Failure::failed(format_args!(
-            "the record has {count} samples, and the effects of this stand are taken back in memory for at most \
+            "the record has {count} samples; the effects of this stand are removed in memory, from at most \
              {MOST_SAMPLES}; cut the record into parts of {} s",
             rounded(MOST_SAMPLES as f64 / record.rate_hz, 3)
         )));
@@ -145,9 +114,9 @@ fn reach(taps: &[f64]) -> usize {
 }
 
 /// What is done about each effect of a stand.
-pub fn effects(stand: &Stand, undo: Option<&Undo>) -> Vec<Effect> {
+pub(super) fn effects(stand: &Stand, undo: Option<&Undo>) -> Vec<UndoneEffect> {
     let Some(undo) = undo else {
-        let divided = |declared: &crate::stand::DeclaredEffect| Effect {
+        let divided = |declared: &crate::stand::DeclaredEffect| UndoneEffect {
             effect: declared.effect.name,
             form: declared.form.name,
             done: "divided out",
@@ -157,7 +126,7 @@ pub fn effects(stand: &Stand, undo: Option<&Undo>) -> Vec<Effect> {
     let links = undo.links().iter().rev();
     links
         .filter(|link| link.action.is_some())
-        .map(|link| Effect {
+        .map(|link| UndoneEffect {
             effect: link.effect,
             form: link.form,
             done: treatment(link),
@@ -165,35 +134,26 @@ pub fn effects(stand: &Stand, undo: Option<&Undo>) -> Vec<Effect> {
         .collect()
 }
 
-/// Fills in what the way back found.
-pub fn complete(report: &mut Report, found: &Found) {
-    let undone = &found.undone;
+/// Adds what the inverse found to the report.
+fn describe(report: &mut CompensateReport, undone: &Undone, scales: &Scales) {
     report.seen_to_hz = undone.seen_to_hz;
-    report.lines = undone
-        .lines
-        .iter()
-        .map(|line| line_of(line, found))
-        .collect();
-    if let (Some(noise), Some(rms)) = (&mut report.noise.record, found.noise_rms) {
-        noise.compensated_rms = rms;
-    }
+    report.lines = undone.lines.iter().map(|l| removed(l, scales)).collect();
     for lost in &undone.lost {
-        let spans = spans(&lost.samples, found);
-        report.warnings.push(lost_warning(lost, &spans, found));
-        report
-            .lost
-            .extend(spans.iter().map(|[from_s, to_s]| LostSpan {
-                effect: lost.effect,
-                from_s: *from_s,
-                to_s: *to_s,
-            }));
+        let spans = spans(&lost.samples, scales);
+        report.warnings.push(lost_warning(lost, &spans, scales));
+        let span = |[from_s, to_s]: &[f64; 2]| LostSpan {
+            effect: lost.effect,
+            from_s: *from_s,
+            to_s: *to_s,
+        };
+        report.lost.extend(spans.iter().map(span));
     }
     for line in undone.lines.iter().filter(|line| line.share < SURE) {
         report.warnings.push(Warning::new(
             "phase-hidden",
             format!(
-                "the record's own signal at {} Hz hides the phase of the line there: {} % of its amplitude was taken \
-                 off, and some of it is left; record without excitation at this frequency",
+                "the signal at {} Hz hides the phase of the line there: only {} % of its amplitude was removed; \
+                 record without excitation at this frequency",
                 rounded(line.frequency_hz, 5),
                 rounded(100.0 * line.share, 2)
             ),
@@ -203,8 +163,8 @@ pub fn complete(report: &mut Report, found: &Found) {
         report.warnings.push(Warning::new(
             "direction-unknown",
             format!(
-                "over {} % of the record the speed cannot be told from zero: there the friction, and with it the torque, \
-                 is known to its size only",
+                "over {} % of the record the speed is not significantly different from zero: the direction of the \
+                 friction, and so its part of the torque, is unknown there",
                 rounded(100.0 * still, 2)
             ),
         ));
@@ -212,18 +172,18 @@ pub fn complete(report: &mut Report, found: &Found) {
 }
 
 /// A line in printed units.
-fn line_of(line: &FoundLine, found: &Found) -> Line {
-    Line {
+fn removed(line: &FoundLine, scales: &Scales) -> RemovedLine {
+    RemovedLine {
         frequency_hz: line.frequency_hz,
-        amplitude: line.amplitude * found.scale,
-        recorded: line.recorded * found.scale,
+        amplitude: line.amplitude * scales.printed,
+        recorded: line.recorded * scales.printed,
         phase_rad: line.phase_rad,
         share: line.share,
     }
 }
 
 /// Times of the first and last sample of each run of neighbours.
-fn spans(samples: &[usize], found: &Found) -> Vec<[f64; 2]> {
+fn spans(samples: &[usize], scales: &Scales) -> Vec<[f64; 2]> {
     let mut runs: Vec<[usize; 2]> = Vec::new();
     for sample in samples {
         match runs.last_mut() {
@@ -231,11 +191,11 @@ fn spans(samples: &[usize], found: &Found) -> Vec<[f64; 2]> {
             _ => runs.push([*sample; 2]),
         }
     }
-    let time_s = |i: usize| found.start_s + i as f64 / found.rate_hz;
+    let time_s = |i: usize| scales.start_s + i as f64 / scales.rate_hz;
     runs.iter().map(|run| run.map(time_s)).collect()
 }
 
-fn lost_warning(lost: &crate::undo::Lost, spans: &[[f64; 2]], found: &Found) -> Warning {
+fn lost_warning(lost: &crate::undo::Lost, spans: &[[f64; 2]], scales: &Scales) -> Warning {
     let told: Vec<String> = spans
         .iter()
         .take(SPANS_TOLD)
@@ -253,7 +213,7 @@ fn lost_warning(lost: &crate::undo::Lost, spans: &[[f64; 2]], found: &Found) -> 
             lost.why,
             lost.samples.len(),
             told.join(", "),
-            rounded(1e3 * found.reach_s, 2)
+            rounded(1e3 * scales.reach_s, 2)
         ),
     )
 }

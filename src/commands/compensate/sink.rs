@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::{Plan, heading};
+use super::Plan;
+use super::plot::Traces;
+use super::report::CompensateReport;
 use crate::cli::{Compensate, Format};
 use crate::commands::rows::Rows;
 use crate::failure::Failure;
@@ -11,26 +13,40 @@ use crate::io::Input;
 use crate::io::mcap::Writer;
 use crate::io::mcap::writer::Added;
 use crate::io::output::Output;
-use crate::report::compensate::Report;
 use crate::signal::Origin;
+use crate::stand::Chain;
 
 /// Topic of the result unless another is named.
 const TOPIC: &str = "/torqcomp/torque";
 
-/// An open result.
-pub enum Sink {
-    /// Text.
+/// An open result, and its picture as far as one is drawn.
+pub(super) struct Sink {
+    target: Target,
+    traces: Option<Traces>,
+}
+
+enum Target {
     Text(Output),
-    /// Messages.
     Messages(Box<Messages>),
 }
 
 /// A copy of the input that gets the torque as well.
-pub struct Messages {
+struct Messages {
     writer: Writer<Output>,
     origin: Origin,
     /// Topic of the torque.
     topic: String,
+}
+
+/// The next samples of a result.
+pub(super) struct Part<'a> {
+    pub(super) rows: Rows<'a>,
+    /// The rows as text, if the result is text.
+    pub(super) text: &'a [u8],
+    /// Compensated, in SI units.
+    pub(super) torque: &'a [f64],
+    /// Before compensation, in SI units.
+    pub(super) recorded: &'a [f64],
 }
 
 impl Sink {
@@ -38,11 +54,71 @@ impl Sink {
     ///
     /// # Errors
     /// If the output cannot be written, or its format does not fit the input.
-    pub fn open(args: &Compensate, plan: &Plan, mut output: Output) -> Result<Self, Failure> {
-        if format(args) == Format::Csv {
-            output.write(heading(&plan.chain, args.with_recorded).as_bytes())?;
-            return Ok(Self::Text(output));
+    pub(super) fn open(
+        args: &Compensate,
+        plan: &Plan,
+        mut output: Output,
+    ) -> Result<Self, Failure> {
+        let traces = args.plot.as_ref().map(|_| Traces::new(args.plot_range));
+        let target = match format(args) {
+            Format::Csv => {
+                output.write(heading(&plan.chain, args.with_recorded).as_bytes())?;
+                Target::Text(output)
+            }
+            Format::Mcap => Target::Messages(Box::new(Messages::open(args, plan, output)?)),
+        };
+        Ok(Self { target, traces })
+    }
+
+    /// Whether rows are wanted as text.
+    pub(super) fn is_text(&self) -> bool {
+        matches!(self.target, Target::Text(_))
+    }
+
+    pub(super) fn traces(&self) -> Option<&Traces> {
+        self.traces.as_ref()
+    }
+
+    pub(super) fn take(&mut self, part: &Part) -> Result<(), Failure> {
+        if let Some(traces) = &mut self.traces {
+            let scale = part.rows.scale;
+            for (i, (torque, recorded)) in part.torque.iter().zip(part.recorded).enumerate() {
+                traces.add(part.rows.time_s(i), recorded * scale, torque * scale);
+            }
         }
+        match &mut self.target {
+            Target::Text(output) => output.write(part.text),
+            Target::Messages(messages) => messages.take(part),
+        }
+    }
+
+    /// Writes what comes after the last sample and gives the output its name.
+    pub(super) fn finish(
+        self,
+        args: &Compensate,
+        report: &CompensateReport,
+    ) -> Result<(), Failure> {
+        match self.target {
+            Target::Text(output) => output.finish(),
+            Target::Messages(messages) => {
+                messages.writer.finish(&provenance(args, report)?)?.finish()
+            }
+        }
+    }
+
+    /// Topic and field of the result, if it is one of messages.
+    pub(super) fn signal(&self) -> Option<String> {
+        match &self.target {
+            Target::Text(_) => None,
+            Target::Messages(messages) => {
+                Some(format!("{}.{}", messages.topic, messages.writer.field()))
+            }
+        }
+    }
+}
+
+impl Messages {
+    fn open(args: &Compensate, plan: &Plan, output: Output) -> Result<Self, Failure> {
         let origin = origin(args, plan)?;
         let topic = args.output_topic.as_deref().unwrap_or(TOPIC).to_owned();
         let encoding = origin.encoding.ok_or_else(|| {
@@ -55,54 +131,29 @@ impl Sink {
         };
         let name = output.name().to_owned();
         let writer = Writer::copying(&Input::of(&args.record.input), output, &name, &added)?;
-        Ok(Self::Messages(Box::new(Messages {
+        Ok(Self {
             writer,
             origin,
             topic,
-        })))
+        })
     }
 
-    /// Whether rows are wanted as text.
-    pub fn is_text(&self) -> bool {
-        matches!(self, Self::Text(_))
+    fn take(&mut self, part: &Part) -> Result<(), Failure> {
+        let Self { writer, origin, .. } = self;
+        part.torque.iter().enumerate().try_for_each(|(i, torque)| {
+            let time_ns = part.rows.time_ns(i, origin.first_ns);
+            let log_ns = time_ns.saturating_sub(origin.log_offset_ns);
+            writer.add(time_ns, log_ns, *torque)
+        })
     }
+}
 
-    /// Takes the next part of the result: its text, or its values in SI units and their times.
-    pub fn take(&mut self, text: &[u8], rows: &Rows, torque: &[f64]) -> Result<(), Failure> {
-        match self {
-            Self::Text(output) => output.write(text),
-            Self::Messages(messages) => {
-                let Messages { writer, origin, .. } = messages.as_mut();
-                torque.iter().enumerate().try_for_each(|(i, torque)| {
-                    let time_ns = rows.time_ns(i, origin.first_ns);
-                    writer.add(
-                        time_ns,
-                        time_ns.saturating_sub(origin.log_offset_ns),
-                        *torque,
-                    )
-                })
-            }
-        }
-    }
-
-    /// Writes what comes after the last sample and gives the output its name.
-    pub fn finish(self, args: &Compensate, report: &Report) -> Result<(), Failure> {
-        match self {
-            Self::Text(output) => output.finish(),
-            Self::Messages(messages) => {
-                messages.writer.finish(&provenance(args, report)?)?.finish()
-            }
-        }
-    }
-
-    /// Topic and field of the result, if it is one of messages.
-    pub fn describe(&self) -> Option<String> {
-        match self {
-            Self::Text(_) => None,
-            Self::Messages(messages) => {
-                Some(format!("{}.{}", messages.topic, messages.writer.field()))
-            }
-        }
+/// First line of a text.
+fn heading(chain: &Chain, with_recorded: bool) -> String {
+    let applied = chain.applied.heading();
+    match with_recorded {
+        true => format!("time_s,{applied},recorded_{applied}\n"),
+        false => format!("time_s,{applied}\n"),
     }
 }
 
@@ -116,17 +167,17 @@ fn format(args: &Compensate) -> Format {
         .unwrap_or(if is_mcap { Format::Mcap } else { Format::Csv })
 }
 
-/// Checks that the result can be one of messages.
+/// The origin of the input's messages, if the result can be a copy of them.
 fn origin(args: &Compensate, plan: &Plan) -> Result<Origin, Failure> {
     let Some(origin) = &plan.signal.origin else {
         return Err(Failure::usage(
-            "an MCAP result is a copy of an MCAP input with one channel more, and the input is a \
-             text; use --format csv",
+            "an MCAP result is a copy of an MCAP input with one channel more, but the input is text; \
+             use --format csv",
         ));
     };
     if args.record.input == "-" {
         return Err(Failure::usage(
-            "an MCAP result needs its input twice, which standard input cannot give; name the file",
+            "an MCAP result needs its input twice, and standard input can be read once only; name the file",
         ));
     }
     if args.with_recorded {
@@ -136,20 +187,26 @@ fn origin(args: &Compensate, plan: &Plan) -> Result<Origin, Failure> {
     }
     if plan.chain.applied.name != "torque" {
         return Err(Failure::failed(format_args!(
-            "an MCAP result holds torques in N m, and this record becomes a {} in {}; use --format csv",
+            "an MCAP result holds torque in N m, but this record becomes a {} in {}; use --format csv",
             plan.chain.applied.name, plan.chain.applied.unit
         )));
     }
     Ok(origin.clone())
 }
 
-/// How the torque came about, for the file that holds it.
-fn provenance(args: &Compensate, report: &Report) -> Result<BTreeMap<String, String>, Failure> {
+/// Provenance of the torque, written into the file.
+fn provenance(
+    args: &Compensate,
+    report: &CompensateReport,
+) -> Result<BTreeMap<String, String>, Failure> {
     let stand = std::fs::read_to_string(&args.stand)
         .map_err(|error| Failure::reading(&args.stand, &error))?;
     let number = |value: f64| crate::io::digits::text(value, 12);
     let pairs = [
-        ("tool", format!("torqcomp {}", report.version)),
+        (
+            "tool",
+            concat!("torqcomp ", env!("CARGO_PKG_VERSION")).to_owned(),
+        ),
         ("input", report.input.clone()),
         ("signal", report.channel.clone()),
         ("signal_unit", report.channel_unit.clone()),

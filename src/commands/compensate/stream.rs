@@ -4,12 +4,13 @@ use std::collections::VecDeque;
 
 use torqcomp_dsp::compensate::{BlockConvolver, Windows};
 use torqcomp_dsp::noise::RecordNoise;
-use torqcomp_dsp::resample::Resampler;
-use torqcomp_dsp::spectrum::{PowerSum, welch};
+use torqcomp_dsp::resample::{Resampled, Resampler};
+use torqcomp_dsp::spectrum::{Density, PowerSum, welch};
 
-use super::plot::Traces;
-use super::sink::Sink;
-use super::{Extent, Plan, Run};
+use super::report::CompensateReport;
+use super::sink::{Part, Sink};
+use super::statistics::Sums;
+use super::{Plan, Seen};
 use crate::cli::Compensate;
 use crate::commands::convert;
 use crate::commands::rows::{Rows, Times};
@@ -18,7 +19,7 @@ use crate::io::csv::{TimeAxis, TimeSource};
 use crate::io::text::Text;
 use crate::pipeline::{self, Stages};
 use crate::quality::excerpt;
-use crate::signal::Batch;
+use crate::signal::{Batch, Sequence};
 
 /// Jobs under way beside those that the threads hold.
 const SPARE_JOBS: usize = 2;
@@ -38,7 +39,7 @@ struct Job {
     torque: Vec<f64>,
     text: Text,
     power: Option<PowerSum>,
-    extent: Option<Extent>,
+    sums: Option<Sums>,
 }
 
 /// What each sample goes through, the same on every thread.
@@ -53,8 +54,23 @@ struct Steps<'a> {
     args: &'a Compensate,
 }
 
+/// What is gathered from the finished pieces, in order.
+struct Gathered<'a> {
+    sink: &'a mut Sink,
+    power: PowerSum,
+    sums: Sums,
+    /// The first samples as recorded: for the quality of the record, and for its noise where it is too short for a
+    /// block of the estimate.
+    first: Vec<f64>,
+}
+
 /// Runs the stages over the whole record.
-pub fn run(args: &Compensate, plan: Plan, sink: &mut Sink) -> Result<Run, Failure> {
+pub(super) fn run(
+    args: &Compensate,
+    plan: Plan,
+    sink: &mut Sink,
+    report: &mut CompensateReport,
+) -> Result<Seen, Failure> {
     let Plan {
         signal,
         chain,
@@ -62,11 +78,9 @@ pub fn run(args: &Compensate, plan: Plan, sink: &mut Sink) -> Result<Run, Failur
         ..
     } = plan;
     let half_length = filter.half_length();
-    let rate_hz = signal.time.rate_hz;
     let time = signal.time.clone();
-    let first = BlockConvolver::new(&filter);
-    let noise_block = first.block_length().min(LONGEST_NOISE_BLOCK);
-    let mut joiner = Joiner::new(&time, half_length);
+    let convolver = BlockConvolver::new(&filter);
+    let noise_block = convolver.block_length().min(LONGEST_NOISE_BLOCK);
     let steps = Steps {
         half_length,
         noise_block,
@@ -76,86 +90,78 @@ pub fn run(args: &Compensate, plan: Plan, sink: &mut Sink) -> Result<Run, Failur
         is_text: sink.is_text(),
         args,
     };
+    let mut gathered = Gathered {
+        sink,
+        power: PowerSum::new(noise_block),
+        sums: Sums::NONE,
+        first: Vec::new(),
+    };
+    let mut joiner = Joiner::new(&time, half_length);
     // Rows enough that a piece needs no more than the one after it.
     let (mut fetch, row_plan, mut sequence) = signal.into_stream(2 * half_length);
-    let mut power = PowerSum::new(noise_block);
-    let mut extent = Extent::NONE;
-    let mut traces = args.plot.as_ref().map(|_| Traces::new(args.plot_range));
-    let mut short = Vec::new();
     let threads = args.work.thread_count();
-    let mut convolvers: Vec<BlockConvolver> = (1..threads).map(|_| first.another()).collect();
-    convolvers.push(first);
-
-    pipeline::run(
-        threads + SPARE_JOBS,
-        convolvers,
-        Stages {
-            read: |job: &mut Job| fetch.next(&mut job.batch),
-            prepare: |job: &mut Job| {
-                job.batch.read_rows(row_plan.as_ref(), &time);
-                job.unconverted = convert(&chain, &mut job.batch.rows.values).err();
-            },
-            join: |job: Option<Job>, ready: &mut dyn FnMut(Job)| match job {
-                Some(mut job) => {
-                    sequence.accept(&mut job.batch)?;
-                    if let Some((row, message)) = &job.unconverted {
-                        return Err(sequence.failure_at_row(&job.batch, *row, message));
-                    }
-                    joiner.push(job, ready)
-                }
-                None => {
-                    joiner.finish(ready);
-                    Ok(())
-                }
-            },
-            work: |convolver: &mut BlockConvolver, job: &mut Job| steps.work(convolver, job),
-            deliver: |job: &mut Job| {
-                let rows = steps.rows(&job.batch, job.first);
-                sink.take(job.text.as_bytes(), &rows, &job.torque)?;
-                if let Some(part) = &job.power {
-                    power.add(part);
-                }
-                if let Some(traces) = &mut traces {
-                    steps.trace(job, traces);
-                }
-                if let Some(part) = &job.extent {
-                    extent.join(part);
-                }
-                // For what is wrong with the record, and where it is too short for a block of the
-                // noise estimate.
-                if short.len() < excerpt::OF_STREAM {
-                    short.extend_from_slice(steps.recorded(&job.window));
-                }
-                Ok(())
-            },
-        },
-    )?;
-
-    let density = power.density(rate_hz).or_else(|| {
-        let block = (short.len() / 2).next_power_of_two() / 2;
-        welch(&short, rate_hz, block).ok()
-    });
-    let in_print = |mut noise: RecordNoise| {
-        noise.floor_density *= steps.scale * steps.scale;
-        noise.recorded_rms *= steps.scale;
-        noise.compensated_rms *= steps.scale;
-        noise.in_band_rms *= steps.scale;
-        noise.above_band_rms *= steps.scale;
-        noise
+    let stages = Stages {
+        read: Box::new(|job: &mut Job| fetch.next(&mut job.batch)),
+        prepare: Box::new(|job: &mut Job| {
+            job.batch.read_rows(row_plan.as_ref(), &time);
+            job.unconverted = convert(&chain, &mut job.batch.rows.values).err();
+        }),
+        join: Box::new(|job, ready| joiner.join(&mut sequence, job, ready)),
+        work: Box::new(|convolver, job| steps.work(convolver, job)),
+        deliver: Box::new(|job| gathered.take(&steps, job)),
     };
-    Ok(Run {
+    pipeline::run(threads + SPARE_JOBS, convolvers(convolver, threads), stages)?;
+
+    report.scale = steps.scale;
+    report.start_s = steps.start_s;
+    report.samples = joiner.samples;
+    report.resampled = joiner.resampled;
+    report.result = gathered.sums.statistics(steps.scale);
+    report.noise.record = gathered
+        .density(time.rate_hz)
+        .and_then(|density| RecordNoise::of(&filter, &density))
+        .map(|noise| noise.scaled(steps.scale));
+    Ok(Seen {
         summary: sequence.finish(&mut fetch)?,
-        excerpt: short,
-        samples: joiner.samples,
-        start_s: steps.start_s,
-        extent: extent.scaled(steps.scale),
-        resampled: joiner.resampled,
-        noise: density
-            .and_then(|density| RecordNoise::of(&filter, &density))
-            .map(in_print),
-        traces,
-        refined: None,
+        excerpt: gathered.first,
     })
+}
+
+/// A convolver for each thread.
+fn convolvers(first: BlockConvolver, threads: usize) -> Vec<BlockConvolver> {
+    let mut all: Vec<BlockConvolver> = (1..threads).map(|_| first.another()).collect();
+    all.push(first);
+    all
+}
+
+impl Gathered<'_> {
+    fn take(&mut self, steps: &Steps, job: &Job) -> Result<(), Failure> {
+        let recorded = steps.recorded(&job.window);
+        self.sink.take(&Part {
+            rows: steps.rows(&job.batch, job.first),
+            text: job.text.as_bytes(),
+            torque: &job.torque,
+            recorded,
+        })?;
+        if let Some(part) = &job.power {
+            self.power.add(part);
+        }
+        if let Some(part) = &job.sums {
+            self.sums.join(part);
+        }
+        if self.first.len() < excerpt::OF_STREAM {
+            self.first.extend_from_slice(recorded);
+        }
+        Ok(())
+    }
+
+    /// Power density of the record, if it is long enough.
+    fn density(&self, rate_hz: f64) -> Option<Density> {
+        self.power.density(rate_hz).or_else(|| {
+            let block = (self.first.len() / 2).next_power_of_two() / 2;
+            welch(&self.first, rate_hz, block).ok()
+        })
+    }
 }
 
 /// Puts the pieces together into windows, in order.
@@ -165,7 +171,7 @@ struct Joiner {
     seconds_per_unit: f64,
     waiting: VecDeque<Job>,
     samples: usize,
-    resampled: Option<torqcomp_dsp::resample::Resampled>,
+    resampled: Option<Resampled>,
 }
 
 impl Joiner {
@@ -187,6 +193,24 @@ impl Joiner {
             samples: 0,
             resampled: None,
         }
+    }
+
+    /// Takes the next piece, `None` at the end, and hands on those whose windows are complete.
+    fn join(
+        &mut self,
+        sequence: &mut Sequence,
+        job: Option<Job>,
+        ready: &mut dyn FnMut(Job),
+    ) -> Result<(), Failure> {
+        let Some(mut job) = job else {
+            self.finish(ready);
+            return Ok(());
+        };
+        sequence.accept(&mut job.batch)?;
+        if let Some((row, message)) = &job.unconverted {
+            return Err(sequence.failure_at_row(&job.batch, *row, message));
+        }
+        self.push(job, ready)
     }
 
     fn push(&mut self, job: Job, ready: &mut dyn FnMut(Job)) -> Result<(), Failure> {
@@ -251,31 +275,21 @@ impl Steps<'_> {
             convolver.convolve(&job.window, &mut job.torque, None);
             power.add_samples(&job.window[self.half_length..self.half_length + length]);
         }
-        job.extent = Some(Extent::of(&job.torque));
+        job.sums = Some(Sums::of(&job.torque));
         job.text.clear();
         if !self.is_text {
             return;
         }
         let rows = self.rows(&job.batch, job.first);
-        let recorded = self.recorded(&job.window);
-        let recorded = if self.args.with_recorded {
-            recorded
-        } else {
-            &[]
+        let recorded = match self.args.with_recorded {
+            true => self.recorded(&job.window),
+            false => &[],
         };
         rows.write(&mut job.text, &job.torque, recorded);
     }
 
     fn recorded<'a>(&self, window: &'a [f64]) -> &'a [f64] {
         &window[self.half_length..window.len() - self.half_length]
-    }
-
-    fn trace(&self, job: &Job, traces: &mut Traces) {
-        let rows = self.rows(&job.batch, job.first);
-        let recorded = self.recorded(&job.window);
-        for (i, (torque, recorded)) in job.torque.iter().zip(recorded).enumerate() {
-            traces.add(rows.time_s(i), recorded * self.scale, torque * self.scale);
-        }
     }
 
     fn rows<'a>(&self, batch: &'a Batch, first: usize) -> Rows<'a> {

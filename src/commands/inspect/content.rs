@@ -1,13 +1,13 @@
 //! Reading a file of any format.
 
 use super::messages;
+use super::report::InspectedChannel;
 use super::whole::Whole;
 use crate::failure::Failure;
 use crate::io::Input;
 use crate::io::csv::Options;
 use crate::io::mcap::Inventory;
 use crate::recording::{self, Recording};
-use crate::report::inspect::Channel;
 
 /// Bytes of a text that are read at most.
 const MOST_TEXT: u64 = 1 << 27;
@@ -20,7 +20,7 @@ pub struct Content {
     /// What all samples of a channel come to, where only the first were kept; of a text, nothing.
     pub wholes: Vec<Option<Whole>>,
     /// Channels that are only listed: their samples cannot be read, or are too many.
-    pub listed: Vec<Channel>,
+    pub listed: Vec<InspectedChannel>,
     /// Everything in an MCAP file.
     pub inventory: Option<Inventory>,
 }

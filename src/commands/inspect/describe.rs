@@ -5,14 +5,14 @@ use std::sync::Arc;
 use torqcomp_dsp::quality::clipping::Clipping;
 
 use super::content::Content;
+use super::report::{ChannelWarning, Detail, InspectedChannel, InspectedFile};
 use crate::parallel::{parallel, threads};
 use crate::quality::{self, Findings, TimeFindings, copies, labels, unit_of};
 use crate::recording::{Axis, Channel, Recording};
-use crate::report::inspect::{self, Detail, File, Gap, MainsLine, Said, Segment};
 use crate::warning::Warning;
 
 /// Describes the content of a file.
-pub fn file(content: &Content) -> File {
+pub fn file(content: &Content) -> InspectedFile {
     let recording = &content.recording;
     let channels = &recording.channels;
     let axes = distinct_axes(channels);
@@ -38,12 +38,12 @@ pub fn file(content: &Content) -> File {
 
     let time_of = |i: usize| axes.iter().position(|(_, members)| members.contains(&i));
     let described = channels.iter().zip(&findings).enumerate();
-    File {
+    InspectedFile {
         file: recording.source.clone(),
         format: recording.format,
         dialect: recording.dialect.clone(),
         details: details(recording),
-        segments: segments(recording),
+        segments: recording.segments.clone(),
         channels: described
             .map(|(i, (channel, found))| {
                 let time = time_of(i).map(|place| &times[place]);
@@ -63,7 +63,7 @@ pub fn file(content: &Content) -> File {
 }
 
 /// What is wrong with the file as a whole.
-fn of_file(recording: &Recording) -> Vec<Said> {
+fn of_file(recording: &Recording) -> Vec<ChannelWarning> {
     recording
         .lost
         .iter()
@@ -75,8 +75,8 @@ fn of_file(recording: &Recording) -> Vec<Said> {
 }
 
 /// A warning with the names of the channels that it is about.
-pub fn said(warning: Warning, channels: Vec<String>) -> Said {
-    Said {
+pub fn said(warning: Warning, channels: Vec<String>) -> ChannelWarning {
+    ChannelWarning {
         code: warning.code,
         message: warning.message,
         channels,
@@ -89,15 +89,6 @@ fn details(recording: &Recording) -> Vec<Detail> {
         value: value.clone(),
     };
     recording.details.iter().map(pair).collect()
-}
-
-fn segments(recording: &Recording) -> Vec<Segment> {
-    let segment = |segment: &crate::recording::Segment| Segment {
-        name: segment.name.clone(),
-        start_s: segment.start_s,
-        start_time: segment.start_text.clone(),
-    };
-    recording.segments.iter().map(segment).collect()
 }
 
 /// The time axes of the channels, each with the numbers of its channels.
@@ -147,7 +138,11 @@ fn examine(channels: &[Channel]) -> Vec<Findings> {
 const MANY: usize = 4;
 
 /// What is wrong with the samples; what many channels have in common is said once.
-fn of_channels(channels: &[Channel], labels: &[String], findings: &[Findings]) -> Vec<Said> {
+fn of_channels(
+    channels: &[Channel],
+    labels: &[String],
+    findings: &[Findings],
+) -> Vec<ChannelWarning> {
     let mut all = Vec::new();
     let mut constant = Vec::new();
     let mut coarse = Vec::new();
@@ -173,16 +168,17 @@ fn of_channels(channels: &[Channel], labels: &[String], findings: &[Findings]) -
 }
 
 /// Puts warnings of one code about many channels together.
-fn gathered(warnings: Vec<Said>) -> Vec<Said> {
-    let mut out: Vec<Said> = Vec::new();
+fn gathered(warnings: Vec<ChannelWarning>) -> Vec<ChannelWarning> {
+    let mut out: Vec<ChannelWarning> = Vec::new();
     for warning in &warnings {
-        let alike: Vec<&Said> = warnings.iter().filter(|w| w.code == warning.code).collect();
+        let alike: Vec<&ChannelWarning> =
+            warnings.iter().filter(|w| w.code == warning.code).collect();
         if alike.len() < MANY {
             out.push(warning.clone());
         } else if out.iter().all(|said| said.code != warning.code) {
             let mut channels: Vec<String> = alike.iter().flat_map(|w| w.channels.clone()).collect();
             channels.dedup();
-            out.push(Said {
+            out.push(ChannelWarning {
                 code: warning.code,
                 message: format!(
                     "{} channels, {}; the first: {}",
@@ -212,10 +208,10 @@ fn listed(names: &[String]) -> String {
     }
 }
 
-fn describe(channel: &Channel, found: &Findings, time: Option<&TimeFindings>) -> inspect::Channel {
+fn describe(channel: &Channel, found: &Findings, time: Option<&TimeFindings>) -> InspectedChannel {
     let axis = &channel.axis;
     let unit = unit_of(channel);
-    let of_axis = inspect::Channel {
+    let of_axis = InspectedChannel {
         name: channel.name.clone(),
         heading: channel.heading.clone(),
         segment: channel.segment.map(|segment| segment + 1),
@@ -230,7 +226,7 @@ fn describe(channel: &Channel, found: &Findings, time: Option<&TimeFindings>) ->
         start_time: axis.start_text.clone(),
         duration_s: duration_s(channel),
         assumed: axis.assumed.clone(),
-        ..inspect::Channel::default()
+        ..InspectedChannel::default()
     };
     with_samples(with_steps(of_axis, time), found)
 }
@@ -247,21 +243,17 @@ fn duration_s(channel: &Channel) -> Option<f64> {
 }
 
 /// Adds what the stamps show.
-fn with_steps(channel: inspect::Channel, time: Option<&TimeFindings>) -> inspect::Channel {
+fn with_steps(channel: InspectedChannel, time: Option<&TimeFindings>) -> InspectedChannel {
     let Some((time, steps)) = time.and_then(|time| time.steps.as_ref().map(|s| (time, s))) else {
         return channel;
     };
-    let gap = |event: &torqcomp_dsp::quality::steps::Event| Gap {
-        after_s: event.from_s,
-        length_s: event.step_s,
-    };
-    inspect::Channel {
+    InspectedChannel {
         jitter: steps.jitter.map(|jitter| jitter.std),
         jitter_peak: steps.jitter.map(|jitter| jitter.peak),
         stamps_rounded_to_s: time.rounded.map(|rounded| rounded.quantum_s),
         gaps: Some(steps.gaps.count),
         missing_samples: Some(steps.missing),
-        gap_list: steps.gaps.listed.iter().map(gap).collect(),
+        gap_list: steps.gaps.listed.clone(),
         repeated_stamps: Some(steps.repeated.count),
         backwards: Some(steps.backwards.count),
         clock_jumps: Some(steps.jumps.count),
@@ -270,10 +262,10 @@ fn with_steps(channel: inspect::Channel, time: Option<&TimeFindings>) -> inspect
 }
 
 /// Adds what the samples show.
-fn with_samples(channel: inspect::Channel, found: &Findings) -> inspect::Channel {
+fn with_samples(channel: InspectedChannel, found: &Findings) -> InspectedChannel {
     let rail = |of: fn(&Clipping) -> Option<f64>| found.clipping.as_ref().and_then(of);
     let lines = found.mains.iter().flat_map(|mains| &mains.lines);
-    inspect::Channel {
+    InspectedChannel {
         smallest: found.range.map(|(low, _)| low),
         largest: found.range.map(|(_, high)| high),
         mean: found.mean,
@@ -292,13 +284,7 @@ fn with_samples(channel: inspect::Channel, found: &Findings) -> inspect::Channel
         non_finite: Some(found.non_finite.map_or(0, |f| f.count)),
         resolution: found.quantisation.map(|q| q.step),
         resolution_bits: found.quantisation.map(|q| q.bits),
-        mains: lines
-            .map(|line| MainsLine {
-                frequency_hz: line.frequency_hz,
-                amplitude: line.amplitude,
-                prominence: line.prominence,
-            })
-            .collect(),
+        mains: lines.cloned().collect(),
         ..channel
     }
 }

@@ -3,19 +3,19 @@
 use std::sync::Arc;
 
 use super::content::Content;
+use super::report::InspectedChannel;
 use super::whole::{self, Kept, Stamps, Whole};
 use crate::failure::Failure;
 use crate::io::Input;
 use crate::io::csv::NamedUnit;
 use crate::io::mcap::inventory::{ChannelReport, LeafReport};
-use crate::io::mcap::{self, FieldChoice, Inventory, SelectedSignal, TimeOptions};
+use crate::io::mcap::{Inventory, Options, Selection, Source, Summary};
 use crate::recording::{Axis, Channel, RateFrom, Recording, typical_step};
-use crate::report::inspect;
 use crate::warning::Warning;
 
 /// Samples that are kept at most, of all numbers together: eight bytes each, and as many for stamps.
 const MOST_SAMPLES: u64 = 1 << 22;
-/// Longest file whose samples are read, in bytes.
+/// Bytes of the file that are gone through at most: the file is read once for each number.
 const MOST_BYTES: u64 = 4_000_000_000;
 /// Numbers that are read at most.
 const MOST_NUMBERS: u64 = 64;
@@ -41,41 +41,20 @@ fn read_most(place: &Input, most: u64) -> Result<Content, Failure> {
     };
     let mut budget = Budget::of(place, &inventory, most);
     let mut left_out = 0;
-    let (mut choices, mut kept, mut numbers) = (Vec::new(), Vec::new(), Vec::new());
     for topic in &inventory.channels {
-        let of_topic = numbers.len();
-        for number in topic.leaves.iter().filter(|leaf| !leaf.is_stamp) {
+        let numbers: Vec<&LeafReport> = topic.leaves.iter().filter(|l| !l.is_stamp).collect();
+        if numbers.is_empty() {
+            content.listed.push(entry(topic, None));
+        }
+        for number in numbers {
             let share = budget.share(topic.messages);
-            left_out += usize::from(share.is_none() && topic.messages > 0);
-            numbers.push((topic, Some(number), share.is_some()));
-            if let Some(most) = share {
-                choices.push(choice(topic, number));
-                kept.push(Kept::new(most));
+            let read = share.map(|most| samples(place, topic, number, most));
+            left_out += usize::from(read.is_none() && topic.messages > 0);
+            match read {
+                Some(Ok(read)) => add(&mut content, read, &inventory.warnings),
+                // Lists that are empty at first, and the like: the warnings tell what is damaged.
+                _ => content.listed.push(entry(topic, Some(number))),
             }
-        }
-        if numbers.len() == of_topic {
-            numbers.push((topic, None, false));
-        }
-    }
-    let mut results = Vec::new();
-    if !choices.is_empty() {
-        let options = TimeOptions::default();
-        results = mcap::read_fields(place, &choices, &options, |number, times_ns, values| {
-            kept[number].add(times_ns, values);
-        })?;
-    }
-    let mut results = results.into_iter().zip(kept);
-    for (topic, number, is_read) in numbers {
-        let read = is_read.then(|| results.next()).flatten();
-        if let (Some((Ok((selected, summary)), kept)), Some(number)) = (read, number) {
-            let (channel, whole) = channel(topic, number, &selected, kept);
-            content.recording.channels.push(channel);
-            content.wholes.push(whole);
-            let warnings = &mut content.recording.warnings;
-            add_warnings(warnings, summary.warnings, &inventory.warnings);
-        } else {
-            // Lists that are empty at first, and the like: the warnings name what is damaged.
-            content.listed.push(entry(topic, number));
         }
     }
     let said = &mut content.recording.warnings;
@@ -85,12 +64,14 @@ fn read_most(place: &Input, most: u64) -> Result<Content, Failure> {
     Ok(content)
 }
 
-fn choice(topic: &ChannelReport, number: &LeafReport) -> FieldChoice {
-    FieldChoice {
-        topic: Some(topic.topic.clone()),
-        field: Some(first_item(&number.path)),
-        signal: None,
-    }
+/// A number that was read.
+type Read = (Channel, Option<Whole>, Summary);
+
+/// Adds a number that was read.
+fn add(content: &mut Content, (channel, whole, summary): Read, of_file: &[Warning]) {
+    content.recording.channels.push(channel);
+    content.wholes.push(whole);
+    add_warnings(&mut content.recording.warnings, summary.warnings, of_file);
 }
 
 fn not_read(left_out: usize) -> Warning {
@@ -117,10 +98,9 @@ impl Budget {
         };
         let topics = inventory.channels.iter().filter(|topic| topic.messages > 0);
         let numbers = topics.flat_map(|topic| topic.leaves.iter().filter(|leaf| !leaf.is_stamp));
-        let is_readable = length.is_some_and(|length| length <= MOST_BYTES);
-        let most = if is_readable { MOST_NUMBERS } else { 0 };
+        let passes = length.map_or(0, |length| (MOST_BYTES / length.max(1)).min(MOST_NUMBERS));
         Self {
-            numbers: most.min(numbers.count() as u64),
+            numbers: passes.min(numbers.count() as u64),
             samples,
         }
     }
@@ -138,16 +118,28 @@ impl Budget {
     }
 }
 
-/// A number that was read, and what all of its samples come to if not all were kept.
-fn channel(
+/// Reads one number of a topic and keeps so many samples, and what all of them come to if there are more.
+fn samples(
+    place: &Input,
     topic: &ChannelReport,
     number: &LeafReport,
-    selected: &SelectedSignal,
-    kept: Kept,
-) -> (Channel, Option<Whole>) {
+    most: usize,
+) -> Result<Read, Failure> {
+    let selection = Selection {
+        topic: Some(topic.topic.clone()),
+        field: Some(first_item(&number.path)),
+        signal: None,
+    };
+    let mut source = Source::open(place, &selection, &Options::default())?;
+    let (mut times_ns, mut values) = (Vec::new(), Vec::new());
+    let mut kept = Kept::new(most);
+    while source.next(&mut times_ns, &mut values)? {
+        kept.add(&times_ns, &values);
+    }
     let (stamps, samples, whole) = kept.finish();
-    let unit = selected.unit.as_ref().map(|found| found.unit.clone());
-    let time = &selected.time;
+    let chosen = source.chosen();
+    let unit = chosen.unit.as_ref().map(|found| found.unit.clone());
+    let time = &chosen.time;
     let axis = axis(
         stamps,
         match &time.field {
@@ -165,7 +157,7 @@ fn channel(
         axis,
         segment: None,
     };
-    (channel, whole)
+    Ok((channel, whole, source.finish()))
 }
 
 /// An axis of stamps that are counted from the first: seconds since 1970 would cost them their last
@@ -202,9 +194,9 @@ fn first_item(path: &str) -> String {
 }
 
 /// A channel whose samples are not known.
-fn entry(topic: &ChannelReport, number: Option<&LeafReport>) -> inspect::Channel {
+fn entry(topic: &ChannelReport, number: Option<&LeafReport>) -> InspectedChannel {
     let start_ns = topic.log_ns.map(|(first, _)| first);
-    inspect::Channel {
+    InspectedChannel {
         name: name(topic, number),
         heading: number.map_or_else(String::new, |number| number.path.clone()),
         unit: number.and_then(|number| number.unit.clone()),
@@ -217,7 +209,7 @@ fn entry(topic: &ChannelReport, number: Option<&LeafReport>) -> inspect::Channel
         start: start_ns.map(|ns| ns as f64 * 1e-9),
         start_unit: "s",
         start_time: start_ns.and_then(|ns| date_and_time(i64::try_from(ns).ok()?)),
-        ..inspect::Channel::default()
+        ..InspectedChannel::default()
     }
 }
 

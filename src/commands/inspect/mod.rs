@@ -4,13 +4,16 @@ mod content;
 mod describe;
 mod messages;
 mod plot;
+mod report;
 mod same;
+mod text;
 mod whole;
 
 use std::path::Path;
 
 use self::content::Content;
-use super::{Outcome, open_plot};
+use self::report::{ChannelWarning, InspectReport, Inspected};
+use super::{Outcome, open_plot, publish};
 use crate::cli::Inspect;
 use crate::failure::Failure;
 use crate::io::Input;
@@ -18,7 +21,6 @@ use crate::io::output::Output;
 use crate::print;
 use crate::quality::copies;
 use crate::recording::Recording;
-use crate::report::inspect::{Entry, Report, Said};
 
 /// Runs the verb.
 pub fn run(args: &Inspect) -> Result<Outcome, Failure> {
@@ -35,7 +37,7 @@ pub fn run(args: &Inspect) -> Result<Outcome, Failure> {
     if let [Err(failure)] = read.as_slice() {
         return Err(failure.clone());
     }
-    let report = Report {
+    let report = InspectReport {
         files: read.iter().zip(&args.files).map(entry).collect(),
         warnings: between(&args.files, &read),
     };
@@ -52,10 +54,10 @@ fn check(args: &Inspect) -> Result<(), Failure> {
     Ok(())
 }
 
-fn entry((read, file): (&Result<Content, Failure>, &String)) -> Entry {
+fn entry((read, file): (&Result<Content, Failure>, &String)) -> Inspected {
     match read {
-        Ok(content) => Entry::Read(Box::new(describe::file(content))),
-        Err(failure) => Entry::Failed {
+        Ok(content) => Inspected::Read(Box::new(describe::file(content))),
+        Err(failure) => Inspected::Failed {
             file: file.clone(),
             error: failure.to_string(),
         },
@@ -63,7 +65,7 @@ fn entry((read, file): (&Result<Content, Failure>, &String)) -> Entry {
 }
 
 /// What comparing the files shows. Files that are the same need no comparison of their channels.
-fn between(files: &[String], read: &[Result<Content, Failure>]) -> Vec<Said> {
+fn between(files: &[String], read: &[Result<Content, Failure>]) -> Vec<ChannelWarning> {
     let (mut found, firsts) = same::files(files);
     let recordings: Vec<&Recording> = firsts
         .iter()
@@ -79,18 +81,12 @@ fn between(files: &[String], read: &[Result<Content, Failure>]) -> Vec<Said> {
 /// Writes everything that was found; files that could not be read are a failure in the end.
 fn finish(
     args: &Inspect,
-    report: &Report,
+    report: &InspectReport,
     read: &[Result<Content, Failure>],
-    mut output: Output,
+    output: Output,
     plot: Option<Output>,
 ) -> Result<Outcome, Failure> {
-    let text = if args.json {
-        report.json()
-    } else {
-        report.text()
-    };
-    output.write(text.as_bytes())?;
-    output.finish()?;
+    publish(report, args.json, output)?;
     if let Some(mut plot) = plot {
         let contents = read.iter().flatten();
         let recordings: Vec<&Recording> = contents.map(|content| &content.recording).collect();

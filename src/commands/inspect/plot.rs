@@ -2,11 +2,11 @@
 
 use torqcomp_dsp::quality::range;
 
+use super::report::{InspectReport, Inspected, InspectedChannel};
 use crate::chart::{Chart, Series, picture};
 use crate::print::rounded;
 use crate::quality::{labels, unit_of};
 use crate::recording::{Channel, Recording};
-use crate::report::inspect::{self, Entry, Report};
 
 /// Height of a channel's panel, in user units.
 const HEIGHT: f64 = 120.0;
@@ -14,10 +14,10 @@ const HEIGHT: f64 = 120.0;
 const FAR: f64 = 1e4;
 
 /// Draws every channel of every file that was read.
-pub fn svg(recordings: &[&Recording], report: &Report) -> String {
+pub fn svg(recordings: &[&Recording], report: &InspectReport) -> String {
     let found = report.files.iter().filter_map(|entry| match entry {
-        Entry::Read(file) => Some(file.as_ref()),
-        Entry::Failed { .. } => None,
+        Inspected::Read(file) => Some(file.as_ref()),
+        Inspected::Failed { .. } => None,
     });
     let several = recordings.len() > 1;
     let mut charts = Vec::new();
@@ -38,7 +38,7 @@ pub fn svg(recordings: &[&Recording], report: &Report) -> String {
     picture(&title, HEIGHT, &charts)
 }
 
-fn chart(channel: &Channel, found: &inspect::Channel, name: String) -> Chart {
+fn chart(channel: &Channel, found: &InspectedChannel, name: String) -> Chart {
     let drawn = channel.samples.len();
     let name = match found.samples > drawn {
         true => format!("{name} (the first {drawn} of {} samples)", found.samples),

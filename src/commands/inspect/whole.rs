@@ -1,6 +1,6 @@
 //! Channels too long to be kept: their first samples, and what all of them come to.
 
-use crate::report::inspect;
+use super::report::InspectedChannel;
 use crate::warning::Warning;
 
 /// What all samples of a channel come to of which only the first were kept.
@@ -111,8 +111,8 @@ impl Kept {
 
 impl Whole {
     /// The description of what was kept, with what is known of all samples.
-    pub fn describe(&self, kept: inspect::Channel) -> inspect::Channel {
-        inspect::Channel {
+    pub fn describe(&self, kept: InspectedChannel) -> InspectedChannel {
+        InspectedChannel {
             samples: self.samples,
             duration_s: Some(self.duration_s),
             smallest: self.range.map(|(low, _)| low),

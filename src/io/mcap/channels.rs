@@ -3,85 +3,50 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use mcap::records::{self, Record, op};
+use mcap::records::op;
 
 use super::decode::Encoding;
-use super::record;
+use super::record::{ChannelRecord, SchemaRecord};
 use super::schema::ros2msg::Generation;
 use super::schema::{Schema, json, protobuf, ros2idl, ros2msg};
 
 /// Schemas and channels as the file declares them.
 #[derive(Debug, Default)]
 pub struct Channels {
-    schemas: BTreeMap<u16, Arc<DeclaredSchema>>,
-    channels: BTreeMap<u16, Arc<TopicChannel>>,
+    schemas: BTreeMap<u16, Arc<SchemaRecord>>,
+    channels: BTreeMap<u16, Arc<Channel>>,
     /// Declarations that contradict an earlier one.
     pub conflicts: u64,
 }
 
-/// What a channel's messages are made of.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct DeclaredSchema {
-    id: u16,
-    /// Name of the type, as `sensor_msgs/msg/JointState`.
-    pub name: String,
-    /// Language of the definition, as `ros2msg`.
-    pub encoding: String,
-    data: Vec<u8>,
-}
-
 /// A channel and its schema.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct TopicChannel {
+pub struct Channel {
     /// The channel as the file declares it.
-    pub record: records::Channel,
+    pub record: ChannelRecord,
     /// Its schema, if it has one.
-    pub schema: Option<Arc<DeclaredSchema>>,
+    pub schema: Option<Arc<SchemaRecord>>,
 }
 
 impl Channels {
-    /// The channels that the summary of a file repeats.
-    pub(super) fn of_summary(summary: &mcap::Summary) -> Self {
-        let mut channels = Self::default();
-        for schema in summary.schemas.values() {
-            channels.add_schema(DeclaredSchema {
-                id: schema.id,
-                name: schema.name.clone(),
-                encoding: schema.encoding.clone(),
-                data: schema.data.to_vec(),
-            });
-        }
-        for channel in summary.channels.values() {
-            channels.add_channel(records::Channel {
-                id: channel.id,
-                schema_id: channel.schema.as_ref().map_or(0, |schema| schema.id),
-                topic: channel.topic.clone(),
-                message_encoding: channel.message_encoding.clone(),
-                metadata: channel.metadata.clone(),
-            });
-        }
-        channels
-    }
-
     /// Takes note of a schema or a channel; other records are left alone.
     pub fn note(&mut self, op: u8, body: &[u8]) {
-        // Message indexes need not be parsed.
-        let is_declaration = matches!(op, op::SCHEMA | op::CHANNEL);
-        match is_declaration.then(|| record::parse(op, body)).flatten() {
-            Some(Record::Schema { header, data }) if header.id != 0 => {
-                self.add_schema(DeclaredSchema {
-                    id: header.id,
-                    name: header.name,
-                    encoding: header.encoding,
-                    data: data.into_owned(),
-                });
+        match op {
+            op::SCHEMA => {
+                if let Some(schema) = SchemaRecord::read(body).filter(|schema| schema.id != 0) {
+                    self.add_schema(schema);
+                }
             }
-            Some(Record::Channel(channel)) => self.add_channel(channel),
+            op::CHANNEL => {
+                if let Some(channel) = ChannelRecord::read(body) {
+                    self.add_channel(channel);
+                }
+            }
             _ => {}
         }
     }
 
-    fn add_schema(&mut self, schema: DeclaredSchema) {
+    fn add_schema(&mut self, schema: SchemaRecord) {
         match self.schemas.get(&schema.id) {
             Some(known) if **known != schema => self.conflicts += 1,
             Some(_) => {}
@@ -89,31 +54,32 @@ impl Channels {
         }
     }
 
-    fn add_channel(&mut self, record: records::Channel) {
+    fn add_channel(&mut self, record: ChannelRecord) {
         match self.channels.get(&record.id) {
             Some(known) if known.record != record => self.conflicts += 1,
             // Its schema may have been declared since.
             Some(known) if known.schema.is_some() || record.schema_id == 0 => {}
             _ => {
                 let schema = self.schemas.get(&record.schema_id).cloned();
-                let channel = TopicChannel { record, schema };
+                let channel = Channel { record, schema };
                 self.channels.insert(channel.record.id, Arc::new(channel));
             }
         }
     }
 
     /// A channel by its number.
-    pub fn get(&self, id: u16) -> Option<&Arc<TopicChannel>> {
+    #[must_use]
+    pub fn get(&self, id: u16) -> Option<&Arc<Channel>> {
         self.channels.get(&id)
     }
 
     /// All channels, by number.
-    pub fn iter(&self) -> impl Iterator<Item = &Arc<TopicChannel>> {
+    pub fn iter(&self) -> impl Iterator<Item = &Arc<Channel>> {
         self.channels.values()
     }
 }
 
-impl TopicChannel {
+impl Channel {
     /// How its messages are encoded, and what they are made of. JSON is told from a message.
     ///
     /// # Errors
@@ -163,16 +129,8 @@ impl TopicChannel {
             .map_err(|error| format!("schema \"{}\", {error}", schema.name))
     }
 
-    /// Whether its messages are of the same type as those of another channel.
-    pub(super) fn has_type_of(&self, other: &Self) -> bool {
-        let what = |channel: &Self| {
-            let schema = channel.schema.as_ref();
-            schema.map(|s| (s.name.clone(), s.encoding.clone(), s.data.clone()))
-        };
-        self.record.message_encoding == other.record.message_encoding && what(self) == what(other)
-    }
-
-    /// Name of its schema, for people.
+    /// Name and encoding of its schema, for people.
+    #[must_use]
     pub fn schema_name(&self) -> &str {
         self.schema.as_ref().map_or("", |schema| &schema.name)
     }
@@ -182,16 +140,16 @@ impl TopicChannel {
 mod tests {
     use super::*;
 
-    fn channel(message_encoding: &str, schema_encoding: &str) -> TopicChannel {
-        TopicChannel {
-            record: records::Channel {
+    fn channel(message_encoding: &str, schema_encoding: &str) -> Channel {
+        Channel {
+            record: ChannelRecord {
                 id: 1,
                 schema_id: 1,
                 topic: "/t".to_owned(),
                 message_encoding: message_encoding.to_owned(),
                 metadata: BTreeMap::new(),
             },
-            schema: Some(Arc::new(DeclaredSchema {
+            schema: Some(Arc::new(SchemaRecord {
                 id: 1,
                 name: "p/msg/M".to_owned(),
                 encoding: schema_encoding.to_owned(),

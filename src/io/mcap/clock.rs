@@ -9,7 +9,7 @@ const DRIFT_NS: i64 = 100_000_000;
 
 /// What was seen of both clocks.
 #[derive(Debug, Default)]
-pub struct ClockCheck {
+pub struct Clock {
     /// Stamp minus log time: of the first message, least and greatest, in ns.
     offsets: Option<(i64, i64, i64)>,
     /// Log times, first and last, in ns.
@@ -18,7 +18,7 @@ pub struct ClockCheck {
     zeros: u64,
 }
 
-impl ClockCheck {
+impl Clock {
     /// Takes note of a message's two times.
     #[inline]
     pub fn note(&mut self, stamp_ns: Option<i64>, log_time_ns: u64) {
@@ -41,6 +41,7 @@ impl ClockCheck {
     }
 
     /// What should be said about them.
+    #[must_use]
     pub fn warnings(&self) -> Vec<String> {
         let mut said = Vec::new();
         if self.zeros > 0 {
@@ -75,7 +76,7 @@ mod tests {
     use super::*;
 
     fn said(times: &[(i64, u64)]) -> Vec<String> {
-        let mut clock = ClockCheck::default();
+        let mut clock = Clock::default();
         for (stamp, log) in times {
             clock.note(Some(*stamp), *log);
         }

@@ -2,10 +2,9 @@
 //!
 //! # Data path
 //!
-//! Bytes → `record` (records, chunks unpacked, damage noted) → `channels` (what a channel's messages
-//! are made of, by [`schema`]) → [`route`] (the way to the wanted number) → [`decode`] ([`cdr`],
-//! `protobuf`, `json`) → `blocks` and `order` (times) → [`SignalReader`], or [`read_fields`] for several
-//! numbers in one pass.
+//! Bytes → [`record::frames`] (records, chunks unpacked, damage noted) → [`channels`] (what a
+//! channel's messages are made of, by [`schema`]) → [`route`] (the way to the wanted number) →
+//! [`decode`] ([`cdr`], [`protobuf`], [`json`]) → [`blocks`] and [`order`] (times) → [`Source`].
 //!
 //! # What is believed
 //!
@@ -14,36 +13,31 @@
 //! cut off is used up to its last whole message. Memory is that of one chunk (1 GiB at most), of
 //! the samples held back to be sorted, and of the schemas.
 
-mod blocks;
+pub mod blocks;
 pub mod cdr;
-mod channels;
+pub mod channels;
 mod clock;
 pub mod decode;
-mod index;
 pub mod inventory;
-mod json;
-mod order;
+pub mod json;
+pub mod order;
 pub mod path;
-mod protobuf;
-mod record;
+pub mod protobuf;
+pub mod record;
 pub mod route;
 pub mod schema;
-mod selection;
-mod signal;
-mod source;
-mod summary;
+pub mod selection;
+pub mod source;
+pub mod summary;
 #[cfg(test)]
 pub(crate) mod testing;
 pub mod time;
-mod tree;
-mod units;
+pub mod units;
 pub mod writer;
 
-pub use index::SignalEnd;
 pub use inventory::Inventory;
-pub use selection::FieldChoice;
-pub use signal::{SelectedSignal, TimeOptions};
-pub use source::{SignalReader, read_fields};
-pub use summary::SignalSummary;
+pub use selection::Selection;
+pub use source::{Options, Source};
+pub use summary::Summary;
 pub use time::TimeChoice;
 pub use writer::Writer;

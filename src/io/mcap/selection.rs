@@ -1,12 +1,12 @@
 //! Which number of which topic.
 
-use super::channels::{Channels, TopicChannel};
-use super::path::{self, PathPart};
+use super::channels::{Channel, Channels};
+use super::path::{self, Part};
 use crate::failure::{Failure, did_you_mean};
 
 /// What the command line chooses.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct FieldChoice {
+pub struct Selection {
     /// `--topic /joint_states`
     pub topic: Option<String>,
     /// `--field effort[0]`
@@ -17,21 +17,21 @@ pub struct FieldChoice {
 
 /// The choice, as far as it can be told without the file.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum FieldRequest {
+pub enum Wanted {
     /// A topic and a field, none for the only number there is.
-    Topic(String, Vec<PathPart>),
+    Topic(String, Vec<Part>),
     /// Both in one text; which part is the topic only the file can tell.
     Signal(String),
     /// The only number in the file.
     Only,
 }
 
-impl FieldChoice {
+impl Selection {
     /// Checks what does not need the file.
     ///
     /// # Errors
     /// [`Failure::Usage`] if the choice contradicts itself or is not written as one.
-    pub fn check(&self) -> Result<FieldRequest, Failure> {
+    pub fn check(&self) -> Result<Wanted, Failure> {
         let field = self.field.as_deref().unwrap_or("");
         match (&self.signal, &self.topic) {
             (Some(_), Some(_)) => Err(Failure::usage(
@@ -41,24 +41,25 @@ impl FieldChoice {
             (Some(_), None) if self.field.is_some() => Err(Failure::usage(
                 "--signal names topic and field in one: leave --field out",
             )),
-            (Some(signal), None) => Ok(FieldRequest::Signal(signal.clone())),
+            (Some(signal), None) => Ok(Wanted::Signal(signal.clone())),
             (None, Some(topic)) => {
                 let parts = path::parse(field);
                 let parts = parts.map_err(|why| Failure::usage(format_args!("--field: {why}")))?;
-                Ok(FieldRequest::Topic(topic.clone(), parts))
+                Ok(Wanted::Topic(topic.clone(), parts))
             }
             (None, None) if self.field.is_some() => Err(Failure::usage(
                 "--field needs the topic it is in: add --topic, as --topic /joint_states",
             )),
-            (None, None) => Ok(FieldRequest::Only),
+            (None, None) => Ok(Wanted::Only),
         }
     }
 }
 
-impl FieldRequest {
+impl Wanted {
     /// The field in a channel's messages, if the channel's topic is wanted. Text that is no field
     /// is an error only there.
-    pub fn field_in(&self, channel: &TopicChannel, channels: &Channels) -> Option<FieldText> {
+    #[must_use]
+    pub fn field_in(&self, channel: &Channel, channels: &Channels) -> Option<FieldText> {
         let topic = &channel.record.topic;
         match self {
             Self::Topic(wanted, parts) => {
@@ -78,6 +79,7 @@ impl FieldRequest {
     }
 
     /// Says that no channel fits, and which there are.
+    #[must_use]
     pub fn miss(&self, channels: &Channels) -> String {
         let mut topics: Vec<_> = channels
             .iter()
@@ -118,7 +120,7 @@ impl FieldRequest {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum FieldText {
     /// Taken apart.
-    Parts(Vec<PathPart>),
+    Parts(Vec<Part>),
     /// As text.
     Text(String),
 }
@@ -128,7 +130,7 @@ impl FieldText {
     ///
     /// # Errors
     /// A sentence that says what was expected.
-    pub fn parts(self) -> Result<Vec<PathPart>, String> {
+    pub fn parts(self) -> Result<Vec<Part>, String> {
         match self {
             Self::Parts(parts) => Ok(parts),
             Self::Text(text) => path::parse(&text),
@@ -176,7 +178,7 @@ mod tests {
         channels
     }
 
-    fn found(wanted: &FieldRequest, channels: &Channels) -> Vec<(String, String)> {
+    fn found(wanted: &Wanted, channels: &Channels) -> Vec<(String, String)> {
         channels
             .iter()
             .filter_map(|channel| {
@@ -194,7 +196,7 @@ mod tests {
     #[test]
     fn topic_and_field_together_or_apart() {
         let channels = channels(&["/joint_states", "/a", "/a.b", "plain"]);
-        let signal = |text: &str| found(&FieldRequest::Signal(text.to_owned()), &channels);
+        let signal = |text: &str| found(&Wanted::Signal(text.to_owned()), &channels);
         let expected = [pair("/joint_states", "effort[0]")];
         assert_eq!(signal("/joint_states.effort[0]"), expected);
         assert_eq!(signal("joint_states.effort[0]"), expected);
@@ -202,17 +204,17 @@ mod tests {
         assert_eq!(signal("/a.c"), [pair("/a", "c")]);
         assert_eq!(signal("plain"), [pair("plain", "")]);
         assert_eq!(signal("/joint_statesx.y"), []);
-        let topic = FieldRequest::Topic("joint_states".to_owned(), vec![]);
+        let topic = Wanted::Topic("joint_states".to_owned(), vec![]);
         assert_eq!(found(&topic, &channels), [pair("/joint_states", "")]);
     }
 
     #[test]
     fn a_miss_lists_the_topics() {
         let channels = channels(&["/joint_states", "/imu"]);
-        let said = FieldRequest::Topic("/joint_sates".to_owned(), vec![]).miss(&channels);
+        let said = Wanted::Topic("/joint_sates".to_owned(), vec![]).miss(&channels);
         assert!(said.contains("(did you mean \"/joint_states\"?)"), "{said}");
         assert!(said.contains("/imu"), "{said}");
-        let said = FieldRequest::Signal("/imu.x".to_owned()).miss(&channels);
+        let said = Wanted::Signal("/imu.x".to_owned()).miss(&channels);
         assert!(said.contains("no message on the topic \"/imu\""), "{said}");
     }
 
@@ -226,7 +228,7 @@ mod tests {
             (some("/a"), some("b["), None),
         ];
         for (topic, field, signal) in wrong {
-            let selection = FieldChoice {
+            let selection = Selection {
                 topic,
                 field,
                 signal,
@@ -236,6 +238,6 @@ mod tests {
                 "{selection:?}"
             );
         }
-        assert_eq!(FieldChoice::default().check(), Ok(FieldRequest::Only));
+        assert_eq!(Selection::default().check(), Ok(Wanted::Only));
     }
 }

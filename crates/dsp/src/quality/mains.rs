@@ -1,5 +1,7 @@
 //! Mains hum: lines at 50 or 60 Hz and their multiples that stand out of the spectrum.
 
+use serde::Serialize;
+
 use super::median;
 use crate::spectrum::{Density, PowerSum};
 
@@ -33,7 +35,7 @@ pub struct Mains {
     /// 50 or 60 Hz.
     pub nominal_hz: f64,
     /// The lines, the lowest first.
-    pub lines: Vec<Line>,
+    pub lines: Vec<MainsLine>,
     /// Distance of the spectrum's frequencies: lines closer together are one.
     pub resolution_hz: f64,
     /// A line at a simple fraction of the mains frequency (denominator up to 6), if there is one: then
@@ -41,10 +43,11 @@ pub struct Mains {
     pub shaft_hz: Option<f64>,
 }
 
-/// A line of the spectrum.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Line {
+/// A line at a multiple of the mains frequency.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct MainsLine {
     /// Multiple of the mains frequency.
+    #[serde(skip)]
     pub order: usize,
     /// Where it was found, Hz: the highest bin.
     pub frequency_hz: f64,
@@ -88,7 +91,7 @@ pub fn mains(samples: &[f64], rate_hz: f64) -> Option<Mains> {
     let (density, variance) = spectrum(samples, rate_hz)?;
     let mut best: Option<(f64, Mains)> = None;
     for nominal_hz in NOMINAL_HZ {
-        let lines: Vec<Line> = (1..=ORDERS)
+        let lines: Vec<MainsLine> = (1..=ORDERS)
             .filter_map(|order| line(&density, nominal_hz, order))
             .collect();
         let strongest = lines.iter().map(|l| l.amplitude).fold(0.0, f64::max);
@@ -150,7 +153,7 @@ fn spectrum(samples: &[f64], rate_hz: f64) -> Option<(Density, f64)> {
 }
 
 /// The line at a multiple of a mains frequency, if there is one.
-fn line(density: &Density, nominal_hz: f64, order: usize) -> Option<Line> {
+fn line(density: &Density, nominal_hz: f64, order: usize) -> Option<MainsLine> {
     let bin = peak(density, nominal_hz * order as f64)?;
     let mut beside = beside(density, bin)?;
     let highest = beside.iter().copied().fold(0.0, f64::max);
@@ -159,7 +162,7 @@ fn line(density: &Density, nominal_hz: f64, order: usize) -> Option<Line> {
         .iter()
         .map(|s| (s - floor) * density.step_hz)
         .sum();
-    Some(Line {
+    Some(MainsLine {
         order,
         frequency_hz: bin as f64 * density.step_hz,
         amplitude: (2.0 * power.max(0.0)).sqrt(),

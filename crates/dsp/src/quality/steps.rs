@@ -1,5 +1,7 @@
 //! The time axis: its usual step, and every step that is not.
 
+use serde::Serialize;
+
 use super::median;
 
 /// A step longer than this many usual ones leaves out a sample.
@@ -57,13 +59,16 @@ pub struct Events {
 }
 
 /// An irregular step.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Event {
     /// Index of the stamp that ends it.
+    #[serde(skip)]
     pub index: usize,
     /// The stamp before it, in s.
+    #[serde(rename = "after_s")]
     pub from_s: f64,
     /// Its length in s; negative if time runs backwards.
+    #[serde(rename = "length_s")]
     pub step_s: f64,
 }
 

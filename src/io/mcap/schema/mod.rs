@@ -33,6 +33,7 @@ pub enum Number {
 
 impl Number {
     /// Bytes it takes in CDR and ROS 1.
+    #[must_use]
     pub fn size(self) -> u8 {
         match self {
             Self::Bool | Self::I8 | Self::U8 => 1,
@@ -43,6 +44,7 @@ impl Number {
     }
 
     /// Name as ROS writes it.
+    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Bool => "bool",
@@ -62,7 +64,7 @@ impl Number {
 
 /// The type of a field.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum FieldKind {
+pub enum Kind {
     /// A number.
     Number(Number),
     /// Text of bytes, or bytes in protobuf.
@@ -81,22 +83,37 @@ pub enum FieldKind {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Many {
     /// Type of each.
-    pub item: FieldKind,
+    pub item: Kind,
     /// Their number if it is fixed.
     pub count: Option<u32>,
 }
 
-impl FieldKind {
+impl Kind {
     /// A list of any length.
+    #[must_use]
     pub fn list(item: Self) -> Self {
         Self::Many(Box::new(Many { item, count: None }))
     }
 
     /// A list of that many.
+    #[must_use]
     pub fn array(item: Self, count: u32) -> Self {
         let count = Some(count);
         Self::Many(Box::new(Many { item, count }))
     }
+}
+
+/// How protobuf writes a field.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wire {
+    /// Field number.
+    pub number: u32,
+    /// Whether whole numbers are written zigzag.
+    pub zigzag: bool,
+    /// Whether whole numbers are written with a fixed width.
+    pub fixed: bool,
+    /// What a field that is not there means; none if its absence says that there is no value.
+    pub absent: Option<f64>,
 }
 
 /// A field of a type.
@@ -105,18 +122,22 @@ pub struct Field {
     /// Name.
     pub name: String,
     /// Type.
-    pub kind: FieldKind,
+    pub kind: Kind,
     /// Unit, where the definition states one.
     pub unit: Option<String>,
+    /// For protobuf.
+    pub wire: Option<Wire>,
 }
 
 impl Field {
     /// A field without a unit.
-    pub fn new(name: impl Into<String>, kind: FieldKind) -> Self {
+    #[must_use]
+    pub fn new(name: impl Into<String>, kind: Kind) -> Self {
         Self {
             name: name.into(),
             kind,
             unit: None,
+            wire: None,
         }
     }
 }
@@ -137,8 +158,6 @@ pub struct Schema {
     pub structs: Vec<Struct>,
     /// The type of the messages.
     pub root: usize,
-    /// For protobuf, the same type.
-    pub(crate) descriptor: Option<prost_reflect::MessageDescriptor>,
 }
 
 /// Why a definition cannot be used.
@@ -179,6 +198,7 @@ impl fmt::Display for SchemaError {
 
 impl Schema {
     /// The type of the messages.
+    #[must_use]
     pub fn root(&self) -> &Struct {
         &self.structs[self.root]
     }
@@ -211,10 +231,10 @@ impl Schema {
         let mut deepest = 0;
         for field in &self.structs[index].fields {
             let mut kind = &field.kind;
-            while let FieldKind::Many(many) = kind {
+            while let Kind::Many(many) = kind {
                 kind = &many.item;
             }
-            if let FieldKind::Struct(inner) = kind {
+            if let Kind::Struct(inner) = kind {
                 deepest = deepest.max(self.depth(*inner, depths, above + 1)?);
             }
         }

@@ -56,14 +56,15 @@ const JSON_DEFINITION: &str = r#"{
 
 /// Writes torques as messages.
 #[derive(Debug)]
-pub(super) struct TorqueMessage {
+pub struct Torque {
     encoding: Encoding,
     name: String,
     sequence: u32,
 }
 
-impl TorqueMessage {
+impl Torque {
     /// For a joint or channel of that name.
+    #[must_use]
     pub fn new(encoding: Encoding, name: &str) -> Self {
         Self {
             encoding,
@@ -73,6 +74,7 @@ impl TorqueMessage {
     }
 
     /// Encoding of the messages, as the channel names it.
+    #[must_use]
     pub fn message_encoding(&self) -> &'static str {
         match self.encoding {
             Encoding::Cdr => "cdr",
@@ -83,6 +85,7 @@ impl TorqueMessage {
     }
 
     /// Name, language and text of the schema.
+    #[must_use]
     pub fn schema(&self) -> (&'static str, &'static str, Vec<u8>) {
         match self.encoding {
             Encoding::Cdr => (
@@ -105,6 +108,7 @@ impl TorqueMessage {
     }
 
     /// Path of the torque in the message.
+    #[must_use]
     pub fn field(&self) -> &'static str {
         match self.encoding {
             Encoding::Cdr | Encoding::Ros1 => "effort[0]",
@@ -167,26 +171,28 @@ impl TorqueMessage {
     }
 
     fn protobuf(&self, seconds: i64, nanoseconds: u32, torque_n_m: f64, out: &mut Vec<u8>) {
-        let message = ProtobufTorque {
-            timestamp: Some(prost_types::Timestamp {
-                seconds,
-                nanos: nanoseconds as i32,
-            }),
-            name: self.name.clone(),
-            torque_n_m,
+        let stamp = prost_types::Timestamp {
+            seconds,
+            nanos: nanoseconds as i32,
         };
-        out.extend_from_slice(&message.encode_to_vec());
+        let stamp = stamp.encode_to_vec();
+        out.push(0x0a);
+        varint(stamp.len() as u64, out);
+        out.extend_from_slice(&stamp);
+        out.push(0x12);
+        varint(self.name.len() as u64, out);
+        out.extend_from_slice(self.name.as_bytes());
+        out.push(0x19);
+        out.extend_from_slice(&torque_n_m.to_le_bytes());
     }
 }
 
-#[derive(Clone, PartialEq, prost::Message)]
-struct ProtobufTorque {
-    #[prost(message, tag = "1")]
-    timestamp: Option<prost_types::Timestamp>,
-    #[prost(string, tag = "2")]
-    name: String,
-    #[prost(double, tag = "3")]
-    torque_n_m: f64,
+fn varint(mut number: u64, out: &mut Vec<u8>) {
+    while number >= 0x80 {
+        out.push(number as u8 | 0x80);
+        number >>= 7;
+    }
+    out.push(number as u8);
 }
 
 /// `message Torque { google.protobuf.Timestamp timestamp = 1; string name = 2;

@@ -3,173 +3,116 @@
 use std::fmt::Write;
 
 use serde::Serialize;
+use torqcomp_dsp::noise::RecordNoise;
 use torqcomp_dsp::resample::Resampled;
 
-use crate::print::{rounded, short};
+use super::statistics::Statistics;
+use crate::print::{Report, plural, rounded, short};
 use crate::warning::Warning;
 
-/// Schema of the JSON document.
-pub const SCHEMA: &str = "torqcomp.compensate/1";
-
 /// Report of a compensation.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Report {
-    /// Schema of this document.
-    pub schema: &'static str,
-    /// Version of torqcomp.
-    pub version: &'static str,
-    /// File that was read.
-    pub input: String,
-    /// How it is written.
-    pub dialect: String,
-    /// Channel that was read.
-    pub channel: String,
-    /// Its unit in the file.
-    pub channel_unit: String,
-    /// Stand file.
-    pub stand: String,
-    /// File that was written.
-    pub output: String,
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub(super) struct CompensateReport {
+    pub(super) input: String,
+    pub(super) dialect: String,
+    pub(super) channel: String,
+    pub(super) channel_unit: String,
+    pub(super) stand: String,
+    pub(super) output: String,
     /// Topic and field of the result in a file of messages.
-    pub output_signal: Option<String>,
-    /// Unit of the result.
-    pub unit: String,
+    pub(super) output_signal: Option<String>,
+    pub(super) unit: String,
     /// How the record became torque at rest.
-    pub calibration: String,
-    /// Samples written.
-    pub samples: usize,
-    /// Sampling rate.
-    pub rate_hz: f64,
-    /// Where the rate comes from.
-    pub rate_from: String,
+    pub(super) calibration: String,
+    pub(super) samples: usize,
+    pub(super) rate_hz: f64,
+    pub(super) rate_from: String,
     /// First time of the result.
-    pub start_s: f64,
+    pub(super) start_s: f64,
     /// `stream`, `whole-record`, or `refined` for a stand with effects that no filter describes.
-    pub method: &'static str,
+    pub(super) method: &'static str,
     /// Effects of the stand that were taken out, the last link of the chain first.
-    pub effects: Vec<Effect>,
-    /// Highest frequency of the record that curves and torques of the stand were evaluated with.
-    pub seen_to_hz: Option<f64>,
-    /// Times in which the record does not tell the torque.
-    pub lost: Vec<LostSpan>,
-    /// Lines that were taken off.
-    pub lines: Vec<Line>,
+    pub(super) effects: Vec<UndoneEffect>,
+    /// Highest frequency of the record at which nonlinear curves and torques of the stand were evaluated.
+    pub(super) seen_to_hz: Option<f64>,
+    /// Times at which the torque cannot be recovered from the record.
+    pub(super) lost: Vec<LostSpan>,
+    pub(super) lines: Vec<RemovedLine>,
     /// End of the part that is compensated in full.
-    pub band_hz: f64,
+    pub(super) band_hz: f64,
     /// Frequency from which on nothing is passed.
-    pub band_end_hz: f64,
-    /// Time from either end within which the result leans on the record's continuation.
-    pub edge_s: f64,
-    /// The result in figures.
-    pub result: Ends,
-    /// What was interpolated.
-    pub resampled: Option<Resampled>,
-    /// What the compensation does to noise.
-    pub noise: Noise,
-    /// What should be known.
-    pub warnings: Vec<Warning>,
+    pub(super) band_end_hz: f64,
+    /// Time from either end within which the result depends on extrapolation beyond the record.
+    pub(super) edge_s: f64,
+    pub(super) result: Statistics,
+    pub(super) resampled: Option<Resampled>,
+    pub(super) noise: NoiseReport,
+    pub(super) warnings: Vec<Warning>,
+    /// Printed units per SI unit.
+    #[serde(skip)]
+    pub(super) scale: f64,
 }
 
 /// An effect that was taken out.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Effect {
-    /// Its name.
-    pub effect: &'static str,
-    /// Its form.
-    pub form: &'static str,
+pub(super) struct UndoneEffect {
+    pub(super) effect: &'static str,
+    pub(super) form: &'static str,
     /// `divided out`, `inverted`, `subtracted`, `integrated` (with memory, along the motion), or `marked` where it
     /// cannot be taken out.
-    pub done: &'static str,
+    pub(super) done: &'static str,
 }
 
 /// A line that was taken off, in the unit of the result as a record at rest has it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Line {
-    /// Its frequency.
-    pub frequency_hz: f64,
+pub(super) struct RemovedLine {
+    pub(super) frequency_hz: f64,
     /// Its amplitude in the stand file.
-    pub amplitude: f64,
+    pub(super) amplitude: f64,
     /// What the record has at this frequency, signal included.
-    pub recorded: f64,
+    pub(super) recorded: f64,
     /// Phase of its sine at the first sample.
-    pub phase_rad: f64,
+    pub(super) phase_rad: f64,
     /// Part of the amplitude that was taken off: less than 1 where the signal hides the phase.
-    pub share: f64,
+    pub(super) share: f64,
 }
 
-/// A time in which the record does not tell the torque.
+/// A time in which the torque cannot be recovered from the record.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct LostSpan {
-    /// The effect that took it away.
-    pub effect: &'static str,
-    /// First sample.
-    pub from_s: f64,
-    /// Last sample.
-    pub to_s: f64,
-}
-
-/// A result in figures, in its unit.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct Ends {
-    /// Mean.
-    pub mean: f64,
-    /// Root mean square about the mean.
-    pub rms: f64,
-    /// Smallest value.
-    pub smallest: f64,
-    /// Largest value.
-    pub largest: f64,
+pub(super) struct LostSpan {
+    /// The effect that hides it.
+    pub(super) effect: &'static str,
+    pub(super) from_s: f64,
+    pub(super) to_s: f64,
 }
 
 /// What a compensation does to noise.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Noise {
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub(super) struct NoiseReport {
     /// Rms out over rms in for white noise.
-    pub white_gain: f64,
-    /// Largest gain.
-    pub largest_gain: f64,
+    pub(super) white_gain: f64,
+    pub(super) largest_gain: f64,
     /// Frequency of the largest gain.
-    pub largest_gain_at_hz: f64,
-    /// Gain over frequency.
-    pub gain: Vec<Gain>,
+    pub(super) largest_gain_at_hz: f64,
+    pub(super) gain: Vec<NoiseAt>,
     /// Noise of this record, in the unit of the result.
-    pub record: Option<RecordNoise>,
+    pub(super) record: Option<RecordNoise>,
 }
 
 /// Gain of the compensation at a frequency.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Gain {
-    /// Frequency.
-    pub frequency_hz: f64,
+pub(super) struct NoiseAt {
+    pub(super) frequency_hz: f64,
     /// `|torque / recorded torque|`.
-    pub gain: f64,
+    pub(super) gain: f64,
     /// Its relative standard uncertainty, from the stand's constants; `null` if unknown.
-    pub relative_std: Option<f64>,
+    pub(super) relative_std: Option<f64>,
 }
 
-/// Noise of a record.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct RecordNoise {
-    /// Noise density of the record above the band, in unit/√Hz.
-    pub floor_per_root_hz: f64,
-    /// Where it was taken.
-    pub floor_band_hz: [f64; 2],
-    /// Noise within the band before compensation, rms.
-    pub recorded_rms: f64,
-    /// The same after compensation, rms.
-    pub compensated_rms: f64,
-    /// What the record holds within the band, rms without its mean, noise included.
-    pub in_band_rms: f64,
-    /// What the record holds above the band beside its noise, rms: it is left out.
-    pub above_band_rms: f64,
-    /// Ranges in which the record does not rise above its noise.
-    pub lost_hz: Vec<[f64; 2]>,
-}
+impl Report for CompensateReport {
+    const SCHEMA: &'static str = "torqcomp.compensate/1";
 
-impl Report {
-    /// For people.
-    #[must_use]
-    pub fn text(&self) -> String {
+    fn text(&self) -> String {
         let mut text = String::new();
         let mut line = |label: &str, value: String| {
             // Writing to a String cannot fail.
@@ -197,8 +140,8 @@ impl Report {
         line(
             "band",
             format!(
-                "compensated to {} Hz, nothing passed from {} Hz; within {} ms of either end the \
-                 result leans on the record's continuation",
+                "compensated up to {} Hz, zero from {} Hz; the first and last {} ms depend on \
+                 extrapolation beyond the record",
                 short(self.band_hz),
                 short(self.band_end_hz),
                 rounded(1e3 * self.edge_s, 3)
@@ -213,7 +156,7 @@ impl Report {
         line(
             "result",
             format!(
-                "mean {}, {} rms about it, from {} to {} {}",
+                "mean {}, rms about the mean {}, range {} to {} {}",
                 rounded(result.mean, 4),
                 rounded(result.rms, 4),
                 rounded(result.smallest, 4),
@@ -226,9 +169,9 @@ impl Report {
     }
 }
 
-impl Report {
+impl CompensateReport {
     fn effects_text(&self) -> String {
-        let each = |e: &Effect| format!("{} ({}) {}", e.effect, e.form, e.done);
+        let each = |e: &UndoneEffect| format!("{} ({}) {}", e.effect, e.form, e.done);
         let list: Vec<String> = self.effects.iter().map(each).collect();
         list.join(", ")
     }
@@ -236,19 +179,19 @@ impl Report {
 
 fn resampled_text(resampled: &Resampled) -> String {
     format!(
-        "{} samples interpolated to {}; {} gap(s) bridged by straight lines ({} samples, longest \
-         step {} s), {} repeated stamp(s) left out, steps off by up to {} %",
+        "{} samples interpolated to {}; {} filled by straight lines ({} samples, longest step \
+         {} s), {} dropped, jitter up to {} % of a step",
         resampled.samples_in,
         resampled.samples_out,
-        resampled.gaps,
+        plural(resampled.gaps, "gap"),
         resampled.bridged,
         rounded(resampled.longest_step_s, 4),
-        resampled.repeated,
-        rounded(100.0 * resampled.largest_jitter, 3)
+        plural(resampled.repeated, "repeated time stamp"),
+        rounded(100.0 * resampled.largest_jitter, 2)
     )
 }
 
-impl Noise {
+impl NoiseReport {
     fn gain_text(&self) -> String {
         let points: Vec<String> = self
             .gain
@@ -270,12 +213,12 @@ impl Noise {
     fn record_text(&self, unit: &str) -> String {
         match &self.record {
             None => format!(
-                "white noise grows {} times; how much this record has cannot be told (too few \
+                "white noise is multiplied by {}; the noise of this record is unknown (too few \
                  samples, or no noise above the band)",
                 rounded(self.white_gain, 3)
             ),
             Some(noise) => format!(
-                "{} {unit} rms in the band become {} {unit} rms",
+                "{} {unit} rms in the band before, {} {unit} rms after",
                 rounded(noise.recorded_rms, 3),
                 rounded(noise.compensated_rms, 3)
             ),

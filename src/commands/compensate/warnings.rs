@@ -1,0 +1,153 @@
+//! What should be known about a compensated record.
+
+use torqcomp_dsp::noise::RecordNoise;
+use torqcomp_dsp::resample::Resampled;
+
+use super::Seen;
+use super::plot::Traces;
+use super::report::CompensateReport;
+use crate::print::{plural, rounded, short};
+use crate::quality::excerpt;
+use crate::warning::Warning;
+
+/// Gain from which a record of unknown noise is worth a warning.
+const LARGE_GAIN: f64 = 10.0;
+/// Rms above the band over that within it, from which it is worth a warning.
+const ABOVE_BAND: f64 = 0.1;
+/// Part of the result that may be noise before it is worth a warning.
+const NOISY_FRACTION: f64 = 0.5;
+
+/// Adds the warnings to a report that is complete otherwise.
+pub(super) fn add(report: &mut CompensateReport, seen: &Seen, traces: Option<&Traces>) {
+    let mut more: Vec<Warning> = seen.summary.lost.iter().cloned().collect();
+    more.extend(seen.summary.warnings.clone());
+    match &report.noise.record {
+        Some(noise) => more.extend(of_noise(noise, report)),
+        None => more.extend(of_unknown_noise(report)),
+    }
+    more.extend(of_quality(report, seen));
+    if traces.is_some_and(Traces::is_empty) {
+        more.push(empty_plot(report));
+    }
+    more.extend(report.resampled.as_ref().and_then(of_gaps));
+    more.extend(of_length(report));
+    report.warnings.extend(more);
+}
+
+fn of_unknown_noise(report: &CompensateReport) -> Option<Warning> {
+    let gain = report.noise.largest_gain;
+    (gain > LARGE_GAIN).then(|| {
+        Warning::new(
+            "noise-unknown",
+            format!(
+                "the record is amplified up to {} times and its noise is unknown; choose a lower \
+                 --band if the result looks noisy",
+                rounded(gain, 3)
+            ),
+        )
+    })
+}
+
+fn of_quality(report: &CompensateReport, seen: &Seen) -> Vec<Warning> {
+    let of = excerpt::Of {
+        name: &report.channel,
+        unit: &report.unit,
+        scale: report.scale,
+        rate_hz: report.rate_hz,
+        start_s: report.start_s,
+        samples: report.samples,
+    };
+    let samples = match report.method {
+        "stream" => excerpt::of_stream(&seen.excerpt, report.samples),
+        _ => &seen.excerpt,
+    };
+    excerpt::warnings(samples, of)
+}
+
+fn empty_plot(report: &CompensateReport) -> Warning {
+    let end_s = report.start_s + (report.samples - 1) as f64 / report.rate_hz;
+    Warning::new(
+        "empty-plot",
+        format!(
+            "no sample lies within --plot-range; the record runs from {} to {} s",
+            short(report.start_s),
+            short(end_s)
+        ),
+    )
+}
+
+fn of_length(report: &CompensateReport) -> Option<Warning> {
+    let needed = 2.0 * report.edge_s * report.rate_hz;
+    ((report.samples as f64) < needed).then(|| {
+        Warning::new(
+            "short-record",
+            format!(
+                "the record has {} samples, and all of the result depends on extrapolation beyond \
+                 its ends; record at least {} samples for a band of {} Hz",
+                report.samples,
+                needed as usize,
+                short(report.band_hz)
+            ),
+        )
+    })
+}
+
+fn of_noise(noise: &RecordNoise, report: &CompensateReport) -> Vec<Warning> {
+    let (band_hz, unit, rms) = (report.band_hz, &report.unit, report.result.rms);
+    let mut warnings = Vec::new();
+    if noise.above_band_rms > ABOVE_BAND * noise.in_band_rms {
+        warnings.push(Warning::new(
+            "signal-above-band",
+            format!(
+                "{} {unit} rms of the record lie above the band of {} Hz and are removed; {} {unit} rms \
+                 lie within it",
+                rounded(noise.above_band_rms, 3),
+                short(band_hz),
+                rounded(noise.in_band_rms, 3)
+            ),
+        ));
+    }
+    if let Some(from_hz) = noise.lost_from_hz(band_hz) {
+        let remedy = if from_hz > 0.0 {
+            format!("--band {} excludes it", rounded(from_hz, 4))
+        } else {
+            "the whole band is affected: check the channel".to_owned()
+        };
+        warnings.push(Warning::new(
+            "band-lost-in-noise",
+            format!(
+                "from {} to {} Hz the record is no larger than its noise, which the compensation \
+                 amplifies; {remedy}",
+                rounded(from_hz, 4),
+                short(band_hz)
+            ),
+        ));
+    }
+    if rms > 0.0 && noise.compensated_rms > NOISY_FRACTION * rms {
+        warnings.push(Warning::new(
+            "mostly-noise",
+            format!(
+                "noise makes up {} of {} {unit} rms of the result; choose a lower --band",
+                rounded(noise.compensated_rms, 3),
+                rounded(rms, 3)
+            ),
+        ));
+    }
+    warnings
+}
+
+fn of_gaps(resampled: &Resampled) -> Option<Warning> {
+    (resampled.gaps > 0 || resampled.repeated > 0).then(|| {
+        Warning::new(
+            "resampled-gaps",
+            format!(
+                "{} in the time stamps filled by straight lines ({} samples, the longest step {} s), {} \
+                 dropped",
+                plural(resampled.gaps, "gap"),
+                resampled.bridged,
+                rounded(resampled.longest_step_s, 4),
+                plural(resampled.repeated, "repeated time stamp")
+            ),
+        )
+    })
+}

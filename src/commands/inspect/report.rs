@@ -1,0 +1,183 @@
+//! What files hold and what is wrong with them.
+
+use serde::{Serialize, Serializer};
+use torqcomp_dsp::quality::mains::MainsLine;
+use torqcomp_dsp::quality::steps::Event;
+
+use crate::io::mcap::Inventory;
+use crate::recording::Segment;
+
+/// Everything that was found in the files.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct InspectReport {
+    /// One entry for each file, in the order given.
+    pub(super) files: Vec<Inspected>,
+    /// What comparing the files with each other shows.
+    pub(super) warnings: Vec<ChannelWarning>,
+}
+
+/// A file, or why it could not be read.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub(super) enum Inspected {
+    Read(Box<InspectedFile>),
+    Failed { file: String, error: String },
+}
+
+/// A file.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct InspectedFile {
+    pub(super) file: String,
+    /// `csv` for any text, `mcap`.
+    pub(super) format: &'static str,
+    /// How it is written.
+    pub(super) dialect: String,
+    /// What its head says besides.
+    pub(super) details: Vec<Detail>,
+    /// Its segments, if it has several.
+    pub(super) segments: Vec<Segment>,
+    /// Its channels, in their order.
+    pub(super) channels: Vec<InspectedChannel>,
+    /// What is wrong with it.
+    pub(super) warnings: Vec<ChannelWarning>,
+    /// Whether announced or begun data are missing.
+    pub(super) data_lost: bool,
+    /// Everything in an MCAP file: topics, encodings, attachments, metadata, chunks.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) mcap: Option<Inventory>,
+}
+
+/// A pair of key and value out of a file's head.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct Detail {
+    pub(super) key: String,
+    pub(super) value: String,
+}
+
+/// A warning and the channels that it is about.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub(super) struct ChannelWarning {
+    /// Stable code.
+    pub(super) code: &'static str,
+    /// For people.
+    pub(super) message: String,
+    /// Names of the channels; none if it is about the file.
+    pub(super) channels: Vec<String>,
+}
+
+/// A channel. `null` is what cannot be known.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub(super) struct InspectedChannel {
+    /// Name without the unit.
+    pub(super) name: String,
+    /// Heading as written.
+    pub(super) heading: String,
+    /// Number of the segment, from 1, if there are several.
+    pub(super) segment: Option<usize>,
+    /// Unit as written; that of the values below.
+    pub(super) unit: Option<String>,
+    /// Whether torqcomp knows the unit, so that values can be converted.
+    pub(super) unit_known: bool,
+    /// Number of samples, missing ones included.
+    pub(super) samples: usize,
+    pub(super) rate_hz: Option<f64>,
+    /// Where the rate comes from.
+    pub(super) rate_from: String,
+    /// Rate that the head of the file gives, used or not.
+    pub(super) header_rate_hz: Option<f64>,
+    /// Time of the first sample on the file's own axis, in `start_unit`.
+    pub(super) start: Option<f64>,
+    /// Unit of `start`: always s.
+    pub(super) start_unit: &'static str,
+    /// Date and time of the first sample, as written.
+    pub(super) start_time: Option<String>,
+    /// From the first sample to the last.
+    pub(super) duration_s: Option<f64>,
+    /// Assumption about the time axis.
+    pub(super) assumed: Option<String>,
+    /// Standard deviation of the steps between stamps, over the usual step; `null` without stamps.
+    pub(super) jitter: Option<f64>,
+    /// Largest deviation of such a step, over the usual step.
+    pub(super) jitter_peak: Option<f64>,
+    /// Multiples that the stamps are rounded to, where that alone makes them uneven.
+    pub(super) stamps_rounded_to_s: Option<f64>,
+    /// Number of gaps in the stamps; `null` without stamps.
+    pub(super) gaps: Option<usize>,
+    /// Samples that the gaps leave out.
+    pub(super) missing_samples: Option<f64>,
+    /// The first hundred gaps.
+    pub(super) gap_list: Vec<Event>,
+    /// Stamps equal to the one before; `null` without stamps.
+    pub(super) repeated_stamps: Option<usize>,
+    /// Steps backwards in time; `null` without stamps.
+    pub(super) backwards: Option<usize>,
+    /// Forward jumps of the clock; `null` without stamps.
+    pub(super) clock_jumps: Option<usize>,
+    pub(super) smallest: Option<f64>,
+    pub(super) largest: Option<f64>,
+    /// Mean of the samples.
+    pub(super) mean: Option<f64>,
+    /// Rms of the samples without their mean.
+    pub(super) rms: Option<f64>,
+    /// Samples that repeat the one before, over all; 1 for a constant channel.
+    pub(super) repeated: Option<f64>,
+    /// Whether that is more than the resolution explains; `null` if unknown.
+    pub(super) repeated_unexplained: Option<bool>,
+    /// Samples for which each value is held, if constant.
+    pub(super) hold: Option<usize>,
+    /// Samples at a value where the signal is cut off.
+    pub(super) clipped: Option<usize>,
+    /// Lowest value, if the signal is cut off there.
+    pub(super) clipped_low: Option<f64>,
+    /// Highest value, if the signal is cut off there.
+    pub(super) clipped_high: Option<f64>,
+    /// Samples in which the channel is stuck.
+    pub(super) stuck: Option<usize>,
+    /// Whether all samples are the same.
+    pub(super) constant: Option<bool>,
+    /// Samples that are missing or no finite numbers.
+    pub(super) non_finite: Option<usize>,
+    /// Quantisation step; `null` if it is too fine to be seen.
+    pub(super) resolution: Option<f64>,
+    /// Bits of the range in steps of `resolution`.
+    pub(super) resolution_bits: Option<f64>,
+    /// Lines at multiples of the mains frequency.
+    pub(super) mains: Vec<MainsLine>,
+}
+
+/// The document of several files; that of one file is the file itself.
+#[derive(Serialize)]
+struct SeveralFiles<'a> {
+    files: &'a [Inspected],
+    warnings: &'a [ChannelWarning],
+}
+
+impl Serialize for InspectReport {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self.files.as_slice() {
+            [file] => file.serialize(serializer),
+            files => SeveralFiles {
+                files,
+                warnings: &self.warnings,
+            }
+            .serialize(serializer),
+        }
+    }
+}
+
+impl InspectReport {
+    /// All warnings.
+    pub(super) fn all_warnings(&self) -> impl Iterator<Item = &ChannelWarning> {
+        let of_files = self.files.iter().flat_map(|entry| match entry {
+            Inspected::Read(file) => file.warnings.as_slice(),
+            Inspected::Failed { .. } => &[],
+        });
+        of_files.chain(&self.warnings)
+    }
+
+    /// Whether data of a file were lost.
+    pub(super) fn is_lossy(&self) -> bool {
+        let mut files = self.files.iter();
+        files.any(|entry| matches!(entry, Inspected::Read(file) if file.data_lost))
+    }
+}
