@@ -12,7 +12,6 @@ pub mod pipeline;
 pub mod print;
 pub mod quality;
 pub mod recording;
-pub mod report;
 pub mod signal;
 pub mod stand;
 pub mod undo;

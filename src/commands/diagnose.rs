@@ -1,18 +1,19 @@
 //! `diagnose`: what the stand lacks, and the error before and after it is added.
 
+mod page;
 mod read;
 mod refined;
+mod text;
 
 use std::io::IsTerminal;
 use std::path::Path;
 
-use super::{Outcome, conclude};
+use super::{Outcome, conclude, publish};
 use crate::cli::Diagnose;
 use crate::diagnose::{self, Workers};
 use crate::failure::Failure;
 use crate::io::output::Output;
 use crate::print;
-use crate::report::{diagnose as text, diagnose_page as page};
 use crate::stand::{self, Stand};
 
 /// Runs the verb.
@@ -50,11 +51,7 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
     if let Some(html) = html {
         write(html, &page::page(&diagnosis))?;
     }
-    let text = match args.json {
-        true => print::json(&diagnosis),
-        false => text::text(&diagnosis),
-    };
-    write(output, &text)?;
+    publish(&diagnosis, args.json, output)?;
     Ok(conclude(&diagnosis.warnings, false, args.strict))
 }
 

@@ -1,6 +1,6 @@
 //! What is said about a diagnosis in words: the residual, the next experiment, warnings.
 
-use super::Found;
+use super::SearchState;
 use super::guard_models::GuardModel;
 use super::noise_floor::NoiseFloorSource;
 use super::reason::Status;
@@ -22,7 +22,7 @@ const MOST_UNCERTAIN: [f64; 2] = [0.005, 0.1];
 
 /// What remains after the diagnosis.
 pub fn residual(
-    found: &Found,
+    found: &SearchState,
     verdict: Verdict,
     lines: &[SpectralLine],
     levels: &ExcitationLevels,
@@ -105,7 +105,7 @@ fn level_dependence(levels: &ExcitationLevels) -> Option<String> {
 
 /// What to record next.
 pub fn next_experiment(
-    found: &Found,
+    found: &SearchState,
     suspected: Option<&GuardModel>,
     verdict: Verdict,
 ) -> Option<String> {

@@ -47,6 +47,24 @@ pub struct FitEffort {
     pub corrects_start: bool,
 }
 
+impl FitEffort {
+    /// A full fit.
+    pub const fn full(iterations: usize) -> Self {
+        Self {
+            iterations,
+            corrects_start: true,
+        }
+    }
+
+    /// A fit that only shows whether a longer one is worthwhile.
+    pub const fn brief(iterations: usize) -> Self {
+        Self {
+            iterations,
+            corrects_start: false,
+        }
+    }
+}
+
 /// Relative reduction of the sum of squares at which a fit has converged.
 const TOLERANCE: f64 = 1e-6;
 /// Iterations for the initial state of a held-out record.

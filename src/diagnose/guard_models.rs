@@ -56,7 +56,7 @@ impl GuardModel {
         if accepted.is_some_and(|accepted| !outdoes(&model, accepted, noise_rms)) {
             return None;
         }
-        let effect = model.effects().pop()?;
+        let effect = model.fitted.structure.effects.last()?.effect;
         Some(Self {
             effect,
             equation: effect.equation,

@@ -33,8 +33,7 @@ use torqcomp_model::simulate::{Between, Fixed};
 use crate::failure::Failure;
 use crate::warning::Warning;
 use fit::FittedModel;
-use noise_floor::{NoiseFloor, NoiseFloorSource};
-use result::Sources;
+use noise_floor::NoiseFloor;
 use score::BaseModel;
 use spectra::lines_of;
 use structure::FitContext;
@@ -42,12 +41,13 @@ use verdict::{PlainExcess, noise_rms, remains};
 
 pub use fit::RecordResidual;
 pub use guard_models::GuardModel;
+pub use noise_floor::NoiseFloorSource;
 pub use plot_series::{MotionAxis, autocorrelation, binned, density, response};
 pub use reason::Status;
 pub use record::{InitialState, StandRecord};
 pub use records::Records;
 pub use residual_tests::ResidualTests;
-pub use result::{Diagnosis, Sources as RecordSources};
+pub use result::{Diagnosis, SourceFiles};
 pub use score::{EffectParameter, ScoredModel};
 pub use search::{CandidateFit, Workers};
 pub use spectra::SpectralLine;
@@ -57,7 +57,7 @@ pub use verdict::Verdict;
 
 /// What is diagnosed.
 pub struct Case {
-    pub sources: Sources,
+    pub sources: SourceFiles,
     pub records: Records,
     /// The plain stand that the stand file declares.
     pub declared: Option<PlainStand>,
@@ -69,8 +69,8 @@ pub struct Case {
     pub warnings: Vec<Warning>,
 }
 
-/// What was found with one course of the input between its samples.
-struct Found {
+/// The state of a diagnosis with one course of the input between its samples.
+struct SearchState {
     records: Records,
     /// The stand file as it is.
     declared: Option<ScoredModel>,
@@ -137,7 +137,8 @@ pub fn run(mut case: Case, workers: Workers) -> Result<Diagnosis, Failure> {
     let context = plain::find_plain(&unscaled, case.declared, &case.records.train)?;
     refuse::check(&case, &context)?;
     case.records.prepare_for(&context.plain);
-    let look = |records: &Records| Found::with(records.clone(), &context, case.declared, workers);
+    let look =
+        |records: &Records| SearchState::with(records.clone(), &context, case.declared, workers);
     let mut found = look(&case.records)?;
     if let Some(between) = found.other_course(workers.threads) {
         found = look(&case.records.with_between(between))?;
@@ -145,7 +146,7 @@ pub fn run(mut case: Case, workers: Workers) -> Result<Diagnosis, Failure> {
     Ok(Diagnosis::of(case, found))
 }
 
-impl Found {
+impl SearchState {
     /// Fits the plain stand and adds effects to it.
     fn with(
         mut records: Records,

@@ -1,5 +1,7 @@
 //! The noise floor, estimated without any model of the stand.
 
+use serde::Serialize;
+
 use super::fit::RecordResidual;
 use super::record::{StandRecord, dot};
 use super::spectra::spectra;
@@ -11,21 +13,13 @@ pub struct NoiseFloor {
     pub from: NoiseFloorSource,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum NoiseFloorSource {
     /// Differences between periods of the record.
     Periods,
     /// Frequencies above the signal; white noise is assumed.
     OutOfBand,
-}
-
-impl NoiseFloorSource {
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Periods => "periods",
-            Self::OutOfBand => "out-of-band",
-        }
-    }
 }
 
 /// Part of the input's power that may differ from period to period.

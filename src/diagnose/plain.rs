@@ -19,14 +19,8 @@ const NEAR: [f64; 9] = [0.5, 0.7, 0.8, 0.9, 1.0, 1.1, 1.25, 1.4, 2.0];
 /// Starts that get a full fit.
 const FULL: usize = 3;
 
-const SEARCH: FitEffort = FitEffort {
-    iterations: 60,
-    corrects_start: true,
-};
-const REFINEMENT: FitEffort = FitEffort {
-    iterations: 10,
-    corrects_start: true,
-};
+const SEARCH: FitEffort = FitEffort::full(60);
+const REFINEMENT: FitEffort = FitEffort::full(10);
 
 /// Finds the plain stand that fits records best; the context for it.
 ///

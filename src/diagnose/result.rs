@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::describe;
 use super::guard_models::GuardModel;
+use super::noise_floor::NoiseFloorSource;
 use super::reason::Status;
 use super::record::StandRecord;
 use super::residual_tests::ResidualTests;
@@ -12,12 +13,12 @@ use super::search::CandidateFit;
 use super::spectra::SpectralLine;
 use super::structure::{FitContext, PlainStand};
 use super::verdict::Verdict;
-use super::{Case, Found};
+use super::{Case, SearchState};
 use crate::warning::Warning;
 
 /// Files of a diagnosis.
 #[derive(Debug, Clone, Serialize)]
-pub struct Sources {
+pub struct SourceFiles {
     pub stand: Option<String>,
     pub train: Vec<String>,
     /// Empty if parts of the training records are held out.
@@ -26,11 +27,8 @@ pub struct Sources {
 
 #[derive(Serialize)]
 pub struct Diagnosis {
-    pub schema: &'static str,
-    /// Version of torqcomp.
-    pub version: &'static str,
     #[serde(flatten)]
-    pub sources: Sources,
+    pub sources: SourceFiles,
     pub verdict: Verdict,
     /// Names of the effects that were added.
     pub effects: Vec<&'static str>,
@@ -67,7 +65,7 @@ pub struct ErrorTable {
     pub improvement_ci95: Option<[f64; 2]>,
     /// Rms of the noise of the held-out records, estimated without a model.
     pub noise_floor_rms: Option<f64>,
-    pub noise_floor_from: Option<&'static str>,
+    pub noise_floor_from: Option<NoiseFloorSource>,
 }
 
 #[derive(Debug, Clone, Copy, Serialize)]
@@ -116,8 +114,9 @@ pub struct ExcitationLevels {
 }
 
 impl Diagnosis {
-    pub(super) fn of(case: Case, mut found: Found) -> Self {
+    pub(super) fn of(case: Case, mut found: SearchState) -> Self {
         let lines = found.lines();
+        let unit = case.units.per_printed;
         let verdict = found.conclude();
         let effects = found.after.effect_names();
         let error = ErrorTable::of(&found);
@@ -127,7 +126,7 @@ impl Diagnosis {
             independent_of_input: found.tests.independent_of_input,
             described: describe::residual(&found, verdict, &lines, &levels),
             tests: found.tests.clone(),
-            lines: found.printed(lines),
+            lines: lines.into_iter().map(|line| line.over(unit)).collect(),
             levels,
         };
         let mut suspected = found.suspected.take();
@@ -135,8 +134,6 @@ impl Diagnosis {
             guard.with.clone_from(&effects);
         }
         Self {
-            schema: "torqcomp.diagnose/1",
-            version: env!("CARGO_PKG_VERSION"),
             sources: case.sources,
             verdict,
             effects,
@@ -159,14 +156,7 @@ impl Diagnosis {
     }
 }
 
-impl Found {
-    /// Lines with their amplitudes in the printed unit.
-    fn printed(&self, mut lines: Vec<SpectralLine>) -> Vec<SpectralLine> {
-        let unit = self.after.fitted.structure.context.units.per_printed;
-        lines.iter_mut().for_each(|line| line.amplitude /= unit);
-        lines
-    }
-
+impl SearchState {
     /// All candidates in the order in which they are reported; the accepted ones as they are in the last model, not as they
     /// were when they were chosen.
     fn candidates(&mut self) -> Vec<CandidateFit> {
@@ -196,7 +186,7 @@ impl Found {
 }
 
 impl ErrorTable {
-    fn of(found: &Found) -> Self {
+    fn of(found: &SearchState) -> Self {
         let (before, after) = (&found.before, &found.after);
         let units = &after.fitted.structure.context.units;
         let size = holdout_rms(before);
@@ -212,7 +202,7 @@ impl ErrorTable {
             after: errors(after),
             improvement_ci95: has_effects.then(|| after.against(before).improvement_ci95()),
             noise_floor_rms: found.noise_floor.map(|f| f.rms / units.per_printed),
-            noise_floor_from: found.noise_floor.map(|f| f.from.name()),
+            noise_floor_from: found.noise_floor.map(|f| f.from),
         }
     }
 }
@@ -231,7 +221,7 @@ fn holdout_rms(before: &ScoredModel) -> f64 {
 }
 
 impl ExcitationLevels {
-    fn of(found: &Found, before: &ModelErrors) -> Self {
+    fn of(found: &SearchState, before: &ModelErrors) -> Self {
         let context = &found.before.fitted.structure.context;
         let train_size = context.scales.rms / context.units.per_printed;
         Self {
@@ -250,7 +240,7 @@ fn applied_rms(records: &[StandRecord]) -> f64 {
 }
 
 /// The constants of the plain stand: declared, refitted, and refitted with the effects.
-fn constants(declared: Option<PlainStand>, found: &Found) -> Vec<StandConstant> {
+fn constants(declared: Option<PlainStand>, found: &SearchState) -> Vec<StandConstant> {
     let context = &found.before.fitted.structure.context;
     let (gain_unit, gain_scale) = context.units.gain();
     let named = [

@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use serde::Serialize;
 use torqcomp_model::Estimate;
-use torqcomp_model::effects::Effect;
 
 use super::blocks::{Comparison, compare};
 use super::columns::Columns;
 use super::fit::{FitEffort, FittedModel, RecordResidual, raw_residual};
 use super::record::{Nuisance, NuisanceTerms, StandRecord, dot};
 use super::records::Records;
+use super::structure::EffectForm;
 
 /// A fitted model with its residuals.
 #[derive(Clone)]
@@ -43,10 +43,7 @@ pub struct RmsErrors {
 /// Standard uncertainties from zero from which on a parameter differs from zero.
 const SIGNIFICANT: f64 = 3.0;
 /// A repeated fit with a finer step of integration or another course of the input.
-const REPEATED_FIT: FitEffort = FitEffort {
-    iterations: 6,
-    corrects_start: true,
-};
+const REPEATED_FIT: FitEffort = FitEffort::full(6);
 /// Change of a record with half the step of integration, over the hold-out rms, above which the step is halved.
 const STEP_ERROR: f64 = 0.1;
 /// Most steps of integration, over those of the stand without effects: a listed effect needs one to four of them, a law that
@@ -174,13 +171,9 @@ impl ScoredModel {
         train + holdout + self.parameter_count() as f64 * (n + m).ln()
     }
 
-    pub fn effects(&self) -> Vec<&'static Effect> {
-        let effects = self.fitted.structure.effects.iter();
-        effects.map(|e| e.effect).collect()
-    }
-
     pub fn effect_names(&self) -> Vec<&'static str> {
-        self.effects().iter().map(|e| e.name).collect()
+        let effects = self.fitted.structure.effects.iter();
+        effects.map(|e| e.effect.name).collect()
     }
 
     /// Natural frequency in Hz, damping ratio and static gain of the plain stand in the model.
@@ -205,7 +198,7 @@ impl ScoredModel {
         let mut amplitudes = fitted.amplitudes.iter();
         let effects = fitted.structure.effects.iter();
         let values = fitted.structure.effect_values(&fitted.values);
-        let of_effect = |(effect, mut values): (&super::structure::EffectForm, Vec<f64>)| {
+        let of_effect = |(effect, mut values): (&EffectForm, Vec<f64>)| {
             let moved = effect.moved();
             for (value, amplitude) in values[moved..].iter_mut().zip(&mut amplitudes) {
                 *value = *amplitude;

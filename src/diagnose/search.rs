@@ -67,21 +67,12 @@ const WORTHWHILE: f64 = 5.0;
 /// Gain of the second fit, over the largest of all, from which on a fit is continued to its end.
 const PROMISING: f64 = 0.5;
 
-const FIRST_FIT: FitEffort = FitEffort {
-    iterations: 3,
-    corrects_start: false,
-};
-const SECOND_FIT: FitEffort = FitEffort {
-    iterations: 5,
-    corrects_start: false,
-};
-const FULL_FIT: FitEffort = FitEffort {
-    iterations: 15,
-    corrects_start: true,
-};
+const FIRST_FIT: FitEffort = FitEffort::brief(3);
+const SECOND_FIT: FitEffort = FitEffort::brief(5);
+const FULL_FIT: FitEffort = FitEffort::full(15);
 
 /// How many forms go on from one stage of fitting to the next.
-struct Selection {
+struct SearchEffort {
     /// Forms that get a first fit, by the residual that their starts leave.
     first: usize,
     /// Gain of the first fit, over the largest of all, from which on a second one follows.
@@ -90,13 +81,13 @@ struct Selection {
     full: usize,
 }
 
-const FOR_FIRST_EFFECT: Selection = Selection {
+const FOR_FIRST_EFFECT: SearchEffort = SearchEffort {
     first: usize::MAX,
     second: 0.03,
     full: 12,
 };
 /// Beside an accepted effect a fit costs more and finds less.
-const FOR_SECOND_EFFECT: Selection = Selection {
+const FOR_SECOND_EFFECT: SearchEffort = SearchEffort {
     first: 12,
     second: 0.1,
     full: 4,
@@ -183,16 +174,16 @@ pub fn fit_all(
     workers: Workers,
 ) -> Vec<Option<ScoredModel>> {
     let fitted = &base.scored.fitted;
-    let selection = match fitted.structure.effects.is_empty() {
+    let limits = match fitted.structure.effects.is_empty() {
         true => FOR_FIRST_EFFECT,
         false => FOR_SECOND_EFFECT,
     };
-    let first = first_fits(base, forms, lines, records, &selection, workers);
+    let first = first_fits(base, forms, lines, records, &limits, workers);
     let gain = |fit: &FittedModel| fitted.train_sum - fit.train_sum;
     let largest = first.iter().flatten().map(gain).fold(0.0, f64::max);
     let second = parallel(forms.len(), workers.threads, |k| {
         let fits = first[k].iter().map(|fit| {
-            let is_followed = !fit.converged && gain(fit) >= selection.second * largest;
+            let is_followed = !fit.converged && gain(fit) >= limits.second * largest;
             let second = is_followed.then(|| fit.refit(&records.train, SECOND_FIT));
             second.and_then(Result::ok).unwrap_or_else(|| fit.clone())
         });
@@ -204,7 +195,7 @@ pub fn fit_all(
         .collect();
     gains.sort_by(|a, b| b.total_cmp(a));
     let least = gains
-        .get(selection.full)
+        .get(limits.full)
         .copied()
         .unwrap_or(0.0)
         .max(PROMISING * gains.first().copied().unwrap_or(0.0))
@@ -224,7 +215,7 @@ fn first_fits(
     forms: &[EffectForm],
     lines: &[SpectralLine],
     records: &Records,
-    selection: &Selection,
+    limits: &SearchEffort,
     workers: Workers,
 ) -> Vec<Vec<FittedModel>> {
     let structure = &base.scored.fitted.structure;
@@ -238,7 +229,7 @@ fn first_fits(
     };
     let mut chosen: Vec<usize> = (0..forms.len()).collect();
     chosen.sort_by(|a, b| left(*a).total_cmp(&left(*b)));
-    chosen.truncate(selection.first);
+    chosen.truncate(limits.first);
     let done = AtomicUsize::new(0);
     parallel(forms.len(), workers.threads, |k| {
         let starts = starts[k].iter().filter(|_| chosen.contains(&k));

@@ -95,6 +95,14 @@ pub struct SpectralLine {
     pub prominence: f64,
 }
 
+impl SpectralLine {
+    /// The same line with its amplitude in a unit.
+    pub fn over(self, unit: f64) -> Self {
+        let amplitude = self.amplitude / unit;
+        Self { amplitude, ..self }
+    }
+}
+
 /// Factor by which the frequencies are finer than the records resolve.
 const FINER: usize = 4;
 /// Frequencies on either side of a line that its power is compared with.

@@ -1,6 +1,6 @@
 //! Verdict: whether something is missing, and which effects stand.
 
-use super::Found;
+use super::SearchState;
 use super::noise_floor::{NoiseFloor, NoiseFloorSource};
 use super::reason::{Reason, Status};
 use super::residual_tests::ResidualTests;
@@ -103,7 +103,7 @@ pub fn remains(model: &ScoredModel, tests: &ResidualTests, floor: Option<NoiseFl
     ratio > AT_FLOOR && is_enough
 }
 
-impl Found {
+impl SearchState {
     /// Whether something is left, above the noise or hidden in it. Changes over a record also raise a floor that is taken
     /// from differences of its periods. They are no reason to look for a second effect: none of the list causes them.
     fn leaves(&self, model: &ScoredModel, tests: &ResidualTests) -> bool {

@@ -8,7 +8,7 @@ use torqcomp_model::{Dimension, UnitSystem};
 use crate::cli::Diagnose;
 use crate::commands::convert;
 use crate::diagnose::{
-    Case, ChannelUnits, InitialState, PlainStand, RecordSources, Records, StandRecord,
+    Case, ChannelUnits, InitialState, PlainStand, Records, SourceFiles, StandRecord,
 };
 use crate::failure::Failure;
 use crate::io::Input;
@@ -74,7 +74,7 @@ pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<Case, Failure> {
         ));
     }
     Ok(Case {
-        sources: RecordSources {
+        sources: SourceFiles {
             stand: args.stand.as_ref().map(|p| p.display().to_string()),
             train: args.train.clone(),
             holdout: args.holdout.clone(),

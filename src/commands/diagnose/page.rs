@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::diagnose::{cells, constant_rows, error_rows, error_sentences, suspected};
+use super::text::{cells, constant_rows, error_rows, error_sentences, suspected};
 use crate::chart::{Chart, Page, Series};
 use crate::diagnose::{
     CandidateFit, Diagnosis, MotionAxis, RecordResidual, Status, Verdict, autocorrelation, binned,
@@ -13,13 +13,13 @@ use crate::stand::si_unit;
 
 /// Periods of the stand in the picture over time.
 const PERIODS: f64 = 24.0;
-/// Samples in the picture over time.
-const PICTURED: std::ops::RangeInclusive<usize> = 50..=4000;
+/// Fewest and most samples in that picture.
+const PICTURED: [usize; 2] = [50, 4000];
 /// Lags of the autocorrelation that is drawn.
 const LAGS: usize = 60;
 
 /// A page for a browser, complete in itself.
-pub(crate) fn page(diagnosis: &Diagnosis) -> String {
+pub fn page(diagnosis: &Diagnosis) -> String {
     let stand = diagnosis.sources.stand.as_deref();
     let stand = stand.map_or_else(|| "a plain stand".to_owned(), file_name);
     let units = &diagnosis.context().units;
@@ -39,7 +39,8 @@ pub(crate) fn page(diagnosis: &Diagnosis) -> String {
     page.residuals();
     page.candidates();
     page.remaining();
-    page.page.text(&format!("torqcomp {}", diagnosis.version));
+    page.page
+        .text(concat!("torqcomp ", env!("CARGO_PKG_VERSION")));
     page.page.html()
 }
 
@@ -145,7 +146,7 @@ impl Draft<'_> {
         };
         let natural_hz = self.diagnosis.after.fitted.stand().natural_hz;
         let count = (PERIODS * worst.record.rate_hz() / natural_hz.max(1e-9)) as usize;
-        let range = worst.around_largest(count.clamp(*PICTURED.start(), *PICTURED.end()));
+        let range = worst.around_largest(count.clamp(PICTURED[0], PICTURED[1]));
         let times_s = &worst.times_s()[range.clone()];
         let measured = &worst.record.measured_in_range()[range.clone()];
         let mut series = vec![self.line("measured", times_s, measured)];

@@ -2,37 +2,38 @@
 
 use torqcomp_model::Estimate;
 
-use crate::diagnose::{CandidateFit, Diagnosis, GuardModel, Status};
-use crate::print::{columns, rounded, unit_or_as_recorded, with_std};
+use crate::diagnose::{CandidateFit, Diagnosis, GuardModel, NoiseFloorSource, Status};
+use crate::print::{Report, columns, rounded, unit_or_as_recorded, with_std};
 
-pub(crate) fn text(diagnosis: &Diagnosis) -> String {
-    let effects = match diagnosis.effects.is_empty() {
-        true => "none".to_owned(),
-        false => diagnosis.effects.join(", "),
-    };
-    let mut text = format!(
-        "verdict: {}\neffects: {effects}\n\n{}{}\n\n{}\n",
-        diagnosis.verdict.name(),
-        columns(&error_rows(diagnosis)),
-        error_sentences(diagnosis).join("\n"),
-        columns(&constant_rows(diagnosis))
-    );
-    diagnosis
-        .candidates
-        .iter()
-        .for_each(|c| text += &candidate(c));
-    if let Some(guard) = &diagnosis.suspected {
-        text += &format!("\nsuspected: {}\n", suspected(guard));
+impl Report for Diagnosis {
+    const SCHEMA: &'static str = "torqcomp.diagnose/1";
+
+    fn text(&self) -> String {
+        let effects = match self.effects.is_empty() {
+            true => "none".to_owned(),
+            false => self.effects.join(", "),
+        };
+        let mut text = format!(
+            "verdict: {}\neffects: {effects}\n\n{}{}\n\n{}\n",
+            self.verdict.name(),
+            columns(&error_rows(self)),
+            error_sentences(self).join("\n"),
+            columns(&constant_rows(self))
+        );
+        text.extend(self.candidates.iter().map(candidate));
+        if let Some(guard) = &self.suspected {
+            text += &format!("\nsuspected: {}\n", suspected(guard));
+        }
+        text += &format!("\nresidual: {}\n", self.residual.described);
+        if let Some(next) = &self.next_experiment {
+            text += &format!("next experiment: {next}\n");
+        }
+        text
     }
-    text += &format!("\nresidual: {}\n", diagnosis.residual.described);
-    if let Some(next) = &diagnosis.next_experiment {
-        text += &format!("next experiment: {next}\n");
-    }
-    text
 }
 
 /// A guard model in words.
-pub(crate) fn suspected(guard: &GuardModel) -> String {
+pub fn suspected(guard: &GuardModel) -> String {
     let with = match guard.with.is_empty() {
         true => String::new(),
         false => format!(" beside {}", guard.with.join(" and ")),
@@ -47,7 +48,7 @@ pub(crate) fn suspected(guard: &GuardModel) -> String {
 }
 
 /// A number with its standard uncertainty, for people.
-pub(crate) fn estimate(value: f64, std: Option<f64>) -> String {
+pub fn estimate(value: f64, std: Option<f64>) -> String {
     match std {
         Some(std) => with_std(value, std),
         None => format!("{} (std unknown)", rounded(value, 6)),
@@ -55,7 +56,7 @@ pub(crate) fn estimate(value: f64, std: Option<f64>) -> String {
 }
 
 /// The three errors, with a head.
-pub(crate) fn error_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
+pub fn error_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
     let error = &diagnosis.error;
     let head = format!("rms error, {}", unit_or_as_recorded(&error.unit));
     let mut rows = vec![cells([&head, "training", "held out", "relative"])];
@@ -77,7 +78,7 @@ pub(crate) fn error_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
 }
 
 /// The improvement and the noise floor, a sentence each.
-pub(crate) fn error_sentences(diagnosis: &Diagnosis) -> Vec<String> {
+pub fn error_sentences(diagnosis: &Diagnosis) -> Vec<String> {
     let error = &diagnosis.error;
     let unit = unit_or_as_recorded(&error.unit);
     let improvement = error.improvement_ci95.map(|[low, high]| {
@@ -88,7 +89,7 @@ pub(crate) fn error_sentences(diagnosis: &Diagnosis) -> Vec<String> {
         )
     });
     let from = match error.noise_floor_from {
-        Some("periods") => "differences between periods of the record",
+        Some(NoiseFloorSource::Periods) => "differences between periods of the record",
         _ => "the frequencies without signal",
     };
     let floor = match error.noise_floor_rms {
@@ -108,7 +109,7 @@ pub(crate) fn error_sentences(diagnosis: &Diagnosis) -> Vec<String> {
 }
 
 /// The constants of the plain stand, with a head.
-pub(crate) fn constant_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
+pub fn constant_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
     let mut rows = vec![cells(["constant", "declared", "before", "after"])];
     rows.extend(diagnosis.constants.iter().map(|c| {
         let name = match c.unit.as_str() {
@@ -126,7 +127,7 @@ pub(crate) fn constant_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
     rows
 }
 
-pub(crate) fn cells<const N: usize>(texts: [&str; N]) -> Vec<String> {
+pub fn cells<const N: usize>(texts: [&str; N]) -> Vec<String> {
     texts.map(str::to_owned).to_vec()
 }
 
