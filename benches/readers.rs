@@ -9,9 +9,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use mcap::records::MessageHeader;
 use mcap::{Compression, WriteOptions, Writer};
 use torqcomp::io::Input;
-use torqcomp::io::mcap::record::frames::Frames;
-use torqcomp::io::mcap::record::input::CountedInput;
-use torqcomp::io::mcap::{Inventory, Options, Selection, Source};
+use torqcomp::io::mcap::{FieldChoice, Inventory, SignalReader, TimeOptions};
 
 const MESSAGES: u64 = 100_000;
 const JOINTS: u32 = 6;
@@ -88,26 +86,24 @@ fn recording(compression: Option<Compression>) -> Vec<u8> {
     writer.into_inner().into_inner()
 }
 
-fn frames(bytes: &[u8]) -> Frames {
-    let input = CountedInput::new(Box::new(Cursor::new(bytes.to_vec())));
-    Frames::new("bench".to_owned(), input).expect("an MCAP file")
+fn stream(bytes: &[u8]) -> Box<Cursor<Vec<u8>>> {
+    Box::new(Cursor::new(bytes.to_vec()))
 }
 
 fn read(bytes: &[u8], field: &str) -> u64 {
-    let selection = Selection {
+    let choice = FieldChoice {
         topic: Some("/joint_states".to_owned()),
         field: Some(field.to_owned()),
         signal: None,
     };
-    let wanted = selection.check().expect("a topic and a field");
-    let options = Options::default();
-    let mut source =
-        Source::read(&Input::Stdin, frames(bytes), &wanted, &options).expect("it is there");
+    let options = TimeOptions::default();
+    let reader = SignalReader::with_stream(&Input::Stdin, stream(bytes), &choice, &options);
+    let mut reader = reader.expect("it is there");
     let (mut times, mut values) = (Vec::new(), Vec::new());
-    while source.next(&mut times, &mut values).expect("in memory") {
+    while reader.next(&mut times, &mut values).expect("in memory") {
         black_box((&times, &values));
     }
-    source.finish().samples
+    reader.finish().samples
 }
 
 fn readers(criterion: &mut Criterion) {
@@ -127,7 +123,10 @@ fn readers(criterion: &mut Criterion) {
             });
         }
         group.bench_function(format!("{name}/inventory"), |bencher| {
-            bencher.iter(|| Inventory::read(frames(&bytes)).expect("in memory").messages);
+            bencher.iter(|| {
+                let inventory = Inventory::read("bench".to_owned(), stream(&bytes));
+                inventory.expect("in memory").messages
+            });
         });
     }
     group.finish();

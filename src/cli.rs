@@ -14,7 +14,7 @@ use torqcomp_model::UnitSystem;
 use crate::failure::Failure;
 use crate::io::csv;
 use crate::io::digits::Digits;
-use crate::io::mcap::{Selection, TimeChoice};
+use crate::io::mcap::{FieldChoice, TimeChoice};
 use crate::io::output::Output;
 use crate::signal::{self, MessageOptions};
 
@@ -162,7 +162,7 @@ impl Record {
                 told: self.marks.told(),
             },
             messages: MessageOptions {
-                selection: Selection {
+                selection: FieldChoice {
                     topic: self.topic.clone(),
                     field: self.field.clone(),
                     signal: self.signal.clone(),

@@ -6,7 +6,7 @@ use super::{Axis, Channel, Recording};
 use crate::failure::Failure;
 use crate::io::Input;
 use crate::io::csv::NamedUnit;
-use crate::io::mcap::{self, Selection, Source, source::Chosen, time::TimeUsed};
+use crate::io::mcap::{self, FieldChoice, SelectedSignal, TimeOptions, time::TimeUsed};
 
 /// The signals that are named as `--signal` names them, or the only one in the file for `None`. Their
 /// stamps are counted from the first sample of the first one.
@@ -14,73 +14,56 @@ use crate::io::mcap::{self, Selection, Source, source::Chosen, time::TimeUsed};
 /// # Errors
 /// If the file cannot be read, or a signal is not in it: then with what is there.
 pub fn read(place: &Input, wanted: &[Option<&str>]) -> Result<Recording, Failure> {
-    if *place == Input::Stdin && wanted.len() > 1 {
-        return Err(Failure::usage(
-            "several signals of an MCAP file are read one after the other, which standard input does \
-             not allow; give the name of the file",
-        ));
-    }
+    let choice = |signal: &Option<&str>| FieldChoice {
+        signal: signal.map(str::to_owned),
+        ..FieldChoice::default()
+    };
+    let choices: Vec<_> = wanted.iter().map(choice).collect();
+    let mut held = vec![(Vec::new(), Vec::new()); wanted.len()];
+    let options = TimeOptions::default();
+    let results = mcap::read_fields(place, &choices, &options, |signal, times_ns, values| {
+        held[signal].0.extend_from_slice(times_ns);
+        held[signal].1.extend_from_slice(values);
+    })?;
     let mut recording = Recording::empty("mcap", place.name());
-    let mut origin_ns = None;
-    for signal in wanted {
-        let read = one(place, *signal, &mut origin_ns, &mut recording)?;
-        recording.channels.push(read);
+    let origin_ns = held
+        .iter()
+        .find_map(|(times_ns, _)| times_ns.first().copied());
+    for ((signal, result), (times_ns, samples)) in wanted.iter().zip(results).zip(held) {
+        let (selected, summary) = result?;
+        describe(&selected, &mut recording.dialect);
+        let mut warnings = summary.warnings;
+        if summary.is_lossy && recording.lost.is_none() && !warnings.is_empty() {
+            recording.lost = Some(warnings.remove(0));
+        }
+        recording.warnings.extend(warnings);
+        let seconds = |time_ns: &i64| time_ns.wrapping_sub(origin_ns.unwrap_or(0)) as f64 * 1e-9;
+        let stamps_s = times_ns.iter().map(seconds).collect();
+        let channel = channel(*signal, &selected, samples, stamps_s, origin_ns);
+        recording.channels.push(channel);
     }
     Ok(recording)
 }
 
-fn one(
-    place: &Input,
-    signal: Option<&str>,
-    origin_ns: &mut Option<i64>,
-    recording: &mut Recording,
-) -> Result<Channel, Failure> {
-    let selection = Selection {
-        signal: signal.map(str::to_owned),
-        ..Selection::default()
-    };
-    let mut source = Source::open(place, &selection, &mcap::Options::default())?;
-    let (mut times_ns, mut values) = (Vec::new(), Vec::new());
-    let (mut stamps_s, mut samples) = (Vec::new(), Vec::new());
-    while source.next(&mut times_ns, &mut values)? {
-        let origin = *origin_ns.get_or_insert(times_ns[0]);
-        let seconds = |time_ns: &i64| time_ns.wrapping_sub(origin) as f64 * 1e-9;
-        stamps_s.extend(times_ns.iter().map(seconds));
-        samples.append(&mut values);
-    }
-    let chosen = source.chosen().clone();
-    let described = describe(&chosen);
-    if !recording.dialect.contains(&described) {
-        let joint = if recording.dialect.is_empty() {
-            "MCAP"
-        } else {
-            ";"
-        };
-        recording.dialect += &format!("{joint} {described}");
-    }
-    let summary = source.finish();
-    let mut warnings = summary.warnings;
-    if summary.is_lossy && recording.lost.is_none() && !warnings.is_empty() {
-        recording.lost = Some(warnings.remove(0));
-    }
-    recording.warnings.extend(warnings);
-    Ok(channel(signal, &chosen, samples, stamps_s, *origin_ns))
-}
-
-fn describe(chosen: &Chosen) -> String {
-    let TimeUsed { choice, field, why } = &chosen.time;
+/// Adds what a signal's messages are to the description of a file, unless it is in it.
+fn describe(selected: &SelectedSignal, dialect: &mut String) {
+    let TimeUsed { choice, field, why } = &selected.time;
     let time = field
         .clone()
         .unwrap_or_else(|| format!("{} time", choice.name()));
-    format!(
+    let described = format!(
         "{} {}, time: {time} ({why})",
-        chosen.encoding, chosen.schema
-    )
+        selected.encoding, selected.schema
+    );
+    if !dialect.contains(&described) {
+        let joint = if dialect.is_empty() { "MCAP" } else { ";" };
+        *dialect += &format!("{joint} {described}");
+    }
 }
 
 fn channel(
     signal: Option<&str>,
-    chosen: &Chosen,
+    chosen: &SelectedSignal,
     samples: Vec<f64>,
     stamps_s: Vec<f64>,
     origin_ns: Option<i64>,

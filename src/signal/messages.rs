@@ -3,7 +3,7 @@
 use super::{Feed, MessageOptions, Origin, RowSource, Signal};
 use crate::failure::Failure;
 use crate::io::csv::{Column, NamedUnit, Options, Rows, Stamps, TimeAxis, TimeSource};
-use crate::io::mcap::{self, Source};
+use crate::io::mcap::{self, SelectedSignal, SignalReader};
 use crate::warning::Warning;
 
 /// Nanoseconds that an `f64` holds exactly: 104 days.
@@ -12,11 +12,11 @@ const EXACT_NS: i64 = 1 << 53;
 impl Signal {
     /// The signal of a topic's messages.
     pub(super) fn of_messages(
-        mut source: Source,
+        mut source: SignalReader,
         table: &Options,
         wanted: &MessageOptions,
     ) -> Result<Self, Failure> {
-        let (name, chosen) = (source.name().to_owned(), source.chosen().clone());
+        let (name, chosen) = (source.name().to_owned(), source.selected().clone());
         let mut times_ns = Vec::new();
         let mut values = Vec::new();
         source.next(&mut times_ns, &mut values)?;
@@ -78,8 +78,8 @@ impl Signal {
     }
 }
 
-fn nothing_usable(name: &str, source: Source) -> Failure {
-    let topic = source.chosen().topic.clone();
+fn nothing_usable(name: &str, source: SignalReader) -> Failure {
+    let topic = source.selected().topic.clone();
     let said: Vec<String> = source
         .finish()
         .warnings
@@ -101,7 +101,7 @@ fn describe_time(used: &mcap::time::TimeUsed) -> String {
 
 fn unit(
     name: &str,
-    chosen: &mcap::source::Chosen,
+    chosen: &SelectedSignal,
     options: &Options,
 ) -> Result<Option<NamedUnit>, Failure> {
     let (text, is_told) = match (&options.unit, &chosen.unit) {
@@ -124,7 +124,7 @@ fn unit(
 
 /// Messages on their way; times are handed on from the first one.
 struct Messages {
-    source: Option<Source>,
+    source: Option<SignalReader>,
     origin_ns: i64,
     /// What was read and not handed on.
     times_ns: Vec<i64>,

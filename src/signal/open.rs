@@ -7,9 +7,7 @@ use super::{Feed, Options, Signal};
 use crate::failure::Failure;
 use crate::io::Input;
 use crate::io::csv::{self, Table};
-use crate::io::mcap::record::frames::Frames;
-use crate::io::mcap::record::input::CountedInput;
-use crate::io::mcap::{self, Source, selection::Wanted};
+use crate::io::mcap::{SignalReader, TimeOptions};
 use crate::recording;
 
 /// Bytes that are read before anything is told.
@@ -52,17 +50,13 @@ impl Signal {
         input: Box<dyn Read + Send>,
         options: &Options,
     ) -> Result<Self, Failure> {
-        let wanted = match options.messages.selection.check()? {
-            Wanted::Only => mcap::inventory::only_topic(place)?,
-            wanted => wanted,
-        };
-        let frames = Frames::new(place.name(), CountedInput::new(input))?;
-        let reading = mcap::Options {
+        let time = TimeOptions {
             time: options.messages.time,
             spacing: options.messages.spacing.clone(),
         };
-        let source = Source::read(place, frames, &wanted, &reading)?;
-        Self::of_messages(source, &options.table, &options.messages)
+        let choice = &options.messages.selection;
+        let reader = SignalReader::with_stream(place, input, choice, &time)?;
+        Self::of_messages(reader, &options.table, &options.messages)
     }
 
     /// The signal of a plain table.

@@ -2,7 +2,7 @@
 
 use crate::failure::Failure;
 use crate::io::csv;
-use crate::io::mcap::{Selection, TimeChoice};
+use crate::io::mcap::{FieldChoice, TimeChoice};
 
 /// What the command line says about a signal.
 #[derive(Debug, Clone, Default)]
@@ -17,7 +17,7 @@ pub struct Options {
 #[derive(Debug, Clone, Default)]
 pub struct MessageOptions {
     /// Topic and field.
-    pub selection: Selection,
+    pub selection: FieldChoice,
     /// The time that counts; told from the messages if not given.
     pub time: Option<TimeChoice>,
     /// Field with the spacing of samples, for messages with many of them.

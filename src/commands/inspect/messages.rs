@@ -9,13 +9,13 @@ use crate::failure::Failure;
 use crate::io::Input;
 use crate::io::csv::NamedUnit;
 use crate::io::mcap::inventory::{ChannelReport, LeafReport};
-use crate::io::mcap::{Inventory, Options, Selection, Source, Summary};
+use crate::io::mcap::{self, FieldChoice, Inventory, SelectedSignal, TimeOptions};
 use crate::recording::{Axis, Channel, RateFrom, Recording, typical_step};
 use crate::warning::Warning;
 
 /// Samples that are kept at most, of all numbers together: eight bytes each, and as many for stamps.
 const MOST_SAMPLES: u64 = 1 << 22;
-/// Bytes of the file that are gone through at most: the file is read once for each number.
+/// Longest file whose samples are read, in bytes.
 const MOST_BYTES: u64 = 4_000_000_000;
 /// Numbers that are read at most.
 const MOST_NUMBERS: u64 = 64;
@@ -41,20 +41,41 @@ fn read_most(place: &Input, most: u64) -> Result<Content, Failure> {
     };
     let mut budget = Budget::of(place, &inventory, most);
     let mut left_out = 0;
+    let (mut choices, mut kept, mut numbers) = (Vec::new(), Vec::new(), Vec::new());
     for topic in &inventory.channels {
-        let numbers: Vec<&LeafReport> = topic.leaves.iter().filter(|l| !l.is_stamp).collect();
-        if numbers.is_empty() {
-            content.listed.push(entry(topic, None));
-        }
-        for number in numbers {
+        let of_topic = numbers.len();
+        for number in topic.leaves.iter().filter(|leaf| !leaf.is_stamp) {
             let share = budget.share(topic.messages);
-            let read = share.map(|most| samples(place, topic, number, most));
-            left_out += usize::from(read.is_none() && topic.messages > 0);
-            match read {
-                Some(Ok(read)) => add(&mut content, read, &inventory.warnings),
-                // Lists that are empty at first, and the like: the warnings tell what is damaged.
-                _ => content.listed.push(entry(topic, Some(number))),
+            left_out += usize::from(share.is_none() && topic.messages > 0);
+            numbers.push((topic, Some(number), share.is_some()));
+            if let Some(most) = share {
+                choices.push(choice(topic, number));
+                kept.push(Kept::new(most));
             }
+        }
+        if numbers.len() == of_topic {
+            numbers.push((topic, None, false));
+        }
+    }
+    let mut results = Vec::new();
+    if !choices.is_empty() {
+        let options = TimeOptions::default();
+        results = mcap::read_fields(place, &choices, &options, |number, times_ns, values| {
+            kept[number].add(times_ns, values);
+        })?;
+    }
+    let mut results = results.into_iter().zip(kept);
+    for (topic, number, is_read) in numbers {
+        let read = is_read.then(|| results.next()).flatten();
+        if let (Some((Ok((selected, summary)), kept)), Some(number)) = (read, number) {
+            let (channel, whole) = channel(topic, number, &selected, kept);
+            content.recording.channels.push(channel);
+            content.wholes.push(whole);
+            let warnings = &mut content.recording.warnings;
+            add_warnings(warnings, summary.warnings, &inventory.warnings);
+        } else {
+            // Lists that are empty at first, and the like: the warnings name what is damaged.
+            content.listed.push(entry(topic, number));
         }
     }
     let said = &mut content.recording.warnings;
@@ -64,14 +85,12 @@ fn read_most(place: &Input, most: u64) -> Result<Content, Failure> {
     Ok(content)
 }
 
-/// A number that was read.
-type Read = (Channel, Option<Whole>, Summary);
-
-/// Adds a number that was read.
-fn add(content: &mut Content, (channel, whole, summary): Read, of_file: &[Warning]) {
-    content.recording.channels.push(channel);
-    content.wholes.push(whole);
-    add_warnings(&mut content.recording.warnings, summary.warnings, of_file);
+fn choice(topic: &ChannelReport, number: &LeafReport) -> FieldChoice {
+    FieldChoice {
+        topic: Some(topic.topic.clone()),
+        field: Some(first_item(&number.path)),
+        signal: None,
+    }
 }
 
 fn not_read(left_out: usize) -> Warning {
@@ -98,9 +117,10 @@ impl Budget {
         };
         let topics = inventory.channels.iter().filter(|topic| topic.messages > 0);
         let numbers = topics.flat_map(|topic| topic.leaves.iter().filter(|leaf| !leaf.is_stamp));
-        let passes = length.map_or(0, |length| (MOST_BYTES / length.max(1)).min(MOST_NUMBERS));
+        let is_readable = length.is_some_and(|length| length <= MOST_BYTES);
+        let most = if is_readable { MOST_NUMBERS } else { 0 };
         Self {
-            numbers: passes.min(numbers.count() as u64),
+            numbers: most.min(numbers.count() as u64),
             samples,
         }
     }
@@ -118,28 +138,16 @@ impl Budget {
     }
 }
 
-/// Reads one number of a topic and keeps so many samples, and what all of them come to if there are more.
-fn samples(
-    place: &Input,
+/// A number that was read, and what all of its samples come to if not all were kept.
+fn channel(
     topic: &ChannelReport,
     number: &LeafReport,
-    most: usize,
-) -> Result<Read, Failure> {
-    let selection = Selection {
-        topic: Some(topic.topic.clone()),
-        field: Some(first_item(&number.path)),
-        signal: None,
-    };
-    let mut source = Source::open(place, &selection, &Options::default())?;
-    let (mut times_ns, mut values) = (Vec::new(), Vec::new());
-    let mut kept = Kept::new(most);
-    while source.next(&mut times_ns, &mut values)? {
-        kept.add(&times_ns, &values);
-    }
+    selected: &SelectedSignal,
+    kept: Kept,
+) -> (Channel, Option<Whole>) {
     let (stamps, samples, whole) = kept.finish();
-    let chosen = source.chosen();
-    let unit = chosen.unit.as_ref().map(|found| found.unit.clone());
-    let time = &chosen.time;
+    let unit = selected.unit.as_ref().map(|found| found.unit.clone());
+    let time = &selected.time;
     let axis = axis(
         stamps,
         match &time.field {
@@ -157,7 +165,7 @@ fn samples(
         axis,
         segment: None,
     };
-    Ok((channel, whole, source.finish()))
+    (channel, whole)
 }
 
 /// An axis of stamps that are counted from the first: seconds since 1970 would cost them their last

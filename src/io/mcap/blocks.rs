@@ -1,7 +1,7 @@
 //! Times of the samples in messages that hold many.
 
 use super::route::{Hop, Route};
-use super::schema::{Kind, Schema};
+use super::schema::{FieldKind, Schema};
 use crate::failure::did_you_mean;
 
 /// How far samples within a message are apart.
@@ -11,8 +11,6 @@ pub enum Spacing {
     Single,
     /// A field says it: seconds per unit of the field, or its reciprocal for a rate.
     Field {
-        /// Path of the field.
-        text: String,
         /// Way to it.
         hops: Vec<Hop>,
         /// Seconds per unit; of the reciprocal if the field is a rate.
@@ -92,8 +90,7 @@ impl Spacing {
 
     fn field(schema: &Schema, place: usize, seconds: f64, is_rate: bool) -> Option<Self> {
         let field = &schema.root().fields[place];
-        matches!(field.kind, Kind::Number(_)).then(|| Self::Field {
-            text: field.name.clone(),
+        matches!(field.kind, FieldKind::Number(_)).then(|| Self::Field {
             hops: vec![Hop::Field(place)],
             seconds,
             is_rate,
@@ -101,26 +98,10 @@ impl Spacing {
     }
 
     /// Way to the field, if there is one.
-    #[must_use]
     pub fn hops(&self) -> Option<&Vec<Hop>> {
         match self {
             Self::Field { hops, .. } => Some(hops),
             _ => None,
-        }
-    }
-
-    /// For people.
-    #[must_use]
-    pub fn describe(&self) -> String {
-        match self {
-            Self::Single => "one sample in a message".to_owned(),
-            Self::Field { text, is_rate, .. } => {
-                let what = if *is_rate { "the rate" } else { "the spacing" };
-                format!("samples of a message follow its time at {what} in its field \"{text}\"")
-            }
-            Self::Even => {
-                "samples of a message lie evenly from its time to the next message's".to_owned()
-            }
         }
     }
 }
@@ -152,7 +133,6 @@ pub struct Blocks {
 
 impl Blocks {
     /// Starts without a message.
-    #[must_use]
     pub fn new(spacing: Spacing) -> Self {
         Self {
             spacing,
@@ -160,12 +140,6 @@ impl Blocks {
             last_ns: None,
             without_spacing: 0,
         }
-    }
-
-    /// How far samples are apart.
-    #[must_use]
-    pub fn spacing(&self) -> &Spacing {
-        &self.spacing
     }
 
     /// Takes a message's samples; those whose times are known go to `each`.

@@ -3,50 +3,85 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use mcap::records::op;
+use mcap::records::{self, Record, op};
 
 use super::decode::Encoding;
-use super::record::{ChannelRecord, SchemaRecord};
+use super::record;
 use super::schema::ros2msg::Generation;
 use super::schema::{Schema, json, protobuf, ros2idl, ros2msg};
 
 /// Schemas and channels as the file declares them.
 #[derive(Debug, Default)]
 pub struct Channels {
-    schemas: BTreeMap<u16, Arc<SchemaRecord>>,
-    channels: BTreeMap<u16, Arc<Channel>>,
+    schemas: BTreeMap<u16, Arc<DeclaredSchema>>,
+    channels: BTreeMap<u16, Arc<TopicChannel>>,
     /// Declarations that contradict an earlier one.
     pub conflicts: u64,
 }
 
+/// What a channel's messages are made of.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DeclaredSchema {
+    id: u16,
+    /// Name of the type, as `sensor_msgs/msg/JointState`.
+    pub name: String,
+    /// Language of the definition, as `ros2msg`.
+    pub encoding: String,
+    data: Vec<u8>,
+}
+
 /// A channel and its schema.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Channel {
+pub struct TopicChannel {
     /// The channel as the file declares it.
-    pub record: ChannelRecord,
+    pub record: records::Channel,
     /// Its schema, if it has one.
-    pub schema: Option<Arc<SchemaRecord>>,
+    pub schema: Option<Arc<DeclaredSchema>>,
 }
 
 impl Channels {
+    /// The channels that the summary of a file repeats.
+    pub(super) fn of_summary(summary: &mcap::Summary) -> Self {
+        let mut channels = Self::default();
+        for schema in summary.schemas.values() {
+            channels.add_schema(DeclaredSchema {
+                id: schema.id,
+                name: schema.name.clone(),
+                encoding: schema.encoding.clone(),
+                data: schema.data.to_vec(),
+            });
+        }
+        for channel in summary.channels.values() {
+            channels.add_channel(records::Channel {
+                id: channel.id,
+                schema_id: channel.schema.as_ref().map_or(0, |schema| schema.id),
+                topic: channel.topic.clone(),
+                message_encoding: channel.message_encoding.clone(),
+                metadata: channel.metadata.clone(),
+            });
+        }
+        channels
+    }
+
     /// Takes note of a schema or a channel; other records are left alone.
     pub fn note(&mut self, op: u8, body: &[u8]) {
-        match op {
-            op::SCHEMA => {
-                if let Some(schema) = SchemaRecord::read(body).filter(|schema| schema.id != 0) {
-                    self.add_schema(schema);
-                }
+        // Message indexes need not be parsed.
+        let is_declaration = matches!(op, op::SCHEMA | op::CHANNEL);
+        match is_declaration.then(|| record::parse(op, body)).flatten() {
+            Some(Record::Schema { header, data }) if header.id != 0 => {
+                self.add_schema(DeclaredSchema {
+                    id: header.id,
+                    name: header.name,
+                    encoding: header.encoding,
+                    data: data.into_owned(),
+                });
             }
-            op::CHANNEL => {
-                if let Some(channel) = ChannelRecord::read(body) {
-                    self.add_channel(channel);
-                }
-            }
+            Some(Record::Channel(channel)) => self.add_channel(channel),
             _ => {}
         }
     }
 
-    fn add_schema(&mut self, schema: SchemaRecord) {
+    fn add_schema(&mut self, schema: DeclaredSchema) {
         match self.schemas.get(&schema.id) {
             Some(known) if **known != schema => self.conflicts += 1,
             Some(_) => {}
@@ -54,32 +89,31 @@ impl Channels {
         }
     }
 
-    fn add_channel(&mut self, record: ChannelRecord) {
+    fn add_channel(&mut self, record: records::Channel) {
         match self.channels.get(&record.id) {
             Some(known) if known.record != record => self.conflicts += 1,
             // Its schema may have been declared since.
             Some(known) if known.schema.is_some() || record.schema_id == 0 => {}
             _ => {
                 let schema = self.schemas.get(&record.schema_id).cloned();
-                let channel = Channel { record, schema };
+                let channel = TopicChannel { record, schema };
                 self.channels.insert(channel.record.id, Arc::new(channel));
             }
         }
     }
 
     /// A channel by its number.
-    #[must_use]
-    pub fn get(&self, id: u16) -> Option<&Arc<Channel>> {
+    pub fn get(&self, id: u16) -> Option<&Arc<TopicChannel>> {
         self.channels.get(&id)
     }
 
     /// All channels, by number.
-    pub fn iter(&self) -> impl Iterator<Item = &Arc<Channel>> {
+    pub fn iter(&self) -> impl Iterator<Item = &Arc<TopicChannel>> {
         self.channels.values()
     }
 }
 
-impl Channel {
+impl TopicChannel {
     /// How its messages are encoded, and what they are made of. JSON is told from a message.
     ///
     /// # Errors
@@ -129,8 +163,16 @@ impl Channel {
             .map_err(|error| format!("schema \"{}\", {error}", schema.name))
     }
 
-    /// Name and encoding of its schema, for people.
-    #[must_use]
+    /// Whether its messages are of the same type as those of another channel.
+    pub(super) fn has_type_of(&self, other: &Self) -> bool {
+        let what = |channel: &Self| {
+            let schema = channel.schema.as_ref();
+            schema.map(|s| (s.name.clone(), s.encoding.clone(), s.data.clone()))
+        };
+        self.record.message_encoding == other.record.message_encoding && what(self) == what(other)
+    }
+
+    /// Name of its schema, for people.
     pub fn schema_name(&self) -> &str {
         self.schema.as_ref().map_or("", |schema| &schema.name)
     }
@@ -140,16 +182,16 @@ impl Channel {
 mod tests {
     use super::*;
 
-    fn channel(message_encoding: &str, schema_encoding: &str) -> Channel {
-        Channel {
-            record: ChannelRecord {
+    fn channel(message_encoding: &str, schema_encoding: &str) -> TopicChannel {
+        TopicChannel {
+            record: records::Channel {
                 id: 1,
                 schema_id: 1,
                 topic: "/t".to_owned(),
                 message_encoding: message_encoding.to_owned(),
                 metadata: BTreeMap::new(),
             },
-            schema: Some(Arc::new(SchemaRecord {
+            schema: Some(Arc::new(DeclaredSchema {
                 id: 1,
                 name: "p/msg/M".to_owned(),
                 encoding: schema_encoding.to_owned(),

@@ -9,7 +9,7 @@ const DRIFT_NS: i64 = 100_000_000;
 
 /// What was seen of both clocks.
 #[derive(Debug, Default)]
-pub struct Clock {
+pub struct ClockCheck {
     /// Stamp minus log time: of the first message, least and greatest, in ns.
     offsets: Option<(i64, i64, i64)>,
     /// Log times, first and last, in ns.
@@ -18,7 +18,7 @@ pub struct Clock {
     zeros: u64,
 }
 
-impl Clock {
+impl ClockCheck {
     /// Takes note of a message's two times.
     #[inline]
     pub fn note(&mut self, stamp_ns: Option<i64>, log_time_ns: u64) {
@@ -41,7 +41,6 @@ impl Clock {
     }
 
     /// What should be said about them.
-    #[must_use]
     pub fn warnings(&self) -> Vec<String> {
         let mut said = Vec::new();
         if self.zeros > 0 {
@@ -76,7 +75,7 @@ mod tests {
     use super::*;
 
     fn said(times: &[(i64, u64)]) -> Vec<String> {
-        let mut clock = Clock::default();
+        let mut clock = ClockCheck::default();
         for (stamp, log) in times {
             clock.note(Some(*stamp), *log);
         }

@@ -3,12 +3,15 @@
 use std::fmt;
 use std::sync::Arc;
 
+use prost_reflect::MessageDescriptor;
+
 use super::cdr;
 use super::json;
 use super::protobuf;
 use super::route::{Hop, Route};
 use super::schema::Schema;
 use super::time::Stamp;
+use super::tree::TreeTargets;
 use crate::failure::did_you_mean;
 
 /// What is wanted of every message.
@@ -45,7 +48,6 @@ impl Reading {
     }
 
     /// The stamp in ns.
-    #[must_use]
     pub fn stamp_ns(&self) -> Option<i64> {
         self.seconds?
             .checked_mul(1_000_000_000)?
@@ -186,7 +188,6 @@ pub enum Encoding {
 
 impl Encoding {
     /// Reads the name that channels give.
-    #[must_use]
     pub fn of(name: &str) -> Option<Self> {
         match name {
             "cdr" => Some(Self::Cdr),
@@ -201,23 +202,29 @@ impl Encoding {
 /// Takes wanted numbers out of messages.
 pub enum Decoder {
     /// CDR and ROS 1.
-    Cdr(cdr::Decoder),
+    Cdr(Box<cdr::CdrDecoder>),
     /// Protobuf.
-    Protobuf(protobuf::Decoder),
+    Protobuf(Option<MessageDescriptor>, TreeTargets),
     /// JSON.
-    Json(json::Decoder),
+    Json(TreeTargets),
 }
 
 impl Decoder {
     /// Prepares for messages of one type.
-    #[must_use]
     pub fn new(encoding: Encoding, schema: &Arc<Schema>, targets: Targets) -> Self {
         match encoding {
-            Encoding::Cdr => Self::Cdr(cdr::Decoder::new(schema, targets, false)),
-            Encoding::Ros1 => Self::Cdr(cdr::Decoder::new(schema, targets, true)),
-            Encoding::Protobuf => Self::Protobuf(protobuf::Decoder::new(schema, targets)),
-            Encoding::Json => Self::Json(json::Decoder::new(schema, &targets)),
+            Encoding::Cdr => Self::cdr(schema, targets, false),
+            Encoding::Ros1 => Self::cdr(schema, targets, true),
+            Encoding::Protobuf => {
+                let descriptor = schema.descriptor.clone();
+                Self::Protobuf(descriptor, TreeTargets::new(schema, &targets))
+            }
+            Encoding::Json => Self::Json(TreeTargets::new(schema, &targets)),
         }
+    }
+
+    fn cdr(schema: &Arc<Schema>, targets: Targets, is_ros1: bool) -> Self {
+        Self::Cdr(Box::new(cdr::CdrDecoder::new(schema, targets, is_ros1)))
     }
 
     /// Reads a message; `reading` is cleared first.
@@ -228,8 +235,11 @@ impl Decoder {
         reading.clear();
         match self {
             Self::Cdr(decoder) => decoder.read(data, reading),
-            Self::Protobuf(decoder) => decoder.read(data, reading),
-            Self::Json(decoder) => decoder.read(data, reading),
+            Self::Protobuf(Some(descriptor), targets) => {
+                protobuf::read(descriptor, targets, data, reading)
+            }
+            Self::Protobuf(None, _) => Err(Damage::Malformed("it has no definition".to_owned())),
+            Self::Json(targets) => json::read(targets, data, reading),
         }
     }
 }

@@ -1,20 +1,23 @@
 //! What is in a file.
 
 use std::collections::BTreeMap;
+use std::io::Read;
 use std::sync::Arc;
 
-use mcap::records::op;
+use mcap::records::{Header, Record, op};
 use serde::Serialize;
 
-use super::channels::{Channel, Channels};
+use super::channels::{Channels, TopicChannel};
 use super::decode::{Damage, Decoder, Encoding, Reading, Targets};
-use super::path::{self, Part};
-use super::record::frames::Frames;
-use super::record::{AttachmentHead, HeaderRecord, Message, MetadataRecord};
+use super::index;
+use super::path::{self, PathPart};
+use super::record::input::CountedInput;
+use super::record::reader::RecordReader;
+use super::record::{self, RawMessage};
 use super::route::Route;
 use super::schema::Schema;
 use super::schema::leaves::{self, Leaf};
-use super::selection::Wanted;
+use super::selection::FieldRequest;
 use super::summary;
 use super::time::Stamp;
 use super::units;
@@ -96,7 +99,7 @@ pub struct ChannelReport {
 pub struct LeafReport {
     /// Path; lists with `[]`, arrays with `[3]`.
     pub path: String,
-    /// Kind of number.
+    /// FieldKind of number.
     pub kind: &'static str,
     /// Unit, if the file tells it.
     pub unit: Option<String>,
@@ -148,20 +151,21 @@ impl Inventory {
     ///
     /// # Errors
     /// If it cannot be read or is not MCAP. Damage is no error: it is among the warnings.
-    pub fn scan(place: &Input) -> Result<Self, Failure> {
-        Self::read(Frames::open(place)?)
+    pub fn scan(input: &Input) -> Result<Self, Failure> {
+        Self::read(input.name(), input.open()?)
     }
 
-    /// The same of a file that is open.
+    /// The same of a stream.
     ///
     /// # Errors
-    /// If it cannot be read.
-    pub fn read(mut frames: Frames) -> Result<Self, Failure> {
+    /// If it cannot be read or is not MCAP.
+    pub fn read(name: String, stream: Box<dyn Read + Send>) -> Result<Self, Failure> {
+        let mut records = RecordReader::new(name, CountedInput::new(stream))?;
         let mut scan = Scan::default();
-        while let Some(frame) = frames.advance()? {
-            scan.note(frame.op, frames.body(&frame));
+        while let Some((op, body)) = records.next()? {
+            scan.note(op, body);
         }
-        Ok(scan.finish(&frames))
+        Ok(scan.finish(&records))
     }
 }
 
@@ -169,43 +173,75 @@ impl Inventory {
 ///
 /// # Errors
 /// If there are several, or none, or the file can only be read once.
-pub fn only_topic(place: &Input) -> Result<Wanted, Failure> {
-    if *place == Input::Stdin {
+pub(super) fn only_topic(input: &Input) -> Result<FieldRequest, Failure> {
+    if *input == Input::Stdin {
         return Err(Failure::usage(
             "choose what to read from standard input with --topic, as --topic /joint_states \
              --field effort[0]",
         ));
     }
-    let inventory = Inventory::scan(place)?;
-    let has_numbers = |channel: &&ChannelReport| channel.leaves.iter().any(|leaf| !leaf.is_stamp);
-    let with_numbers = inventory.channels.iter().filter(has_numbers);
-    let mut topics: Vec<_> = with_numbers.map(|channel| channel.topic.as_str()).collect();
-    topics.dedup();
-    match topics[..] {
-        [topic] => Ok(Wanted::Topic(topic.to_owned(), Vec::new())),
+    // What JSON messages are made of only a message can tell, so that the file must be gone through.
+    let channels = index::channels(input).filter(|channels| {
+        let mut encodings = channels
+            .iter()
+            .map(|channel| &channel.record.message_encoding);
+        encodings.all(|encoding| encoding != "json")
+    });
+    let topics = match channels {
+        Some(channels) => channels.iter().map(|channel| numbers_of(channel)).collect(),
+        None => {
+            let channels = Inventory::scan(input)?.channels.into_iter();
+            let topic = |channel: ChannelReport| match channel.unreadable {
+                Some(why) => (channel.topic, Err(why)),
+                None => (
+                    channel.topic,
+                    Ok(channel.leaves.iter().any(|l| !l.is_stamp)),
+                ),
+            };
+            channels.map(topic).collect()
+        }
+    };
+    choose_topic(&input.name(), topics)
+}
+
+/// A topic, and whether there are numbers in its messages or why they cannot be read.
+type TopicNumbers = (String, Result<bool, String>);
+
+fn numbers_of(channel: &TopicChannel) -> TopicNumbers {
+    let layout = channel.layout(&[]);
+    let has_numbers = |schema: &Schema| leaves::leaves(schema).0.iter().any(|leaf| !leaf.is_stamp);
+    let numbers = layout.map(|(_, schema)| has_numbers(&schema));
+    (channel.record.topic.clone(), numbers)
+}
+
+fn choose_topic(file: &str, mut topics: Vec<TopicNumbers>) -> Result<FieldRequest, Failure> {
+    topics.sort();
+    let has_numbers = |(_, numbers): &&TopicNumbers| *numbers == Ok(true);
+    let with_numbers = topics.iter().filter(has_numbers);
+    let mut names: Vec<_> = with_numbers.map(|(topic, _)| topic.as_str()).collect();
+    names.dedup();
+    match names[..] {
+        [topic] => Ok(FieldRequest::Topic(topic.to_owned(), Vec::new())),
         [] => Err(Failure::failed(format_args!(
-            "{}: there is no topic whose numbers can be read{}",
-            inventory.file,
-            inventory
-                .channels
+            "{file}: there is no topic whose numbers can be read{}",
+            topics
                 .iter()
-                .filter_map(|channel| {
-                    let why = channel.unreadable.as_ref()?;
-                    Some(format!("; {}: {why}", channel.topic))
+                .filter_map(|(topic, numbers)| {
+                    let why = numbers.as_ref().err()?;
+                    Some(format!("; {topic}: {why}"))
                 })
                 .collect::<String>()
         ))),
         _ => Err(Failure::usage(format_args!(
-            "{}: choose a topic with --topic; there are: {}",
-            inventory.file,
-            topics.join(", ")
+            "{file}: choose a topic with --topic; there are: {}",
+            names.join(", ")
         ))),
     }
 }
 
 #[derive(Default)]
 struct Scan {
-    header: HeaderRecord,
+    header: Option<Header>,
     channels: Channels,
     seen: BTreeMap<u16, Seen>,
     attachments: Vec<AttachmentReport>,
@@ -228,31 +264,33 @@ struct Seen {
 impl Scan {
     fn note(&mut self, op: u8, body: &[u8]) {
         match op {
-            op::MESSAGE => match Message::read(body) {
+            op::MESSAGE => match RawMessage::read(body) {
                 Some(message) => self.message(&message),
                 None => self.broken += 1,
             },
-            op::HEADER => self.header = HeaderRecord::read(body).unwrap_or_default(),
+            op::HEADER | op::METADATA => match record::parse(op, body) {
+                Some(Record::Header(header)) => self.header = Some(header),
+                Some(Record::Metadata(found)) => self.metadata.push(MetadataReport {
+                    name: found.name,
+                    pairs: found.metadata,
+                }),
+                _ => {}
+            },
             op::ATTACHMENT => {
-                if let Some((head, _)) = AttachmentHead::read(body) {
+                if let Some((header, size)) = record::attachment_front(body) {
                     self.attachments.push(AttachmentReport {
-                        name: head.name,
-                        media_type: head.media_type,
-                        size: head.size,
-                        log_ns: head.log_time_ns,
+                        name: header.name,
+                        media_type: header.media_type,
+                        size,
+                        log_ns: header.log_time,
                     });
-                }
-            }
-            op::METADATA => {
-                if let Some(MetadataRecord { name, pairs }) = MetadataRecord::read(body) {
-                    self.metadata.push(MetadataReport { name, pairs });
                 }
             }
             _ => self.channels.note(op, body),
         }
     }
 
-    fn message(&mut self, message: &Message) {
+    fn message(&mut self, message: &RawMessage) {
         let (log, publish) = (message.log_time_ns, message.publish_time_ns);
         match self.seen.get_mut(&message.channel_id) {
             Some(seen) => {
@@ -278,7 +316,7 @@ impl Scan {
         }
     }
 
-    fn finish(self, frames: &Frames) -> Inventory {
+    fn finish(self, records: &RecordReader) -> Inventory {
         let mut channels: Vec<_> = self
             .channels
             .iter()
@@ -288,20 +326,22 @@ impl Scan {
         let first_log_ns = self.seen.values().map(|seen| seen.least_log_ns).min();
         let last_log_ns = self.seen.values().map(|seen| seen.greatest_log_ns).max();
         let last = last_log_ns.and_then(|last| i64::try_from(last).ok());
-        let mut warnings = summary::losses(frames, last);
+        let mut warnings = summary::losses(records, last);
         warnings.extend(self.warnings(&channels));
+        let header = self.header.map(|header| (header.profile, header.library));
+        let (profile, library) = header.unwrap_or_default();
         Inventory {
-            file: frames.name().to_owned(),
-            profile: self.header.profile,
-            library: self.header.library,
+            file: records.name().to_owned(),
+            profile,
+            library,
             messages: self.seen.values().map(|seen| seen.messages).sum(),
             first_log_ns,
             last_log_ns,
             channels,
             attachments: self.attachments,
             metadata: self.metadata,
-            chunks: frames
-                .compressions()
+            chunks: records
+                .chunk_counts()
                 .iter()
                 .map(|(compression, count)| ChunkReport {
                     compression: compression.clone(),
@@ -310,8 +350,8 @@ impl Scan {
                     unpacked_bytes: count.unpacked,
                 })
                 .collect(),
-            is_closed: frames.is_closed(),
-            is_lossy: frames.loss_count() > 0 || self.broken > 0,
+            is_closed: records.is_closed(),
+            is_lossy: records.losses().count > 0 || self.broken > 0,
             warnings,
         }
     }
@@ -342,19 +382,12 @@ impl Scan {
             let message = format!("{} message records are cut short", self.broken);
             say("mcap-skipped", message);
         }
-        if self.channels.conflicts > 0 {
-            let message = format!(
-                "{} schemas or channels are declared again with another content; the first \
-                 declaration was used",
-                self.channels.conflicts
-            );
-            say("mcap-conflict", message);
-        }
+        warnings.extend(summary::conflict(self.channels.conflicts));
         warnings
     }
 }
 
-fn report(channel: &Channel, seen: Option<&Seen>) -> ChannelReport {
+fn report(channel: &TopicChannel, seen: Option<&Seen>) -> ChannelReport {
     let record = &channel.record;
     let schema = channel.schema.as_ref();
     let first = seen.map(|seen| seen.first.as_slice());
@@ -406,7 +439,7 @@ fn leaf_report(
     metadata: &BTreeMap<String, String>,
 ) -> LeafReport {
     let parts = path::parse(&leaf.first_item()).ok();
-    let find = |parts: &Vec<Part>| Route::find(schema, parts).ok();
+    let find = |parts: &Vec<PathPart>| Route::find(schema, parts).ok();
     let route = parts.as_ref().and_then(find);
     let read = |value: Route, message: &[u8]| {
         let targets = Targets {
@@ -443,9 +476,9 @@ fn leaf_report(
 }
 
 /// A path whose first item of a list is asked for by a name.
-fn called(mut parts: Vec<Part>, name: &str) -> Option<Vec<Part>> {
-    let item = parts.iter_mut().find(|part| **part == Part::Index(0))?;
-    *item = Part::Called {
+fn called(mut parts: Vec<PathPart>, name: &str) -> Option<Vec<PathPart>> {
+    let item = parts.iter_mut().find(|part| **part == PathPart::Index(0))?;
+    *item = PathPart::Called {
         key: None,
         name: name.to_owned(),
     };

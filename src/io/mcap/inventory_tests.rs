@@ -1,6 +1,6 @@
 use mcap::Compression;
 
-use super::super::testing::{File, float64, frames, options};
+use super::super::testing::{File, float64, inventory, options};
 use super::*;
 
 fn file(compression: Option<Compression>) -> Vec<u8> {
@@ -48,7 +48,7 @@ fn file(compression: Option<Compression>) -> Vec<u8> {
 
 #[test]
 fn everything_in_a_file_is_listed() {
-    let inventory = Inventory::read(frames(&file(Some(Compression::Zstd)))).unwrap();
+    let inventory = inventory(&file(Some(Compression::Zstd)));
     assert_eq!(
         (inventory.profile.as_str(), inventory.messages),
         ("ros2", 6)
@@ -87,7 +87,7 @@ fn everything_in_a_file_is_listed() {
 #[test]
 fn a_cut_file_is_lossy_and_says_where() {
     let bytes = file(None);
-    let inventory = Inventory::read(frames(&bytes[..700])).unwrap();
+    let inventory = inventory(&bytes[..700]);
     assert!(inventory.is_lossy && !inventory.is_closed);
     let said = &inventory.warnings[0].message;
     assert!(said.contains("the file ends within a chunk"), "{said}");

@@ -2,9 +2,10 @@
 //!
 //! # Data path
 //!
-//! Bytes → [`record::frames`] (records, chunks unpacked, damage noted) → [`channels`] (what a
-//! channel's messages are made of, by [`schema`]) → [`route`] (the way to the wanted number) →
-//! [`decode`] ([`cdr`], [`protobuf`], [`json`]) → [`blocks`] and [`order`] (times) → [`Source`].
+//! Bytes → `record` (records, chunks unpacked, damage noted) → `channels` (what a channel's messages
+//! are made of, by [`schema`]) → [`route`] (the way to the wanted number) → [`decode`] ([`cdr`],
+//! `protobuf`, `json`) → `blocks` and `order` (times) → [`SignalReader`], or [`read_fields`] for several
+//! numbers in one pass.
 //!
 //! # What is believed
 //!
@@ -13,31 +14,36 @@
 //! cut off is used up to its last whole message. Memory is that of one chunk (1 GiB at most), of
 //! the samples held back to be sorted, and of the schemas.
 
-pub mod blocks;
+mod blocks;
 pub mod cdr;
-pub mod channels;
+mod channels;
 mod clock;
 pub mod decode;
+mod index;
 pub mod inventory;
-pub mod json;
-pub mod order;
+mod json;
+mod order;
 pub mod path;
-pub mod protobuf;
-pub mod record;
+mod protobuf;
+mod record;
 pub mod route;
 pub mod schema;
-pub mod selection;
-pub mod source;
-pub mod summary;
+mod selection;
+mod signal;
+mod source;
+mod summary;
 #[cfg(test)]
 pub(crate) mod testing;
 pub mod time;
-pub mod units;
+mod tree;
+mod units;
 pub mod writer;
 
+pub use index::SignalEnd;
 pub use inventory::Inventory;
-pub use selection::Selection;
-pub use source::{Options, Source};
-pub use summary::Summary;
+pub use selection::FieldChoice;
+pub use signal::{SelectedSignal, TimeOptions};
+pub use source::{SignalReader, read_fields};
+pub use summary::SignalSummary;
 pub use time::TimeChoice;
 pub use writer::Writer;

@@ -3,7 +3,7 @@
 
 /// One step into a message.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Part {
+pub enum PathPart {
     /// A field by its name.
     Name(String),
     /// An item by its place; negative ones count from the end.
@@ -23,7 +23,7 @@ pub enum Part {
 ///
 /// # Errors
 /// A sentence that says what was expected.
-pub fn parse(text: &str) -> Result<Vec<Part>, String> {
+pub fn parse(text: &str) -> Result<Vec<PathPart>, String> {
     let mut parts = Vec::new();
     let mut rest = text.trim();
     while !rest.is_empty() {
@@ -47,7 +47,7 @@ pub fn parse(text: &str) -> Result<Vec<Part>, String> {
             if end == 0 {
                 return Err(format!("\"{text}\" is no field: a name is missing in it"));
             }
-            parts.push(Part::Name(name[..end].to_owned()));
+            parts.push(PathPart::Name(name[..end].to_owned()));
             rest = &name[end..];
         }
     }
@@ -68,13 +68,13 @@ fn bracket(text: &str) -> Option<(&str, &str)> {
     None
 }
 
-fn item(word: &str, text: &str) -> Result<Part, String> {
+fn item(word: &str, text: &str) -> Result<PathPart, String> {
     let word = word.trim();
     if word == ":" {
-        return Ok(Part::All);
+        return Ok(PathPart::All);
     }
     if let Ok(index) = word.parse() {
-        return Ok(Part::Index(index));
+        return Ok(PathPart::Index(index));
     }
     let (key, name) = match word.split_once('=') {
         Some((key, name)) => (Some(key.trim().to_owned()), name.trim()),
@@ -91,20 +91,19 @@ fn item(word: &str, text: &str) -> Result<Part, String> {
         ));
     }
     let name = name.to_owned();
-    Ok(Part::Called { key, name })
+    Ok(PathPart::Called { key, name })
 }
 
 /// The text again.
-#[must_use]
-pub fn text(parts: &[Part]) -> String {
+pub fn text(parts: &[PathPart]) -> String {
     let mut text = String::new();
     for part in parts {
         match part {
-            Part::Name(name) if text.is_empty() => text.push_str(name),
-            Part::Name(name) => text.push_str(&format!(".{name}")),
-            Part::Index(index) => text.push_str(&format!("[{index}]")),
-            Part::All => text.push_str("[:]"),
-            Part::Called { key, name } => {
+            PathPart::Name(name) if text.is_empty() => text.push_str(name),
+            PathPart::Name(name) => text.push_str(&format!(".{name}")),
+            PathPart::Index(index) => text.push_str(&format!("[{index}]")),
+            PathPart::All => text.push_str("[:]"),
+            PathPart::Called { key, name } => {
                 let key = key.as_deref().unwrap_or("name");
                 text.push_str(&format!("[{key}={name}]"));
             }
@@ -119,8 +118,8 @@ mod tests {
 
     #[test]
     fn every_way_to_write_a_field() {
-        let name = |name: &str| Part::Name(name.to_owned());
-        let called = |key: Option<&str>, name: &str| Part::Called {
+        let name = |name: &str| PathPart::Name(name.to_owned());
+        let called = |key: Option<&str>, name: &str| PathPart::Called {
             key: key.map(str::to_owned),
             name: name.to_owned(),
         };
@@ -130,13 +129,13 @@ mod tests {
                 "wrench.torque.z",
                 vec![name("wrench"), name("torque"), name("z")],
             ),
-            ("effort[0]", vec![name("effort"), Part::Index(0)]),
-            ("effort[-1]", vec![name("effort"), Part::Index(-1)]),
+            ("effort[0]", vec![name("effort"), PathPart::Index(0)]),
+            ("effort[-1]", vec![name("effort"), PathPart::Index(-1)]),
             (
                 "a[1][2].b",
-                vec![name("a"), Part::Index(1), Part::Index(2), name("b")],
+                vec![name("a"), PathPart::Index(1), PathPart::Index(2), name("b")],
             ),
-            ("data[:]", vec![name("data"), Part::All]),
+            ("data[:]", vec![name("data"), PathPart::All]),
             (
                 "effort[name=m_1]",
                 vec![name("effort"), called(Some("name"), "m_1")],

@@ -1,8 +1,8 @@
 //! The way to a number in messages of one type.
 
-use super::path::{self, Part};
+use super::path::{self, PathPart};
 use super::schema::leaves::{self, Leaf};
-use super::schema::{Field, Kind, Number, Schema};
+use super::schema::{Field, FieldKind, Number, Schema};
 use crate::failure::did_you_mean;
 
 /// Leaves that an error message lists.
@@ -39,7 +39,7 @@ pub struct Route {
     pub hops: Vec<Hop>,
     /// What must be found first.
     pub lookup: Option<Lookup>,
-    /// Kind of number.
+    /// FieldKind of number.
     pub number: Number,
     /// Unit as the definition states it.
     pub unit: Option<String>,
@@ -51,7 +51,6 @@ pub struct Route {
 
 impl Route {
     /// Whether a message gives several values.
-    #[must_use]
     pub fn is_whole_list(&self) -> bool {
         self.hops.contains(&Hop::All)
     }
@@ -60,7 +59,7 @@ impl Route {
     ///
     /// # Errors
     /// A sentence that says what is there and what was probably meant.
-    pub fn find(schema: &Schema, parts: &[Part]) -> Result<Self, String> {
+    pub fn find(schema: &Schema, parts: &[PathPart]) -> Result<Self, String> {
         let only;
         let parts = if parts.is_empty() {
             only = only_leaf(schema)?;
@@ -68,7 +67,7 @@ impl Route {
         } else {
             parts
         };
-        let mut walk = Walk::new(schema, parts);
+        let mut walk = RouteWalk::new(schema, parts);
         for place in 0..parts.len() {
             walk.step(place)?;
         }
@@ -76,7 +75,7 @@ impl Route {
     }
 }
 
-fn only_leaf(schema: &Schema) -> Result<Vec<Part>, String> {
+fn only_leaf(schema: &Schema) -> Result<Vec<PathPart>, String> {
     let (found, _) = leaves::leaves(schema);
     let mut numbers = found.iter().filter(|leaf| !leaf.is_stamp);
     match (numbers.next(), numbers.next()) {
@@ -101,10 +100,10 @@ fn list(found: &[Leaf]) -> String {
     format!("there are: {}{more}", shown.join(", "))
 }
 
-struct Walk<'a> {
+struct RouteWalk<'a> {
     schema: &'a Schema,
-    parts: &'a [Part],
-    kind: Kind,
+    parts: &'a [PathPart],
+    kind: FieldKind,
     hops: Vec<Hop>,
     lookup: Option<Lookup>,
     unit: Option<String>,
@@ -116,12 +115,12 @@ struct Walk<'a> {
     owner_hops: usize,
 }
 
-impl<'a> Walk<'a> {
-    fn new(schema: &'a Schema, parts: &'a [Part]) -> Self {
+impl<'a> RouteWalk<'a> {
+    fn new(schema: &'a Schema, parts: &'a [PathPart]) -> Self {
         Self {
             schema,
             parts,
-            kind: Kind::Struct(schema.root),
+            kind: FieldKind::Struct(schema.root),
             hops: Vec::new(),
             lookup: None,
             unit: None,
@@ -135,23 +134,25 @@ impl<'a> Walk<'a> {
     fn step(&mut self, place: usize) -> Result<(), String> {
         let parts = self.parts;
         match &parts[place] {
-            Part::Name(name) => self.field(place, name),
-            Part::Index(index) => self.item(place, Hop::Item(*index)),
-            Part::All => {
+            PathPart::Name(name) => self.field(place, name),
+            PathPart::Index(index) => self.item(place, Hop::Item(*index)),
+            PathPart::All => {
                 if self.hops.contains(&Hop::All) {
                     return Err("only one [:] can be in a field".to_owned());
                 }
                 self.item(place, Hop::All)
             }
-            Part::Called { key, name } => self.called(place, key.as_deref(), name),
+            PathPart::Called { key, name } => self.called(place, key.as_deref(), name),
         }
     }
 
     fn field(&mut self, place: usize, name: &str) -> Result<(), String> {
-        let Kind::Struct(index) = self.kind else {
+        let FieldKind::Struct(index) = self.kind else {
             let before = path::text(&self.parts[..place]);
             let why = match &self.kind {
-                Kind::Many(_) => format!("\"{before}\" is a list: choose an item, as {before}[0]"),
+                FieldKind::Many(_) => {
+                    format!("\"{before}\" is a list: choose an item, as {before}[0]")
+                }
                 _ => format!("\"{before}\" has no fields"),
             };
             return Err(self.miss(&why));
@@ -168,7 +169,7 @@ impl<'a> Walk<'a> {
         self.kind = field.kind.clone();
         self.unit = field.unit.clone();
         self.fields.push(field.name.clone());
-        if let Kind::Struct(inner) = innermost(&field.kind) {
+        if let FieldKind::Struct(inner) = innermost(&field.kind) {
             self.types.push(self.schema.structs[*inner].name.clone());
         }
         Ok(())
@@ -176,7 +177,7 @@ impl<'a> Walk<'a> {
 
     fn item(&mut self, place: usize, hop: Hop) -> Result<(), String> {
         let before = path::text(&self.parts[..place]);
-        let Kind::Many(many) = &self.kind else {
+        let FieldKind::Many(many) = &self.kind else {
             return Err(self.miss(&format!("\"{before}\" is no list")));
         };
         if let (Some(count), Hop::Item(index)) = (many.count, hop) {
@@ -218,20 +219,21 @@ impl<'a> Walk<'a> {
     }
 
     fn names(&self, key: &str) -> Option<Vec<Hop>> {
-        let Kind::Many(many) = &self.kind else {
+        let FieldKind::Many(many) = &self.kind else {
             return None;
         };
-        if let Kind::Struct(inner) = many.item {
+        if let FieldKind::Struct(inner) = many.item {
             let fields = &self.schema.structs[inner].fields;
             let found = position(fields, key)?;
-            let is_text = fields[found].kind == Kind::Text;
+            let is_text = fields[found].kind == FieldKind::Text;
             let mut hops = self.hops.clone();
             hops.extend([Hop::All, Hop::Field(found)]);
             return is_text.then_some(hops);
         }
         let fields = &self.schema.structs[self.owner].fields;
         let found = position(fields, key)?;
-        let is_texts = matches!(&fields[found].kind, Kind::Many(many) if many.item == Kind::Text);
+        let is_texts =
+            matches!(&fields[found].kind, FieldKind::Many(many) if many.item == FieldKind::Text);
         let mut hops = self.hops[..self.owner_hops].to_vec();
         hops.extend([Hop::Field(found), Hop::All]);
         is_texts.then_some(hops)
@@ -240,14 +242,14 @@ impl<'a> Walk<'a> {
     fn finish(self) -> Result<Route, String> {
         let text = path::text(self.parts);
         let number = match &self.kind {
-            Kind::Number(number) => *number,
-            Kind::Many(many) if matches!(many.item, Kind::Number(_)) => {
+            FieldKind::Number(number) => *number,
+            FieldKind::Many(many) if matches!(many.item, FieldKind::Number(_)) => {
                 return Err(self.miss(&format!(
                     "\"{text}\" is a list of numbers: choose one item, as {text}[0] or \
                      {text}[-1], or all as {text}[:]"
                 )));
             }
-            Kind::Text | Kind::WideText => {
+            FieldKind::Text | FieldKind::WideText => {
                 return Err(self.miss(&format!("\"{text}\" is text")));
             }
             _ => return Err(self.miss(&format!("\"{text}\" is not one number"))),
@@ -279,8 +281,8 @@ fn position(fields: &[Field], name: &str) -> Option<usize> {
     fields.iter().position(|field| field.name == name)
 }
 
-fn innermost(mut kind: &Kind) -> &Kind {
-    while let Kind::Many(many) = kind {
+fn innermost(mut kind: &FieldKind) -> &FieldKind {
+    while let FieldKind::Many(many) = kind {
         kind = &many.item;
     }
     kind

@@ -1,12 +1,12 @@
 //! Which number of which topic.
 
-use super::channels::{Channel, Channels};
-use super::path::{self, Part};
+use super::channels::{Channels, TopicChannel};
+use super::path::{self, PathPart};
 use crate::failure::{Failure, did_you_mean};
 
 /// What the command line chooses.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Selection {
+pub struct FieldChoice {
     /// `--topic /joint_states`
     pub topic: Option<String>,
     /// `--field effort[0]`
@@ -17,21 +17,21 @@ pub struct Selection {
 
 /// The choice, as far as it can be told without the file.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Wanted {
+pub enum FieldRequest {
     /// A topic and a field, none for the only number there is.
-    Topic(String, Vec<Part>),
+    Topic(String, Vec<PathPart>),
     /// Both in one text; which part is the topic only the file can tell.
     Signal(String),
     /// The only number in the file.
     Only,
 }
 
-impl Selection {
+impl FieldChoice {
     /// Checks what does not need the file.
     ///
     /// # Errors
     /// [`Failure::Usage`] if the choice contradicts itself or is not written as one.
-    pub fn check(&self) -> Result<Wanted, Failure> {
+    pub fn check(&self) -> Result<FieldRequest, Failure> {
         let field = self.field.as_deref().unwrap_or("");
         match (&self.signal, &self.topic) {
             (Some(_), Some(_)) => Err(Failure::usage(
@@ -41,25 +41,24 @@ impl Selection {
             (Some(_), None) if self.field.is_some() => Err(Failure::usage(
                 "--signal names topic and field in one: leave --field out",
             )),
-            (Some(signal), None) => Ok(Wanted::Signal(signal.clone())),
+            (Some(signal), None) => Ok(FieldRequest::Signal(signal.clone())),
             (None, Some(topic)) => {
                 let parts = path::parse(field);
                 let parts = parts.map_err(|why| Failure::usage(format_args!("--field: {why}")))?;
-                Ok(Wanted::Topic(topic.clone(), parts))
+                Ok(FieldRequest::Topic(topic.clone(), parts))
             }
             (None, None) if self.field.is_some() => Err(Failure::usage(
                 "--field needs the topic it is in: add --topic, as --topic /joint_states",
             )),
-            (None, None) => Ok(Wanted::Only),
+            (None, None) => Ok(FieldRequest::Only),
         }
     }
 }
 
-impl Wanted {
+impl FieldRequest {
     /// The field in a channel's messages, if the channel's topic is wanted. Text that is no field
     /// is an error only there.
-    #[must_use]
-    pub fn field_in(&self, channel: &Channel, channels: &Channels) -> Option<FieldText> {
+    pub fn field_in(&self, channel: &TopicChannel, channels: &Channels) -> Option<FieldText> {
         let topic = &channel.record.topic;
         match self {
             Self::Topic(wanted, parts) => {
@@ -79,7 +78,6 @@ impl Wanted {
     }
 
     /// Says that no channel fits, and which there are.
-    #[must_use]
     pub fn miss(&self, channels: &Channels) -> String {
         let mut topics: Vec<_> = channels
             .iter()
@@ -120,7 +118,7 @@ impl Wanted {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum FieldText {
     /// Taken apart.
-    Parts(Vec<Part>),
+    Parts(Vec<PathPart>),
     /// As text.
     Text(String),
 }
@@ -130,7 +128,7 @@ impl FieldText {
     ///
     /// # Errors
     /// A sentence that says what was expected.
-    pub fn parts(self) -> Result<Vec<Part>, String> {
+    pub fn parts(self) -> Result<Vec<PathPart>, String> {
         match self {
             Self::Parts(parts) => Ok(parts),
             Self::Text(text) => path::parse(&text),
@@ -178,7 +176,7 @@ mod tests {
         channels
     }
 
-    fn found(wanted: &Wanted, channels: &Channels) -> Vec<(String, String)> {
+    fn found(wanted: &FieldRequest, channels: &Channels) -> Vec<(String, String)> {
         channels
             .iter()
             .filter_map(|channel| {
@@ -196,7 +194,7 @@ mod tests {
     #[test]
     fn topic_and_field_together_or_apart() {
         let channels = channels(&["/joint_states", "/a", "/a.b", "plain"]);
-        let signal = |text: &str| found(&Wanted::Signal(text.to_owned()), &channels);
+        let signal = |text: &str| found(&FieldRequest::Signal(text.to_owned()), &channels);
         let expected = [pair("/joint_states", "effort[0]")];
         assert_eq!(signal("/joint_states.effort[0]"), expected);
         assert_eq!(signal("joint_states.effort[0]"), expected);
@@ -204,17 +202,17 @@ mod tests {
         assert_eq!(signal("/a.c"), [pair("/a", "c")]);
         assert_eq!(signal("plain"), [pair("plain", "")]);
         assert_eq!(signal("/joint_statesx.y"), []);
-        let topic = Wanted::Topic("joint_states".to_owned(), vec![]);
+        let topic = FieldRequest::Topic("joint_states".to_owned(), vec![]);
         assert_eq!(found(&topic, &channels), [pair("/joint_states", "")]);
     }
 
     #[test]
     fn a_miss_lists_the_topics() {
         let channels = channels(&["/joint_states", "/imu"]);
-        let said = Wanted::Topic("/joint_sates".to_owned(), vec![]).miss(&channels);
+        let said = FieldRequest::Topic("/joint_sates".to_owned(), vec![]).miss(&channels);
         assert!(said.contains("(did you mean \"/joint_states\"?)"), "{said}");
         assert!(said.contains("/imu"), "{said}");
-        let said = Wanted::Signal("/imu.x".to_owned()).miss(&channels);
+        let said = FieldRequest::Signal("/imu.x".to_owned()).miss(&channels);
         assert!(said.contains("no message on the topic \"/imu\""), "{said}");
     }
 
@@ -228,7 +226,7 @@ mod tests {
             (some("/a"), some("b["), None),
         ];
         for (topic, field, signal) in wrong {
-            let selection = Selection {
+            let selection = FieldChoice {
                 topic,
                 field,
                 signal,
@@ -238,6 +236,6 @@ mod tests {
                 "{selection:?}"
             );
         }
-        assert_eq!(Selection::default().check(), Ok(Wanted::Only));
+        assert_eq!(FieldChoice::default().check(), Ok(FieldRequest::Only));
     }
 }

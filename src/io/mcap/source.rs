@@ -1,231 +1,100 @@
-//! One number of one topic as a signal, read as a stream.
+//! Numbers of an MCAP file as signals, read as a stream.
 
-use std::collections::VecDeque;
+use std::io::Read;
 
 use mcap::records::op;
 
-use super::blocks::{Blocks, Spacing};
-use super::channels::{Channel, Channels};
-use super::clock::Clock;
-use super::decode::{Damage, Decoder, Reading, Targets};
-use super::order::Sorter;
-use super::record::Message;
-use super::record::frames::Frames;
-use super::route::Route;
-use super::selection::{Selection, Wanted};
-use super::summary::{Summary, Tally};
-use super::time::{Stamp, TimeChoice, TimeUsed};
-use super::units::{self, UnitFound};
+use super::channels::Channels;
+use super::index::{self, SignalEnd};
+use super::inventory;
+use super::record::RawMessage;
+use super::record::input::CountedInput;
+use super::record::reader::RecordReader;
+use super::selection::{FieldChoice, FieldRequest};
+use super::signal::{SelectedSignal, TimeOptions, TopicSignal};
+use super::summary::SignalSummary;
 use crate::failure::Failure;
 use crate::io::Input;
 
-/// Samples given at a time.
+/// Messages read before samples are given away.
 const BATCH: usize = 1 << 13;
-/// Messages looked at before the choice of the time.
-const FIRST: usize = 16;
-
-/// What the command line says beyond the choice of a number.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Options {
-    /// The time that counts; told from the messages if not given.
-    pub time: Option<TimeChoice>,
-    /// Field that holds the spacing of samples, for messages with many of them.
-    pub spacing: Option<String>,
-}
-
-/// What was chosen, for people.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Chosen {
-    /// Topic.
-    pub topic: String,
-    /// Name of the schema.
-    pub schema: String,
-    /// Encoding of its messages.
-    pub encoding: String,
-    /// Field.
-    pub field: String,
-    /// Kind of number.
-    pub number: &'static str,
-    /// Unit, if the file tells it.
-    pub unit: Option<UnitFound>,
-    /// Which time counts, and why.
-    pub time: TimeUsed,
-    /// How samples within a message lie.
-    pub spacing: Spacing,
-}
-
-impl Chosen {
-    /// A number of a topic, before the time is chosen; `stamp` is the field of the time stamp.
-    fn of(channel: &Channel, route: &Route, stamp: Option<String>, spacing: Spacing) -> Self {
-        Self {
-            topic: channel.record.topic.clone(),
-            schema: channel.schema_name().to_owned(),
-            encoding: channel.record.message_encoding.clone(),
-            field: route.text.clone(),
-            number: route.number.name(),
-            unit: units::find(route, &channel.record.metadata),
-            time: TimeUsed {
-                choice: TimeChoice::Log,
-                field: stamp,
-                why: String::new(),
-            },
-            spacing,
-        }
-    }
-}
-
-/// The time that counts, and why: as told, or what the messages carry in a field.
-fn choice_of_time(
-    told: Option<TimeChoice>,
-    field: Option<&str>,
-    is_set: bool,
-) -> (TimeChoice, String) {
-    match (told, field) {
-        (Some(choice), _) => (choice, "as asked".to_owned()),
-        (None, Some(_)) if is_set => (
-            TimeChoice::Header,
-            "the messages carry their own time stamp".to_owned(),
-        ),
-        (None, Some(field)) => (
-            TimeChoice::Log,
-            format!("the field {field} is not set in the first messages"),
-        ),
-        (None, None) => (
-            TimeChoice::Log,
-            "the messages carry no time stamp of their own".to_owned(),
-        ),
-    }
-}
 
 /// A signal that is open for reading.
-pub struct Source {
-    frames: Frames,
-    channels: Channels,
-    /// The first channel of the topic; others must be like it.
-    channel: std::sync::Arc<Channel>,
-    /// For each channel whether it is of the topic.
-    is_ours: Vec<Option<bool>>,
-    chosen: Chosen,
-    decoder: Decoder,
-    reading: Reading,
-    /// Messages that were looked at before, with log and publish time.
-    first: VecDeque<Copied>,
-    blocks: Blocks,
-    sorter: Sorter,
-    clock: Clock,
-    tally: Tally,
-    is_at_end: bool,
-    log_offset_ns: i64,
+pub struct SignalReader {
+    pass: Pass,
+    request: FieldRequest,
+    signal: TopicSignal,
 }
 
-/// A message kept for later.
-struct Copied {
-    log_time_ns: u64,
-    publish_time_ns: u64,
-    data: Vec<u8>,
-}
-
-impl Source {
+impl SignalReader {
     /// Opens a file and finds the number in it.
     ///
     /// # Errors
     /// If the file cannot be read, or the number is not in it: then with what is there.
-    pub fn open(place: &Input, selection: &Selection, options: &Options) -> Result<Self, Failure> {
-        let wanted = match selection.check()? {
-            Wanted::Only => super::inventory::only_topic(place)?,
-            wanted => wanted,
-        };
-        Self::read(place, Frames::open(place)?, &wanted, options)
+    pub fn open(
+        input: &Input,
+        choice: &FieldChoice,
+        options: &TimeOptions,
+    ) -> Result<Self, Failure> {
+        Self::with_stream(input, input.open()?, choice, options)
     }
 
-    /// Finds a number in a place that is open.
+    /// The same of an input that is open.
     ///
     /// # Errors
-    /// If the number is not in it: then with what is there.
-    pub fn read(
-        place: &Input,
-        mut frames: Frames,
-        wanted: &Wanted,
-        options: &Options,
+    /// Those of [`Self::open`].
+    pub fn with_stream(
+        input: &Input,
+        stream: Box<dyn Read + Send>,
+        choice: &FieldChoice,
+        options: &TimeOptions,
     ) -> Result<Self, Failure> {
-        let mut channels = Channels::default();
-        if let Some(found) = first_message(&mut frames, &mut channels, wanted)? {
-            return Self::after(frames, channels, found, wanted, options);
-        }
-        // Where the chunk that declares a channel is damaged, the end of the file may declare it again.
-        if frames.loss_count() > 0 && *place != Input::Stdin {
-            let mut again = Frames::open(place)?;
-            if let Some(found) = first_message(&mut again, &mut channels, wanted)? {
-                return Self::after(again, channels, found, wanted, options);
+        let mut pass = Pass::new(input, stream)?;
+        let mut wanted = RequestedSignal::new(input, choice)?;
+        loop {
+            while !pass.is_at_end && !wanted.is_time_chosen() {
+                pass.read(1, |message, channels| {
+                    wanted.take(message, channels, options, &input.name())
+                })?;
+            }
+            if wanted.signal.is_some() || !pass.read_again()? {
+                break;
             }
         }
-        Err(missed(&frames, &channels, wanted))
-    }
-
-    /// Goes on behind the first message of the wanted topic.
-    fn after(
-        frames: Frames,
-        channels: Channels,
-        (channel, first): (std::sync::Arc<Channel>, Copied),
-        wanted: &Wanted,
-        options: &Options,
-    ) -> Result<Self, Failure> {
-        let topic = &channel.record.topic;
-        let name = frames.name().to_owned();
-        let at_topic = |why: String| Failure::failed(format_args!("{name}: topic {topic}: {why}"));
-        let (encoding, schema) = channel.layout(&first.data).map_err(at_topic)?;
-        let field = wanted.field_in(&channel, &channels);
-        let parts = field.map_or(Ok(Vec::new()), super::selection::FieldText::parts);
-        let route = parts.and_then(|parts| Route::find(&schema, &parts));
-        let route = route.map_err(at_topic)?;
-        let spacing = Spacing::find(&schema, &route, options.spacing.as_deref());
-        let spacing = spacing.map_err(at_topic)?;
-        let stamp = Stamp::find(&schema);
-        let field = stamp.as_ref().map(|stamp| stamp.text.clone());
-        let targets = Targets {
-            value: route.clone(),
-            stamp,
-            spacing: spacing.hops().cloned(),
+        let Some(mut signal) = wanted.signal else {
+            return Err(pass.missed(&wanted.request));
         };
-        let chosen = Chosen::of(&channel, &route, field, spacing.clone());
-        let mut source = Self {
-            decoder: Decoder::new(encoding, &schema, targets),
-            frames,
-            channels,
-            channel,
-            is_ours: vec![None; 1 << 16],
-            chosen,
-            reading: Reading::default(),
-            first: VecDeque::from([first]),
-            blocks: Blocks::new(spacing),
-            sorter: Sorter::default(),
-            clock: Clock::default(),
-            tally: Tally::default(),
-            is_at_end: false,
-            log_offset_ns: 0,
-        };
-        source.look_ahead()?;
-        source.choose_time(options.time)?;
-        Ok(source)
+        if pass.is_at_end {
+            signal.end()?;
+        }
+        Ok(Self {
+            pass,
+            request: wanted.request,
+            signal,
+        })
     }
 
     /// Name of the file, for people.
-    #[must_use]
     pub fn name(&self) -> &str {
-        self.frames.name()
+        self.pass.records.name()
     }
 
     /// What was chosen.
-    #[must_use]
-    pub fn chosen(&self) -> &Chosen {
-        &self.chosen
+    pub fn selected(&self) -> &SelectedSignal {
+        &self.signal.selected
     }
 
     /// The chosen time of the first message minus its log time, in ns: what a time must be
     /// lessened by to lie among the log times of the file.
-    #[must_use]
     pub fn log_offset_ns(&self) -> i64 {
-        self.log_offset_ns
+        self.signal.log_offset_ns
+    }
+
+    /// The end of the signal, if the file has a summary and can be sought.
+    pub fn end(&self) -> Option<SignalEnd> {
+        let signal = &self.signal;
+        let (selected, options) = (&signal.selected, &signal.options);
+        index::signal_end(&self.pass.input, &self.request, selected, options)
     }
 
     /// Gives the next samples in the order of their times, in ns since the clock's zero; false
@@ -238,247 +107,212 @@ impl Source {
         times_ns: &mut Vec<i64>,
         values: &mut Vec<f64>,
     ) -> Result<bool, Failure> {
-        times_ns.clear();
-        values.clear();
-        while values.len() < BATCH && !self.is_at_end {
-            for _ in 0..BATCH {
-                if !self.message()? {
-                    self.is_at_end = true;
-                    break;
-                }
+        loop {
+            let signal = &mut self.signal;
+            let take = |message: &RawMessage, channels: &Channels| signal.take(message, channels);
+            self.pass.read(BATCH, take)?;
+            let is_at_end = self.pass.is_at_end;
+            if is_at_end {
+                self.signal.end()?;
             }
-            if self.is_at_end {
-                let sorter = &mut self.sorter;
-                self.blocks.finish(|time, value| sorter.push(time, value));
+            self.signal.give(is_at_end, times_ns, values);
+            if is_at_end || !values.is_empty() {
+                return Ok(!values.is_empty());
             }
-            self.sorter.give(self.is_at_end, times_ns, values);
         }
-        self.tally.samples(times_ns);
-        Ok(!values.is_empty())
     }
 
     /// Says what was read and what was not; to be called at the end.
-    #[must_use]
-    pub fn finish(self) -> Summary {
-        self.tally.summary(
-            &self.chosen,
-            &self.frames,
-            &self.sorter,
-            &self.blocks,
-            &self.clock,
-            self.channels.conflicts,
-        )
+    pub fn finish(self) -> SignalSummary {
+        self.pass.summary(&self.signal)
     }
+}
 
-    /// Reads one message of the topic; false at the end of the file.
-    fn message(&mut self) -> Result<bool, Failure> {
-        if let Some(copied) = self.first.pop_front() {
-            self.take(copied.log_time_ns, copied.publish_time_ns, &copied.data);
-            return Ok(true);
+/// Reads several numbers of any topics in one pass and calls `each` with the place of the choice, times in
+/// ns and values. The samples of a choice are in order of time; choices take turns. One result for each
+/// choice: an error for one that is not in the file.
+///
+/// # Errors
+/// If the file cannot be read.
+pub fn read_fields(
+    input: &Input,
+    choices: &[FieldChoice],
+    options: &TimeOptions,
+    mut each: impl FnMut(usize, &[i64], &[f64]),
+) -> Result<Vec<Result<(SelectedSignal, SignalSummary), Failure>>, Failure> {
+    let wanted = choices
+        .iter()
+        .map(|choice| RequestedSignal::new(input, choice));
+    let mut wanted = wanted.collect::<Result<Vec<_>, _>>()?;
+    let mut pass = Pass::new(input, input.open()?)?;
+    let name = input.name();
+    let (mut times_ns, mut values) = (Vec::new(), Vec::new());
+    loop {
+        while !pass.is_at_end {
+            pass.read(BATCH, |message, channels| {
+                let mut is_taken = false;
+                for wanted in wanted.iter_mut().filter(|wanted| !wanted.is_done) {
+                    match wanted.take(message, channels, options, &name) {
+                        Ok(is_its) => is_taken |= is_its,
+                        Err(failure) => wanted.fail(failure),
+                    }
+                }
+                Ok(is_taken)
+            })?;
+            for (place, wanted) in wanted.iter_mut().enumerate() {
+                wanted.give(pass.is_at_end, &mut times_ns, &mut values);
+                each(place, &times_ns, &values);
+            }
         }
-        while let Some(frame) = self.frames.advance()? {
-            if frame.op != op::MESSAGE {
-                self.channels.note(frame.op, self.frames.body(&frame));
-                continue;
-            }
-            let body = self.frames.body(&frame);
-            let Some(message) = Message::read(body) else {
-                self.tally.broken += 1;
-                continue;
-            };
-            if self.is_ours[usize::from(message.channel_id)].is_none() {
-                let is_ours = is_ours(
-                    &self.channel,
-                    &self.channels,
-                    message.channel_id,
-                    self.frames.name(),
-                )?;
-                self.is_ours[usize::from(message.channel_id)] = is_ours;
-            }
-            if self.is_ours[usize::from(message.channel_id)] != Some(true) {
-                continue;
-            }
-            // Taken apart so that the message can stay where it is while the rest is filled.
-            let (log, publish) = (message.log_time_ns, message.publish_time_ns);
-            let result = self.decoder.read(message.data, &mut self.reading);
-            self.keep(log, publish, result);
-            return Ok(true);
+        if wanted.iter().all(|wanted| wanted.is_done) || !pass.read_again()? {
+            break;
         }
-        Ok(false)
+    }
+    let result = |wanted: RequestedSignal| match (wanted.failure, wanted.signal) {
+        (Some(failure), _) => Err(failure),
+        (None, Some(signal)) => {
+            let summary = pass.summary(&signal);
+            Ok((signal.selected, summary))
+        }
+        (None, None) => Err(pass.missed(&wanted.request)),
+    };
+    Ok(wanted.into_iter().map(result).collect())
+}
+
+/// A signal that is asked for.
+struct RequestedSignal {
+    request: FieldRequest,
+    /// The signal, once a message of its topic has been seen.
+    signal: Option<TopicSignal>,
+    failure: Option<Failure>,
+    /// Whether it takes no more messages.
+    is_done: bool,
+}
+
+impl RequestedSignal {
+    fn new(input: &Input, choice: &FieldChoice) -> Result<Self, Failure> {
+        Ok(Self {
+            request: match choice.check()? {
+                FieldRequest::Only => inventory::only_topic(input)?,
+                request => request,
+            },
+            signal: None,
+            failure: None,
+            is_done: false,
+        })
     }
 
-    fn take(&mut self, log_time_ns: u64, publish_time_ns: u64, data: &[u8]) {
-        let result = self.decoder.read(data, &mut self.reading);
-        self.keep(log_time_ns, publish_time_ns, result);
+    fn take(
+        &mut self,
+        message: &RawMessage,
+        channels: &Channels,
+        options: &TimeOptions,
+        name: &str,
+    ) -> Result<bool, Failure> {
+        if self.signal.is_none() {
+            let found = TopicSignal::find(&self.request, message, channels, options, name);
+            self.signal = found.transpose()?;
+        }
+        match &mut self.signal {
+            Some(signal) => signal.take(message, channels),
+            None => Ok(false),
+        }
     }
 
-    fn keep(&mut self, log_time_ns: u64, publish_time_ns: u64, result: Result<(), Damage>) {
-        self.tally.messages += 1;
-        if let Err(damage) = result {
-            self.tally.skip(damage, log_time_ns);
+    fn is_time_chosen(&self) -> bool {
+        let signal = self.signal.as_ref();
+        signal.is_some_and(|signal| signal.is_time_chosen)
+    }
+
+    fn fail(&mut self, failure: Failure) {
+        self.failure = Some(failure);
+        self.is_done = true;
+    }
+
+    /// Gives away what need not be held back, or, at the end of the file, everything.
+    fn give(&mut self, all: bool, times_ns: &mut Vec<i64>, values: &mut Vec<f64>) {
+        times_ns.clear();
+        values.clear();
+        let Some(signal) = self.signal.as_mut().filter(|_| !self.is_done) else {
             return;
+        };
+        if all && let Err(failure) = signal.end() {
+            return self.fail(failure);
         }
-        let time_ns = match self.chosen.time.choice {
-            TimeChoice::Log => i64::try_from(log_time_ns).ok(),
-            TimeChoice::Publish => i64::try_from(publish_time_ns).ok(),
-            TimeChoice::Header => {
-                let stamp_ns = self.reading.stamp_ns();
-                self.clock.note(stamp_ns, log_time_ns);
-                stamp_ns
-            }
-        };
-        let Some(time_ns) = time_ns else {
-            self.tally.without_time += 1;
-            return;
-        };
-        let sorter = &mut self.sorter;
-        let reading = &self.reading;
-        self.blocks
-            .push(time_ns, &reading.values, reading.spacing, |time, value| {
-                sorter.push(time, value);
-            });
+        signal.give(all, times_ns, values);
+        self.is_done = all;
+    }
+}
+
+/// A way through a file from front to end.
+struct Pass {
+    input: Input,
+    records: RecordReader,
+    channels: Channels,
+    /// Message records that are cut short.
+    broken: u64,
+    is_second: bool,
+    is_at_end: bool,
+}
+
+impl Pass {
+    fn new(input: &Input, stream: Box<dyn Read + Send>) -> Result<Self, Failure> {
+        Ok(Self {
+            input: input.clone(),
+            records: RecordReader::new(input.name(), CountedInput::new(stream))?,
+            channels: Channels::default(),
+            broken: 0,
+            is_second: false,
+            is_at_end: false,
+        })
     }
 
-    /// Copies the first messages, to choose the time by them.
-    fn look_ahead(&mut self) -> Result<(), Failure> {
-        while self.first.len() < FIRST {
-            let Some(frame) = self.frames.advance()? else {
+    /// Reads until so many messages have been taken, or to the end.
+    fn read(
+        &mut self,
+        messages: usize,
+        mut take: impl FnMut(&RawMessage, &Channels) -> Result<bool, Failure>,
+    ) -> Result<(), Failure> {
+        let mut taken = 0;
+        while taken < messages && !self.is_at_end {
+            let Some((op, body)) = self.records.next()? else {
+                self.is_at_end = true;
                 break;
             };
-            let body = self.frames.body(&frame);
-            if frame.op != op::MESSAGE {
-                self.channels.note(frame.op, body);
-                continue;
-            }
-            let Some(message) = Message::read(body) else {
-                self.tally.broken += 1;
-                continue;
-            };
-            let name = self.frames.name();
-            if is_ours(&self.channel, &self.channels, message.channel_id, name)? == Some(true) {
-                self.first.push_back(Copied::of(&message));
+            if op != op::MESSAGE {
+                self.channels.note(op, body);
+            } else if let Some(message) = RawMessage::read(body) {
+                taken += usize::from(take(&message, &self.channels)?);
+            } else {
+                self.broken += 1;
             }
         }
         Ok(())
     }
 
-    /// Takes the time that the user names, or the message's own stamp if it has one that counts.
-    fn choose_time(&mut self, told: Option<TimeChoice>) -> Result<(), Failure> {
-        let field = self.chosen.time.field.take();
-        let stamps: Vec<Option<i64>> = self
-            .first
-            .iter()
-            .map(|message| {
-                let read = self.decoder.read(&message.data, &mut self.reading);
-                read.ok().and_then(|()| self.reading.stamp_ns())
-            })
-            .collect();
-        if told == Some(TimeChoice::Header) && field.is_none() {
-            return Err(Failure::failed(format_args!(
-                "{}: topic {}: its messages have no time stamp (header.stamp, stamp or timestamp); \
-                 use --time log or --time publish",
-                self.frames.name(),
-                self.chosen.topic
-            )));
+    /// Goes back to the front if that may help to find a topic: where the chunk that declares a channel is
+    /// damaged, the end of the file may have declared it again.
+    fn read_again(&mut self) -> Result<bool, Failure> {
+        if self.is_second || self.records.losses().count == 0 || self.input == Input::Stdin {
+            return Ok(false);
         }
-        let is_set = stamps.iter().flatten().any(|stamp| *stamp != 0);
-        let (choice, why) = choice_of_time(told, field.as_deref(), is_set);
-        self.log_offset_ns = self.first.front().map_or(0, |message| {
-            let log_ns = i64::try_from(message.log_time_ns).ok();
-            let time_ns = match choice {
-                TimeChoice::Log => log_ns,
-                TimeChoice::Publish => i64::try_from(message.publish_time_ns).ok(),
-                TimeChoice::Header => stamps.first().copied().flatten(),
-            };
-            time_ns
-                .zip(log_ns)
-                .map_or(0, |(time, log)| time.saturating_sub(log))
-        });
-        self.chosen.time = TimeUsed {
-            choice,
-            field: field.filter(|_| choice == TimeChoice::Header),
-            why,
-        };
-        Ok(())
+        self.records = RecordReader::open(&self.input)?;
+        (self.broken, self.is_second, self.is_at_end) = (0, true, false);
+        Ok(true)
     }
-}
 
-impl Copied {
-    fn of(message: &Message) -> Self {
-        Self {
-            log_time_ns: message.log_time_ns,
-            publish_time_ns: message.publish_time_ns,
-            data: message.data.to_vec(),
+    /// The failure of a file without the wanted topic: what is there, and what was lost.
+    fn missed(&self, request: &FieldRequest) -> Failure {
+        let mut message = format!("{}: {}", self.records.name(), request.miss(&self.channels));
+        for loss in &self.records.losses().first {
+            message.push_str(&format!("; {loss}"));
         }
+        Failure::failed(message)
     }
-}
 
-/// The first message of the wanted topic; none if there is none.
-fn first_message(
-    frames: &mut Frames,
-    channels: &mut Channels,
-    wanted: &Wanted,
-) -> Result<Option<(std::sync::Arc<Channel>, Copied)>, Failure> {
-    while let Some(frame) = frames.advance()? {
-        let body = frames.body(&frame);
-        if frame.op != op::MESSAGE {
-            channels.note(frame.op, body);
-            continue;
-        }
-        let Some(message) = Message::read(body) else {
-            continue;
-        };
-        let Some(channel) = channels.get(message.channel_id) else {
-            continue;
-        };
-        if wanted.field_in(channel, channels).is_some() {
-            return Ok(Some((channel.clone(), Copied::of(&message))));
-        }
+    fn summary(&self, signal: &TopicSignal) -> SignalSummary {
+        SignalSummary::of(signal, &self.records, self.broken, self.channels.conflicts)
     }
-    Ok(None)
-}
-
-/// The failure of a file without the wanted topic: what is there, and what was lost.
-fn missed(frames: &Frames, channels: &Channels, wanted: &Wanted) -> Failure {
-    let mut said = format!("{}: {}", frames.name(), wanted.miss(channels));
-    for loss in frames.losses() {
-        said.push_str(&format!("; {loss}"));
-    }
-    Failure::failed(said)
-}
-
-/// Whether a channel is of the topic; none if it is not declared.
-fn is_ours(
-    ours: &Channel,
-    channels: &Channels,
-    id: u16,
-    name: &str,
-) -> Result<Option<bool>, Failure> {
-    let Some(channel) = channels.get(id) else {
-        return Ok(None);
-    };
-    if channel.record.topic != ours.record.topic {
-        return Ok(Some(false));
-    }
-    let what = |channel: &Channel| {
-        let schema = channel.schema.as_ref();
-        let schema = schema.map(|s| (s.name.clone(), s.encoding.clone(), s.data.clone()));
-        (channel.record.message_encoding.clone(), schema)
-    };
-    if what(channel) == what(ours) {
-        return Ok(Some(true));
-    }
-    Err(Failure::failed(format_args!(
-        "{name}: the topic {} has channels of different types: channel {} is {} in {}, channel {} \
-         is {} in {}; split the file by channel first",
-        ours.record.topic,
-        ours.record.id,
-        ours.schema_name(),
-        ours.record.message_encoding,
-        channel.record.id,
-        channel.schema_name(),
-        channel.record.message_encoding,
-    )))
 }
 
 #[cfg(test)]

@@ -1,33 +1,14 @@
-use super::super::testing::{File, float64, frames, options};
+use super::super::testing::{File, chunks, drain, float64, open, options};
+use super::super::time::TimeChoice;
 use super::*;
 use mcap::Compression;
 
 const FLOAT64: (&str, &[u8]) = ("std_msgs/msg/Float64", b"float64 data");
 
-fn wanted(topic: &str, field: &str) -> Wanted {
-    let selection = Selection {
-        topic: Some(topic.to_owned()),
-        field: Some(field.to_owned()),
-        signal: None,
-    };
-    selection.check().unwrap()
-}
-
-fn read(bytes: &[u8], topic: &str, field: &str) -> (Vec<i64>, Vec<f64>, Summary) {
-    let mut source = Source::read(
-        &Input::Stdin,
-        frames(bytes),
-        &wanted(topic, field),
-        &Options::default(),
-    )
-    .unwrap();
-    let (mut times, mut values) = (Vec::new(), Vec::new());
-    let (mut some_times, mut some_values) = (Vec::new(), Vec::new());
-    while source.next(&mut some_times, &mut some_values).unwrap() {
-        times.append(&mut some_times);
-        values.append(&mut some_values);
-    }
-    (times, values, source.finish())
+fn read(bytes: &[u8], topic: &str, field: &str) -> (Vec<i64>, Vec<f64>, SignalSummary) {
+    let mut reader = open(bytes, (topic, field), &TimeOptions::default()).unwrap();
+    let (times, values) = drain(&mut reader);
+    (times, values, reader.finish())
 }
 
 fn numbers(options: mcap::WriteOptions, count: u64) -> Vec<u8> {
@@ -56,10 +37,6 @@ fn every_compression_and_none_and_no_chunks() {
         assert!(values.iter().enumerate().all(|(i, v)| *v == i as f64 + 0.1));
         assert_eq!((summary.messages, summary.samples), (5000, 5000));
         assert!(!summary.is_lossy && summary.warnings.is_empty());
-        assert_eq!(
-            (summary.first_ns, summary.last_ns),
-            (Some(1000), Some(5999))
-        );
     }
 }
 
@@ -97,13 +74,8 @@ fn a_cut_chunk_without_compression_is_used_to_the_last_whole_message() {
 fn a_damaged_chunk_is_left_out_and_the_others_are_used() {
     for compression in [None, Some(Compression::Zstd)] {
         let mut bytes = numbers(options(compression), 1000);
-        let (mut some, mut chunks) = (frames(&bytes), Vec::new());
-        while let Some(frame) = some.advance().unwrap() {
-            if frame.is_in_chunk && chunks.last() != Some(&frame.offset) {
-                chunks.push(frame.offset);
-            }
-        }
-        bytes[chunks[2] as usize + 150] ^= 0x55;
+        let third = chunks(&bytes)[2];
+        bytes[third + 150] ^= 0x55;
         let (times, values, summary) = read(&bytes, "/x", "data");
         assert!(summary.is_lossy);
         assert_eq!(summary.warnings[0].code, "mcap-damaged-chunk");
@@ -120,31 +92,102 @@ fn a_damaged_chunk_is_left_out_and_the_others_are_used() {
 #[test]
 fn channels_of_a_damaged_first_chunk_are_known_from_the_end_of_the_file() {
     let mut bytes = numbers(options(Some(Compression::Zstd)), 1000);
-    let mut some = frames(&bytes);
-    let first = loop {
-        let frame = some.advance().unwrap().unwrap();
-        if frame.is_in_chunk {
-            break frame.offset;
-        }
-    };
-    bytes[first as usize + 150] ^= 0x55;
+    let first = chunks(&bytes)[0];
+    bytes[first + 150] ^= 0x55;
     let file = tempfile::NamedTempFile::new().unwrap();
     std::fs::write(file.path(), &bytes).unwrap();
-    let place = Input::File(file.path().to_owned());
-    let found = Source::read(
-        &place,
-        frames(&bytes),
-        &wanted("/x", "data"),
-        &Options::default(),
-    );
-    let mut source = found.unwrap();
-    let (mut times, mut values, mut count) = (Vec::new(), Vec::new(), 0);
-    while source.next(&mut times, &mut values).unwrap() {
-        count += values.len();
-    }
-    assert!(count > 500 && count < 1000, "{count}");
-    let summary = source.finish();
+    let input = Input::File(file.path().to_owned());
+    let choice = |topic: &str| FieldChoice {
+        topic: Some(topic.to_owned()),
+        ..FieldChoice::default()
+    };
+    let options = TimeOptions::default();
+    let mut reader = SignalReader::open(&input, &choice("/x"), &options).unwrap();
+    let (_, values) = drain(&mut reader);
+    assert!(values.len() > 500 && values.len() < 1000);
+    let summary = reader.finish();
     assert!(summary.is_lossy && summary.warnings[0].code == "mcap-damaged-chunk");
+    // The same in one pass with others: nothing is given twice.
+    let choices = [choice("/y"), choice("/z"), choice("/x")];
+    let mut counts = [0; 3];
+    let results = read_fields(&input, &choices, &options, |place, times, values| {
+        assert_eq!(times.len(), values.len());
+        counts[place] += values.len();
+    });
+    let results = results.unwrap();
+    assert_eq!(counts, [values.len(), 0, values.len()]);
+    let samples = |place: usize| results[place].as_ref().unwrap().1.samples;
+    assert_eq!(
+        (samples(0), samples(2)),
+        (counts[0] as u64, counts[2] as u64)
+    );
+    let said = results[1].as_ref().unwrap_err().to_string();
+    assert!(said.contains("no topic \"/z\""), "{said}");
+}
+
+#[test]
+fn several_fields_in_one_pass_are_those_read_one_by_one() {
+    let mut file = File::new(options(Some(Compression::Lz4)));
+    file.channel(1, "/x", "json+", ("", b""));
+    file.channel(2, "/y", "cdr+ros2msg", FLOAT64);
+    for place in 0..30_000_u64 {
+        let time = if place % 7 == 0 { place + 3 } else { place };
+        let text = format!("{{\"a\": [{place}, 2], \"b\": {}}}", place * 2);
+        file.message(1, time, text.as_bytes());
+        file.message(2, place, &float64(-1.0));
+    }
+    let bytes = file.finish();
+    let fields = [("/x", "b"), ("/y", "data"), ("/x", "a[0]"), ("/x", "c")];
+    let choice = |(topic, field): &(&str, &str)| FieldChoice {
+        topic: Some((*topic).to_owned()),
+        field: Some((*field).to_owned()),
+        signal: None,
+    };
+    let choices: Vec<_> = fields.iter().map(choice).collect();
+    let file = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(file.path(), &bytes).unwrap();
+    let input = Input::File(file.path().to_owned());
+    let mut together = vec![(Vec::new(), Vec::new()); fields.len()];
+    let options = TimeOptions::default();
+    let results = read_fields(&input, &choices, &options, |place, times, values| {
+        together[place].0.extend_from_slice(times);
+        together[place].1.extend_from_slice(values);
+    });
+    let results = results.unwrap();
+    for (place, (topic, field)) in fields[..3].iter().enumerate() {
+        let (times, values, mut summary) = read(&bytes, topic, field);
+        assert!((times, values) == together[place], "{topic} {field}");
+        let (selected, found) = results[place].as_ref().unwrap();
+        assert_eq!(
+            (selected.topic.as_str(), selected.field.as_str()),
+            (*topic, *field)
+        );
+        summary.warnings.clone_from(&found.warnings);
+        assert_eq!(summary, *found);
+    }
+    assert!(results[3].is_err());
+}
+
+#[test]
+fn the_end_of_a_signal_follows_from_the_summary() {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    let input = Input::File(file.path().to_owned());
+    let end = |bytes: &[u8]| {
+        std::fs::write(file.path(), bytes).unwrap();
+        let choice = FieldChoice {
+            topic: Some("/x".to_owned()),
+            ..FieldChoice::default()
+        };
+        let reader = SignalReader::open(&input, &choice, &TimeOptions::default());
+        reader.unwrap().end()
+    };
+    let (last_ns, messages) = (1999, 1000);
+    for compression in [None, Some(Compression::Zstd)] {
+        let bytes = numbers(options(compression), 1000);
+        assert_eq!(end(&bytes), Some(SignalEnd { last_ns, messages }));
+        assert_eq!(end(&bytes[..bytes.len() - 100]), None);
+    }
+    assert_eq!(end(&numbers(options(None).use_chunks(false), 1000)), None);
 }
 
 #[test]
@@ -178,12 +221,7 @@ fn channels_of_a_topic_are_one_signal_unless_they_differ() {
     file.message(1, 1, &float64(1.0));
     file.message(2, 2, b"{}");
     let bytes = file.finish();
-    let said = Source::read(
-        &Input::Stdin,
-        frames(&bytes),
-        &wanted("/x", ""),
-        &Options::default(),
-    );
+    let said = open(&bytes, ("/x", ""), &TimeOptions::default());
     let said = said.err().unwrap().to_string();
     assert!(said.contains("channels of different types"), "{said}");
 }
@@ -198,7 +236,7 @@ fn the_time_is_the_messages_own_if_it_has_one_that_is_set() {
         data.extend_from_slice(&1.5_f64.to_le_bytes());
         data
     };
-    let open = |seconds: u32, time: Option<TimeChoice>| {
+    let first = |seconds: u32, time: Option<TimeChoice>| {
         let mut file = File::new(options(None));
         file.channel(1, "/x", "cdr+ros2msg", ("p/msg/M", text));
         let mut data = stamped(seconds);
@@ -207,20 +245,17 @@ fn the_time_is_the_messages_own_if_it_has_one_that_is_set() {
         }
         file.message(1, 8_000_000_000, &data);
         let bytes = file.finish();
-        let options = Options {
+        let options = TimeOptions {
             time,
             spacing: None,
         };
-        let mut source =
-            Source::read(&Input::Stdin, frames(&bytes), &wanted("/x", ""), &options).unwrap();
-        let (mut times, mut values) = (Vec::new(), Vec::new());
-        source.next(&mut times, &mut values).unwrap();
-        (times[0], source.chosen().time.choice)
+        let mut reader = open(&bytes, ("/x", ""), &options).unwrap();
+        (drain(&mut reader).0[0], reader.selected().time.choice)
     };
-    assert_eq!(open(7, None), (7_000_000_005, TimeChoice::Header));
-    assert_eq!(open(0, None), (8_000_000_000, TimeChoice::Log));
+    assert_eq!(first(7, None), (7_000_000_005, TimeChoice::Header));
+    assert_eq!(first(0, None), (8_000_000_000, TimeChoice::Log));
     let publish = Some(TimeChoice::Publish);
-    assert_eq!(open(7, publish), (7_999_999_999, TimeChoice::Publish));
+    assert_eq!(first(7, publish), (7_999_999_999, TimeChoice::Publish));
 }
 
 #[test]
@@ -263,19 +298,11 @@ fn whole_lists_have_times_between_messages() {
 fn a_miss_says_what_is_there() {
     let bytes = numbers(options(None), 3);
     let said = |topic: &str, field: &str| {
-        let source = Source::read(
-            &Input::Stdin,
-            frames(&bytes),
-            &wanted(topic, field),
-            &Options::default(),
-        );
+        let source = open(&bytes, (topic, field), &TimeOptions::default());
         source.err().unwrap().to_string()
     };
     assert!(said("/z", "").contains("/x (std_msgs/msg/Float64), /y"));
     assert!(said("/x", "dat").contains("did you mean \"data\"?"));
-    let not = Frames::new(
-        "no.mcap".to_owned(),
-        super::super::record::input::CountedInput::new(Box::new(&b"time,v"[..])),
-    );
+    let not = open(b"time,v", ("/x", ""), &TimeOptions::default());
     assert!(not.err().unwrap().to_string().contains("not an MCAP file"));
 }

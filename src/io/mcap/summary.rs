@@ -1,16 +1,14 @@
 //! What was read of a signal, and what was not.
 
-use super::blocks::Blocks;
-use super::clock::Clock;
 use super::decode::Damage;
 use super::order::{Sorter, WINDOW};
-use super::record::frames::Frames;
-use super::source::Chosen;
+use super::record::reader::RecordReader;
+use super::signal::{SelectedSignal, TopicSignal};
 use crate::warning::Warning;
 
 /// What a signal came to.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Summary {
+pub struct SignalSummary {
     /// Messages of the topic.
     pub messages: u64,
     /// Samples that were given.
@@ -23,27 +21,20 @@ pub struct Summary {
     pub out_of_order: u64,
     /// Whether data were lost: exit code 3.
     pub is_lossy: bool,
-    /// Time of the first sample, in ns.
-    pub first_ns: Option<i64>,
-    /// Time of the last sample, in ns.
-    pub last_ns: Option<i64>,
     /// What a user should know.
     pub warnings: Vec<Warning>,
 }
 
 /// Counts while reading.
 #[derive(Debug, Default)]
-pub struct Tally {
+pub(super) struct Tally {
     /// Messages of the topic.
     pub messages: u64,
-    /// Message records that are cut short.
-    pub broken: u64,
     /// Messages without a time.
     pub without_time: u64,
     samples: u64,
     without_item: Skipped,
     unreadable: Skipped,
-    first_ns: Option<i64>,
     last_ns: Option<i64>,
 }
 
@@ -84,68 +75,27 @@ impl Tally {
     /// Counts samples that are given.
     pub fn samples(&mut self, times_ns: &[i64]) {
         self.samples += times_ns.len() as u64;
-        self.first_ns = self.first_ns.or(times_ns.first().copied());
         self.last_ns = times_ns.last().copied().or(self.last_ns);
     }
 
-    /// Puts everything together.
-    #[must_use]
-    pub fn summary(
-        self,
-        chosen: &Chosen,
-        frames: &Frames,
-        sorter: &Sorter,
-        blocks: &Blocks,
-        clock: &Clock,
-        conflicts: u64,
-    ) -> Summary {
-        let mut warnings = losses(frames, self.last_ns);
-        warnings.extend(self.left_out(chosen, blocks));
-        warnings.extend(out_of_order(&chosen.topic, sorter));
-        let mut say = |code, message: String| warnings.push(Warning::new(code, message));
-        for said in clock.warnings() {
-            say("mcap-clock", format!("{}: {said}", chosen.topic));
-        }
-        if conflicts > 0 {
-            let message = format!(
-                "{conflicts} schemas or channels are declared again with another content; the \
-                 first declaration was used"
-            );
-            say("mcap-conflict", message);
-        }
-        Summary {
-            is_lossy: frames.loss_count() > 0
-                || sorter.too_late > 0
-                || self.unreadable.count + self.without_time + self.broken > 0
-                || blocks.without_spacing > 0,
-            messages: self.messages,
-            samples: self.samples,
-            without_item: self.without_item.count,
-            unreadable: self.unreadable.count,
-            out_of_order: sorter.out_of_order,
-            first_ns: self.first_ns,
-            last_ns: self.last_ns,
-            warnings,
-        }
-    }
-
     /// What is said of messages that gave no sample.
-    fn left_out(&self, chosen: &Chosen, blocks: &Blocks) -> Vec<Warning> {
+    fn left_out(&self, signal: &TopicSignal, broken: u64) -> Vec<Warning> {
+        let SelectedSignal { topic, field, .. } = &signal.selected;
         let mut warnings = Vec::new();
         let mut say = |code, message: String| warnings.push(Warning::new(code, message));
-        let topic = &chosen.topic;
         if let Some(said) = self.unreadable.say("messages could not be read") {
             say("mcap-unreadable", format!("{topic}: {said}"));
         }
-        let what = format!("messages have no {}", chosen.field);
+        let what = format!("messages have no {field}");
         if let Some(said) = self.without_item.say(&what) {
             say("mcap-without-item", format!("{topic}: {said}"));
         }
-        if self.without_time + self.broken + blocks.without_spacing > 0 {
+        let without_spacing = signal.blocks.without_spacing;
+        if self.without_time + broken + without_spacing > 0 {
             let message = format!(
-                "{topic}: {} messages without a usable time, {} without a usable spacing of their \
-                 samples and {} cut short were left out",
-                self.without_time, blocks.without_spacing, self.broken
+                "{topic}: {} messages without a usable time, {without_spacing} without a usable spacing \
+                 of their samples and {broken} cut short were left out",
+                self.without_time
             );
             say("mcap-skipped", message);
         }
@@ -153,23 +103,64 @@ impl Tally {
     }
 }
 
+impl SignalSummary {
+    /// What a signal came to; `broken` message records of the file were cut short, `conflicts`
+    /// declarations contradicted earlier ones.
+    pub(super) fn of(
+        signal: &TopicSignal,
+        records: &RecordReader,
+        broken: u64,
+        conflicts: u64,
+    ) -> Self {
+        let (tally, sorter) = (&signal.tally, &signal.sorter);
+        let topic = &signal.selected.topic;
+        let mut warnings = losses(records, tally.last_ns);
+        warnings.extend(tally.left_out(signal, broken));
+        warnings.extend(out_of_order(topic, sorter));
+        let clock = signal.clock.warnings().into_iter();
+        warnings.extend(clock.map(|said| Warning::new("mcap-clock", format!("{topic}: {said}"))));
+        warnings.extend(conflict(conflicts));
+        let skipped = tally.unreadable.count + tally.without_time + broken;
+        Self {
+            is_lossy: records.losses().count > 0
+                || sorter.too_late > 0
+                || skipped + signal.blocks.without_spacing > 0,
+            messages: tally.messages,
+            samples: tally.samples,
+            without_item: tally.without_item.count,
+            unreadable: tally.unreadable.count,
+            out_of_order: sorter.out_of_order,
+            warnings,
+        }
+    }
+}
+
+/// What is said of declarations that contradict an earlier one.
+pub(super) fn conflict(conflicts: u64) -> Option<Warning> {
+    let message = format!(
+        "{conflicts} schemas or channels are declared again with another content; the first \
+         declaration was used"
+    );
+    (conflicts > 0).then(|| Warning::new("mcap-conflict", message))
+}
+
 /// A warning for each loss of the file.
-#[must_use]
-pub fn losses(frames: &Frames, last_ns: Option<i64>) -> Vec<Warning> {
-    let mut warnings: Vec<_> = frames
-        .losses()
+pub(super) fn losses(records: &RecordReader, last_ns: Option<i64>) -> Vec<Warning> {
+    let (name, losses) = (records.name(), records.losses());
+    let mut warnings: Vec<_> = losses
+        .first
         .iter()
         .map(|loss| {
             let last = match (loss.code(), last_ns) {
                 ("mcap-truncated", Some(last)) => format!(" (last message at {last} ns)"),
                 _ => String::new(),
             };
-            Warning::new(loss.code(), format!("{}: {loss}{last}", frames.name()))
+            Warning::new(loss.code(), format!("{name}: {loss}{last}"))
         })
         .collect();
-    let more = frames.loss_count() - frames.losses().len();
+    let more = losses.count - losses.first.len();
     if more > 0 {
-        let message = format!("{}: {more} more losses of this kind", frames.name());
+        let message = format!("{name}: {more} more losses of this kind");
         warnings.push(Warning::new("mcap-more-losses", message));
     }
     warnings

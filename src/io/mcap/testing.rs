@@ -1,18 +1,70 @@
 //! MCAP files for tests, written by the crate `mcap`.
 
 use std::collections::BTreeMap;
-use std::io::Cursor;
+use std::io::{Cursor, Read};
 
-use mcap::records::MessageHeader;
+use mcap::records::{MessageHeader, op};
 use mcap::{Compression, WriteOptions, Writer};
 
-use super::record::frames::Frames;
+use super::record::file::FileReader;
 use super::record::input::CountedInput;
+use super::record::reader::RecordReader;
+use super::{FieldChoice, Inventory, SignalReader, TimeOptions};
+use crate::failure::Failure;
+use crate::io::Input;
 
-/// Frames of bytes in memory.
-pub fn frames(bytes: &[u8]) -> Frames {
-    let input = CountedInput::new(Box::new(Cursor::new(bytes.to_vec())));
-    Frames::new("test.mcap".to_owned(), input).unwrap()
+/// Records of bytes in memory.
+pub fn reader(bytes: &[u8]) -> RecordReader {
+    let input = CountedInput::new(stream(bytes));
+    RecordReader::new("test.mcap".to_owned(), input).unwrap()
+}
+
+/// Bytes in memory as a stream.
+pub fn stream(bytes: &[u8]) -> Box<dyn Read + Send> {
+    Box::new(Cursor::new(bytes.to_vec()))
+}
+
+/// What is in bytes in memory.
+pub fn inventory(bytes: &[u8]) -> Inventory {
+    Inventory::read("test.mcap".to_owned(), stream(bytes)).unwrap()
+}
+
+/// A number of bytes in memory.
+pub fn open(
+    bytes: &[u8],
+    (topic, field): (&str, &str),
+    options: &TimeOptions,
+) -> Result<SignalReader, Failure> {
+    let choice = FieldChoice {
+        topic: Some(topic.to_owned()),
+        field: Some(field.to_owned()),
+        signal: None,
+    };
+    SignalReader::with_stream(&Input::Stdin, stream(bytes), &choice, options)
+}
+
+/// All times and values of a signal.
+pub fn drain(reader: &mut SignalReader) -> (Vec<i64>, Vec<f64>) {
+    let (mut all_times, mut all_values) = (Vec::new(), Vec::new());
+    let (mut times, mut values) = (Vec::new(), Vec::new());
+    while reader.next(&mut times, &mut values).unwrap() {
+        all_times.append(&mut times);
+        all_values.append(&mut values);
+    }
+    (all_times, all_values)
+}
+
+/// Where the chunks of a file begin.
+pub fn chunks(bytes: &[u8]) -> Vec<usize> {
+    let input = CountedInput::new(stream(bytes));
+    let mut file = FileReader::new("test.mcap".to_owned(), input).unwrap();
+    let mut chunks = Vec::new();
+    while let Some(record) = file.next().unwrap() {
+        if record.op == op::CHUNK {
+            chunks.push(record.offset as usize);
+        }
+    }
+    chunks
 }
 
 /// A file under construction.

@@ -2,7 +2,7 @@
 
 use super::route::Hop;
 use super::schema::leaves::{is_nanoseconds, is_seconds, is_stamp};
-use super::schema::{Kind, Schema};
+use super::schema::{FieldKind, Schema};
 
 /// The time that samples are placed at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,7 +17,6 @@ pub enum TimeChoice {
 
 impl TimeChoice {
     /// Reads `log`, `publish` or `header`.
-    #[must_use]
     pub fn parse(text: &str) -> Option<Self> {
         match text {
             "log" => Some(Self::Log),
@@ -28,7 +27,6 @@ impl TimeChoice {
     }
 
     /// As a user writes it.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Log => "log",
@@ -63,7 +61,6 @@ pub struct Stamp {
 impl Stamp {
     /// Finds it: `header.stamp`, then `stamp` or `timestamp` in the message itself or in its
     /// header, then the only field that is a `google.protobuf.Timestamp`.
-    #[must_use]
     pub fn find(schema: &Schema) -> Option<Self> {
         let named = [
             &["header", "stamp"][..],
@@ -75,7 +72,9 @@ impl Stamp {
         found.or_else(|| {
             let root = schema.root();
             let mut stamps = root.fields.iter().filter(|field| match field.kind {
-                Kind::Struct(inner) => schema.structs[inner].name == "google.protobuf.Timestamp",
+                FieldKind::Struct(inner) => {
+                    schema.structs[inner].name == "google.protobuf.Timestamp"
+                }
                 _ => false,
             });
             match (stamps.next(), stamps.next()) {
@@ -91,7 +90,7 @@ impl Stamp {
         for name in names {
             let fields = &schema.structs[index].fields;
             let place = fields.iter().position(|field| field.name == *name)?;
-            let Kind::Struct(inner) = fields[place].kind else {
+            let FieldKind::Struct(inner) = fields[place].kind else {
                 return None;
             };
             hops.push(Hop::Field(place));
@@ -103,7 +102,7 @@ impl Stamp {
         let (seconds, nanoseconds) = (place(is_seconds)?, place(is_nanoseconds)?);
         let is_numbers = [seconds, nanoseconds]
             .iter()
-            .all(|place| matches!(fields[*place].kind, Kind::Number(_)));
+            .all(|place| matches!(fields[*place].kind, FieldKind::Number(_)));
         let way = |place| {
             let mut way = hops.clone();
             way.push(Hop::Field(place));

@@ -51,7 +51,6 @@ const STANDARD: &[(&str, &str, &str)] = &[
 /// `units`, or `unit.FIELD` for one field), or what the standard message is defined to hold.
 /// Effort of a joint that slides would be in N; the definition cannot tell, a turning joint is
 /// taken, and it is said.
-#[must_use]
 pub fn find(route: &Route, metadata: &BTreeMap<String, String>) -> Option<UnitFound> {
     let found = |unit: &str, from: String| {
         (!unit.is_empty()).then(|| UnitFound {

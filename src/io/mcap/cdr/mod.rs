@@ -3,15 +3,15 @@
 //! CDR: CORBA 3.4, part 2, 9.3; XCDR2 and the encapsulation: DDS-XTypes 1.3, 7.4 and 7.6.3.1.2.
 
 pub mod plan;
-pub mod run;
+pub mod size;
 pub mod walk;
 
 use std::sync::Arc;
 
 use super::decode::{Damage, Names, Reading, Targets};
-use super::schema::{Kind, Schema};
-use plan::{Plan, Rules};
-use walk::Walk;
+use super::schema::{FieldKind, Schema};
+use plan::{CdrPlan, Rules};
+use walk::CdrWalk;
 
 /// Bytes of the encapsulation in front of a message.
 const ENCAPSULATION: usize = 4;
@@ -19,32 +19,31 @@ const ENCAPSULATION: usize = 4;
 const TAIL: usize = 3;
 
 /// Takes wanted numbers out of messages of one type.
-pub struct Decoder {
+pub struct CdrDecoder {
     schema: Arc<Schema>,
     targets: Targets,
     is_ros1: bool,
     has_wide_text: bool,
     /// For CDR (and ROS 1) and for XCDR2.
-    layouts: [Option<Layout>; 2],
+    layouts: [Option<CdrLayout>; 2],
 }
 
 /// Plans for the ways in which messages of an encapsulation may be laid out.
-struct Layout {
-    plans: Vec<Plan>,
+struct CdrLayout {
+    plans: Vec<CdrPlan>,
     chosen: usize,
     is_decided: bool,
 }
 
-impl Decoder {
+impl CdrDecoder {
     /// Prepares for messages of one type that does not contain itself.
-    #[must_use]
     pub fn new(schema: &Arc<Schema>, targets: Targets, is_ros1: bool) -> Self {
         let fields = schema.structs.iter().flat_map(|s| &s.fields);
         let has_wide_text = fields.map(|field| &field.kind).any(|mut kind| {
-            while let Kind::Many(many) = kind {
+            while let FieldKind::Many(many) = kind {
                 kind = &many.item;
             }
-            *kind == Kind::WideText
+            *kind == FieldKind::WideText
         });
         Self {
             schema: Arc::clone(schema),
@@ -77,7 +76,7 @@ impl Decoder {
         let plan = &layout.plans[layout.chosen];
         let name = self.targets.value.lookup.as_ref();
         let name = name.map_or(&[][..], |lookup| lookup.name.as_bytes());
-        let mut walk = Walk {
+        let mut walk = CdrWalk {
             data,
             at: 0,
             is_big,
@@ -96,7 +95,7 @@ impl Decoder {
         walk.follow(&plan.steps)
     }
 
-    fn layout(&self, is_second: bool) -> Layout {
+    fn layout(&self, is_second: bool) -> CdrLayout {
         let rules = Rules {
             largest_align: match (self.is_ros1, is_second) {
                 (true, _) => 1,
@@ -111,7 +110,7 @@ impl Decoder {
         // XCDR2 wants before lists: messages tell which.
         let wides: &[u8] = if self.has_wide_text { &[4, 2] } else { &[4] };
         let ahead: &[bool] = if is_second { &[true, false] } else { &[false] };
-        let mut plans: Vec<Plan> = Vec::new();
+        let mut plans: Vec<CdrPlan> = Vec::new();
         for &size_ahead in ahead {
             for &wide in wides {
                 let rules = Rules {
@@ -119,7 +118,7 @@ impl Decoder {
                     size_ahead,
                     ..rules
                 };
-                let plan = Plan::new(&self.schema, &self.targets, rules);
+                let plan = CdrPlan::new(&self.schema, &self.targets, rules);
                 let is_new = plans.iter().all(|other| {
                     (&other.steps, &other.whole, &other.structs)
                         != (&plan.steps, &plan.whole, &plan.structs)
@@ -130,7 +129,7 @@ impl Decoder {
                 }
             }
         }
-        Layout {
+        CdrLayout {
             is_decided: plans.len() == 1,
             plans,
             chosen: 0,
@@ -138,12 +137,12 @@ impl Decoder {
     }
 }
 
-impl Layout {
+impl CdrLayout {
     /// Chooses the plan by which the message ends where its bytes do.
     fn decide(&mut self, data: &[u8], is_big: bool, reading: &mut Reading) {
         let mut fitting = (0..self.plans.len()).filter(|place| {
             let plan = &self.plans[*place];
-            let mut walk = Walk {
+            let mut walk = CdrWalk {
                 data,
                 at: 0,
                 is_big,

@@ -1,9 +1,9 @@
 //! A message's layout turned into the fewest steps that lead to the wanted numbers.
 
-use super::run::Run;
+use super::size::PaddedSize;
 use crate::io::mcap::decode::Targets;
 use crate::io::mcap::route::Hop;
-use crate::io::mcap::schema::{Kind, Number, Schema};
+use crate::io::mcap::schema::{FieldKind, Number, Schema};
 
 /// How data are laid out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,7 +35,6 @@ impl Sinks {
     pub const NAME: Self = Self(16);
 
     /// Whether one of the others is among these.
-    #[must_use]
     pub fn has(self, other: Self) -> bool {
         self.0 & other.0 != 0
     }
@@ -45,7 +44,7 @@ impl Sinks {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Item {
     /// Of a size that follows from where it begins.
-    Fixed(Run),
+    Fixed(PaddedSize),
     /// Text.
     Text,
     /// Text of wide characters.
@@ -99,7 +98,7 @@ pub struct Pick {
 
 /// Steps to the wanted numbers.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Plan {
+pub struct CdrPlan {
     /// How data are laid out.
     pub rules: Rules,
     /// The steps.
@@ -112,9 +111,8 @@ pub struct Plan {
     pub whole: Item,
 }
 
-impl Plan {
+impl CdrPlan {
     /// Plans the way through messages of a type that does not contain itself.
-    #[must_use]
     pub fn new(schema: &Schema, targets: &Targets, rules: Rules) -> Self {
         let mut planner = Planner {
             schema,
@@ -133,13 +131,13 @@ impl Plan {
         let names = targets.value.lookup.as_ref();
         let names = names.map(|lookup| (&lookup.hops[..], Sinks::NAME));
         let names: Vec<_> = names.into_iter().collect();
-        let whole = planner.item(&Kind::Struct(schema.root));
+        let whole = planner.item(&FieldKind::Struct(schema.root));
         Self {
             rules,
-            steps: planner.steps(&Kind::Struct(schema.root), &wanted, false),
+            steps: planner.steps(&FieldKind::Struct(schema.root), &wanted, false),
             lookup: match names.is_empty() {
                 true => Vec::new(),
-                false => planner.steps(&Kind::Struct(schema.root), &names, false),
+                false => planner.steps(&FieldKind::Struct(schema.root), &names, false),
             },
             structs: planner.structs,
             whole,
@@ -147,7 +145,7 @@ impl Plan {
     }
 }
 
-type Wanted<'a> = (&'a [Hop], Sinks);
+type CdrTarget<'a> = (&'a [Hop], Sinks);
 
 struct Planner<'a> {
     schema: &'a Schema,
@@ -158,23 +156,25 @@ struct Planner<'a> {
 }
 
 impl Planner<'_> {
-    fn item(&mut self, kind: &Kind) -> Item {
+    fn item(&mut self, kind: &FieldKind) -> Item {
         let largest = self.rules.largest_align;
         let align = |size: u8| size.min(largest);
         match kind {
-            Kind::Number(number) => Item::Fixed(Run::of(number.size(), align(number.size()))),
-            Kind::Text => Item::Text,
-            Kind::WideText => Item::WideText,
-            Kind::Nothing => Item::Fixed(Run::NONE),
-            Kind::Struct(index) => self.structure(*index),
-            Kind::Many(many) => {
+            FieldKind::Number(number) => {
+                Item::Fixed(PaddedSize::of(number.size(), align(number.size())))
+            }
+            FieldKind::Text => Item::Text,
+            FieldKind::WideText => Item::WideText,
+            FieldKind::Nothing => Item::Fixed(PaddedSize::NONE),
+            FieldKind::Struct(index) => self.structure(*index),
+            FieldKind::Many(many) => {
                 let list = self.list(&many.item, many.count);
                 match (&list.item, list.count) {
                     // An array of nothing takes no bytes, whatever its items would take.
-                    (_, Some(0)) if !list.size_ahead => Item::Fixed(Run::NONE),
+                    (_, Some(0)) if !list.size_ahead => Item::Fixed(PaddedSize::NONE),
                     (Item::Fixed(run), Some(count)) => {
                         let items = run.repeat(count);
-                        let size = Run::of(4, align(4));
+                        let size = PaddedSize::of(4, align(4));
                         Item::Fixed(if list.size_ahead {
                             size.then(&items)
                         } else {
@@ -187,8 +187,8 @@ impl Planner<'_> {
         }
     }
 
-    fn list(&mut self, item: &Kind, count: Option<u32>) -> List {
-        let size_ahead = self.rules.size_ahead && !matches!(item, Kind::Number(_));
+    fn list(&mut self, item: &FieldKind, count: Option<u32>) -> List {
+        let size_ahead = self.rules.size_ahead && !matches!(item, FieldKind::Number(_));
         let item = self.item(item);
         List {
             count,
@@ -208,14 +208,14 @@ impl Planner<'_> {
         let schema = self.schema;
         let mut steps = Vec::new();
         if schema.structs[index].fields.is_empty() {
-            push_skip(&mut steps, Item::Fixed(Run::of(self.rules.empty, 1)));
+            push_skip(&mut steps, Item::Fixed(PaddedSize::of(self.rules.empty, 1)));
         }
         for field in &schema.structs[index].fields {
             let item = self.item(&field.kind);
             push_skip(&mut steps, item);
         }
         let item = match &steps[..] {
-            [] => Item::Fixed(Run::NONE),
+            [] => Item::Fixed(PaddedSize::NONE),
             [Step::Skip(Item::Fixed(run))] => Item::Fixed(*run),
             _ => {
                 self.structs[index] = steps;
@@ -227,25 +227,25 @@ impl Planner<'_> {
     }
 
     /// Steps to what is wanted in data of a kind, and to their end if something follows.
-    fn steps(&mut self, kind: &Kind, wanted: &[Wanted], to_end: bool) -> Vec<Step> {
+    fn steps(&mut self, kind: &FieldKind, wanted: &[CdrTarget], to_end: bool) -> Vec<Step> {
         match kind {
-            Kind::Struct(index) => self.fields(*index, wanted, to_end),
-            Kind::Many(many) => {
+            FieldKind::Struct(index) => self.fields(*index, wanted, to_end),
+            FieldKind::Many(many) => {
                 let list = self.list(&many.item, many.count);
                 vec![self.pick(list, &many.item, wanted, to_end)]
             }
-            Kind::Number(number) => {
+            FieldKind::Number(number) => {
                 let sinks = wanted.iter().fold(0, |bits, (_, sinks)| bits | sinks.0);
                 vec![Step::Read(*number, Sinks(sinks))]
             }
-            Kind::Text if wanted.iter().any(|(_, sinks)| sinks.has(Sinks::NAME)) => {
+            FieldKind::Text if wanted.iter().any(|(_, sinks)| sinks.has(Sinks::NAME)) => {
                 vec![Step::Name]
             }
             other => vec![Step::Skip(self.item(other))],
         }
     }
 
-    fn fields(&mut self, index: usize, wanted: &[Wanted], to_end: bool) -> Vec<Step> {
+    fn fields(&mut self, index: usize, wanted: &[CdrTarget], to_end: bool) -> Vec<Step> {
         let schema = self.schema;
         let fields = &schema.structs[index].fields;
         let place = |hops: &[Hop]| match hops.first() {
@@ -260,7 +260,7 @@ impl Planner<'_> {
         };
         let mut steps = Vec::new();
         for (at, field) in fields.iter().enumerate().take(end) {
-            let inside: Vec<Wanted> = wanted
+            let inside: Vec<CdrTarget> = wanted
                 .iter()
                 .filter(|(hops, _)| place(hops) == Some(at))
                 .map(|(hops, sinks)| (&hops[1..], *sinks))
@@ -276,14 +276,14 @@ impl Planner<'_> {
         steps
     }
 
-    fn pick(&mut self, list: List, item: &Kind, wanted: &[Wanted], resume: bool) -> Step {
+    fn pick(&mut self, list: List, item: &FieldKind, wanted: &[CdrTarget], resume: bool) -> Step {
         // Only the value or the names lie in lists, so all that is wanted takes the same hop.
         let which = wanted.first().and_then(|(hops, _)| hops.first());
         let which = which.copied().unwrap_or(Hop::All);
-        if let (Hop::All, Kind::Number(number)) = (which, item) {
+        if let (Hop::All, FieldKind::Number(number)) = (which, item) {
             return Step::Numbers(Box::new(list), *number);
         }
-        let inside: Vec<Wanted> = wanted
+        let inside: Vec<CdrTarget> = wanted
             .iter()
             .map(|(hops, sinks)| (hops.get(1..).unwrap_or(&[]), *sinks))
             .collect();
@@ -302,7 +302,7 @@ fn push_skip(steps: &mut Vec<Step>, item: Item) {
         *last = last.then(next);
         return;
     }
-    if item != Item::Fixed(Run::NONE) {
+    if item != Item::Fixed(PaddedSize::NONE) {
         steps.push(Step::Skip(item));
     }
 }

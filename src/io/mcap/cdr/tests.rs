@@ -10,13 +10,13 @@ fn schema(text: &str, generation: Generation) -> Arc<Schema> {
     Arc::new(ros2msg::read("p/msg/M", &text, generation).unwrap())
 }
 
-fn decoder(schema: &Arc<Schema>, field: &str, is_ros1: bool) -> Decoder {
+fn decoder(schema: &Arc<Schema>, field: &str, is_ros1: bool) -> CdrDecoder {
     let targets = Targets {
         value: Route::find(schema, &path::parse(field).unwrap()).unwrap(),
         stamp: Stamp::find(schema),
         spacing: None,
     };
-    Decoder::new(schema, targets, is_ros1)
+    CdrDecoder::new(schema, targets, is_ros1)
 }
 
 fn read(schema: &Arc<Schema>, field: &str, message: &[u8]) -> Result<Vec<f64>, Damage> {

@@ -1,12 +1,13 @@
 //! Following the steps of a plan through the bytes of a message.
 
-use super::plan::{Item, List, Pick, Plan, Sinks, Step};
+use super::plan::{CdrPlan, Item, List, Pick, Sinks, Step};
 use crate::io::mcap::decode::{Damage, Names, Reading};
 use crate::io::mcap::route::Hop;
 use crate::io::mcap::schema::Number;
+use crate::io::mcap::tree::item_place;
 
 /// A place in a message.
-pub struct Walk<'a> {
+pub struct CdrWalk<'a> {
     /// The message behind its encapsulation; padding counts from its start.
     pub data: &'a [u8],
     /// The place.
@@ -14,14 +15,14 @@ pub struct Walk<'a> {
     /// Whether numbers have their large end first.
     pub is_big: bool,
     /// The plan.
-    pub plan: &'a Plan,
+    pub plan: &'a CdrPlan,
     /// What is filled.
     pub reading: &'a mut Reading,
     /// The name that is looked for.
     pub names: Names<'a>,
 }
 
-impl<'a> Walk<'a> {
+impl<'a> CdrWalk<'a> {
     /// Follows steps.
     pub fn follow(&mut self, steps: &'a [Step]) -> Result<(), Damage> {
         for step in steps {
@@ -148,17 +149,7 @@ impl<'a> Walk<'a> {
             Hop::Item(index) => index,
             Hop::Field(_) => return Err(Damage::Malformed("a list has no fields".to_owned())),
         };
-        let from_front = if index < 0 {
-            index.saturating_add(count as i64)
-        } else {
-            index
-        };
-        let place = usize::try_from(from_front).ok().filter(|p| *p < count);
-        let place = place.ok_or(Damage::NoItem {
-            index,
-            count: count as u64,
-        })?;
-        self.skip_items(list, place)?;
+        self.skip_items(list, item_place(index, count)?)?;
         self.follow(&pick.inside)?;
         if pick.resume {
             self.at = start;

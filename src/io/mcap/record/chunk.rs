@@ -1,57 +1,39 @@
 //! A chunk: records put together, mostly compressed.
 //!
-//! The crate `mcap` has readers of its own. They allocate what a chunk or record claims to need,
-//! give nothing of a chunk that is cut off, and cannot go on behind a damaged one; so the bytes
-//! are unpacked here, into a buffer that grows by what really comes out.
+//! The bytes are unpacked into a buffer that grows with what really comes out.
 
 use std::fmt;
-use std::io::Read;
+use std::io::{self, Read, Write};
 
-use super::fields::Fields;
+use lz4_flex::frame::{BlockMode, BlockSize, FrameDecoder, FrameEncoder, FrameInfo};
+use mcap::records::ChunkHeader;
+
+use super::fields::RecordFields;
 
 /// Most bytes a chunk may unpack to.
-pub const LARGEST: u64 = 1 << 30;
+pub(crate) const LARGEST: u64 = 1 << 30;
 
 /// Bytes that the buffer grows by while unpacking.
 const STEP: usize = 1 << 18;
 
-/// The front of a chunk.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ChunkHead {
-    /// Earliest log time in it, in ns.
-    pub start_ns: u64,
-    /// Latest log time in it, in ns.
-    pub end_ns: u64,
-    /// Bytes of its records, unpacked.
-    pub size: u64,
-    /// CRC-32 of its records, unpacked; 0 if the writer left it out.
-    pub crc: u32,
-    /// Name of the compression, empty for none.
-    pub compression: String,
-    /// Bytes of its records as they are in the file.
-    pub packed_size: u64,
-}
-
-impl ChunkHead {
-    /// Reads the front of a chunk record; what follows are the records.
-    #[must_use]
-    pub fn read(body: &[u8]) -> Option<(Self, &[u8])> {
-        let mut fields = Fields::new(body);
-        let head = Self {
-            start_ns: fields.u64()?,
-            end_ns: fields.u64()?,
-            size: fields.u64()?,
-            crc: fields.u32()?,
-            compression: fields.text()?,
-            packed_size: fields.u64()?,
-        };
-        Some((head, fields.rest()))
-    }
+/// Reads the front of a chunk record; what follows are its records as they are in the file.
+/// `mcap::parse_record` refuses a chunk that is cut off, front and all.
+pub(crate) fn chunk_front(body: &[u8]) -> Option<(ChunkHeader, &[u8])> {
+    let mut fields = RecordFields { rest: body };
+    let header = ChunkHeader {
+        message_start_time: fields.u64()?,
+        message_end_time: fields.u64()?,
+        uncompressed_size: fields.u64()?,
+        uncompressed_crc: fields.u32()?,
+        compression: fields.text()?,
+        compressed_size: fields.u64()?,
+    };
+    Some((header, fields.rest))
 }
 
 /// What is wrong with a chunk.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum ChunkError {
+pub(crate) enum ChunkError {
     /// The front cannot be read.
     Head,
     /// A compression that is not known.
@@ -99,45 +81,78 @@ impl fmt::Display for ChunkError {
     }
 }
 
-/// Unpacks a whole chunk into `records` and checks its length and its CRC.
-///
-/// # Errors
-/// [`ChunkError`] if any of them is wrong; `records` then holds what came out until there.
-pub fn unpack(head: &ChunkHead, packed: &[u8], records: &mut Vec<u8>) -> Result<(), ChunkError> {
-    if head.size > LARGEST {
-        return Err(ChunkError::TooLarge(head.size));
-    }
-    unpack_bytes(head, packed, records)?;
-    check(head, records)
+/// Where the records of a chunk are after unpacking.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Unpacked {
+    /// In the buffer.
+    Buffer,
+    /// In the file as they are: that many bytes after the front.
+    InPlace(usize),
 }
 
-/// Checks length and CRC of the records of a chunk.
+impl Unpacked {
+    /// The records, out of what follows the front or the buffer.
+    pub fn records<'a>(self, rest: &'a [u8], buffer: &'a [u8]) -> &'a [u8] {
+        match self {
+            Self::Buffer => buffer,
+            Self::InPlace(length) => &rest[..length],
+        }
+    }
+}
+
+/// Unpacks a whole chunk after its front was read, into `records` if it is compressed, and checks its
+/// length and its CRC.
 ///
 /// # Errors
-/// [`ChunkError`] if one of them is wrong.
-pub fn check(head: &ChunkHead, records: &[u8]) -> Result<(), ChunkError> {
-    let found = records.len() as u64;
-    if found != head.size {
-        let told = head.size;
+/// [`ChunkError`] if any of them is wrong; `records` is then to be ignored.
+pub(crate) fn unpack(
+    front: Option<&(ChunkHeader, &[u8])>,
+    records: &mut Vec<u8>,
+) -> Result<Unpacked, ChunkError> {
+    let (header, rest) = front.ok_or(ChunkError::Head)?;
+    let packed = usize::try_from(header.compressed_size)
+        .ok()
+        .and_then(|size| rest.get(..size))
+        .ok_or(ChunkError::Length {
+            told: header.compressed_size,
+            found: rest.len() as u64,
+        })?;
+    if header.compression.is_empty() {
+        check(header, packed)?;
+        return Ok(Unpacked::InPlace(packed.len()));
+    }
+    if header.uncompressed_size > LARGEST {
+        return Err(ChunkError::TooLarge(header.uncompressed_size));
+    }
+    unpack_part(header, packed, records)?;
+    check(header, records)?;
+    Ok(Unpacked::Buffer)
+}
+
+fn check(header: &ChunkHeader, records: &[u8]) -> Result<(), ChunkError> {
+    let (told, found) = (header.uncompressed_size, records.len() as u64);
+    if found != told {
         return Err(ChunkError::Length { told, found });
     }
-    let found = crc32fast::hash(records);
-    if head.crc != 0 && head.crc != found {
-        let told = head.crc;
+    let (told, found) = (header.uncompressed_crc, crc32fast::hash(records));
+    if told != 0 && told != found {
         return Err(ChunkError::Crc { told, found });
     }
     Ok(())
 }
 
-/// Unpacks as much as there is of a chunk that is cut off: the records that came out whole.
-pub fn unpack_part(head: &ChunkHead, packed: &[u8], records: &mut Vec<u8>) -> Option<ChunkError> {
-    unpack_bytes(head, packed, records).err()
-}
-
-fn unpack_bytes(head: &ChunkHead, packed: &[u8], records: &mut Vec<u8>) -> Result<(), ChunkError> {
+/// Unpacks as much as there is, also of a chunk that is cut off.
+///
+/// # Errors
+/// [`ChunkError`] if the rest cannot be unpacked; `records` holds what came before.
+pub(crate) fn unpack_part(
+    head: &ChunkHeader,
+    packed: &[u8],
+    records: &mut Vec<u8>,
+) -> Result<(), ChunkError> {
     records.clear();
-    let limit = head.size.min(LARGEST);
-    let damaged = |error: std::io::Error| ChunkError::Damaged(error.to_string());
+    let limit = head.uncompressed_size.min(LARGEST);
+    let damaged = |error: io::Error| ChunkError::Damaged(error.to_string());
     match head.compression.as_str() {
         "" => {
             records.extend_from_slice(packed);
@@ -147,7 +162,7 @@ fn unpack_bytes(head: &ChunkHead, packed: &[u8], records: &mut Vec<u8>) -> Resul
             let input = zstd::stream::read::Decoder::with_buffer(packed).map_err(damaged)?;
             drain(input, limit, records)
         }
-        "lz4" => drain(lz4::Decoder::new(packed).map_err(damaged)?, limit, records),
+        "lz4" => drain(FrameDecoder::new(packed), limit, records),
         name => Err(ChunkError::Compression(name.to_owned())),
     }
 }
@@ -178,19 +193,46 @@ fn drain(mut input: impl Read, limit: u64, records: &mut Vec<u8>) -> Result<(), 
     Ok(())
 }
 
+/// Compresses records: as `zstd`, `lz4` or not at all.
+pub(crate) fn pack(compression: &str, records: &[u8]) -> io::Result<Vec<u8>> {
+    match compression {
+        "zstd" => zstd::bulk::compress(records, zstd::DEFAULT_COMPRESSION_LEVEL),
+        "lz4" => {
+            // Of a chunk that is cut off, whole blocks can be unpacked: they are small.
+            let frame = FrameInfo::new()
+                .block_size(BlockSize::Max64KB)
+                .block_mode(BlockMode::Linked)
+                .content_checksum(true);
+            let mut encoder = FrameEncoder::with_frame_info(frame, Vec::new());
+            encoder.write_all(records)?;
+            encoder.finish().map_err(io::Error::other)
+        }
+        _ => Ok(records.to_vec()),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn head(compression: &str, size: u64, crc: u32) -> ChunkHead {
-        ChunkHead {
-            start_ns: 0,
-            end_ns: 0,
-            size,
-            crc,
+    fn head(compression: &str, size: u64, crc: u32) -> ChunkHeader {
+        ChunkHeader {
+            message_start_time: 0,
+            message_end_time: 0,
+            uncompressed_size: size,
+            uncompressed_crc: crc,
             compression: compression.to_owned(),
-            packed_size: 0,
+            compressed_size: 0,
         }
+    }
+
+    fn unpack(
+        mut header: ChunkHeader,
+        packed: &[u8],
+        records: &mut Vec<u8>,
+    ) -> Result<Unpacked, ChunkError> {
+        header.compressed_size = packed.len() as u64;
+        super::unpack(Some(&(header, packed)), records)
     }
 
     fn text() -> Vec<u8> {
@@ -199,31 +241,20 @@ mod tests {
             .collect()
     }
 
-    fn packed(compression: &str, plain: &[u8]) -> Vec<u8> {
-        match compression {
-            "zstd" => zstd::stream::encode_all(plain, 3).unwrap(),
-            "lz4" => {
-                let mut encoder = lz4::EncoderBuilder::new().build(Vec::new()).unwrap();
-                std::io::Write::write_all(&mut encoder, plain).unwrap();
-                encoder.finish().0
-            }
-            _ => plain.to_vec(),
-        }
-    }
-
     #[test]
     fn every_compression_gives_the_bytes_back() {
         let plain = text();
         let crc = crc32fast::hash(&plain);
         for compression in ["", "zstd", "lz4"] {
             let mut records = vec![1, 2, 3];
-            let bytes = packed(compression, &plain);
-            unpack(
-                &head(compression, plain.len() as u64, crc),
+            let bytes = pack(compression, &plain).unwrap();
+            let unpacked = unpack(
+                head(compression, plain.len() as u64, crc),
                 &bytes,
                 &mut records,
             )
             .unwrap();
+            let records = unpacked.records(&bytes, &records);
             assert!(records == plain, "{compression}");
         }
     }
@@ -233,13 +264,13 @@ mod tests {
         let plain = text();
         let size = plain.len() as u64;
         let mut records = Vec::new();
-        let wrong = unpack(&head("", size, 1), &plain, &mut records);
+        let wrong = unpack(head("", size, 1), &plain, &mut records);
         assert!(matches!(wrong, Err(ChunkError::Crc { told: 1, .. })));
         for compression in ["zstd", "lz4"] {
-            let bytes = packed(compression, &plain);
-            let short = unpack(&head(compression, size + 1, 0), &bytes, &mut records);
+            let bytes = pack(compression, &plain).unwrap();
+            let short = unpack(head(compression, size + 1, 0), &bytes, &mut records);
             assert!(matches!(short, Err(ChunkError::Length { .. })), "{short:?}");
-            let long = unpack(&head(compression, 1000, 0), &bytes, &mut records);
+            let long = unpack(head(compression, 1000, 0), &bytes, &mut records);
             assert!(matches!(long, Err(ChunkError::Length { told: 1000, .. })));
             assert!(records.len() <= 1001, "no more is unpacked than was said");
         }
@@ -248,11 +279,11 @@ mod tests {
     #[test]
     fn a_huge_claim_allocates_nothing() {
         let mut records = Vec::new();
-        let bytes = packed("zstd", b"few bytes");
-        let said = unpack(&head("zstd", LARGEST, 0), &bytes, &mut records);
+        let bytes = pack("zstd", b"few bytes").unwrap();
+        let said = unpack(head("zstd", LARGEST, 0), &bytes, &mut records);
         assert!(matches!(said, Err(ChunkError::Length { found: 9, .. })));
         assert!(records.capacity() <= 2 * STEP);
-        let said = unpack(&head("zstd", u64::MAX, 0), &bytes, &mut records);
+        let said = unpack(head("zstd", u64::MAX, 0), &bytes, &mut records);
         assert_eq!(said, Err(ChunkError::TooLarge(u64::MAX)));
     }
 
@@ -260,11 +291,11 @@ mod tests {
     fn a_cut_chunk_gives_what_is_whole() {
         let plain = text();
         for compression in ["zstd", "lz4"] {
-            let bytes = packed(compression, &plain);
+            let bytes = pack(compression, &plain).unwrap();
             let mut records = Vec::new();
             let cut = &bytes[..bytes.len() / 2];
             let error = unpack_part(&head(compression, plain.len() as u64, 0), cut, &mut records);
-            assert!(error.is_some() || records.len() < plain.len());
+            assert!(error.is_err() || records.len() < plain.len());
             assert!(records.len() > 200_000, "{compression}: {}", records.len());
             assert!(records == plain[..records.len()], "{compression}");
         }

@@ -7,7 +7,7 @@ use std::io::{self, Read};
 const PIECE: usize = 1 << 18;
 
 /// A stream with a window of bytes that have been read and not yet used.
-pub struct CountedInput {
+pub(crate) struct CountedInput {
     stream: Box<dyn Read + Send>,
     buffer: Vec<u8>,
     start: usize,
@@ -18,7 +18,6 @@ pub struct CountedInput {
 
 impl CountedInput {
     /// Begins at the front of a stream.
-    #[must_use]
     pub fn new(stream: Box<dyn Read + Send>) -> Self {
         Self {
             stream,
@@ -30,7 +29,6 @@ impl CountedInput {
     }
 
     /// Place in the file of the next byte.
-    #[must_use]
     pub fn offset(&self) -> u64 {
         self.offset
     }
@@ -65,22 +63,8 @@ impl CountedInput {
     }
 
     /// The bytes in the window.
-    #[must_use]
     pub fn window(&self) -> &[u8] {
         &self.buffer[self.start..self.end]
-    }
-
-    /// Where in the buffer a part of the window lies, for [`Self::at`].
-    #[must_use]
-    pub fn place(&self, from: usize, length: usize) -> std::ops::Range<usize> {
-        let start = self.start + from;
-        start..start + length
-    }
-
-    /// Bytes at a place, valid until the next call of [`Self::want`] or [`Self::skip`].
-    #[must_use]
-    pub fn at(&self, place: std::ops::Range<usize>) -> &[u8] {
-        &self.buffer[place]
     }
 
     /// Goes on behind that many bytes of the window.
@@ -88,24 +72,6 @@ impl CountedInput {
         let count = count.min(self.end - self.start);
         self.start += count;
         self.offset += count as u64;
-    }
-
-    /// Goes on behind that many bytes without keeping them; gives how many there were.
-    ///
-    /// # Errors
-    /// If the stream cannot be read.
-    pub fn skip(&mut self, count: u64) -> io::Result<u64> {
-        let mut left = count;
-        while left > 0 {
-            let step = usize::try_from(left.min(PIECE as u64)).unwrap_or(PIECE);
-            let there = self.want(step)?;
-            self.used(there);
-            left -= there as u64;
-            if there < step {
-                break;
-            }
-        }
-        Ok(count - left)
     }
 }
 
@@ -125,8 +91,6 @@ mod tests {
             at += step;
             assert_eq!(input.offset(), at as u64);
         }
-        assert_eq!(input.skip(1_000_000).unwrap(), 1_000_000);
-        at += 1_000_000;
         assert_eq!(input.want(usize::MAX).unwrap(), bytes.len() - at);
         assert!(*input.window() == bytes[at..]);
     }

@@ -1,98 +1,88 @@
 //! The records of an MCAP file, <https://mcap.dev/spec>.
 
 pub mod chunk;
-pub mod fields;
-pub mod frames;
+mod fields;
+pub mod file;
 pub mod input;
+pub mod reader;
 
 use std::collections::BTreeMap;
 
-use fields::Fields;
+use mcap::records::{AttachmentHeader, Record, op};
 
-/// What a channel's messages are made of.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct SchemaRecord {
-    /// Number within the file, from 1.
-    pub id: u16,
-    /// Name of the type, as `sensor_msgs/msg/JointState`.
-    pub name: String,
-    /// Language of the definition, as `ros2msg`.
-    pub encoding: String,
-    /// The definition.
-    pub data: Vec<u8>,
-}
+use fields::RecordFields;
 
-impl SchemaRecord {
-    /// Reads the body of a schema record.
-    #[must_use]
-    pub fn read(body: &[u8]) -> Option<Self> {
-        let mut fields = Fields::new(body);
-        Some(Self {
-            id: fields.u16()?,
-            name: fields.text()?,
-            encoding: fields.text()?,
-            data: fields.bytes()?.to_vec(),
-        })
+/// Reads a header, schema, channel or metadata record. Where a text in it is not UTF-8, it is read with
+/// replacement characters; of pairs with the same key, the last one counts. `mcap` refuses both.
+pub(crate) fn parse(op: u8, body: &[u8]) -> Option<Record<'static>> {
+    if let Ok(record) = mcap::parse_record(op, body) {
+        return Some(record.into_owned());
     }
+    let mended = mended(op, body)?;
+    mcap::parse_record(op, &mended).ok().map(Record::into_owned)
 }
 
-/// A stream of messages of one type on one topic.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ChannelRecord {
-    /// Number within the file.
-    pub id: u16,
-    /// Number of its schema, 0 for none.
-    pub schema_id: u16,
-    /// Topic.
-    pub topic: String,
-    /// Encoding of the messages, as `cdr`.
-    pub message_encoding: String,
-    /// Anything else that the recorder noted.
-    pub metadata: BTreeMap<String, String>,
-}
-
-impl ChannelRecord {
-    /// Reads the body of a channel record.
-    #[must_use]
-    pub fn read(body: &[u8]) -> Option<Self> {
-        let mut fields = Fields::new(body);
-        Some(Self {
-            id: fields.u16()?,
-            schema_id: fields.u16()?,
-            topic: fields.text()?,
-            message_encoding: fields.text()?,
-            metadata: fields.map()?,
-        })
+/// The same record in UTF-8 and without repeated keys.
+fn mended(op: u8, body: &[u8]) -> Option<Vec<u8>> {
+    let (front, texts, has_pairs) = match op {
+        op::HEADER => (0, 2, false),
+        op::SCHEMA => (2, 2, false),
+        op::CHANNEL => (4, 2, true),
+        op::METADATA => (0, 1, true),
+        _ => return None,
+    };
+    let mut fields = RecordFields { rest: body };
+    let mut mended = fields.take(front)?.to_vec();
+    for _ in 0..texts {
+        push(&mut mended, fields.text()?.as_bytes());
     }
+    if has_pairs {
+        let mut rest = RecordFields {
+            rest: fields.bytes()?,
+        };
+        let mut pairs = BTreeMap::new();
+        while !rest.rest.is_empty() {
+            pairs.insert(rest.text()?, rest.text()?);
+        }
+        let mut bytes = Vec::new();
+        for text in pairs.iter().flat_map(|(key, value)| [key, value]) {
+            push(&mut bytes, text.as_bytes());
+        }
+        push(&mut mended, &bytes);
+    }
+    mended.extend_from_slice(fields.rest);
+    Some(mended)
+}
+
+fn push(record: &mut Vec<u8>, bytes: &[u8]) {
+    // What was longer than a record can be has been refused before.
+    let length = u32::try_from(bytes.len()).unwrap_or(u32::MAX);
+    record.extend_from_slice(&length.to_le_bytes());
+    record.extend_from_slice(bytes);
 }
 
 /// Bytes in front of a message's own content.
 const MESSAGE_HEAD: usize = 2 + 4 + 8 + 8;
 
-/// One message.
+/// One message. `mcap::parse_record` reads its head field by field through a cursor; this is what every
+/// message of a file goes through.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Message<'a> {
-    /// Number of its channel.
+pub(crate) struct RawMessage<'a> {
     pub channel_id: u16,
-    /// Sequence number given by the publisher.
-    pub sequence: u32,
     /// Time at which it was recorded, in ns.
     pub log_time_ns: u64,
     /// Time at which it was published, in ns.
     pub publish_time_ns: u64,
-    /// Its content.
     pub data: &'a [u8],
 }
 
-impl<'a> Message<'a> {
-    /// Reads the body of a message record.
-    #[must_use]
+impl<'a> RawMessage<'a> {
     pub fn read(body: &'a [u8]) -> Option<Self> {
-        let (head, data) = body.split_at_checked(MESSAGE_HEAD)?;
-        let mut fields = Fields::new(head);
+        let (head, data) = body.split_first_chunk::<MESSAGE_HEAD>()?;
+        let mut fields = RecordFields { rest: head };
+        let (channel_id, _sequence) = (fields.u16()?, fields.u32()?);
         Some(Self {
-            channel_id: fields.u16()?,
-            sequence: fields.u32()?,
+            channel_id,
             log_time_ns: fields.u64()?,
             publish_time_ns: fields.u64()?,
             data,
@@ -100,77 +90,41 @@ impl<'a> Message<'a> {
     }
 }
 
-/// A file within the file, without its bytes.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct AttachmentHead {
-    /// Time at which it was recorded, in ns.
-    pub log_time_ns: u64,
-    /// Time at which it was made, in ns; 0 if unknown.
-    pub create_time_ns: u64,
-    /// Name.
-    pub name: String,
-    /// Media type, as `text/plain`.
-    pub media_type: String,
-    /// Length of its content in bytes.
-    pub size: u64,
+/// Reads the front of an attachment record: its header and the length of its content.
+pub(crate) fn attachment_front(body: &[u8]) -> Option<(AttachmentHeader, u64)> {
+    let mut fields = RecordFields { rest: body };
+    let header = AttachmentHeader {
+        log_time: fields.u64()?,
+        create_time: fields.u64()?,
+        name: fields.text()?,
+        media_type: fields.text()?,
+    };
+    Some((header, fields.u64()?))
 }
 
-impl AttachmentHead {
-    /// Reads the front of an attachment record, and where its content begins.
-    #[must_use]
-    pub fn read(body: &[u8]) -> Option<(Self, usize)> {
-        let mut fields = Fields::new(body);
-        let head = Self {
-            log_time_ns: fields.u64()?,
-            create_time_ns: fields.u64()?,
-            name: fields.text()?,
-            media_type: fields.text()?,
-            size: fields.u64()?,
-        };
-        Some((head, body.len() - fields.rest().len()))
+/// Calls `each` with opcode and body of every whole record.
+pub(crate) fn each_record(records: &[u8], mut each: impl FnMut(u8, &[u8])) {
+    let mut rest = records;
+    while let Some((op, body)) = split_record(rest) {
+        each(op, body);
+        rest = &rest[RECORD_HEAD + body.len()..];
     }
 }
 
-/// Named pairs of texts.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct MetadataRecord {
-    /// Name.
-    pub name: String,
-    /// Keys and values.
-    pub pairs: BTreeMap<String, String>,
+/// Bytes of a record's opcode and length.
+const RECORD_HEAD: usize = 9;
+
+/// Opcode and body of the record at the front, if it is whole.
+fn split_record(records: &[u8]) -> Option<(u8, &[u8])> {
+    let (op, length) = record_head(records)?;
+    let body = records[RECORD_HEAD..].get(..usize::try_from(length).ok()?)?;
+    Some((op, body))
 }
 
-impl MetadataRecord {
-    /// Reads the body of a metadata record.
-    #[must_use]
-    pub fn read(body: &[u8]) -> Option<Self> {
-        let mut fields = Fields::new(body);
-        Some(Self {
-            name: fields.text()?,
-            pairs: fields.map()?,
-        })
-    }
-}
-
-/// The first record: who wrote the file, and by which rules.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct HeaderRecord {
-    /// Profile, as `ros2`.
-    pub profile: String,
-    /// Library that wrote the file.
-    pub library: String,
-}
-
-impl HeaderRecord {
-    /// Reads the body of a header record.
-    #[must_use]
-    pub fn read(body: &[u8]) -> Option<Self> {
-        let mut fields = Fields::new(body);
-        Some(Self {
-            profile: fields.text()?,
-            library: fields.text()?,
-        })
-    }
+/// Opcode and claimed length of the body.
+fn record_head(bytes: &[u8]) -> Option<(u8, u64)> {
+    let ([op, length @ ..], _) = bytes.split_first_chunk::<RECORD_HEAD>()?;
+    Some((*op, u64::from_le_bytes(*length)))
 }
 
 #[cfg(test)]
@@ -182,11 +136,42 @@ mod tests {
         let mut body = vec![7, 0, 9, 0, 0, 0];
         body.extend_from_slice(&5_u64.to_le_bytes());
         body.extend_from_slice(&6_u64.to_le_bytes());
-        assert!(Message::read(&body[..21]).is_none());
+        assert!(RawMessage::read(&body[..21]).is_none());
         body.extend_from_slice(b"xyz");
-        let message = Message::read(&body).unwrap();
-        assert_eq!((message.channel_id, message.sequence), (7, 9));
+        let message = RawMessage::read(&body).unwrap();
+        assert_eq!(message.channel_id, 7);
         assert_eq!((message.log_time_ns, message.publish_time_ns), (5, 6));
         assert_eq!(message.data, b"xyz");
+    }
+
+    #[test]
+    fn texts_that_are_not_utf8_and_repeated_keys_are_read() {
+        let mut body = vec![3, 0, 0, 0];
+        push(&mut body, b"/t\xe4");
+        push(&mut body, b"json");
+        let pairs: Vec<u8> = [&b"k"[..], b"1", b"k", b"\xff"]
+            .iter()
+            .flat_map(|text| {
+                let mut bytes = Vec::new();
+                push(&mut bytes, text);
+                bytes
+            })
+            .collect();
+        push(&mut body, &pairs);
+        assert!(mcap::parse_record(op::CHANNEL, &body).is_err());
+        let Some(Record::Channel(channel)) = parse(op::CHANNEL, &body) else {
+            panic!("no channel");
+        };
+        assert_eq!((channel.id, channel.topic.as_str()), (3, "/t\u{fffd}"));
+        assert_eq!(channel.metadata["k"], "\u{fffd}");
+    }
+
+    #[test]
+    fn a_text_that_claims_to_be_huge_is_refused() {
+        let mut body = vec![3, 0, 0, 0];
+        body.extend_from_slice(&u32::MAX.to_le_bytes());
+        body.extend_from_slice(b"/topic");
+        assert!(parse(op::CHANNEL, &body).is_none());
+        assert!(parse(op::METADATA, b"\x01\0\0\0n\x09\0\0\0\x01\0\0\0k").is_none());
     }
 }

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::{DEEPEST, Field, Kind, Number, Schema, SchemaError, Struct};
+use super::{DEEPEST, Field, FieldKind, Number, Schema, SchemaError, Struct};
 
 /// Tells the fields of messages from one of them. Numbers count as `float64`.
 ///
@@ -12,9 +12,10 @@ pub fn read(message: &Value) -> Result<Schema, SchemaError> {
     let mut schema = Schema {
         structs: Vec::new(),
         root: 0,
+        descriptor: None,
     };
     match kind(&mut schema, message, "message", 0) {
-        Kind::Struct(root) => {
+        FieldKind::Struct(root) => {
             schema.root = root;
             Ok(schema)
         }
@@ -22,20 +23,18 @@ pub fn read(message: &Value) -> Result<Schema, SchemaError> {
     }
 }
 
-fn kind(schema: &mut Schema, value: &Value, name: &str, level: usize) -> Kind {
+fn kind(schema: &mut Schema, value: &Value, name: &str, level: usize) -> FieldKind {
     if level >= DEEPEST {
-        return Kind::Nothing;
+        return FieldKind::Nothing;
     }
     match value {
-        Value::Null => Kind::Nothing,
-        Value::Bool(_) => Kind::Number(Number::Bool),
-        Value::Number(_) => Kind::Number(Number::F64),
-        Value::String(_) => Kind::Text,
-        Value::Array(items) => Kind::list(
-            items
-                .first()
-                .map_or(Kind::Nothing, |first| kind(schema, first, name, level + 1)),
-        ),
+        Value::Null => FieldKind::Nothing,
+        Value::Bool(_) => FieldKind::Number(Number::Bool),
+        Value::Number(_) => FieldKind::Number(Number::F64),
+        Value::String(_) => FieldKind::Text,
+        Value::Array(items) => FieldKind::list(items.first().map_or(FieldKind::Nothing, |first| {
+            kind(schema, first, name, level + 1)
+        })),
         Value::Object(pairs) => {
             let fields = pairs
                 .iter()
@@ -45,7 +44,7 @@ fn kind(schema: &mut Schema, value: &Value, name: &str, level: usize) -> Kind {
                 name: name.to_owned(),
                 fields,
             });
-            Kind::Struct(schema.structs.len() - 1)
+            FieldKind::Struct(schema.structs.len() - 1)
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The numbers in a message: what a user can choose from.
 
-use super::{DEEPEST, Field, Kind, Number, Schema};
+use super::{DEEPEST, Field, FieldKind, Number, Schema};
 
 /// Most leaves that are listed.
 pub const MOST: usize = 1000;
@@ -10,7 +10,7 @@ pub const MOST: usize = 1000;
 pub struct Leaf {
     /// Path as a user writes it, lists with `[]`, arrays with `[3]`.
     pub path: String,
-    /// Kind of number.
+    /// FieldKind of number.
     pub number: Number,
     /// Unit as the definition states it.
     pub unit: Option<String>,
@@ -22,13 +22,11 @@ pub struct Leaf {
 
 impl Leaf {
     /// The path to its first item.
-    #[must_use]
     pub fn first_item(&self) -> String {
         self.with_items("[0]")
     }
 
     /// The path with a choice of items in place of each list's length.
-    #[must_use]
     pub fn with_items(&self, item: &str) -> String {
         let mut pieces = self.path.split('[');
         let mut path = pieces.next().unwrap_or("").to_owned();
@@ -42,9 +40,8 @@ impl Leaf {
 }
 
 /// The numbers in a message, in order, and whether there are more than [`MOST`].
-#[must_use]
 pub fn leaves(schema: &Schema) -> (Vec<Leaf>, bool) {
-    let mut walk = Walk {
+    let mut walk = LeafWalk {
         schema,
         above: Vec::new(),
         found: Vec::new(),
@@ -55,7 +52,6 @@ pub fn leaves(schema: &Schema) -> (Vec<Leaf>, bool) {
 }
 
 /// Whether a type is a time stamp: two whole numbers, of seconds and of nanoseconds.
-#[must_use]
 pub fn is_stamp(schema: &Schema, index: usize) -> bool {
     let fields = &schema.structs[index].fields;
     let [seconds, nanoseconds] = &fields[..] else {
@@ -65,29 +61,27 @@ pub fn is_stamp(schema: &Schema, index: usize) -> bool {
         && is_nanoseconds(&nanoseconds.name)
         && [seconds, nanoseconds]
             .iter()
-            .all(|field| matches!(field.kind, Kind::Number(_)))
+            .all(|field| matches!(field.kind, FieldKind::Number(_)))
 }
 
 /// Names of a stamp's seconds.
-#[must_use]
 pub fn is_seconds(name: &str) -> bool {
     ["sec", "secs", "seconds"].contains(&name)
 }
 
 /// Names of a stamp's nanoseconds.
-#[must_use]
 pub fn is_nanoseconds(name: &str) -> bool {
     ["nanosec", "nsec", "nsecs", "nanos", "nanoseconds"].contains(&name)
 }
 
-struct Walk<'a> {
+struct LeafWalk<'a> {
     schema: &'a Schema,
     above: Vec<usize>,
     found: Vec<Leaf>,
     visits: usize,
 }
 
-impl Walk<'_> {
+impl LeafWalk<'_> {
     /// False if there were too many.
     fn types(&mut self, index: usize, prefix: &str) -> bool {
         // A type of protobuf may contain itself: its inside is listed once.
@@ -112,7 +106,7 @@ impl Walk<'_> {
 
     fn field(&mut self, field: &Field, mut path: String, is_stamp: bool) -> bool {
         let mut kind = &field.kind;
-        while let Kind::Many(many) = kind {
+        while let FieldKind::Many(many) = kind {
             match many.count {
                 Some(count) => path.push_str(&format!("[{count}]")),
                 None => path.push_str("[]"),
@@ -120,15 +114,15 @@ impl Walk<'_> {
             kind = &many.item;
         }
         match kind {
-            Kind::Number(_) if self.found.len() >= MOST => return false,
-            Kind::Number(number) => self.found.push(Leaf {
+            FieldKind::Number(_) if self.found.len() >= MOST => return false,
+            FieldKind::Number(number) => self.found.push(Leaf {
                 is_many: path.contains('['),
                 path,
                 number: *number,
                 unit: field.unit.clone(),
                 is_stamp,
             }),
-            Kind::Struct(inner) => return self.types(*inner, &(path + ".")),
+            FieldKind::Struct(inner) => return self.types(*inner, &(path + ".")),
             _ => {}
         }
         true

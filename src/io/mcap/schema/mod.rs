@@ -33,7 +33,6 @@ pub enum Number {
 
 impl Number {
     /// Bytes it takes in CDR and ROS 1.
-    #[must_use]
     pub fn size(self) -> u8 {
         match self {
             Self::Bool | Self::I8 | Self::U8 => 1,
@@ -44,7 +43,6 @@ impl Number {
     }
 
     /// Name as ROS writes it.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Bool => "bool",
@@ -64,7 +62,7 @@ impl Number {
 
 /// The type of a field.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Kind {
+pub enum FieldKind {
     /// A number.
     Number(Number),
     /// Text of bytes, or bytes in protobuf.
@@ -83,37 +81,22 @@ pub enum Kind {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Many {
     /// Type of each.
-    pub item: Kind,
+    pub item: FieldKind,
     /// Their number if it is fixed.
     pub count: Option<u32>,
 }
 
-impl Kind {
+impl FieldKind {
     /// A list of any length.
-    #[must_use]
     pub fn list(item: Self) -> Self {
         Self::Many(Box::new(Many { item, count: None }))
     }
 
     /// A list of that many.
-    #[must_use]
     pub fn array(item: Self, count: u32) -> Self {
         let count = Some(count);
         Self::Many(Box::new(Many { item, count }))
     }
-}
-
-/// How protobuf writes a field.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Wire {
-    /// Field number.
-    pub number: u32,
-    /// Whether whole numbers are written zigzag.
-    pub zigzag: bool,
-    /// Whether whole numbers are written with a fixed width.
-    pub fixed: bool,
-    /// What a field that is not there means; none if its absence says that there is no value.
-    pub absent: Option<f64>,
 }
 
 /// A field of a type.
@@ -122,22 +105,18 @@ pub struct Field {
     /// Name.
     pub name: String,
     /// Type.
-    pub kind: Kind,
+    pub kind: FieldKind,
     /// Unit, where the definition states one.
     pub unit: Option<String>,
-    /// For protobuf.
-    pub wire: Option<Wire>,
 }
 
 impl Field {
     /// A field without a unit.
-    #[must_use]
-    pub fn new(name: impl Into<String>, kind: Kind) -> Self {
+    pub fn new(name: impl Into<String>, kind: FieldKind) -> Self {
         Self {
             name: name.into(),
             kind,
             unit: None,
-            wire: None,
         }
     }
 }
@@ -158,6 +137,8 @@ pub struct Schema {
     pub structs: Vec<Struct>,
     /// The type of the messages.
     pub root: usize,
+    /// For protobuf, the same type.
+    pub(crate) descriptor: Option<prost_reflect::MessageDescriptor>,
 }
 
 /// Why a definition cannot be used.
@@ -198,7 +179,6 @@ impl fmt::Display for SchemaError {
 
 impl Schema {
     /// The type of the messages.
-    #[must_use]
     pub fn root(&self) -> &Struct {
         &self.structs[self.root]
     }
@@ -231,10 +211,10 @@ impl Schema {
         let mut deepest = 0;
         for field in &self.structs[index].fields {
             let mut kind = &field.kind;
-            while let Kind::Many(many) = kind {
+            while let FieldKind::Many(many) = kind {
                 kind = &many.item;
             }
-            if let Kind::Struct(inner) = kind {
+            if let FieldKind::Struct(inner) = kind {
                 deepest = deepest.max(self.depth(*inner, depths, above + 1)?);
             }
         }

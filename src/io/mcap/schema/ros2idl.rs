@@ -6,7 +6,7 @@
 use std::collections::HashMap;
 
 use super::token::{Token, tokens};
-use super::{Field, Kind, MOST_STRUCTS, Number, Schema, SchemaError, Struct};
+use super::{Field, FieldKind, MOST_STRUCTS, Number, Schema, SchemaError, Struct};
 
 /// Most dimensions or levels of a list.
 const DEEPEST_LIST: usize = 16;
@@ -31,7 +31,7 @@ pub fn read(name: &str, text: &str) -> Result<Schema, SchemaError> {
 /// A type as written.
 #[derive(Debug, Clone)]
 enum Written {
-    Kind(Kind),
+    FieldKind(FieldKind),
     /// A name and the scope it is used in.
     Named(String, Vec<String>, usize),
     Many(Box<Written>, Option<u32>),
@@ -183,7 +183,7 @@ impl<'a> Parser<'a, '_> {
         }
         self.skip(";");
         let full = self.full(&name);
-        let kind = Written::Kind(Kind::Number(Number::U32));
+        let kind = Written::FieldKind(FieldKind::Number(Number::U32));
         self.declared.aliases.insert(full, kind);
         Ok(())
     }
@@ -208,15 +208,15 @@ impl<'a> Parser<'a, '_> {
                     self.next()?;
                     self.expect(">")?;
                 }
-                let text = [Kind::Text, Kind::WideText];
-                let [narrow, wide] = text.map(Written::Kind);
+                let text = [FieldKind::Text, FieldKind::WideText];
+                let [narrow, wide] = text.map(Written::FieldKind);
                 Ok(if first == "string" { narrow } else { wide })
             }
             "wchar" | "map" | "any" | "fixed" | "union" => {
                 Err(self.error(format_args!("\"{first}\" is not supported")))
             }
             name => match self.number(name)? {
-                Some(number) => Ok(Written::Kind(Kind::Number(number))),
+                Some(number) => Ok(Written::FieldKind(FieldKind::Number(number))),
                 None => {
                     let line = self.line();
                     Ok(Written::Named(name.to_owned(), self.scope.clone(), line))
@@ -376,7 +376,11 @@ fn resolve(declared: &Declared, root: &str) -> Result<Schema, SchemaError> {
             fields: fields?,
         });
     }
-    let schema = Schema { structs, root };
+    let schema = Schema {
+        structs,
+        root,
+        descriptor: None,
+    };
     schema.check_nesting()?;
     Ok(schema)
 }
@@ -388,14 +392,14 @@ fn field(declared: &Declared, member: &Member) -> Result<Field, SchemaError> {
     })
 }
 
-fn kind(declared: &Declared, written: &Written, level: usize) -> Result<Kind, SchemaError> {
+fn kind(declared: &Declared, written: &Written, level: usize) -> Result<FieldKind, SchemaError> {
     match written {
-        Written::Kind(kind) => Ok(kind.clone()),
+        Written::FieldKind(kind) => Ok(kind.clone()),
         Written::Many(item, count) => {
             let item = kind(declared, item, level + 1)?;
             Ok(count.map_or_else(
-                || Kind::list(item.clone()),
-                |n| Kind::array(item.clone(), n),
+                || FieldKind::list(item.clone()),
+                |n| FieldKind::array(item.clone(), n),
             ))
         }
         Written::Named(name, scope, line) => {
@@ -409,7 +413,7 @@ fn kind(declared: &Declared, written: &Written, level: usize) -> Result<Kind, Sc
                 return kind(declared, alias, level + 1);
             }
             lookup(name, scope, |full| declared.by_name.get(full))
-                .map(|place| Kind::Struct(*place))
+                .map(|place| FieldKind::Struct(*place))
                 .or_else(|| by_last_name(declared, name))
                 .ok_or_else(|| {
                     SchemaError::at(*line, format_args!("the type \"{name}\" is not defined"))
@@ -419,7 +423,7 @@ fn kind(declared: &Declared, written: &Written, level: usize) -> Result<Kind, Sc
 }
 
 /// A type given by its last name alone, if there is only one.
-fn by_last_name(declared: &Declared, name: &str) -> Option<Kind> {
+fn by_last_name(declared: &Declared, name: &str) -> Option<FieldKind> {
     let wanted = name.rsplit("::").next()?;
     let mut found = declared
         .structs
@@ -427,11 +431,11 @@ fn by_last_name(declared: &Declared, name: &str) -> Option<Kind> {
         .enumerate()
         .filter(|(_, (full, _))| full.rsplit("::").next() == Some(wanted));
     match (found.next(), found.next()) {
-        (Some((place, _)), None) => Some(Kind::Struct(place)),
+        (Some((place, _)), None) => Some(FieldKind::Struct(place)),
         _ => None,
     }
 }
 
 #[cfg(test)]
-#[path = "ros2idl_tests.rs"]
+#[path = "tests/ros2idl.rs"]
 mod tests;

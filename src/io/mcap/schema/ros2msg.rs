@@ -5,7 +5,7 @@
 
 use std::collections::HashMap;
 
-use super::{Field, Kind, MOST_STRUCTS, Number, Schema, SchemaError, Struct};
+use super::{Field, FieldKind, MOST_STRUCTS, Number, Schema, SchemaError, Struct};
 
 /// Which generation of ROS wrote the definition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,19 +44,20 @@ pub fn read(name: &str, text: &str, generation: Generation) -> Result<Schema, Sc
     let schema = Schema {
         structs: reader.structs,
         root: 0,
+        descriptor: None,
     };
     schema.check_nesting()?;
     Ok(schema)
 }
 
 /// One definition: the name without `msg`, and its lines.
-struct Section<'a> {
+struct MessageSection<'a> {
     name: String,
     lines: Vec<(usize, &'a str)>,
 }
 
-fn sections<'a>(name: &str, text: &'a str) -> Result<Vec<Section<'a>>, SchemaError> {
-    let mut sections = vec![Section {
+fn sections<'a>(name: &str, text: &'a str) -> Result<Vec<MessageSection<'a>>, SchemaError> {
+    let mut sections = vec![MessageSection {
         name: short(name),
         lines: Vec::new(),
     }];
@@ -72,7 +73,7 @@ fn sections<'a>(name: &str, text: &'a str) -> Result<Vec<Section<'a>>, SchemaErr
                     "expected \"MSG: package/Name\" behind the \"=\" line",
                 )
             })?;
-            sections.push(Section {
+            sections.push(MessageSection {
                 name: short(named.trim()),
                 lines: Vec::new(),
             });
@@ -113,7 +114,7 @@ struct Reader {
 }
 
 impl Reader {
-    fn fields(&mut self, section: &Section) -> Result<Vec<Field>, SchemaError> {
+    fn fields(&mut self, section: &MessageSection) -> Result<Vec<Field>, SchemaError> {
         let package = section.name.split_once('/').map_or("", |(first, _)| first);
         let mut fields = Vec::new();
         for (line, text) in &section.lines {
@@ -132,7 +133,7 @@ impl Reader {
         Ok(fields)
     }
 
-    fn kind(&mut self, text: &str, package: &str) -> Result<Kind, String> {
+    fn kind(&mut self, text: &str, package: &str) -> Result<FieldKind, String> {
         let Some((base, array)) = text.split_once('[') else {
             return self.base(text, package);
         };
@@ -141,25 +142,25 @@ impl Reader {
             .strip_suffix(']')
             .ok_or_else(|| format!("\"{text}\" has no closing bracket"))?;
         if bound.is_empty() || bound.starts_with("<=") {
-            return Ok(Kind::list(item));
+            return Ok(FieldKind::list(item));
         }
         let count = bound
             .parse()
             .map_err(|_| format!("\"{bound}\" is no length of an array"))?;
-        Ok(Kind::array(item, count))
+        Ok(FieldKind::array(item, count))
     }
 
-    fn base(&mut self, text: &str, package: &str) -> Result<Kind, String> {
+    fn base(&mut self, text: &str, package: &str) -> Result<FieldKind, String> {
         let name = text.split_once("<=").map_or(text, |(name, _)| name);
         let ros1 = self.generation == Generation::Ros1;
         Ok(match name {
-            "string" => Kind::Text,
-            "wstring" => Kind::WideText,
-            "byte" if ros1 => Kind::Number(Number::I8),
-            "time" | "duration" if ros1 => Kind::Struct(self.builtin(name)),
+            "string" => FieldKind::Text,
+            "wstring" => FieldKind::WideText,
+            "byte" if ros1 => FieldKind::Number(Number::I8),
+            "time" | "duration" if ros1 => FieldKind::Struct(self.builtin(name)),
             _ => match number(name) {
-                Some(number) => Kind::Number(number),
-                None => Kind::Struct(self.named(name, package)?),
+                Some(number) => FieldKind::Number(number),
+                None => FieldKind::Struct(self.named(name, package)?),
             },
         })
     }
@@ -197,8 +198,8 @@ impl Reader {
         self.structs.push(Struct {
             name: name.to_owned(),
             fields: vec![
-                Field::new(sec, Kind::Number(whole)),
-                Field::new(nanosec, Kind::Number(part)),
+                Field::new(sec, FieldKind::Number(whole)),
+                Field::new(nanosec, FieldKind::Number(part)),
             ],
         });
         self.known.insert(name.to_owned(), self.structs.len() - 1);
@@ -253,5 +254,5 @@ fn number(name: &str) -> Option<Number> {
 }
 
 #[cfg(test)]
-#[path = "ros2msg_tests.rs"]
+#[path = "tests/ros2msg.rs"]
 mod tests;

@@ -2,87 +2,82 @@
 
 use std::io::Write;
 
-use mcap::MAGIC;
-use mcap::records::op;
+use mcap::records::{AttachmentIndex, MetadataIndex, Record, op};
 
-use super::chunks::Chunk;
-use super::index::{ChunkEntry, Entry, Index};
-use super::sink::{Body, Sink};
+use super::chunks::{ChunkBuilder, chunk_index};
+use super::index::FileIndex;
+use super::sink::RecordSink;
 use crate::failure::Failure;
 use crate::io::Input;
-use crate::io::mcap::record::chunk::{self, ChunkError, ChunkHead};
-use crate::io::mcap::record::fields::Fields;
-use crate::io::mcap::record::frames::{Loss, not_mcap};
-use crate::io::mcap::record::input::CountedInput;
-use crate::io::mcap::record::{
-    AttachmentHead, ChannelRecord, Message, MetadataRecord, SchemaRecord,
-};
-
-/// Bytes of a record's opcode and length.
-const RECORD_HEAD: usize = 9;
-/// Bytes of an attachment that its names are read from.
-const ATTACHMENT_FRONT: u64 = 1 << 16;
-/// Bytes copied at a time.
-const PIECE: usize = 1 << 18;
+use crate::io::mcap::record::chunk::{chunk_front, unpack, unpack_part};
+use crate::io::mcap::record::file::{FileReader, FileRecord, IN_ATTACHMENT, Loss};
+use crate::io::mcap::record::{RawMessage, attachment_front, each_record, parse};
 
 /// What was copied.
-pub struct Copied {
-    /// What is in it.
-    pub index: Index,
+pub(super) struct CopiedFile {
+    pub index: FileIndex,
     /// Compression of most of its chunks, by their number; none if it has messages, but no chunks.
     pub compression: Option<&'static str>,
-    /// What could not be copied.
-    pub losses: Vec<Loss>,
 }
 
 /// Copies everything up to the end of the data.
 ///
 /// # Errors
 /// If the input cannot be read or is not MCAP, or the output cannot be written.
-pub fn copy<W: Write>(
-    place: &Input,
-    sink: &mut Sink<W>,
+pub(super) fn copy<W: Write>(
+    input: &Input,
+    sink: &mut RecordSink<W>,
     output_name: &str,
-) -> Result<Copied, Failure> {
+) -> Result<CopiedFile, Failure> {
     let mut copier = Copier {
-        input: CountedInput::new(place.open()?),
-        input_name: place.name(),
+        file: FileReader::open(input)?,
         sink,
         output_name,
-        index: Index::default(),
-        losses: Vec::new(),
+        index: FileIndex::default(),
         records: Vec::new(),
         is_chunk_copied: false,
     };
-    copier.start()?;
-    while copier.record()? {}
-    Ok(Copied {
+    // The magic bytes.
+    copier.pass()?;
+    while let Some(record) = copier.file.next()? {
+        if record.op == op::DATA_END {
+            break;
+        }
+        copier.record(record)?;
+    }
+    // It may be too long to be held, so that it ends too early is found only in copying it.
+    for loss in &copier.file.losses.first {
+        if let Loss::Truncated { at, what } = loss
+            && *what == IN_ATTACHMENT
+        {
+            return Err(Failure::failed(format_args!(
+                "{}: the file ends within the attachment at byte {at}; such a file cannot be \
+                 copied. Make it whole first with \"mcap recover\"",
+                input.name()
+            )));
+        }
+    }
+    Ok(CopiedFile {
         compression: usual_compression(&copier.index),
         index: copier.index,
-        losses: copier.losses,
     })
 }
 
-fn usual_compression(index: &Index) -> Option<&'static str> {
-    if index.chunks.is_empty() && !index.messages.is_empty() {
+fn usual_compression(index: &FileIndex) -> Option<&'static str> {
+    if index.chunks.is_empty() && index.statistics.message_count > 0 {
         return None;
     }
     ["zstd", "lz4", ""].into_iter().rev().max_by_key(|name| {
-        let same = index
-            .chunks
-            .iter()
-            .filter(|chunk| chunk.compression == *name);
-        same.count()
+        let compressions = index.chunks.iter().map(|chunk| &chunk.compression);
+        compressions.filter(|other| other == name).count()
     })
 }
 
 struct Copier<'a, W: Write> {
-    input: CountedInput,
-    input_name: String,
-    sink: &'a mut Sink<W>,
+    file: FileReader,
+    sink: &'a mut RecordSink<W>,
     output_name: &'a str,
-    index: Index,
-    losses: Vec<Loss>,
+    index: FileIndex,
     /// Unpacked records of a chunk.
     records: Vec<u8>,
     /// Whether the indexes that follow belong to a chunk that was copied.
@@ -90,135 +85,77 @@ struct Copier<'a, W: Write> {
 }
 
 impl<W: Write> Copier<'_, W> {
-    fn start(&mut self) -> Result<(), Failure> {
-        let there = self.want(MAGIC.len())?;
-        if self.input.window()[..there] != *MAGIC {
-            return Err(not_mcap(&self.input_name));
-        }
-        self.pass(MAGIC.len() as u64).map(drop)
-    }
-
-    /// Copies one record; false at the end of the data.
-    fn record(&mut self) -> Result<bool, Failure> {
-        let at = self.input.offset();
-        let there = self.want(RECORD_HEAD)?;
-        let Some(length) = self.input.window().get(1..RECORD_HEAD) else {
-            let what = if there == 0 {
-                "after a whole record"
-            } else {
-                "within a record"
-            };
-            return Ok(self.truncated(at, what));
-        };
-        let op = self.input.window()[0];
-        let length = length.try_into().map_or(0, u64::from_le_bytes);
-        match op {
-            op::DATA_END | op::FOOTER => Ok(false),
-            op::ATTACHMENT => self.attachment(at, length),
-            _ if length > chunk::LARGEST && op != op::CHUNK => {
-                self.losses.push(Loss::TooLong { at, op, length });
-                Ok(false)
-            }
-            _ => self.whole(at, op, length),
-        }
-    }
-
-    fn whole(&mut self, at: u64, op: u8, length: u64) -> Result<bool, Failure> {
-        let whole = RECORD_HEAD + length.min(chunk::LARGEST) as usize;
-        let there = self.want(whole)?;
-        if op == op::CHUNK {
-            // A recorder that was stopped leaves its last chunk without a length.
-            let is_whole = there == whole && length <= chunk::LARGEST;
-            return self.chunk(at, there, is_whole);
-        }
-        if there < whole {
-            return Ok(self.truncated(at, "within a record"));
-        }
+    /// Copies one record, or leaves it out.
+    fn record(&mut self, record: FileRecord) -> Result<(), Failure> {
         let offset = self.sink.offset();
-        let body = &self.input.window()[RECORD_HEAD..whole];
-        match op {
-            op::MESSAGE_INDEX if !self.is_chunk_copied => {
-                self.input.used(whole);
-                return Ok(true);
-            }
+        let body = self.file.body();
+        match record.op {
+            op::CHUNK => return self.chunk(record),
+            op::MESSAGE_INDEX if !self.is_chunk_copied => return Ok(()),
             op::MESSAGE_INDEX => {
-                let channel = Fields::new(body).u16();
-                if let (Some(entry), Some(channel)) = (self.index.chunks.last_mut(), channel) {
-                    entry.index_offsets.insert(channel, offset);
-                    entry.index_length += whole as u64;
+                if let (Some(chunk), Some(Record::MessageIndex(list))) = (
+                    self.index.chunks.last_mut(),
+                    mcap::parse_record(record.op, body).ok(),
+                ) {
+                    chunk.message_index_offsets.insert(list.channel_id, offset);
+                    chunk.message_index_length += self.file.bytes().len() as u64;
                 }
             }
+            op::ATTACHMENT => return self.attachment(offset),
             op::METADATA => {
-                let name = MetadataRecord::read(body).map(|record| record.name);
-                let name = name.unwrap_or_default();
-                let entry = Entry::metadata(offset, whole as u64, &name);
-                self.index.metadata.push(entry);
+                if let Some(Record::Metadata(metadata)) = parse(record.op, body) {
+                    self.index.metadata.push(MetadataIndex {
+                        offset,
+                        length: self.file.bytes().len() as u64,
+                        name: metadata.name,
+                    });
+                }
             }
-            _ => note(&mut self.index, op, body),
+            op => note(&mut self.index, op, body),
         }
-        self.pass(whole as u64).map(|_| true)
+        self.pass().map(drop)
     }
 
-    fn chunk(&mut self, at: u64, there: usize, is_whole: bool) -> Result<bool, Failure> {
-        let body = &self.input.window()[RECORD_HEAD.min(there)..there];
-        let Some((head, packed)) = ChunkHead::read(body) else {
-            if !is_whole {
-                return Ok(self.truncated(at, "within a chunk"));
+    fn chunk(&mut self, record: FileRecord) -> Result<(), Failure> {
+        let front = chunk_front(self.file.body());
+        self.records.clear();
+        if !record.is_whole {
+            let Some((header, packed)) = front else {
+                return Ok(());
+            };
+            // What is whole of it is used; that the rest is missing is among the losses.
+            let _ = unpack_part(&header, packed, &mut self.records);
+            return self.salvage(&header.compression);
+        }
+        let unpacked = unpack(front.as_ref(), &mut self.records);
+        self.is_chunk_copied = unpacked.is_ok();
+        let at = record.offset;
+        let span_ns = front
+            .as_ref()
+            .map(|(header, _)| (header.message_start_time, header.message_end_time));
+        match (unpacked, front) {
+            (Err(why), _) => self.file.losses.add(Loss::Chunk { at, why, span_ns }),
+            (Ok(unpacked), Some((header, rest))) => {
+                let index = &mut self.index;
+                let records = unpacked.records(rest, &self.records);
+                each_record(records, |op, body| note(index, op, body));
+                let mut entry = chunk_index(header, self.sink.offset());
+                entry.chunk_length = self.file.bytes().len() as u64;
+                index.chunks.push(entry);
+                self.pass()?;
             }
-            return Ok(self.leave_out(at, there, ChunkError::Head, None));
-        };
-        let span_ns = Some((head.start_ns, head.end_ns));
-        if !is_whole {
-            let _ = chunk::unpack_part(&head, packed, &mut self.records);
-            self.salvage(&head.compression)?;
-            return Ok(self.truncated(at, "within a chunk"));
+            (Ok(_), None) => {}
         }
-        let size = usize::try_from(head.packed_size).unwrap_or(usize::MAX);
-        let unpacked = match packed.get(..size) {
-            Some(packed) => chunk::unpack(&head, packed, &mut self.records),
-            None => Err(ChunkError::Length {
-                told: head.packed_size,
-                found: packed.len() as u64,
-            }),
-        };
-        if let Err(why) = unpacked {
-            return Ok(self.leave_out(at, there, why, span_ns));
-        }
-        self.is_chunk_copied = true;
-        let index = &mut self.index;
-        each(&self.records, |op, body| note(index, op, body));
-        self.index.chunks.push(ChunkEntry {
-            span_ns: (head.start_ns, head.end_ns),
-            offset: self.sink.offset(),
-            length: there as u64,
-            compression: head.compression,
-            packed: head.packed_size,
-            unpacked: head.size,
-            ..ChunkEntry::default()
-        });
-        self.pass(there as u64).map(|_| true)
-    }
-
-    fn leave_out(
-        &mut self,
-        at: u64,
-        whole: usize,
-        why: ChunkError,
-        span_ns: Option<(u64, u64)>,
-    ) -> bool {
-        self.is_chunk_copied = false;
-        self.losses.push(Loss::Chunk { at, why, span_ns });
-        self.input.used(whole);
-        true
+        Ok(())
     }
 
     /// Writes the whole records of a chunk that is cut off as a chunk.
     fn salvage(&mut self, compression: &str) -> Result<(), Failure> {
-        let mut chunk = Chunk::new(Some(compression));
+        let mut chunk = ChunkBuilder::new(Some(compression));
         let index = &mut self.index;
-        each(&self.records, |op, body| {
+        each_record(&self.records, |op, body| {
             note(index, op, body);
-            match Message::read(body) {
+            match RawMessage::read(body) {
                 Some(message) if op == op::MESSAGE => {
                     chunk.message(message.channel_id, message.log_time_ns, body);
                 }
@@ -229,98 +166,51 @@ impl<W: Write> Copier<'_, W> {
         written.map_err(|error| Failure::writing(self.output_name, &error))
     }
 
-    fn attachment(&mut self, at: u64, length: u64) -> Result<bool, Failure> {
-        let front = length.min(ATTACHMENT_FRONT) as usize;
-        let there = self.want(RECORD_HEAD + front)?;
-        let body = &self.input.window()[RECORD_HEAD.min(there)..there];
-        let head = AttachmentHead::read(body);
-        let offset = self.sink.offset();
-        let whole = length.saturating_add(RECORD_HEAD as u64);
-        // It may be too long to be held, so that it ends too early is found only in copying it.
-        let copied = self.pass(whole)?;
-        if copied < whole {
-            return Err(Failure::failed(format_args!(
-                "{}: the file ends within the attachment at byte {at}; such a file cannot be \
-                 copied. Make it whole first with \"mcap recover\"",
-                self.input_name
-            )));
+    fn attachment(&mut self, offset: u64) -> Result<(), Failure> {
+        let front = attachment_front(self.file.body());
+        self.pass()?;
+        if let Some((header, data_size)) = front {
+            self.index.attachments.push(AttachmentIndex {
+                offset,
+                length: self.sink.offset() - offset,
+                log_time: header.log_time,
+                create_time: header.create_time,
+                data_size,
+                name: header.name,
+                media_type: header.media_type,
+            });
         }
-        if let Some((head, _)) = head {
-            let mut body = Body::default();
-            body.u64(offset)
-                .u64(whole)
-                .u64(head.log_time_ns)
-                .u64(head.create_time_ns)
-                .u64(head.size)
-                .bytes(head.name.as_bytes())
-                .bytes(head.media_type.as_bytes());
-            self.index.attachments.push(Entry { index: body.0 });
-        }
-        Ok(true)
+        Ok(())
     }
 
-    fn truncated(&mut self, at: u64, what: &str) -> bool {
-        let what = what.to_owned();
-        self.losses.push(Loss::Truncated { at, what });
-        false
-    }
-
-    fn want(&mut self, count: usize) -> Result<usize, Failure> {
-        let there = self.input.want(count);
-        there.map_err(|error| {
-            Failure::failed(format_args!("{}: cannot be read: {error}", self.input_name))
+    /// Copies the current record.
+    fn pass(&mut self) -> Result<bool, Failure> {
+        let (sink, output_name) = (&mut *self.sink, self.output_name);
+        self.file.copy(|bytes| {
+            let written = sink.write(bytes);
+            written.map_err(|error| Failure::writing(output_name, &error))
         })
-    }
-
-    /// Copies that many bytes; gives how many there were.
-    fn pass(&mut self, count: u64) -> Result<u64, Failure> {
-        let mut left = count;
-        while left > 0 {
-            let step = usize::try_from(left).unwrap_or(usize::MAX).min(PIECE);
-            let there = self.want(step)?;
-            if there == 0 {
-                break;
-            }
-            let written = self.sink.write(&self.input.window()[..there]);
-            written.map_err(|error| Failure::writing(self.output_name, &error))?;
-            self.input.used(there);
-            left -= there as u64;
-        }
-        Ok(count - left)
     }
 }
 
 /// Takes note of a record.
-fn note(index: &mut Index, op: u8, body: &[u8]) {
+fn note(index: &mut FileIndex, op: u8, body: &[u8]) {
     match op {
-        op::SCHEMA => {
-            if let Some(schema) = SchemaRecord::read(body) {
-                index.schemas.entry(schema.id).or_insert(body.to_vec());
-            }
-        }
-        op::CHANNEL => {
-            if let Some(channel) = ChannelRecord::read(body) {
-                index.topics.insert(channel.topic);
-                index.channels.entry(channel.id).or_insert(body.to_vec());
-            }
-        }
         op::MESSAGE => {
-            if let Some(message) = Message::read(body) {
+            if let Some(message) = RawMessage::read(body) {
                 index.message(message.channel_id, message.log_time_ns);
             }
         }
+        op::SCHEMA | op::CHANNEL => match parse(op, body) {
+            Some(Record::Schema { header, .. }) => {
+                index.schemas.entry(header.id).or_insert(body.to_vec());
+            }
+            Some(Record::Channel(channel)) => {
+                index.topics.insert(channel.topic);
+                index.channels.entry(channel.id).or_insert(body.to_vec());
+            }
+            _ => {}
+        },
         _ => {}
-    }
-}
-
-/// Calls with each whole record.
-fn each(records: &[u8], mut call: impl FnMut(u8, &[u8])) {
-    let mut rest = Fields::new(records);
-    while let Some(op) = rest.take(1) {
-        let length = rest.u64().and_then(|length| usize::try_from(length).ok());
-        let Some(body) = length.and_then(|length| rest.take(length)) else {
-            return;
-        };
-        call(op[0], body);
     }
 }

@@ -14,18 +14,17 @@ mod sink;
 mod torque;
 
 use std::collections::BTreeMap;
-use std::io::Write;
+use std::io::{self, Write};
 
-use mcap::records::op;
+use mcap::records::{Channel, Metadata, MetadataIndex, SchemaHeader, op};
 
 use super::decode::Encoding;
-use super::record::frames::Loss;
 use crate::failure::Failure;
 use crate::io::Input;
-use chunks::Chunk;
-use index::{Entry, Index};
-use sink::{Body, Sink};
-use torque::Torque;
+use chunks::ChunkBuilder;
+use index::FileIndex;
+use sink::{RecordSink, body};
+use torque::TorqueMessage;
 
 /// Name of the metadata record with the provenance.
 pub const METADATA: &str = "torqcomp";
@@ -43,14 +42,14 @@ pub struct Added {
 
 /// A copy under construction.
 pub struct Writer<W: Write> {
-    sink: Sink<W>,
-    place: String,
-    index: Index,
-    chunk: Chunk,
-    torque: Torque,
+    sink: RecordSink<W>,
+    /// Name of the output, for people.
+    name: String,
+    index: FileIndex,
+    chunk: ChunkBuilder,
+    torque: TorqueMessage,
     channel_id: u16,
     sequence: u32,
-    losses: Vec<Loss>,
     body: Vec<u8>,
 }
 
@@ -65,7 +64,7 @@ impl<W: Write> Writer<W> {
         output_name: &str,
         added: &Added,
     ) -> Result<Self, Failure> {
-        let mut sink = Sink::new(output);
+        let mut sink = RecordSink::new(output);
         let copied = copy::copy(input, &mut sink, output_name)?;
         let mut index = copied.index;
         if index.topics.contains(&added.topic) {
@@ -75,31 +74,24 @@ impl<W: Write> Writer<W> {
                 added.topic
             )));
         }
-        let torque = Torque::new(added.encoding, &added.name);
-        let mut chunk = Chunk::new(copied.compression);
+        let torque = TorqueMessage::new(added.encoding, &added.name);
+        let mut chunk = ChunkBuilder::new(copied.compression);
         let channel_id = declare(&mut index, &mut chunk, &torque, &added.topic)
+            .map_err(|error| Failure::writing(output_name, &error))?
             .ok_or_else(|| Failure::failed("the file has no number left for another channel"))?;
         Ok(Self {
             sink,
-            place: output_name.to_owned(),
+            name: output_name.to_owned(),
             index,
             chunk,
             torque,
             channel_id,
             sequence: 0,
-            losses: copied.losses,
             body: Vec::new(),
         })
     }
 
-    /// What could not be copied.
-    #[must_use]
-    pub fn losses(&self) -> &[Loss] {
-        &self.losses
-    }
-
     /// Path of the torque in the added messages, as `effort[0]`.
-    #[must_use]
     pub fn field(&self) -> &'static str {
         self.torque.field()
     }
@@ -121,7 +113,7 @@ impl<W: Write> Writer<W> {
         self.index.message(self.channel_id, log_ns);
         if self.chunk.is_full() {
             let written = self.chunk.write(&mut self.sink, &mut self.index);
-            written.map_err(|e| Failure::writing(&self.place, &e))?;
+            written.map_err(|e| Failure::writing(&self.name, &e))?;
         }
         Ok(())
     }
@@ -131,61 +123,71 @@ impl<W: Write> Writer<W> {
     /// # Errors
     /// If the output cannot be written.
     pub fn finish(mut self, provenance: &BTreeMap<String, String>) -> Result<W, Failure> {
-        let place = std::mem::take(&mut self.place);
+        let name = std::mem::take(&mut self.name);
         self.end(provenance)
-            .map_err(|error| Failure::writing(&place, &error))
+            .map_err(|error| Failure::writing(&name, &error))
     }
 
-    fn end(mut self, provenance: &BTreeMap<String, String>) -> std::io::Result<W> {
+    fn end(mut self, provenance: &BTreeMap<String, String>) -> io::Result<W> {
         self.chunk.write(&mut self.sink, &mut self.index)?;
-        let mut body = Body::default();
-        let pairs = provenance.iter().map(|(k, v)| (k.as_str(), v.as_str()));
-        body.bytes(METADATA.as_bytes()).map(pairs);
+        let metadata = Metadata {
+            name: METADATA.to_owned(),
+            metadata: provenance.clone(),
+        };
         let offset = self.sink.offset();
-        self.sink.record(op::METADATA, &body.0)?;
-        let length = self.sink.offset() - offset;
-        self.index
-            .metadata
-            .push(Entry::metadata(offset, length, METADATA));
+        self.sink.record(op::METADATA, &body(&metadata)?)?;
+        self.index.metadata.push(MetadataIndex {
+            offset,
+            length: self.sink.offset() - offset,
+            name: metadata.name,
+        });
         self.index.write(&mut self.sink)?;
         self.sink.finish()
     }
 }
 
-/// Declares schema and channel in the first chunk; gives the channel's number.
-fn declare(index: &mut Index, chunk: &mut Chunk, torque: &Torque, topic: &str) -> Option<u16> {
-    let (name, language, text) = torque.schema();
-    let front = |id: u16| {
-        let mut body = Body::default();
-        body.u16(id)
-            .bytes(name.as_bytes())
-            .bytes(language.as_bytes())
-            .bytes(&text);
-        body.0
+/// Declares schema and channel in the first chunk; gives the channel's number, or none if all are taken.
+fn declare(
+    index: &mut FileIndex,
+    chunk: &mut ChunkBuilder,
+    torque: &TorqueMessage,
+    topic: &str,
+) -> io::Result<Option<u16>> {
+    let (name, encoding, text) = torque.schema();
+    let schema = |id: u16| -> io::Result<Vec<u8>> {
+        let (name, encoding) = (name.to_owned(), encoding.to_owned());
+        let mut record = body(&SchemaHeader { id, name, encoding })?;
+        record.extend_from_slice(&(text.len() as u32).to_le_bytes());
+        record.extend_from_slice(&text);
+        Ok(record)
     };
     // The same schema need not be declared twice.
-    let known = index
-        .schemas
-        .iter()
-        .find(|(id, body)| **body == front(**id));
-    let schema_id = match known {
-        Some((id, _)) => *id,
-        None => (1..=u16::MAX).find(|id| !index.schemas.contains_key(id))?,
+    let is_same = |(id, body): &(&u16, &Vec<u8>)| schema(**id).is_ok_and(|same| same == **body);
+    let known = index.schemas.iter().find(is_same).map(|(id, _)| *id);
+    let unused = |id: &u16| !index.schemas.contains_key(id);
+    let Some(schema_id) = known.or_else(|| (1..=u16::MAX).find(unused)) else {
+        return Ok(None);
     };
-    let schema = front(schema_id);
-    chunk.record(op::SCHEMA, &schema);
-    index.schemas.insert(schema_id, schema);
-    let free = |id: &u16| !index.channels.contains_key(id) && !index.messages.contains_key(id);
-    let channel_id = (1..=u16::MAX).find(free)?;
-    let mut body = Body::default();
-    body.u16(channel_id)
-        .u16(schema_id)
-        .bytes(topic.as_bytes())
-        .bytes(torque.message_encoding().as_bytes())
-        .map([("unit", "N m")]);
-    chunk.record(op::CHANNEL, &body.0);
-    index.channels.insert(channel_id, body.0);
-    Some(channel_id)
+    if known.is_none() {
+        let schema = schema(schema_id)?;
+        chunk.record(op::SCHEMA, &schema);
+        index.schemas.insert(schema_id, schema);
+    }
+    let counts = &index.statistics.channel_message_counts;
+    let unused = |id: &u16| !index.channels.contains_key(id) && !counts.contains_key(id);
+    let Some(id) = (1..=u16::MAX).find(unused) else {
+        return Ok(None);
+    };
+    let channel = body(&Channel {
+        id,
+        schema_id,
+        topic: topic.to_owned(),
+        message_encoding: torque.message_encoding().to_owned(),
+        metadata: BTreeMap::from([("unit".to_owned(), "N m".to_owned())]),
+    })?;
+    chunk.record(op::CHANNEL, &channel);
+    index.channels.insert(id, channel);
+    Ok(Some(id))
 }
 
 #[cfg(test)]

@@ -1,67 +1,35 @@
-//! Bytes on their way out, counted and with their checksum.
+//! Records on their way out, counted and with their checksum.
 
-use std::io::{self, Write};
+use std::io::{self, Cursor, Write};
 
-/// A record's body under construction: little-endian numbers, texts with a length.
-#[derive(Debug, Clone, Default)]
-pub struct Body(pub Vec<u8>);
+use binrw::{BinWrite, Endian};
 
-impl Body {
-    /// A number of 16 bits.
-    pub fn u16(&mut self, number: u16) -> &mut Self {
-        self.raw(&number.to_le_bytes())
-    }
-
-    /// A number of 32 bits.
-    pub fn u32(&mut self, number: u32) -> &mut Self {
-        self.raw(&number.to_le_bytes())
-    }
-
-    /// A number of 64 bits.
-    pub fn u64(&mut self, number: u64) -> &mut Self {
-        self.raw(&number.to_le_bytes())
-    }
-
-    /// Bytes as they are.
-    pub fn raw(&mut self, bytes: &[u8]) -> &mut Self {
-        self.0.extend_from_slice(bytes);
-        self
-    }
-
-    /// Bytes behind their length.
-    pub fn bytes(&mut self, bytes: &[u8]) -> &mut Self {
-        self.u32(length(bytes)).raw(bytes)
-    }
-
-    /// Pairs of texts behind the length of all of them.
-    pub fn map<'a>(&mut self, pairs: impl IntoIterator<Item = (&'a str, &'a str)>) -> &mut Self {
-        let mut inside = Self::default();
-        for (key, value) in pairs {
-            inside.bytes(key.as_bytes()).bytes(value.as_bytes());
-        }
-        self.bytes(&inside.0)
-    }
-
-    /// Appends a record: opcode, length and body.
-    pub fn record(&mut self, op: u8, body: &[u8]) -> &mut Self {
-        self.raw(&[op]).u64(body.len() as u64).raw(body)
-    }
+/// The body of a record.
+pub(super) fn body<T>(record: &T) -> io::Result<Vec<u8>>
+where
+    T: for<'a> BinWrite<Args<'a> = ()>,
+{
+    let mut bytes = Cursor::new(Vec::new());
+    let written = record.write_options(&mut bytes, Endian::Little, ());
+    written.map_err(io::Error::other)?;
+    Ok(bytes.into_inner())
 }
 
-/// Length as MCAP writes it; what is longer than 4 GiB has been refused before.
-fn length(bytes: &[u8]) -> u32 {
-    u32::try_from(bytes.len()).unwrap_or(u32::MAX)
+/// Appends a record: opcode, length and body.
+pub(super) fn push_record(records: &mut Vec<u8>, op: u8, body: &[u8]) {
+    records.push(op);
+    records.extend_from_slice(&(body.len() as u64).to_le_bytes());
+    records.extend_from_slice(body);
 }
 
 /// An output that knows how far it is.
-pub struct Sink<W> {
+pub(super) struct RecordSink<W> {
     out: W,
     offset: u64,
     crc: crc32fast::Hasher,
 }
 
-impl<W: Write> Sink<W> {
-    /// Starts at the front.
+impl<W: Write> RecordSink<W> {
     pub fn new(out: W) -> Self {
         Self {
             out,
@@ -80,10 +48,6 @@ impl<W: Write> Sink<W> {
         std::mem::take(&mut self.crc).finalize()
     }
 
-    /// Writes bytes.
-    ///
-    /// # Errors
-    /// If the output cannot be written.
     pub fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.out.write_all(bytes)?;
         self.crc.update(bytes);
@@ -91,10 +55,6 @@ impl<W: Write> Sink<W> {
         Ok(())
     }
 
-    /// Writes a record.
-    ///
-    /// # Errors
-    /// If the output cannot be written.
     pub fn record(&mut self, op: u8, body: &[u8]) -> io::Result<()> {
         self.write(&[op])?;
         self.write(&(body.len() as u64).to_le_bytes())?;
@@ -102,9 +62,6 @@ impl<W: Write> Sink<W> {
     }
 
     /// Gives the output back, flushed.
-    ///
-    /// # Errors
-    /// If the output cannot be written.
     pub fn finish(mut self) -> io::Result<W> {
         self.out.flush()?;
         Ok(self.out)

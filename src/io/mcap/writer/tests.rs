@@ -2,9 +2,8 @@ use std::collections::BTreeSet;
 
 use mcap::{Compression, MessageStream, Summary, WriteOptions};
 
-use super::super::inventory::Inventory;
-use super::super::testing::{File, float64, frames, options};
-use super::super::{Options, Source};
+use super::super::TimeOptions;
+use super::super::testing::{File, drain, float64, inventory, open, options};
 use super::*;
 
 fn original(options: WriteOptions) -> Vec<u8> {
@@ -46,7 +45,7 @@ fn added(encoding: Encoding) -> Added {
     }
 }
 
-fn copy(bytes: &[u8], encoding: Encoding) -> (Vec<u8>, Vec<Loss>) {
+fn copy(bytes: &[u8], encoding: Encoding) -> Vec<u8> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("in.mcap");
     std::fs::write(&path, bytes).unwrap();
@@ -57,35 +56,16 @@ fn copy(bytes: &[u8], encoding: Encoding) -> (Vec<u8>, Vec<Loss>) {
             .add(1000 + place, 1000 + place, torque(place))
             .unwrap();
     }
-    let losses = writer.losses().to_vec();
     let provenance = BTreeMap::from([("input".to_owned(), "in.mcap".to_owned())]);
-    (writer.finish(&provenance).unwrap(), losses)
+    writer.finish(&provenance).unwrap()
 }
 
 fn torque(place: i64) -> f64 {
     place as f64 / 7.0 - 100.0
 }
 
-fn wanted(topic: &str, field: &str) -> super::super::selection::Wanted {
-    let selection = super::super::Selection {
-        topic: Some(topic.to_owned()),
-        field: Some(field.to_owned()),
-        signal: None,
-    };
-    selection.check().unwrap()
-}
-
 fn read(bytes: &[u8], field: &str) -> (Vec<i64>, Vec<f64>) {
-    let wanted = wanted("/torque", field);
-    let mut source =
-        Source::read(&Input::Stdin, frames(bytes), &wanted, &Options::default()).unwrap();
-    let (mut all_times, mut all_values) = (Vec::new(), Vec::new());
-    let (mut times, mut values) = (Vec::new(), Vec::new());
-    while source.next(&mut times, &mut values).unwrap() {
-        all_times.append(&mut times);
-        all_values.append(&mut values);
-    }
-    (all_times, all_values)
+    drain(&mut open(bytes, ("/torque", field), &TimeOptions::default()).unwrap())
 }
 
 #[test]
@@ -98,8 +78,7 @@ fn the_data_are_copied_byte_for_byte_and_the_torque_is_added() {
     ];
     for options in all {
         let before = original(options);
-        let (after, losses) = copy(&before, Encoding::Cdr);
-        assert!(losses.is_empty());
+        let after = copy(&before, Encoding::Cdr);
         // Everything up to the end of the data is the same.
         let same = before
             .iter()
@@ -124,7 +103,7 @@ fn the_data_are_copied_byte_for_byte_and_the_torque_is_added() {
 fn the_official_reader_finds_everything_by_the_summary() {
     for compression in [None, Some(Compression::Zstd), Some(Compression::Lz4)] {
         let before = original(options(compression));
-        let (after, _) = copy(&before, Encoding::Cdr);
+        let after = copy(&before, Encoding::Cdr);
         let summary = Summary::read(&after).unwrap().unwrap();
         let statistics = summary.stats.as_ref().unwrap();
         assert_eq!(statistics.message_count, 22_000);
@@ -167,7 +146,7 @@ fn the_official_reader_finds_everything_by_the_summary() {
 #[test]
 fn checksums_of_data_and_summary_are_right() {
     use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
-    let (after, _) = copy(&original(options(Some(Compression::Zstd))), Encoding::Cdr);
+    let after = copy(&original(options(Some(Compression::Zstd))), Encoding::Cdr);
     let mut reader = LinearReader::new_with_options(
         LinearReaderOptions::default()
             .with_validate_chunk_crcs(true)
@@ -195,7 +174,7 @@ fn checksums_of_data_and_summary_are_right() {
 
 #[test]
 fn a_file_without_chunks_stays_without() {
-    let (after, _) = copy(&original(options(None).use_chunks(false)), Encoding::Cdr);
+    let after = copy(&original(options(None).use_chunks(false)), Encoding::Cdr);
     let summary = Summary::read(&after).unwrap().unwrap();
     assert!(summary.chunk_indexes.is_empty());
     assert_eq!(summary.stats.unwrap().message_count, 22_000);
@@ -211,7 +190,7 @@ fn every_encoding_can_be_read_back() {
         (Encoding::Protobuf, "torque_n_m"),
         (Encoding::Json, "torque_n_m"),
     ] {
-        let (after, _) = copy(&before, encoding);
+        let after = copy(&before, encoding);
         let (times, values) = read(&after, field);
         assert_eq!(times.len(), 20_000, "{encoding:?}");
         let is_right = |(place, value): (usize, &f64)| *value == torque(place as i64);
@@ -223,21 +202,23 @@ fn every_encoding_can_be_read_back() {
 fn damage_is_left_out_and_said_and_the_copy_is_whole() {
     let before = original(options(Some(Compression::Zstd)));
     let cut = &before[..before.len() / 30];
-    let (after, losses) = copy(cut, Encoding::Cdr);
-    assert!(matches!(losses[..], [Loss::Truncated { .. }]));
-    let inventory = Inventory::read(frames(&after)).unwrap();
-    assert!(inventory.is_closed && !inventory.is_lossy);
-    let there = Inventory::read(frames(cut)).unwrap();
-    assert_eq!(inventory.messages, there.messages + 20_000);
+    let after = copy(cut, Encoding::Cdr);
+    let copied = inventory(&after);
+    assert!(copied.is_closed && !copied.is_lossy);
+    let there = inventory(cut);
+    assert_eq!(there.warnings[0].code, "mcap-truncated");
+    assert_eq!(copied.messages, there.messages + 20_000);
 
     let mut damaged = before.clone();
     let summary = Summary::read(&before).unwrap().unwrap();
     let chunk = &summary.chunk_indexes[3];
     damaged[chunk.chunk_start_offset as usize + 150] ^= 0x55;
-    let (after, losses) = copy(&damaged, Encoding::Cdr);
-    assert!(matches!(losses[..], [Loss::Chunk { .. }]));
-    let inventory = Inventory::read(frames(&after)).unwrap();
-    assert!(!inventory.is_lossy && inventory.messages < 22_000);
+    let after = copy(&damaged, Encoding::Cdr);
+    let copied = inventory(&after);
+    let there = inventory(&damaged);
+    assert_eq!(there.warnings[0].code, "mcap-damaged-chunk");
+    assert!(!copied.is_lossy && copied.messages < 22_000);
+    assert_eq!(copied.messages, there.messages + 20_000);
 }
 
 #[test]

@@ -56,15 +56,14 @@ const JSON_DEFINITION: &str = r#"{
 
 /// Writes torques as messages.
 #[derive(Debug)]
-pub struct Torque {
+pub(super) struct TorqueMessage {
     encoding: Encoding,
     name: String,
     sequence: u32,
 }
 
-impl Torque {
+impl TorqueMessage {
     /// For a joint or channel of that name.
-    #[must_use]
     pub fn new(encoding: Encoding, name: &str) -> Self {
         Self {
             encoding,
@@ -74,7 +73,6 @@ impl Torque {
     }
 
     /// Encoding of the messages, as the channel names it.
-    #[must_use]
     pub fn message_encoding(&self) -> &'static str {
         match self.encoding {
             Encoding::Cdr => "cdr",
@@ -85,7 +83,6 @@ impl Torque {
     }
 
     /// Name, language and text of the schema.
-    #[must_use]
     pub fn schema(&self) -> (&'static str, &'static str, Vec<u8>) {
         match self.encoding {
             Encoding::Cdr => (
@@ -108,7 +105,6 @@ impl Torque {
     }
 
     /// Path of the torque in the message.
-    #[must_use]
     pub fn field(&self) -> &'static str {
         match self.encoding {
             Encoding::Cdr | Encoding::Ros1 => "effort[0]",
@@ -171,28 +167,26 @@ impl Torque {
     }
 
     fn protobuf(&self, seconds: i64, nanoseconds: u32, torque_n_m: f64, out: &mut Vec<u8>) {
-        let stamp = prost_types::Timestamp {
-            seconds,
-            nanos: nanoseconds as i32,
+        let message = ProtobufTorque {
+            timestamp: Some(prost_types::Timestamp {
+                seconds,
+                nanos: nanoseconds as i32,
+            }),
+            name: self.name.clone(),
+            torque_n_m,
         };
-        let stamp = stamp.encode_to_vec();
-        out.push(0x0a);
-        varint(stamp.len() as u64, out);
-        out.extend_from_slice(&stamp);
-        out.push(0x12);
-        varint(self.name.len() as u64, out);
-        out.extend_from_slice(self.name.as_bytes());
-        out.push(0x19);
-        out.extend_from_slice(&torque_n_m.to_le_bytes());
+        out.extend_from_slice(&message.encode_to_vec());
     }
 }
 
-fn varint(mut number: u64, out: &mut Vec<u8>) {
-    while number >= 0x80 {
-        out.push(number as u8 | 0x80);
-        number >>= 7;
-    }
-    out.push(number as u8);
+#[derive(Clone, PartialEq, prost::Message)]
+struct ProtobufTorque {
+    #[prost(message, tag = "1")]
+    timestamp: Option<prost_types::Timestamp>,
+    #[prost(string, tag = "2")]
+    name: String,
+    #[prost(double, tag = "3")]
+    torque_n_m: f64,
 }
 
 /// `message Torque { google.protobuf.Timestamp timestamp = 1; string name = 2;

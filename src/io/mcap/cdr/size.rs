@@ -5,14 +5,13 @@
 /// Data are padded to multiples of their own size, so what follows a field depends on where it
 /// began, but only modulo the largest padding, which is 8.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Run([u64; 8]);
+pub struct PaddedSize([u64; 8]);
 
-impl Run {
+impl PaddedSize {
     /// Nothing.
     pub const NONE: Self = Self([0; 8]);
 
     /// A number of `size` bytes that begins at a multiple of `align`, a power of two up to 8.
-    #[must_use]
     pub fn of(size: u8, align: u8) -> Self {
         let align = u64::from(align.clamp(1, 8));
         let size = u64::from(size);
@@ -23,13 +22,11 @@ impl Run {
     }
 
     /// Bytes from a start.
-    #[must_use]
     pub fn length_from(&self, start: usize) -> usize {
         usize::try_from(self.0[start & 7]).unwrap_or(usize::MAX)
     }
 
     /// This, and then that.
-    #[must_use]
     pub fn then(&self, next: &Self) -> Self {
         Self(std::array::from_fn(|start| {
             let length = self.0[start];
@@ -39,7 +36,6 @@ impl Run {
     }
 
     /// This so many times.
-    #[must_use]
     pub fn repeat(&self, count: u32) -> Self {
         let (mut power, mut result, mut left) = (*self, Self::NONE, count);
         while left > 0 {
@@ -53,7 +49,6 @@ impl Run {
     }
 
     /// The length that all repetitions but the first have, if they have the same.
-    #[must_use]
     pub fn stride(&self) -> Option<u64> {
         let mut strides = (0..8_usize).flat_map(|start| {
             let mut at = start as u64 + self.0[start];
@@ -74,34 +69,44 @@ mod tests {
 
     #[test]
     fn a_number_is_padded_to_its_own_size() {
-        let double = Run::of(8, 8);
+        let double = PaddedSize::of(8, 8);
         assert_eq!(
             [0, 1, 4, 8].map(|start| double.length_from(start)),
             [8, 15, 12, 8]
         );
-        let short = Run::of(8, 4);
+        let short = PaddedSize::of(8, 4);
         assert_eq!([0, 1, 4].map(|start| short.length_from(start)), [8, 11, 8]);
     }
 
     #[test]
     fn repetition_is_the_same_as_one_after_the_other() {
         // A byte and a double, 1 + 7 + 8 bytes from 0, then 1 + 7 + 8 again.
-        let pair = Run::of(1, 1).then(&Run::of(8, 8));
+        let pair = PaddedSize::of(1, 1).then(&PaddedSize::of(8, 8));
         assert_eq!(pair.length_from(0), 16);
-        for odd in [pair, Run::of(4, 4).then(&Run::of(1, 1)), Run::of(2, 2)] {
-            let mut slow = Run::NONE;
+        for odd in [
+            pair,
+            PaddedSize::of(4, 4).then(&PaddedSize::of(1, 1)),
+            PaddedSize::of(2, 2),
+        ] {
+            let mut slow = PaddedSize::NONE;
             for count in 0..20 {
                 assert_eq!(odd.repeat(count), slow);
                 slow = slow.then(&odd);
             }
         }
         assert_eq!(
-            Run::of(8, 8).repeat(u32::MAX).length_from(0),
+            PaddedSize::of(8, 8).repeat(u32::MAX).length_from(0),
             8 * u32::MAX as usize
         );
-        assert_eq!(Run::of(8, 8).stride(), Some(8));
-        assert_eq!(Run::of(4, 4).then(&Run::of(1, 1)).stride(), Some(8));
+        assert_eq!(PaddedSize::of(8, 8).stride(), Some(8));
+        assert_eq!(
+            PaddedSize::of(4, 4).then(&PaddedSize::of(1, 1)).stride(),
+            Some(8)
+        );
         // 12 bytes from 0, then 4 of padding and 12.
-        assert_eq!(Run::of(8, 8).then(&Run::of(4, 4)).stride(), Some(16));
+        assert_eq!(
+            PaddedSize::of(8, 8).then(&PaddedSize::of(4, 4)).stride(),
+            Some(16)
+        );
     }
 }

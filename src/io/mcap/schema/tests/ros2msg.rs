@@ -1,6 +1,6 @@
 use super::*;
 
-fn fields(schema: &Schema, place: usize) -> Vec<(&str, &Kind)> {
+fn fields(schema: &Schema, place: usize) -> Vec<(&str, &FieldKind)> {
     let fields = &schema.structs[place].fields;
     fields.iter().map(|f| (f.name.as_str(), &f.kind)).collect()
 }
@@ -22,17 +22,17 @@ fn everything_a_line_may_hold() {
         char c 65\n\
         wstring wide";
     let schema = read("p/msg/Everything", text, Generation::Ros2).unwrap();
-    let number = |number| Kind::Number(number);
+    let number = |number| FieldKind::Number(number);
     let expected = [
         ("plain", number(Number::F64)),
         ("with_default", number(Number::F64)),
-        ("short", Kind::Text),
-        ("words", Kind::list(Kind::Text)),
-        ("fixed", Kind::array(number(Number::U8), 16)),
-        ("list", Kind::list(number(Number::I16))),
+        ("short", FieldKind::Text),
+        ("words", FieldKind::list(FieldKind::Text)),
+        ("fixed", FieldKind::array(number(Number::U8), 16)),
+        ("list", FieldKind::list(number(Number::I16))),
         ("b", number(Number::U8)),
         ("c", number(Number::U8)),
-        ("wide", Kind::WideText),
+        ("wide", FieldKind::WideText),
     ];
     let expected: Vec<_> = expected.iter().map(|(n, k)| (*n, k)).collect();
     assert_eq!(fields(&schema, 0), expected);
@@ -51,10 +51,10 @@ fn types_are_found_by_full_short_and_relative_names() {
     assert_eq!(
         fields(&schema, 0),
         [
-            ("header", &Kind::Struct(1)),
-            ("a", &Kind::Struct(2)),
-            ("b", &Kind::array(Kind::Struct(3), 2)),
-            ("t", &Kind::Struct(4)),
+            ("header", &FieldKind::Struct(1)),
+            ("a", &FieldKind::Struct(2)),
+            ("b", &FieldKind::array(FieldKind::Struct(3), 2)),
+            ("t", &FieldKind::Struct(4)),
         ]
     );
     assert_eq!(schema.structs[4].fields[1].name, "nanosec");
@@ -68,13 +68,13 @@ fn ros1_has_time_and_signed_bytes_and_a_bare_header() {
         "=".repeat(80)
     );
     let schema = read("p/Old", &text, Generation::Ros1).unwrap();
-    assert_eq!(schema.root().fields[0].kind, Kind::Struct(1));
-    assert_eq!(schema.root().fields[1].kind, Kind::Number(Number::I8));
-    let Kind::Struct(duration) = schema.root().fields[3].kind else {
+    assert_eq!(schema.root().fields[0].kind, FieldKind::Struct(1));
+    assert_eq!(schema.root().fields[1].kind, FieldKind::Number(Number::I8));
+    let FieldKind::Struct(duration) = schema.root().fields[3].kind else {
         panic!("a duration is two numbers");
     };
     let seconds = &schema.structs[duration].fields[0].kind;
-    assert_eq!(*seconds, Kind::Number(Number::I32));
+    assert_eq!(*seconds, FieldKind::Number(Number::I32));
 }
 
 #[test]

@@ -41,21 +41,24 @@ module builtin_interfaces { module msg { struct Time { int32 sec; uint32 nanosec
 fn a_definition_with_everything() {
     let schema = read("p/msg/Joint", JOINT).unwrap();
     let root = schema.root();
-    let number = |number| Kind::Number(number);
+    let number = |number| FieldKind::Number(number);
     let expected = [
-        ("stamp", Kind::Struct(2)),
+        ("stamp", FieldKind::Struct(2)),
         ("effort", number(Number::F64)),
-        ("matrix", Kind::array(number(Number::F64), 9)),
-        ("some", Kind::list(number(Number::F64))),
-        ("names", Kind::list(Kind::Text)),
+        ("matrix", FieldKind::array(number(Number::F64), 9)),
+        ("some", FieldKind::list(number(Number::F64))),
+        ("names", FieldKind::list(FieldKind::Text)),
         ("big", number(Number::U64)),
-        ("more", Kind::array(number(Number::U64), 2)),
-        ("grid", Kind::array(Kind::array(number(Number::I32), 3), 2)),
+        ("more", FieldKind::array(number(Number::U64), 2)),
+        (
+            "grid",
+            FieldKind::array(FieldKind::array(number(Number::I32), 3), 2),
+        ),
         ("mode", number(Number::U32)),
-        ("nothing", Kind::Struct(1)),
+        ("nothing", FieldKind::Struct(1)),
         ("ok", number(Number::Bool)),
         ("raw", number(Number::U8)),
-        ("w", Kind::WideText),
+        ("w", FieldKind::WideText),
     ];
     let found: Vec<_> = root
         .fields

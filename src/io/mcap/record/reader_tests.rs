@@ -1,15 +1,15 @@
-use mcap::Compression;
+use mcap::{Compression, MAGIC};
 
-use super::super::super::testing::{File, float64, frames, options};
+use super::super::super::testing::{File, float64, options, reader};
 use super::*;
 
-fn ops(bytes: &[u8]) -> (Vec<u8>, Frames) {
-    let mut frames = frames(bytes);
+fn ops(bytes: &[u8]) -> (Vec<u8>, RecordReader) {
+    let mut reader = reader(bytes);
     let mut ops = Vec::new();
-    while let Some(frame) = frames.advance().unwrap() {
-        ops.push(frame.op);
+    while let Some((op, _)) = reader.next().unwrap() {
+        ops.push(op);
     }
-    (ops, frames)
+    (ops, reader)
 }
 
 fn file(compression: Option<Compression>) -> Vec<u8> {
@@ -37,7 +37,7 @@ fn file(compression: Option<Compression>) -> Vec<u8> {
 #[test]
 fn records_in_and_out_of_chunks_come_in_order() {
     for compression in [None, Some(Compression::Zstd), Some(Compression::Lz4)] {
-        let (ops, frames) = ops(&file(compression));
+        let (ops, reader) = ops(&file(compression));
         let expected = [
             op::HEADER,
             op::SCHEMA,
@@ -50,25 +50,25 @@ fn records_in_and_out_of_chunks_come_in_order() {
             op::DATA_END,
         ];
         assert_eq!(ops[..expected.len()], expected);
-        assert!(frames.is_closed() && frames.losses().is_empty());
+        assert!(reader.is_closed() && reader.losses().count == 0);
         let name = compression.map_or("", |c| match c {
             Compression::Zstd => "zstd",
             Compression::Lz4 => "lz4",
         });
-        assert_eq!(frames.compressions()[name].chunks, 2);
+        assert_eq!(reader.chunk_counts()[name].chunks, 2);
     }
 }
 
 #[test]
 fn an_attachment_is_told_by_its_front() {
     let bytes = file(None);
-    let mut frames = frames(&bytes);
+    let mut reader = reader(&bytes);
     let mut seen = None;
-    while let Some(frame) = frames.advance().unwrap() {
-        if frame.op == op::ATTACHMENT {
-            assert!(frame.is_front && !frame.is_in_chunk);
-            let (head, _) = super::super::AttachmentHead::read(frames.body(&frame)).unwrap();
-            seen = Some((head.name, head.size));
+    while let Some((op, body)) = reader.next().unwrap() {
+        if op == op::ATTACHMENT {
+            assert!(body.len() < 100_000);
+            let (header, size) = super::super::attachment_front(body).unwrap();
+            seen = Some((header.name, size));
         }
     }
     assert_eq!(seen, Some(("notes".to_owned(), 300_000)));
@@ -79,16 +79,25 @@ fn hostile_lengths_end_the_reading() {
     let mut bytes = MAGIC.to_vec();
     bytes.push(op::MESSAGE);
     bytes.extend_from_slice(&u64::MAX.to_le_bytes());
-    let (_, frames) = ops(&bytes);
-    assert!(matches!(frames.losses()[0], Loss::TooLong { at: 8, .. }));
+    let (_, reader) = ops(&bytes);
+    assert!(matches!(
+        reader.losses().first[0],
+        Loss::TooLong { at: 8, .. }
+    ));
     bytes.truncate(9);
     bytes.extend_from_slice(&(1_u64 << 29).to_le_bytes());
-    let (_, frames) = ops(&bytes);
-    assert!(matches!(frames.losses()[0], Loss::Truncated { at: 8, .. }));
+    let (_, reader) = ops(&bytes);
+    assert!(matches!(
+        reader.losses().first[0],
+        Loss::Truncated { at: 8, .. }
+    ));
     bytes[8] = op::ATTACHMENT;
     bytes[9..].copy_from_slice(&u64::MAX.to_le_bytes());
-    let (_, frames) = ops(&bytes);
-    assert!(matches!(frames.losses()[0], Loss::Truncated { at: 8, .. }));
+    let (_, reader) = ops(&bytes);
+    assert!(matches!(
+        reader.losses().first[0],
+        Loss::Truncated { at: 8, .. }
+    ));
 }
 
 #[test]
@@ -104,8 +113,8 @@ fn a_record_past_the_end_of_its_chunk_is_said() {
     bytes.push(op::CHUNK);
     bytes.extend_from_slice(&(body.len() as u64).to_le_bytes());
     bytes.extend_from_slice(&body);
-    let (seen, frames) = ops(&bytes);
+    let (seen, reader) = ops(&bytes);
     assert!(seen.is_empty());
-    let said: Vec<_> = frames.losses().iter().map(Loss::code).collect();
+    let said: Vec<_> = reader.losses().first.iter().map(Loss::code).collect();
     assert_eq!(said, ["mcap-damaged-chunk", "mcap-truncated"]);
 }

@@ -1,0 +1,286 @@
+//! The records of a file one after the other, chunks as they are.
+
+use std::fmt;
+
+use mcap::MAGIC;
+use mcap::records::op;
+
+use super::chunk::{self, ChunkError};
+use super::input::CountedInput;
+use super::{RECORD_HEAD, record_head};
+use crate::failure::Failure;
+use crate::io::Input;
+
+/// Longest record that is taken into memory; attachments may be longer, they are passed over.
+const LONGEST: u64 = chunk::LARGEST;
+/// Bytes of an attachment that are looked at: its names.
+const ATTACHMENT_FRONT: u64 = 1 << 16;
+/// Losses that are kept one by one.
+const LOSSES_KEPT: usize = 20;
+/// Where a file ends that ends within an attachment.
+pub(crate) const IN_ATTACHMENT: &str = "within an attachment";
+
+/// Data that are lost.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Loss {
+    /// The file ends before its end record.
+    Truncated {
+        /// Byte after the last whole record.
+        at: u64,
+        /// Where it ends.
+        what: &'static str,
+    },
+    /// A chunk is damaged and was left out.
+    Chunk {
+        /// Byte at which it begins.
+        at: u64,
+        why: ChunkError,
+        /// Log times in it as it says, in ns.
+        span_ns: Option<(u64, u64)>,
+    },
+    /// A record within a chunk runs past its end.
+    Overrun {
+        /// Byte at which the chunk begins.
+        at: u64,
+    },
+    /// A record that is too long to be one.
+    TooLong {
+        /// Byte at which it begins.
+        at: u64,
+        op: u8,
+        /// Its length as it says.
+        length: u64,
+    },
+}
+
+impl Loss {
+    /// Stable code for warnings.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::Truncated { .. } => "mcap-truncated",
+            Self::Chunk { .. } | Self::Overrun { .. } => "mcap-damaged-chunk",
+            Self::TooLong { .. } => "mcap-damaged-record",
+        }
+    }
+}
+
+impl fmt::Display for Loss {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Truncated { at, what } => write!(
+                f,
+                "the file ends {what}, without its end record; what is whole up to byte {at} was \
+                 read"
+            ),
+            Self::Chunk { at, why, span_ns } => {
+                write!(f, "the chunk at byte {at} was left out: {why}")?;
+                match span_ns {
+                    Some((start, end)) => {
+                        write!(f, " (log times {start} ns to {end} ns)")
+                    }
+                    None => Ok(()),
+                }
+            }
+            Self::Overrun { at } => write!(
+                f,
+                "a record in the chunk at byte {at} runs past the end of the chunk; the rest of \
+                 the chunk was left out"
+            ),
+            Self::TooLong { at, op, length } => write!(
+                f,
+                "the record at byte {at} (opcode 0x{op:02x}) says it is {length} bytes long, more \
+                 than any record; nothing behind it could be read"
+            ),
+        }
+    }
+}
+
+/// Data that were lost so far.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Losses {
+    /// The first ones.
+    pub first: Vec<Loss>,
+    pub count: usize,
+}
+
+impl Losses {
+    pub fn add(&mut self, loss: Loss) {
+        self.count += 1;
+        if self.first.len() < LOSSES_KEPT {
+            self.first.push(loss);
+        }
+    }
+}
+
+/// A record of the file; its bytes are held until the next one is asked for.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FileRecord {
+    pub op: u8,
+    /// Byte in the file at which it begins.
+    pub offset: u64,
+    /// Whether all of its bytes are there. Only a chunk is given otherwise.
+    pub is_whole: bool,
+}
+
+/// The records of a file. Damage to its content is no error, it is among the losses.
+pub(crate) struct FileReader {
+    name: String,
+    input: CountedInput,
+    /// Bytes of the current record in the window.
+    held: usize,
+    /// Bytes of the current record after those: of attachments.
+    behind: u64,
+    pub is_ended: bool,
+    /// Whether the end record was found.
+    pub is_closed: bool,
+    pub losses: Losses,
+}
+
+impl FileReader {
+    /// Opens a file and checks that it is MCAP.
+    ///
+    /// # Errors
+    /// If it cannot be read, or does not begin as an MCAP file does.
+    pub fn open(input: &Input) -> Result<Self, Failure> {
+        Self::new(input.name(), CountedInput::new(input.open()?))
+    }
+
+    /// Reads from a stream.
+    ///
+    /// # Errors
+    /// If it does not begin as an MCAP file does.
+    pub fn new(name: String, input: CountedInput) -> Result<Self, Failure> {
+        let mut file = Self {
+            name,
+            input,
+            held: 0,
+            behind: 0,
+            is_ended: false,
+            is_closed: false,
+            losses: Losses::default(),
+        };
+        file.held = file.want(MAGIC.len())?;
+        if file.bytes() != MAGIC {
+            return Err(Failure::failed(format_args!(
+                "{}: not an MCAP file: it does not begin with the bytes 89 4d 43 41 50 30 0d 0a; \
+                 record with a recorder that writes MCAP, or convert the file first",
+                file.name
+            )));
+        }
+        Ok(file)
+    }
+
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The current record with opcode and length, only the front of an attachment.
+    pub fn bytes(&self) -> &[u8] {
+        &self.input.window()[..self.held]
+    }
+
+    /// The current record's body, only the front of an attachment's.
+    pub fn body(&self) -> &[u8] {
+        self.bytes().get(RECORD_HEAD..).unwrap_or(&[])
+    }
+
+    /// The next record, or none at the end.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn next(&mut self) -> Result<Option<FileRecord>, Failure> {
+        self.skip()?;
+        if self.is_ended {
+            return Ok(None);
+        }
+        let offset = self.input.offset();
+        let there = self.want(RECORD_HEAD)?;
+        let Some((op, length)) = record_head(&self.input.window()[..there]) else {
+            let what = match there {
+                0 => "after a whole record",
+                _ => "within a record",
+            };
+            return Ok(self.truncated(offset, what));
+        };
+        let is_attachment = op == op::ATTACHMENT;
+        // A recorder that was stopped leaves its last chunk without a length.
+        if length > LONGEST && !is_attachment && op != op::CHUNK {
+            self.is_ended = true;
+            let at = offset;
+            self.losses.add(Loss::TooLong { at, op, length });
+            return Ok(None);
+        }
+        let most = if is_attachment {
+            ATTACHMENT_FRONT
+        } else {
+            LONGEST
+        };
+        let whole = RECORD_HEAD + length.min(most) as usize;
+        self.held = self.want(whole)?;
+        let is_whole = self.held == whole && (is_attachment || length <= most);
+        match op {
+            op::ATTACHMENT if is_whole => self.behind = length - length.min(most),
+            op::ATTACHMENT => return Ok(self.truncated(offset, IN_ATTACHMENT)),
+            op::CHUNK if !is_whole => drop(self.truncated(offset, "within a chunk")),
+            _ if !is_whole => return Ok(self.truncated(offset, "within a record")),
+            op::FOOTER => {
+                self.is_closed = true;
+                self.is_ended = true;
+                return Ok(None);
+            }
+            _ => {}
+        }
+        Ok(Some(FileRecord {
+            op,
+            offset,
+            is_whole,
+        }))
+    }
+
+    /// Passes over the current record; false if the file ends in it.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn skip(&mut self) -> Result<bool, Failure> {
+        self.copy(|_| Ok(()))
+    }
+
+    /// Gives all bytes of the current record away; false if the file ends in it.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or those of `write`.
+    pub fn copy(
+        &mut self,
+        mut write: impl FnMut(&[u8]) -> Result<(), Failure>,
+    ) -> Result<bool, Failure> {
+        let at = self.input.offset();
+        write(self.bytes())?;
+        self.input.used(std::mem::take(&mut self.held));
+        while self.behind > 0 {
+            let step = self.behind.min(ATTACHMENT_FRONT) as usize;
+            let there = self.want(step)?;
+            write(&self.input.window()[..there])?;
+            self.input.used(there);
+            self.behind -= there as u64;
+            if there < step {
+                self.behind = 0;
+                self.truncated(at, IN_ATTACHMENT);
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    fn truncated(&mut self, at: u64, what: &'static str) -> Option<FileRecord> {
+        self.is_ended = true;
+        self.losses.add(Loss::Truncated { at, what });
+        None
+    }
+
+    fn want(&mut self, count: usize) -> Result<usize, Failure> {
+        let there = self.input.want(count);
+        there.map_err(|error| {
+            Failure::failed(format_args!("{}: cannot be read: {error}", self.name))
+        })
+    }
+}

@@ -1,0 +1,184 @@
+//! The records of an MCAP file one after the other, those in chunks included.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use mcap::records::op;
+
+use super::chunk::{Unpacked, chunk_front, unpack, unpack_part};
+use super::file::{FileReader, FileRecord, Loss, Losses};
+use super::input::CountedInput;
+use super::{RECORD_HEAD, split_record};
+use crate::failure::Failure;
+use crate::io::Input;
+
+/// How many chunks of a compression there are, and their bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct ChunkCount {
+    pub chunks: u64,
+    /// Bytes in the file.
+    pub packed: u64,
+    /// Bytes unpacked, as the chunks say.
+    pub unpacked: u64,
+}
+
+/// The records of a file.
+pub(crate) struct RecordReader {
+    file: FileReader,
+    /// Unpacked records of the current chunk, or the front of an attachment.
+    buffer: Vec<u8>,
+    /// Where they lie in the file's record instead, of a chunk that is not compressed.
+    in_place: Option<Range<usize>>,
+    /// How far they have been delivered.
+    at: usize,
+    chunk_offset: u64,
+    chunk_counts: BTreeMap<String, ChunkCount>,
+}
+
+/// Where the body of a record is held.
+enum Holder {
+    File,
+    Records(Range<usize>),
+}
+
+impl RecordReader {
+    /// Opens a file and checks that it is MCAP.
+    ///
+    /// # Errors
+    /// If it cannot be read, or does not begin as an MCAP file does.
+    pub fn open(input: &Input) -> Result<Self, Failure> {
+        FileReader::open(input).map(Self::of_file)
+    }
+
+    /// Reads from a stream.
+    ///
+    /// # Errors
+    /// If it does not begin as an MCAP file does.
+    pub fn new(name: String, input: CountedInput) -> Result<Self, Failure> {
+        FileReader::new(name, input).map(Self::of_file)
+    }
+
+    fn of_file(file: FileReader) -> Self {
+        Self {
+            file,
+            buffer: Vec::new(),
+            in_place: None,
+            at: 0,
+            chunk_offset: 0,
+            chunk_counts: BTreeMap::new(),
+        }
+    }
+
+    pub fn name(&self) -> &str {
+        self.file.name()
+    }
+
+    /// Data that were lost so far.
+    pub fn losses(&self) -> &Losses {
+        &self.file.losses
+    }
+
+    /// Chunks so far, by the name of their compression.
+    pub fn chunk_counts(&self) -> &BTreeMap<String, ChunkCount> {
+        &self.chunk_counts
+    }
+
+    /// Whether the end record was found.
+    pub fn is_closed(&self) -> bool {
+        self.file.is_closed
+    }
+
+    /// Opcode and body of the next record, or none at the end. Of an attachment it is the front.
+    ///
+    /// # Errors
+    /// If the file cannot be read. Damage to its content is no error: see [`Self::losses`].
+    pub fn next(&mut self) -> Result<Option<(u8, &[u8])>, Failure> {
+        let Some((op, holder)) = self.advance()? else {
+            return Ok(None);
+        };
+        Ok(Some(match holder {
+            Holder::File => (op, self.file.body()),
+            Holder::Records(range) => (op, &self.records()[range]),
+        }))
+    }
+
+    fn records(&self) -> &[u8] {
+        match &self.in_place {
+            Some(range) => &self.file.body()[range.clone()],
+            None => &self.buffer,
+        }
+    }
+
+    fn advance(&mut self) -> Result<Option<(u8, Holder)>, Failure> {
+        loop {
+            let rest = &self.records()[self.at..];
+            if let Some((op, body)) = split_record(rest) {
+                let start = self.at + RECORD_HEAD;
+                let end = start + body.len();
+                self.at = end;
+                return Ok(Some((op, Holder::Records(start..end))));
+            }
+            // The rest of a chunk that was cut off has been reported already.
+            if !rest.is_empty() && !self.file.is_ended {
+                let at = self.chunk_offset;
+                self.file.losses.add(Loss::Overrun { at });
+            }
+            (self.at, self.in_place) = (0, None);
+            self.buffer.clear();
+            let Some(record) = self.file.next()? else {
+                return Ok(None);
+            };
+            match record.op {
+                op::CHUNK => self.unpack(record),
+                op::ATTACHMENT => {
+                    self.buffer.extend_from_slice(self.file.body());
+                    self.at = self.buffer.len();
+                    return Ok(match self.file.skip()? {
+                        true => Some((record.op, Holder::Records(0..self.at))),
+                        false => None,
+                    });
+                }
+                op => return Ok(Some((op, Holder::File))),
+            }
+        }
+    }
+
+    /// Unpacks the chunk that the file is at; what it holds is delivered next.
+    fn unpack(&mut self, record: FileRecord) {
+        let body = self.file.body();
+        let front = chunk_front(body);
+        if let Some((header, _)) = &front {
+            let count = self.chunk_counts.entry(header.compression.clone());
+            let count = count.or_default();
+            count.chunks += 1;
+            count.packed = count.packed.saturating_add(header.compressed_size);
+            count.unpacked = count.unpacked.saturating_add(header.uncompressed_size);
+        }
+        self.chunk_offset = record.offset;
+        if !record.is_whole {
+            if let Some((header, packed)) = front {
+                // Whatever comes out whole is used; that the chunk is cut off is said anyway.
+                let _ = unpack_part(&header, packed, &mut self.buffer);
+            }
+            return;
+        }
+        match unpack(front.as_ref(), &mut self.buffer) {
+            Ok(Unpacked::Buffer) => {}
+            Ok(Unpacked::InPlace(length)) => {
+                let start = body.len() - front.map_or(0, |(_, rest)| rest.len());
+                self.in_place = Some(start..start + length);
+            }
+            Err(why) => {
+                self.buffer.clear();
+                let span_ns =
+                    front.map(|(header, _)| (header.message_start_time, header.message_end_time));
+                let at = record.offset;
+                self.file.losses.add(Loss::Chunk { at, why, span_ns });
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "reader_tests.rs"]
+mod tests;

@@ -1,0 +1,309 @@
+//! One number of one topic while a file is read.
+
+use std::sync::Arc;
+
+use super::blocks::{Blocks, Spacing};
+use super::channels::{Channels, TopicChannel};
+use super::clock::ClockCheck;
+use super::decode::{Decoder, Reading, Targets};
+use super::order::Sorter;
+use super::record::RawMessage;
+use super::route::Route;
+use super::selection::{FieldRequest, FieldText};
+use super::summary::Tally;
+use super::time::{Stamp, TimeChoice, TimeUsed};
+use super::units::{self, UnitFound};
+use crate::failure::Failure;
+
+/// Messages looked at before the time is chosen.
+const FIRST: usize = 16;
+
+/// How the samples of messages get their times.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct TimeOptions {
+    /// The clock; chosen by the messages if not given.
+    pub time: Option<TimeChoice>,
+    /// Field that holds the spacing of samples, for messages with many of them.
+    pub spacing: Option<String>,
+}
+
+/// What was chosen, for people.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SelectedSignal {
+    /// Topic.
+    pub topic: String,
+    /// Name of the schema.
+    pub schema: String,
+    /// Encoding of its messages.
+    pub encoding: String,
+    /// Field.
+    pub field: String,
+    /// Unit, if the file states it.
+    pub unit: Option<UnitFound>,
+    /// Which time counts, and why.
+    pub time: TimeUsed,
+}
+
+/// A signal whose topic has been found.
+pub(super) struct TopicSignal {
+    /// Name of the file, for people.
+    name: String,
+    /// The first channel of the topic; others must be like it.
+    channel: Arc<TopicChannel>,
+    /// For each channel whether it is of the topic.
+    is_ours: Vec<Option<bool>>,
+    pub selected: SelectedSignal,
+    pub options: TimeOptions,
+    decoder: Decoder,
+    reading: Reading,
+    /// Messages held back until the time is chosen.
+    first: Vec<CopiedMessage>,
+    pub is_time_chosen: bool,
+    pub blocks: Blocks,
+    pub sorter: Sorter,
+    pub clock: ClockCheck,
+    pub tally: Tally,
+    /// The chosen time of the first message minus its log time, in ns.
+    pub log_offset_ns: i64,
+}
+
+/// A message kept for later.
+struct CopiedMessage {
+    log_time_ns: u64,
+    publish_time_ns: u64,
+    data: Vec<u8>,
+}
+
+impl TopicSignal {
+    /// The signal that is asked for, if a message is the first of its topic.
+    pub fn find(
+        request: &FieldRequest,
+        message: &RawMessage,
+        channels: &Channels,
+        options: &TimeOptions,
+        name: &str,
+    ) -> Option<Result<Self, Failure>> {
+        let channel = channels.get(message.channel_id)?;
+        let field = request.field_in(channel, channels)?;
+        let topic = &channel.record.topic;
+        let signal = Self::new(name, channel, field, message, options);
+        Some(signal.map_err(|why| Failure::failed(format_args!("{name}: topic {topic}: {why}"))))
+    }
+
+    fn new(
+        name: &str,
+        channel: &Arc<TopicChannel>,
+        field: FieldText,
+        message: &RawMessage,
+        options: &TimeOptions,
+    ) -> Result<Self, String> {
+        let (encoding, schema) = channel.layout(message.data)?;
+        let route = Route::find(&schema, &field.parts()?)?;
+        let spacing = Spacing::find(&schema, &route, options.spacing.as_deref())?;
+        let stamp = Stamp::find(&schema);
+        let selected = SelectedSignal {
+            topic: channel.record.topic.clone(),
+            schema: channel.schema_name().to_owned(),
+            encoding: channel.record.message_encoding.clone(),
+            field: route.text.clone(),
+            unit: units::find(&route, &channel.record.metadata),
+            time: TimeUsed {
+                choice: TimeChoice::Log,
+                field: stamp.as_ref().map(|stamp| stamp.text.clone()),
+                why: String::new(),
+            },
+        };
+        let targets = Targets {
+            value: route,
+            stamp,
+            spacing: spacing.hops().cloned(),
+        };
+        Ok(Self {
+            name: name.to_owned(),
+            channel: Arc::clone(channel),
+            is_ours: vec![None; 1 << 16],
+            selected,
+            options: options.clone(),
+            decoder: Decoder::new(encoding, &schema, targets),
+            reading: Reading::default(),
+            first: Vec::new(),
+            is_time_chosen: false,
+            blocks: Blocks::new(spacing),
+            sorter: Sorter::default(),
+            clock: ClockCheck::default(),
+            tally: Tally::default(),
+            log_offset_ns: 0,
+        })
+    }
+
+    /// Takes a message if it is of the topic.
+    ///
+    /// # Errors
+    /// If channels of the topic are of different types, or the messages lack the time that is asked for.
+    pub fn take(&mut self, message: &RawMessage, channels: &Channels) -> Result<bool, Failure> {
+        let id = usize::from(message.channel_id);
+        if self.is_ours[id].is_none() {
+            self.is_ours[id] = is_ours(&self.channel, channels, message.channel_id, &self.name)?;
+        }
+        if self.is_ours[id] != Some(true) {
+            return Ok(false);
+        }
+        if self.is_time_chosen {
+            self.decode(message);
+            return Ok(true);
+        }
+        self.first.push(CopiedMessage {
+            log_time_ns: message.log_time_ns,
+            publish_time_ns: message.publish_time_ns,
+            data: message.data.to_vec(),
+        });
+        if self.first.len() == FIRST {
+            self.choose_time()?;
+        }
+        Ok(true)
+    }
+
+    /// Takes note that there are no more messages.
+    ///
+    /// # Errors
+    /// If the messages lack the time that is asked for.
+    pub fn end(&mut self) -> Result<(), Failure> {
+        if !self.is_time_chosen {
+            self.choose_time()?;
+        }
+        let sorter = &mut self.sorter;
+        self.blocks.finish(|time, value| sorter.push(time, value));
+        Ok(())
+    }
+
+    /// Gives away the samples that need not be held back any more, or all.
+    pub fn give(&mut self, all: bool, times_ns: &mut Vec<i64>, values: &mut Vec<f64>) {
+        times_ns.clear();
+        values.clear();
+        self.sorter.give(all, times_ns, values);
+        self.tally.samples(times_ns);
+    }
+
+    fn decode(&mut self, message: &RawMessage) {
+        self.tally.messages += 1;
+        let log_time_ns = message.log_time_ns;
+        if let Err(damage) = self.decoder.read(message.data, &mut self.reading) {
+            self.tally.skip(damage, log_time_ns);
+            return;
+        }
+        let time_ns = self.time_ns(log_time_ns, message.publish_time_ns);
+        if self.selected.time.choice == TimeChoice::Header {
+            self.clock.note(time_ns, log_time_ns);
+        }
+        let Some(time_ns) = time_ns else {
+            self.tally.without_time += 1;
+            return;
+        };
+        let (sorter, reading) = (&mut self.sorter, &self.reading);
+        self.blocks
+            .push(time_ns, &reading.values, reading.spacing, |time, value| {
+                sorter.push(time, value);
+            });
+    }
+
+    /// The chosen time of the message that was decoded last.
+    fn time_ns(&self, log_time_ns: u64, publish_time_ns: u64) -> Option<i64> {
+        match self.selected.time.choice {
+            TimeChoice::Log => i64::try_from(log_time_ns).ok(),
+            TimeChoice::Publish => i64::try_from(publish_time_ns).ok(),
+            TimeChoice::Header => self.reading.stamp_ns(),
+        }
+    }
+
+    /// Takes the time that the user names, or the messages' own stamp if they have one that is set, and
+    /// decodes the messages that were held back.
+    fn choose_time(&mut self) -> Result<(), Failure> {
+        let field = self.selected.time.field.take();
+        if self.options.time == Some(TimeChoice::Header) && field.is_none() {
+            return Err(Failure::failed(format_args!(
+                "{}: topic {}: its messages have no time stamp (header.stamp, stamp or timestamp); \
+                 use --time log or --time publish",
+                self.name, self.selected.topic
+            )));
+        }
+        let first = std::mem::take(&mut self.first);
+        let is_set = first.iter().any(|message| {
+            let read = self.decoder.read(&message.data, &mut self.reading);
+            read.is_ok() && self.reading.stamp_ns().is_some_and(|stamp| stamp != 0)
+        });
+        let (choice, why) = choice_of_time(self.options.time, field.as_deref(), is_set);
+        self.selected.time = TimeUsed {
+            choice,
+            field: field.filter(|_| choice == TimeChoice::Header),
+            why,
+        };
+        self.is_time_chosen = true;
+        for (place, copied) in first.iter().enumerate() {
+            self.decode(&RawMessage {
+                channel_id: self.channel.record.id,
+                log_time_ns: copied.log_time_ns,
+                publish_time_ns: copied.publish_time_ns,
+                data: &copied.data,
+            });
+            if place == 0 {
+                let time_ns = self.time_ns(copied.log_time_ns, copied.publish_time_ns);
+                let log_ns = i64::try_from(copied.log_time_ns).ok();
+                let offset = time_ns.zip(log_ns);
+                self.log_offset_ns = offset.map_or(0, |(time, log)| time.saturating_sub(log));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The time that counts, and why: the one asked for, or what the messages carry in a field.
+fn choice_of_time(
+    asked: Option<TimeChoice>,
+    field: Option<&str>,
+    is_set: bool,
+) -> (TimeChoice, String) {
+    match (asked, field) {
+        (Some(choice), _) => (choice, "as asked".to_owned()),
+        (None, Some(_)) if is_set => (
+            TimeChoice::Header,
+            "the messages carry their own time stamp".to_owned(),
+        ),
+        (None, Some(field)) => (
+            TimeChoice::Log,
+            format!("the field {field} is not set in the first messages"),
+        ),
+        (None, None) => (
+            TimeChoice::Log,
+            "the messages carry no time stamp of their own".to_owned(),
+        ),
+    }
+}
+
+/// Whether a channel is of the topic; none if it is not declared.
+fn is_ours(
+    ours: &TopicChannel,
+    channels: &Channels,
+    id: u16,
+    name: &str,
+) -> Result<Option<bool>, Failure> {
+    let Some(channel) = channels.get(id) else {
+        return Ok(None);
+    };
+    if channel.record.topic != ours.record.topic {
+        return Ok(Some(false));
+    }
+    if channel.has_type_of(ours) {
+        return Ok(Some(true));
+    }
+    Err(Failure::failed(format_args!(
+        "{name}: the topic {} has channels of different types: channel {} is {} in {}, channel {} \
+         is {} in {}; split the file by channel first",
+        ours.record.topic,
+        ours.record.id,
+        ours.schema_name(),
+        ours.record.message_encoding,
+        channel.record.id,
+        channel.schema_name(),
+        channel.record.message_encoding,
+    )))
+}
