@@ -2,7 +2,6 @@
 
 pub mod diagnose;
 pub mod identify;
-pub mod reading;
 pub mod simulate;
 mod values;
 
@@ -12,19 +11,14 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use torqcomp_model::UnitSystem;
 
 use crate::failure::Failure;
-use crate::io::csv;
 use crate::io::digits::Digits;
-use crate::io::mcap::{FieldChoice, TimeChoice};
 use crate::io::output::Output;
-use crate::signal::{self, MessageOptions};
+use crate::io::{ChannelChoice, Reading, frequency, positive_frequency};
 
 pub use diagnose::Diagnose;
-pub use reading::{Marks, Reading, TimeAxis};
 pub use simulate::Simulate;
 pub use values::Orders;
-use values::{
-    clock, decimal, delimiter, digits, frequency, orders, percent, positive_frequency, range,
-};
+use values::{digits, orders, percent, range};
 
 /// True torque from the records of a reaction-torque stand.
 ///
@@ -91,87 +85,18 @@ pub enum Format {
     Mcap,
 }
 
-/// How a record is read.
+/// One channel of a recording.
 #[derive(Debug, Args)]
-pub struct Record {
+pub struct OneChannel {
     /// Recording to read (CSV, TSV, a recorder's text export, or MCAP), or - for standard input
     #[arg(value_name = "INPUT")]
     pub input: String,
-    /// Topic of an MCAP file, as /joint_states
-    #[arg(long, value_name = "TOPIC")]
-    pub topic: Option<String>,
-    /// Field of its messages.
-    #[arg(
-        long,
-        value_name = "FIELD",
-        requires = "topic",
-        help = "Field of its messages: effort[0], 'effort[name=motor]', 'data[:]'; none if it has one number"
-    )]
-    pub field: Option<String>,
-    /// Topic and field in one.
-    #[arg(
-        long,
-        value_name = "PATH",
-        conflicts_with = "topic",
-        help = "Topic and field in one, as '/joint_states.effort[name=motor]'"
-    )]
-    pub signal: Option<String>,
-    /// Time of messages that counts [default: their own stamp if they have one, else log]
-    #[arg(long, value_name = "CLOCK", value_parser = clock)]
-    pub time: Option<TimeChoice>,
-    /// Field with the spacing of the samples, for messages that hold many
-    #[arg(long, value_name = "FIELD")]
-    pub spacing: Option<String>,
-    /// Column with the signal: its heading, with or without the unit, or its number as inspect gives it
-    #[arg(long, value_name = "NAME")]
-    pub channel: Option<String>,
-    /// Unit of the signal, if its heading does not say: V, mV, "N m", "ft lbf", ustrain
-    #[arg(long, value_name = "UNIT")]
-    pub unit: Option<String>,
-    /// Column with the time stamps
-    #[arg(long, value_name = "NAME")]
-    pub time_column: Option<String>,
-    /// Unit of the time stamps, if their heading does not say: s, ms, us, min
-    #[arg(long, value_name = "UNIT")]
-    pub time_unit: Option<String>,
-    /// Sampling rate, where there are no time stamps or they are wrong; with --resample, the rate
-    /// to interpolate to
-    #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = positive_frequency)]
-    pub rate: Option<f64>,
-    /// Interpolate where the time stamps are not uniform, instead of refusing
-    #[arg(long)]
-    pub resample: bool,
-    /// The marks.
+    /// Which channel.
     #[command(flatten)]
-    pub marks: Marks,
-}
-
-impl Record {
-    /// The options that opening a signal takes.
-    #[must_use]
-    pub fn options(&self) -> signal::Options {
-        signal::Options {
-            table: csv::Options {
-                channel: self.channel.clone(),
-                unit: self.unit.clone(),
-                time_column: self.time_column.clone(),
-                time_unit: self.time_unit.clone(),
-                rate_hz: self.rate,
-                resample: self.resample,
-                any_steps: false,
-                told: self.marks.told(),
-            },
-            messages: MessageOptions {
-                selection: FieldChoice {
-                    topic: self.topic.clone(),
-                    field: self.field.clone(),
-                    signal: self.signal.clone(),
-                },
-                time: self.time,
-                spacing: self.spacing.clone(),
-            },
-        }
-    }
+    pub choice: ChannelChoice,
+    /// How it is read.
+    #[command(flatten)]
+    pub reading: Reading,
 }
 
 /// Where a result goes.
@@ -221,7 +146,7 @@ impl Work {
 pub struct Compensate {
     /// The recording.
     #[command(flatten)]
-    pub record: Record,
+    pub record: OneChannel,
     /// The result.
     #[command(flatten)]
     pub result: OutputArgs,
@@ -271,7 +196,7 @@ pub struct Compensate {
 pub struct Extract {
     /// The recording.
     #[command(flatten)]
-    pub record: Record,
+    pub record: OneChannel,
     /// The result.
     #[command(flatten)]
     pub result: OutputArgs,
@@ -291,7 +216,7 @@ pub struct Extract {
 pub struct Harmonics {
     /// The recording.
     #[command(flatten)]
-    pub record: Record,
+    pub record: OneChannel,
     /// The result.
     #[command(flatten)]
     pub result: OutputArgs,

@@ -12,7 +12,7 @@ pub mod pipeline;
 pub mod print;
 pub mod quality;
 pub mod recording;
-pub mod signal;
 pub mod stand;
 pub mod undo;
+pub mod unit;
 pub mod warning;

@@ -133,6 +133,16 @@ pub fn plural(count: usize, noun: &str) -> String {
     }
 }
 
+/// `a, b or c`.
+pub(crate) fn list(items: impl IntoIterator<Item = String>) -> String {
+    let items: Vec<String> = items.into_iter().collect();
+    match items.as_slice() {
+        [] => "none".to_owned(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} or {last}", first.join(", ")),
+    }
+}
+
 /// A unit for people, also where a file says none.
 #[must_use]
 pub fn unit_or_as_recorded(unit: &str) -> &str {

@@ -68,19 +68,16 @@ fn columns() {
         two.as_bytes(),
         &[],
         1,
-        &[
-            "could be the signal",
-            "--channel \"bridge_V\" or \"load_N\"",
-        ],
+        &["could be the signal", "--channel \"bridge\" or \"load\""],
     );
     refused(
         two.as_bytes(),
         &["--channel", "brigde"],
         1,
         &[
-            "no column \"brigde\"",
-            "did you mean \"bridge_V\"",
-            "\"load_N\"",
+            "no channel \"brigde\"",
+            "did you mean \"bridge\"",
+            "\"load\"",
         ],
     );
     refused(

@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{TimeAxis, Work};
+use super::Work;
+use crate::io::Reading;
 
 /// Arguments of `diagnose`.
 #[derive(Debug, Args)]
@@ -18,10 +19,11 @@ pub struct Diagnose {
     /// Hold-out record; may be given several times [default: the last 30 % of each training record]
     #[arg(long, value_name = "FILE")]
     pub holdout: Vec<String>,
-    /// Column with the applied quantity, or the signal of an MCAP file, as '/joint_states.effort[name=motor]'
+    /// Channel with the applied quantity: its number as inspect gives it, heading or name; of an MCAP file topic and
+    /// field, as '/joint_states.effort[name=motor]', or the field of --topic
     #[arg(long, value_name = "COL")]
     pub applied: String,
-    /// Column with the measured quantity, or the signal of an MCAP file
+    /// Channel with the measured quantity
     #[arg(long, value_name = "COL")]
     pub measured: String,
     /// Unit of the applied quantity, if its heading does not say
@@ -30,9 +32,9 @@ pub struct Diagnose {
     /// Unit of the measured quantity, if its heading does not say
     #[arg(long, value_name = "UNIT")]
     pub measured_unit: Option<String>,
-    /// The time axis.
+    /// How the records are read.
     #[command(flatten)]
-    pub axis: TimeAxis,
+    pub reading: Reading,
     /// Write an HTML report with charts of records, models and residuals
     #[arg(long, value_name = "FILE")]
     pub html: Option<String>,

@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use super::{OutputArgs, Reading, Units, range};
+use super::{OutputArgs, Units, range};
 use crate::identify::Motion;
 use crate::identify::response::Excitation;
+use crate::io::{ChannelChoice, Reading};
 
 /// Arguments of `identify`.
 #[derive(Debug, Args)]
@@ -69,9 +70,9 @@ pub struct Decay {
     /// Recordings of free decays of one stand, or - for standard input
     #[arg(value_name = "INPUT", required = true)]
     pub inputs: Vec<String>,
-    /// Column of the signal: its heading, with or without the unit, or its number as printed by inspect
-    #[arg(long, value_name = "NAME")]
-    pub channel: Option<String>,
+    /// Which channel.
+    #[command(flatten)]
+    pub choice: ChannelChoice,
     /// Number of modes [default: chosen from the data]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=20))]
     pub modes: Option<u8>,
@@ -98,13 +99,19 @@ pub struct Response {
     /// Recordings of one stand
     #[arg(value_name = "INPUT", required = true)]
     pub inputs: Vec<String>,
-    /// Column of the excitation: hammer force, exciter force, known torque; or the signal of an MCAP file, such as
-    /// '/joint_states.effort[name=motor]'
+    /// Channel of the excitation (hammer force, exciter force, known torque): its number as inspect gives it, heading or
+    /// name; of an MCAP file topic and field, as '/joint_states.effort[name=motor]', or the field of --topic
     #[arg(long, value_name = "NAME")]
     pub applied: String,
-    /// Column of the response, or the signal of an MCAP file
+    /// Unit of the excitation, if its heading does not say
+    #[arg(long, value_name = "UNIT")]
+    pub applied_unit: Option<String>,
+    /// Channel of the response
     #[arg(long, value_name = "NAME")]
     pub measured: String,
+    /// Unit of the response, if its heading does not say
+    #[arg(long, value_name = "UNIT")]
+    pub measured_unit: Option<String>,
     /// Quantity of the measured channel [default: from its unit]
     #[arg(long, value_enum)]
     pub measured_as: Option<Motion>,

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use torqcomp_model::simulate;
 
-use super::{OutputArgs, TimeAxis, digits};
+use super::{OutputArgs, digits};
+use crate::io::Reading;
 use crate::io::digits::Digits;
 
 /// Arguments of `simulate`.
@@ -20,7 +21,8 @@ pub struct Simulate {
     /// Stand file
     #[arg(long, value_name = "FILE")]
     pub stand: PathBuf,
-    /// Column with the applied quantity, or the signal of an MCAP file, as '/joint_states.effort[name=motor]'
+    /// Channel with the applied quantity: its number as inspect gives it, heading or name; of an MCAP file topic and
+    /// field, as '/joint_states.effort[name=motor]', or the field of --topic
     #[arg(long, value_name = "COL")]
     pub applied: Option<String>,
     /// What the applied quantity does between its samples
@@ -29,9 +31,9 @@ pub struct Simulate {
     /// Unit of the applied quantity, if its heading does not say
     #[arg(long, value_name = "UNIT")]
     pub unit: Option<String>,
-    /// The time axis.
+    /// How the recording is read.
     #[command(flatten)]
-    pub axis: TimeAxis,
+    pub reading: Reading,
     /// Significant digits of the result, 1 to 15, or "shortest" for as many as bring back every bit
     #[arg(long, value_name = "N", default_value = "12", value_parser = digits)]
     pub digits: Digits,

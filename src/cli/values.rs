@@ -1,10 +1,6 @@
 //! Values as people write them on the command line.
 
-use torqcomp_model::Kind;
-
-use crate::io::csv::Delimiter;
 use crate::io::digits::Digits;
-use crate::io::mcap::TimeChoice;
 
 /// Orders of a fundamental, rising.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,56 +9,10 @@ pub struct Orders(pub Vec<f64>);
 /// Most orders that are fitted at once.
 const MOST_ORDERS: usize = 500;
 
-/// A frequency: a number of Hz, or a number with a unit.
-pub fn frequency(text: &str) -> Result<f64, String> {
-    let value = match text.trim().parse::<f64>() {
-        Ok(value) => value,
-        Err(_) => Kind::Frequency.parse(text).map_err(|e| e.to_string())?,
-    };
-    if value.is_finite() && value >= 0.0 {
-        Ok(value)
-    } else {
-        Err("expected a frequency in Hz, such as 2400 or \"2.4 kHz\"".to_owned())
-    }
-}
-
-pub fn positive_frequency(text: &str) -> Result<f64, String> {
-    match frequency(text)? {
-        0.0 => Err("expected a frequency greater than zero".to_owned()),
-        value => Ok(value),
-    }
-}
-
 pub fn percent(text: &str) -> Result<f64, String> {
     match text.trim().trim_end_matches('%').trim().parse::<f64>() {
         Ok(value) if value > 0.0 && value < 50.0 => Ok(value),
         _ => Err("expected per cent between 0 and 50, such as 2".to_owned()),
-    }
-}
-
-pub fn clock(text: &str) -> Result<TimeChoice, String> {
-    TimeChoice::parse(text).ok_or_else(|| "expected log, publish or header".to_owned())
-}
-
-pub fn delimiter(text: &str) -> Result<Delimiter, String> {
-    match text {
-        "tab" | "\t" | "\\t" => Ok(Delimiter::Byte(b'\t')),
-        "space" | "spaces" | " " => Ok(Delimiter::Spaces),
-        "none" => Ok(Delimiter::None),
-        _ => match text.as_bytes() {
-            [byte] if byte.is_ascii_punctuation() && !b".+-\"".contains(byte) => {
-                Ok(Delimiter::Byte(*byte))
-            }
-            _ => Err("expected one of , ; | tab space none".to_owned()),
-        },
-    }
-}
-
-pub fn decimal(text: &str) -> Result<u8, String> {
-    match text {
-        "." | "point" => Ok(b'.'),
-        "," | "comma" => Ok(b','),
-        _ => Err("expected . or ,".to_owned()),
     }
 }
 
@@ -120,13 +70,8 @@ mod tests {
 
     #[test]
     fn values_are_read_as_people_write_them() {
-        assert_eq!(frequency("2400"), Ok(2400.0));
-        assert_eq!(frequency("2.4 kHz"), Ok(2400.0));
-        assert!(frequency("-1").is_err() && frequency("nan").is_err() && frequency("2 V").is_err());
         assert_eq!(orders("1-3,0.5,2").unwrap().0, [0.5, 1.0, 2.0, 3.0]);
         assert!(orders("3-1").is_err() && orders("0").is_err() && orders("a").is_err());
-        assert_eq!(delimiter("tab"), Ok(Delimiter::Byte(b'\t')));
-        assert!(delimiter("ab").is_err());
         assert_eq!(range("0.1..0.2"), Ok((0.1, 0.2)));
         assert!(range("0.2..0.1").is_err());
         assert_eq!(digits("9"), Ok(Digits::Significant(9)));

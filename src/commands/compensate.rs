@@ -16,12 +16,12 @@ use torqcomp_dsp::noise::NoiseGain;
 use self::report::{CompensateReport, NoiseAt, NoiseReport};
 use self::sink::Sink;
 use super::{Outcome, conclude, open_plot, uncertainty, unit_text};
-use crate::cli;
+use crate::cli::{self, OneChannel};
 use crate::failure::Failure;
 use crate::io::Input;
 use crate::io::output::{self, Output};
 use crate::print::{self, Report};
-use crate::signal::{Signal, Summary};
+use crate::recording::{ChannelStream, StreamSummary};
 use crate::stand::{self, Chain, Stand};
 use crate::undo::Undo;
 
@@ -32,7 +32,7 @@ const GAIN_POINTS: usize = 9;
 
 /// All that is settled before the first sample is read.
 struct Plan {
-    signal: Signal,
+    stream: ChannelStream,
     stand: Stand,
     chain: Chain,
     filter: InverseFilter,
@@ -42,7 +42,7 @@ struct Plan {
 
 /// What the reader found, and the samples that the quality of the record is judged by.
 struct Seen {
-    summary: Summary,
+    summary: StreamSummary,
     /// The first samples, converted, as they were recorded.
     excerpt: Vec<f64>,
 }
@@ -89,18 +89,18 @@ impl Plan {
     fn new(args: &cli::Compensate) -> Result<Self, Failure> {
         let stand = stand::read(&args.stand)?;
         stand.mechanics()?;
-        let place = Input::of(&args.record.input);
-        let signal = Signal::open(&place, &args.record.options())?;
-        let chain = stand.chain(
-            &signal.channel.name,
-            signal.channel.unit.as_ref(),
-            args.units.into(),
-        )?;
+        let OneChannel {
+            input,
+            choice,
+            reading,
+        } = &args.record;
+        let stream = ChannelStream::open(&Input::of(input), choice, reading)?;
+        let chain = stand.chain(&stream.name, stream.unit.as_ref(), args.units.into())?;
         let band = match args.band {
-            Some(band_hz) => Band::new(signal.time.rate_hz, band_hz),
-            None => Band::fitting(signal.time.rate_hz, DEFAULT_BAND_HZ),
+            Some(band_hz) => Band::new(stream.rate_hz, band_hz),
+            None => Band::fitting(stream.rate_hz, DEFAULT_BAND_HZ),
         }
-        .map_err(|error| Failure::failed(error).at(&signal.source))?;
+        .map_err(|error| Failure::failed(error).at(&stream.source))?;
         let (filter, undo) = if stand.is_a_response() {
             (InverseFilter::design(stand.inverse()?, band)?, None)
         } else {
@@ -108,7 +108,7 @@ impl Plan {
             (undo.filter().clone(), Some(undo))
         };
         Ok(Self {
-            signal,
+            stream,
             stand,
             chain,
             filter,
@@ -118,18 +118,18 @@ impl Plan {
 
     /// The report as far as it is known before the run.
     fn describe(&self, args: &cli::Compensate, output: &str) -> CompensateReport {
-        let (signal, chain, band) = (&self.signal, &self.chain, self.filter.band());
+        let (stream, chain, band) = (&self.stream, &self.chain, self.filter.band());
         CompensateReport {
-            input: signal.source.clone(),
-            dialect: signal.dialect.clone(),
-            channel: signal.channel.name.clone(),
-            channel_unit: unit_text(signal.channel.unit.as_ref()).to_owned(),
+            input: stream.source.clone(),
+            dialect: stream.dialect.clone(),
+            channel: stream.name.clone(),
+            channel_unit: unit_text(stream.unit.as_ref()).to_owned(),
             stand: self.stand.file.clone(),
             output: output.to_owned(),
             unit: chain.applied.unit.clone(),
             calibration: chain.described.clone(),
-            rate_hz: signal.time.rate_hz,
-            rate_from: signal.time.rate_from(),
+            rate_hz: stream.rate_hz,
+            rate_from: stream.time.rate_from.sentence(stream.time.is_resampled()),
             method: match self.undo {
                 Some(_) => "refined",
                 None if args.whole_record => "whole-record",

@@ -31,7 +31,7 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
     let refined = args.output.as_ref().map(open).transpose()?;
     let html = args.html.as_ref().map(open).transpose()?;
     let output = Output::open(None, args.force, &files)?;
-    let case = read::read(args, stand.as_ref().map(|(stand, _)| stand))?;
+    let (case, is_lossy) = read::read(args, stand.as_ref().map(|(stand, _)| stand))?;
     let is_shown = !args.work.quiet && std::io::stderr().is_terminal();
     let progress = |done: usize, of: usize| {
         if is_shown {
@@ -52,7 +52,7 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
         write(html, &page::page(&diagnosis))?;
     }
     publish(&diagnosis, args.json, output)?;
-    Ok(conclude(&diagnosis.warnings, false, args.strict))
+    Ok(conclude(&diagnosis.warnings, is_lossy, args.strict))
 }
 
 fn write(mut output: Output, text: &str) -> Result<(), Failure> {

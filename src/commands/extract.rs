@@ -2,33 +2,40 @@
 
 use super::rows::{self, Rows, Times};
 use super::{Outcome, conclude};
-use crate::cli::Extract;
+use crate::cli::{Extract, OneChannel};
 use crate::failure::Failure;
-use crate::io::Input;
 use crate::io::output::Output;
 use crate::io::text::Text;
+use crate::io::{Input, Reading};
 use crate::print;
-use crate::signal::{Batch, Record, Signal, Summary};
+use crate::recording::{Block, ChannelStream, StreamSummary, UniformRecord};
 
 /// Runs the verb.
 pub fn run(args: &Extract) -> Result<Outcome, Failure> {
-    let mut options = args.record.options();
-    options.table.any_steps = true;
-    let signal = Signal::open(&Input::of(&args.record.input), &options)?;
+    let OneChannel {
+        input,
+        choice,
+        reading,
+    } = &args.record;
+    let reading = Reading {
+        any_steps: true,
+        ..reading.clone()
+    };
+    let stream = ChannelStream::open(&Input::of(input), choice, &reading)?;
     let inputs = [args.record.input.as_ref()];
     let mut output = args.result.open(&inputs)?;
-    output.write(&heading(&signal))?;
+    output.write(&heading(&stream))?;
     let said = format!(
         "{}: {}; {} Hz {}\n",
-        signal.source,
-        signal.dialect,
-        print::rounded(signal.time.rate_hz, 9),
-        signal.time.rate_from()
+        stream.source,
+        stream.dialect,
+        print::rounded(stream.rate_hz, 9),
+        stream.time.rate_from.sentence(stream.time.is_resampled())
     );
-    let summary = if signal.time.is_resampled() {
-        write_resampled(args, signal, &mut output)?
+    let summary = if stream.time.is_resampled() {
+        write_resampled(args, stream, &mut output)?
     } else {
-        write_as_it_is(args, signal, &mut output)?
+        write_as_it_is(args, stream, &mut output)?
     };
     output.finish()?;
     if !args.quiet {
@@ -40,9 +47,9 @@ pub fn run(args: &Extract) -> Result<Outcome, Failure> {
 }
 
 /// `time_s`, and the name of the channel with its unit in brackets.
-fn heading(signal: &Signal) -> Vec<u8> {
-    let mut name = signal.channel.name.clone();
-    if let Some(unit) = &signal.channel.unit {
+fn heading(stream: &ChannelStream) -> Vec<u8> {
+    let mut name = stream.name.clone();
+    if let Some(unit) = &stream.unit {
         name = format!("{name} [{}]", unit.text);
     }
     if name.contains([',', '"', '\n']) {
@@ -51,35 +58,39 @@ fn heading(signal: &Signal) -> Vec<u8> {
     format!("time_s,{name}\n").into_bytes()
 }
 
-fn write_as_it_is(args: &Extract, signal: Signal, output: &mut Output) -> Result<Summary, Failure> {
-    let (time, start_s) = (signal.time.clone(), signal.first_time_s());
-    let (mut fetch, plan, mut sequence) = signal.into_stream(0);
-    let mut batch = Batch::default();
+fn write_as_it_is(
+    args: &Extract,
+    stream: ChannelStream,
+    output: &mut Output,
+) -> Result<StreamSummary, Failure> {
+    let (grid, rate_hz, start_s) = (stream.time.grid.clone(), stream.rate_hz, stream.start_s);
+    let (mut blocks, plan, mut validator) = stream.into_parts(0);
+    let mut block = Block::default();
     let mut text = Text::default();
     let mut first = 0;
-    while fetch.next(&mut batch)? {
-        batch.read_rows(plan.as_ref(), &time);
-        sequence.accept(&mut batch)?;
+    while blocks.next(&mut block)? {
+        block.read_rows(plan.as_ref(), grid.as_ref());
+        validator.accept(&mut block)?;
         let rows = Rows {
             digits: args.digits,
             scale: 1.0,
-            rate_hz: time.rate_hz,
-            times: Times::of(&batch, &time, start_s, first),
+            rate_hz,
+            times: Times::of(&block, grid.as_ref(), start_s, first),
         };
         text.clear();
-        rows.write(&mut text, &batch.rows.values, &[]);
+        rows.write(&mut text, &block.rows.values, &[]);
         output.write(text.as_bytes())?;
-        first += batch.rows.values.len();
+        first += block.rows.values.len();
     }
-    sequence.finish(&mut fetch)
+    validator.finish(blocks.as_mut())
 }
 
 fn write_resampled(
     args: &Extract,
-    signal: Signal,
+    stream: ChannelStream,
     output: &mut Output,
-) -> Result<Summary, Failure> {
-    let record = Record::read(signal, |_| Ok(()))?;
+) -> Result<StreamSummary, Failure> {
+    let record = UniformRecord::read(stream, |_| Ok(()))?;
     let axis = (record.rate_hz, record.start_s);
     rows::write_uniform(output, args.digits, axis, &record.samples)?;
     Ok(record.summary)

@@ -7,14 +7,14 @@ use serde::Serialize;
 use torqcomp_dsp::harmonics::{self, Fundamental, refine_fundamental};
 
 use super::{Outcome, conclude, publish, unit_text};
-use crate::cli;
+use crate::cli::{self, OneChannel};
 use crate::failure::Failure;
 use crate::io::Input;
-use crate::io::csv::Column;
 use crate::print::{Report, columns, rounded, short};
 use crate::quality::excerpt;
-use crate::signal::{Record, Signal};
+use crate::recording::{ChannelStream, UniformRecord};
 use crate::stand::{self, Chain, Stand};
+use crate::unit::NamedUnit;
 use crate::warning::Warning;
 
 /// Distance of the record from time zero, in its own lengths, up to which phases refer to zero.
@@ -79,17 +79,20 @@ struct ComponentTorque {
 pub fn run(args: &cli::Harmonics) -> Result<Outcome, Failure> {
     let stand = stand::read(&args.stand)?;
     stand.mechanics()?;
-    let signal = Signal::open(&Input::of(&args.record.input), &args.record.options())?;
-    let chain = stand.chain(
-        &signal.channel.name,
-        signal.channel.unit.as_ref(),
-        args.units.into(),
-    )?;
+    let OneChannel {
+        input,
+        choice,
+        reading,
+    } = &args.record;
+    let stream = ChannelStream::open(&Input::of(input), choice, reading)?;
+    let chain = stand.chain(&stream.name, stream.unit.as_ref(), args.units.into())?;
     let inputs = [args.record.input.as_ref(), args.stand.as_path()];
     let output = args.result.open(&inputs)?;
-    let (source, channel) = (signal.source.clone(), signal.channel.clone());
-    let record = Record::read(signal, |values| super::convert(&chain, values))?;
-    let report = fit(args, &stand, &chain, &record, &source, &channel);
+    let source = stream.source.clone();
+    let (name, unit) = (stream.name.clone(), stream.unit.clone());
+    let record = UniformRecord::read(stream, |values| super::convert(&chain, values))?;
+    let channel = (name.as_str(), unit.as_ref());
+    let report = fit(args, &stand, &chain, &record, &source, channel);
     let report = report.map_err(|failure| failure.at(&source))?;
     publish(&report, args.json, output)?;
     Ok(conclude(
@@ -103,9 +106,9 @@ fn fit(
     args: &cli::Harmonics,
     stand: &Stand,
     chain: &Chain,
-    record: &Record,
+    record: &UniformRecord,
     source: &str,
-    channel: &Column,
+    (channel, channel_unit): (&str, Option<&NamedUnit>),
 ) -> Result<HarmonicsReport, Failure> {
     let samples = &record.samples;
     let duration_s = samples.len() as f64 / record.rate_hz;
@@ -140,7 +143,7 @@ fn fit(
     warnings.extend(excerpt::warnings(
         seen,
         excerpt::Of {
-            name: &channel.name,
+            name: channel,
             unit: &chain.applied.unit,
             scale: printed,
             rate_hz: record.rate_hz,
@@ -150,8 +153,8 @@ fn fit(
     ));
     Ok(HarmonicsReport {
         input: source.to_owned(),
-        channel: channel.name.clone(),
-        channel_unit: unit_text(channel.unit.as_ref()).to_owned(),
+        channel: channel.to_owned(),
+        channel_unit: unit_text(channel_unit).to_owned(),
         stand: stand.file.clone(),
         calibration: chain.described.clone(),
         unit: chain.applied.unit.clone(),

@@ -18,10 +18,10 @@ use torqcomp_model::InverseUncertainty;
 
 use crate::cli::{Cli, OutputArgs, Verb};
 use crate::failure::Failure;
-use crate::io::csv::NamedUnit;
 use crate::io::output::{self, Output};
 use crate::print::{self, Report};
 use crate::stand::{Chain, Stand};
+use crate::unit::NamedUnit;
 use crate::warning::Warning;
 
 /// How a command ended well.

@@ -3,11 +3,11 @@
 use std::ops::Range;
 
 use crate::failure::Failure;
-use crate::io::csv::{TimeAxis, TimeSource, place_of};
+use crate::io::csv::place_of;
 use crate::io::digits::{self, Decimal, Digits};
 use crate::io::output::Output;
 use crate::io::text::Text;
-use crate::signal::Batch;
+use crate::recording::{Block, StampGrid};
 
 /// Rows whose numbers are taken apart together.
 const ROWS_TOGETHER: usize = 8;
@@ -70,28 +70,27 @@ pub(super) fn write_uniform(
 }
 
 impl<'a> Times<'a> {
-    /// The times of a batch whose first sample is the `first` of the record.
-    pub(super) fn of(batch: &'a Batch, time: &TimeAxis, start_s: f64, first: usize) -> Self {
-        let times = &batch.rows.times;
-        match &time.source {
-            TimeSource::Given
-            | TimeSource::Header { .. }
-            | TimeSource::Stamps {
-                resampled: true, ..
-            } => Self::Grid { start_s, first },
-            TimeSource::Stamps { copied: true, .. } => Self::Copied {
-                text: &batch.text,
-                spans: &batch.rows.time_text,
+    /// The times of a block whose first sample is the `first` of the record.
+    pub(super) fn of(
+        block: &'a Block,
+        grid: Option<&StampGrid>,
+        start_s: f64,
+        first: usize,
+    ) -> Self {
+        let times = &block.rows.times;
+        match grid.filter(|grid| !grid.resampled) {
+            None => Self::Grid { start_s, first },
+            Some(grid) if grid.copied => Self::Copied {
+                text: &block.text,
+                spans: &block.rows.time_text,
             },
-            TimeSource::Stamps { origin_ns, .. } if *origin_ns != 0 => Self::Nanoseconds {
+            Some(grid) if grid.origin_ns != 0 => Self::Nanoseconds {
                 times,
-                origin: *origin_ns,
+                origin: grid.origin_ns,
             },
-            TimeSource::Stamps {
-                seconds_per_unit, ..
-            } => Self::Stamps {
+            Some(grid) => Self::Stamps {
                 times,
-                seconds: *seconds_per_unit,
+                seconds: grid.seconds_per_unit,
             },
         }
     }

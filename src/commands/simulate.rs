@@ -8,12 +8,11 @@ use torqcomp_model::{Estimate, Kind, Unit};
 use super::{Outcome, conclude, report_beside, rows};
 use crate::cli;
 use crate::failure::Failure;
-use crate::io::Input;
-use crate::io::csv::NamedUnit;
+use crate::io::{ChannelChoice, Flags, Input};
 use crate::print::{Report, short};
-use crate::signal::Together;
-use crate::signal::together::Track;
+use crate::recording::{AlignedChannel, AlignedChannels};
 use crate::stand::{self, Given, Stand};
+use crate::unit::NamedUnit;
 use crate::warning::Warning;
 
 /// Relative change of the result at which the step of integration is fine enough.
@@ -43,11 +42,13 @@ struct SimulateReport {
 /// Runs the verb.
 pub fn run(args: &cli::Simulate) -> Result<Outcome, Failure> {
     let stand = stand::read(&args.stand)?;
-    let options = args
-        .axis
-        .options(args.applied.as_deref(), args.unit.as_deref());
-    let read = Together::read(&Input::of(&args.input), &[options])?;
-    let chosen = &read.tracks[0];
+    let flags = Flags {
+        channel: "--applied",
+        unit: Some("--unit"),
+    };
+    let choice = ChannelChoice::of(flags, args.applied.as_deref(), args.unit.as_deref());
+    let read = AlignedChannels::read(&Input::of(&args.input), &[choice], &args.reading)?;
+    let chosen = &read.channels[0];
     if args.json && args.result.is_stdout() {
         return Err(Failure::usage(
             "the record and the JSON document cannot both go to standard output; give -o FILE",
@@ -60,7 +61,7 @@ pub fn run(args: &cli::Simulate) -> Result<Outcome, Failure> {
     }
     let inputs = [args.input.as_ref(), args.stand.as_path()];
     let mut output = args.result.open(&inputs)?;
-    let mut warnings: Vec<Warning> = read.lost.iter().chain(&read.warnings).cloned().collect();
+    let mut warnings = read.warnings.clone();
     let units = ChannelUnits::of(&stand, chosen, &mut warnings)?;
     let applied: Vec<f64> = chosen.samples.iter().map(|u| u * units.applied).collect();
     let model = model(&stand, units.gain)?;
@@ -89,7 +90,7 @@ pub fn run(args: &cli::Simulate) -> Result<Outcome, Failure> {
         warnings,
     };
     report_beside(&report, args.json, args.quiet || args.json)?;
-    Ok(conclude(&report.warnings, read.lost.is_some(), args.strict))
+    Ok(conclude(&report.warnings, read.is_lossy, args.strict))
 }
 
 impl Report for SimulateReport {
@@ -127,7 +128,11 @@ struct ChannelUnits {
 }
 
 impl ChannelUnits {
-    fn of(stand: &Stand, chosen: &Track, warnings: &mut Vec<Warning>) -> Result<Self, Failure> {
+    fn of(
+        stand: &Stand,
+        chosen: &AlignedChannel,
+        warnings: &mut Vec<Warning>,
+    ) -> Result<Self, Failure> {
         let gain = match &stand.mechanics()?.given {
             Given::Modal {
                 static_gain: Some(gain),
@@ -158,7 +163,7 @@ impl ChannelUnits {
 
 /// The unit of the applied column, which must be one that the stand takes.
 fn applied_unit(
-    chosen: &Track,
+    chosen: &AlignedChannel,
     expected: &str,
     warnings: &mut Vec<Warning>,
 ) -> Result<NamedUnit, Failure> {

@@ -6,6 +6,9 @@ mod input;
 pub mod mcap;
 pub mod number;
 pub mod output;
+mod reading;
 pub mod text;
 
 pub use input::Input;
+pub use reading::{ChannelChoice, DialectOverride, Flags, Reading};
+pub(crate) use reading::{frequency, positive_frequency};

@@ -1,6 +1,6 @@
 //! What is wrong with a record that a verb works on, told from as much of it as may be kept.
 
-use crate::recording::Axis;
+use crate::recording::TimeAxis;
 use crate::warning::Warning;
 
 /// Samples that are kept of a record that goes by as a stream.
@@ -63,7 +63,7 @@ pub fn of_memory(mut samples: Vec<f64>) -> Vec<f64> {
 #[must_use]
 pub fn warnings(samples: &[f64], of: Of) -> Vec<Warning> {
     let scaled: Vec<f64> = samples.iter().map(|sample| sample * of.scale).collect();
-    let axis = Axis::of_header("rate", of.rate_hz, Some(of.start_s));
+    let axis = TimeAxis::of_header("rate", of.rate_hz, Some(of.start_s));
     let mut found = super::warnings(of.name, of.unit, &scaled, &axis);
     if samples.len() < of.samples {
         let rest = format!(

@@ -10,7 +10,7 @@ pub mod time;
 
 use std::collections::HashMap;
 
-use crate::recording::{Axis, Channel};
+use crate::recording::{Channel, TimeAxis};
 use crate::warning::Warning;
 
 pub use samples::Findings;
@@ -22,14 +22,14 @@ pub use time::TimeFindings;
 ///
 /// ```
 /// use torqcomp::quality;
-/// use torqcomp::recording::Axis;
+/// use torqcomp::recording::TimeAxis;
 /// let samples: Vec<f64> = (0..1000).map(|i| (0.1 * f64::from(i)).sin().min(0.7)).collect();
-/// let axis = Axis::of_header("Delta_X", 1000.0, None);
+/// let axis = TimeAxis::of_header("Delta_X", 1000.0, None);
 /// let found = quality::warnings("torque", "N m", &samples, &axis);
 /// assert_eq!(found[0].code, "clipped");
 /// ```
 #[must_use]
-pub fn warnings(name: &str, unit: &str, samples: &[f64], axis: &Axis) -> Vec<Warning> {
+pub fn warnings(name: &str, unit: &str, samples: &[f64], axis: &TimeAxis) -> Vec<Warning> {
     let mut found = TimeFindings::of(axis).warnings(&format!("\"{name}\""), axis);
     let findings = Findings::of(samples, axis.rate_hz);
     found.extend(findings.warnings(name, unit, axis, &[]));
@@ -104,7 +104,7 @@ pub(crate) fn with_unit(value: f64, unit: &str, digits: u32) -> String {
 }
 
 /// Where a sample lies, for people: its time if that is known, or its number from 1.
-fn place(axis: &Axis, index: usize) -> String {
+fn place(axis: &TimeAxis, index: usize) -> String {
     let stamp = axis.stamps_s.as_ref().and_then(|t| t.get(index).copied());
     let counted = || {
         axis.rate_hz

@@ -10,7 +10,7 @@ use torqcomp_dsp::quality::{Run, is_straight, range};
 
 use super::{place, with_unit};
 use crate::print::{rounded, short};
-use crate::recording::{Axis, Hole, HoleKind};
+use crate::recording::{Hole, HoleKind, TimeAxis};
 use crate::warning::Warning;
 
 /// Levels in the range below which a resolution is coarse: 8 bits.
@@ -97,7 +97,13 @@ impl Findings {
     /// ([`super::constant`], [`super::coarse`]). `holes` are the cells that held no number, as far as
     /// they are known.
     #[must_use]
-    pub fn warnings(&self, name: &str, unit: &str, axis: &Axis, holes: &[Hole]) -> Vec<Warning> {
+    pub fn warnings(
+        &self,
+        name: &str,
+        unit: &str,
+        axis: &TimeAxis,
+        holes: &[Hole],
+    ) -> Vec<Warning> {
         let mut found = Vec::new();
         found.extend(
             self.non_finite
@@ -129,7 +135,7 @@ fn mean_and_std(samples: &[f64]) -> Option<(f64, f64)> {
     (count > 0.0).then(|| (mean, (square / count).sqrt()))
 }
 
-fn non_finite_cells(name: &str, found: &NonFinite, axis: &Axis, holes: &[Hole]) -> Warning {
+fn non_finite_cells(name: &str, found: &NonFinite, axis: &TimeAxis, holes: &[Hole]) -> Warning {
     let kinds = [
         (HoleKind::Empty, "empty"),
         (HoleKind::Missing, "beyond the end of their line"),
@@ -162,7 +168,7 @@ fn non_finite_cells(name: &str, found: &NonFinite, axis: &Axis, holes: &[Hole]) 
     )
 }
 
-fn clipped(name: &str, unit: &str, end: &str, rail: &Rail, axis: &Axis) -> Warning {
+fn clipped(name: &str, unit: &str, end: &str, rail: &Rail, axis: &TimeAxis) -> Warning {
     Warning::new(
         "clipped",
         format!(
@@ -178,7 +184,7 @@ fn clipped(name: &str, unit: &str, end: &str, rail: &Rail, axis: &Axis) -> Warni
     )
 }
 
-fn stuck(name: &str, unit: &str, runs: &[Run], axis: &Axis) -> Option<Warning> {
+fn stuck(name: &str, unit: &str, runs: &[Run], axis: &TimeAxis) -> Option<Warning> {
     let longest = runs.iter().max_by_key(|run| run.length)?;
     let samples: usize = runs.iter().map(|run| run.length).sum();
     Some(Warning::new(
@@ -194,7 +200,7 @@ fn stuck(name: &str, unit: &str, runs: &[Run], axis: &Axis) -> Option<Warning> {
     ))
 }
 
-fn repeated(name: &str, found: &Repeats, axis: &Axis) -> Warning {
+fn repeated(name: &str, found: &Repeats, axis: &TimeAxis) -> Warning {
     let percent = rounded(100.0 * found.fraction, 3);
     let rate = axis.rate_hz.map_or_else(String::new, |rate_hz| {
         format!(

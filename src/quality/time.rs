@@ -6,7 +6,7 @@ use torqcomp_dsp::quality::rounding::{Rounded, rounded};
 use torqcomp_dsp::quality::steps::{Event, Events, Steps, rounded_steps, steps};
 
 use crate::print::rounded as number;
-use crate::recording::{Axis, Channel};
+use crate::recording::{Channel, TimeAxis};
 use crate::warning::Warning;
 
 /// Largest deviation of a step, as a part of it, in an axis that counts as uniform.
@@ -28,7 +28,7 @@ pub struct TimeFindings {
 impl TimeFindings {
     /// Looks at an axis.
     #[must_use]
-    pub fn of(axis: &Axis) -> Self {
+    pub fn of(axis: &TimeAxis) -> Self {
         let Some(stamps_s) = &axis.stamps_s else {
             return Self::default();
         };
@@ -54,7 +54,7 @@ impl TimeFindings {
 
     /// The warnings; `whose` names the channels that the axis belongs to.
     #[must_use]
-    pub fn warnings(&self, whose: &str, axis: &Axis) -> Vec<Warning> {
+    pub fn warnings(&self, whose: &str, axis: &TimeAxis) -> Vec<Warning> {
         let mut found: Vec<Warning> = missing(whose, axis).into_iter().collect();
         if let Some(assumed) = &axis.assumed {
             found.push(Warning::new("time-assumed", format!("{whose}: {assumed}")));
@@ -107,7 +107,7 @@ pub fn stamps_in_channel(name: &str, channel: &Channel) -> Option<Warning> {
     ))
 }
 
-fn missing(whose: &str, axis: &Axis) -> Option<Warning> {
+fn missing(whose: &str, axis: &TimeAxis) -> Option<Warning> {
     if axis.rate_hz.is_some() {
         return None;
     }
@@ -242,21 +242,21 @@ mod tests {
 
     use super::*;
 
-    fn codes(axis: &Axis) -> Vec<&'static str> {
+    fn codes(axis: &TimeAxis) -> Vec<&'static str> {
         let found = TimeFindings::of(axis).warnings("\"a\"", axis);
         found.iter().map(|w| w.code).collect()
     }
 
-    fn stamped(stamps: Vec<f64>) -> Axis {
-        Axis::of_stamps("t", Arc::new(stamps))
+    fn stamped(stamps: Vec<f64>) -> TimeAxis {
+        TimeAxis::of_stamps("t", Arc::new(stamps))
     }
 
     #[test]
     fn each_fault_has_its_code_and_a_good_axis_none() {
         let good: Vec<f64> = (0..1000).map(|i| 1e-3 * f64::from(i)).collect();
         assert!(codes(&stamped(good.clone())).is_empty());
-        assert!(codes(&Axis::of_header("Delta_X", 1000.0, None)).is_empty());
-        assert_eq!(codes(&Axis::default()), ["missing-rate"]);
+        assert!(codes(&TimeAxis::of_header("Delta_X", 1000.0, None)).is_empty());
+        assert_eq!(codes(&TimeAxis::default()), ["missing-rate"]);
 
         let mut gap = good.clone();
         gap.iter_mut().skip(400).for_each(|t| *t += 0.005);

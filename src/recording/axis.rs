@@ -2,18 +2,25 @@
 
 use std::sync::Arc;
 
-use torqcomp_dsp::quality::rounding::rounded;
+use torqcomp_dsp::quality::rounding::{Rounded, rounded};
+
+use super::stamps::StampGrid;
+use crate::io::digits;
 
 /// Largest deviation of a step from the usual one, as a fraction of it, in a record that has a rate.
 const USUAL: f64 = 0.25;
 /// Relative difference of the usual step from the mean one that leaves nothing to be asked.
 const SAME: f64 = 1e-3;
+/// Fewest steps unlike the others that speak for rounding: one or two are gaps.
+const FEWEST_UNLIKE: usize = 3;
+/// Largest deviation of a step, as a fraction of it, that counts as uniform.
+pub(super) const UNIFORM: f64 = 0.01;
 /// Deviations among which steps are averaged where there are gaps.
 const CLOSE: [f64; 2] = [0.01, 0.05];
 
 /// The time axis of a channel.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Axis {
+pub struct TimeAxis {
     /// Samples a second; `None` if the file says nothing of it, or if its stamps have no usual step.
     pub rate_hz: Option<f64>,
     /// Where the rate comes from.
@@ -24,6 +31,10 @@ pub struct Axis {
     pub start_text: Option<String>,
     /// Time of each sample in seconds, as read.
     pub stamps_s: Option<Arc<Vec<f64>>>,
+    /// Heading of the column of stamps, or what they are.
+    pub stamps_in: Option<String>,
+    /// Of samples that pass as a stream, the grid that their stamps lie on.
+    pub(crate) grid: Option<StampGrid>,
     /// Rate that the head of the file gives, in Hz, used or not.
     pub header_rate_hz: Option<f64>,
     /// What was taken for granted about the axis and should be confirmed before results rest on it:
@@ -54,6 +65,20 @@ impl RateFrom {
             Self::Given => "given".to_owned(),
             Self::Header(words) => format!("header: {words}"),
             Self::Stamps(heading) => format!("stamps: {heading}"),
+        }
+    }
+
+    /// As part of a sentence.
+    #[must_use]
+    pub fn sentence(&self, resampled: bool) -> String {
+        match self {
+            Self::None => "unknown".to_owned(),
+            Self::Given => "given with --rate".to_owned(),
+            Self::Header(words) => format!("from the head of the file: {words}"),
+            Self::Stamps(heading) if resampled => {
+                format!("from the stamps in \"{heading}\", interpolated")
+            }
+            Self::Stamps(heading) => format!("from the uniform stamps in \"{heading}\""),
         }
     }
 }
@@ -123,29 +148,37 @@ fn equal_step(stamps: &[f64]) -> Option<f64> {
 
 /// Usual step of stamps, or that of the straight line that they are but for being rounded: 3 and 4 ms
 /// by turns are a step of 3.5 ms.
-fn step_of(stamps_s: &[f64]) -> Option<f64> {
+pub(super) fn step_of(stamps_s: &[f64]) -> Option<f64> {
     let step = typical_step(stamps_s)?;
     let span = stamps_s.last()? - stamps_s.first()?;
     let mean = span / (stamps_s.len() - 1) as f64;
     if (step / mean - 1.0).abs() <= SAME {
         return Some(step);
     }
-    Some(rounded(stamps_s).map_or(step, |line| line.step_s))
+    Some(rounding(stamps_s, step).map_or(step, |line| line.step_s))
 }
 
-impl Axis {
+/// How stamps about a step apart are rounded, if that is all that is wrong with them.
+pub(super) fn rounding(stamps_s: &[f64], step: f64) -> Option<Rounded> {
+    let unlike = |pair: &&[f64]| ((pair[1] - pair[0]) / step - 1.0).abs() > UNIFORM;
+    let some = stamps_s.windows(2).filter(unlike).take(FEWEST_UNLIKE);
+    rounded(stamps_s).filter(|_| some.count() == FEWEST_UNLIKE)
+}
+
+impl TimeAxis {
     /// An axis of stamps in seconds.
     #[must_use]
     pub fn of_stamps(heading: &str, stamps_s: Arc<Vec<f64>>) -> Self {
         let step = step_of(&stamps_s);
         let rate_hz = step
-            .map(|step| crate::io::csv::without_rounding(1.0 / step))
+            .map(|step| without_rounding(1.0 / step))
             .filter(|hz| hz.is_finite() && *hz > 0.0);
         Self {
             rate_hz,
             rate_from: rate_hz.map_or(RateFrom::None, |_| RateFrom::Stamps(heading.to_owned())),
             start_s: stamps_s.first().copied().filter(|t| t.is_finite()),
             stamps_s: Some(stamps_s),
+            stamps_in: Some(heading.to_owned()),
             ..Self::default()
         }
     }
@@ -160,5 +193,36 @@ impl Axis {
             header_rate_hz: Some(rate_hz),
             ..Self::default()
         }
+    }
+}
+
+/// A rate without the rounding of the stamps it was found from: nine digits, if they say the same.
+pub(crate) fn without_rounding(rate_hz: f64) -> f64 {
+    let short: f64 = digits::text(rate_hz, 9).parse().unwrap_or(rate_hz);
+    if (short / rate_hz - 1.0).abs() < 1e-10 {
+        short
+    } else {
+        rate_hz
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rates_lose_rounding_but_not_digits() {
+        assert_eq!(without_rounding(20_000.000_000_000_735), 20_000.0);
+        assert_eq!(without_rounding(20_000.001), 20_000.001);
+        assert_eq!(without_rounding(610.351_562_5), 610.351_562_5);
+        assert_eq!(without_rounding(1000.0 / 3.0), 1000.0 / 3.0);
+    }
+
+    #[test]
+    fn usual_step_is_not_moved_by_a_gap() {
+        let mut times: Vec<f64> = (0..100).map(|i| 0.002 * f64::from(i)).collect();
+        times.push(5.0);
+        assert!((typical_step(&times).unwrap() - 0.002).abs() < 1e-12);
+        assert_eq!(typical_step(&[1.0, 1.0]), None);
     }
 }

@@ -1,89 +1,135 @@
-//! Signals of an MCAP file as the channels of a recording, each as a whole in memory.
+//! Numbers in the messages of an MCAP file as the channels of a recording, each as a whole in memory.
 
 use std::sync::Arc;
 
-use super::{Axis, Channel, Recording};
+use super::{Channel, Recording, TimeAxis};
 use crate::failure::Failure;
-use crate::io::Input;
-use crate::io::csv::NamedUnit;
-use crate::io::mcap::{self, FieldChoice, SelectedSignal, TimeOptions, time::TimeUsed};
+use crate::io::mcap::{
+    self, FieldChoice, SelectedSignal, SignalSummary, TimeOptions, time::TimeUsed,
+};
+use crate::io::{ChannelChoice, Input, Reading};
+use crate::unit::NamedUnit;
+use crate::warning::Warning;
 
-/// The signals that are named as `--signal` names them, or the only one in the file for `None`. Their
-/// stamps are counted from the first sample of the first one.
+/// The numbers that are chosen, in that order, or the only one in the file. Their stamps are counted from the first
+/// sample of the first one.
 ///
 /// # Errors
-/// If the file cannot be read, or a signal is not in it: then with what is there.
-pub fn read(place: &Input, wanted: &[Option<&str>]) -> Result<Recording, Failure> {
-    let choice = |signal: &Option<&str>| FieldChoice {
-        signal: signal.map(str::to_owned),
-        ..FieldChoice::default()
-    };
-    let choices: Vec<_> = wanted.iter().map(choice).collect();
-    let mut held = vec![(Vec::new(), Vec::new()); wanted.len()];
-    let options = TimeOptions::default();
-    let results = mcap::read_fields(place, &choices, &options, |signal, times_ns, values| {
-        held[signal].0.extend_from_slice(times_ns);
-        held[signal].1.extend_from_slice(values);
+/// If the file cannot be read, or a number is not in it: then with what is there.
+pub(super) fn read(
+    input: &Input,
+    choices: &[ChannelChoice],
+    reading: &Reading,
+) -> Result<Recording, Failure> {
+    let fields: Vec<FieldChoice> = choices.iter().map(|c| field(c, reading)).collect();
+    let mut held = vec![(Vec::new(), Vec::new()); choices.len()];
+    let options = times(reading);
+    let results = mcap::read_fields(input, &fields, &options, |number, times_ns, values| {
+        held[number].0.extend_from_slice(times_ns);
+        held[number].1.extend_from_slice(values);
     })?;
-    let mut recording = Recording::empty("mcap", place.name());
+    let mut recording = Recording::empty("mcap", input.name());
     let origin_ns = held
         .iter()
         .find_map(|(times_ns, _)| times_ns.first().copied());
-    for ((signal, result), (times_ns, samples)) in wanted.iter().zip(results).zip(held) {
+    for ((choice, result), (times_ns, samples)) in choices.iter().zip(results).zip(held) {
         let (selected, summary) = result?;
-        describe(&selected, &mut recording.dialect);
-        let mut warnings = summary.warnings;
-        if summary.is_lossy && recording.lost.is_none() && !warnings.is_empty() {
-            recording.lost = Some(warnings.remove(0));
+        let described = describe(&selected);
+        if !recording.dialect.contains(&described) {
+            let joint = if recording.dialect.is_empty() {
+                "MCAP,"
+            } else {
+                ";"
+            };
+            recording.dialect += &format!("{joint} {described}");
+        }
+        let (lost, warnings) = losses(summary);
+        match recording.lost {
+            None => recording.lost = lost,
+            Some(_) => recording.warnings.extend(lost),
         }
         recording.warnings.extend(warnings);
         let seconds = |time_ns: &i64| time_ns.wrapping_sub(origin_ns.unwrap_or(0)) as f64 * 1e-9;
         let stamps_s = times_ns.iter().map(seconds).collect();
-        let channel = channel(*signal, &selected, samples, stamps_s, origin_ns);
-        recording.channels.push(channel);
+        let mut axis = TimeAxis::of_stamps(&clock(&selected.time), Arc::new(stamps_s));
+        axis.start_text = origin_ns.map(|ns| format!("{ns} ns"));
+        recording.channels.push(Channel {
+            heading: choice.channel.clone().unwrap_or_else(|| name(&selected)),
+            name: name(&selected),
+            unit: unit(&selected),
+            unit_text: selected.unit.as_ref().map(|found| found.unit.clone()),
+            samples,
+            holes: Vec::new(),
+            axis,
+            segment: None,
+        });
     }
     Ok(recording)
 }
 
-/// Adds what a signal's messages are to the description of a file, unless it is in it.
-fn describe(selected: &SelectedSignal, dialect: &mut String) {
-    let TimeUsed { choice, field, why } = &selected.time;
-    let time = field
-        .clone()
-        .unwrap_or_else(|| format!("{} time", choice.name()));
-    let described = format!(
-        "{} {}, time: {time} ({why})",
-        selected.encoding, selected.schema
-    );
-    if !dialect.contains(&described) {
-        let joint = if dialect.is_empty() { "MCAP" } else { ";" };
-        *dialect += &format!("{joint} {described}");
+/// Topic and field of a choice. Where a topic is given, a channel is named by the field alone.
+pub(super) fn field(choice: &ChannelChoice, reading: &Reading) -> FieldChoice {
+    let topic = reading.topic.clone();
+    match (&topic, &choice.field, &choice.signal, &choice.channel) {
+        (Some(_), None, None, Some(field)) => FieldChoice {
+            topic,
+            field: Some(field.clone()),
+            signal: None,
+        },
+        (_, field, signal, channel) => FieldChoice {
+            topic,
+            field: field.clone(),
+            signal: signal.clone().or_else(|| channel.clone()),
+        },
     }
 }
 
-fn channel(
-    signal: Option<&str>,
-    chosen: &SelectedSignal,
-    samples: Vec<f64>,
-    stamps_s: Vec<f64>,
-    origin_ns: Option<i64>,
-) -> Channel {
-    let name = if chosen.field.is_empty() {
-        chosen.topic.clone()
-    } else {
-        format!("{}.{}", chosen.topic, chosen.field)
-    };
-    let unit_text = chosen.unit.as_ref().map(|found| found.unit.clone());
-    let mut axis = Axis::of_stamps("stamps of the messages", Arc::new(stamps_s));
-    axis.start_text = origin_ns.map(|ns| format!("{ns} ns"));
-    Channel {
-        heading: signal.unwrap_or(&name).to_owned(),
-        name,
-        unit: unit_text.as_deref().and_then(NamedUnit::parse),
-        unit_text,
-        samples,
-        holes: Vec::new(),
-        axis,
-        segment: None,
+/// Which time of the messages counts.
+pub(crate) fn times(reading: &Reading) -> TimeOptions {
+    TimeOptions {
+        time: reading.time,
+        spacing: reading.spacing.clone(),
     }
+}
+
+/// Topic and field in one.
+pub(super) fn name(chosen: &SelectedSignal) -> String {
+    match chosen.field.as_str() {
+        "" => chosen.topic.clone(),
+        field => format!("{}.{field}", chosen.topic),
+    }
+}
+
+/// Which time of the messages is taken.
+pub(super) fn clock(used: &TimeUsed) -> String {
+    match &used.field {
+        Some(field) => field.clone(),
+        None => format!("{} time", used.choice.name()),
+    }
+}
+
+/// `cdr sensor_msgs/msg/JointState, time: header.stamp (the messages carry their own time stamp)`.
+pub(super) fn describe(chosen: &SelectedSignal) -> String {
+    format!(
+        "{} {}, time: {} ({})",
+        chosen.encoding,
+        chosen.schema,
+        clock(&chosen.time),
+        chosen.time.why
+    )
+}
+
+/// The unit that the file gives, if it is known to torqcomp.
+pub(super) fn unit(chosen: &SelectedSignal) -> Option<NamedUnit> {
+    NamedUnit::parse(&chosen.unit.as_ref()?.unit)
+}
+
+/// What was lost of a number, and what else should be known of it.
+pub(super) fn losses(summary: SignalSummary) -> (Option<Warning>, Vec<Warning>) {
+    let mut warnings = summary.warnings;
+    let lost = summary.is_lossy.then(|| {
+        let first = (!warnings.is_empty()).then(|| warnings.remove(0));
+        first.unwrap_or_else(|| Warning::new("mcap-lost", "messages were lost"))
+    });
+    (lost, warnings)
 }

@@ -3,21 +3,41 @@
 //! Whatever the format and dialect of a file, this is what comes out of it. Nothing is repaired:
 //! samples and stamps are as read, cells that hold no number are `NaN` and listed with their lines.
 
+mod aligned;
 mod axis;
+mod block;
+mod checkpoints;
+mod choice;
+mod memory_stream;
+mod message_stream;
 mod messages;
 mod part;
-mod select;
+mod stamps;
+mod stream;
+mod table;
 pub mod text;
+mod uniform;
+mod validator;
 
 use serde::Serialize;
 
 use crate::failure::Failure;
-use crate::io::Input;
-use crate::io::csv::{NamedUnit, Options};
+use crate::io::{ChannelChoice, Input, Reading};
+use crate::unit::NamedUnit;
 use crate::warning::Warning;
 
-pub use axis::{Axis, RateFrom, typical_step};
-pub use select::Selection;
+pub(crate) use aligned::{AlignedChannel, AlignedChannels};
+pub(crate) use axis::without_rounding;
+pub use axis::{RateFrom, TimeAxis, TimeAxis as Axis, typical_step};
+pub(crate) use block::Block;
+pub(crate) use choice::{Selection, unit_of};
+pub(crate) use memory_stream::check_holes;
+pub(crate) use message_stream::MessageOrigin;
+pub(crate) use messages::times as message_times;
+pub(crate) use stamps::{StampGrid, is_uniform};
+pub(crate) use stream::ChannelStream;
+pub(crate) use uniform::UniformRecord;
+pub(crate) use validator::{StreamSummary, StreamValidator};
 
 /// A file's content.
 #[derive(Debug, Clone, PartialEq)]
@@ -85,7 +105,7 @@ pub struct Channel {
     /// The cells that held no number, in order.
     pub holes: Vec<Hole>,
     /// How its samples lie in time.
-    pub axis: Axis,
+    pub axis: TimeAxis,
     /// The segment it belongs to, from 0, if there are several.
     pub segment: Option<usize>,
 }
@@ -115,58 +135,86 @@ pub enum HoleKind {
 }
 
 /// Reads a recording of any format and dialect as a whole into memory: the text, and eight bytes for
-/// each number in it. Of an MCAP file that is the signal that the options name as their channel, or the
-/// only one.
+/// each number in it. Of an MCAP file that is the only number in it.
 ///
 /// # Errors
 /// If the file cannot be read, is no recording, or leaves open how it is to be read.
-pub fn read(place: &Input, options: &Options) -> Result<Recording, Failure> {
-    read_channels(place, std::slice::from_ref(options))
+pub fn read(input: &Input, reading: &Reading) -> Result<Recording, Failure> {
+    Recording::read(input, &[ChannelChoice::default()], reading)
 }
 
-/// The same, for several channels: all of a text, and of an MCAP file the signals that are named, such as
-/// `/joint_states.effort[0]`. How a text is read is told by the first of the options.
-///
-/// # Errors
-/// See [`read`].
-pub fn read_channels(place: &Input, wanted: &[Options]) -> Result<Recording, Failure> {
-    let name = place.name();
-    let options = wanted.first().cloned().unwrap_or_default();
-    if place.is_mcap()? {
-        refuse_for_messages(&options)?;
-        let signals: Vec<Option<&str>> = wanted.iter().map(|o| o.channel.as_deref()).collect();
-        return messages::read(place, &signals);
+impl Recording {
+    /// All channels of a text; of an MCAP file those that are chosen.
+    ///
+    /// # Errors
+    /// See [`read`].
+    pub(crate) fn read(
+        input: &Input,
+        choices: &[ChannelChoice],
+        reading: &Reading,
+    ) -> Result<Self, Failure> {
+        if input.is_mcap()? {
+            refuse_for_messages(reading)?;
+            return messages::read(input, choices, reading);
+        }
+        for choice in choices {
+            refuse_for_text(choice, reading)?;
+        }
+        Self::of_text(input, reading, u64::MAX)
     }
-    let (bytes, _) = part::first(place, u64::MAX)?;
-    text::read(&name, bytes, &options).map_err(|failure| failure.at(&name))
+
+    /// The channels of a text in no more than so many bytes of it, in whole lines; what was left out is
+    /// among the warnings.
+    ///
+    /// # Errors
+    /// See [`read`].
+    pub(crate) fn of_text(input: &Input, reading: &Reading, most: u64) -> Result<Self, Failure> {
+        let name = input.name();
+        let (bytes, left_out) = part::first(input, most)?;
+        let mut recording = text::read(&name, bytes, reading).map_err(|f| f.at(&name))?;
+        recording.warnings.extend(left_out);
+        Ok(recording)
+    }
+
+    /// What was lost, and what else should be known.
+    pub(crate) fn all_warnings(&self) -> Vec<Warning> {
+        self.lost.iter().chain(&self.warnings).cloned().collect()
+    }
 }
 
-/// Reads a text as [`read`] does, but no more than so many bytes of it, in whole lines; what was left out
-/// is among the warnings.
-///
-/// # Errors
-/// See [`read`].
-pub fn read_first(place: &Input, options: &Options, most: u64) -> Result<Recording, Failure> {
-    let name = place.name();
-    let (bytes, left_out) = part::first(place, most)?;
-    let mut recording = text::read(&name, bytes, options).map_err(|failure| failure.at(&name))?;
-    recording.warnings.extend(left_out);
-    Ok(recording)
-}
-
-/// Refuses what only tables have.
-fn refuse_for_messages(options: &Options) -> Result<(), Failure> {
-    let told = [
-        ("--time-column", options.time_column.is_some()),
-        ("--time-unit", options.time_unit.is_some()),
-        ("--delimiter", options.told.delimiter.is_some()),
-        ("--decimal", options.told.decimal.is_some()),
+/// Refuses what only texts have.
+pub(crate) fn refuse_for_messages(reading: &Reading) -> Result<(), Failure> {
+    let given = [
+        ("--time-column", reading.time_column.is_some()),
+        ("--time-unit", reading.time_unit.is_some()),
+        ("--delimiter", reading.dialect.delimiter.is_some()),
+        ("--decimal", reading.dialect.decimal.is_some()),
     ];
-    match told.iter().find(|(_, is_told)| *is_told) {
-        Some((flag, _)) => Err(Failure::usage(format_args!(
-            "{flag} does not apply: the input is an MCAP file, whose messages have time stamps; choose \
-             a signal as /joint_states.effort[0]"
-        ))),
+    refuse(
+        &given,
+        "the input is an MCAP file, whose messages have time stamps",
+    )
+}
+
+/// Refuses what only messages have.
+pub(crate) fn refuse_for_text(choice: &ChannelChoice, reading: &Reading) -> Result<(), Failure> {
+    let given = [
+        ("--topic", reading.topic.is_some()),
+        ("--field", choice.field.is_some()),
+        ("--signal", choice.signal.is_some()),
+        ("--time", reading.time.is_some()),
+        ("--spacing", reading.spacing.is_some()),
+    ];
+    let flag = choice.flags.channel;
+    refuse(
+        &given,
+        &format!("the input is a text; choose with {flag} NAME"),
+    )
+}
+
+fn refuse(given: &[(&str, bool)], why: &str) -> Result<(), Failure> {
+    match given.iter().find(|(_, is_given)| *is_given) {
+        Some((flag, _)) => Err(Failure::usage(format_args!("{flag} does not apply: {why}"))),
         None => Ok(()),
     }
 }

@@ -6,7 +6,7 @@ use torqcomp_model::{Dimension, Kind, Unit, UnitSystem};
 
 use super::{Given, Stand};
 use crate::failure::Failure;
-use crate::io::csv::NamedUnit;
+use crate::unit::NamedUnit;
 
 /// What acts on the stand: its name, and the unit it is printed in.
 #[derive(Debug, Clone, PartialEq)]

@@ -14,7 +14,7 @@ use crate::commands::rows::uniform_parts;
 use crate::failure::Failure;
 use crate::io::text::Text;
 use crate::quality::excerpt;
-use crate::signal::Record;
+use crate::recording::UniformRecord;
 
 /// Longest block of the noise estimate.
 const LONGEST_BLOCK: usize = 1 << 12;
@@ -27,13 +27,13 @@ pub(super) fn run(
     report: &mut CompensateReport,
 ) -> Result<Seen, Failure> {
     let Plan {
-        signal,
+        stream,
         stand,
         chain,
         filter,
         undo,
     } = plan;
-    let record = Record::read(signal, |values| convert(&chain, values))?;
+    let record = UniformRecord::read(stream, |values| convert(&chain, values))?;
     let scale = 1.0 / chain.applied.factor;
     report.scale = scale;
     report.start_s = record.start_s;
@@ -54,7 +54,7 @@ pub(super) fn run(
 }
 
 /// Power density of a record in printed units, if it is long enough.
-fn density(record: &Record, scale: f64) -> Option<Density> {
+fn density(record: &UniformRecord, scale: f64) -> Option<Density> {
     let block = (record.samples.len() / 2).next_power_of_two() / 2;
     let printed: Vec<f64> = record.samples.iter().map(|x| x * scale).collect();
     welch(&printed, record.rate_hz, block.min(LONGEST_BLOCK)).ok()
@@ -63,7 +63,7 @@ fn density(record: &Record, scale: f64) -> Option<Density> {
 fn deliver(
     args: &Compensate,
     sink: &mut Sink,
-    record: &Record,
+    record: &UniformRecord,
     torque: &[f64],
     scale: f64,
 ) -> Result<(), Failure> {

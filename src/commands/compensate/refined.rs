@@ -3,7 +3,7 @@
 use super::report::{CompensateReport, LostSpan, RemovedLine, UndoneEffect};
 use crate::failure::Failure;
 use crate::print::rounded;
-use crate::signal::Record;
+use crate::recording::UniformRecord;
 use crate::stand::Stand;
 use crate::undo::{FoundLine, Undo, Undone, treatment};
 use crate::warning::Warning;
@@ -33,7 +33,7 @@ struct Scales {
 pub(super) fn torque(
     undo: &Undo,
     stand: &Stand,
-    record: &Record,
+    record: &UniformRecord,
     report: &mut CompensateReport,
 ) -> Result<Vec<f64>, Failure> {
     check(record)?;
@@ -59,7 +59,7 @@ pub(super) fn torque(
     Ok(torque)
 }
 
-fn check(record: &Record) -> Result<(), Failure> {
+fn check(record: &UniformRecord) -> Result<(), Failure> {
     let count = record.samples.len();
     if count < 2 {
         return Err(Failure::failed(
@@ -79,7 +79,7 @@ fn check(record: &Record) -> Result<(), Failure> {
 /// Rms of what noise of that deviation makes of a result: from a second run with such noise added.
 fn spread(
     undo: &Undo,
-    record: &Record,
+    record: &UniformRecord,
     (recorded, torque): (&[f64], &[f64]),
     noise_std: f64,
 ) -> Result<f64, Failure> {

@@ -13,7 +13,7 @@ use crate::io::Input;
 use crate::io::mcap::Writer;
 use crate::io::mcap::writer::Added;
 use crate::io::output::Output;
-use crate::signal::Origin;
+use crate::recording::MessageOrigin;
 use crate::stand::Chain;
 
 /// Topic of the result unless another is named.
@@ -33,7 +33,7 @@ enum Target {
 /// A copy of the input that gets the torque as well.
 struct Messages {
     writer: Writer<Output>,
-    origin: Origin,
+    origin: MessageOrigin,
     /// Topic of the torque.
     topic: String,
 }
@@ -126,7 +126,7 @@ impl Messages {
         })?;
         let added = Added {
             topic: topic.clone(),
-            name: plan.signal.channel.name.clone(),
+            name: plan.stream.name.clone(),
             encoding,
         };
         let name = output.name().to_owned();
@@ -168,8 +168,8 @@ fn format(args: &Compensate) -> Format {
 }
 
 /// The origin of the input's messages, if the result can be a copy of them.
-fn origin(args: &Compensate, plan: &Plan) -> Result<Origin, Failure> {
-    let Some(origin) = &plan.signal.origin else {
+fn origin(args: &Compensate, plan: &Plan) -> Result<MessageOrigin, Failure> {
+    let Some(origin) = &plan.stream.origin else {
         return Err(Failure::usage(
             "an MCAP result is a copy of an MCAP input with one channel more, but the input is text; \
              use --format csv",

@@ -15,11 +15,10 @@ use crate::cli::Compensate;
 use crate::commands::convert;
 use crate::commands::rows::{Rows, Times};
 use crate::failure::Failure;
-use crate::io::csv::{TimeAxis, TimeSource};
 use crate::io::text::Text;
 use crate::pipeline::{self, Stages};
 use crate::quality::excerpt;
-use crate::signal::{Batch, Sequence};
+use crate::recording::{Block, StampGrid, StreamValidator};
 
 /// Jobs under way beside those that the threads hold.
 const SPARE_JOBS: usize = 2;
@@ -30,7 +29,7 @@ const LONGEST_NOISE_BLOCK: usize = 1 << 13;
 /// A piece of the record on its way.
 #[derive(Default)]
 struct Job {
-    batch: Batch,
+    block: Block,
     /// Sample that did not convert, and why.
     unconverted: Option<(usize, String)>,
     /// Index of the first sample of the window's middle in the record.
@@ -46,7 +45,8 @@ struct Job {
 struct Steps<'a> {
     half_length: usize,
     noise_block: usize,
-    time: &'a TimeAxis,
+    grid: Option<&'a StampGrid>,
+    rate_hz: f64,
     start_s: f64,
     scale: f64,
     /// Whether the result is text.
@@ -72,20 +72,23 @@ pub(super) fn run(
     report: &mut CompensateReport,
 ) -> Result<Seen, Failure> {
     let Plan {
-        signal,
+        stream,
         chain,
         filter,
         ..
     } = plan;
     let half_length = filter.half_length();
-    let time = signal.time.clone();
+    let rate_hz = stream.rate_hz;
+    let grid = stream.time.grid.clone();
+    let grid = grid.as_ref();
     let convolver = BlockConvolver::new(&filter);
     let noise_block = convolver.block_length().min(LONGEST_NOISE_BLOCK);
     let steps = Steps {
         half_length,
         noise_block,
-        time: &time,
-        start_s: signal.first_time_s(),
+        grid,
+        rate_hz,
+        start_s: stream.start_s,
         scale: 1.0 / chain.applied.factor,
         is_text: sink.is_text(),
         args,
@@ -96,17 +99,17 @@ pub(super) fn run(
         sums: Sums::NONE,
         first: Vec::new(),
     };
-    let mut joiner = Joiner::new(&time, half_length);
+    let mut joiner = Joiner::new(grid, rate_hz, half_length);
     // Rows enough that a piece needs no more than the one after it.
-    let (mut fetch, row_plan, mut sequence) = signal.into_stream(2 * half_length);
+    let (mut blocks, row_plan, mut validator) = stream.into_parts(2 * half_length);
     let threads = args.work.thread_count();
     let stages = Stages {
-        read: Box::new(|job: &mut Job| fetch.next(&mut job.batch)),
+        read: Box::new(|job: &mut Job| blocks.next(&mut job.block)),
         prepare: Box::new(|job: &mut Job| {
-            job.batch.read_rows(row_plan.as_ref(), &time);
-            job.unconverted = convert(&chain, &mut job.batch.rows.values).err();
+            job.block.read_rows(row_plan.as_ref(), grid);
+            job.unconverted = convert(&chain, &mut job.block.rows.values).err();
         }),
-        join: Box::new(|job, ready| joiner.join(&mut sequence, job, ready)),
+        join: Box::new(|job, ready| joiner.join(&mut validator, job, ready)),
         work: Box::new(|convolver, job| steps.work(convolver, job)),
         deliver: Box::new(|job| gathered.take(&steps, job)),
     };
@@ -118,11 +121,11 @@ pub(super) fn run(
     report.resampled = joiner.resampled;
     report.result = gathered.sums.statistics(steps.scale);
     report.noise.record = gathered
-        .density(time.rate_hz)
+        .density(rate_hz)
         .and_then(|density| RecordNoise::of(&filter, &density))
         .map(|noise| noise.scaled(steps.scale));
     Ok(Seen {
-        summary: sequence.finish(&mut fetch)?,
+        summary: validator.finish(blocks.as_mut())?,
         excerpt: gathered.first,
     })
 }
@@ -138,7 +141,7 @@ impl Gathered<'_> {
     fn take(&mut self, steps: &Steps, job: &Job) -> Result<(), Failure> {
         let recorded = steps.recorded(&job.window);
         self.sink.take(&Part {
-            rows: steps.rows(&job.batch, job.first),
+            rows: steps.rows(&job.block, job.first),
             text: job.text.as_bytes(),
             torque: &job.torque,
             recorded,
@@ -175,16 +178,11 @@ struct Joiner {
 }
 
 impl Joiner {
-    fn new(time: &TimeAxis, half_length: usize) -> Self {
-        let resampler = time
-            .is_resampled()
-            .then(|| Resampler::new(1.0 / time.rate_hz).expect("a rate found in the stamps"));
-        let seconds_per_unit = match &time.source {
-            TimeSource::Stamps {
-                seconds_per_unit, ..
-            } => *seconds_per_unit,
-            TimeSource::Given | TimeSource::Header { .. } => 1.0,
-        };
+    fn new(grid: Option<&StampGrid>, rate_hz: f64, half_length: usize) -> Self {
+        let grid = grid.filter(|grid| grid.resampled);
+        let resampler =
+            grid.map(|_| Resampler::new(1.0 / rate_hz).expect("a rate found in the stamps"));
+        let seconds_per_unit = grid.map_or(1.0, |grid| grid.seconds_per_unit);
         Self {
             windows: Windows::new(half_length),
             resampler,
@@ -198,7 +196,7 @@ impl Joiner {
     /// Takes the next piece, `None` at the end, and hands on those whose windows are complete.
     fn join(
         &mut self,
-        sequence: &mut Sequence,
+        validator: &mut StreamValidator,
         job: Option<Job>,
         ready: &mut dyn FnMut(Job),
     ) -> Result<(), Failure> {
@@ -206,15 +204,15 @@ impl Joiner {
             self.finish(ready);
             return Ok(());
         };
-        sequence.accept(&mut job.batch)?;
+        validator.accept(&mut job.block)?;
         if let Some((row, message)) = &job.unconverted {
-            return Err(sequence.failure_at_row(&job.batch, *row, message));
+            return Err(validator.failure_at_row(&job.block, *row, message));
         }
         self.push(job, ready)
     }
 
     fn push(&mut self, job: Job, ready: &mut dyn FnMut(Job)) -> Result<(), Failure> {
-        let rows = &job.batch.rows;
+        let rows = &job.block.rows;
         match &mut self.resampler {
             None => {
                 self.windows.push(&rows.values);
@@ -280,7 +278,7 @@ impl Steps<'_> {
         if !self.is_text {
             return;
         }
-        let rows = self.rows(&job.batch, job.first);
+        let rows = self.rows(&job.block, job.first);
         let recorded = match self.args.with_recorded {
             true => self.recorded(&job.window),
             false => &[],
@@ -292,12 +290,12 @@ impl Steps<'_> {
         &window[self.half_length..window.len() - self.half_length]
     }
 
-    fn rows<'a>(&self, batch: &'a Batch, first: usize) -> Rows<'a> {
-        let times = Times::of(batch, self.time, self.start_s, first);
+    fn rows<'a>(&self, block: &'a Block, first: usize) -> Rows<'a> {
+        let times = Times::of(block, self.grid, self.start_s, first);
         Rows {
             digits: self.args.digits,
             scale: self.scale,
-            rate_hz: self.time.rate_hz,
+            rate_hz: self.rate_hz,
             times,
         }
     }

@@ -11,11 +11,11 @@ use crate::diagnose::{
     Case, ChannelUnits, InitialState, PlainStand, Records, SourceFiles, StandRecord,
 };
 use crate::failure::Failure;
-use crate::io::Input;
-use crate::io::csv::NamedUnit;
+use crate::io::{ChannelChoice, Flags, Input};
 use crate::print::short;
-use crate::signal::Together;
+use crate::recording::AlignedChannels;
 use crate::stand::{Given, Stand, si_unit};
+use crate::unit::NamedUnit;
 use crate::warning::Warning;
 
 /// Minimum number of samples of a record.
@@ -37,10 +37,11 @@ struct Pair {
     applied_unit: Option<NamedUnit>,
     measured_unit: Option<NamedUnit>,
     warnings: Vec<Warning>,
+    is_lossy: bool,
 }
 
-/// Reads all records, and what the stand file declares of them.
-pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<Case, Failure> {
+/// Reads all records, and what the stand file declares of them; whether something of a record was lost.
+pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<(Case, bool), Failure> {
     let pairs = |files: &[String]| -> Result<Vec<Pair>, Failure> {
         files.iter().map(|file| pair(args, file)).collect()
     };
@@ -57,6 +58,7 @@ pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<Case, Failure> {
         .transpose()?;
     let all = train.iter().chain(&holdout);
     let mut warnings: Vec<Warning> = all.flat_map(|pair| pair.warnings.clone()).collect();
+    let is_lossy = train.iter().chain(&holdout).any(|pair| pair.is_lossy);
     let calibrated = stand.filter(|_| is_calibrated);
     let convert = |pairs: Vec<Pair>| -> Result<Vec<StandRecord>, Failure> {
         let each = pairs.into_iter();
@@ -73,7 +75,7 @@ pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<Case, Failure> {
             "no hold-out record was given; the last 30 % of each training record are held out instead",
         ));
     }
-    Ok(Case {
+    let case = Case {
         sources: SourceFiles {
             stand: args.stand.as_ref().map(|p| p.display().to_string()),
             train: args.train.clone(),
@@ -85,7 +87,8 @@ pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<Case, Failure> {
         recorder: stand.and_then(recorder),
         units,
         warnings,
-    })
+    };
+    Ok((case, is_lossy))
 }
 
 /// The recorder as far as the stand file declares it.
@@ -102,14 +105,30 @@ fn pair(args: &Diagnose, file: &str) -> Result<Pair, Failure> {
             "--applied and --measured name the same column",
         ));
     }
-    let wanted = [
-        (&args.applied, &args.applied_unit),
-        (&args.measured, &args.measured_unit),
-    ]
-    .map(|(channel, unit)| args.axis.options(Some(channel), unit.as_deref()));
-    let read = Together::read(&Input::of(file), &wanted)?;
-    let mut tracks = read.tracks.into_iter();
-    let (Some(applied), Some(measured)) = (tracks.next(), tracks.next()) else {
+    let choice = |flags: [&'static str; 2], name: &str, unit: Option<&str>| {
+        let [channel, unit_flag] = flags;
+        let flags = Flags {
+            channel,
+            unit: Some(unit_flag),
+        };
+        ChannelChoice::of(flags, Some(name), unit)
+    };
+    let (applied_unit, measured_unit) = (&args.applied_unit, &args.measured_unit);
+    let choices = [
+        choice(
+            ["--applied", "--applied-unit"],
+            &args.applied,
+            applied_unit.as_deref(),
+        ),
+        choice(
+            ["--measured", "--measured-unit"],
+            &args.measured,
+            measured_unit.as_deref(),
+        ),
+    ];
+    let read = AlignedChannels::read(&Input::of(file), &choices, &args.reading)?;
+    let mut channels = read.channels.into_iter();
+    let (Some(applied), Some(measured)) = (channels.next(), channels.next()) else {
         return Err(Failure::failed(format_args!(
             "{}: two channels are needed",
             read.source
@@ -130,7 +149,8 @@ fn pair(args: &Diagnose, file: &str) -> Result<Pair, Failure> {
         start_s: read.start_s,
         applied_unit: applied.unit,
         measured_unit: measured.unit,
-        warnings: read.lost.into_iter().chain(read.warnings).collect(),
+        warnings: read.warnings,
+        is_lossy: read.is_lossy,
     })
 }
 

@@ -1,12 +1,14 @@
 //! `identify decay`.
 
 use super::constants::{Ratios, from_ratios};
-use super::{ONE_MODE, Recorded, deliver, read, uniform};
+use super::{ONE_MODE, Recorded, deliver};
 use crate::cli::identify::Decay;
 use crate::commands::Outcome;
 use crate::failure::Failure;
 use crate::identify::Identification;
 use crate::identify::decay::{DecayOptions, Ringing, identify};
+use crate::io::{Input, Reading};
+use crate::recording::{AlignedChannels, Recording, is_uniform};
 use crate::stand::update::Entry;
 
 /// A recording of decays.
@@ -50,11 +52,25 @@ pub fn run(args: &Decay) -> Result<Outcome, Failure> {
 
 /// Reads one recording, without missing samples: the fit needs no uniform steps.
 fn load(args: &Decay, input: &str, recorded: &mut Recorded) -> Result<Loaded, Failure> {
-    let options = args.reading.options(args.channel.as_deref(), None);
-    let recording = read(input, std::slice::from_ref(&options))?;
-    let selection = recording.select(&options)?;
-    let count = selection.samples.len();
-    let stamps = match (&selection.channel.axis.stamps_s, args.reading.axis.rate) {
+    let Reading {
+        rate_hz, resample, ..
+    } = args.reading;
+    let choices = std::slice::from_ref(&args.choice);
+    let recording = Recording::read(&Input::of(input), choices, &args.reading)?;
+    if resample {
+        let aligned = AlignedChannels::of(recording, choices, &args.reading);
+        return Ok(resampled(
+            input,
+            aligned.map_err(|f| f.at(input))?,
+            recorded,
+        ));
+    }
+    let selection = recording
+        .select(&args.choice, &args.reading)
+        .map_err(|failure| failure.at(input))?;
+    let samples = &selection.channel.samples;
+    let count = samples.len();
+    let stamps = match (&selection.channel.axis.stamps_s, rate_hz) {
         (Some(stamps), None) => stamps.to_vec(),
         _ => {
             let (start, rate) = (selection.start_s, selection.rate_hz);
@@ -62,11 +78,11 @@ fn load(args: &Decay, input: &str, recorded: &mut Recorded) -> Result<Loaded, Fa
         }
     };
     let is_whole = selection.channel.holes.is_empty();
-    let rate_hz = (is_whole && uniform(&stamps, selection.rate_hz)).then_some(selection.rate_hz);
+    let rate_hz = (is_whole && is_uniform(&stamps, selection.rate_hz)).then_some(selection.rate_hz);
     let mut last = f64::NEG_INFINITY;
     let (times_s, values) = stamps
         .into_iter()
-        .zip(selection.samples.iter().copied())
+        .zip(samples.iter().copied())
         .filter(|(t, v)| {
             let later = *t > last && v.is_finite();
             last = if later { *t } else { last };
@@ -75,7 +91,8 @@ fn load(args: &Decay, input: &str, recorded: &mut Recorded) -> Result<Loaded, Fa
         .unzip();
     let values: Vec<f64> = values;
     recorded.add(input, values.len(), rate_hz);
-    recorded.warn(&recording.warnings, recording.lost.as_ref());
+    let warnings = [recording.all_warnings(), selection.warnings].concat();
+    recorded.warn(warnings, recording.lost.is_some());
     Ok(Loaded {
         name: input.to_owned(),
         times_s,
@@ -83,6 +100,22 @@ fn load(args: &Decay, input: &str, recorded: &mut Recorded) -> Result<Loaded, Fa
         values,
         unit: selection.unit.map_or_else(String::new, |u| u.text),
     })
+}
+
+/// A recording that was interpolated to a uniform step.
+fn resampled(input: &str, mut aligned: AlignedChannels, recorded: &mut Recorded) -> Loaded {
+    let channel = aligned.channels.swap_remove(0);
+    let (start_s, rate_hz) = (aligned.start_s, aligned.rate_hz);
+    let time_s = |i: usize| start_s + i as f64 / rate_hz;
+    recorded.add(input, channel.samples.len(), Some(rate_hz));
+    recorded.warn(aligned.warnings, aligned.is_lossy);
+    Loaded {
+        name: input.to_owned(),
+        times_s: (0..channel.samples.len()).map(time_s).collect(),
+        rate_hz: Some(rate_hz),
+        values: channel.samples,
+        unit: channel.unit.map_or_else(String::new, |u| u.text),
+    }
 }
 
 /// Adds the constants that follow from the strongest mode; returns the entries of the stand file.

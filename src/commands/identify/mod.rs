@@ -14,15 +14,11 @@ use super::{Outcome, conclude};
 use crate::cli::identify::{Findings, Identify, Test};
 use crate::failure::Failure;
 use crate::identify::{Identification, NamedEstimate};
-use crate::io::Input;
-use crate::io::csv::{NamedUnit, Options};
-use crate::io::output;
+use crate::io::{ChannelChoice, Flags, output};
 use crate::print::Report;
-use crate::recording::{Recording, Selection};
-use crate::signal::Together;
-use crate::signal::together::{axes, uniform};
 use crate::stand::update::Entry;
 use crate::stand::{self, update};
+use crate::unit::NamedUnit;
 use crate::warning::Warning;
 
 const TORQUE: Dimension = Dimension::new([1, 2, -2, 0, 0, 0]);
@@ -61,11 +57,10 @@ impl Recorded {
         self.samples += samples;
     }
 
-    /// Adds the warnings about a file, and what was lost of it.
-    fn warn(&mut self, warnings: &[Warning], lost: Option<&Warning>) {
-        self.is_lossy |= lost.is_some();
-        self.warnings
-            .extend(lost.into_iter().chain(warnings).cloned());
+    /// Adds the warnings about a file.
+    fn warn(&mut self, warnings: Vec<Warning>, is_lossy: bool) {
+        self.is_lossy |= is_lossy;
+        self.warnings.extend(warnings);
     }
 }
 
@@ -167,33 +162,17 @@ fn write_stand(
     output::write_all(Some(output), force, read, &text)
 }
 
-/// Reads one file: all of a text, the named signals of an MCAP file.
-fn read(input: &str, wanted: &[Options]) -> Result<Recording, Failure> {
-    crate::recording::read_channels(&Input::of(input), wanted)
-}
-
-/// Reads channels of one file onto one time axis. Stamps of a text must be uniform; those of messages never are and are
-/// resampled.
-fn together(input: &str, wanted: &[Options]) -> Result<Together, Failure> {
-    let recording = read(input, wanted)?;
-    if recording.format != "mcap" {
-        let mut chosen = Vec::new();
-        for options in wanted {
-            let selection = recording.select(options)?;
-            whole(&selection)?;
-            chosen.push(selection);
-        }
-        let is_given = wanted.iter().any(|options| options.rate_hz.is_some());
-        for selection in axes(&chosen) {
-            must_be_uniform(selection, is_given)?;
-        }
-    }
-    Together::of(recording, wanted)
-}
-
-/// The unit of a channel, or a hint how to give it.
-fn unit_of(selection: &Selection, flag: &str) -> Result<NamedUnit, Failure> {
-    unit_or(selection.unit.as_ref(), &selection.channel.name, flag)
+/// A channel that a flag of the verb names, with its unit if another flag gives it.
+fn choice(
+    [channel, unit]: [&'static str; 2],
+    name: &str,
+    unit_text: Option<&str>,
+) -> ChannelChoice {
+    let flags = Flags {
+        channel,
+        unit: Some(unit),
+    };
+    ChannelChoice::of(flags, Some(name), unit_text)
 }
 
 /// The unit of a channel of that name.
@@ -209,29 +188,4 @@ fn unit_or(unit: Option<&NamedUnit>, name: &str, flag: &str) -> Result<NamedUnit
 fn quantity(flag: &str, text: &str, kind: Kind) -> Result<f64, Failure> {
     kind.parse(text)
         .map_err(|error| Failure::usage(format_args!("{flag} {text}: {error}")))
-}
-
-/// Refuses samples that are not there.
-fn whole(selection: &Selection) -> Result<(), Failure> {
-    match selection.channel.holes.first() {
-        None => Ok(()),
-        Some(hole) => Err(Failure::failed(format_args!(
-            "line {}: the channel \"{}\" has no number there; remove the line or repair it",
-            hole.line, selection.channel.name
-        ))),
-    }
-}
-
-/// Refuses a channel whose stamps are not uniform.
-fn must_be_uniform(selection: &Selection, given: bool) -> Result<(), Failure> {
-    match &selection.channel.axis.stamps_s {
-        Some(stamps) if !given && !uniform(stamps, selection.rate_hz) => {
-            Err(Failure::failed(format_args!(
-                "the time stamps of \"{}\" are not uniform; give --rate HZ if they are wrong, or \
-                 resample the record first",
-                selection.channel.name
-            )))
-        }
-        _ => Ok(()),
-    }
 }

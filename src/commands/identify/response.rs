@@ -1,25 +1,37 @@
 //! `identify response`.
 
 use super::constants::{Ratios, from_ratios, from_residue};
-use super::{ONE_MODE, Recorded, TORQUE, deliver, together};
+use super::{ONE_MODE, Recorded, TORQUE, choice, deliver};
 use crate::cli::identify::Response;
 use crate::commands::Outcome;
 use crate::failure::Failure;
 use crate::identify::response::{Driven, ResponseOptions, identify};
 use crate::identify::{Identification, Motion};
-use crate::signal::Together;
+use crate::io::Input;
+use crate::recording::AlignedChannels;
 use crate::stand::update::Entry;
 
 /// Runs the test.
 pub fn run(args: &Response) -> Result<Outcome, Failure> {
-    let wanted =
-        [&args.applied, &args.measured].map(|channel| args.reading.options(Some(channel), None));
+    let (applied_unit, measured_unit) = (&args.applied_unit, &args.measured_unit);
+    let choices = [
+        choice(
+            ["--applied", "--applied-unit"],
+            &args.applied,
+            applied_unit.as_deref(),
+        ),
+        choice(
+            ["--measured", "--measured-unit"],
+            &args.measured,
+            measured_unit.as_deref(),
+        ),
+    ];
     let mut recorded = Recorded::default();
     let mut loaded = Vec::new();
     for input in &args.inputs {
-        let read = together(input, &wanted)?;
-        recorded.add(input, read.tracks[0].samples.len(), Some(read.rate_hz));
-        recorded.warn(&read.warnings, read.lost.as_ref());
+        let read = AlignedChannels::read(&Input::of(input), &choices, &args.reading)?;
+        recorded.add(input, read.channels[0].samples.len(), Some(read.rate_hz));
+        recorded.warn(read.warnings.clone(), read.is_lossy);
         loaded.push(read);
     }
     let records: Vec<Driven> = loaded
@@ -28,11 +40,11 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
         .map(|(l, input)| Driven {
             name: input,
             rate_hz: l.rate_hz,
-            applied: &l.tracks[0].samples,
-            measured: &l.tracks[1].samples,
+            applied: &l.channels[0].samples,
+            measured: &l.channels[1].samples,
         })
         .collect();
-    let unit = loaded[0].tracks[1].unit.as_ref();
+    let unit = loaded[0].channels[1].unit.as_ref();
     let by_unit = unit.and_then(|u| Motion::of(u.unit.dimension()));
     let motion = by_unit.map_or(Motion::Displacement, |(motion, _)| motion);
     let motion = args.measured_as.unwrap_or(motion);
@@ -57,11 +69,11 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
 /// a torque.
 fn rad_per_n_m(
     args: &Response,
-    loaded: &[Together],
+    loaded: &[AlignedChannels],
     motion: Motion,
 ) -> Result<Option<f64>, Failure> {
-    let of = |record: &Together| {
-        let unit = |k: usize| record.tracks[k].unit.as_ref().map(|u| u.unit);
+    let of = |record: &AlignedChannels| {
+        let unit = |k: usize| record.channels[k].unit.as_ref().map(|u| u.unit);
         let (applied, measured) = (unit(0)?, unit(1)?);
         let is_rotation = Motion::of(measured.dimension()) == Some((motion, true));
         let is_known = is_rotation && applied.dimension() == TORQUE;

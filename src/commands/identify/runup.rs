@@ -2,25 +2,26 @@
 
 use torqcomp_model::{Dimension, Kind, Unit};
 
-use super::{FORCE, Recorded, TORQUE, deliver, entry, quantity, together, unit_or};
+use super::{FORCE, Recorded, TORQUE, choice, deliver, entry, quantity, unit_or};
 use crate::cli::identify::Runup;
 use crate::commands::Outcome;
 use crate::failure::Failure;
 use crate::identify::runup::{Body, FreeRun, RunupOptions, identify};
 use crate::identify::{Identification, Motion};
+use crate::io::Input;
 use crate::print::short;
-use crate::signal::together::Track;
+use crate::recording::{AlignedChannel, AlignedChannels};
 use crate::stand::update::Entry;
 
 /// Runs the test.
 pub fn run(args: &Runup) -> Result<Outcome, Failure> {
-    let wanted = [
-        (&args.motion, args.motion_unit.as_deref()),
-        (&args.torque, args.torque_unit.as_deref()),
-    ]
-    .map(|(channel, unit)| args.reading.options(Some(channel), unit));
-    let read = together(&args.input, &wanted)?;
-    let (motion, torque) = (&read.tracks[0], &read.tracks[1]);
+    let (motion_unit, torque_unit) = (args.motion_unit.as_deref(), args.torque_unit.as_deref());
+    let choices = [
+        choice(["--motion", "--motion-unit"], &args.motion, motion_unit),
+        choice(["--torque", "--torque-unit"], &args.torque, torque_unit),
+    ];
+    let read = AlignedChannels::read(&Input::of(&args.input), &choices, &args.reading)?;
+    let (motion, torque) = (&read.channels[0], &read.channels[1]);
     let motion_unit = unit_or(motion.unit.as_ref(), &motion.name, "--motion-unit")?;
     let (kind, turning) = Motion::of(motion_unit.unit.dimension()).ok_or_else(|| {
         Failure::failed(format_args!(
@@ -51,7 +52,7 @@ pub fn run(args: &Runup) -> Result<Outcome, Failure> {
     let entries = entries(args, &result)?;
     let mut recorded = Recorded::default();
     recorded.add(&args.input, positions.len(), Some(read.rate_hz));
-    recorded.warn(&read.warnings, read.lost.as_ref());
+    recorded.warn(read.warnings, read.is_lossy);
     deliver(result, recorded, &args.findings, &entries)
 }
 
@@ -77,7 +78,7 @@ fn entries(args: &Runup, result: &Identification) -> Result<Vec<Entry>, Failure>
 }
 
 /// SI units of torque (rotation) or force per unit of the channel.
-fn effort_factor(args: &Runup, torque: &Track, turning: bool) -> Result<f64, Failure> {
+fn effort_factor(args: &Runup, torque: &AlignedChannel, turning: bool) -> Result<f64, Failure> {
     let (factor, dimension) = match &args.torque_factor {
         Some(text) => factor_of(text)?,
         None => {

@@ -2,25 +2,34 @@
 
 use torqcomp_model::{Dimension, Kind};
 
-use super::{FORCE, Recorded, TORQUE, deliver, entry, quantity, read, unit_of, whole};
+use super::{FORCE, Recorded, TORQUE, choice, deliver, entry, quantity, unit_or};
 use crate::cli::identify::Static;
 use crate::commands::Outcome;
 use crate::failure::Failure;
 use crate::identify::Identification;
 use crate::identify::static_load::{LoadUnits, Point, identify, series_of};
-use crate::io::csv::{self, NamedUnit};
-use crate::recording::Recording;
+use crate::io::{ChannelChoice, Flags, Input, Reading};
+use crate::recording::{Recording, check_holes, unit_of};
 use crate::stand::update::Entry;
+use crate::unit::NamedUnit;
 
 const VOLTAGE: Dimension = Dimension::new([1, 2, -3, -1, 0, 0]);
 
 /// Runs the test.
 pub fn run(args: &Static) -> Result<Outcome, Failure> {
-    let mut options = args.table.options(None, None);
+    if args.table.resample {
+        return Err(Failure::usage(
+            "--resample does not apply: a table of loads has no time axis",
+        ));
+    }
     // A table of loads has no time axis; with a rate none is searched for.
-    options.rate_hz = options.rate_hz.or(Some(1.0));
-    let recording = read(&args.input, &wanted(args, &options))?;
-    let (points, units) = points(args, &recording)?;
+    let reading = Reading {
+        rate_hz: args.table.rate_hz.or(Some(1.0)),
+        ..args.table.clone()
+    };
+    let columns = Columns::of(args);
+    let recording = Recording::read(&Input::of(&args.input), &columns.all(), &reading)?;
+    let (points, units) = points(args, &columns, &recording)?;
     let result = identify(&points, args.degree, &units)?;
     let entries = entries(args, &result);
     if entries.is_empty() && args.findings.result.output.is_some() {
@@ -31,32 +40,57 @@ pub fn run(args: &Static) -> Result<Outcome, Failure> {
     }
     let mut recorded = Recorded::default();
     recorded.add(&args.input, points.len(), None);
-    recorded.warn(&recording.warnings, recording.lost.as_ref());
+    recorded.warn(recording.all_warnings(), recording.lost.is_some());
     deliver(result, recorded, &args.findings, &entries)
 }
 
 /// The columns that are read.
-fn wanted(args: &Static, options: &csv::Options) -> Vec<csv::Options> {
-    let names = [
-        Some(&args.load),
-        Some(&args.reading),
-        args.series.as_ref(),
-        args.position.as_ref(),
-        args.std.as_ref(),
-    ];
-    let one = |name: &String| csv::Options {
-        channel: Some(name.clone()),
-        ..options.clone()
-    };
-    names.into_iter().flatten().map(one).collect()
+struct Columns {
+    load: ChannelChoice,
+    reading: ChannelChoice,
+    series: Option<ChannelChoice>,
+    position: Option<ChannelChoice>,
+    std: Option<ChannelChoice>,
+}
+
+impl Columns {
+    fn of(args: &Static) -> Self {
+        let plain = |channel: &'static str, name: &Option<String>| {
+            let flags = Flags {
+                channel,
+                unit: None,
+            };
+            let name = name.as_deref()?;
+            Some(ChannelChoice::of(flags, Some(name), None))
+        };
+        let (load_unit, unit) = (args.load_unit.as_deref(), args.reading_unit.as_deref());
+        Self {
+            load: choice(["--load", "--load-unit"], &args.load, load_unit),
+            reading: choice(["--reading", "--reading-unit"], &args.reading, unit),
+            series: plain("--series", &args.series),
+            position: plain("--position", &args.position),
+            std: plain("--std", &args.std),
+        }
+    }
+
+    fn all(&self) -> Vec<ChannelChoice> {
+        let further = [&self.series, &self.position, &self.std];
+        [&self.load, &self.reading]
+            .into_iter()
+            .chain(further.into_iter().flatten())
+            .cloned()
+            .collect()
+    }
 }
 
 /// Loads and readings in SI units, with the units' names.
-fn points(args: &Static, recording: &Recording) -> Result<(Vec<Point>, LoadUnits), Failure> {
-    let load_flag = args.load_unit.as_deref();
-    let (loads, load_unit) = column(recording, &args.load, load_flag, "--load-unit")?;
-    let flag = args.reading_unit.as_deref();
-    let (readings, unit) = column(recording, &args.reading, flag, "--reading-unit")?;
+fn points(
+    args: &Static,
+    columns: &Columns,
+    recording: &Recording,
+) -> Result<(Vec<Point>, LoadUnits), Failure> {
+    let (loads, load_unit) = column(recording, &columns.load)?;
+    let (readings, unit) = column(recording, &columns.reading)?;
     let is_effort = [TORQUE, FORCE].contains(&unit.unit.dimension());
     if load_unit.unit.dimension() == VOLTAGE && is_effort {
         return Err(Failure::usage(format_args!(
@@ -70,9 +104,9 @@ fn points(args: &Static, recording: &Recording) -> Result<(Vec<Point>, LoadUnits
         _ => (1.0, unit.text.clone()),
     };
     let loads: Vec<f64> = loads.iter().map(|v| v * load_factor).collect();
-    let series = numbers(recording, args.series.as_ref())?.unwrap_or_else(|| series_of(&loads));
-    let positions = numbers(recording, args.position.as_ref())?;
-    let stds = stds(args, recording)?;
+    let series = numbers(recording, columns.series.as_ref())?.unwrap_or_else(|| series_of(&loads));
+    let positions = numbers(recording, columns.position.as_ref())?;
+    let stds = stds(args, columns, recording)?;
     let counts = [
         Some(readings.len()),
         positions.as_ref().map(Vec::len),
@@ -101,11 +135,15 @@ fn points(args: &Static, recording: &Recording) -> Result<(Vec<Point>, LoadUnits
 }
 
 /// Standard uncertainties of the readings, in the unit of their column.
-fn stds(args: &Static, recording: &Recording) -> Result<Option<Vec<f64>>, Failure> {
-    let Some(name) = &args.std else {
+fn stds(
+    args: &Static,
+    columns: &Columns,
+    recording: &Recording,
+) -> Result<Option<Vec<f64>>, Failure> {
+    let Some(choice) = &columns.std else {
         return Ok(None);
     };
-    let stds = recording.channel(Some(name))?.samples.clone();
+    let stds = recording.channel(choice)?.samples.clone();
     match stds.iter().position(|s| s.is_nan() || *s <= 0.0) {
         Some(i) => Err(Failure::failed(format_args!(
             "row {} of {}: the standard uncertainty must be greater than 0",
@@ -117,28 +155,23 @@ fn stds(args: &Static, recording: &Recording) -> Result<Option<Vec<f64>>, Failur
 }
 
 /// Values of a column, numbered by first appearance.
-fn numbers(recording: &Recording, name: Option<&String>) -> Result<Option<Vec<usize>>, Failure> {
-    let Some(name) = name else { return Ok(None) };
-    let channel = recording.channel(Some(name))?;
-    Ok(Some(ranks(&channel.samples)))
+fn numbers(
+    recording: &Recording,
+    choice: Option<&ChannelChoice>,
+) -> Result<Option<Vec<usize>>, Failure> {
+    let Some(choice) = choice else {
+        return Ok(None);
+    };
+    Ok(Some(ranks(&recording.channel(choice)?.samples)))
 }
 
-fn column(
-    recording: &Recording,
-    name: &str,
-    unit: Option<&str>,
-    flag: &str,
-) -> Result<(Vec<f64>, NamedUnit), Failure> {
-    let options = csv::Options {
-        channel: Some(name.to_owned()),
-        unit: unit.map(str::to_owned),
-        rate_hz: Some(1.0),
-        ..Default::default()
-    };
-    let selection = recording.select(&options)?;
-    whole(&selection)?;
-    let unit = unit_of(&selection, flag)?;
-    Ok((selection.samples.to_vec(), unit))
+fn column(recording: &Recording, choice: &ChannelChoice) -> Result<(Vec<f64>, NamedUnit), Failure> {
+    let channel = recording.channel(choice)?;
+    check_holes(channel)?;
+    let (unit, _) = unit_of(choice, &channel.heading, channel.unit.as_ref())?;
+    let flag = choice.flags.unit.unwrap_or_default();
+    let unit = unit_or(unit.as_ref(), &channel.name, flag)?;
+    Ok((channel.samples.clone(), unit))
 }
 
 /// SI units per unit of the load, and their name.

@@ -4,10 +4,9 @@ use super::messages;
 use super::report::InspectedChannel;
 use super::whole::Whole;
 use crate::failure::Failure;
-use crate::io::Input;
-use crate::io::csv::Options;
 use crate::io::mcap::Inventory;
-use crate::recording::{self, Recording};
+use crate::io::{ChannelChoice, Input, Reading};
+use crate::recording::{Recording, refuse_for_messages, refuse_for_text};
 
 /// Bytes of a text that are read at most.
 const MOST_TEXT: u64 = 1 << 27;
@@ -26,12 +25,14 @@ pub struct Content {
 }
 
 /// Reads a file, whatever its format.
-pub fn read(place: &Input, options: &Options) -> Result<Content, Failure> {
+pub fn read(place: &Input, reading: &Reading) -> Result<Content, Failure> {
     if place.is_mcap()? {
-        return messages::read(place);
+        refuse_for_messages(reading)?;
+        return messages::read(place, reading);
     }
+    refuse_for_text(&ChannelChoice::default(), reading)?;
     Ok(Content {
-        recording: recording::read_first(place, options, MOST_TEXT)?,
+        recording: Recording::of_text(place, reading, MOST_TEXT)?,
         wholes: Vec::new(),
         listed: Vec::new(),
         inventory: None,

@@ -8,7 +8,7 @@ use super::content::Content;
 use super::report::{ChannelWarning, Detail, InspectedChannel, InspectedFile};
 use crate::parallel::{parallel, threads};
 use crate::quality::{self, Findings, TimeFindings, copies, labels, unit_of};
-use crate::recording::{Axis, Channel, Recording};
+use crate::recording::{Channel, Recording, TimeAxis};
 use crate::warning::Warning;
 
 /// Describes the content of a file.
@@ -92,8 +92,8 @@ fn details(recording: &Recording) -> Vec<Detail> {
 }
 
 /// The time axes of the channels, each with the numbers of its channels.
-fn distinct_axes(channels: &[Channel]) -> Vec<(&Axis, Vec<usize>)> {
-    let mut axes: Vec<(&Axis, Vec<usize>)> = Vec::new();
+fn distinct_axes(channels: &[Channel]) -> Vec<(&TimeAxis, Vec<usize>)> {
+    let mut axes: Vec<(&TimeAxis, Vec<usize>)> = Vec::new();
     for (i, channel) in channels.iter().enumerate() {
         match axes
             .iter_mut()
@@ -106,13 +106,13 @@ fn distinct_axes(channels: &[Channel]) -> Vec<(&Axis, Vec<usize>)> {
     axes
 }
 
-fn is_same(a: &Axis, b: &Axis) -> bool {
+fn is_same(a: &TimeAxis, b: &TimeAxis) -> bool {
     let stamps = match (&a.stamps_s, &b.stamps_s) {
         (Some(a), Some(b)) => Arc::ptr_eq(a, b) || a == b,
         (None, None) => true,
         _ => false,
     };
-    let head = |axis: &Axis| (axis.rate_hz, axis.rate_from.clone(), axis.assumed.clone());
+    let head = |axis: &TimeAxis| (axis.rate_hz, axis.rate_from.clone(), axis.assumed.clone());
     stamps && head(a) == head(b)
 }
 

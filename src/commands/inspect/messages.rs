@@ -6,11 +6,11 @@ use super::content::Content;
 use super::report::InspectedChannel;
 use super::whole::{self, Kept, Stamps, Whole};
 use crate::failure::Failure;
-use crate::io::Input;
-use crate::io::csv::NamedUnit;
 use crate::io::mcap::inventory::{ChannelReport, LeafReport};
-use crate::io::mcap::{self, FieldChoice, Inventory, SelectedSignal, TimeOptions};
-use crate::recording::{Axis, Channel, RateFrom, Recording, typical_step};
+use crate::io::mcap::{self, FieldChoice, Inventory, SelectedSignal};
+use crate::io::{Input, Reading};
+use crate::recording::{Channel, RateFrom, Recording, TimeAxis, message_times, typical_step};
+use crate::unit::NamedUnit;
 use crate::warning::Warning;
 
 /// Samples that are kept at most, of all numbers together: eight bytes each, and as many for stamps.
@@ -21,13 +21,16 @@ const MOST_BYTES: u64 = 4_000_000_000;
 const MOST_NUMBERS: u64 = 64;
 
 /// Lists a file and reads the numbers in it, as far as they are not too many.
-pub fn read(place: &Input) -> Result<Content, Failure> {
-    read_most(place, MOST_SAMPLES)
+pub fn read(place: &Input, reading: &Reading) -> Result<Content, Failure> {
+    read_most(place, reading, MOST_SAMPLES)
 }
 
 /// The same, keeping so many samples of all numbers together.
-fn read_most(place: &Input, most: u64) -> Result<Content, Failure> {
-    let inventory = Inventory::scan(place)?;
+fn read_most(place: &Input, reading: &Reading, most: u64) -> Result<Content, Failure> {
+    let mut inventory = Inventory::scan(place)?;
+    if let Some(wanted) = &reading.topic {
+        keep_topic(&mut inventory, wanted)?;
+    }
     let mut content = Content {
         recording: Recording {
             dialect: dialect(&inventory),
@@ -59,7 +62,7 @@ fn read_most(place: &Input, most: u64) -> Result<Content, Failure> {
     }
     let mut results = Vec::new();
     if !choices.is_empty() {
-        let options = TimeOptions::default();
+        let options = message_times(reading);
         results = mcap::read_fields(place, &choices, &options, |number, times_ns, values| {
             kept[number].add(times_ns, values);
         })?;
@@ -83,6 +86,18 @@ fn read_most(place: &Input, most: u64) -> Result<Content, Failure> {
     said.extend(whole::warning(&content.wholes));
     content.inventory = Some(inventory);
     Ok(content)
+}
+
+/// Leaves out all other topics.
+fn keep_topic(inventory: &mut Inventory, wanted: &str) -> Result<(), Failure> {
+    inventory.channels.retain(|channel| channel.topic == wanted);
+    if inventory.channels.is_empty() {
+        return Err(Failure::failed(format_args!(
+            "{}: there is no topic {wanted}; leave --topic out to see all",
+            inventory.file
+        )));
+    }
+    Ok(())
 }
 
 fn choice(topic: &ChannelReport, number: &LeafReport) -> FieldChoice {
@@ -170,15 +185,15 @@ fn channel(
 
 /// An axis of stamps that are counted from the first: seconds since 1970 would cost them their last
 /// digits.
-fn axis(stamps: Stamps, words: String) -> Axis {
+fn axis(stamps: Stamps, words: String) -> TimeAxis {
     let step = typical_step(&stamps.from_first_s);
-    Axis {
+    TimeAxis {
         rate_hz: step.map(|step| 1.0 / step),
         rate_from: step.map_or(RateFrom::None, |_| RateFrom::Stamps(words)),
         start_s: stamps.first_ns.map(|t| t as f64 * 1e-9),
         start_text: stamps.first_ns.and_then(date_and_time),
         stamps_s: Some(Arc::new(stamps.from_first_s)),
-        ..Axis::default()
+        ..TimeAxis::default()
     }
 }
 
@@ -339,7 +354,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("long.mcap");
         std::fs::write(&path, file.finish()).unwrap();
-        let content = read_most(&Input::File(path), 610).unwrap();
+        let content = read_most(&Input::File(path), &Reading::default(), 610).unwrap();
         let kept = content.recording.channels.iter().map(|c| c.samples.len());
         assert_eq!(kept.collect::<Vec<_>>(), [10, 300, 300]);
         let all = content.wholes.iter().map(|whole| whole.map(|w| w.samples));

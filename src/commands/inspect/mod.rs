@@ -32,7 +32,7 @@ pub fn run(args: &Inspect) -> Result<Outcome, Failure> {
     let read: Vec<Result<Content, Failure>> = args
         .files
         .iter()
-        .map(|file| content::read(&Input::of(file), &args.reading.options(None, None)))
+        .map(|file| content::read(&Input::of(file), &args.reading))
         .collect();
     if let [Err(failure)] = read.as_slice() {
         return Err(failure.clone());
@@ -49,6 +49,11 @@ fn check(args: &Inspect) -> Result<(), Failure> {
     if args.files.iter().filter(|file| *file == "-").count() > 1 {
         return Err(Failure::usage(
             "standard input can be read once only; name files",
+        ));
+    }
+    if args.reading.resample {
+        return Err(Failure::usage(
+            "--resample does not apply: inspect shows recordings as they are",
         ));
     }
     Ok(())

@@ -37,6 +37,11 @@ impl Chunks {
         }
     }
 
+    /// Makes the pieces about so many bytes long.
+    pub fn set_size(&mut self, bytes: usize) {
+        self.size = bytes;
+    }
+
     /// Fills `piece` with the next whole lines.
     ///
     /// # Errors

@@ -6,9 +6,11 @@
 
 use std::collections::BTreeMap;
 
-use super::names::{Column, NamedUnit};
+use super::names::Column;
 use crate::failure::Failure;
+use crate::io::DialectOverride;
 use crate::io::number;
+use crate::unit::NamedUnit;
 
 /// Most lines above the data that are looked at for headings and units.
 const LINES_FOR_HEADINGS: usize = 6;
@@ -50,15 +52,6 @@ pub struct Layout {
     pub data_line: usize,
     /// Byte of the first row of numbers.
     pub data_offset: usize,
-}
-
-/// What the user said about the file.
-#[derive(Debug, Clone, Default)]
-pub struct Told {
-    /// Cell separator.
-    pub delimiter: Option<Delimiter>,
-    /// Decimal mark.
-    pub decimal: Option<u8>,
 }
 
 impl Dialect {
@@ -124,7 +117,7 @@ pub fn is_skipped(line: &str) -> bool {
 ///
 /// # Errors
 /// If there is no table of numbers, or more than one way to read it.
-pub fn find(head: &[u8], complete: bool, told: &Told) -> Result<Layout, Failure> {
+pub fn find(head: &[u8], complete: bool, told: &DialectOverride) -> Result<Layout, Failure> {
     let lines = Lines::of(head, complete);
     let dialects = dialects(told, head.contains(&b'"'));
     // Columns of text beside the numbers are looked for only if there is no table without.
@@ -197,7 +190,7 @@ fn byte_order_mark(head: &[u8]) -> usize {
 }
 
 /// Dialects in the order of preference between equals. A decimal comma between commas needs quotes.
-pub fn dialects(told: &Told, quoted: bool) -> Vec<Dialect> {
+pub fn dialects(told: &DialectOverride, quoted: bool) -> Vec<Dialect> {
     let delimiters = match told.delimiter {
         Some(delimiter) => vec![delimiter],
         None => vec![

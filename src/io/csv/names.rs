@@ -1,6 +1,8 @@
 //! What a column's heading says: its name and its unit.
 
-use torqcomp_model::{Dimension, Unit};
+use torqcomp_model::Unit;
+
+use crate::unit::{NamedUnit, inside_brackets};
 
 /// A column of a table.
 #[derive(Debug, Clone, PartialEq)]
@@ -11,15 +13,6 @@ pub struct Column {
     pub name: String,
     /// The unit, if the file gives one.
     pub unit: Option<NamedUnit>,
-}
-
-/// A unit and how the file writes it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct NamedUnit {
-    /// As written.
-    pub text: String,
-    /// What it means.
-    pub unit: Unit,
 }
 
 /// Units that a heading may end in after an underscore: as understood, and other ways to write them.
@@ -71,33 +64,6 @@ const TIME_NAMES: [&str; 10] = [
     "secs",
     "rel_time",
 ];
-
-impl NamedUnit {
-    /// Reads a unit as recorders write it; words in brackets after it are left out
-    /// (`Voltage (unscaled)` names no unit).
-    #[must_use]
-    pub fn parse(text: &str) -> Option<Self> {
-        let text = text.trim();
-        let text = match inside_brackets(text) {
-            Some(("", inside)) => inside,
-            _ => text,
-        };
-        // A bare number is no unit, although "1" stands for a ratio.
-        if text.is_empty() || text.chars().all(|c| c.is_ascii_digit() || c == '.') {
-            return None;
-        }
-        Unit::parse(text).ok().map(|unit| Self {
-            text: text.to_owned(),
-            unit,
-        })
-    }
-
-    /// Whether it is a unit of time.
-    #[must_use]
-    pub fn is_time(&self) -> bool {
-        self.unit.dimension() == Dimension::new([0, 0, 1, 0, 0, 0])
-    }
-}
 
 impl Column {
     /// Reads a heading; `units_row` is the cell below it, if the table has a row of units.
@@ -208,24 +174,6 @@ fn suffixed(text: &str) -> Option<(&str, &'static str)> {
             .any(|word| lower.contains(word))
             .then_some((name, *unit))
     })
-}
-
-/// Text before and inside a bracket at the end of a heading.
-fn inside_brackets(heading: &str) -> Option<(&str, &str)> {
-    [('(', ')'), ('[', ']'), ('{', '}'), ('<', '>')]
-        .into_iter()
-        .find_map(|(open, close)| {
-            let body = heading.trim_end().strip_suffix(close)?;
-            // The matching bracket: units may hold brackets themselves.
-            let mut depth = 1;
-            for (place, c) in body.char_indices().rev() {
-                depth += i32::from(c == close) - i32::from(c == open);
-                if depth == 0 {
-                    return Some((body[..place].trim(), body[place + 1..].trim()));
-                }
-            }
-            None
-        })
 }
 
 #[cfg(test)]

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use super::cell::Cell;
 use crate::failure::Failure;
-use crate::io::csv::{Delimiter, Dialect, Told, decode_line, dialects, is_skipped};
+use crate::io::DialectOverride;
+use crate::io::csv::{Delimiter, Dialect, decode_line, dialects, is_skipped};
 
 /// Bytes that a table is looked for in, and more if there is none.
 const HEADS: [usize; 4] = [1 << 15, 1 << 17, 1 << 20, 1 << 23];
@@ -112,7 +113,7 @@ pub fn find(
     text: &[u8],
     from: usize,
     number: usize,
-    told: &Told,
+    told: &DialectOverride,
 ) -> Result<(Head, Table), Failure> {
     let mut failure = None;
     for bytes in HEADS {
@@ -132,7 +133,7 @@ pub fn find(
 ///
 /// # Errors
 /// See [`find`].
-pub fn find_in(head: &Head, told: &Told) -> Result<Table, Failure> {
+pub fn find_in(head: &Head, told: &DialectOverride) -> Result<Table, Failure> {
     let quoted = head.lines.iter().any(|line| line.text.contains('"'));
     let occurs = |byte: u8| {
         head.lines

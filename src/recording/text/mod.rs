@@ -98,10 +98,10 @@ pub fn is_plain(head: &[u8], complete: bool, options: &Options) -> bool {
     if makers::recognise(&lines).is_some_and(is_special) {
         return false;
     }
-    let Ok(layout) = csv::find_layout_in(head, complete, &options.told) else {
+    let Ok(layout) = csv::find_layout_in(head, complete, &options.dialect) else {
         return false;
     };
-    let Ok((head, table)) = head::find(&text.bytes, 0, 1, &options.told) else {
+    let Ok((head, table)) = head::find(&text.bytes, 0, 1, &options.dialect) else {
         return false;
     };
     let wanted = table::wanted(&head, &table);
@@ -223,13 +223,13 @@ fn line_at(text: &[u8], offset: usize) -> &[u8] {
 /// the samples so.
 fn one_line(text: &[u8], options: &Options) -> Option<Vec<u8>> {
     let line = text.trim_ascii();
-    if line.contains(&b'\n') || options.told.delimiter.is_some() {
+    if line.contains(&b'\n') || options.dialect.delimiter.is_some() {
         return None;
     }
     let mark = *[b'\t', b';', b',', b' ']
         .iter()
         .find(|mark| line.contains(mark))?;
-    let decimal = options.told.decimal.unwrap_or(b'.');
+    let decimal = options.dialect.decimal.unwrap_or(b'.');
     let cells = line.split(|byte| *byte == mark);
     let numbers = cells.clone().filter(|cell| !cell.is_empty()).all(|cell| {
         std::str::from_utf8(cell).is_ok_and(|cell| crate::io::number::cell(cell, decimal).is_some())

@@ -74,7 +74,7 @@ fn of_stamps(axis: &Axis, stamps: &[f64], filled: &[usize]) -> Option<Axis> {
 fn of_rate(axis: &Axis, first: usize, every: usize) -> Option<Axis> {
     let rows_hz = axis.rate_hz?;
     Some(Axis {
-        rate_hz: Some(crate::io::csv::without_rounding(rows_hz / every as f64)),
+        rate_hz: Some(crate::recording::without_rounding(rows_hz / every as f64)),
         start_s: axis.start_s.map(|start_s| start_s + first as f64 / rows_hz),
         stamps_s: None,
         ..axis.clone()

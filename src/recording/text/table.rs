@@ -58,7 +58,7 @@ pub fn read(
     options: &Options,
     stop: &dyn Fn(&str) -> bool,
 ) -> Result<Part, Failure> {
-    let (head, table) = head::find(text, from, number, &options.told)?;
+    let (head, table) = head::find(text, from, number, &options.dialect)?;
     read_at(text, &head, &table, hints, options, stop)
 }
 
@@ -269,7 +269,7 @@ fn drop_cut_row(text: &[u8], dialect: Dialect, rows: &mut Rows) -> Option<Warnin
     }
     rows.truncate(rows.count - 1);
     Some(Warning::new(
-        "last-line-cut",
+        "truncated-last-line",
         "the file ends within its last line; that line was left out",
     ))
 }

@@ -2,7 +2,7 @@
 
 use torqcomp_model::{Dimension, Unit};
 
-use crate::io::csv::NamedUnit;
+use crate::unit::NamedUnit;
 
 pub use super::axis_names::{
     is_axis_name, is_index_name, is_time_name, is_weak_time_name, spaced, time_stem,

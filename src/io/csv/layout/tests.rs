@@ -1,7 +1,7 @@
 use super::*;
 
 fn layout(text: &str) -> Layout {
-    find(text.as_bytes(), true, &Told::default()).unwrap()
+    find(text.as_bytes(), true, &DialectOverride::default()).unwrap()
 }
 
 fn names(layout: &Layout) -> Vec<&str> {
@@ -98,13 +98,13 @@ fn no_headings() {
 
 #[test]
 fn a_comma_that_could_be_either_is_asked_for() {
-    let error = find(b"0,5\n0,6\n0,7\n", true, &Told::default()).unwrap_err();
+    let error = find(b"0,5\n0,6\n0,7\n", true, &DialectOverride::default()).unwrap_err();
     assert!(error.to_string().contains("--decimal ,"), "{error}");
     // Headings settle it, and so does the user.
     assert_eq!(layout("time_s,bridge_V\n0,5\n1,6\n").columns.len(), 2);
-    let told = Told {
+    let told = DialectOverride {
         decimal: Some(b','),
-        ..Told::default()
+        ..DialectOverride::default()
     };
     assert_eq!(
         find(b"0,5\n0,6\n0,7\n", true, &told).unwrap().columns.len(),
@@ -115,7 +115,7 @@ fn a_comma_that_could_be_either_is_asked_for() {
 #[test]
 fn what_is_no_table_is_refused() {
     for text in ["", "\n\n", "hello\nworld\n", "a,b,c\nd,e,f\n"] {
-        let error = find(text.as_bytes(), true, &Told::default()).unwrap_err();
+        let error = find(text.as_bytes(), true, &DialectOverride::default()).unwrap_err();
         let message = error.to_string();
         assert!(
             message.contains("empty") || message.contains("no table"),
@@ -129,7 +129,7 @@ fn latin_1_headings_are_read() {
     let found = find(
         b"Zeit (s);Dehnung (\xB5m/m)\n0;1\n1;2\n",
         true,
-        &Told::default(),
+        &DialectOverride::default(),
     )
     .unwrap();
     assert_eq!(units(&found), [Some("s"), Some("µm/m")]);

@@ -3,7 +3,7 @@
 use super::stamps::seconds_of_step;
 use super::{Sources, is_counting};
 use crate::failure::Failure;
-use crate::io::csv::time_column;
+use crate::recording::table::time_column;
 use crate::recording::text::header::Field;
 use crate::recording::text::units;
 use crate::recording::typical_step;

@@ -3,10 +3,10 @@
 use super::groups::Group;
 use super::{SAME, Sources, is_counting};
 use crate::failure::Failure;
-use crate::io::csv::NamedUnit;
 use crate::recording::text::clock::Clock;
 use crate::recording::text::units;
 use crate::recording::typical_step;
+use crate::unit::NamedUnit;
 use torqcomp_model::Unit;
 
 /// Stamps as one column gives them.

@@ -1,7 +1,7 @@
 //! A column as its headings describe it.
 
-use crate::io::csv::NamedUnit;
 use crate::recording::text::units::{self, Heading};
+use crate::unit::NamedUnit;
 
 /// A column as its headings describe it.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,10 +3,10 @@
 use super::Row;
 use super::field::Field;
 use super::keyed::{is_key_block, is_key_with_values, is_list_of_quantities, repeats_a_key};
-use crate::io::csv::NamedUnit;
 use crate::recording::text::cell::Cell;
 use crate::recording::text::head::Table;
 use crate::recording::text::units;
+use crate::unit::NamedUnit;
 
 /// Lines above a table among which its headings are looked for.
 const LINES_FOR_HEADINGS: usize = 10;

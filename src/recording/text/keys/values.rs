@@ -109,7 +109,7 @@ pub fn rate_hz(entry: &Entry, place: Option<usize>, decimal: u8) -> Option<f64> 
     }
     let hz = hertz(value, unit, is_interval)?;
     // A shorter decimal where the reciprocal of an interval is one but for rounding.
-    Some(crate::io::csv::without_rounding(hz)).filter(|hz| hz.is_finite())
+    Some(crate::recording::without_rounding(hz)).filter(|hz| hz.is_finite())
 }
 
 /// The first of values that are given for each channel, `CH1:1.0E-06 CH2:1.0E-06`, or the value as

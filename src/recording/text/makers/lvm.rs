@@ -6,12 +6,13 @@ use std::sync::Arc;
 
 use super::{Maker, channel};
 use crate::failure::Failure;
-use crate::io::csv::{Delimiter, Dialect, Options, without_rounding};
+use crate::io::csv::{Delimiter, Dialect, Options};
 use crate::io::number;
 use crate::recording::text::decode::Text;
 use crate::recording::text::header::Field;
 use crate::recording::text::rows::{self, Column, Wanted};
 use crate::recording::text::table::Hints;
+use crate::recording::without_rounding;
 use crate::recording::{Axis, Channel, RateFrom, Recording, Segment};
 use crate::warning::Warning;
 
@@ -185,9 +186,12 @@ fn file_header(lines: &mut Cursor, options: &Options) -> File {
         }
     }
     let dialect = Dialect {
-        delimiter: options.told.delimiter.unwrap_or(Delimiter::Byte(separator)),
+        delimiter: options
+            .dialect
+            .delimiter
+            .unwrap_or(Delimiter::Byte(separator)),
         decimal: options
-            .told
+            .dialect
             .decimal
             .or(decimal)
             .unwrap_or_else(|| lines.decimal(separator)),

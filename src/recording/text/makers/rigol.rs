@@ -4,7 +4,7 @@
 
 use super::{Maker, channel};
 use crate::failure::Failure;
-use crate::io::csv::{Delimiter, Dialect, Options, without_rounding};
+use crate::io::csv::{Delimiter, Dialect, Options};
 use crate::io::number;
 use crate::recording::text::FOR_MAKER;
 use crate::recording::text::decode::Text;
@@ -12,6 +12,7 @@ use crate::recording::text::head::Head;
 use crate::recording::text::header::Field;
 use crate::recording::text::rows::{self, Wanted};
 use crate::recording::text::table::Hints;
+use crate::recording::without_rounding;
 use crate::recording::{Axis, RateFrom, Recording};
 
 const HINTS: Hints = Hints {

@@ -1,8 +1,10 @@
-//! What is wrong with a signal, found while its pieces pass in order.
+//! What is wrong with a channel, found while its blocks pass in order.
 
-use super::feed::{Batch, Fetch};
+use super::TimeAxis;
+use super::block::{Block, BlockSource};
+use super::stamps::IrregularStep;
 use crate::failure::Failure;
-use crate::io::csv::{Break, Defect, Problem, RowPlan, Rows, TimeAxis, TimeSource};
+use crate::io::csv::{Defect, Problem, RowPlan, Rows};
 use crate::warning::Warning;
 
 /// Code of the warning that stamps are irregular.
@@ -10,21 +12,21 @@ const IRREGULAR: &str = "irregular-stamps";
 /// Difference of the mean rate from that of the first rows that is worth a warning.
 const RATE_DRIFT: f64 = 1e-4;
 
-/// Looks at the batches in order: what one alone cannot know.
+/// Looks at the blocks in order: at what one alone cannot know.
 #[derive(Debug)]
-pub struct Sequence {
+pub(crate) struct StreamValidator {
     source: String,
     /// What a row is called: `line`, `message`.
     row_name: &'static str,
     /// Of a text, how it is written.
     text: Option<TextRows>,
     time: TimeAxis,
-    /// Lines before the next batch.
+    /// Lines before the next block.
     lines: usize,
     samples: usize,
     first_stamp: Option<f64>,
     last_stamp: Option<f64>,
-    /// An empty line at the end of the batches so far, without stamps.
+    /// An empty line at the end of the blockes so far, without stamps.
     empty_line: Option<usize>,
     lost: Option<Warning>,
     warnings: Vec<Warning>,
@@ -34,37 +36,34 @@ pub struct Sequence {
 
 /// How the rows of a text are written, as far as messages need it.
 #[derive(Debug, Clone)]
-pub struct TextRows {
+pub(super) struct TextRows {
     /// Which cells are wanted.
-    pub plan: RowPlan,
+    pub(super) plan: RowPlan,
     /// Headings.
-    pub columns: Vec<String>,
+    pub(super) columns: Vec<String>,
     /// Fewest characters of a value in the head.
-    pub shortest_value: usize,
+    pub(super) shortest_value: usize,
     /// Lines above the first row.
-    pub lines_before: usize,
+    pub(super) lines_before: usize,
 }
 
-/// What a whole signal held.
+/// What a whole stream held.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Summary {
-    /// Rows read.
-    pub samples: usize,
-    /// First and last stamp, in seconds; `None` without stamps.
-    pub span_s: Option<(f64, f64)>,
+pub(crate) struct StreamSummary {
     /// What was lost, if anything.
-    pub lost: Option<Warning>,
+    pub(crate) lost: Option<Warning>,
     /// What else should be known.
-    pub warnings: Vec<Warning>,
+    pub(crate) warnings: Vec<Warning>,
 }
 
-impl Sequence {
+impl StreamValidator {
     pub(super) fn new(
         source: String,
         row_name: &'static str,
         text: Option<TextRows>,
         time: TimeAxis,
         warnings: Vec<Warning>,
+        any_steps: bool,
     ) -> Self {
         Self {
             source,
@@ -78,40 +77,33 @@ impl Sequence {
             empty_line: None,
             lost: None,
             warnings,
-            any_steps: false,
+            any_steps,
         }
     }
 
-    /// Lets irregular stamps pass with a warning.
-    #[must_use]
-    pub(super) fn with_any_steps(mut self, any_steps: bool) -> Self {
-        self.any_steps = any_steps;
-        self
-    }
-
-    /// Takes the next batch.
+    /// Takes the next block.
     ///
     /// # Errors
     /// The first row that cannot be read, and the first stamp that is not uniform, with its line.
-    pub fn accept(&mut self, batch: &mut Batch) -> Result<(), Failure> {
-        if let Some(found) = self.time_break(batch) {
-            let line = self.line_of_row(batch, found.row);
-            let is_last = found.row + 1 == batch.rows.times.len();
+    pub(crate) fn accept(&mut self, block: &mut Block) -> Result<(), Failure> {
+        if let Some(found) = self.irregular_step(block) {
+            let line = self.line_of_row(block, found.row);
+            let is_last = found.row + 1 == block.rows.times.len();
             if self.any_steps {
                 self.say_irregular(line, &found);
-            } else if !(batch.unended && is_last && batch.rows.problem.is_none()) {
-                return Err(self.at(line, self.time.explain(&found)));
+            } else if !(block.unended && is_last && block.rows.problem.is_none()) {
+                return Err(self.at(line, self.explain(&found)));
             } else {
-                self.drop_cut_stamp(batch, line);
+                self.drop_cut_stamp(block, line);
             }
         }
         if self.text.is_some() {
-            self.look_at_lines(batch)?;
-            self.lines += batch.rows.lines;
+            self.look_at_lines(block)?;
+            self.lines += block.rows.lines;
         } else {
-            self.lines += batch.rows.values.len();
+            self.lines += block.rows.values.len();
         }
-        let rows = &batch.rows;
+        let rows = &block.rows;
         self.samples += rows.values.len();
         self.first_stamp = self.first_stamp.or(rows.times.first().copied());
         self.last_stamp = rows.times.last().copied().or(self.last_stamp);
@@ -119,28 +111,28 @@ impl Sequence {
     }
 
     /// The file was cut within its last stamp.
-    fn drop_cut_stamp(&mut self, batch: &mut Batch, line: usize) {
-        batch.rows.times.pop();
-        batch.rows.time_text.pop();
-        batch.rows.values.pop();
-        let start = memchr::memrchr(b'\n', &batch.text).map_or(0, |place| place + 1);
-        let text = String::from_utf8_lossy(&batch.text[start..]).into_owned();
+    fn drop_cut_stamp(&mut self, block: &mut Block, line: usize) {
+        block.rows.times.pop();
+        block.rows.time_text.pop();
+        block.rows.values.pop();
+        let start = memchr::memrchr(b'\n', &block.text).map_or(0, |place| place + 1);
+        let text = String::from_utf8_lossy(&block.text[start..]).into_owned();
         self.lose_last_line(line, &text);
     }
 
     /// Says once that the stamps are irregular.
-    fn say_irregular(&mut self, line: usize, found: &Break) {
+    fn say_irregular(&mut self, line: usize, found: &IrregularStep) {
         if !self.warnings.iter().any(|w| w.code == IRREGULAR) {
             let (source, name) = (&self.source, self.row_name);
-            let what = self.time.explain(found);
+            let what = self.explain(found);
             let message = format!("{source}, {name} {line}: {what}");
             self.warnings.push(Warning::new(IRREGULAR, message));
         }
     }
 
     /// What only lines of text can have wrong with them.
-    fn look_at_lines(&mut self, batch: &Batch) -> Result<(), Failure> {
-        let rows = &batch.rows;
+    fn look_at_lines(&mut self, block: &Block) -> Result<(), Failure> {
+        let rows = &block.rows;
         if let Some(line) = self.empty_line
             && !rows.values.is_empty()
         {
@@ -151,19 +143,19 @@ impl Sequence {
             self.empty_line = self.empty_line.or(Some(self.lines + line + 1));
         }
         if let Some(problem) = &rows.problem {
-            self.bad_row(batch, problem)?;
-        } else if batch.unended {
-            self.look_at_unended_line(batch);
+            self.bad_row(block, problem)?;
+        } else if block.unended {
+            self.look_at_unended_line(block);
         }
         Ok(())
     }
 
-    /// Ends the signal; `fetch` gave its pieces.
+    /// Ends the stream; `blocks` gave its blocks.
     ///
     /// # Errors
     /// If it held fewer than two samples.
-    pub fn finish(mut self, fetch: &mut Fetch) -> Result<Summary, Failure> {
-        let (lost, warnings) = fetch.finish();
+    pub(crate) fn finish(mut self, blocks: &mut dyn BlockSource) -> Result<StreamSummary, Failure> {
+        let (lost, warnings) = blocks.finish();
         if self.samples < 2 {
             let why = lost.map_or(String::new(), |lost| format!(": {}", lost.message));
             return Err(Failure::failed(format_args!(
@@ -173,37 +165,25 @@ impl Sequence {
         }
         self.lost = self.lost.or(lost);
         self.warnings.extend(warnings);
-        let stamps = self.first_stamp.zip(self.last_stamp);
-        let span_s = match (&self.time.source, stamps) {
-            (
-                TimeSource::Stamps {
-                    seconds_per_unit, ..
-                },
-                Some((first, last)),
-            ) => Some((first * seconds_per_unit, last * seconds_per_unit)),
-            _ => None,
-        };
-        if let Some(span) = span_s
-            && !self.time.is_resampled()
+        if let Some(grid) = self.time.grid.as_ref().filter(|grid| !grid.resampled)
+            && let Some((first, last)) = self.first_stamp.zip(self.last_stamp)
         {
-            self.look_at_drift(span);
+            let (steps, rounding) = ((last - first) / grid.step, grid.quantum / grid.step);
+            self.look_at_drift(steps, rounding);
         }
-        Ok(Summary {
-            samples: self.samples,
-            span_s,
+        Ok(StreamSummary {
             lost: self.lost,
             warnings: self.warnings,
         })
     }
 
-    /// A failure at a row of the batch that was accepted last.
-    #[must_use]
-    pub fn failure_at_row(&self, batch: &Batch, row: usize, message: &str) -> Failure {
+    /// A failure at a row of the block that was accepted last.
+    pub(crate) fn failure_at_row(&self, block: &Block, row: usize, message: &str) -> Failure {
         let before = match &self.text {
-            Some(_) => batch.rows.lines,
-            None => batch.rows.values.len(),
+            Some(_) => block.rows.lines,
+            None => block.rows.values.len(),
         };
-        self.at(self.line_of_row(batch, row) - before, message)
+        self.at(self.line_of_row(block, row) - before, message)
     }
 
     fn at(&self, line: usize, message: impl std::fmt::Display) -> Failure {
@@ -211,10 +191,10 @@ impl Sequence {
         Failure::failed(format_args!("{source}, {name} {line}: {message}"))
     }
 
-    /// Line, from 1, of a row of the next batch.
-    fn line_of_row(&self, batch: &Batch, row: usize) -> usize {
+    /// Line, from 1, of a row of the next block.
+    fn line_of_row(&self, block: &Block, row: usize) -> usize {
         let within = match &self.text {
-            Some(text) => line_of_row(&batch.text, &text.plan, row),
+            Some(text) => line_of_row(&block.text, &text.plan, row),
             None => row,
         };
         self.lines + within + 1
@@ -224,18 +204,23 @@ impl Sequence {
         self.text.as_ref().map_or(0, |text| text.plan.value)
     }
 
-    fn time_break(&self, batch: &Batch) -> Option<Break> {
-        let first = batch.rows.times.get(..1)?;
-        self.time
-            .first_break(self.last_stamp, first)
-            .or(batch.time_break)
+    fn explain(&self, found: &IrregularStep) -> String {
+        let grid = self.time.grid.as_ref();
+        grid.map_or_else(String::new, |grid| grid.explain(found))
+    }
+
+    fn irregular_step(&self, block: &Block) -> Option<IrregularStep> {
+        let first = block.rows.times.get(..1)?;
+        let grid = self.time.grid.as_ref()?;
+        grid.first_irregular(self.last_stamp, first)
+            .or(block.irregular)
     }
 
     /// A row that cannot be read is an error, unless the file was cut there.
-    fn bad_row(&mut self, batch: &Batch, problem: &Problem) -> Result<(), Failure> {
+    fn bad_row(&mut self, block: &Block, problem: &Problem) -> Result<(), Failure> {
         let line = self.lines + problem.line + 1;
-        let text = String::from_utf8_lossy(&batch.text[problem.offset..]);
-        let is_last = batch.unended && !text.contains('\n');
+        let text = String::from_utf8_lossy(&block.text[problem.offset..]);
+        let is_last = block.unended && !text.contains('\n');
         if is_last {
             self.lines += 1;
             self.lose_last_line(line, &text);
@@ -297,12 +282,12 @@ impl Sequence {
     }
 
     /// A last line without a line feed may have been cut within its last number.
-    fn look_at_unended_line(&mut self, batch: &Batch) {
+    fn look_at_unended_line(&mut self, block: &Block) {
         let Some(rows) = &self.text else {
             return;
         };
-        let start = memchr::memrchr(b'\n', &batch.text).map_or(0, |place| place + 1);
-        let text = String::from_utf8_lossy(&batch.text[start..]);
+        let start = memchr::memrchr(b'\n', &block.text).map_or(0, |place| place + 1);
+        let text = String::from_utf8_lossy(&block.text[start..]);
         let cells = rows.plan.dialect.cells(&text);
         let is_last = cells.len() == rows.plan.value + 1;
         let length = cells.get(rows.plan.value).map_or(0, String::len);
@@ -318,18 +303,22 @@ impl Sequence {
         }
     }
 
-    fn look_at_drift(&mut self, (first_s, last_s): (f64, f64)) {
-        let mean_hz = (self.samples - 1) as f64 / (last_s - first_s);
-        let drift = mean_hz / self.time.rate_hz - 1.0;
-        if drift.abs() > RATE_DRIFT {
+    /// Says so if the mean rate is not that which was told before all was read: `steps` are those between the first
+    /// and the last stamp, off by up to `rounding` of one.
+    fn look_at_drift(&mut self, steps: f64, rounding: f64) {
+        let samples = (self.samples - 1) as f64;
+        let Some(rate_hz) = self.time.rate_hz else {
+            return;
+        };
+        if (samples - steps).abs() > RATE_DRIFT * samples + rounding {
             self.warnings.push(Warning::new(
                 "rate-drift",
                 format!(
                     "{}: the first rows are {} Hz apart, the whole record {} Hz on average; the \
                      rate of the first rows was used",
                     self.source,
-                    crate::io::digits::text(self.time.rate_hz, 7),
-                    crate::io::digits::text(mean_hz, 7)
+                    crate::io::digits::text(rate_hz, 7),
+                    crate::io::digits::text(rate_hz * samples / steps, 7)
                 ),
             ));
         }

@@ -4,103 +4,116 @@ use std::sync::Arc;
 
 use torqcomp_dsp::resample::{Resampled, Resampler};
 
+use super::memory_stream::check_holes;
+use super::stamps::check_resampled;
+use super::{Recording, Selection, typical_step};
 use crate::failure::Failure;
-use crate::io::Input;
-use crate::io::csv::{NamedUnit, Options};
-use crate::print::{self};
-use crate::recording::{self, Recording, Selection};
+use crate::io::{ChannelChoice, Input, Reading};
+use crate::print;
+use crate::unit::NamedUnit;
 use crate::warning::Warning;
 
-/// Largest distance of stamps from a uniform grid, or from those of another channel, that is none, in
-/// steps.
-const JITTER: f64 = 0.05;
-/// The same for each step of the record: the rounding of the rate.
-const DRIFT: f64 = 1e-6;
-/// Distance, in steps, from which a grid is not that of the stamps any more.
-const HALF: f64 = 0.5;
+/// Largest distance of the stamps of two channels that count as the same, in steps.
+const SAME_STAMP: f64 = 0.05;
 /// Largest relative difference of rates that resampling may bridge.
 const SIMILAR: f64 = 0.05;
-/// Relative difference of rates that is none.
+/// Relative difference of rates that count as the same.
 const SAME_RATE: f64 = 1e-6;
 
 /// A channel.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Track {
-    /// Its name.
-    pub name: String,
+pub(crate) struct AlignedChannel {
+    pub(crate) name: String,
     /// Its samples, in the unit of the file.
-    pub samples: Vec<f64>,
+    pub(crate) samples: Vec<f64>,
     /// That unit, if it is known.
-    pub unit: Option<NamedUnit>,
+    pub(crate) unit: Option<NamedUnit>,
 }
 
 /// Channels with a sample each at every moment.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Together {
+pub(crate) struct AlignedChannels {
     /// Name of the file, for people.
-    pub source: String,
+    pub(crate) source: String,
     /// Samples a second.
-    pub rate_hz: f64,
+    pub(crate) rate_hz: f64,
     /// Time of the first sample, in seconds.
-    pub start_s: f64,
+    pub(crate) start_s: f64,
     /// The channels, in the order in which they were asked for.
-    pub tracks: Vec<Track>,
-    /// What should be known of the file and of how its channels were brought together.
-    pub warnings: Vec<Warning>,
-    /// What was lost of the file, if anything.
-    pub lost: Option<Warning>,
+    pub(crate) channels: Vec<AlignedChannel>,
+    /// What should be known of the file and of how its channels were brought together; what was lost comes first.
+    pub(crate) warnings: Vec<Warning>,
+    /// Whether something of the file was lost.
+    pub(crate) is_lossy: bool,
 }
 
-impl Together {
-    /// Reads the channels that the options name, out of a file of any format.
+impl AlignedChannels {
+    /// Reads the channels that are chosen, out of a file of any format.
     ///
     /// # Errors
     /// If one is not there, has no rate or holds no number somewhere, or if they do not lie on one time
     /// axis and cannot be brought there.
-    pub fn read(place: &Input, wanted: &[Options]) -> Result<Self, Failure> {
-        let recording = recording::read_channels(place, wanted)?;
+    pub(crate) fn read(
+        input: &Input,
+        choices: &[ChannelChoice],
+        reading: &Reading,
+    ) -> Result<Self, Failure> {
+        let recording = Recording::read(input, choices, reading)?;
         let source = recording.source.clone();
-        Self::of(recording, wanted).map_err(|failure| failure.at(&source))
+        Self::of(recording, choices, reading).map_err(|failure| failure.at(&source))
     }
 
-    /// The channels that the options name.
+    /// The channels that are chosen. Messages are interpolated where their stamps are not uniform or not the same;
+    /// so are the samples of a text with `--resample`.
     ///
     /// # Errors
-    /// See [`Together::read`].
-    pub fn of(mut recording: Recording, wanted: &[Options]) -> Result<Self, Failure> {
+    /// See [`AlignedChannels::read`].
+    pub(crate) fn of(
+        mut recording: Recording,
+        choices: &[ChannelChoice],
+        reading: &Reading,
+    ) -> Result<Self, Failure> {
+        let is_text = recording.format != "mcap";
+        let mut warnings = recording.all_warnings();
         let mut chosen = Vec::new();
-        for options in wanted {
-            let selection = recording.select(options)?;
-            whole(&selection)?;
-            chosen.push(selection);
+        for (i, choice) in choices.iter().enumerate() {
+            // Of messages, only what is chosen was read.
+            let place = if is_text { recording.place(choice)? } else { i };
+            let selection = recording.select_at(place, choice, reading)?;
+            check_holes(selection.channel)?;
+            check_finite(&selection)?;
+            let new = |w: &Warning| !warnings.contains(w);
+            let more: Vec<Warning> = selection
+                .warnings
+                .iter()
+                .filter(|w| new(w))
+                .cloned()
+                .collect();
+            warnings.extend(more);
+            chosen.push((place, selection));
         }
+        let (places, chosen): (Vec<usize>, Vec<Selection>) = chosen.into_iter().unzip();
         let Some(first) = chosen.first() else {
             return Err(Failure::usage("no channel was asked for"));
         };
-        let is_given = wanted.iter().any(|options| options.rate_hz.is_some());
-        let mut together = Self {
+        let mut aligned = Self {
             source: recording.source.clone(),
             rate_hz: first.rate_hz,
             start_s: first.start_s,
-            tracks: Vec::new(),
-            warnings: recording.warnings.clone(),
-            lost: recording.lost.clone(),
+            channels: Vec::new(),
+            warnings,
+            is_lossy: recording.lost.is_some(),
         };
-        let is_text = recording.format != "mcap";
-        if is_given || is_one_axis(&chosen, is_text)? {
-            if let Some(failure) = axes(&chosen).filter(|_| !is_given).find_map(irregular) {
-                return Err(failure);
-            }
-            let count = chosen.iter().map(|c| c.samples.len()).min().unwrap_or(0);
-            let empty: Vec<(usize, Track)> = chosen
-                .iter()
-                .map(|c| (recording.place_of(c.channel), track(c, Vec::new())))
-                .collect();
-            together.tracks = filled(&mut recording, empty, count);
+        let is_given = reading.rate_hz.is_some() && !reading.resample;
+        if is_given || !reading.resample && is_one_axis(&chosen, is_text)? {
+            let count = chosen.iter().map(|c| c.channel.samples.len()).min();
+            let empty = chosen.iter().map(|c| aligned_channel(c, Vec::new()));
+            let empty = places.into_iter().zip(empty).collect();
+            aligned.channels = filled(&mut recording, empty, count.unwrap_or(0));
         } else {
-            together.resample(&chosen)?;
+            aligned.resample(&chosen)?;
         }
-        Ok(together)
+        Ok(aligned)
     }
 
     /// Interpolates all channels on a grid with the step of the first one, over the time that all have.
@@ -128,24 +141,26 @@ impl Together {
                 names(chosen)
             )));
         }
+        let recorded = typical_step(&stamps[0]).map(|step| 1.0 / step);
+        check_resampled(self.rate_hz, recorded.unwrap_or(self.rate_hz))?;
         let mut worst = Resampled::default();
         for (c, stamps) in chosen.iter().zip(&stamps) {
             let mut resampler = Resampler::on_grid(1.0 / self.rate_hz, start_s)?;
             let mut samples = Vec::new();
-            for (stamp, value) in stamps.iter().zip(c.samples) {
+            for (stamp, value) in stamps.iter().zip(&c.channel.samples) {
                 resampler.push(*stamp, *value, &mut samples)?;
             }
             note_worst(&mut worst, &resampler.finish(&mut samples));
             samples.truncate(count as usize);
-            self.tracks.push(track(c, samples));
+            self.channels.push(aligned_channel(c, samples));
         }
         let shortest = self
-            .tracks
+            .channels
             .iter()
             .map(|t| t.samples.len())
             .min()
             .unwrap_or(0);
-        self.tracks
+        self.channels
             .iter_mut()
             .for_each(|t| t.samples.truncate(shortest));
         self.start_s = start_s;
@@ -192,59 +207,56 @@ fn note_worst(worst: &mut Resampled, done: &Resampled) {
     worst.largest_jitter = worst.largest_jitter.max(done.largest_jitter);
 }
 
-fn track(selection: &Selection, samples: Vec<f64>) -> Track {
-    Track {
+fn aligned_channel(selection: &Selection, samples: Vec<f64>) -> AlignedChannel {
+    AlignedChannel {
         name: selection.channel.name.clone(),
         samples,
         unit: selection.unit.clone(),
     }
 }
 
-/// Tracks with the first samples of their channels, which are taken out of the recording: they may be most of what
+/// The channels with their first samples, which are taken out of the recording: they may be most of what
 /// it holds.
-fn filled(recording: &mut Recording, empty: Vec<(usize, Track)>, count: usize) -> Vec<Track> {
+fn filled(
+    recording: &mut Recording,
+    empty: Vec<(usize, AlignedChannel)>,
+    count: usize,
+) -> Vec<AlignedChannel> {
     let places: Vec<usize> = empty.iter().map(|(place, _)| *place).collect();
-    let fill = |(i, (place, track)): (usize, (usize, Track))| {
+    let fill = |(i, (place, channel)): (usize, (usize, AlignedChannel))| {
         let samples = &mut recording.channels[place].samples;
         let mut samples = match places[i + 1..].contains(&place) {
             true => samples.clone(),
             false => std::mem::take(samples),
         };
         samples.truncate(count);
-        Track { samples, ..track }
+        AlignedChannel { samples, ..channel }
     };
     empty.into_iter().enumerate().map(fill).collect()
 }
 
-/// Refuses samples that are not there.
-fn whole(selection: &Selection) -> Result<(), Failure> {
-    let name = &selection.channel.name;
-    if let Some(hole) = selection.channel.holes.first() {
-        return Err(Failure::failed(format_args!(
-            "line {}: the channel \"{name}\" has no number there; remove the line or repair it",
-            hole.line
-        )));
-    }
-    match selection.samples.iter().position(|v| !v.is_finite()) {
+/// Refuses samples that are no numbers.
+fn check_finite(selection: &Selection) -> Result<(), Failure> {
+    let channel = selection.channel;
+    match channel.samples.iter().position(|v| !v.is_finite()) {
         None => Ok(()),
         Some(place) => Err(Failure::failed(format_args!(
-            "sample {} of \"{name}\" is no finite number; repair it or cut the record there",
-            place + 1
+            "sample {} of \"{}\" is no finite number; repair it or cut the record there",
+            place + 1,
+            channel.name
         ))),
     }
 }
 
-/// Whether all channels have their samples at the same moments, a uniform step apart. Stamps in a text
-/// are rounded: interpolating between them would make noise out of that, so that of a text only the
-/// moments must be the same.
+/// Whether all channels have their samples at the same moments, a uniform step apart. Stamps of a text that are
+/// the same for all channels must be uniform.
 ///
 /// # Errors
 /// If their rates are too different to be brought together, or nothing says how they lie.
 fn is_one_axis(chosen: &[Selection], is_text: bool) -> Result<bool, Failure> {
     let first = &chosen[0];
     let stamps = |c: &Selection| c.channel.axis.stamps_s.clone();
-    let is_uniform = || stamps(first).is_none_or(|stamps| uniform(&stamps, first.rate_hz));
-    let mut same = is_text || is_uniform();
+    let mut same = true;
     for other in &chosen[1..] {
         let rates = other.rate_hz / first.rate_hz - 1.0;
         if rates.abs() > SIMILAR {
@@ -254,7 +266,7 @@ fn is_one_axis(chosen: &[Selection], is_text: bool) -> Result<bool, Failure> {
             (Some(a), Some(b)) => Arc::ptr_eq(&a, &b) || is_same(&a, &b, first.rate_hz),
             (None, None) => {
                 let apart_s = (other.start_s - first.start_s).abs();
-                if rates.abs() > SAME_RATE || apart_s * first.rate_hz > JITTER {
+                if rates.abs() > SAME_RATE || apart_s * first.rate_hz > SAME_STAMP {
                     return Err(differ(chosen));
                 }
                 true
@@ -262,66 +274,23 @@ fn is_one_axis(chosen: &[Selection], is_text: bool) -> Result<bool, Failure> {
             _ => return Err(differ(chosen)),
         };
     }
-    Ok(same)
-}
-
-/// The first channel on each time axis.
-pub fn axes<'a, 'b>(chosen: &'b [Selection<'a>]) -> impl Iterator<Item = &'b Selection<'a>> {
-    let stamps = |c: &'b Selection<'a>| c.channel.axis.stamps_s.as_ref();
-    let is_same = move |a: &'b Selection<'a>, b: &'b Selection<'a>| {
-        a.rate_hz == b.rate_hz
-            && stamps(a)
-                .zip(stamps(b))
-                .is_some_and(|(a, b)| Arc::ptr_eq(a, b))
-    };
-    let is_first = move |(i, c): &(usize, &'b Selection<'a>)| {
-        !chosen[..*i].iter().any(|other| is_same(other, c))
-    };
-    chosen.iter().enumerate().filter(is_first).map(|(_, c)| c)
-}
-
-/// Refuses stamps that lie more than half a step from the grid of their rate.
-fn irregular(selection: &Selection) -> Option<Failure> {
-    let stamps = selection.channel.axis.stamps_s.as_ref()?;
-    let first = *stamps.first()?;
-    let off = |(i, t): (usize, &f64)| (t - first) * selection.rate_hz - i as f64;
-    let is_off = |i: &usize| off((*i, &stamps[*i])).abs() > HALF + DRIFT * *i as f64;
-    let place = (0..stamps.len()).find(is_off)?;
-    Some(Failure::failed(format_args!(
-        "the time stamps of \"{}\" are not uniform: the one at {} s (sample {}) lies {} steps from a grid of {} Hz; cut the \
-         record there, give --rate HZ if the stamps are wrong, or bring each channel onto a grid with torqcomp extract \
-         --resample",
-        selection.channel.name,
-        print::short(stamps[place]),
-        place + 1,
-        print::rounded(off((place, &stamps[place])), 3),
-        print::short(selection.rate_hz)
-    )))
-}
-
-/// Whether stamps are as good as uniform.
-#[must_use]
-pub fn uniform(stamps_s: &[f64], rate_hz: f64) -> bool {
-    let first = stamps_s.first().copied().unwrap_or(0.0);
-    stamps_s
-        .iter()
-        .enumerate()
-        // Every stamp is looked at whatever the others were, which several at a time can be.
-        .fold(true, |uniform, (i, t)| {
-            uniform & (((t - first) * rate_hz - i as f64).abs() < JITTER + DRIFT * i as f64)
-        })
+    let irregular = first.channel.irregular(first.rate_hz);
+    match irregular.filter(|_| same && is_text) {
+        Some(why) => Err(why),
+        None => Ok(same && first.channel.irregular(first.rate_hz).is_none()),
+    }
 }
 
 /// Whether stamps are as good as the same, as far as both go.
 fn is_same(a: &[f64], b: &[f64], rate_hz: f64) -> bool {
     a.iter()
         .zip(b)
-        .all(|(a, b)| ((a - b) * rate_hz).abs() < JITTER)
+        .all(|(a, b)| ((a - b) * rate_hz).abs() < SAME_STAMP)
 }
 
 fn names(chosen: &[Selection]) -> String {
     let names = chosen.iter().map(|c| format!("\"{}\"", c.channel.name));
-    crate::io::csv::list(names)
+    print::list(names)
 }
 
 fn differ(chosen: &[Selection]) -> Failure {
@@ -342,5 +311,5 @@ fn differ(chosen: &[Selection]) -> Failure {
 }
 
 #[cfg(test)]
-#[path = "together_tests.rs"]
+#[path = "aligned_tests.rs"]
 mod tests;

@@ -1,7 +1,8 @@
 use super::*;
-use crate::recording::{Axis, Channel};
+use crate::io::Flags;
+use crate::recording::{Channel, TimeAxis};
 
-fn channel(name: &str, axis: Axis, of: impl Fn(f64) -> f64) -> Channel {
+fn channel(name: &str, axis: TimeAxis, of: impl Fn(f64) -> f64) -> Channel {
     let times: Vec<f64> = match &axis.stamps_s {
         Some(stamps) => stamps.to_vec(),
         None => (0..400)
@@ -33,24 +34,25 @@ fn recording(format: &'static str, channels: Vec<Channel>) -> Recording {
     }
 }
 
-fn named(name: &str) -> Options {
-    Options {
-        channel: Some(name.to_owned()),
-        ..Options::default()
-    }
+fn named(name: &str) -> ChannelChoice {
+    ChannelChoice::of(Flags::default(), Some(name), None)
 }
 
-fn both(recording: &Recording) -> Result<Together, Failure> {
-    Together::of(recording.clone(), &[named("a"), named("b")])
+fn both(recording: &Recording) -> Result<AlignedChannels, Failure> {
+    AlignedChannels::of(
+        recording.clone(),
+        &[named("a"), named("b")],
+        &Reading::default(),
+    )
 }
 
 /// Stamps a millisecond apart, each off by up to so much of that.
-fn stamps(first_s: f64, jitter: f64) -> Axis {
+fn stamps(first_s: f64, jitter: f64) -> TimeAxis {
     let off = |i: u32| jitter * (f64::from(i) * 2.4).sin();
     let all = (0..400)
         .map(|i| first_s + 1e-3 * (f64::from(i) + off(i)))
         .collect();
-    Axis::of_stamps("t", Arc::new(all))
+    TimeAxis::of_stamps("t", Arc::new(all))
 }
 
 fn wave(time_s: f64) -> f64 {
@@ -67,8 +69,8 @@ fn the_same_stamps_are_taken_as_they_are() {
         ],
     );
     let found = both(&record).unwrap();
-    assert_eq!(found.tracks[0].samples, record.channels[0].samples);
-    assert_eq!(found.tracks[1].samples, record.channels[1].samples);
+    assert_eq!(found.channels[0].samples, record.channels[0].samples);
+    assert_eq!(found.channels[1].samples, record.channels[1].samples);
     assert!(found.warnings.is_empty());
     assert!((found.start_s - 5.0).abs() < 1e-12 && (found.rate_hz - 1000.0).abs() < 1e-6);
 }
@@ -84,7 +86,7 @@ fn messages_at_other_moments_are_interpolated_and_that_is_said() {
     );
     let found = both(&record).unwrap();
     assert_eq!(found.warnings[0].code, "resampled");
-    let [a, b] = [&found.tracks[0].samples, &found.tracks[1].samples];
+    let [a, b] = [&found.channels[0].samples, &found.channels[1].samples];
     assert!(a.len() == b.len() && a.len() > 380);
     // Both channels hold the same wave, so that they must agree where they overlap.
     for (i, (a, b)) in a.iter().zip(b).enumerate() {
@@ -98,7 +100,7 @@ fn messages_at_other_moments_are_interpolated_and_that_is_said() {
 
 #[test]
 fn rates_that_differ_are_refused() {
-    let slow = Axis::of_stamps(
+    let slow = TimeAxis::of_stamps(
         "t",
         Arc::new((0..100).map(|i| f64::from(i) * 4e-3).collect()),
     );
@@ -113,8 +115,8 @@ fn rates_that_differ_are_refused() {
         let said = both(&record).unwrap_err().to_string();
         assert!(said.contains("\"b\" has 250 Hz"), "{said}");
     }
-    let late = Axis::of_header("dt", 1000.0, Some(0.25));
-    let first = Axis::of_header("dt", 1000.0, Some(0.0));
+    let late = TimeAxis::of_header("dt", 1000.0, Some(0.25));
+    let first = TimeAxis::of_header("dt", 1000.0, Some(0.0));
     let record = recording(
         "csv",
         vec![channel("a", first, wave), channel("b", late, wave)],
@@ -142,7 +144,7 @@ fn records_of_different_times_are_refused() {
 
 #[test]
 fn rounded_stamps_of_a_text_are_not_interpolated() {
-    let rounded = Axis::of_stamps(
+    let rounded = TimeAxis::of_stamps(
         "t",
         Arc::new(
             (0..400)
@@ -158,12 +160,12 @@ fn rounded_stamps_of_a_text_are_not_interpolated() {
         ],
     );
     let found = both(&record).unwrap();
-    assert_eq!(found.tracks[0].samples, record.channels[0].samples);
+    assert_eq!(found.channels[0].samples, record.channels[0].samples);
     assert!(found.warnings.is_empty(), "{:?}", found.warnings);
     // A gap is another thing.
     let mut gap: Vec<f64> = (0..400).map(|i| f64::from(i) * 1e-3).collect();
     gap[200..].iter_mut().for_each(|t| *t += 0.02);
-    let gap = Axis::of_stamps("t", Arc::new(gap));
+    let gap = TimeAxis::of_stamps("t", Arc::new(gap));
     let record = recording(
         "csv",
         vec![channel("a", gap.clone(), wave), channel("b", gap, wave)],

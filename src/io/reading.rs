@@ -1,0 +1,179 @@
+//! How a recording is read, as far as its file leaves that open.
+
+use clap::Args;
+
+use super::csv::Delimiter;
+use super::mcap::TimeChoice;
+use torqcomp_model::Kind;
+
+/// How a recording is read, the same for every verb.
+#[derive(Debug, Clone, Default, Args)]
+pub struct Reading {
+    /// Marks of a table.
+    #[command(flatten)]
+    pub dialect: DialectOverride,
+    /// Column with the time stamps
+    #[arg(long, value_name = "NAME")]
+    pub time_column: Option<String>,
+    /// Unit of the time stamps, if their heading does not say: s, ms, us, min
+    #[arg(long, value_name = "UNIT")]
+    pub time_unit: Option<String>,
+    /// Sampling rate, where there are no time stamps or they are wrong; with --resample, the rate
+    /// to interpolate to
+    #[arg(long = "rate", value_name = "HZ", allow_negative_numbers = true, value_parser = positive_frequency)]
+    pub rate_hz: Option<f64>,
+    /// Interpolate where the time stamps are not uniform, instead of refusing
+    #[arg(long)]
+    pub resample: bool,
+    /// Topic of an MCAP file, as /joint_states; channels are then named by the fields of its messages
+    #[arg(long, value_name = "TOPIC")]
+    pub topic: Option<String>,
+    /// Time of messages that counts [default: their own stamp if they have one, else log]
+    #[arg(long, value_name = "CLOCK", value_parser = clock)]
+    pub time: Option<TimeChoice>,
+    /// Field with the spacing of the samples, for messages that hold many
+    #[arg(long, value_name = "FIELD")]
+    pub spacing: Option<String>,
+    /// Whether stamps may be irregular, because they are only handed on.
+    #[arg(skip)]
+    pub any_steps: bool,
+}
+
+/// Marks of a table, given by the user instead of found in the file.
+#[derive(Debug, Clone, Default, Args)]
+pub struct DialectOverride {
+    /// What separates the cells: , ; | tab space none
+    #[arg(long, value_name = "MARK", value_parser = delimiter)]
+    pub delimiter: Option<Delimiter>,
+    /// Decimal mark: . or ,
+    #[arg(long, value_name = "MARK", value_parser = decimal)]
+    pub decimal: Option<u8>,
+}
+
+/// Which channel of a recording is read, and its unit if the file does not say or is wrong.
+#[derive(Debug, Clone, Args)]
+pub struct ChannelChoice {
+    /// Channel to read: its number as inspect gives it, its heading, or its name without the unit
+    #[arg(long, value_name = "NAME")]
+    pub channel: Option<String>,
+    /// Field of the messages of --topic.
+    #[arg(
+        long,
+        value_name = "FIELD",
+        requires = "topic",
+        help = "Field of the messages of --topic: effort[0], 'effort[name=motor]', 'data[:]'; none if it has one number"
+    )]
+    pub field: Option<String>,
+    /// Topic and field in one.
+    #[arg(
+        long,
+        value_name = "PATH",
+        conflicts_with = "topic",
+        help = "Topic and field of an MCAP file in one, as '/joint_states.effort[name=motor]'"
+    )]
+    pub signal: Option<String>,
+    /// Unit of the signal, if its heading does not say: V, mV, "N m", "ft lbf", ustrain
+    #[arg(long, value_name = "UNIT")]
+    pub unit: Option<String>,
+    /// Flags of the verb that give channel and unit.
+    #[arg(skip = Flags::default())]
+    pub flags: Flags,
+}
+
+/// The flags of a verb that choose a channel and give its unit, for messages.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Flags {
+    /// That of the channel.
+    pub channel: &'static str,
+    /// That of its unit; `None` if the verb has none.
+    pub unit: Option<&'static str>,
+}
+
+impl Default for Flags {
+    fn default() -> Self {
+        Self {
+            channel: "--channel",
+            unit: Some("--unit"),
+        }
+    }
+}
+
+impl Default for ChannelChoice {
+    fn default() -> Self {
+        Self::of(Flags::default(), None, None)
+    }
+}
+
+impl ChannelChoice {
+    /// The channel and unit that a verb's own flags give.
+    #[must_use]
+    pub fn of(flags: Flags, channel: Option<&str>, unit: Option<&str>) -> Self {
+        Self {
+            channel: channel.map(str::to_owned),
+            field: None,
+            signal: None,
+            unit: unit.map(str::to_owned),
+            flags,
+        }
+    }
+}
+
+/// A frequency: a number of Hz, or a number with a unit.
+pub(crate) fn frequency(text: &str) -> Result<f64, String> {
+    let value = match text.trim().parse::<f64>() {
+        Ok(value) => value,
+        Err(_) => Kind::Frequency.parse(text).map_err(|e| e.to_string())?,
+    };
+    if value.is_finite() && value >= 0.0 {
+        Ok(value)
+    } else {
+        Err("expected a frequency in Hz, such as 2400 or \"2.4 kHz\"".to_owned())
+    }
+}
+
+pub(crate) fn positive_frequency(text: &str) -> Result<f64, String> {
+    match frequency(text)? {
+        0.0 => Err("expected a frequency greater than zero".to_owned()),
+        value => Ok(value),
+    }
+}
+
+fn clock(text: &str) -> Result<TimeChoice, String> {
+    TimeChoice::parse(text).ok_or_else(|| "expected log, publish or header".to_owned())
+}
+
+fn delimiter(text: &str) -> Result<Delimiter, String> {
+    match text {
+        "tab" | "\t" | "\\t" => Ok(Delimiter::Byte(b'\t')),
+        "space" | "spaces" | " " => Ok(Delimiter::Spaces),
+        "none" => Ok(Delimiter::None),
+        _ => match text.as_bytes() {
+            [byte] if byte.is_ascii_punctuation() && !b".+-\"".contains(byte) => {
+                Ok(Delimiter::Byte(*byte))
+            }
+            _ => Err("expected one of , ; | tab space none".to_owned()),
+        },
+    }
+}
+
+fn decimal(text: &str) -> Result<u8, String> {
+    match text {
+        "." | "point" => Ok(b'.'),
+        "," | "comma" => Ok(b','),
+        _ => Err("expected . or ,".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_read_as_people_write_them() {
+        assert_eq!(frequency("2400"), Ok(2400.0));
+        assert_eq!(frequency("2.4 kHz"), Ok(2400.0));
+        assert!(frequency("-1").is_err() && frequency("nan").is_err() && frequency("2 V").is_err());
+        assert_eq!(delimiter("tab"), Ok(Delimiter::Byte(b'\t')));
+        assert!(delimiter("ab").is_err());
+    }
+}

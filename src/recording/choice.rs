@@ -1,0 +1,224 @@
+//! Choosing one channel of a recording: the same way for every format and verb.
+
+use super::axis::UNIFORM;
+use super::{Channel, Recording, TimeAxis, typical_step};
+use crate::failure::{Failure, did_you_mean};
+use crate::io::{ChannelChoice, Reading, digits};
+use crate::print::list;
+use crate::unit::NamedUnit;
+use crate::warning::Warning;
+
+/// What a channel goes by.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Label<'a> {
+    pub(crate) heading: &'a str,
+    pub(crate) name: &'a str,
+    /// Its segment, from 0, if there are several.
+    pub(crate) segment: Option<usize>,
+}
+
+/// The place of the channel that is wanted: by its heading, its name without the unit, either of them in any case, or
+/// its number from 1; the only channel if none is named. `flag` is the flag that names it.
+pub(crate) fn choose(
+    channels: &[Label],
+    wanted: Option<&str>,
+    flag: &str,
+) -> Result<usize, Failure> {
+    let Some(wanted) = wanted else {
+        return match channels {
+            [_] => Ok(0),
+            [] => Err(Failure::failed("there is no channel with numbers in it")),
+            several => Err(Failure::failed(format_args!(
+                "{} channels could be the signal; choose one with {flag} {}",
+                several.len(),
+                names(channels)
+            ))),
+        };
+    };
+    let ways: [&dyn Fn(&Label) -> bool; 3] =
+        [&|c| c.heading == wanted, &|c| c.name == wanted, &|c| {
+            c.name.eq_ignore_ascii_case(wanted) || c.heading.eq_ignore_ascii_case(wanted)
+        }];
+    for is in ways {
+        let found: Vec<usize> = (0..channels.len()).filter(|i| is(&channels[*i])).collect();
+        match found.as_slice() {
+            [] => {}
+            [one] => return Ok(*one),
+            several => {
+                return Err(Failure::failed(format_args!(
+                    "{} channels are called \"{wanted}\"; give the number of the one you mean, {flag} {}",
+                    several.len(),
+                    list(several.iter().map(|i| (i + 1).to_string()))
+                )));
+            }
+        }
+    }
+    if let Ok(number) = wanted.parse::<usize>()
+        && (1..=channels.len()).contains(&number)
+    {
+        return Ok(number - 1);
+    }
+    let known = channels.iter().map(|c| c.name);
+    Err(Failure::failed(format_args!(
+        "there is no channel \"{wanted}\"{}; the channels are {}",
+        did_you_mean(wanted, known),
+        names(channels)
+    )))
+}
+
+/// The channels as they can be chosen: by name, or by number where a name is used twice.
+fn names(channels: &[Label]) -> String {
+    let one = |(place, channel): (usize, &Label)| {
+        let same = channels.iter().filter(|c| c.name == channel.name);
+        match (same.count(), channel.segment) {
+            (1, _) => format!("\"{}\"", channel.name),
+            (_, None) => format!("{} (\"{}\")", place + 1, channel.name),
+            (_, Some(segment)) => {
+                format!(
+                    "{} (\"{}\" of segment {})",
+                    place + 1,
+                    channel.name,
+                    segment + 1
+                )
+            }
+        }
+    };
+    list(channels.iter().enumerate().map(one))
+}
+
+/// The unit of a channel: the one that is given, or that of the file. A warning if both differ.
+pub(crate) fn unit_of(
+    choice: &ChannelChoice,
+    heading: &str,
+    of_file: Option<&NamedUnit>,
+) -> Result<(Option<NamedUnit>, Option<Warning>), Failure> {
+    let (Some(text), Some(flag)) = (&choice.unit, choice.flags.unit) else {
+        return Ok((of_file.cloned(), None));
+    };
+    let given = NamedUnit::given(flag, text)?;
+    let other = of_file.filter(|named| named.unit != given.unit);
+    let warning = other.map(|named| {
+        Warning::new(
+            "unit-overrides-heading",
+            format!(
+                "\"{heading}\" says {}, {flag} says {text}; {text} was taken",
+                named.text
+            ),
+        )
+    });
+    Ok((Some(given), warning))
+}
+
+/// A warning if a rate that was given is not that of the stamps.
+pub(crate) fn overridden(reading: &Reading, stamps_in: &str, stamps_s: &[f64]) -> Option<Warning> {
+    let rate_hz = reading.rate_hz.filter(|_| !reading.resample)?;
+    let stamped_hz = 1.0 / typical_step(stamps_s)?;
+    if (rate_hz / stamped_hz - 1.0).abs() <= UNIFORM {
+        return None;
+    }
+    Some(Warning::new(
+        "rate-overrides-stamps",
+        format!(
+            "the stamps in \"{stamps_in}\" come at {} Hz, --rate says {} Hz; {} Hz was taken",
+            digits::text(stamped_hz, 7),
+            digits::text(rate_hz, 7),
+            digits::text(rate_hz, 7)
+        ),
+    ))
+}
+
+/// A channel that was chosen, with what the user said of it taken in.
+#[derive(Debug, Clone)]
+pub(crate) struct Selection<'a> {
+    pub(crate) channel: &'a Channel,
+    /// Samples a second.
+    pub(crate) rate_hz: f64,
+    /// Time of the first sample, in seconds: 0 if the file does not say, or the rate was given.
+    pub(crate) start_s: f64,
+    /// Unit of the samples, if it is known.
+    pub(crate) unit: Option<NamedUnit>,
+    /// Where the command line and the file differ.
+    pub(crate) warnings: Vec<Warning>,
+}
+
+impl Recording {
+    /// The channel that is chosen, or the only one, with its rate.
+    ///
+    /// # Errors
+    /// If no channel or several have the name, or its rate is unknown or only assumed.
+    pub(crate) fn select(
+        &self,
+        choice: &ChannelChoice,
+        reading: &Reading,
+    ) -> Result<Selection<'_>, Failure> {
+        self.select_at(self.place(choice)?, choice, reading)
+    }
+
+    /// The same, where the place of the channel is known.
+    pub(super) fn select_at(
+        &self,
+        place: usize,
+        choice: &ChannelChoice,
+        reading: &Reading,
+    ) -> Result<Selection<'_>, Failure> {
+        let channel = &self.channels[place];
+        let (unit, warning) = unit_of(choice, &channel.heading, channel.unit.as_ref())?;
+        let mut warnings: Vec<Warning> = warning.into_iter().collect();
+        let axis = &channel.axis;
+        let (rate_hz, start_s) = match (reading.rate_hz, axis.rate_hz) {
+            (Some(rate_hz), _) => (rate_hz, 0.0),
+            (None, Some(rate_hz)) => (rate_hz, axis.start_s.unwrap_or(0.0)),
+            (None, None) => return Err(without_rate(channel)),
+        };
+        if let (Some(assumed), None) = (&axis.assumed, reading.rate_hz) {
+            return Err(Failure::failed(format_args!(
+                "{assumed}; confirm it with --time-column and --time-unit, or give --rate HZ"
+            )));
+        }
+        let stamps = axis.stamps_s.as_ref();
+        let name = axis.stamps_in.as_deref().unwrap_or("time");
+        warnings.extend(stamps.and_then(|stamps_s| overridden(reading, name, stamps_s)));
+        Ok(Selection {
+            channel,
+            rate_hz,
+            start_s,
+            unit,
+            warnings,
+        })
+    }
+
+    /// The channel that is chosen, whatever its rate.
+    pub(crate) fn channel(&self, choice: &ChannelChoice) -> Result<&Channel, Failure> {
+        Ok(&self.channels[self.place(choice)?])
+    }
+
+    /// The place of the channel that is chosen.
+    pub(crate) fn place(&self, choice: &ChannelChoice) -> Result<usize, Failure> {
+        let label = |channel| Channel::label(channel);
+        let labels: Vec<Label> = self.channels.iter().map(label).collect();
+        choose(&labels, choice.channel.as_deref(), choice.flags.channel)
+    }
+}
+
+impl Channel {
+    fn label(&self) -> Label<'_> {
+        Label {
+            heading: &self.heading,
+            name: &self.name,
+            segment: self.segment,
+        }
+    }
+}
+
+fn without_rate(channel: &Channel) -> Failure {
+    let TimeAxis { stamps_s, .. } = &channel.axis;
+    let why = match stamps_s {
+        Some(_) => "its time stamps have no usual step",
+        None => "the file has neither time stamps nor a rate",
+    };
+    Failure::failed(format_args!(
+        "the sampling rate of \"{}\" is unknown, because {why}; give it with --rate HZ, or \
+         name the column of stamps with --time-column",
+        channel.name
+    ))
+}

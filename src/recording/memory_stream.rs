@@ -1,0 +1,131 @@
+//! A channel of a recording that was read whole, as a stream.
+
+use std::sync::Arc;
+
+use super::block::{Block, BlockSource};
+use super::stamps::StampGrid;
+use super::stream::ChannelStream;
+use super::{Channel, HoleKind, RateFrom, Recording, TimeAxis};
+use crate::failure::Failure;
+use crate::io::{ChannelChoice, Reading};
+use crate::warning::Warning;
+
+/// Samples of a block.
+const SAMPLES: usize = 1 << 13;
+
+impl ChannelStream {
+    /// The channel of a recording that is chosen.
+    ///
+    /// # Errors
+    /// If there is no such channel, its rate is unknown, or a cell of it holds no number.
+    pub(super) fn of_recording(
+        recording: Recording,
+        choice: &ChannelChoice,
+        reading: &Reading,
+    ) -> Result<Self, Failure> {
+        let source = recording.source.clone();
+        let selection = recording
+            .select(choice, reading)
+            .map_err(|f| f.at(&source))?;
+        let channel = selection.channel;
+        check_holes(channel).map_err(|failure| failure.at(&source))?;
+        let stamps = used_stamps(channel, reading);
+        let time = match &stamps {
+            Some(stamps) => {
+                let heading = channel.axis.stamps_in.as_deref().unwrap_or("time");
+                TimeAxis::of_stream(heading, StampGrid::of_seconds(), stamps, &[], reading)?
+            }
+            None if reading.rate_hz.is_some() => TimeAxis::given(selection.rate_hz),
+            None => TimeAxis {
+                stamps_s: None,
+                start_s: Some(selection.start_s),
+                ..channel.axis.clone()
+            },
+        };
+        let mut warnings = recording.warnings.clone();
+        warnings.extend(selection.warnings.iter().cloned());
+        Ok(Self {
+            dialect: recording.dialect.clone(),
+            name: channel.name.clone(),
+            unit: selection.unit.clone(),
+            rate_hz: time.rate_hz.unwrap_or(selection.rate_hz),
+            start_s: time.start_s.unwrap_or(0.0),
+            time,
+            origin: None,
+            any_steps: reading.any_steps,
+            warnings,
+            blocks: Box::new(MemoryBlocks {
+                samples: channel.samples.clone(),
+                stamps,
+                given: 0,
+                lost: recording.lost.clone(),
+            }),
+            text: None,
+            source,
+        })
+    }
+}
+
+/// The stamps of a channel, if its samples are placed by them.
+fn used_stamps(channel: &Channel, reading: &Reading) -> Option<Arc<Vec<f64>>> {
+    let by_stamps = matches!(channel.axis.rate_from, RateFrom::Stamps(_) | RateFrom::None);
+    let wanted = reading.resample || (by_stamps && reading.rate_hz.is_none());
+    channel.axis.stamps_s.clone().filter(|_| wanted)
+}
+
+/// Refuses cells without a number.
+pub(crate) fn check_holes(channel: &Channel) -> Result<(), Failure> {
+    let Some(hole) = channel.holes.first() else {
+        return Ok(());
+    };
+    let what = match hole.what {
+        HoleKind::Missing => "is missing: the line ends before it",
+        HoleKind::Empty => "is empty",
+        HoleKind::NonFinite => "is not a finite number",
+        HoleKind::Text => "is a text, expected a number",
+    };
+    Err(Failure::failed(format_args!(
+        "line {}: the value of \"{}\" {what} ({} such cell(s) in all); correct or remove the line{}",
+        hole.line,
+        channel.name,
+        channel.holes.len(),
+        if channel.axis.stamps_s.is_some() {
+            ", and use --resample to bridge the gap"
+        } else {
+            ""
+        }
+    )))
+}
+
+/// Samples that are in memory.
+struct MemoryBlocks {
+    samples: Vec<f64>,
+    stamps: Option<Arc<Vec<f64>>>,
+    /// Samples given so far.
+    given: usize,
+    lost: Option<Warning>,
+}
+
+impl BlockSource for MemoryBlocks {
+    fn next(&mut self, block: &mut Block) -> Result<bool, Failure> {
+        let rows = &mut block.rows;
+        rows.clear();
+        let end = (self.given + SAMPLES).min(self.samples.len());
+        rows.values
+            .extend_from_slice(&self.samples[self.given..end]);
+        if let Some(stamps) = &self.stamps {
+            rows.times.extend_from_slice(&stamps[self.given..end]);
+        }
+        let any = end > self.given;
+        self.given = end;
+        Ok(any)
+    }
+
+    fn finish(&mut self) -> (Option<Warning>, Vec<Warning>) {
+        (self.lost.take(), Vec::new())
+    }
+
+    fn row_name(&self) -> &'static str {
+        "sample"
+    }
+}

@@ -1,0 +1,167 @@
+//! A number in the messages of an MCAP file, as a stream.
+
+use std::io::Read;
+
+use super::block::{Block, BlockSource};
+use super::stamps::StampGrid;
+use super::stream::ChannelStream;
+use super::{TimeAxis, choice, messages};
+use crate::failure::Failure;
+use crate::io::mcap::SignalReader;
+use crate::io::mcap::decode::Encoding;
+use crate::io::{ChannelChoice, Input, Reading};
+use crate::warning::Warning;
+
+/// Nanoseconds that an `f64` holds exactly: 104 days.
+const EXACT_NS: i64 = 1 << 53;
+
+/// Where messages come from.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct MessageOrigin {
+    /// Their encoding, if it is known.
+    pub(crate) encoding: Option<Encoding>,
+    /// Time of the first sample, in ns.
+    pub(crate) first_ns: i64,
+    /// What a sample's time is ahead of the file's log times, in ns.
+    pub(crate) log_offset_ns: i64,
+}
+
+impl ChannelStream {
+    /// A number in the messages of a file whose bytes are `bytes`.
+    pub(super) fn of_messages(
+        input: &Input,
+        bytes: Box<dyn Read + Send>,
+        choice: &ChannelChoice,
+        reading: &Reading,
+    ) -> Result<Self, Failure> {
+        let (field, times) = (messages::field(choice, reading), messages::times(reading));
+        let mut source = SignalReader::with_stream(input, bytes, &field, &times)?;
+        let (name, chosen) = (source.name().to_owned(), source.selected().clone());
+        let mut times_ns = Vec::new();
+        let mut values = Vec::new();
+        source.next(&mut times_ns, &mut values)?;
+        let Some(&origin_ns) = times_ns.first() else {
+            return Err(nothing_usable(&name, source));
+        };
+        let channel = messages::name(&chosen);
+        let of_file = messages::unit(&chosen);
+        let (unit, warning) = choice::unit_of(choice, &channel, of_file.as_ref())?;
+        let log_offset_ns = source.log_offset_ns();
+        let later = later(&source, origin_ns);
+        let blocks = MessageBlocks {
+            source: Some(source),
+            origin_ns,
+            times_ns,
+            values,
+        };
+        let time = match reading.rate_hz.filter(|_| !reading.resample) {
+            Some(rate_hz) => TimeAxis::given(rate_hz),
+            None => {
+                let grid = StampGrid {
+                    unit: "ns".to_owned(),
+                    seconds_per_unit: 1e-9,
+                    origin_ns,
+                    ..StampGrid::of_seconds()
+                };
+                let heading = messages::clock(&chosen.time);
+                TimeAxis::of_stream(&heading, grid, &blocks.relative()?, &later, reading)
+                    .map_err(|f| f.at(&name))?
+            }
+        };
+        Ok(Self {
+            source: name,
+            dialect: format!("MCAP, {}", messages::describe(&chosen)),
+            name: channel,
+            unit,
+            rate_hz: time.rate_hz.unwrap_or(f64::NAN),
+            start_s: time.start_s.unwrap_or(0.0),
+            time,
+            warnings: warning.into_iter().collect(),
+            any_steps: reading.any_steps,
+            origin: Some(MessageOrigin {
+                encoding: Encoding::of(&chosen.encoding),
+                log_offset_ns,
+                first_ns: origin_ns,
+            }),
+            blocks: Box::new(blocks),
+            text: None,
+        })
+    }
+}
+
+/// Stamps of a uniform record with as many messages, the last of them at the same time, at places that double; none if
+/// the end of the file does not say.
+fn later(source: &SignalReader, origin_ns: i64) -> Vec<f64> {
+    let Some(end) = source.end().filter(|end| end.messages > 1) else {
+        return Vec::new();
+    };
+    let steps = end.messages - 1;
+    let step_ns = end.last_ns.saturating_sub(origin_ns) as f64 / steps as f64;
+    let places = (6..63).map(|power| 1_u64 << power);
+    let places = places.take_while(|place| *place < steps).chain([steps]);
+    places.map(|place| step_ns * place as f64).collect()
+}
+
+fn nothing_usable(name: &str, source: SignalReader) -> Failure {
+    let topic = source.selected().topic.clone();
+    let said: Vec<String> = source
+        .finish()
+        .warnings
+        .into_iter()
+        .map(|warning| warning.message)
+        .collect();
+    Failure::failed(format_args!(
+        "{name}: no message of {topic} could be used: {}",
+        said.join("; ")
+    ))
+}
+
+/// Messages on their way; times are given from the first one.
+struct MessageBlocks {
+    source: Option<SignalReader>,
+    origin_ns: i64,
+    /// What was read and not given.
+    times_ns: Vec<i64>,
+    values: Vec<f64>,
+}
+
+impl MessageBlocks {
+    fn relative(&self) -> Result<Vec<f64>, Failure> {
+        let one = |time_ns: &i64| match time_ns.checked_sub(self.origin_ns) {
+            Some(ns) if ns.abs() < EXACT_NS => Ok(ns as f64),
+            _ => Err(Failure::failed(format_args!(
+                "a message at {time_ns} ns is more than 104 days from the first one at {} ns: the \
+                 clock jumped; choose another one with --time log, publish or header",
+                self.origin_ns
+            ))),
+        };
+        self.times_ns.iter().map(one).collect()
+    }
+}
+
+impl BlockSource for MessageBlocks {
+    fn next(&mut self, block: &mut Block) -> Result<bool, Failure> {
+        if self.values.is_empty()
+            && let Some(source) = &mut self.source
+        {
+            source.next(&mut self.times_ns, &mut self.values)?;
+        }
+        let rows = &mut block.rows;
+        rows.clear();
+        rows.times = self.relative()?;
+        rows.values.append(&mut self.values);
+        self.times_ns.clear();
+        Ok(!rows.values.is_empty())
+    }
+
+    fn finish(&mut self) -> (Option<Warning>, Vec<Warning>) {
+        let Some(source) = self.source.take() else {
+            return (None, Vec::new());
+        };
+        messages::losses(source.finish())
+    }
+
+    fn row_name(&self) -> &'static str {
+        "message"
+    }
+}

@@ -1,0 +1,314 @@
+//! Stamps of samples that pass as a stream: the grid that they lie on.
+
+use super::Channel;
+use super::axis::{RateFrom, TimeAxis, UNIFORM, rounding, step_of, without_rounding};
+use super::checkpoints::sharpened;
+use crate::failure::Failure;
+use crate::io::{Reading, digits};
+
+/// Rates, over the recorded one, that stamps may be brought to.
+const RESAMPLED_RATES: (f64, f64) = (0.9, 1.4);
+
+/// How stamps are written, and their step.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct StampGrid {
+    /// Their unit as written.
+    pub(crate) unit: String,
+    pub(crate) seconds_per_unit: f64,
+    /// Uniform step, in their unit.
+    pub(crate) step: f64,
+    /// Whether they need not be uniform, because samples are interpolated between them.
+    pub(crate) resampled: bool,
+    /// Whether the text of a stamp is a number of seconds as the output writes it.
+    pub(crate) copied: bool,
+    /// Nanoseconds at which they are zero.
+    pub(crate) origin_ns: i64,
+    /// What they are rounded to, in their unit, if that is all that is wrong with them; else 0.
+    pub(super) quantum: f64,
+}
+
+/// Where and how stamps stop being uniform.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct IrregularStep {
+    /// Index of the stamp that ends the step, within its block.
+    pub(crate) row: usize,
+    /// The stamp before it.
+    pub(crate) before: f64,
+    /// The stamp itself.
+    pub(crate) after: f64,
+}
+
+impl TimeAxis {
+    /// The axis of a stream whose stamps begin with `first`, in the unit of the grid; `later` are some farther on, as
+    /// far as they are known before it is read.
+    ///
+    /// # Errors
+    /// If they do not rise, or are to be resampled to a rate far from theirs.
+    pub(super) fn of_stream(
+        heading: &str,
+        mut grid: StampGrid,
+        first: &[f64],
+        later: &[f64],
+        reading: &Reading,
+    ) -> Result<Self, Failure> {
+        let typical = step_of(first).ok_or_else(|| Failure::failed(no_step(heading, first)))?;
+        let typical = sharpened(typical, first[0], later).unwrap_or(typical);
+        grid.resampled = reading.resample;
+        grid.step = match reading.rate_hz {
+            None => typical,
+            Some(rate_hz) => {
+                check_resampled(rate_hz, 1.0 / (typical * grid.seconds_per_unit))?;
+                1.0 / rate_hz / grid.seconds_per_unit
+            }
+        };
+        grid.allow_rounding(first);
+        let start_s = first[0] * grid.seconds_per_unit + grid.origin_ns as f64 * 1e-9;
+        Ok(Self {
+            rate_hz: Some(without_rounding(1.0 / (grid.step * grid.seconds_per_unit))),
+            rate_from: RateFrom::Stamps(heading.to_owned()),
+            start_s: Some(start_s),
+            stamps_in: Some(heading.to_owned()),
+            grid: Some(grid),
+            ..Self::default()
+        })
+    }
+
+    /// The axis of samples at a rate that the user gave; the first is at time 0.
+    pub(super) fn given(rate_hz: f64) -> Self {
+        Self {
+            rate_hz: Some(rate_hz),
+            rate_from: RateFrom::Given,
+            start_s: Some(0.0),
+            ..Self::default()
+        }
+    }
+
+    /// Whether samples are interpolated between stamps.
+    pub(crate) fn is_resampled(&self) -> bool {
+        self.grid.as_ref().is_some_and(|grid| grid.resampled)
+    }
+}
+
+impl StampGrid {
+    /// Stamps in seconds, their step still unknown.
+    pub(super) fn of_seconds() -> Self {
+        Self {
+            unit: "s".to_owned(),
+            seconds_per_unit: 1.0,
+            step: f64::NAN,
+            resampled: false,
+            copied: false,
+            origin_ns: 0,
+            quantum: 0.0,
+        }
+    }
+
+    /// Uniform stamps in seconds at a rate.
+    fn at_rate(rate_hz: f64, stamps_s: &[f64]) -> Self {
+        let mut grid = Self {
+            step: 1.0 / rate_hz,
+            ..Self::of_seconds()
+        };
+        grid.allow_rounding(stamps_s);
+        grid
+    }
+
+    /// Lets stamps deviate by their rounding, if that is all that is wrong with them and no two samples share one.
+    fn allow_rounding(&mut self, stamps: &[f64]) {
+        if self.first_irregular(None, stamps).is_some() {
+            let rounded = rounding(stamps, self.step).map(|line| line.quantum_s);
+            self.quantum = rounded.filter(|q| *q <= self.step).unwrap_or(0.0);
+        }
+    }
+
+    /// First stamp that does not follow the one before it by the uniform step. `last` is the stamp
+    /// before the first of them. Of stamps that are resampled, the first that runs backwards.
+    pub(super) fn first_irregular(
+        &self,
+        last: Option<f64>,
+        times: &[f64],
+    ) -> Option<IrregularStep> {
+        let (&first, &end) = (times.first()?, times.last()?);
+        // A stamp cannot be more exact than its own last bit.
+        let rounding = 2.0 * f64::EPSILON * first.abs().max(end.abs()) + self.quantum;
+        let (low, high) = if self.resampled {
+            (0.0, f64::INFINITY)
+        } else {
+            (
+                self.step * (1.0 - UNIFORM) - rounding,
+                self.step * (1.0 + UNIFORM) + rounding,
+            )
+        };
+        let good = |before: f64, after: f64| (low..=high).contains(&(after - before));
+        if let Some(before) = last
+            && !good(before, first)
+        {
+            return Some(IrregularStep {
+                row: 0,
+                before,
+                after: first,
+            });
+        }
+        let row = first_step(times, &good)? + 1;
+        Some(IrregularStep {
+            row,
+            before: times[row - 1],
+            after: times[row],
+        })
+    }
+
+    /// Says what is wrong at a break and what to do.
+    pub(super) fn explain(&self, found: &IrregularStep) -> String {
+        let Self { unit, step, .. } = self;
+        let (before, after) = (
+            digits::text(found.before, 12),
+            digits::text(found.after, 12),
+        );
+        if found.after < found.before {
+            return format!(
+                "time runs backwards, from {before} {unit} to {after} {unit}: the clock was set \
+                 back or two recordings were joined; split the file there"
+            );
+        }
+        let what = if found.after == found.before {
+            format!("the time stamp {after} {unit} repeats the one before it")
+        } else {
+            let length = (found.after - found.before) / step;
+            format!(
+                "the time stamps are not uniform: the step from {before} {unit} to {after} {unit} \
+                 is {} times the usual one of {} {unit}",
+                digits::text(length, 4),
+                digits::text(*step, 6)
+            )
+        };
+        format!("{what}; use --resample to interpolate, or --rate HZ if the stamps are wrong")
+    }
+}
+
+/// Whether stamps in seconds are uniform.
+pub(crate) fn is_uniform(stamps_s: &[f64], rate_hz: f64) -> bool {
+    let grid = StampGrid::at_rate(rate_hz, stamps_s);
+    grid.first_irregular(None, stamps_s).is_none()
+}
+
+impl Channel {
+    /// The first of its stamps that is not uniform, if it is placed by stamps.
+    pub(super) fn irregular(&self, rate_hz: f64) -> Option<Failure> {
+        let by_stamps = matches!(self.axis.rate_from, RateFrom::Stamps(_));
+        let stamps_s = self.axis.stamps_s.as_ref().filter(|_| by_stamps)?;
+        let grid = StampGrid::at_rate(rate_hz, stamps_s);
+        let found = grid.first_irregular(None, stamps_s)?;
+        Some(Failure::failed(format_args!(
+            "sample {} of \"{}\": {}",
+            found.row + 1,
+            self.name,
+            grid.explain(&found)
+        )))
+    }
+}
+
+/// Index of the first step that is not good. Looks at many at once, since there rarely is one.
+fn first_step(times: &[f64], good: &impl Fn(f64, f64) -> bool) -> Option<usize> {
+    const TOGETHER: usize = 64;
+    let steps = times.len().saturating_sub(1);
+    let is_good = |i: usize| good(times[i], times[i + 1]);
+    let start = (0..steps).step_by(TOGETHER).find(|&start| {
+        let part = &times[start..(start + TOGETHER + 1).min(times.len())];
+        let pairs = part.iter().zip(&part[1..]);
+        !pairs.fold(true, |all, (a, b)| all & good(*a, *b))
+    })?;
+    (start..steps).find(|i| !is_good(*i))
+}
+
+/// Refuses to bring stamps to a rate far from the recorded one.
+pub(super) fn check_resampled(rate_hz: f64, recorded_hz: f64) -> Result<(), Failure> {
+    let (low, high) = RESAMPLED_RATES;
+    if (low * recorded_hz..=high * recorded_hz).contains(&rate_hz) {
+        return Ok(());
+    }
+    Err(Failure::failed(format_args!(
+        "the stamps come at {} Hz; --resample with --rate {} would fold high frequencies down or \
+         invent samples. Resample near the recorded rate, and limit the band with --band",
+        digits::text(recorded_hz, 6),
+        digits::text(rate_hz, 6)
+    )))
+}
+
+fn no_step(heading: &str, times: &[f64]) -> String {
+    if times.len() < 2 {
+        return format!(
+            "the time column \"{heading}\" has {} stamp(s), so the sampling rate is unknown; give \
+             it with --rate HZ",
+            times.len()
+        );
+    }
+    format!(
+        "the stamps of the time column \"{heading}\" do not rise; give the rate with --rate HZ, or \
+         another column with --time-column"
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grid(step: f64, resampled: bool) -> StampGrid {
+        StampGrid {
+            unit: "s".to_owned(),
+            seconds_per_unit: 1.0,
+            step,
+            resampled,
+            copied: true,
+            origin_ns: 0,
+            quantum: 0.0,
+        }
+    }
+
+    #[test]
+    fn one_per_cent_of_a_step_is_uniform_and_more_is_not() {
+        let grid = grid(0.001, false);
+        assert_eq!(
+            grid.first_irregular(None, &[0.0, 0.001, 0.002_009, 0.003_001]),
+            None
+        );
+        let found = grid
+            .first_irregular(None, &[0.0, 0.001, 0.002_011, 0.003])
+            .unwrap();
+        assert_eq!((found.row, found.after), (2, 0.002_011));
+        let found = grid.first_irregular(Some(-0.002), &[0.0, 0.001]).unwrap();
+        assert_eq!((found.row, found.before), (0, -0.002));
+    }
+
+    #[test]
+    fn large_stamps_are_allowed_their_rounding() {
+        let start = 1.7e9;
+        let times: Vec<f64> = (0..1000).map(|i| start + 20e-6 * f64::from(i)).collect();
+        assert_eq!(grid(20e-6, false).first_irregular(None, &times), None);
+    }
+
+    #[test]
+    fn resampled_stamps_may_do_anything_but_run_backwards() {
+        let grid = grid(1.0, true);
+        assert_eq!(grid.first_irregular(None, &[0.0, 0.5, 0.5, 7.0]), None);
+        assert_eq!(grid.first_irregular(None, &[0.0, 0.5, 0.4]).unwrap().row, 2);
+    }
+
+    #[test]
+    fn messages_say_what_and_what_to_do() {
+        let grid = grid(0.5, false);
+        let explain = |before, after| {
+            grid.explain(&IrregularStep {
+                row: 1,
+                before,
+                after,
+            })
+        };
+        assert!(explain(1.0, 0.5).contains("backwards, from 1 s to 0.5 s"));
+        assert!(explain(1.0, 1.0).contains("repeats"));
+        let gap = explain(1.0, 2.5);
+        assert!(
+            gap.contains("3 times") && gap.contains("--resample"),
+            "{gap}"
+        );
+    }
+}

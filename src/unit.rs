@@ -1,0 +1,70 @@
+//! Units as files write them.
+
+use torqcomp_model::{Dimension, Unit};
+
+use crate::failure::Failure;
+
+/// A unit and how the file writes it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NamedUnit {
+    /// As written.
+    pub text: String,
+    /// What it means.
+    pub unit: Unit,
+}
+
+impl NamedUnit {
+    /// Reads a unit as recorders write it; words in brackets after it are left out
+    /// (`Voltage (unscaled)` names no unit).
+    #[must_use]
+    pub fn parse(text: &str) -> Option<Self> {
+        let text = text.trim();
+        let text = match inside_brackets(text) {
+            Some(("", inside)) => inside,
+            _ => text,
+        };
+        // A bare number is no unit, although "1" stands for a ratio.
+        if text.is_empty() || text.chars().all(|c| c.is_ascii_digit() || c == '.') {
+            return None;
+        }
+        Unit::parse(text).ok().map(|unit| Self {
+            text: text.to_owned(),
+            unit,
+        })
+    }
+
+    /// Reads a unit that was given with a flag.
+    pub(crate) fn given(flag: &str, text: &str) -> Result<Self, Failure> {
+        match Unit::parse(text) {
+            Ok(unit) => Ok(Self {
+                text: text.to_owned(),
+                unit,
+            }),
+            Err(error) => Err(Failure::usage(format_args!("{flag} {text}: {error}"))),
+        }
+    }
+
+    /// Whether it is a unit of time.
+    #[must_use]
+    pub fn is_time(&self) -> bool {
+        self.unit.dimension() == Dimension::new([0, 0, 1, 0, 0, 0])
+    }
+}
+
+/// Text before and inside a bracket at the end of a heading.
+pub(crate) fn inside_brackets(heading: &str) -> Option<(&str, &str)> {
+    [('(', ')'), ('[', ']'), ('{', '}'), ('<', '>')]
+        .into_iter()
+        .find_map(|(open, close)| {
+            let body = heading.trim_end().strip_suffix(close)?;
+            // The matching bracket: units may hold brackets themselves.
+            let mut depth = 1;
+            for (place, c) in body.char_indices().rev() {
+                depth += i32::from(c == close) - i32::from(c == open);
+                if depth == 0 {
+                    return Some((body[..place].trim(), body[place + 1..].trim()));
+                }
+            }
+            None
+        })
+}
