@@ -28,9 +28,8 @@ const MCAP: [(&str, &str, &str); 5] = [
 ];
 
 /// Beginnings of the codes of warnings about reading. The others are about the signal or the verb's own work.
-const READING: [&str; 17] = [
+const READING: [&str; 16] = [
     "extra-cells",
-    "last-line-cut",
     "lines-skipped",
     "mcap-",
     "no-time-axis",

@@ -2,7 +2,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use torqcomp::io::csv::Options;
+use torqcomp::io::Reading as Options;
 use torqcomp::recording::text;
 
 fuzz_target!(|bytes: &[u8]| {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use libtest_mimic::Failed;
 use torqcomp::io::Input;
-use torqcomp::io::csv::Options;
+use torqcomp::io::Reading as Options;
 use torqcomp::recording::{self, Recording};
 
 use crate::check;
