@@ -47,28 +47,8 @@ const READING: [&str; 16] = [
     "zero-bytes",
 ];
 
-/// Parts of messages by which a verb refuses what it has read: a signal that it can make nothing of.
-const NOT_READING: [&str; 16] = [
-    "a diagnosis needs at least",
-    "do not lie on one time axis",
-    "does not swing",
-    "does not change",
-    "nothing in the record rings",
-    "too few for a decay",
-    "a fit of that many components",
-    "too short",
-    "too few samples",
-    "same numbers",
-    "carries frequencies",
-    "below half the sampling rate",
-    "cannot be told apart",
-    "does not become torque",
-    "acts on this stand is in",
-    "does not follow",
-];
-
 /// Reasons to refuse a recording, and parts of the messages that give them.
-const REASONS: [(&str, &[&str]); 4] = [
+const REASONS: [(&str, &[&str]); 5] = [
     ("option", &["unexpected argument"]),
     (
         "uneven",
@@ -98,7 +78,24 @@ const REASONS: [(&str, &[&str]); 4] = [
             "not a finite number",
         ],
     ),
+    (
+        "no recording",
+        &[
+            "no table of numbers",
+            "file is empty",
+            "not a recording",
+            "no column besides the time",
+            "variables in turn",
+            "block of its own",
+            "there is no column",
+            "there is no channel",
+            "say which with",
+        ],
+    ),
 ];
+
+/// Verbs that refuse a good recording for what its signal is, in words of their own: too short, slow or still.
+const CHOOSY: [&str; 4] = ["compensate", "harmonics", "identify", "diagnose"];
 
 /// What a verb says of what it took, by the names of the facts.
 type Taken = BTreeMap<&'static str, String>;
@@ -319,7 +316,11 @@ fn reported(of: &str, args: &[&str], options: &[String]) -> Taken {
         units = false;
         ran = verb(of, &[args, &["--unit", "N m"]].concat(), options);
     }
-    taken.insert("refused", refused(&ran));
+    let mut refused = refused(&ran);
+    if refused == "yes" && CHOOSY.contains(&of) {
+        refused = "no".to_owned();
+    }
+    taken.insert("refused", refused);
     if !matches!(ran.code, 0 | 3) {
         return taken;
     }
@@ -397,7 +398,7 @@ fn reading<'a>(codes: impl Iterator<Item = &'a str>) -> String {
 /// Why a verb refuses to read a recording.
 fn refused(ran: &Ran) -> String {
     let says = |part: &&str| ran.stderr.contains(*part);
-    if matches!(ran.code, 0 | 3) || NOT_READING.iter().any(says) {
+    if matches!(ran.code, 0 | 3) {
         return "no".to_owned();
     }
     let reason = REASONS.iter().find(|(_, parts)| parts.iter().any(says));
@@ -418,5 +419,5 @@ fn refuse_differently(taken: &[(&'static str, Taken)]) -> bool {
     reasons.sort_unstable();
     reasons.dedup();
     reasons.len() > 1
-        || (reasons == ["yes"] && taken.iter().any(|(_, taken)| taken["refused"] == "no"))
+        || (reasons == ["no recording"] && taken.iter().any(|(_, taken)| taken["refused"] == "no"))
 }
