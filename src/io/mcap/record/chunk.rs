@@ -196,7 +196,7 @@ fn drain(mut input: impl Read, limit: u64, records: &mut Vec<u8>) -> Result<(), 
 /// Compresses records: as `zstd`, `lz4` or not at all.
 pub(crate) fn pack(compression: &str, records: &[u8]) -> io::Result<Vec<u8>> {
     match compression {
-        "zstd" => zstd::bulk::compress(records, zstd::DEFAULT_COMPRESSION_LEVEL),
+        "zstd" => zstd::stream::encode_all(records, zstd::DEFAULT_COMPRESSION_LEVEL),
         "lz4" => {
             // Of a chunk that is cut off, whole blocks can be unpacked: they are small.
             let frame = FrameInfo::new()

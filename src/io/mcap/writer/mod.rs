@@ -161,18 +161,17 @@ fn declare(
         record.extend_from_slice(&text);
         Ok(record)
     };
-    // The same schema need not be declared twice.
+    // The same schema keeps its number.
     let is_same = |(id, body): &(&u16, &Vec<u8>)| schema(**id).is_ok_and(|same| same == **body);
     let known = index.schemas.iter().find(is_same).map(|(id, _)| *id);
     let unused = |id: &u16| !index.schemas.contains_key(id);
     let Some(schema_id) = known.or_else(|| (1..=u16::MAX).find(unused)) else {
         return Ok(None);
     };
-    if known.is_none() {
-        let schema = schema(schema_id)?;
-        chunk.record(op::SCHEMA, &schema);
-        index.schemas.insert(schema_id, schema);
-    }
+    // Declared in the chunk in any case, which can then be read by itself.
+    let schema = schema(schema_id)?;
+    chunk.record(op::SCHEMA, &schema);
+    index.schemas.insert(schema_id, schema);
     let counts = &index.statistics.channel_message_counts;
     let unused = |id: &u16| !index.channels.contains_key(id) && !counts.contains_key(id);
     let Some(id) = (1..=u16::MAX).find(unused) else {
