@@ -176,12 +176,11 @@ impl TopicSignal {
         Ok(())
     }
 
-    /// Gives away the samples that need not be held back any more, or all.
+    /// Appends the samples that need not be held back any more, or all.
     pub fn give(&mut self, all: bool, times_ns: &mut Vec<i64>, values: &mut Vec<f64>) {
-        times_ns.clear();
-        values.clear();
+        let given = times_ns.len();
         self.sorter.give(all, times_ns, values);
-        self.tally.samples(times_ns);
+        self.tally.samples(&times_ns[given..]);
     }
 
     fn decode(&mut self, message: &RawMessage) {

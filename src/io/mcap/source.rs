@@ -24,6 +24,8 @@ pub struct SignalReader {
     pass: Pass,
     request: FieldRequest,
     signal: TopicSignal,
+    /// Messages that were taken in opening.
+    ahead: usize,
 }
 
 impl SignalReader {
@@ -51,10 +53,13 @@ impl SignalReader {
     ) -> Result<Self, Failure> {
         let mut pass = Pass::new(input, stream)?;
         let mut wanted = RequestedSignal::new(input, choice)?;
+        let mut ahead = 0;
         loop {
             while !pass.is_at_end && !wanted.is_time_chosen() {
                 pass.read(1, |message, channels| {
-                    wanted.take(message, channels, options, &input.name())
+                    let is_taken = wanted.take(message, channels, options, &input.name())?;
+                    ahead += usize::from(is_taken);
+                    Ok(is_taken)
                 })?;
             }
             if wanted.signal.is_some() || !pass.read_again()? {
@@ -71,6 +76,7 @@ impl SignalReader {
             pass,
             request: wanted.request,
             signal,
+            ahead,
         })
     }
 
@@ -107,19 +113,23 @@ impl SignalReader {
         times_ns: &mut Vec<i64>,
         values: &mut Vec<f64>,
     ) -> Result<bool, Failure> {
-        loop {
+        times_ns.clear();
+        values.clear();
+        let mut is_first = true;
+        // Rates are told from the first block, which must not be a short one.
+        while values.len() < BATCH && (is_first || !self.pass.is_at_end) {
+            is_first = false;
             let signal = &mut self.signal;
             let take = |message: &RawMessage, channels: &Channels| signal.take(message, channels);
-            self.pass.read(BATCH, take)?;
+            let messages = BATCH - std::mem::take(&mut self.ahead);
+            self.pass.read(messages, take)?;
             let is_at_end = self.pass.is_at_end;
             if is_at_end {
                 self.signal.end()?;
             }
             self.signal.give(is_at_end, times_ns, values);
-            if is_at_end || !values.is_empty() {
-                return Ok(!values.is_empty());
-            }
         }
+        Ok(!values.is_empty())
     }
 
     /// Says what was read and what was not; to be called at the end.

@@ -169,6 +169,15 @@ fn several_fields_in_one_pass_are_those_read_one_by_one() {
 }
 
 #[test]
+fn the_first_block_is_long_enough_to_tell_a_rate_from() {
+    let bytes = numbers(options(None), 80_000);
+    let mut reader = open(&bytes, ("/x", "data"), &TimeOptions::default()).unwrap();
+    let (mut times, mut values) = (Vec::new(), Vec::new());
+    assert!(reader.next(&mut times, &mut values).unwrap());
+    assert_eq!((times.len(), values.len()), (BATCH, BATCH));
+}
+
+#[test]
 fn the_end_of_a_signal_follows_from_the_summary() {
     let file = tempfile::NamedTempFile::new().unwrap();
     let input = Input::File(file.path().to_owned());
