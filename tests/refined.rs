@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use torqcomp_model::effects::{EFFECTS, Effect, Form, Rulers};
+use torqcomp_model::effects::{EFFECTS, Effect, Form, RecordScales};
 
 use crate::blind::draw::Draw;
 use crate::blind::excitation::RATE_HZ;
@@ -38,7 +38,7 @@ fn rms(values: impl Iterator<Item = f64>) -> f64 {
 
 /// A stand file with one form of an effect, of a size as a fit would begin with.
 fn stand(effect: &Effect, form: &Form) -> String {
-    let rulers = Rulers {
+    let scales = RecordScales {
         rms: 5.0,
         peak: 16.0,
         natural_hz: 592.0,
@@ -52,7 +52,7 @@ fn stand(effect: &Effect, form: &Form) -> String {
     for (i, parameter) in form.parameters.iter().enumerate() {
         // A line has an amplitude that the start leaves to the record.
         let value = match start.get(i) {
-            Some(start) => parameter.value(*start, &rulers),
+            Some(start) => parameter.value(*start, &scales),
             None => 0.3 / i as f64,
         };
         let value = if form.starts.is_empty() {
@@ -147,7 +147,7 @@ fn add_lines(folder: &Folder, form: &Form) {
 /// What a form may leave of a torque: nothing is lost by most of them.
 fn allowed(effect: &str, form: &str) -> f64 {
     match (effect, form) {
-        // Cut off for good, at the rulers of a fit.
+        // Cut off for good, at the scales of a fit.
         ("saturation", "hard" | "uneven") => 0.3,
         ("saturation", _) => 0.05,
         // Nothing is shown within the gap.

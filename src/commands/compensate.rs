@@ -18,12 +18,12 @@ use self::sink::Sink;
 use super::{Outcome, conclude, open_plot, uncertainty, unit_text};
 use crate::cli::{self, OneChannel};
 use crate::failure::Failure;
+use crate::inverse::ChainInverse;
 use crate::io::Input;
 use crate::io::output::{self, Output};
 use crate::print::{self, Report};
 use crate::recording::{ChannelStream, StreamSummary};
-use crate::stand::{self, Chain, Stand};
-use crate::undo::Undo;
+use crate::stand::{self, Calibration, Stand};
 
 /// The band unless another is asked for, as far as the rate allows: that of the thesis.
 const DEFAULT_BAND_HZ: f64 = 2400.0;
@@ -34,10 +34,10 @@ const GAIN_POINTS: usize = 9;
 struct Plan {
     stream: ChannelStream,
     stand: Stand,
-    chain: Chain,
+    chain: Calibration,
     filter: InverseFilter,
     /// The inverse of effects that no filter describes, if there are any.
-    undo: Option<Undo>,
+    undo: Option<ChainInverse>,
 }
 
 /// What the reader found, and the samples that the quality of the record is judged by.
@@ -95,16 +95,16 @@ impl Plan {
             reading,
         } = &args.record;
         let stream = ChannelStream::open(&Input::of(input), choice, reading)?;
-        let chain = stand.chain(&stream.name, stream.unit.as_ref(), args.units.into())?;
+        let chain = stand.calibration(&stream.name, stream.unit.as_ref(), args.units.into())?;
         let band = match args.band {
             Some(band_hz) => Band::new(stream.rate_hz, band_hz),
             None => Band::fitting(stream.rate_hz, DEFAULT_BAND_HZ),
         }
         .map_err(|error| Failure::failed(error).at(&stream.source))?;
-        let (filter, undo) = if stand.is_a_response() {
+        let (filter, undo) = if stand.chain()?.is_a_response() {
             (InverseFilter::design(stand.inverse()?, band)?, None)
         } else {
-            let undo = Undo::new(&stand, band)?;
+            let undo = ChainInverse::new(&stand, band)?;
             (undo.filter().clone(), Some(undo))
         };
         Ok(Self {

@@ -13,7 +13,7 @@ use crate::io::Input;
 use crate::print::{Report, columns, rounded, short};
 use crate::quality::excerpt;
 use crate::recording::{ChannelStream, UniformRecord};
-use crate::stand::{self, Chain, Stand};
+use crate::stand::{self, Calibration, Stand};
 use crate::unit::NamedUnit;
 use crate::warning::Warning;
 
@@ -85,7 +85,7 @@ pub fn run(args: &cli::Harmonics) -> Result<Outcome, Failure> {
         reading,
     } = &args.record;
     let stream = ChannelStream::open(&Input::of(input), choice, reading)?;
-    let chain = stand.chain(&stream.name, stream.unit.as_ref(), args.units.into())?;
+    let chain = stand.calibration(&stream.name, stream.unit.as_ref(), args.units.into())?;
     let inputs = [args.record.input.as_ref(), args.stand.as_path()];
     let output = args.result.open(&inputs)?;
     let source = stream.source.clone();
@@ -105,7 +105,7 @@ pub fn run(args: &cli::Harmonics) -> Result<Outcome, Failure> {
 fn fit(
     args: &cli::Harmonics,
     stand: &Stand,
-    chain: &Chain,
+    chain: &Calibration,
     record: &UniformRecord,
     source: &str,
     (channel, channel_unit): (&str, Option<&NamedUnit>),
@@ -210,7 +210,7 @@ fn component(
     inverse: Complex64,
     printed: f64,
     stand: &Stand,
-    chain: &Chain,
+    chain: &Calibration,
 ) -> ComponentTorque {
     let factor = inverse.norm();
     let recorded = fitted.phasor.norm() * printed;

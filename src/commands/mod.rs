@@ -20,7 +20,7 @@ use crate::cli::{Cli, OutputArgs, Verb};
 use crate::failure::Failure;
 use crate::io::output::{self, Output};
 use crate::print::{self, Report};
-use crate::stand::{Chain, Stand};
+use crate::stand::{Calibration, Stand};
 use crate::unit::NamedUnit;
 use crate::warning::Warning;
 
@@ -107,7 +107,11 @@ fn unit_text(unit: Option<&NamedUnit>) -> &str {
 
 /// Standard uncertainty of the compensated torque that the stand's constants bring, its calibration
 /// included.
-fn uncertainty(stand: &Stand, chain: &Chain, frequency_hz: f64) -> Option<InverseUncertainty> {
+fn uncertainty(
+    stand: &Stand,
+    chain: &Calibration,
+    frequency_hz: f64,
+) -> Option<InverseUncertainty> {
     let mechanics = stand.mechanics.as_ref()?;
     let mut std = mechanics.std;
     std.static_gain_relative = chain.relative_std;
@@ -120,7 +124,7 @@ const LARGEST: f64 = 1e100;
 
 /// Brings recorded values to the applied quantity at rest, in SI units; index and reason of the
 /// first that cannot be.
-pub(crate) fn convert(chain: &Chain, values: &mut [f64]) -> Result<(), (usize, String)> {
+pub(crate) fn convert(chain: &Calibration, values: &mut [f64]) -> Result<(), (usize, String)> {
     if chain.recorded_factor != 1.0 {
         values.iter_mut().for_each(|v| *v *= chain.recorded_factor);
     }

@@ -1,9 +1,8 @@
 //! `simulate`: the stand's answer to a given input.
 
 use serde::Serialize;
-use torqcomp_model::effects::Action;
-use torqcomp_model::simulate::{Excitation, Fixed, Model, State, substeps};
-use torqcomp_model::{Estimate, Kind, Unit};
+use torqcomp_model::simulate::{Excitation, MotionState, substeps};
+use torqcomp_model::{Chain, Estimate, Kind, Unit};
 
 use super::{Outcome, conclude, report_beside, rows};
 use crate::cli;
@@ -11,7 +10,7 @@ use crate::failure::Failure;
 use crate::io::{ChannelChoice, Flags, Input};
 use crate::print::{Report, short};
 use crate::recording::{AlignedChannel, AlignedChannels};
-use crate::stand::{self, Given, Stand};
+use crate::stand::{self, Stand};
 use crate::unit::NamedUnit;
 use crate::warning::Warning;
 
@@ -64,10 +63,10 @@ pub fn run(args: &cli::Simulate) -> Result<Outcome, Failure> {
     let mut warnings = read.warnings.clone();
     let units = ChannelUnits::of(&stand, chosen, &mut warnings)?;
     let applied: Vec<f64> = chosen.samples.iter().map(|u| u * units.applied).collect();
-    let model = model(&stand, units.gain)?;
+    let chain = stand.chain()?;
     let between = args.between.into();
     let input = Excitation::new(applied, read.rate_hz, read.start_s, 1).with_between(between);
-    let (mut simulated, steps) = refined(&model, &input)?;
+    let (mut simulated, steps) = refined(&chain, &input)?;
     for value in &mut simulated {
         *value = (*value + stand.diagnosed.offset) / units.measured;
     }
@@ -115,7 +114,7 @@ impl Report for SimulateReport {
     }
 }
 
-/// Units of both quantities, and the gain between them.
+/// Units of both quantities.
 struct ChannelUnits {
     /// SI units per unit of the file.
     applied: f64,
@@ -123,8 +122,6 @@ struct ChannelUnits {
     /// SI units per unit of the result.
     measured: f64,
     measured_text: String,
-    /// Measured per applied quantity at rest, in SI units.
-    gain: f64,
 }
 
 impl ChannelUnits {
@@ -133,13 +130,8 @@ impl ChannelUnits {
         chosen: &AlignedChannel,
         warnings: &mut Vec<Warning>,
     ) -> Result<Self, Failure> {
-        let gain = match &stand.mechanics()?.given {
-            Given::Modal {
-                static_gain: Some(gain),
-                ..
-            } => Some(gain),
-            _ => None,
-        };
+        stand.mechanics()?;
+        let gain = stand.static_gain();
         let expected = gain.map_or("N m", |gain| gain.applied_unit.as_str());
         let applied = applied_unit(chosen, expected, warnings)?;
         let text = match (&stand.diagnosed.measured_unit, gain) {
@@ -156,7 +148,6 @@ impl ChannelUnits {
             applied_text: applied.text,
             measured: unit.factor() * per_volt.map_or(1.0, Estimate::value),
             measured_text: text,
-            gain: gain.map_or(1.0, |gain| gain.value),
         })
     }
 }
@@ -191,28 +182,12 @@ fn applied_unit(
     }
 }
 
-/// The stand with its effects.
-fn model(stand: &Stand, gain: f64) -> Result<Model, Failure> {
-    let recorder = stand.recorder.recorder.clone();
-    let actions = stand.effects.iter().map(stand::DeclaredEffect::action);
-    Ok(Model {
-        mode: stand.mode()?,
-        gain,
-        shift: stand.diagnosed.shift,
-        recorder: (!recorder.is_ideal()).then(|| -> Fixed {
-            std::sync::Arc::new(move |frequency_hz| recorder.response(frequency_hz))
-        }),
-        actions: actions
-            .filter(|(_, a)| !matches!(a, Action::Lines(_)))
-            .collect(),
-    })
-}
-
 /// The record from rest, its step halved until that changes nothing that matters; and the steps a sample.
-fn refined(model: &Model, input: &Excitation) -> Result<(Vec<f64>, usize), Failure> {
-    let run = |steps: usize| model.simulate_from(&input.with_substeps(steps), State::default());
+fn refined(chain: &Chain, input: &Excitation) -> Result<(Vec<f64>, usize), Failure> {
+    let run =
+        |steps: usize| chain.simulate_from(&input.with_substeps(steps), MotionState::default());
     let rate_hz = input.rate_hz();
-    let mut steps = substeps(model.mode.omega_rad_s / std::f64::consts::TAU, rate_hz);
+    let mut steps = substeps(chain.mode.natural_frequency_hz(), rate_hz);
     let mut last = run(steps);
     loop {
         let finer = run(2 * steps);

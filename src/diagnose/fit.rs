@@ -2,9 +2,9 @@
 
 use std::f64::consts::TAU;
 
+use torqcomp_model::Chain;
 use torqcomp_model::Mode;
 use torqcomp_model::fit::{self, Differences, Fit, FitError, Options, Parameter};
-use torqcomp_model::simulate::Model;
 
 use super::record::{InitialState, Nuisance, NuisanceFit, NuisanceTerms, StandRecord, dot};
 use super::structure::{PlainStand, Structure};
@@ -179,7 +179,7 @@ fn parameters(
 }
 
 /// Measured less modelled over the range of a record, nuisance terms included.
-pub fn raw_residual(model: &Model, record: &StandRecord) -> Result<Vec<f64>, FitError> {
+pub fn raw_residual(model: &Chain, record: &StandRecord) -> Result<Vec<f64>, FitError> {
     let modelled = model.simulate(&record.input, record.initial.motion);
     let pairs = record.measured_in_range().iter();
     let pairs = pairs.zip(&modelled[record.range.clone()]);
@@ -193,7 +193,7 @@ pub fn raw_residual(model: &Model, record: &StandRecord) -> Result<Vec<f64>, Fit
 /// Mean square of the raw residual of a record, and the nuisance terms in it.
 fn nuisance_of(
     structure: &Structure,
-    (model, terms): &mut (Model, NuisanceTerms),
+    (model, terms): &mut (Chain, NuisanceTerms),
     record: &StandRecord,
 ) -> Option<(f64, NuisanceFit)> {
     model.shift = record.initial.preload;
@@ -300,7 +300,7 @@ impl FittedModel {
     /// The residual of a record with the initial state that it has.
     fn evaluate(
         &self,
-        model: &mut Model,
+        model: &mut Chain,
         terms: &NuisanceTerms,
         record: StandRecord,
     ) -> Option<RecordResidual> {

@@ -27,8 +27,8 @@ mod structure;
 mod units;
 mod verdict;
 
-use torqcomp_model::effects::Rulers;
-use torqcomp_model::simulate::{Between, Fixed};
+use torqcomp_model::effects::{Fixed, RecordScales};
+use torqcomp_model::simulate::Between;
 
 use crate::failure::Failure;
 use crate::warning::Warning;
@@ -98,7 +98,7 @@ const PROMINENT: f64 = 30.0;
 const MOST_LINES: usize = 5;
 
 /// Scales of the parameters for training records, without the natural frequency.
-fn scales(train: &[StandRecord]) -> Rulers {
+fn scales(train: &[StandRecord]) -> RecordScales {
     let (mut sum, mut count, mut peak) = (0.0, 0_usize, 0.0_f64);
     for record in train {
         let y = record.measured_in_range();
@@ -110,7 +110,7 @@ fn scales(train: &[StandRecord]) -> Rulers {
         count += y.len();
     }
     let longest = train.iter().map(StandRecord::count).max().unwrap_or(1);
-    Rulers {
+    RecordScales {
         rms: (sum / count.max(1) as f64).sqrt(),
         peak,
         natural_hz: 1.0,

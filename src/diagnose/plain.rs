@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use torqcomp_model::simulate::{Model, State};
+use torqcomp_model::Chain;
+use torqcomp_model::simulate::MotionState;
 
 use super::fit::{FitEffort, FittedModel, fit};
 use super::record::{StandRecord, dot};
@@ -95,14 +96,9 @@ fn try_start(
     record: &StandRecord,
 ) -> Option<(f64, PlainStand)> {
     let is_free = context.gain_is_free;
-    let model = Model {
-        mode: start.mode(),
-        gain: if is_free { 1.0 } else { start.gain },
-        recorder: context.recorder.clone(),
-        shift: 0.0,
-        actions: Vec::new(),
-    };
-    let modelled = model.simulate(&record.input, State::default());
+    let gain = if is_free { 1.0 } else { start.gain };
+    let model = Chain::new(start.mode(), gain).with_recorder(context.recorder.clone(), false);
+    let modelled = model.simulate(&record.input, MotionState::default());
     let x = without_mean(&modelled[record.range.clone()]);
     let y = without_mean(record.measured_in_range());
     let (xx, xy, yy) = (dot(&x, &x), dot(&x, &y), dot(&y, &y));
@@ -126,7 +122,7 @@ pub fn set_starts(plain: &FittedModel, records: &mut [StandRecord]) {
         };
         let [x, speed] = model.state_at_start(&record.input);
         let [dx, dspeed] = found.nuisance.motion.unwrap_or_default();
-        record.initial.motion = State {
+        record.initial.motion = MotionState {
             x: x + dx,
             speed: speed + dspeed * reference.omega_rad_s,
         };

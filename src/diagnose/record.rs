@@ -4,15 +4,16 @@ use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 use std::sync::Arc;
 
+use torqcomp_model::Chain;
 use torqcomp_model::Mode;
-use torqcomp_model::simulate::{Excitation, Model, State};
+use torqcomp_model::simulate::{Excitation, MotionState};
 
 use super::columns::Columns;
 
 /// State of the stand at the first sample of a record.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct InitialState {
-    pub motion: State,
+    pub motion: MotionState,
     /// Displacement by a constant load that is not in the input.
     pub preload: f64,
 }
@@ -122,13 +123,7 @@ impl StandRecord {
         if decay < DECAYED {
             nuisance.motion = Some(1);
             nuisance.sees_start = decay < START_SEEN;
-            let model = Model {
-                mode: *mode,
-                gain: 1.0,
-                recorder: None,
-                shift: 0.0,
-                actions: Vec::new(),
-            };
+            let model = Chain::new(*mode, 1.0);
             for column in model.free_motion(rate_hz, self.range.end) {
                 columns.push(column[self.range.clone()].to_vec());
             }

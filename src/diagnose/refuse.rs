@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use torqcomp_model::simulate::{Excitation, State};
+use torqcomp_model::simulate::{Excitation, MotionState};
 
 use super::plain::find_plain;
 use super::record::{NuisanceTerms, StandRecord, dot};
@@ -104,7 +104,7 @@ fn relative_error(context: &FitContext, records: &[StandRecord]) -> f64 {
     let (model, _) = structure.model(&context.plain_values(&plain));
     let (mut error, mut whole) = (0.0, 0.0);
     for record in records {
-        let modelled = model.simulate(&record.input, State::default());
+        let modelled = model.simulate(&record.input, MotionState::default());
         let measured = record.measured_in_range();
         let pairs = measured.iter().zip(&modelled[record.range.clone()]);
         let mut residual: Vec<f64> = pairs.map(|(y, x)| y - x).collect();

@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use torqcomp_model::Mode;
-use torqcomp_model::effects::{Action, Effect, Form, Rulers, Stage, Unit};
-use torqcomp_model::simulate::{Fixed, Model};
+use torqcomp_model::effects::{Action, Effect, Fixed, Form, RecordScales, Stage, Unit};
+use torqcomp_model::{Chain, Link};
 
 use super::record::NuisanceTerms;
 use super::units::ChannelUnits;
@@ -32,7 +32,7 @@ impl PlainStand {
 #[derive(Clone)]
 pub struct FitContext {
     /// Scales that make the parameters pure numbers.
-    pub scales: Rulers,
+    pub scales: RecordScales,
     /// The fitted plain stand: scale of natural frequency and gain, and the mode of the free motion in the residuals.
     pub plain: PlainStand,
     /// Whether the gain is a parameter of the plain stand.
@@ -45,7 +45,7 @@ pub struct FitContext {
 impl FitContext {
     /// The same context for another plain stand.
     pub fn at(&self, plain: PlainStand) -> Self {
-        let scales = Rulers {
+        let scales = RecordScales {
             natural_hz: plain.natural_hz,
             ..self.scales
         };
@@ -182,29 +182,26 @@ impl Structure {
     }
 
     /// The model of parameter values, and what it adds that belongs to a record.
-    pub fn model(&self, values: &[f64]) -> (Model, NuisanceTerms) {
+    pub fn model(&self, values: &[f64]) -> (Chain, NuisanceTerms) {
         let (mode, gain) = self.mode(values);
         let mut terms = NuisanceTerms::NONE;
-        let mut actions = Vec::new();
+        let mut links = Vec::new();
         for (effect, own) in self.effects.iter().zip(self.effect_values(values)) {
             let corners = effect.form.parameters.iter().zip(&own);
             let fading = corners.filter(|(p, _)| p.fades);
             terms.decays_per_s.extend(fading.map(|(_, hz)| TAU * hz));
-            match (effect.form.build)(&own) {
+            let link = Link::of(effect.effect, effect.form, &own);
+            match &link.action {
                 Action::Lines(lines) => terms.lines_hz.extend(lines.iter().map(|l| l.frequency_hz)),
                 Action::Course(count) => {
-                    terms.drift_half_waves = terms.drift_half_waves.max(count);
+                    terms.drift_half_waves = terms.drift_half_waves.max(*count);
                 }
-                action => actions.push((effect.form.stage, action)),
+                _ => links.push(link),
             }
         }
-        let model = Model {
-            mode,
-            gain,
-            recorder: self.context.recorder.clone(),
-            shift: 0.0,
-            actions,
-        };
-        (model, terms)
+        let chain = Chain::new(mode, gain)
+            .with_recorder(self.context.recorder.clone(), false)
+            .with_links(links);
+        (chain, terms)
     }
 }

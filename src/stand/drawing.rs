@@ -1,19 +1,19 @@
 //! Reading what a drawing gives: the beam, the parts of the inertia, the friction.
 
-use torqcomp_model::{Beam, Estimate, Kind, ModelError, Part, Section as CrossSection, Segment};
+use torqcomp_model::{Beam, CrossSection, Estimate, Kind, ModelError, Part, Segment};
 
 use super::section::Section;
 use super::{BeamDrawing, Friction, NamedPart};
 use crate::failure::Failure;
 
 /// The shape of a beam's section and the lengths that it is made of.
-struct Shape {
+struct BeamShape {
     word: &'static str,
     sizes: Vec<Estimate>,
     shear_coefficient: Option<f64>,
 }
 
-impl Shape {
+impl BeamShape {
     fn read(section: &Section) -> Result<Self, Failure> {
         let words = ["rectangle", "circle", "tube"];
         let (word, keys): (_, &[_]) = match section.word("section", &words)? {
@@ -49,7 +49,7 @@ impl Shape {
 
 pub(super) fn beam(section: &Section) -> Result<BeamDrawing, Failure> {
     let wrong = |error| section.fail("", error);
-    let shape = Shape::read(section)?;
+    let shape = BeamShape::read(section)?;
     let length = section.positive("length", Kind::Length)?;
     let modulus = section.positive("elastic_modulus", Kind::Pressure)?;
     let radius = section.positive("radius", Kind::Length)?;
@@ -93,7 +93,7 @@ pub(super) fn beam(section: &Section) -> Result<BeamDrawing, Failure> {
 /// Stiffness of the beam as a slender one, uncertainties of the drawing carried through.
 fn slender_stiffness(
     section: &Section,
-    shape: &Shape,
+    shape: &BeamShape,
     length: &Estimate,
     modulus: &Estimate,
     radius: &Estimate,

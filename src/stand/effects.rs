@@ -2,21 +2,13 @@
 
 use std::sync::Arc;
 
-use num_complex::Complex64;
 use torqcomp_dsp::compensate::Inverse;
-use torqcomp_model::Unit as TextUnit;
-use torqcomp_model::effects::{
-    Action, EFFECTS, Effect, Form, Frequency, Mode, Parameter, Stage, Unit,
-};
+use torqcomp_model::effects::{EFFECTS, Effect, EffectParameter, Fixed, Form, Unit};
+use torqcomp_model::{Chain, Link, Mode, Unit as TextUnit};
 
+use super::Stand;
 use super::section::Section;
-use super::{Given, Stand};
 use crate::failure::Failure;
-
-/// Frequency, over the natural one, that is next to rest.
-const NEAR_REST: f64 = 1e-6;
-/// Step of a factor at rest, relative to the factor, that is none.
-const LARGEST_STEP: f64 = 1e-4;
 
 /// An effect that the stand file declares.
 #[derive(Debug, Clone)]
@@ -30,10 +22,8 @@ pub struct DeclaredEffect {
 }
 
 impl DeclaredEffect {
-    /// What it does.
-    #[must_use]
-    pub fn action(&self) -> (Stage, Action) {
-        (self.form.stage, (self.form.build)(&self.values))
+    fn link(&self) -> Link {
+        Link::of(self.effect, self.form, &self.values)
     }
 }
 
@@ -64,7 +54,11 @@ pub(super) fn effect(section: &Section, recorded_unit: &str) -> Result<DeclaredE
     })
 }
 
-fn value(section: &Section, parameter: &Parameter, recorded_unit: &str) -> Result<f64, Failure> {
+fn value(
+    section: &Section,
+    parameter: &EffectParameter,
+    recorded_unit: &str,
+) -> Result<f64, Failure> {
     let name = parameter.name;
     let unit = parameter.unit.text(recorded_unit);
     let example = || format!("{name} = \"0.01 {unit}\"").replace(" \"", "\"");
@@ -103,13 +97,8 @@ impl Stand {
     /// Unit of what the stand's mechanics move the record by: that of the static gain, or torque.
     #[must_use]
     pub fn recorded_unit(&self) -> &str {
-        match self.mechanics.as_ref().map(|m| &m.given) {
-            Some(Given::Modal {
-                static_gain: Some(gain),
-                ..
-            }) => &gain.recorded_unit,
-            _ => "N m",
-        }
+        self.static_gain()
+            .map_or("N m", |gain| gain.recorded_unit.as_str())
     }
 
     /// The linear mode of the mechanics.
@@ -124,94 +113,42 @@ impl Stand {
         })
     }
 
-    /// Whether a response over frequency describes the stand with all its effects, down to rest.
-    #[must_use]
-    pub fn is_a_response(&self) -> bool {
-        let Ok(mode) = self.mode() else { return true };
-        self.effects
-            .iter()
-            .all(|declared| match declared.action().1 {
-                Action::Factor(factor) => is_smooth_at_rest(&factor, &mode),
-                Action::Feedthrough(_) => true,
-                _ => false,
-            })
-    }
-
     /// Recorded per applied quantity at rest, in SI units; 1 for a stand that records torque.
     #[must_use]
     pub fn gain(&self) -> f64 {
-        match self.mechanics.as_ref().map(|m| &m.given) {
-            Some(Given::Modal {
-                static_gain: Some(gain),
-                ..
-            }) => gain.value,
-            _ => 1.0,
-        }
+        self.static_gain().map_or(1.0, |gain| gain.value)
     }
 
-    /// What a compensation divides by: the response of the stand and the recorder, linear effects included.
+    /// The chain from the applied quantity to the record in SI units, with all effects and the recorder.
+    ///
+    /// # Errors
+    /// If the stand file gives no mechanics.
+    pub fn chain(&self) -> Result<Chain, Failure> {
+        let recorder = self.recorder.recorder.clone();
+        let is_ideal = recorder.is_ideal();
+        let response: Fixed = Arc::new(move |frequency_hz| recorder.response(frequency_hz));
+        Ok(Chain::new(self.mode()?, self.gain())
+            .with_shift(self.diagnosed.shift)
+            .with_recorder(Some(response), is_ideal)
+            .with_links(self.effects.iter().map(DeclaredEffect::link)))
+    }
+
+    /// What a compensation multiplies by: the inverse response of the chain.
     ///
     /// # Errors
     /// If the stand file gives no mechanics, or an effect that no division takes out.
     pub fn inverse(&self) -> Result<Inverse, Failure> {
-        let response = self.mechanics()?.response;
-        let recorder = self.recorder.recorder.clone();
-        if self.effects.is_empty() {
-            return Ok(Arc::new(move |frequency_hz| {
-                response.inverse(frequency_hz) / recorder.response(frequency_hz)
-            }));
+        let plain = self.mechanics()?.response;
+        let chain = self.chain()?;
+        if let Some(link) = chain.links().iter().find(|link| !link.is_linear()) {
+            return Err(Failure::failed(format_args!(
+                "{}: the effect \"{}\" is no response over frequency; leave it out to use the plain \
+                 stand, or take it out of the record with compensate",
+                self.file, link.effect
+            )));
         }
-        let mode = self.mode()?;
-        let mut links = Vec::new();
-        for declared in &self.effects {
-            match declared.action() {
-                (_, action @ (Action::Factor(_) | Action::Feedthrough(_))) => {
-                    links.push((declared.form.stage, action));
-                }
-                (_, _) => {
-                    return Err(Failure::failed(format_args!(
-                        "{}: the effect \"{}\" is no response over frequency; leave it out to use the plain \
-                         stand, or take it out of the record with compensate",
-                        self.file, declared.effect.name
-                    )));
-                }
-            }
-        }
-        links.sort_by_key(|(place, _)| *place);
         Ok(Arc::new(move |frequency_hz| {
-            let omega = std::f64::consts::TAU * frequency_hz;
-            let mut through = response.inverse(frequency_hz).inv();
-            let mut recorded = false;
-            for (place, action) in &links {
-                if *place >= Stage::Chain && !recorded {
-                    through *= recorder.response(frequency_hz);
-                    recorded = true;
-                }
-                through = along(action, &mode, omega, through);
-            }
-            if !recorded {
-                through *= recorder.response(frequency_hz);
-            }
-            through.inv()
+            chain.divide_out(plain.inverse(frequency_hz), frequency_hz)
         }))
-    }
-}
-
-/// Whether a factor goes over into a constant at rest that is not zero, without a step: the impulse response of its
-/// inverse then dies out.
-#[must_use]
-pub fn is_smooth_at_rest(factor: &Frequency, mode: &Mode) -> bool {
-    let at_rest = factor(mode, 0.0);
-    let near = factor(mode, NEAR_REST * mode.omega_rad_s);
-    // Of both signs of frequency the constant is the same only if it is real.
-    let step = (near - at_rest).norm().max(near.im.abs());
-    at_rest.norm() > 0.0 && step < LARGEST_STEP * at_rest.norm()
-}
-
-fn along(action: &Action, mode: &Mode, omega_rad_s: f64, through: Complex64) -> Complex64 {
-    match action {
-        Action::Factor(factor) => through * factor(mode, omega_rad_s),
-        Action::Feedthrough(term) => through + term(mode, omega_rad_s),
-        _ => through,
     }
 }

@@ -52,61 +52,28 @@ pub fn parse(name: &str, text: &str) -> Result<Stand, Failure> {
         source.at(error.span().map(|span| span.start), format_args!("{message}{hint}"))
     })?;
     let top = Section::new(&source, "", document.as_table(), Some(0));
-    match top.text("schema")? {
-        Some(SCHEMA) => {}
-        Some(other) => {
-            return Err(top.fail(
-                "schema",
-                format_args!("\"{other}\" is not known; this version reads \"{SCHEMA}\""),
-            ));
-        }
-        None => {
-            return Err(top.fail(
-                "",
-                format_args!("schema is missing; write schema = \"{SCHEMA}\""),
-            ));
-        }
-    }
-    let stand_name = top.text("name")?.unwrap_or("unnamed stand").to_owned();
-    let mechanics = top
-        .section("mechanics")?
-        .map(|s| mechanics(&s))
-        .transpose()?;
-    let torque_per_volt = top
-        .section("calibration")?
-        .map(|s| calibration(&s))
-        .transpose()?;
-    let beam = top.section("beam")?.map(|s| beam(&s)).transpose()?;
-    let parts = top
-        .sections("parts")?
-        .iter()
-        .map(part)
-        .collect::<Result<_, _>>()?;
-    let friction = top.section("friction")?.map(|s| friction(&s)).transpose()?;
-    let gage = top.section("gage")?.map(|s| gage(&s)).transpose()?;
-    let bridge = top.section("bridge")?.map(|s| bridge(&s)).transpose()?;
-    let recorder = recorder(top.section("recorder")?.as_ref())?;
-    let effect_sections = top.sections("effects")?;
-    let diagnosed = top
-        .section("diagnosed")?
-        .map(|s| diagnosed(&s))
-        .transpose()?
-        .unwrap_or_default();
-    top.finish()?;
+    check_schema(&top)?;
     let mut stand = Stand {
-        name: stand_name,
+        name: top.text("name")?.unwrap_or("unnamed stand").to_owned(),
         file: name.to_owned(),
-        mechanics,
-        torque_per_volt,
-        beam,
-        parts,
-        friction,
-        gage,
-        bridge,
-        recorder,
+        mechanics: one(&top, "mechanics", mechanics)?,
+        torque_per_volt: one(&top, "calibration", calibration)?,
+        beam: one(&top, "beam", beam)?,
+        parts: top
+            .sections("parts")?
+            .iter()
+            .map(part)
+            .collect::<Result<_, _>>()?,
+        friction: one(&top, "friction", friction)?,
+        gage: one(&top, "gage", gage)?,
+        bridge: one(&top, "bridge", bridge)?,
+        recorder: recorder(top.section("recorder")?.as_ref())?,
         effects: Vec::new(),
-        diagnosed,
+        diagnosed: Diagnosed::default(),
     };
+    let effect_sections = top.sections("effects")?;
+    stand.diagnosed = one(&top, "diagnosed", diagnosed)?.unwrap_or_default();
+    top.finish()?;
     one_calibration(&top, &stand)?;
     stand.effects = effect_sections
         .iter()
@@ -115,23 +82,35 @@ pub fn parse(name: &str, text: &str) -> Result<Stand, Failure> {
     Ok(stand)
 }
 
+/// A section that may be there once.
+fn one<T>(
+    top: &Section,
+    key: &'static str,
+    read: impl Fn(&Section) -> Result<T, Failure>,
+) -> Result<Option<T>, Failure> {
+    top.section(key)?.map(|section| read(&section)).transpose()
+}
+
+fn check_schema(top: &Section) -> Result<(), Failure> {
+    match top.text("schema")? {
+        Some(SCHEMA) => Ok(()),
+        Some(other) => Err(top.fail(
+            "schema",
+            format_args!("\"{other}\" is not known; this version reads \"{SCHEMA}\""),
+        )),
+        None => Err(top.fail(
+            "",
+            format_args!("schema is missing; write schema = \"{SCHEMA}\""),
+        )),
+    }
+}
+
 /// A static gain and a torque per volt would say the same thing twice.
 fn one_calibration(top: &Section, stand: &Stand) -> Result<(), Failure> {
-    let has_gain = matches!(
-        &stand.mechanics,
-        Some(Mechanics {
-            given: Given::Modal {
-                static_gain: Some(_),
-                ..
-            },
-            ..
-        })
-    );
-    if has_gain && stand.torque_per_volt.is_some() {
+    if stand.static_gain().is_some() && stand.torque_per_volt.is_some() {
         return Err(top.fail(
             "calibration",
-            "torque_per_volt and the static_gain of [mechanics] both tell how the record follows \
-             the torque; keep one of them",
+            "torque_per_volt and the static_gain of [mechanics] both convert the record to torque; keep one of them",
         ));
     }
     Ok(())
@@ -156,7 +135,7 @@ fn mechanics(section: &Section) -> Result<Mechanics, Failure> {
         let own = |estimate: &Estimate| own_std(section, estimate, common);
         let response = SecondOrder::new(inertia.value(), damping.value(), stiffness.value())
             .map_err(|error| section.fail("", error))?;
-        // So that a wrong key is told the right ones of both forms.
+        // So that the message about an unknown key lists those of both forms.
         let _ = (
             section.raw("natural_frequency"),
             section.raw("damping_ratio"),
@@ -182,10 +161,13 @@ fn mechanics(section: &Section) -> Result<Mechanics, Failure> {
 
 /// Relative standard uncertainty that inertia, damping and stiffness share, since two of them follow from the third.
 fn common_std(section: &Section) -> Result<f64, Failure> {
-    if !section.has("common_std") {
+    let Some(common) = section.quantity("common_std", Kind::Ratio)? else {
         return Ok(0.0);
+    };
+    if common.value() >= 0.0 {
+        return Ok(common.value());
     }
-    Ok(section.not_negative("common_std", Kind::Ratio)?.value())
+    Err(section.fail("common_std", "expected a ratio of zero or more"))
 }
 
 /// Largest part by which the common uncertainty may exceed the whole one: both are rounded.

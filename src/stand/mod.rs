@@ -1,9 +1,10 @@
 //! The stand as the stand file describes it.
 
-mod chain;
+mod calibration;
 mod drawing;
 mod effects;
 mod file;
+pub(crate) mod keys;
 mod measuring;
 mod refine;
 mod section;
@@ -13,8 +14,8 @@ use torqcomp_dsp::bridge::{BridgeLayout, Leads, Supply};
 use torqcomp_dsp::recorder::Recorder;
 use torqcomp_model::{Estimate, ParameterStd, SecondOrder};
 
-pub use chain::{Applied, Chain, applied_by_unit};
-pub use effects::{DeclaredEffect, is_smooth_at_rest};
+pub use calibration::{Applied, Calibration, applied_by_unit};
+pub use effects::DeclaredEffect;
 pub use file::{parse, read, text};
 pub use refine::{Refined, refine, si_unit};
 

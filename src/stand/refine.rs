@@ -1,6 +1,6 @@
 //! Writing what a diagnosis found into a stand file.
 
-use toml_edit::{DocumentMut, Item, Table, value};
+use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, value};
 
 use torqcomp_model::Estimate;
 
@@ -36,17 +36,13 @@ pub struct Refined<'a> {
     pub verdict: &'a str,
 }
 
-fn relative_std(estimate: &Estimate) -> Option<f64> {
-    Some(estimate.std_uncertainty()? / estimate.value())
-}
-
 impl Refined<'_> {
     /// Inertia `K/ω₀²` and damping `2ζK/ω₀` beside a declared stiffness, each with the standard uncertainty that this and
     /// the fit give it.
     fn beside(&self, stiffness: &Estimate) -> [(f64, Option<f64>); 2] {
         let relative = |(value, std): (f64, Option<f64>)| std.map(|std| std / value);
         let omega = std::f64::consts::TAU * self.natural_hz.0;
-        let common = relative_std(stiffness).unwrap_or(0.0);
+        let common = stiffness.relative_std().unwrap_or(0.0);
         let frequency = relative(self.natural_hz);
         let inertia = stiffness.value() / (omega * omega);
         let damping = 2.0 * self.damping_ratio.0 * stiffness.value() / omega;
@@ -71,6 +67,74 @@ impl Refined<'_> {
         };
         format!("{} {}/{applied}", digits::text(gain, 12), one(recorded))
     }
+
+    /// A quantity with its standard uncertainty and its source.
+    fn quantity(&self, (number, std): (f64, Option<f64>), unit: &str) -> Item {
+        let text = |number: f64| format!("{} {unit}", digits::text(number, 9));
+        let mut table = InlineTable::new();
+        table.insert("value", text(number).trim().into());
+        if let Some(std) = std {
+            table.insert("std", text(std).trim().into());
+        }
+        table.insert("source", self.source.as_str().into());
+        value(table)
+    }
+
+    fn write_mechanics(&self, document: &mut DocumentMut, declared: Option<&Stand>) {
+        let given = declared.and_then(|stand| Some(&stand.mechanics.as_ref()?.given));
+        let mechanics = document
+            .entry("mechanics")
+            .or_insert(Item::Table(Table::new()));
+        if let Some(Given::Constants { stiffness, .. }) = given
+            && self.gain.is_none()
+        {
+            // Torque against torque determines ratios only: the stiffness stays as declared.
+            let [inertia, damping] = self.beside(stiffness);
+            mechanics["inertia"] = self.quantity(inertia, "kg m^2");
+            mechanics["damping"] = self.quantity(damping, "N m s/rad");
+            if let Some(table) = mechanics.as_table_like_mut() {
+                table.remove(COMMON);
+            }
+            if let Some(common) = stiffness.relative_std() {
+                mechanics[COMMON] = value(digits::text(common, 9));
+            }
+            return;
+        }
+        let mut table = Table::new();
+        table["natural_frequency"] = self.quantity(self.natural_hz, "Hz");
+        table["damping_ratio"] = self.quantity(self.damping_ratio, "");
+        if let Some(gain) = self.gain {
+            table["static_gain"] = value(self.static_gain(gain));
+            document.remove("calibration");
+        }
+        document["mechanics"] = Item::Table(table);
+    }
+
+    fn write_effects(&self, document: &mut DocumentMut) {
+        document.remove("effects");
+        let mut effects = ArrayOfTables::new();
+        for (kind, form, parameters) in &self.effects {
+            let mut table = Table::new();
+            table["kind"] = value(*kind);
+            table["form"] = value(*form);
+            for (name, text, std) in parameters {
+                table[*name] = match std {
+                    None => value(text.as_str()),
+                    Some(std) => {
+                        let mut inline = InlineTable::new();
+                        inline.insert("value", text.as_str().into());
+                        inline.insert("std", std.as_str().into());
+                        value(inline)
+                    }
+                };
+            }
+            table["source"] = value(self.source.as_str());
+            effects.push(table);
+        }
+        if !effects.is_empty() {
+            document["effects"] = Item::ArrayOfTables(effects);
+        }
+    }
 }
 
 /// The text of a stand file with the refined constants and the effects: the declared one, changed where it was
@@ -84,69 +148,8 @@ pub fn refine(declared: Option<(&Stand, &str)>, refined: &Refined) -> Result<Str
         |d| d.1,
     );
     let mut document: DocumentMut = text.parse().map_err(Failure::failed)?;
-    let given = declared
-        .and_then(|(stand, _)| stand.mechanics.as_ref())
-        .map(|m| &m.given);
-    let quantity = |(number, std): (f64, Option<f64>), unit: &str| {
-        let text = |number: f64, digits: u32| format!("{} {unit}", digits::text(number, digits));
-        let mut table = toml_edit::InlineTable::new();
-        table.insert("value", text(number, 9).trim().into());
-        if let Some(std) = std {
-            table.insert("std", text(std, 9).trim().into());
-        }
-        table.insert("source", refined.source.as_str().into());
-        value(table)
-    };
-    let mechanics = document
-        .entry("mechanics")
-        .or_insert(Item::Table(Table::new()));
-    match given {
-        Some(Given::Constants { stiffness, .. }) if refined.gain.is_none() => {
-            // Only ratios follow from torque against torque: the stiffness stays as declared.
-            let [inertia, damping] = refined.beside(stiffness);
-            mechanics["inertia"] = quantity(inertia, "kg m^2");
-            mechanics["damping"] = quantity(damping, "N m s/rad");
-            if let Some(table) = mechanics.as_table_like_mut() {
-                table.remove(COMMON);
-            }
-            if let Some(common) = relative_std(stiffness) {
-                mechanics[COMMON] = value(digits::text(common, 9));
-            }
-        }
-        _ => {
-            let mut table = Table::new();
-            table["natural_frequency"] = quantity(refined.natural_hz, "Hz");
-            table["damping_ratio"] = quantity(refined.damping_ratio, "");
-            if let Some(gain) = refined.gain {
-                table["static_gain"] = value(refined.static_gain(gain));
-                document.remove("calibration");
-            }
-            document["mechanics"] = Item::Table(table);
-        }
-    }
-    document.remove("effects");
-    let mut effects = toml_edit::ArrayOfTables::new();
-    for (kind, form, parameters) in &refined.effects {
-        let mut table = Table::new();
-        table["kind"] = value(*kind);
-        table["form"] = value(*form);
-        for (name, text, std) in parameters {
-            table[*name] = match std {
-                None => value(text.as_str()),
-                Some(std) => {
-                    let mut inline = toml_edit::InlineTable::new();
-                    inline.insert("value", text.as_str().into());
-                    inline.insert("std", std.as_str().into());
-                    value(inline)
-                }
-            };
-        }
-        table["source"] = value(refined.source.as_str());
-        effects.push(table);
-    }
-    if !effects.is_empty() {
-        document["effects"] = Item::ArrayOfTables(effects);
-    }
+    refined.write_mechanics(&mut document, declared.map(|d| d.0));
+    refined.write_effects(&mut document);
     let mut diagnosed = Table::new();
     diagnosed["measured_unit"] = value(refined.measured_unit);
     diagnosed["verdict"] = value(refined.verdict);

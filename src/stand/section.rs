@@ -5,6 +5,7 @@ use std::cell::RefCell;
 use toml_edit::{Item, TableLike};
 use torqcomp_model::{Estimate, Kind};
 
+use super::keys::{self, Takes};
 use crate::failure::{Failure, did_you_mean};
 
 /// The text of a stand file and its name.
@@ -54,7 +55,18 @@ impl<'a> Section<'a> {
         }
     }
 
+    /// What `keys` says of a key. Tables of `value`, `std` and `source` are not listed there, nor are parameters of
+    /// effects.
+    fn listed(&self, key: &str) -> Option<Takes> {
+        keys::takes(&self.title, key)
+    }
+
     fn item(&self, key: &'static str) -> Option<&'a Item> {
+        debug_assert!(
+            self.listed(key).is_some() || self.title.contains(' ') || self.title == "[[effects]]",
+            "{} {key} is not listed in keys.rs",
+            self.title
+        );
         self.asked.borrow_mut().push(key);
         self.table.get(key)
     }
@@ -164,6 +176,7 @@ impl<'a> Section<'a> {
 
     /// A quantity: a text such as `"22.5 V"`, or a table of `value`, `std` and `source`.
     pub fn quantity(&self, key: &'static str, kind: Kind) -> Result<Option<Estimate>, Failure> {
+        debug_assert_eq!(self.listed(key), Some(Takes::Quantity(kind)), "{key}");
         let Some(item) = self.item(key) else {
             return Ok(None);
         };

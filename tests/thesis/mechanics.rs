@@ -1,14 +1,14 @@
 //! The computed constants, equations (14) to (27) and appendix A of the thesis.
 
 use torqcomp_model::inertia::{mass_from_weight_kg, total_inertia_kg_m2};
-use torqcomp_model::{Beam, Kind, Part, Section, Segment};
+use torqcomp_model::{Beam, CrossSection, Kind, Part, Segment};
 use torqcomp_model::{beam, calibration, damping};
 
 use super::comparison::{compare, inches, si, stand, us};
 
 /// ½ in by ½ in by 1½ in steel beam.
 fn thesis_beam() -> Beam {
-    let section = Section::rectangle(inches(0.5), inches(0.5)).unwrap();
+    let section = CrossSection::rectangle(inches(0.5), inches(0.5)).unwrap();
     let segment = Segment::new(inches(1.5), section).unwrap();
     Beam::new(vec![segment], si(Kind::Pressure, "30e6 psi")).unwrap()
 }

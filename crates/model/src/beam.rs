@@ -5,13 +5,13 @@
 
 use crate::check::{finite, positive};
 use crate::error::ModelError;
-use crate::section::Section;
+use crate::section::CrossSection;
 
 /// A length of beam with one cross section.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Segment {
     length_m: f64,
-    section: Section,
+    section: CrossSection,
 }
 
 impl Segment {
@@ -21,12 +21,12 @@ impl Segment {
     /// [`ModelError`] if the length is not finite or not greater than 0.
     ///
     /// ```
-    /// use torqcomp_model::{Section, Segment};
-    /// let segment = Segment::new(0.5, Section::circle(0.1)?)?;
+    /// use torqcomp_model::{CrossSection, Segment};
+    /// let segment = Segment::new(0.5, CrossSection::circle(0.1)?)?;
     /// assert_eq!(segment.length_m(), 0.5);
     /// # Ok::<(), torqcomp_model::ModelError>(())
     /// ```
-    pub fn new(length_m: f64, section: Section) -> Result<Self, ModelError> {
+    pub fn new(length_m: f64, section: CrossSection) -> Result<Self, ModelError> {
         let length_m = positive("segment length", "m", length_m)?;
         Ok(Self { length_m, section })
     }
@@ -37,7 +37,7 @@ impl Segment {
     }
 
     /// Cross section.
-    pub fn section(&self) -> &Section {
+    pub fn section(&self) -> &CrossSection {
         &self.section
     }
 }
@@ -97,9 +97,9 @@ impl Beam {
     /// [`ModelError`] if there is no segment or E is not finite or not greater than 0.
     ///
     /// ```
-    /// use torqcomp_model::{Beam, Section, Segment};
+    /// use torqcomp_model::{Beam, CrossSection, Segment};
     /// // I = 12·1³/12 = 1 m⁴, L = 3 m, E = 9 Pa: 3EI/L³ = 27/27 = 1 N/m.
-    /// let segment = Segment::new(3.0, Section::rectangle(12.0, 1.0)?)?;
+    /// let segment = Segment::new(3.0, CrossSection::rectangle(12.0, 1.0)?)?;
     /// let beam = Beam::new(vec![segment], 9.0)?;
     /// assert!((beam.tip_stiffness_n_per_m() - 1.0).abs() < 1e-12);
     /// # Ok::<(), torqcomp_model::ModelError>(())
@@ -126,9 +126,9 @@ impl Beam {
     /// [`ModelError`] if G is not finite or not greater than 0.
     ///
     /// ```
-    /// use torqcomp_model::{Beam, Section, Segment};
+    /// use torqcomp_model::{Beam, CrossSection, Segment};
     /// // A = 12 m², κ = 5/6, G = 0.3 Pa, L = 3 m: L/(κGA) = 3/3 = 1 m/N.
-    /// let segment = Segment::new(3.0, Section::rectangle(12.0, 1.0)?)?;
+    /// let segment = Segment::new(3.0, CrossSection::rectangle(12.0, 1.0)?)?;
     /// let beam = Beam::new(vec![segment], 9.0)?.with_shear_modulus(0.3)?;
     /// assert!((beam.compliance().shear_m_per_n - 1.0).abs() < 1e-12);
     /// # Ok::<(), torqcomp_model::ModelError>(())
@@ -147,9 +147,9 @@ impl Beam {
     /// [`ModelError`] if the stiffness is not finite or not greater than 0.
     ///
     /// ```
-    /// use torqcomp_model::{Beam, Section, Segment};
+    /// use torqcomp_model::{Beam, CrossSection, Segment};
     /// // L = 3 m, k = 9 N m/rad: L²/k = 1 m/N.
-    /// let segment = Segment::new(3.0, Section::rectangle(12.0, 1.0)?)?;
+    /// let segment = Segment::new(3.0, CrossSection::rectangle(12.0, 1.0)?)?;
     /// let beam = Beam::new(vec![segment], 9.0)?.with_clamp_stiffness(9.0)?;
     /// assert_eq!(beam.compliance().clamp_m_per_n, 1.0);
     /// # Ok::<(), torqcomp_model::ModelError>(())
@@ -180,11 +180,11 @@ impl Beam {
     /// for the uniform slender beam, Timoshenko's beam theory for the shear term.
     ///
     /// ```
-    /// use torqcomp_model::{Beam, Section, Segment};
+    /// use torqcomp_model::{Beam, CrossSection, Segment};
     /// // EI = 1 N m² over 0..1 m, 2 N m² over 1..2 m, so bending if stiff all over: 8/3/2 = 4/3.
     /// // The weak root adds (8−1)/3·(1/1 − 1/2) = 7/6.
-    /// let root = Segment::new(1.0, Section::rectangle(12.0, 1.0)?)?;
-    /// let free = Segment::new(1.0, Section::rectangle(24.0, 1.0)?)?;
+    /// let root = Segment::new(1.0, CrossSection::rectangle(12.0, 1.0)?)?;
+    /// let free = Segment::new(1.0, CrossSection::rectangle(24.0, 1.0)?)?;
     /// let parts = Beam::new(vec![root, free], 1.0)?.compliance();
     /// assert!((parts.bending_m_per_n - 4.0 / 3.0).abs() < 1e-12);
     /// assert!((parts.reduced_sections_m_per_n - 7.0 / 6.0).abs() < 1e-12);
@@ -222,9 +222,9 @@ impl Beam {
     /// For one uniform slender segment this is 3 E I/L³, (11).
     ///
     /// ```
-    /// use torqcomp_model::{Beam, Section, Segment};
+    /// use torqcomp_model::{Beam, CrossSection, Segment};
     /// // 3EI/L³ = 1 N/m and k/L² = 1 N/m in series give 0.5 N/m.
-    /// let segment = Segment::new(3.0, Section::rectangle(12.0, 1.0)?)?;
+    /// let segment = Segment::new(3.0, CrossSection::rectangle(12.0, 1.0)?)?;
     /// let beam = Beam::new(vec![segment], 9.0)?.with_clamp_stiffness(9.0)?;
     /// assert!((beam.tip_stiffness_n_per_m() - 0.5).abs() < 1e-12);
     /// # Ok::<(), torqcomp_model::ModelError>(())
@@ -242,9 +242,9 @@ impl Beam {
     /// [`ModelError`] if the radius is not finite or not greater than 0.
     ///
     /// ```
-    /// use torqcomp_model::{Beam, Section, Segment};
+    /// use torqcomp_model::{Beam, CrossSection, Segment};
     /// // 1 N/m at a radius of 2 m: 4 N m/rad.
-    /// let segment = Segment::new(3.0, Section::rectangle(12.0, 1.0)?)?;
+    /// let segment = Segment::new(3.0, CrossSection::rectangle(12.0, 1.0)?)?;
     /// let beam = Beam::new(vec![segment], 9.0)?;
     /// assert!((beam.angular_stiffness_n_m_per_rad(2.0)? - 4.0).abs() < 1e-12);
     /// # Ok::<(), torqcomp_model::ModelError>(())
@@ -266,9 +266,9 @@ impl Beam {
     /// [`ModelError`] if x is not on the beam or a number is not finite.
     ///
     /// ```
-    /// use torqcomp_model::{Beam, Section, Segment};
+    /// use torqcomp_model::{Beam, CrossSection, Segment};
     /// // P = 18 N, L − x = 2 m, c = 0.5 m, EI = 9 N m²: ε = 18·2·0.5/9 = 2.
-    /// let segment = Segment::new(3.0, Section::rectangle(12.0, 1.0)?)?;
+    /// let segment = Segment::new(3.0, CrossSection::rectangle(12.0, 1.0)?)?;
     /// let beam = Beam::new(vec![segment], 9.0)?;
     /// assert!((beam.surface_strain(18.0, 1.0)? - 2.0).abs() < 1e-12);
     /// # Ok::<(), torqcomp_model::ModelError>(())
@@ -292,9 +292,9 @@ impl Beam {
     /// than 0.
     ///
     /// ```
-    /// use torqcomp_model::{Beam, Section, Segment};
+    /// use torqcomp_model::{Beam, CrossSection, Segment};
     /// // EI = 9 N m², r = 2 m, L − x = 2 m, c = 0.5 m: 9·2/(2·0.5) = 18 N m.
-    /// let segment = Segment::new(3.0, Section::rectangle(12.0, 1.0)?)?;
+    /// let segment = Segment::new(3.0, CrossSection::rectangle(12.0, 1.0)?)?;
     /// let beam = Beam::new(vec![segment], 9.0)?;
     /// assert!((beam.torque_per_strain_n_m(2.0, 1.0)? - 18.0).abs() < 1e-12);
     /// # Ok::<(), torqcomp_model::ModelError>(())
@@ -309,20 +309,20 @@ impl Beam {
     }
 
     /// Bending compliance of one section over a ≤ x ≤ b: ((L−a)³ − (L−b)³)/(3 E I).
-    fn bending(&self, section: &Section, start_m: f64, end_m: f64) -> f64 {
+    fn bending(&self, section: &CrossSection, start_m: f64, end_m: f64) -> f64 {
         let length = self.length_m();
         let cubes = (length - start_m).powi(3) - (length - end_m).powi(3);
         cubes / (3.0 * self.elastic_modulus_pa * section.second_moment_m4())
     }
 
     /// Shear compliance of one section over a length: l/(κ G A).
-    fn shear(&self, section: &Section, length_m: f64) -> f64 {
+    fn shear(&self, section: &CrossSection, length_m: f64) -> f64 {
         self.shear_modulus_pa.map_or(0.0, |modulus| {
             length_m / (section.shear_coefficient() * modulus * section.area_m2())
         })
     }
 
-    fn stiffest_section(&self) -> Section {
+    fn stiffest_section(&self) -> CrossSection {
         let mut stiffest = self.segments[0].section;
         for segment in &self.segments[1..] {
             if segment.section.second_moment_m4() > stiffest.second_moment_m4() {
@@ -332,7 +332,7 @@ impl Beam {
         stiffest
     }
 
-    fn section_at(&self, position_m: f64) -> Result<Section, ModelError> {
+    fn section_at(&self, position_m: f64) -> Result<CrossSection, ModelError> {
         let length_m = self.length_m();
         if !(0.0..=length_m).contains(&position_m) {
             return Err(ModelError::OffBeam {

@@ -44,7 +44,8 @@
 //! | [`damping`] | viscous coefficient, free decay |
 //! | [`response`] | transfer function and its inverse |
 //! | [`effects`] | what a plain stand can lack |
-//! | [`simulate`] | the stand's answer to an input, effects included |
+//! | [`chain`] | the links from the applied torque to the record, both ways |
+//! | [`simulate`] | the motion under an input, integrated in time |
 //! | [`uncertainty`] | uncertainty of the inverse |
 //! | [`calibration`] | torque per volt from a static load |
 //! | [`fit`] | least squares: parameters with uncertainties from data |
@@ -52,6 +53,7 @@
 
 pub mod beam;
 pub mod calibration;
+pub mod chain;
 mod check;
 pub mod damping;
 pub mod effects;
@@ -66,6 +68,7 @@ pub mod simulate;
 pub mod uncertainty;
 
 pub use beam::{Beam, Compliance, Segment};
+pub use chain::{Chain, Link};
 pub use damping::FreeDecay;
 pub use error::ModelError;
 pub use inertia::Part;
@@ -74,5 +77,5 @@ pub use quantity::{
     Covariance, Dimension, Estimate, Estimates, Kind, Measure, QuantityError, Unit, UnitSystem,
 };
 pub use response::SecondOrder;
-pub use section::Section;
+pub use section::CrossSection;
 pub use uncertainty::{InverseGradient, InverseUncertainty, ParameterStd};

@@ -13,14 +13,14 @@ const POISSON_RATIO_STEEL: f64 = 0.3;
 /// Valid for bending about one principal axis; the depth is measured in the direction of the
 /// load.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Section {
+pub struct CrossSection {
     area_m2: f64,
     second_moment_m4: f64,
     shear_coefficient: f64,
     half_depth_m: f64,
 }
 
-impl Section {
+impl CrossSection {
     /// Solid rectangle: A = b h, I = b h³/12, κ = 5/6, c = h/2.
     ///
     /// `width_m` is b in m, across the load; `depth_m` is h in m, along the load. A is in m²,
@@ -32,7 +32,7 @@ impl Section {
     ///
     /// ```
     /// // b = 2 m, h = 3 m: I = 2·27/12 = 4.5 m⁴.
-    /// let section = torqcomp_model::Section::rectangle(2.0, 3.0)?;
+    /// let section = torqcomp_model::CrossSection::rectangle(2.0, 3.0)?;
     /// assert_eq!(section.second_moment_m4(), 4.5);
     /// assert_eq!(section.half_depth_m(), 1.5);
     /// # Ok::<(), torqcomp_model::ModelError>(())
@@ -53,7 +53,7 @@ impl Section {
     ///
     /// ```
     /// // d = 2 m: I = π·16/64 = π/4 m⁴.
-    /// let section = torqcomp_model::Section::circle(2.0)?;
+    /// let section = torqcomp_model::CrossSection::circle(2.0)?;
     /// assert!((section.second_moment_m4() - 0.785398).abs() < 1e-6);
     /// # Ok::<(), torqcomp_model::ModelError>(())
     /// ```
@@ -71,14 +71,14 @@ impl Section {
     ///
     /// (G. R. Cowper, *Journal of Applied Mechanics* 33 (1966) 335). It falls from 0.886 for a
     /// small bore to 0.531 for a thin wall. For another material use
-    /// [`Section::with_shear_coefficient`].
+    /// [`CrossSection::with_shear_coefficient`].
     ///
     /// # Errors
     /// [`ModelError`] if a diameter is not greater than 0 or the inner one is not the smaller.
     ///
     /// ```
     /// // D = 2 m, d = 1 m: I = π (16 − 1)/64 = 0.736311 m⁴.
-    /// let section = torqcomp_model::Section::tube(2.0, 1.0)?;
+    /// let section = torqcomp_model::CrossSection::tube(2.0, 1.0)?;
     /// assert!((section.second_moment_m4() - 0.736311).abs() < 1e-6);
     /// # Ok::<(), torqcomp_model::ModelError>(())
     /// ```
@@ -105,7 +105,7 @@ impl Section {
     /// [`ModelError`] if `shear_coefficient` is not finite or not greater than 0.
     ///
     /// ```
-    /// let section = torqcomp_model::Section::circle(2.0)?.with_shear_coefficient(0.886)?;
+    /// let section = torqcomp_model::CrossSection::circle(2.0)?.with_shear_coefficient(0.886)?;
     /// assert_eq!(section.shear_coefficient(), 0.886);
     /// # Ok::<(), torqcomp_model::ModelError>(())
     /// ```
@@ -191,15 +191,15 @@ mod tests {
     fn areas_and_second_moments_match_quadrature() {
         let cases = [
             (
-                Section::rectangle(0.02, 0.03).unwrap(),
+                CrossSection::rectangle(0.02, 0.03).unwrap(),
                 integrate(0.015, |_| 0.02),
             ),
             (
-                Section::circle(0.03).unwrap(),
+                CrossSection::circle(0.03).unwrap(),
                 integrate(0.015, |y| chord(0.015, y)),
             ),
             (
-                Section::tube(0.03, 0.02).unwrap(),
+                CrossSection::tube(0.03, 0.02).unwrap(),
                 integrate(0.015, |y| chord(0.015, y) - chord(0.010, y)),
             ),
         ];
@@ -228,13 +228,13 @@ mod tests {
 
     #[test]
     fn solid_shear_coefficients_match_strain_energy() {
-        let rectangle = Section::rectangle(0.02, 0.03).unwrap();
+        let rectangle = CrossSection::rectangle(0.02, 0.03).unwrap();
         close(
             rectangle.shear_coefficient(),
             energy_shear_coefficient(0.015, |_| 0.02),
             1e-5,
         );
-        let circle = Section::circle(0.03).unwrap();
+        let circle = CrossSection::circle(0.03).unwrap();
         let energy = energy_shear_coefficient(0.015, |y| chord(0.015, y));
         close(circle.shear_coefficient(), energy, 1e-5);
     }
@@ -243,35 +243,35 @@ mod tests {
     fn tube_shear_coefficient_reaches_cowpers_limits() {
         // Cowper 1966 lists the limits as separate entries: solid 6(1+ν)/(7+6ν), thin wall
         // 2(1+ν)/(4+3ν).
-        let nearly_solid = Section::tube(1.0, 1e-6).unwrap();
+        let nearly_solid = CrossSection::tube(1.0, 1e-6).unwrap();
         close(nearly_solid.shear_coefficient(), 7.8 / 8.8, 1e-9);
-        let thin = Section::tube(1.0, 1.0 - 1e-9).unwrap();
+        let thin = CrossSection::tube(1.0, 1.0 - 1e-9).unwrap();
         close(thin.shear_coefficient(), 2.6 / 4.9, 1e-9);
     }
 
     #[test]
     fn impossible_dimensions_are_refused() {
         assert!(matches!(
-            Section::rectangle(0.0, 1.0),
+            CrossSection::rectangle(0.0, 1.0),
             Err(ModelError::NotPositive { .. })
         ));
         assert!(matches!(
-            Section::rectangle(1.0, -1.0),
+            CrossSection::rectangle(1.0, -1.0),
             Err(ModelError::NotPositive { .. })
         ));
         assert!(matches!(
-            Section::circle(f64::NAN),
+            CrossSection::circle(f64::NAN),
             Err(ModelError::NotFinite { .. })
         ));
         assert!(matches!(
-            Section::tube(1.0, 1.0),
+            CrossSection::tube(1.0, 1.0),
             Err(ModelError::NotSmaller { .. })
         ));
         assert!(matches!(
-            Section::circle(1e-120),
+            CrossSection::circle(1e-120),
             Err(ModelError::NotPositive { .. })
         ));
-        let circle = Section::circle(1.0).unwrap();
+        let circle = CrossSection::circle(1.0).unwrap();
         assert!(matches!(
             circle.with_shear_coefficient(0.0),
             Err(ModelError::NotPositive { .. })

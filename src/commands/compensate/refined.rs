@@ -1,11 +1,13 @@
 //! The inverse of a stand with effects that no filter describes.
 
+use torqcomp_model::effects::{Action, FoundLine, Unrecovered};
+
 use super::report::{CompensateReport, LostSpan, RemovedLine, UndoneEffect};
 use crate::failure::Failure;
+use crate::inverse::{ChainInverse, InverseResult};
 use crate::print::rounded;
 use crate::recording::UniformRecord;
 use crate::stand::Stand;
-use crate::undo::{FoundLine, Undo, Undone, treatment};
 use crate::warning::Warning;
 
 /// Most samples of a record: about 100 bytes of memory each are needed.
@@ -17,7 +19,7 @@ const REACH: f64 = 0.01;
 /// Share of a line's amplitude below which its phase is uncertain: by more than 0.2 rad.
 const SURE: f64 = 0.98;
 /// Part of the record in which the direction of the motion is not known, from which it is worth a warning.
-const STILL: f64 = 0.02;
+const STUCK: f64 = 0.02;
 
 /// The scales of a record whose inverse is reported.
 struct Scales {
@@ -31,7 +33,7 @@ struct Scales {
 
 /// The torque behind a record; what was found on the way goes into the report.
 pub(super) fn torque(
-    undo: &Undo,
+    undo: &ChainInverse,
     stand: &Stand,
     record: &UniformRecord,
     report: &mut CompensateReport,
@@ -78,7 +80,7 @@ fn check(record: &UniformRecord) -> Result<(), Failure> {
 
 /// Rms of what noise of that deviation makes of a result: from a second run with such noise added.
 fn spread(
-    undo: &Undo,
+    undo: &ChainInverse,
     record: &UniformRecord,
     (recorded, torque): (&[f64], &[f64]),
     noise_std: f64,
@@ -114,7 +116,7 @@ fn reach(taps: &[f64]) -> usize {
 }
 
 /// What is done about each effect of a stand.
-pub(super) fn effects(stand: &Stand, undo: Option<&Undo>) -> Vec<UndoneEffect> {
+pub(super) fn effects(stand: &Stand, undo: Option<&ChainInverse>) -> Vec<UndoneEffect> {
     let Some(undo) = undo else {
         let divided = |declared: &crate::stand::DeclaredEffect| UndoneEffect {
             effect: declared.effect.name,
@@ -125,24 +127,26 @@ pub(super) fn effects(stand: &Stand, undo: Option<&Undo>) -> Vec<UndoneEffect> {
     };
     let links = undo.links().iter().rev();
     links
-        .filter(|link| link.action.is_some())
+        .filter(|link| !matches!(link.action, Action::Recorder { .. }))
         .map(|link| UndoneEffect {
             effect: link.effect,
             form: link.form,
-            done: treatment(link),
+            done: link.action.treatment().name(),
         })
         .collect()
 }
 
 /// Adds what the inverse found to the report.
-fn describe(report: &mut CompensateReport, undone: &Undone, scales: &Scales) {
+fn describe(report: &mut CompensateReport, undone: &InverseResult, scales: &Scales) {
     report.seen_to_hz = undone.seen_to_hz;
     report.lines = undone.lines.iter().map(|l| removed(l, scales)).collect();
-    for lost in &undone.lost {
+    for (effect, lost) in &undone.lost {
         let spans = spans(&lost.samples, scales);
-        report.warnings.push(lost_warning(lost, &spans, scales));
+        report
+            .warnings
+            .push(lost_warning(effect, lost, &spans, scales));
         let span = |[from_s, to_s]: &[f64; 2]| LostSpan {
-            effect: lost.effect,
+            effect,
             from_s: *from_s,
             to_s: *to_s,
         };
@@ -159,13 +163,13 @@ fn describe(report: &mut CompensateReport, undone: &Undone, scales: &Scales) {
             ),
         ));
     }
-    if let Some(still) = undone.still.filter(|still| *still > STILL) {
+    if let Some(stuck) = undone.stuck.filter(|stuck| *stuck > STUCK) {
         report.warnings.push(Warning::new(
             "direction-unknown",
             format!(
                 "over {} % of the record the speed is not significantly different from zero: the direction of the \
                  friction, and so its part of the torque, is unknown there",
-                rounded(100.0 * still, 2)
+                rounded(100.0 * stuck, 2)
             ),
         ));
     }
@@ -195,7 +199,7 @@ fn spans(samples: &[usize], scales: &Scales) -> Vec<[f64; 2]> {
     runs.iter().map(|run| run.map(time_s)).collect()
 }
 
-fn lost_warning(lost: &crate::undo::Lost, spans: &[[f64; 2]], scales: &Scales) -> Warning {
+fn lost_warning(effect: &str, lost: &Unrecovered, spans: &[[f64; 2]], scales: &Scales) -> Warning {
     let told: Vec<String> = spans
         .iter()
         .take(SPANS_TOLD)
@@ -209,7 +213,7 @@ fn lost_warning(lost: &crate::undo::Lost, spans: &[[f64; 2]], scales: &Scales) -
         "not-recovered",
         format!(
             "{}: {}; {} samples, from {}{more}: within {} ms of them the torque is not recovered",
-            lost.effect,
+            effect,
             lost.why,
             lost.samples.len(),
             told.join(", "),

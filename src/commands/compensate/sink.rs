@@ -14,7 +14,7 @@ use crate::io::mcap::Writer;
 use crate::io::mcap::writer::Added;
 use crate::io::output::Output;
 use crate::recording::MessageOrigin;
-use crate::stand::Chain;
+use crate::stand::Calibration;
 
 /// Topic of the result unless another is named.
 const TOPIC: &str = "/torqcomp/torque";
@@ -149,7 +149,7 @@ impl Messages {
 }
 
 /// First line of a text.
-fn heading(chain: &Chain, with_recorded: bool) -> String {
+fn heading(chain: &Calibration, with_recorded: bool) -> String {
     let applied = chain.applied.heading();
     match with_recorded {
         true => format!("time_s,{applied},recorded_{applied}\n"),

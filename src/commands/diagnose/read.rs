@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use torqcomp_model::simulate::{Excitation, Fixed};
+use torqcomp_model::effects::Fixed;
+use torqcomp_model::simulate::Excitation;
 use torqcomp_model::{Dimension, UnitSystem};
 
 use crate::cli::Diagnose;
@@ -261,7 +262,7 @@ fn record(
         None => pair.measured.iter().map(|y| y * measured_factor).collect(),
         Some(stand) => {
             let unit = pair.measured_unit.as_ref();
-            let chain = stand.chain("measured", unit, UnitSystem::Si)?;
+            let chain = stand.calibration("measured", unit, UnitSystem::Si)?;
             let mut values = pair.measured;
             convert(&chain, &mut values).map_err(|(row, why)| {
                 Failure::failed(format_args!("{}: sample {}: {why}", pair.source, row + 1))

@@ -1,23 +1,26 @@
-//! What an effect does, ready to be applied.
+//! What an effect does, forwards to the record and back to what was applied.
+
+use std::sync::Arc;
 
 use num_complex::Complex64;
 
+use super::lines::SpectralLine;
 use crate::mode::Mode;
 
-/// A function of the plain mode and the angular frequency.
+/// A function of the plain mode and the angular frequency in rad/s.
 pub type Frequency = Box<dyn Fn(&Mode, f64) -> Complex64 + Send + Sync>;
 
-/// A change of recorded samples in place.
-pub type Transform = Box<dyn Fn(Clock, &mut [f64]) + Send + Sync>;
+/// A response that is known and not fitted, such as that of the recorder: of the frequency in Hz.
+pub type Fixed = Arc<dyn Fn(f64) -> Complex64 + Send + Sync>;
 
 /// Times of samples since their record began: what drifts begins anew with each record, whatever its time stamps say.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Clock {
+pub struct SampleClock {
     /// Time between samples in s.
     pub step_s: f64,
 }
 
-impl Clock {
+impl SampleClock {
     /// Time of a sample in s.
     #[must_use]
     pub fn time_s(&self, index: usize) -> f64 {
@@ -25,57 +28,94 @@ impl Clock {
     }
 }
 
-/// A steady line, independent of what is applied; its phase belongs to the record.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Line {
-    /// Frequency in Hz.
-    pub frequency_hz: f64,
-    /// Amplitude in units of the record.
-    pub amplitude: f64,
-}
-
-impl Line {
-    /// A frequency in Hz, then the amplitudes of it and of its orders 2, 3, …
-    #[must_use]
-    pub fn orders(p: &[f64]) -> Vec<Self> {
-        let line = |order: usize| Self {
-            frequency_hz: order as f64 * p[0],
-            amplitude: p[order],
-        };
-        (1..p.len()).map(line).collect()
-    }
-}
-
 /// What an effect does.
 pub enum Action {
-    /// A torque in the stand; if `shown`, the gage shows it together with `x`.
+    /// A torque in the stand; in the gage's path, the gage shows it together with `x`.
     Torque {
         /// The torque.
         torque: Box<dyn Torque>,
-        /// Whether the gage shows it: it then bends the part that the gage sits on.
-        shown: bool,
+        /// Whether it bends the part that the gage sits on.
+        in_gage_path: bool,
     },
     /// A factor of the response.
     Factor(Frequency),
     /// A term of the response, past the stand: recorded at once what is applied.
     Feedthrough(Frequency),
-    /// A change of the recorded samples.
-    Transform {
-        /// The change.
-        apply: Transform,
-        /// What takes it back, if it can be.
-        undo: Option<Transform>,
+    /// The recorder as far as it is known, a factor of the response.
+    Recorder {
+        /// Its response.
+        response: Fixed,
+        /// Whether it changes nothing.
+        is_ideal: bool,
     },
+    /// A change of the recorded samples.
+    Distortion(Box<dyn Distortion>),
     /// Lines added.
-    Lines(Vec<Line>),
+    Lines(Vec<SpectralLine>),
     /// A slow course added, that belongs to the record: as many half waves over its length as it may have.
     Course(usize),
+}
+
+/// What a compensation does about an effect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Treatment {
+    /// The spectrum is divided by its response.
+    DividedOut,
+    /// It is estimated and subtracted.
+    Subtracted,
+    /// Its equation is solved.
+    Inverted,
+    /// Its torque is integrated along the measured motion.
+    Integrated,
+    /// The samples that it spoils are marked.
+    Marked,
+}
+
+impl Treatment {
+    /// In words for reports.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::DividedOut => "divided out",
+            Self::Subtracted => "subtracted",
+            Self::Inverted => "inverted",
+            Self::Integrated => "integrated",
+            Self::Marked => "marked",
+        }
+    }
+}
+
+/// Samples that do not determine what was there before a distortion.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Unrecovered {
+    /// What it is about them.
+    pub why: String,
+    /// Their indices, in order.
+    pub samples: Vec<usize>,
+}
+
+/// A change of the recorded samples in place, both ways.
+pub trait Distortion: Send + Sync {
+    /// Applies it.
+    fn forward(&self, clock: SampleClock, samples: &mut [f64]);
+
+    /// Takes it back, in the presence of noise of that standard deviation; the samples of which the record does not
+    /// tell enough.
+    fn inverse(&self, clock: SampleClock, noise_std: f64, samples: &mut [f64]) -> Unrecovered;
+
+    /// What its inverse is.
+    fn treatment(&self) -> Treatment {
+        Treatment::Inverted
+    }
 }
 
 /// What a torque remembers from node to node.
 pub type Memory = [f64; 2];
 
 /// A torque `n(x, x', z)` in units of the record, in `x'' + 2ζω₀ x' + ω₀² (x + n) = ω₀² G u`.
+///
+/// The way back evaluates it along the measured motion: [`Torque::blurred`], and in the gage's path
+/// [`Torque::hidden`].
 pub trait Torque: Send + Sync {
     /// The torque at a state; what is remembered moves on to it.
     fn value(&self, memory: &mut Memory, x: f64, speed: f64) -> f64;
@@ -112,6 +152,11 @@ pub trait Torque: Send + Sync {
         None
     }
 
+    /// Whether it switches with the direction of the motion: where that is unknown, so is the torque.
+    fn switches(&self) -> bool {
+        false
+    }
+
     /// Whether the torque depends on where zero is: a constant load then matters.
     fn has_zero(&self) -> bool {
         false
@@ -130,16 +175,28 @@ impl Action {
     pub fn beside(torque: impl Torque + 'static) -> Self {
         Self::Torque {
             torque: Box::new(torque),
-            shown: false,
+            in_gage_path: false,
         }
     }
 
     /// A torque that the gage shows.
     #[must_use]
-    pub fn shown(torque: impl Torque + 'static) -> Self {
+    pub fn in_gage_path(torque: impl Torque + 'static) -> Self {
         Self::Torque {
             torque: Box::new(torque),
-            shown: true,
+            in_gage_path: true,
+        }
+    }
+
+    /// What a compensation does about it.
+    #[must_use]
+    pub fn treatment(&self) -> Treatment {
+        match self {
+            Self::Factor(_) | Self::Feedthrough(_) | Self::Recorder { .. } => Treatment::DividedOut,
+            Self::Lines(_) | Self::Course(_) => Treatment::Subtracted,
+            Self::Distortion(distortion) => distortion.treatment(),
+            Self::Torque { torque, .. } if torque.begin(1.0) == [0.0; 2] => Treatment::Inverted,
+            Self::Torque { .. } => Treatment::Integrated,
         }
     }
 }
@@ -150,7 +207,8 @@ impl std::fmt::Debug for Action {
             Self::Torque { .. } => "Torque",
             Self::Factor(_) => "Factor",
             Self::Feedthrough(_) => "Feedthrough",
-            Self::Transform { .. } => "Transform",
+            Self::Recorder { .. } => "Recorder",
+            Self::Distortion(_) => "Distortion",
             Self::Lines(_) => "Lines",
             Self::Course(_) => "Course",
         })

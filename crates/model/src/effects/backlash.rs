@@ -9,12 +9,15 @@
 //! **Valid for stiff flanks without impact losses.** Mistaken for `coulomb-friction`, `bouc-wen-hysteresis`, and at
 //! one level for `cubic-stiffness`.
 
-use super::{Action, Effect, Form, Memory, Parameter, Stage, Torque};
+use super::{
+    Action, Distortion, Effect, EffectParameter, Form, Memory, SampleClock, Stage, Torque,
+    Unrecovered,
+};
 
-const GAP: Parameter = Parameter::motion("gap", 1, 0, 0.0, 3.0);
+const GAP: EffectParameter = EffectParameter::motion("gap", 1, 0, 0.0, 3.0);
 /// With the gap far out, this would be an end stop beside the beam.
-const SMALL_GAP: Parameter = Parameter::motion("gap", 1, 0, 0.0, 0.8);
-const SOFTENING: Parameter = Parameter::number("softening", 0.0, 1.0);
+const SMALL_GAP: EffectParameter = EffectParameter::motion("gap", 1, 0, 0.0, 0.8);
+const SOFTENING: EffectParameter = EffectParameter::number("softening", 0.0, 1.0);
 const GAPS: &[&[f64]] = &[&[0.005], &[0.02], &[0.1], &[0.4]];
 const SOFT_GAPS: &[&[f64]] = &[&[0.01, 0.4], &[0.05, 0.4], &[0.3, 0.4]];
 
@@ -28,13 +31,15 @@ pub(super) static EFFECT: Effect = Effect {
     forms: &[
         Form {
             name: "gap",
+            law: "n = -clamp(x, -g, g): between -g and g the beam is not touched, and the gage shows nothing",
             stage: Stage::Stand,
             parameters: &[GAP],
             starts: GAPS,
-            build: |p| Action::shown(Gap::of(p)),
+            build: |p| Action::in_gage_path(Gap::of(p)),
         },
         Form {
             name: "gap-beside",
+            law: "n = -clamp(x, -g, g), and the gage follows the displacement all the same",
             stage: Stage::Stand,
             parameters: &[GAP],
             starts: GAPS,
@@ -42,13 +47,15 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "soft-gap",
+            law: "n = -r clamp(x, -g, g): something softer carries within the gap",
             stage: Stage::Stand,
             parameters: &[SMALL_GAP, SOFTENING],
             starts: SOFT_GAPS,
-            build: |p| Action::shown(Gap::of(p)),
+            build: |p| Action::in_gage_path(Gap::of(p)),
         },
         Form {
             name: "soft-gap-beside",
+            law: "n = -r clamp(x, -g, g), and the gage follows the displacement all the same",
             stage: Stage::Stand,
             parameters: &[SMALL_GAP, SOFTENING],
             starts: SOFT_GAPS,
@@ -56,6 +63,7 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "joint",
+            law: "n = w - x, w dragged along at a distance of at most g: the beam follows the stator with play",
             stage: Stage::Stand,
             parameters: &[GAP],
             starts: &[&[0.02], &[0.1]],
@@ -63,22 +71,11 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "recorded",
+            law: "y = w, w dragged along at a distance of at most g: play in what moves the gage only",
             stage: Stage::Gage,
             parameters: &[GAP],
             starts: &[&[0.02], &[0.1]],
-            build: |p| {
-                let gap = p[0];
-                Action::Transform {
-                    apply: Box::new(move |_, samples| {
-                        let mut follower = samples.first().copied().unwrap_or(0.0);
-                        for sample in samples {
-                            follower = follower.clamp(*sample - gap, *sample + gap);
-                            *sample = follower;
-                        }
-                    }),
-                    undo: None,
-                }
-            },
+            build: |p| Action::Distortion(Box::new(Play { gap: p[0] })),
         },
     ],
 };
@@ -124,5 +121,179 @@ impl Torque for Joint {
 
     fn begin(&self, x: f64) -> Memory {
         [x, 0.0]
+    }
+}
+
+/// Play in what moves the gage.
+struct Play {
+    gap: f64,
+}
+
+impl Distortion for Play {
+    fn forward(&self, _: SampleClock, samples: &mut [f64]) {
+        let mut follower = samples.first().copied().unwrap_or(0.0);
+        for sample in samples {
+            follower = follower.clamp(*sample - self.gap, *sample + self.gap);
+            *sample = follower;
+        }
+    }
+
+    fn inverse(&self, _: SampleClock, noise_std: f64, samples: &mut [f64]) -> Unrecovered {
+        Unrecovered {
+            why: "the gage stands still while the play is gone through".to_owned(),
+            samples: without_play(samples, self.gap, noise_std),
+        }
+    }
+}
+
+/// Noise, in standard deviations, that a turning point must exceed.
+const TURN: f64 = 4.0;
+/// Smallest turn, as a part of the play.
+const SMALLEST: f64 = 1e-3;
+
+/// Takes play of half-width `gap` back, `x = y ± g` while the gage is moved and on the way from one flank to the other
+/// a parabola, as a motion near its turning point is; the samples at which the gage stood still.
+fn without_play(samples: &mut [f64], gap: f64, noise_std: f64) -> Vec<usize> {
+    let width = (TURN * noise_std).max(SMALLEST * gap);
+    let turns = turns(samples, width);
+    let mut bridged = Vec::new();
+    let Some(first) = turns.first() else {
+        return bridged;
+    };
+    let mut direction = first.before;
+    let mut next = turns.iter().peekable();
+    for (i, sample) in samples.iter_mut().enumerate() {
+        while next.peek().is_some_and(|turn| i > turn.to) {
+            direction = -next.next().map_or(direction, |turn| turn.before);
+        }
+        match next.peek() {
+            Some(turn) if i >= turn.from => {
+                let part = (i - turn.from) as f64 / (turn.to - turn.from).max(1) as f64;
+                *sample = turn.at + turn.before * gap * (1.0 - 2.0 * part * part);
+                bridged.push(i);
+            }
+            _ => *sample += direction * gap,
+        }
+    }
+    bridged
+}
+
+/// A stretch over which the gage stood still while the play was gone through.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Turn {
+    /// First and last sample at rest.
+    from: usize,
+    to: usize,
+    /// Direction before it: 1 or −1.
+    before: f64,
+    /// Where the gage stood.
+    at: f64,
+}
+
+/// Turning points of a signal that exceed a width.
+fn turns(samples: &[f64], width: f64) -> Vec<Turn> {
+    let mut turns = Vec::new();
+    let mut direction = 0.0;
+    let (mut high, mut low) = (0, 0);
+    for (i, y) in samples.iter().enumerate() {
+        if *y > samples[high] {
+            high = i;
+        }
+        if *y < samples[low] {
+            low = i;
+        }
+        let turned = if direction >= 0.0 && samples[high] - y > width {
+            Some((1.0, high))
+        } else if direction <= 0.0 && y - samples[low] > width {
+            Some((-1.0, low))
+        } else {
+            None
+        };
+        if let Some((before, extreme)) = turned {
+            turns.push(rest(samples, before, extreme, width));
+            direction = -before;
+            (high, low) = (i, i);
+        }
+    }
+    turns
+}
+
+/// How long a signal stood still around an extreme: within the width of it.
+fn rest(samples: &[f64], before: f64, extreme: usize, width: f64) -> Turn {
+    let end = samples[extreme];
+    let still = |i: &usize| (end - samples[*i]) * before <= width;
+    let from = (0..=extreme)
+        .rev()
+        .take_while(still)
+        .last()
+        .unwrap_or(extreme);
+    let to = (extreme..samples.len())
+        .take_while(still)
+        .last()
+        .unwrap_or(extreme);
+    // In noise the extreme is the largest of many; the gage stood where most of them are.
+    let at = samples[from..=to].iter().sum::<f64>() / (to + 1 - from) as f64;
+    Turn {
+        from,
+        to,
+        before,
+        at,
+    }
+}
+
+/// Where the gage shows nothing, `|y| ≤ nothing`, leads the displacement from side to side by a cubic with the slopes at
+/// both ends, and marks the samples as unknown.
+pub(crate) fn bridge(x: &mut [f64], unknown: &mut [bool], signal: &[f64], nothing: f64) {
+    let inside = |y: &f64| y.abs() <= nothing;
+    let mut i = 0;
+    while i < x.len() {
+        if !inside(&signal[i]) {
+            i += 1;
+            continue;
+        }
+        let first = i;
+        let end = (first..x.len())
+            .find(|k| !inside(&signal[*k]))
+            .unwrap_or(x.len());
+        unknown[first..end].fill(true);
+        if first >= 2 && end + 1 < x.len() {
+            cubic(x, first - 1, end);
+        }
+        i = end;
+    }
+}
+
+/// The cubic between two places with the slopes at both of them.
+fn cubic(x: &mut [f64], from: usize, to: usize) {
+    let length = (to - from) as f64;
+    let (a, b) = (x[from], x[to]);
+    let (slope_a, slope_b) = (
+        (a - x[from - 1]) * length,
+        (x[(to + 1).min(x.len() - 1)] - b) * length,
+    );
+    for (i, x) in x[from + 1..to].iter_mut().enumerate() {
+        let t = (i + 1) as f64 / length;
+        let (u, t2) = (1.0 - t, t * t);
+        *x = u * u * ((1.0 + 2.0 * t) * a + t * slope_a) + t2 * ((3.0 - 2.0 * t) * b - u * slope_b);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sine_comes_back_through_play() {
+        let gap = 0.2;
+        let clean: Vec<f64> = (0..4000).map(|i| (f64::from(i) * 0.01).sin()).collect();
+        let mut samples = clean.clone();
+        Play { gap }.forward(SampleClock { step_s: 0.01 }, &mut samples);
+        let _ = without_play(&mut samples, gap, 0.0);
+        let worst = |range: std::ops::Range<usize>| {
+            range
+                .map(|i| (samples[i] - clean[i]).abs())
+                .fold(0.0, f64::max)
+        };
+        assert!(worst(200..3900) < 0.02, "{}", worst(200..3900));
     }
 }

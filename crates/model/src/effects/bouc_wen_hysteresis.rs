@@ -9,14 +9,14 @@
 //!
 //! The law does not depend on rate: `z` follows the steps of `x`, by the midpoint rule.
 
-use super::{Action, Effect, Form, Memory, Parameter, Stage, Torque};
+use super::{Action, Effect, EffectParameter, Form, Memory, Stage, Torque};
 
-const PART: Parameter = Parameter::number("stiffness_ratio", 0.0, 50.0);
+const PART: EffectParameter = EffectParameter::number("stiffness_ratio", 0.0, 50.0);
 /// Without loss the loops are closed: what is left is a bent spring.
-const LOSS: Parameter = Parameter::motion("loss", -1, 0, 0.0, 100.0).essential();
-const SHAPE: Parameter = Parameter::motion("shape", -1, 0, -100.0, 100.0);
-const SHARE: Parameter = Parameter::number("stiffness_share", 0.0, 1.0);
-const EXPONENT: Parameter = Parameter::number("exponent", 1.0, 5.0);
+const LOSS: EffectParameter = EffectParameter::motion("loss", -1, 0, 0.0, 100.0).essential();
+const SHAPE: EffectParameter = EffectParameter::motion("shape", -1, 0, -100.0, 100.0);
+const SHARE: EffectParameter = EffectParameter::number("stiffness_share", 0.0, 1.0);
+const EXPONENT: EffectParameter = EffectParameter::number("exponent", 1.0, 5.0);
 const CURVED: &[&[f64]] = &[
     &[0.1, 0.5, 0.1, 1.5],
     &[0.5, 0.7, 0.3, 2.0],
@@ -40,6 +40,7 @@ pub(super) static EFFECT: Effect = Effect {
     forms: &[
         Form {
             name: "linear",
+            law: "n = k z, z' = x' - b |x'| z - c x' |z|",
             stage: Stage::Stand,
             parameters: &[PART, LOSS, SHAPE],
             starts: STARTS,
@@ -47,27 +48,31 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "shown",
+            law: "n = k z as in linear; the gage shows x + n",
             stage: Stage::Stand,
             parameters: &[PART, LOSS, SHAPE],
             starts: STARTS,
-            build: |p| Action::shown(BoucWen::of(p)),
+            build: |p| Action::in_gage_path(BoucWen::of(p)),
         },
         Form {
             name: "part",
+            law: "n = k (z - x), z as in linear: a share k of the stand's own stiffness",
             stage: Stage::Stand,
             parameters: &[SHARE, LOSS, SHAPE],
             starts: STARTS,
-            build: |p| Action::beside(Part::of(p)),
+            build: |p| Action::beside(StiffnessShare::of(p)),
         },
         Form {
             name: "exponent-part",
+            law: "n = k (z - x), z as in exponent",
             stage: Stage::Stand,
             parameters: &[SHARE, LOSS, SHAPE, EXPONENT],
             starts: CURVED,
-            build: |p| Action::beside(Part::of(p)),
+            build: |p| Action::beside(StiffnessShare::of(p)),
         },
         Form {
             name: "exponent",
+            law: "n = k z, z' = x' - |s z|^m (b |x'| sgn z + c x')/s, s = b + |c|",
             stage: Stage::Stand,
             parameters: &[PART, LOSS, SHAPE, EXPONENT],
             starts: CURVED,
@@ -75,10 +80,11 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "exponent-shown",
+            law: "n = k z as in exponent; the gage shows x + n",
             stage: Stage::Stand,
             parameters: &[PART, LOSS, SHAPE, EXPONENT],
             starts: CURVED,
-            build: |p| Action::shown(BoucWen::of(p)),
+            build: |p| Action::in_gage_path(BoucWen::of(p)),
         },
     ],
 };
@@ -134,12 +140,12 @@ impl Torque for BoucWen {
     }
 }
 
-/// Part of the stand's own stiffness has the hysteresis: `n = k (z − x)`.
-struct Part {
+/// StiffnessShare of the stand's own stiffness has the hysteresis: `n = k (z − x)`.
+struct StiffnessShare {
     whole: BoucWen,
 }
 
-impl Part {
+impl StiffnessShare {
     fn of(p: &[f64]) -> Self {
         Self {
             whole: BoucWen::of(p),
@@ -147,7 +153,7 @@ impl Part {
     }
 }
 
-impl Torque for Part {
+impl Torque for StiffnessShare {
     fn value(&self, memory: &mut Memory, x: f64, speed: f64) -> f64 {
         self.whole.value(memory, x, speed) - self.whole.ratio * x
     }

@@ -6,7 +6,7 @@
 //! **Valid far below the corner of the stray path** for the first two. Mistaken for `second-mode` below the excitation,
 //! `time-delay` of the other channel.
 
-use super::{Action, Effect, Form, Parameter, Stage};
+use super::{Action, Effect, EffectParameter, Form, Stage};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
@@ -20,8 +20,9 @@ pub(super) static EFFECT: Effect = Effect {
     forms: &[
         Form {
             name: "slope-of-load",
+            law: "y = x + G tau u'",
             stage: Stage::Chain,
-            parameters: &[Parameter::motion("time", 0, 1, -5.0, 5.0)],
+            parameters: &[EffectParameter::motion("time", 0, 1, -5.0, 5.0)],
             starts: &[&[0.005]],
             build: |p| {
                 let time_s = p[0];
@@ -32,8 +33,9 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "slope-of-record",
+            law: "y = x + tau x'",
             stage: Stage::Chain,
-            parameters: &[Parameter::motion("time", 0, 1, -5.0, 5.0)],
+            parameters: &[EffectParameter::motion("time", 0, 1, -5.0, 5.0)],
             starts: &[&[0.005]],
             build: |p| {
                 let time_s = p[0];
@@ -44,11 +46,12 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "high-pass-leak",
+            law: "y = x + c s tau/(1 + s tau) G u, tau = 1/(2 pi corner)",
             stage: Stage::Chain,
             parameters: &[
                 // A small capacitor has a corner far above the band, and much of it passes there.
-                Parameter::number("share", -100.0, 100.0),
-                Parameter::frequency("corner", 0.01, 300.0),
+                EffectParameter::number("share", -100.0, 100.0),
+                EffectParameter::frequency("corner", 0.01, 300.0),
             ],
             starts: &[&[0.01, 0.3], &[0.01, 1.0], &[0.01, 4.0], &[0.1, 40.0]],
             build: |p| {
@@ -61,9 +64,10 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "ac-coupled",
+            law: "y = s/(s + 2 pi corner) x",
             stage: Stage::Chain,
             // Below, a record of a thousand periods shows no corner but a slope, which is a drift.
-            parameters: &[Parameter::frequency("corner", 1e-4, 3.0).fading()],
+            parameters: &[EffectParameter::frequency("corner", 1e-4, 3.0).fading()],
             starts: &[&[0.003], &[0.05], &[0.3]],
             build: |p| {
                 let corner = TAU * p[0];
@@ -75,3 +79,21 @@ pub(super) static EFFECT: Effect = Effect {
         },
     ],
 };
+
+/// Takes off the slope that comes in where a link that passes no constant is divided out: what it blocked is known but
+/// for a constant at either end.
+pub fn level(before: &[f64], after: &mut [f64]) {
+    if after.len() < 2 {
+        return;
+    }
+    let middle = 0.5 * (after.len() - 1) as f64;
+    let (mut sum, mut squares) = (0.0, 0.0);
+    for (i, (a, b)) in after.iter().zip(before).enumerate() {
+        sum += (i as f64 - middle) * (a - b);
+        squares += (i as f64 - middle).powi(2);
+    }
+    let slope = sum / squares;
+    for (i, a) in after.iter_mut().enumerate() {
+        *a -= slope * (i as f64 - middle);
+    }
+}

@@ -10,7 +10,7 @@
 //! the speed changes sign between two nodes, `v` is taken no less than half the change, so that the sum over
 //! the nodes has the friction switch at the right time.
 
-use super::{Action, Effect, Form, Memory, Parameter, Stage, Torque};
+use super::{Action, Effect, EffectParameter, Form, Memory, Stage, Torque};
 
 pub(super) static EFFECT: Effect = Effect {
     name: "coulomb-friction",
@@ -26,8 +26,9 @@ pub(super) static EFFECT: Effect = Effect {
     forms: &[
         Form {
             name: "sharp",
+            law: "n = F sgn(x'), with sticking",
             stage: Stage::Stand,
-            parameters: &[Parameter::motion("torque", 1, 0, 0.0, 5.0)],
+            parameters: &[EffectParameter::motion("torque", 1, 0, 0.0, 5.0)],
             starts: &[&[0.02], &[0.2]],
             build: |p| {
                 Action::beside(Friction {
@@ -38,10 +39,11 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "tanh",
+            law: "n = F tanh(x'/v)",
             stage: Stage::Stand,
             parameters: &[
-                Parameter::motion("torque", 1, 0, 0.0, 5.0),
-                Parameter::motion("transition_speed", 1, -1, 1e-5, 0.3),
+                EffectParameter::motion("torque", 1, 0, 0.0, 5.0),
+                EffectParameter::motion("transition_speed", 1, -1, 1e-5, 0.3),
             ],
             starts: &[&[0.03, 0.02], &[0.3, 0.02]],
             build: |p| {
@@ -72,6 +74,10 @@ impl Torque for Friction {
 
     fn dry(&self) -> Option<f64> {
         (self.speed == 0.0).then_some(self.torque)
+    }
+
+    fn switches(&self) -> bool {
+        true
     }
 
     /// `F tanh(x'/√(v² + πσ²/2))`: for `v = 0` it has the slope that the mean of `sgn` has at zero.

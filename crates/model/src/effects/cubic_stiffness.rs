@@ -6,9 +6,10 @@
 //! a gap, which sets in at one displacement, is not cubic. Mistaken for `gage-nonlinearity` of the same
 //! power, which bends the record and not the motion, at low level for `quadratic-stiffness`.
 
-use super::{Action, Effect, Form, Memory, Parameter, Stage, Torque};
+use super::{Action, Effect, EffectParameter, Form, Memory, Stage, Torque};
 
-const COEFFICIENT: &[Parameter] = &[Parameter::motion("coefficient", -2, 0, -0.2, 100.0)];
+const COEFFICIENT: &[EffectParameter] =
+    &[EffectParameter::motion("coefficient", -2, 0, -0.2, 100.0)];
 const STARTS: &[&[f64]] = &[&[0.01], &[-0.005]];
 
 pub(super) static EFFECT: Effect = Effect {
@@ -21,6 +22,7 @@ pub(super) static EFFECT: Effect = Effect {
     forms: &[
         Form {
             name: "beside",
+            law: "n = c x^3; the gage shows x",
             stage: Stage::Stand,
             parameters: COEFFICIENT,
             starts: STARTS,
@@ -28,10 +30,11 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "shown",
+            law: "n = c x^3; the gage shows x + n",
             stage: Stage::Stand,
             parameters: COEFFICIENT,
             starts: STARTS,
-            build: |p| Action::shown(Cubic { coefficient: p[0] }),
+            build: |p| Action::in_gage_path(Cubic { coefficient: p[0] }),
         },
     ],
 };

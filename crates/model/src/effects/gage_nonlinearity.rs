@@ -4,10 +4,11 @@
 //! `ΔR/R = GF (T₀/T) ε + C₂ (T₀/T)² ε²`), `y = x + b x³` (`cube`) or both (`both`). **Valid while the curve rises.**
 //! Mistaken for `quadratic-stiffness` or `cubic-stiffness`, which change the motion too, and for `saturation`.
 
-use super::{Action, Effect, Form, Parameter, Stage};
+use super::curve::curve;
+use super::{Action, Effect, EffectParameter, Form, Stage};
 
-const SQUARE: Parameter = Parameter::motion("square", -1, 0, -0.15, 0.15);
-const CUBE: Parameter = Parameter::motion("cube", -2, 0, -0.05, 1.0);
+const SQUARE: EffectParameter = EffectParameter::motion("square", -1, 0, -0.15, 0.15);
+const CUBE: EffectParameter = EffectParameter::motion("cube", -2, 0, -0.05, 1.0);
 
 pub(super) static EFFECT: Effect = Effect {
     name: "gage-nonlinearity",
@@ -19,41 +20,36 @@ pub(super) static EFFECT: Effect = Effect {
     forms: &[
         Form {
             name: "square",
+            law: "y = x + a x^2",
             stage: Stage::Gage,
             parameters: &[SQUARE],
             starts: &[&[0.005]],
-            build: |p| curve(p[0], 0.0),
+            build: |p| law(p[0], 0.0),
         },
         Form {
             name: "cube",
+            law: "y = x + b x^3",
             stage: Stage::Gage,
             parameters: &[CUBE],
             starts: &[&[0.002]],
-            build: |p| curve(0.0, p[0]),
+            build: |p| law(0.0, p[0]),
         },
         Form {
             name: "both",
+            law: "y = x + a x^2 + b x^3",
             stage: Stage::Gage,
             parameters: &[SQUARE, CUBE],
             starts: &[&[0.005, 0.002]],
-            build: |p| curve(p[0], p[1]),
+            build: |p| law(p[0], p[1]),
         },
     ],
 };
 
-fn curve(square: f64, cube: f64) -> Action {
-    Action::Transform {
-        apply: Box::new(move |_, samples| {
-            for x in samples {
-                *x += *x * *x * (square + cube * *x);
-            }
-        }),
-        undo: Some(Box::new(move |_, samples| {
-            for y in samples {
-                *y = inverse(square, cube, *y);
-            }
-        })),
-    }
+fn law(square: f64, cube: f64) -> Action {
+    curve(
+        move |x| x + x * x * (square + cube * x),
+        move |y| inverse(square, cube, y),
+    )
 }
 
 /// The `x` nearest to `y` with `x + a x² + b x³ = y`, by Newton's method from `y`.
@@ -71,4 +67,24 @@ fn inverse(square: f64, cube: f64, y: f64) -> f64 {
         }
     }
     x
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::SampleClock;
+
+    #[test]
+    fn a_fold_ends_the_branch_and_is_reported() {
+        // x + x²/10 has its least value −2.5 at −5; its inverse has slope 10 where 1 + x/5 = 1/10, at −2.475.
+        let Action::Distortion(bent) = law(0.1, 0.0) else {
+            panic!("not a curve")
+        };
+        let mut samples = [1.0, 2.0, -2.4, -2.6, -4.0];
+        let beyond = bent.inverse(SampleClock { step_s: 1e-3 }, 0.0, &mut samples);
+        assert_eq!(beyond.samples, [3, 4]);
+        assert!(beyond.why.contains("beyond -2.475"), "{}", beyond.why);
+        assert!((samples[0] + 0.1 * samples[0] * samples[0] - 1.0).abs() < 1e-12);
+        assert!(samples[4] < samples[3] && samples[3] < -4.5, "{samples:?}");
+    }
 }

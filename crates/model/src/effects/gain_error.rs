@@ -4,7 +4,7 @@
 //! calibration); elsewhere the gain is a parameter of the plain stand. **Valid at all levels and
 //! frequencies alike.** Mistaken for wrong stiffness where only frequencies far above the natural one are excited.
 
-use super::{Action, Effect, Form, Parameter, Stage};
+use super::{Action, Effect, EffectParameter, Form, Stage};
 use num_complex::Complex64;
 
 pub(super) static EFFECT: Effect = Effect {
@@ -16,8 +16,9 @@ pub(super) static EFFECT: Effect = Effect {
     experiment: "a known static load",
     forms: &[Form {
         name: "factor",
+        law: "y = (1 + e) x",
         stage: Stage::Gage,
-        parameters: &[Parameter::number("error", -0.9, 10.0)],
+        parameters: &[EffectParameter::number("error", -0.9, 10.0)],
         starts: &[&[0.01]],
         build: |p| {
             let gain = Complex64::new(1.0 + p[0], 0.0);

@@ -4,24 +4,26 @@
 //! the frequency is that of the grid within ¼ %. **Valid for a steady grid.** Mistaken for an order of the shaft
 //! (`rotor-imbalance`) that falls on the same frequency.
 
-use super::{Action, Effect, Form, Line, Parameter, Ruler, Stage};
+use super::lines::SpectralLine;
+use super::{Action, Effect, EffectParameter, Form, ParameterScale, Stage};
 
-const fn amplitude(name: &'static str) -> Parameter {
-    Parameter::motion(name, 1, 0, 0.0, 10.0)
+const fn amplitude(name: &'static str) -> EffectParameter {
+    EffectParameter::motion(name, 1, 0, 0.0, 10.0)
 }
 
-const fn grid(hz: f64) -> Parameter {
-    Parameter::frequency("frequency", 0.9975 * hz, 1.0025 * hz).by(Ruler::Absolute)
+const fn grid(hz: f64) -> EffectParameter {
+    EffectParameter::frequency("frequency", 0.9975 * hz, 1.0025 * hz).by(ParameterScale::Absolute)
 }
 
 macro_rules! form {
     ($name:literal, $hz:literal, $($amplitude:literal),+) => {
         Form {
             name: $name,
+            law: "y = x + sum of a_k sin(2 pi k f t + phase_k)",
             stage: Stage::Disturbance,
             parameters: &[grid($hz), $(amplitude($amplitude)),+],
             starts: &[&[$hz]],
-            build: |p| Action::Lines(Line::orders(p)),
+            build: |p| Action::Lines(SpectralLine::orders(p)),
         }
     };
 }

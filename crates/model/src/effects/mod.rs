@@ -16,6 +16,8 @@
 //! [`RIVALS`] are laws that stand beside the list, so that none of it is named in their place.
 
 mod action;
+mod curve;
+mod lines;
 mod parameter;
 mod rivals;
 
@@ -38,9 +40,15 @@ mod thermal_drift;
 mod time_delay;
 
 pub use crate::mode::Mode;
-pub use action::{Action, Clock, Frequency, Line, Memory, Torque, Transform};
-pub use parameter::{Parameter, Ruler, Rulers, Unit};
+pub use action::{
+    Action, Distortion, Fixed, Frequency, Memory, SampleClock, Torque, Treatment, Unrecovered,
+};
+pub(crate) use backlash::bridge;
+pub use capacitive_coupling::level;
+pub use lines::{FoundLine, SpectralLine, subtract_lines};
+pub use parameter::{EffectParameter, ParameterScale, RecordScales, Unit};
 pub use rivals::RIVALS;
+pub use thermal_drift::subtract_course;
 
 /// All effects.
 pub const EFFECTS: &[&Effect] = &[
@@ -105,11 +113,13 @@ pub struct Effect {
 pub struct Form {
     /// Its name within the effect.
     pub name: &'static str,
+    /// Its equation.
+    pub law: &'static str,
     /// Where it sits in the chain.
     pub stage: Stage,
     /// Its parameters.
-    pub parameters: &'static [Parameter],
-    /// Values, in rulers, from which a fit starts; several where the error has several minima.
+    pub parameters: &'static [EffectParameter],
+    /// Values, in scales, from which a fit starts; several where the error has several minima.
     pub starts: &'static [&'static [f64]],
     /// The effect with these values, in units of the record, s and Hz.
     pub build: fn(&[f64]) -> Action,

@@ -1,17 +1,17 @@
-//! Parameters of effects: units, physical bounds, and the rulers that make them pure numbers.
+//! Parameters of effects: units, physical bounds, and the scales that make them pure numbers.
 
 /// A parameter of an effect.
 #[derive(Debug)]
-pub struct Parameter {
+pub struct EffectParameter {
     /// Its name in stand files and reports.
     pub name: &'static str,
     /// Its unit.
     pub unit: Unit,
     /// What it is measured with in a fit.
-    pub ruler: Ruler,
-    /// Least physical value, in rulers.
+    pub scale: ParameterScale,
+    /// Least physical value, in scales.
     pub lower: f64,
-    /// Greatest physical value, in rulers.
+    /// Greatest physical value, in scales.
     pub upper: f64,
     /// Whether a fit moves the reciprocal: zero is then an effect that is not there.
     pub reciprocal: bool,
@@ -40,7 +40,7 @@ pub enum Unit {
 
 /// How a parameter is made a pure number near one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ruler {
+pub enum ParameterScale {
     /// Recorded units by the rms of the record, times by `1/ω₀`, frequencies by `f₀`.
     Motion,
     /// Recorded units by the largest recorded magnitude, times by `1/ω₀`.
@@ -51,9 +51,9 @@ pub enum Ruler {
     Absolute,
 }
 
-/// The rulers of a set of records; fixed before any effect is fitted.
+/// The scales of a set of records; fixed before any effect is fitted.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Rulers {
+pub struct RecordScales {
     /// Rms of the record, about its mean.
     pub rms: f64,
     /// Largest distance of the record from its mean.
@@ -64,14 +64,14 @@ pub struct Rulers {
     pub duration_s: f64,
 }
 
-impl Parameter {
+impl EffectParameter {
     /// A pure number.
     #[must_use]
     pub const fn number(name: &'static str, lower: f64, upper: f64) -> Self {
         Self {
             name,
             unit: Unit::Number,
-            ruler: Ruler::Absolute,
+            scale: ParameterScale::Absolute,
             lower,
             upper,
             reciprocal: false,
@@ -85,7 +85,7 @@ impl Parameter {
     pub const fn frequency(name: &'static str, lower: f64, upper: f64) -> Self {
         Self {
             unit: Unit::Hertz,
-            ruler: Ruler::Motion,
+            scale: ParameterScale::Motion,
             ..Self::number(name, lower, upper)
         }
     }
@@ -101,7 +101,7 @@ impl Parameter {
     ) -> Self {
         Self {
             unit: Unit::Powers { recorded, second },
-            ruler: Ruler::Motion,
+            scale: ParameterScale::Motion,
             ..Self::number(name, lower, upper)
         }
     }
@@ -134,16 +134,16 @@ impl Parameter {
         }
     }
 
-    /// The same with another ruler.
+    /// The same with another scale.
     #[must_use]
-    pub const fn by(self, ruler: Ruler) -> Self {
-        Self { ruler, ..self }
+    pub const fn by(self, scale: ParameterScale) -> Self {
+        Self { scale, ..self }
     }
 
     /// The value, in its unit, of what a fit moves.
     #[must_use]
-    pub fn value(&self, moved: f64, rulers: &Rulers) -> f64 {
-        let size = self.size(rulers);
+    pub fn value(&self, moved: f64, scales: &RecordScales) -> f64 {
+        let size = self.size(scales);
         if self.reciprocal {
             size / moved
         } else {
@@ -153,8 +153,8 @@ impl Parameter {
 
     /// The standard uncertainty, in its unit, of what a fit moves.
     #[must_use]
-    pub fn std(&self, moved: f64, std: f64, rulers: &Rulers) -> f64 {
-        let size = self.size(rulers);
+    pub fn std(&self, moved: f64, std: f64, scales: &RecordScales) -> f64 {
+        let size = self.size(scales);
         if self.reciprocal {
             size * std / (moved * moved)
         } else {
@@ -162,24 +162,24 @@ impl Parameter {
         }
     }
 
-    /// The size of the parameter's ruler, in the parameter's unit.
+    /// The size of the parameter's scale, in the parameter's unit.
     ///
     /// ```
-    /// use torqcomp_model::effects::{Parameter, Rulers};
-    /// let rulers = Rulers { rms: 2.0, peak: 5.0, natural_hz: 10.0, duration_s: 1.0 };
+    /// use torqcomp_model::effects::{EffectParameter, RecordScales};
+    /// let scales = RecordScales { rms: 2.0, peak: 5.0, natural_hz: 10.0, duration_s: 1.0 };
     /// // A cubic coefficient, in 1/unit²: 1/2².
-    /// assert_eq!(Parameter::motion("coefficient", -2, 0, 0.0, 1.0).size(&rulers), 0.25);
+    /// assert_eq!(EffectParameter::motion("coefficient", -2, 0, 0.0, 1.0).size(&scales), 0.25);
     /// // A corner frequency: 10 Hz.
-    /// assert_eq!(Parameter::frequency("corner", 0.0, 1.0).size(&rulers), 10.0);
+    /// assert_eq!(EffectParameter::frequency("corner", 0.0, 1.0).size(&scales), 10.0);
     /// ```
     #[must_use]
-    pub fn size(&self, rulers: &Rulers) -> f64 {
-        let natural_s = 1.0 / (std::f64::consts::TAU * rulers.natural_hz);
-        let (length, time_s, frequency_hz) = match self.ruler {
-            Ruler::Motion => (rulers.rms, natural_s, rulers.natural_hz),
-            Ruler::Peak => (rulers.peak, natural_s, rulers.natural_hz),
-            Ruler::Record => (rulers.rms, rulers.duration_s, 1.0 / rulers.duration_s),
-            Ruler::Absolute => (1.0, 1.0, 1.0),
+    pub fn size(&self, scales: &RecordScales) -> f64 {
+        let natural_s = 1.0 / (std::f64::consts::TAU * scales.natural_hz);
+        let (length, time_s, frequency_hz) = match self.scale {
+            ParameterScale::Motion => (scales.rms, natural_s, scales.natural_hz),
+            ParameterScale::Peak => (scales.peak, natural_s, scales.natural_hz),
+            ParameterScale::Record => (scales.rms, scales.duration_s, 1.0 / scales.duration_s),
+            ParameterScale::Absolute => (1.0, 1.0, 1.0),
         };
         match self.unit {
             Unit::Number => 1.0,

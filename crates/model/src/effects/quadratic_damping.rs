@@ -6,7 +6,7 @@
 //!
 //! Integration: for a fixed `x`, `x' = v/(1 + ω₀² d |v| t)` exactly.
 
-use super::{Action, Effect, Form, Memory, Parameter, Stage, Torque};
+use super::{Action, Effect, EffectParameter, Form, Memory, Stage, Torque};
 
 pub(super) static EFFECT: Effect = Effect {
     name: "quadratic-damping",
@@ -17,8 +17,9 @@ pub(super) static EFFECT: Effect = Effect {
     experiment: "free decays from two amplitudes, or the response at two levels",
     forms: &[Form {
         name: "drag",
+        law: "n = d x' |x'|",
         stage: Stage::Stand,
-        parameters: &[Parameter::motion("coefficient", -1, 2, 0.0, 20.0)],
+        parameters: &[EffectParameter::motion("coefficient", -1, 2, 0.0, 20.0)],
         starts: &[&[0.02]],
         build: |p| Action::beside(Drag { coefficient: p[0] }),
     }],

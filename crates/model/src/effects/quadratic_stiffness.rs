@@ -5,7 +5,7 @@
 //! changes**: at `2 c x = −1` the even form has no stiffness left. Mistaken for `gage-nonlinearity` (even) and
 //! `cubic-stiffness` (odd).
 
-use super::{Action, Effect, Form, Memory, Parameter, Stage, Torque};
+use super::{Action, Effect, EffectParameter, Form, Memory, Stage, Torque};
 
 pub(super) static EFFECT: Effect = Effect {
     name: "quadratic-stiffness",
@@ -17,31 +17,35 @@ pub(super) static EFFECT: Effect = Effect {
     forms: &[
         Form {
             name: "even",
+            law: "n = c x^2; the gage shows x",
             stage: Stage::Stand,
-            parameters: &[Parameter::motion("coefficient", -1, 0, -0.5, 0.5)],
+            parameters: &[EffectParameter::motion("coefficient", -1, 0, -0.5, 0.5)],
             starts: &[&[0.005]],
             build: |p| Action::beside(Even { coefficient: p[0] }),
         },
         Form {
             name: "even-shown",
+            law: "n = c x^2; the gage shows x + n",
             stage: Stage::Stand,
-            parameters: &[Parameter::motion("coefficient", -1, 0, -0.5, 0.5)],
+            parameters: &[EffectParameter::motion("coefficient", -1, 0, -0.5, 0.5)],
             starts: &[&[0.005]],
-            build: |p| Action::shown(Even { coefficient: p[0] }),
+            build: |p| Action::in_gage_path(Even { coefficient: p[0] }),
         },
         Form {
             name: "odd",
+            law: "n = c x |x|; the gage shows x",
             stage: Stage::Stand,
-            parameters: &[Parameter::motion("coefficient", -1, 0, -0.3, 20.0)],
+            parameters: &[EffectParameter::motion("coefficient", -1, 0, -0.3, 20.0)],
             starts: &[&[0.01]],
             build: |p| Action::beside(Odd { coefficient: p[0] }),
         },
         Form {
             name: "odd-shown",
+            law: "n = c x |x|; the gage shows x + n",
             stage: Stage::Stand,
-            parameters: &[Parameter::motion("coefficient", -1, 0, -0.3, 20.0)],
+            parameters: &[EffectParameter::motion("coefficient", -1, 0, -0.3, 20.0)],
             starts: &[&[0.01]],
-            build: |p| Action::shown(Odd { coefficient: p[0] }),
+            build: |p| Action::in_gage_path(Odd { coefficient: p[0] }),
         },
     ],
 };

@@ -4,17 +4,18 @@
 //! `p_k = e^{jπ(2k+n−1)/2n}`. S. Butterworth, Exp. Wireless 7 (1930), 536. **Valid below half the sampling rate.**
 //! Mistaken for `time-delay` where the corner lies far above the excitation.
 
-use super::{Action, Effect, Form, Parameter, Stage};
+use super::{Action, Effect, EffectParameter, Form, Stage};
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
 
-const CORNER: Parameter = Parameter::corner("cutoff", 0.0, 50.0);
+const CORNER: EffectParameter = EffectParameter::corner("cutoff", 0.0, 50.0);
 const STARTS: &[&[f64]] = &[&[3.0], &[1.0], &[0.4], &[0.15], &[0.02]];
 
 macro_rules! order {
-    ($order:literal, $name:literal) => {
+    ($order:literal, $name:literal, $law:literal) => {
         Form {
             name: $name,
+            law: $law,
             stage: Stage::Chain,
             parameters: &[CORNER],
             starts: STARTS,
@@ -31,14 +32,15 @@ pub(super) static EFFECT: Effect = Effect {
     mistaken_for: &["time-delay", "second-mode"],
     experiment: "one signal on both channels at once, with energy around the corner",
     forms: &[
-        order!(1, "order-1"),
-        order!(2, "order-2"),
-        order!(3, "order-3"),
-        order!(4, "order-4"),
+        order!(1, "order-1", "L = 1/(1 + j f/f_c), an RC low-pass"),
+        order!(2, "order-2", "Butterworth of order 2"),
+        order!(3, "order-3", "Butterworth of order 3"),
+        order!(4, "order-4", "Butterworth of order 4"),
         Form {
             name: "second-order",
+            law: "L = 1/(1 + 2 zeta s/w_c + s^2/w_c^2), w_c = 2 pi cutoff",
             stage: Stage::Chain,
-            parameters: &[CORNER, Parameter::number("damping_ratio", 0.3, 3.0)],
+            parameters: &[CORNER, EffectParameter::number("damping_ratio", 0.3, 3.0)],
             starts: &[&[1.0, 0.8], &[0.3, 0.8], &[0.1, 0.8]],
             build: |p| {
                 let (corner, damping) = (TAU * p[0], p[1]);

@@ -4,7 +4,8 @@
 //! thesis, section III). The rate is found in the data; the phase belongs to the record. **Valid for a
 //! constant speed.** Mistaken for `mains-pickup` where the rate or an order of it falls on the mains.
 
-use super::{Action, Effect, Form, Line, Parameter, Ruler, Stage};
+use super::lines::SpectralLine;
+use super::{Action, Effect, EffectParameter, Form, ParameterScale, Stage};
 
 pub(super) static EFFECT: Effect = Effect {
     name: "rotor-imbalance",
@@ -16,24 +17,27 @@ pub(super) static EFFECT: Effect = Effect {
     forms: &[
         Form {
             name: "line",
+            law: "y = x + a sin(2 pi f t + phase)",
             stage: Stage::Disturbance,
-            parameters: &[RATE, Parameter::motion("amplitude", 1, 0, 0.0, 10.0)],
+            parameters: &[RATE, EffectParameter::motion("amplitude", 1, 0, 0.0, 10.0)],
             // The rate is looked for in the spectrum of the residual.
             starts: &[],
-            build: |p| Action::Lines(Line::orders(p)),
+            build: |p| Action::Lines(SpectralLine::orders(p)),
         },
         Form {
             name: "twice",
+            law: "y = x + a sin(2 pi f t + phase) + a_2 sin(4 pi f t + phase_2)",
             stage: Stage::Disturbance,
             parameters: &[
                 RATE,
-                Parameter::motion("amplitude", 1, 0, 0.0, 10.0),
-                Parameter::motion("amplitude_2", 1, 0, 0.0, 10.0),
+                EffectParameter::motion("amplitude", 1, 0, 0.0, 10.0),
+                EffectParameter::motion("amplitude_2", 1, 0, 0.0, 10.0),
             ],
             starts: &[],
-            build: |p| Action::Lines(Line::orders(p)),
+            build: |p| Action::Lines(SpectralLine::orders(p)),
         },
     ],
 };
 
-const RATE: Parameter = Parameter::frequency("frequency", 0.1, 5000.0).by(Ruler::Absolute);
+const RATE: EffectParameter =
+    EffectParameter::frequency("frequency", 0.1, 5000.0).by(ParameterScale::Absolute);

@@ -4,12 +4,18 @@
 //! (`knee`). **What was cut off cannot be recovered**; the soft
 //! form can, up to just below `L`. Mistaken for `gage-nonlinearity` (cube) if soft.
 
-use super::{Action, Effect, Form, Parameter, Ruler, Stage};
+use super::curve::curve;
+use super::{
+    Action, Distortion, Effect, EffectParameter, Form, ParameterScale, SampleClock, Stage,
+    Treatment, Unrecovered,
+};
 
-const LIMIT: Parameter = Parameter::motion("limit", 1, 0, 0.05, 4.0).by(Ruler::Peak);
+const LIMIT: EffectParameter =
+    EffectParameter::motion("limit", 1, 0, 0.05, 4.0).by(ParameterScale::Peak);
 
 /// A record far below the limit of a soft form bends all the same.
-const FAR_LIMIT: Parameter = Parameter::motion("limit", 1, 0, 0.05, 15.0).by(Ruler::Peak);
+const FAR_LIMIT: EffectParameter =
+    EffectParameter::motion("limit", 1, 0, 0.05, 15.0).by(ParameterScale::Peak);
 
 pub(super) static EFFECT: Effect = Effect {
     name: "saturation",
@@ -21,85 +27,117 @@ pub(super) static EFFECT: Effect = Effect {
     forms: &[
         Form {
             name: "hard",
+            law: "y = clamp(x, -L, L)",
             stage: Stage::Limit,
             parameters: &[LIMIT],
             starts: &[&[0.99], &[0.7]],
-            build: |p| {
-                let limit = p[0];
-                Action::Transform {
-                    apply: Box::new(move |_, samples| {
-                        for x in samples {
-                            *x = x.clamp(-limit, limit);
-                        }
-                    }),
-                    undo: None,
-                }
-            },
+            build: |p| clipping(-p[0], p[0]),
         },
         Form {
             name: "uneven",
+            law: "y = clamp(x, L_lower, L)",
             stage: Stage::Limit,
             parameters: &[
                 LIMIT,
-                Parameter::motion("lower_limit", 1, 0, -4.0, -0.05).by(Ruler::Peak),
+                EffectParameter::motion("lower_limit", 1, 0, -4.0, -0.05).by(ParameterScale::Peak),
             ],
             starts: &[&[0.99, -0.99], &[0.7, -0.99], &[0.99, -0.7]],
-            build: |p| {
-                let (upper, lower) = (p[0], p[1]);
-                Action::Transform {
-                    apply: Box::new(move |_, samples| {
-                        for x in samples {
-                            *x = x.clamp(lower, upper);
-                        }
-                    }),
-                    undo: None,
-                }
-            },
+            build: |p| clipping(p[1], p[0]),
         },
         Form {
             name: "knee",
+            law: "y = x/(1 + |x/L|^p)^(1/p)",
             stage: Stage::Limit,
-            parameters: &[LIMIT, Parameter::number("sharpness", 1.0, 30.0)],
+            parameters: &[LIMIT, EffectParameter::number("sharpness", 1.0, 30.0)],
             starts: &[&[1.1, 4.0], &[1.02, 10.0]],
             build: |p| {
                 let (limit, sharpness) = (p[0], p[1]);
-                Action::Transform {
-                    apply: Box::new(move |_, samples| {
-                        for x in samples {
-                            let over = (*x / limit).abs().powf(sharpness);
-                            *x /= (1.0 + over).powf(1.0 / sharpness);
-                        }
-                    }),
-                    undo: Some(Box::new(move |_, samples| {
-                        for y in samples {
-                            let over = (*y / limit).abs().min(0.99).powf(sharpness);
-                            *y /= (1.0 - over).powf(1.0 / sharpness);
-                        }
-                    })),
-                }
+                let part = move |x: f64| (x / limit).abs();
+                curve(
+                    move |x| x / (1.0 + part(x).powf(sharpness)).powf(1.0 / sharpness),
+                    move |y| y / (1.0 - part(y).min(0.99).powf(sharpness)).powf(1.0 / sharpness),
+                )
             },
         },
         Form {
             name: "soft",
+            law: "y = L tanh(x/L)",
             stage: Stage::Limit,
             parameters: &[FAR_LIMIT],
             starts: &[&[1.1], &[2.5], &[6.0]],
             build: |p| {
                 let limit = p[0];
-                Action::Transform {
-                    apply: Box::new(move |_, samples| {
-                        for x in samples {
-                            *x = limit * (*x / limit).tanh();
-                        }
-                    }),
-                    undo: Some(Box::new(move |_, samples| {
-                        for y in samples {
-                            // Just below the limit, where noise would be blown up without bound.
-                            *y = limit * (*y / limit).clamp(-0.999, 0.999).atanh();
-                        }
-                    })),
-                }
+                // Just below the limit noise would be blown up without bound.
+                curve(
+                    move |x| limit * (x / limit).tanh(),
+                    move |y| limit * (y / limit).clamp(-0.999, 0.999).atanh(),
+                )
             },
         },
     ],
 };
+
+fn clipping(lower: f64, upper: f64) -> Action {
+    Action::Distortion(Box::new(Clipping { lower, upper }))
+}
+
+/// `y = clamp(x, lower, upper)`.
+struct Clipping {
+    lower: f64,
+    upper: f64,
+}
+
+/// Standard deviations of the noise within which a sample counts as at the limit.
+const AT_LIMIT: f64 = 3.0;
+/// Part of the limit within which a sample counts as at it.
+const RELATIVE: f64 = 1e-9;
+/// A limit that many times the largest sample away is not a limit of this record.
+const OUT_OF_REACH: f64 = 1e3;
+
+impl Distortion for Clipping {
+    fn forward(&self, _: SampleClock, samples: &mut [f64]) {
+        for x in samples {
+            *x = x.clamp(self.lower, self.upper);
+        }
+    }
+
+    /// What was cut off is lost: the samples at the limits are marked.
+    fn inverse(&self, _: SampleClock, noise_std: f64, samples: &mut [f64]) -> Unrecovered {
+        let largest = samples
+            .iter()
+            .fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
+        let limits = [-OUT_OF_REACH * largest, OUT_OF_REACH * largest]
+            .map(|x| x.clamp(self.lower, self.upper));
+        let near = |limit: f64| AT_LIMIT * noise_std + RELATIVE * limit.abs();
+        let lost = |y: &f64| *y <= limits[0] + near(limits[0]) || *y >= limits[1] - near(limits[1]);
+        let places = samples.iter().enumerate().filter(|(_, y)| lost(y));
+        Unrecovered {
+            why: format!(
+                "at the limits {:.4} and {:.4} of the record in SI units it holds no more than that",
+                limits[0], limits[1]
+            ),
+            samples: places.map(|(i, _)| i).collect(),
+        }
+    }
+
+    fn treatment(&self) -> Treatment {
+        Treatment::Marked
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clipped_sample_is_marked() {
+        let clipping = Clipping {
+            lower: -1.0,
+            upper: 2.0,
+        };
+        let mut samples = [0.0, 2.0, 1.9, -1.0, 1.99];
+        let lost = clipping.inverse(SampleClock { step_s: 1e-3 }, 0.01, &mut samples);
+        assert_eq!(lost.samples, [1, 3, 4]);
+        assert!(lost.why.contains("-1.0000 and 2.0000"), "{}", lost.why);
+    }
+}

@@ -5,14 +5,14 @@
 //! **Valid for modes apart by more than their widths.** Mistaken for `recorder-lowpass` or `time-delay` if it lies
 //! above the excitation.
 
-use super::{Action, Effect, Form, Mode, Parameter, Stage};
+use super::{Action, Effect, EffectParameter, Form, Mode, Stage};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
 /// Far above the band nothing shows of a mode but a slope, which has other causes.
-const FREQUENCY: Parameter = Parameter::frequency("frequency", 0.05, 20.0);
-const DAMPING: Parameter = Parameter::number("damping_ratio", 1e-4, 1.0);
-const SHARE: Parameter = Parameter::number("share", -3.0, 3.0);
+const FREQUENCY: EffectParameter = EffectParameter::frequency("frequency", 0.05, 20.0);
+const DAMPING: EffectParameter = EffectParameter::number("damping_ratio", 1e-4, 1.0);
+const SHARE: EffectParameter = EffectParameter::number("share", -3.0, 3.0);
 
 macro_rules! starts {
     ($($rest:literal),*) => {
@@ -46,6 +46,7 @@ pub(super) static EFFECT: Effect = Effect {
     forms: &[
         Form {
             name: "added",
+            law: "H = H1 + a H2",
             stage: Stage::Dynamics,
             parameters: &[FREQUENCY, DAMPING, SHARE],
             starts: starts!(0.02),
@@ -58,6 +59,7 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "shared",
+            law: "H = (1 - a) H1 + a H2",
             stage: Stage::Dynamics,
             parameters: &[FREQUENCY, DAMPING, SHARE],
             starts: starts!(0.02),
@@ -70,9 +72,13 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "series",
+            law: "H = H1 H2",
             stage: Stage::Dynamics,
             // With more damping it is a low-pass of second order.
-            parameters: &[FREQUENCY, Parameter::number("damping_ratio", 1e-4, 0.3)],
+            parameters: &[
+                FREQUENCY,
+                EffectParameter::number("damping_ratio", 1e-4, 0.3),
+            ],
             starts: starts!(),
             build: |p| {
                 let second = mode(p[0], p[1]);
@@ -81,11 +87,12 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "coupled",
+            law: "a second inertia, mu times the first, hangs on it by a spring and a damper",
             stage: Stage::Dynamics,
             parameters: &[
                 FREQUENCY,
                 DAMPING,
-                Parameter::number("inertia_ratio", 0.0, 3.0),
+                EffectParameter::number("inertia_ratio", 0.0, 3.0),
             ],
             starts: starts!(0.02),
             build: |p| {
@@ -102,13 +109,14 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "free",
+            law: "H = g H1 + (a + b s/w_2) H2",
             stage: Stage::Dynamics,
             parameters: &[
                 FREQUENCY,
                 DAMPING,
-                Parameter::number("gain", 0.1, 3.0),
+                EffectParameter::number("gain", 0.1, 3.0),
                 SHARE,
-                Parameter::number("slope_share", -3.0, 3.0),
+                EffectParameter::number("slope_share", -3.0, 3.0),
             ],
             starts: starts!(1.0, 0.02, 0.0),
             build: |p| {

@@ -5,7 +5,7 @@
 //! before its cause (`springpot`, `K (jω/ω₀)^α`, does not; A. Gemant, Physics 7 (1936), 311), which shows in the first moments of a transient only. Mistaken for viscous damping where
 //! only the resonance is excited, `coulomb-friction` at one level.
 
-use super::{Action, Effect, Form, Parameter, Stage};
+use super::{Action, Effect, EffectParameter, Form, Stage};
 use num_complex::Complex64;
 
 pub(super) static EFFECT: Effect = Effect {
@@ -18,8 +18,9 @@ pub(super) static EFFECT: Effect = Effect {
     forms: &[
         Form {
             name: "loss-factor",
+            law: "K (1 + j eta)",
             stage: Stage::Dynamics,
-            parameters: &[Parameter::number("loss_factor", 0.0, 2.0)],
+            parameters: &[EffectParameter::number("loss_factor", 0.0, 2.0)],
             starts: &[&[0.02]],
             build: |p| {
                 let eta = p[0];
@@ -34,8 +35,9 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "springpot",
+            law: "K (j w/w_0)^alpha",
             stage: Stage::Dynamics,
-            parameters: &[Parameter::number("order", 0.0, 0.5)],
+            parameters: &[EffectParameter::number("order", 0.0, 0.5)],
             starts: &[&[0.02]],
             build: |p| {
                 let order = p[0];
@@ -50,10 +52,11 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "springpot-stiffness",
+            law: "r K (j w/w_0)^alpha",
             stage: Stage::Dynamics,
             parameters: &[
-                Parameter::number("order", 0.0, 0.5),
-                Parameter::number("stiffness_ratio", 0.3, 3.0),
+                EffectParameter::number("order", 0.0, 0.5),
+                EffectParameter::number("stiffness_ratio", 0.3, 3.0),
             ],
             starts: &[&[0.02, 1.0]],
             build: |p| {

@@ -7,7 +7,12 @@
 //! gage factor; as a zero shift 2 % of resistance at 85 °F is. **Valid over one warm-up.** Mistaken for `ac-coupled` of
 //! `capacitive-coupling`, a slow disturbance.
 
-use super::{Action, Clock, Effect, Form, Parameter, Ruler, Stage};
+use std::f64::consts::PI;
+
+use super::{
+    Action, Distortion, Effect, EffectParameter, Form, ParameterScale, SampleClock, Stage,
+    Treatment, Unrecovered,
+};
 
 /// Most half waves of a course over a record.
 const HALF_WAVES: usize = 8;
@@ -22,8 +27,11 @@ pub(super) static EFFECT: Effect = Effect {
     forms: &[
         Form {
             name: "linear",
+            law: "y = x + d t",
             stage: Stage::Chain,
-            parameters: &[Parameter::motion("slope", 1, -1, -100.0, 100.0).by(Ruler::Record)],
+            parameters: &[
+                EffectParameter::motion("slope", 1, -1, -100.0, 100.0).by(ParameterScale::Record)
+            ],
             starts: &[&[0.01]],
             build: |p| {
                 let slope = p[0];
@@ -32,10 +40,12 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "exponential",
+            law: "y = x + D (1 - e^(-t/tau))",
             stage: Stage::Chain,
             parameters: &[
-                Parameter::motion("drift", 1, 0, -100.0, 100.0),
-                Parameter::motion("time_constant", 0, 1, 0.01, 20.0).by(Ruler::Record),
+                EffectParameter::motion("drift", 1, 0, -100.0, 100.0),
+                EffectParameter::motion("time_constant", 0, 1, 0.01, 20.0)
+                    .by(ParameterScale::Record),
             ],
             starts: &[&[0.01, 0.1], &[0.01, 0.4], &[0.01, 1.5]],
             build: |p| {
@@ -45,21 +55,17 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "sensitivity",
+            law: "y = (1 + g t) x",
             stage: Stage::Chain,
-            parameters: &[Parameter::motion("rate", 0, -1, -0.9, 10.0).by(Ruler::Record)],
+            parameters: &[
+                EffectParameter::motion("rate", 0, -1, -0.9, 10.0).by(ParameterScale::Record)
+            ],
             starts: &[&[0.01]],
-            build: |p| {
-                let rate = p[0];
-                Action::Transform {
-                    apply: Box::new(move |clock, samples| scale(clock, samples, rate, 1.0)),
-                    undo: Some(Box::new(move |clock, samples| {
-                        scale(clock, samples, rate, -1.0);
-                    })),
-                }
-            },
+            build: |p| Action::Distortion(Box::new(Sensitivity { rate_per_s: p[0] })),
         },
         Form {
             name: "course",
+            law: "y = x + any slow course, of up to eight half waves over the record",
             stage: Stage::Disturbance,
             parameters: &[],
             starts: &[&[]],
@@ -68,20 +74,83 @@ pub(super) static EFFECT: Effect = Effect {
     ],
 };
 
-fn scale(clock: Clock, samples: &mut [f64], rate: f64, power: f64) {
-    for (i, sample) in samples.iter_mut().enumerate() {
-        *sample *= (1.0 + rate * clock.time_s(i)).powf(power);
+/// `y = x + d(t)`.
+struct Drift<F>(F);
+
+fn added(drift: impl Fn(f64) -> f64 + Send + Sync + 'static) -> Action {
+    Action::Distortion(Box::new(Drift(drift)))
+}
+
+impl<F: Fn(f64) -> f64 + Send + Sync> Distortion for Drift<F> {
+    fn forward(&self, clock: SampleClock, samples: &mut [f64]) {
+        for (i, sample) in samples.iter_mut().enumerate() {
+            *sample += (self.0)(clock.time_s(i));
+        }
+    }
+
+    fn inverse(&self, clock: SampleClock, _: f64, samples: &mut [f64]) -> Unrecovered {
+        for (i, sample) in samples.iter_mut().enumerate() {
+            *sample -= (self.0)(clock.time_s(i));
+        }
+        Unrecovered::default()
+    }
+
+    fn treatment(&self) -> Treatment {
+        Treatment::Subtracted
     }
 }
 
-fn added(drift: impl Fn(f64) -> f64 + Copy + Send + Sync + 'static) -> Action {
-    let add = move |clock: Clock, samples: &mut [f64], sign: f64| {
+/// `y = (1 + g t) x`.
+struct Sensitivity {
+    rate_per_s: f64,
+}
+
+impl Distortion for Sensitivity {
+    fn forward(&self, clock: SampleClock, samples: &mut [f64]) {
         for (i, sample) in samples.iter_mut().enumerate() {
-            *sample += sign * drift(clock.time_s(i));
+            *sample *= 1.0 + self.rate_per_s * clock.time_s(i);
         }
+    }
+
+    fn inverse(&self, clock: SampleClock, _: f64, samples: &mut [f64]) -> Unrecovered {
+        for (i, sample) in samples.iter_mut().enumerate() {
+            *sample *= (1.0 + self.rate_per_s * clock.time_s(i)).recip();
+        }
+        Unrecovered::default()
+    }
+}
+
+/// Half waves above those of a course, over as many as it has, that tell how much of them is signal.
+const COURSE_BESIDE: usize = 2;
+
+/// Takes a slow course of as many half waves off a record, its mean left.
+///
+/// Each half wave is shrunk by `1 − S/c²`, `S` being what the half waves just above have, which are signal.
+pub fn subtract_course(samples: &mut [f64], half_waves: usize) {
+    let count = samples.len() as f64;
+    let wave = |k: usize, i: usize| (PI * k as f64 * (i as f64 + 0.5) / count).cos();
+    let part = |samples: &[f64], k: usize| {
+        let sum: f64 = samples
+            .iter()
+            .enumerate()
+            .map(|(i, x)| x * wave(k, i))
+            .sum();
+        2.0 * sum / count
     };
-    Action::Transform {
-        apply: Box::new(move |clock, samples| add(clock, samples, 1.0)),
-        undo: Some(Box::new(move |clock, samples| add(clock, samples, -1.0))),
+    let mut beside: Vec<f64> = (half_waves + 1..=(1 + COURSE_BESIDE) * half_waves)
+        .map(|k| part(samples, k).powi(2))
+        .collect();
+    beside.sort_by(f64::total_cmp);
+    // Lines of a comb are few: the middle one is beside them. The square of a normal number has a median of 0.455.
+    let beside = beside.get(beside.len() / 2).map_or(0.0, |b| b / 0.455);
+    for k in 1..=half_waves {
+        let own = part(samples, k);
+        let share = (1.0 - beside / (own * own)).max(0.0);
+        if share.is_nan() {
+            continue;
+        }
+        for (i, sample) in samples.iter_mut().enumerate() {
+            *sample -= share * own * wave(k, i);
+        }
     }
 }

@@ -3,7 +3,7 @@
 //! `y(t) = x(t − τ)`, response `e^{−jωτ}`. **Valid if both channels share one clock**; where two recorders run,
 //! their clocks drift apart. Mistaken for `recorder-lowpass` with a corner far above the excitation.
 
-use super::{Action, Effect, Form, Parameter, Stage};
+use super::{Action, Effect, EffectParameter, Form, Stage};
 use num_complex::Complex64;
 
 pub(super) static EFFECT: Effect = Effect {
@@ -15,8 +15,9 @@ pub(super) static EFFECT: Effect = Effect {
     experiment: "one signal on both channels at once, with energy at high frequencies",
     forms: &[Form {
         name: "lag",
+        law: "y(t) = x(t - tau)",
         stage: Stage::Chain,
-        parameters: &[Parameter::motion("delay", 0, 1, 0.0, 20.0)],
+        parameters: &[EffectParameter::motion("delay", 0, 1, 0.0, 20.0)],
         starts: &[&[0.02], &[0.5], &[1.0], &[2.0], &[4.0], &[7.0]],
         build: |p| {
             let delay_s = p[0];

@@ -1,7 +1,7 @@
 //! Kinds of quantity: which units fit, and which are printed.
 
 use super::error::QuantityError;
-use super::kind_table::{PrintUnit, ROWS, Row};
+use super::kind_table::{KindRow, PrintUnit, ROWS};
 use super::unit::Unit;
 
 /// Units that results are printed in. All computation is in SI.
@@ -82,41 +82,18 @@ pub enum Kind {
 
 impl Kind {
     /// All kinds.
-    pub const ALL: [Self; 30] = [
-        Self::Inertia,
-        Self::AngularDamping,
-        Self::AngularStiffness,
-        Self::Torque,
-        Self::Force,
-        Self::Length,
-        Self::Area,
-        Self::SecondMoment,
-        Self::Pressure,
-        Self::Mass,
-        Self::Frequency,
-        Self::AngularSpeed,
-        Self::AngularAcceleration,
-        Self::Angle,
-        Self::Time,
-        Self::DecayRate,
-        Self::Voltage,
-        Self::Current,
-        Self::Resistance,
-        Self::TorquePerVolt,
-        Self::ForcePerAngularSpeed,
-        Self::LinearStiffness,
-        Self::Acceleration,
-        Self::Strain,
-        Self::Ratio,
-        Self::Gain,
-        Self::TemperatureAbsolute,
-        Self::TemperatureDifference,
-        Self::ThermalExpansion,
-        Self::TemperatureCoefficient,
-    ];
+    pub const ALL: [Self; ROWS.len()] = {
+        let mut all = [Self::Inertia; ROWS.len()];
+        let mut i = 0;
+        while i < all.len() {
+            all[i] = ROWS[i].kind;
+            i += 1;
+        }
+        all
+    };
 
-    fn row(self) -> &'static Row {
-        const TABLE: &[Row] = &ROWS;
+    fn row(self) -> &'static KindRow {
+        const TABLE: &[KindRow] = &ROWS;
         &TABLE[self as usize]
     }
 

@@ -9,7 +9,7 @@ use crate::effects::Mode;
 
 /// Displacement and speed, in units of the record.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct State {
+pub struct MotionState {
     /// Displacement.
     pub x: f64,
     /// Its rate of change, per second.
@@ -37,7 +37,7 @@ pub fn substeps(natural_hz: f64, rate_hz: f64) -> usize {
 }
 
 /// One step of the linear part.
-pub(super) struct Step {
+pub(super) struct LinearStep {
     /// `x ← a x + b x'`, `x' ← c x + d x'`.
     pub(super) a: f64,
     b: f64,
@@ -95,7 +95,7 @@ const GAUSS: [(f64, f64); 6] = [
     (0.966_234_757_101_576, 0.085_662_246_189_585_17),
 ];
 
-impl Step {
+impl LinearStep {
     pub(super) fn new(mode: &Mode, gain: f64, step_s: f64) -> Self {
         let [a, b, c, d] = free(mode, step_s);
         let mut to_x = [0.0; 4];
@@ -119,10 +119,10 @@ impl Step {
     }
 
     #[inline]
-    pub(super) fn advance(&self, state: State, input: &[f64]) -> State {
+    pub(super) fn advance(&self, state: MotionState, input: &[f64]) -> MotionState {
         let force =
             |w: &[f64; 4]| w[0] * input[0] + w[1] * input[1] + w[2] * input[2] + w[3] * input[3];
-        State {
+        MotionState {
             x: self.a * state.x + (self.b * state.speed + force(&self.to_x)),
             speed: self.c * state.x + (self.d * state.speed + force(&self.to_speed)),
         }

@@ -1,4 +1,5 @@
-//! The stand's answer to a given input, effects included.
+//! The motion of a stand under a given input, torques of its effects included: the first part of
+//! [`Chain::simulate`](crate::Chain::simulate).
 //!
 //! Torques of the stand are integrated in time, everything linear is applied in the frequency domain, what
 //! gage and recorder do follows sample by sample. Between samples the input is band-limited, not a
@@ -7,13 +8,13 @@
 mod between;
 mod input;
 mod integrate;
-mod model;
 mod run;
 
 pub use between::Between;
 pub use input::Excitation;
-pub use integrate::{State, substeps};
-pub use model::{Fixed, Model};
+pub(crate) use integrate::free_motion;
+pub use integrate::{MotionState, substeps};
+pub(crate) use run::{Torques, integrate};
 
 #[cfg(test)]
 mod tests;

@@ -1,22 +1,22 @@
 //! The motion with the torques of the stand, node by node.
 
 use super::input::Excitation;
-use super::integrate::{State, Step, free};
+use super::integrate::{LinearStep, MotionState, free};
 use crate::effects::{Memory, Mode, Torque};
 
-/// A torque in the stand, and whether the gage shows it.
-pub(super) type Link<'a> = (&'a dyn Torque, bool);
+/// Torques in the stand, each with whether the gage shows it.
+pub(crate) type Torques<'a> = Vec<(&'a dyn Torque, bool)>;
 
 /// The stand on its way through a record.
-struct Run<'a> {
+struct Integrator<'a> {
     mode: Mode,
     gain: f64,
-    step: Step,
+    step: LinearStep,
     step_s: f64,
     /// What a torque of one changes the speed by at a node.
     impulse: f64,
     /// Torques that act at the nodes, with what they remember: all but sharp dry friction.
-    acting: Vec<(Link<'a>, Memory)>,
+    acting: Vec<((&'a dyn Torque, bool), Memory)>,
     /// Displacement by a constant load.
     shift: f64,
     /// Sharp dry friction, and the direction that the stand slides in: 0 while it sticks.
@@ -26,26 +26,26 @@ struct Run<'a> {
 
 /// What the gage shows at the samples, from an initial state on. A load that does not change, and so is not in the
 /// input, shifts the displacement that the torques see. Once the motion is not finite the rest is NaN.
-pub(super) fn run(
+pub(crate) fn integrate(
     mode: &Mode,
     gain: f64,
-    torques: &[Link<'_>],
+    torques: &Torques<'_>,
     input: &Excitation,
-    start: State,
+    start: MotionState,
     shift: f64,
 ) -> Vec<f64> {
     let substeps = input.substeps();
     let step_s = 1.0 / (input.rate_hz() * substeps as f64);
-    let mut run = Run {
+    let mut run = Integrator {
         mode: *mode,
         gain,
-        step: Step::new(mode, gain, step_s),
+        step: LinearStep::new(mode, gain, step_s),
         step_s,
         impulse: mode.omega_rad_s * mode.omega_rad_s * step_s,
         acting: torques
             .iter()
             .filter(|(torque, _)| torque.dry().is_none())
-            .map(|link| (*link, link.0.begin(start.x + shift)))
+            .map(|(torque, shown)| ((*torque, *shown), torque.begin(start.x + shift)))
             .collect(),
         shift,
         dry: torques.iter().filter_map(|(t, _)| t.dry()).sum(),
@@ -74,22 +74,22 @@ pub(super) fn run(
     samples
 }
 
-impl Run<'_> {
+impl Integrator<'_> {
     /// A step without dry friction.
     #[inline]
-    fn advance(&mut self, state: State, window: &[f64]) -> State {
+    fn advance(&mut self, state: MotionState, window: &[f64]) -> MotionState {
         let moved = self.step.advance(state, window);
         self.kick(moved, moved.speed - state.speed)
     }
 
     /// What the torques do at a node.
     #[inline]
-    fn kick(&mut self, moved: State, change: f64) -> State {
+    fn kick(&mut self, moved: MotionState, change: f64) -> MotionState {
         let mut speed = moved.speed;
         for ((torque, _), memory) in &mut self.acting {
             speed = torque.kick(memory, moved.x + self.shift, speed, change, self.impulse);
         }
-        State { x: moved.x, speed }
+        MotionState { x: moved.x, speed }
     }
 
     /// Sum of the torques, dry friction left out, at rest.
@@ -101,8 +101,8 @@ impl Run<'_> {
     }
 
     /// A step of a stand that sticks: it is let go where the rest of the torques exceeds the friction.
-    fn stick(&mut self, state: State, window: &[f64]) -> State {
-        let rest = State {
+    fn stick(&mut self, state: MotionState, window: &[f64]) -> MotionState {
+        let rest = MotionState {
             x: state.x,
             speed: 0.0,
         };
@@ -115,10 +115,10 @@ impl Run<'_> {
 
     /// A step of a stand that slides: friction is a constant torque until the speed changes sign; there the stand
     /// sticks or slides back.
-    fn slide(&mut self, state: State, window: &[f64]) -> State {
+    fn slide(&mut self, state: MotionState, window: &[f64]) -> MotionState {
         let friction = -self.dry * self.direction;
         let linear = self.step.advance(state, window);
-        let moved = State {
+        let moved = MotionState {
             x: linear.x + friction * (1.0 - self.step.a),
             speed: linear.speed - friction * self.step.c,
         };
@@ -131,7 +131,7 @@ impl Run<'_> {
         let turned = state.x + 0.5 * part * self.step_s * state.speed;
         let input = window[1] + part * (window[2] - window[1]);
         let force = self.gain * input - turned - self.held(turned);
-        let rest = State {
+        let rest = MotionState {
             x: turned,
             speed: 0.0,
         };
@@ -141,7 +141,7 @@ impl Run<'_> {
         }
         // For the rest of the step friction has the other sign.
         let [a, _, c, _] = free(&self.mode, (1.0 - part) * self.step_s);
-        let back = State {
+        let back = MotionState {
             x: moved.x - 2.0 * friction * (1.0 - a),
             speed: moved.speed + 2.0 * friction * c,
         };
@@ -154,7 +154,7 @@ impl Run<'_> {
     }
 
     /// Torques that the gage shows beside the displacement.
-    fn shown(&mut self, state: State) -> f64 {
+    fn shown(&mut self, state: MotionState) -> f64 {
         self.acting
             .iter_mut()
             .filter(|((_, shown), _)| *shown)

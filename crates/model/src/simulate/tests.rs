@@ -2,7 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use super::{Between, Excitation, Model, State};
+use super::{Between, Excitation, MotionState};
+use crate::chain::{Chain, Link};
 use crate::effects::{Action, Effect, Mode, RIVALS, Stage};
 
 const RATE_HZ: f64 = 20_000.0;
@@ -29,35 +30,23 @@ fn input(substeps: usize) -> Excitation {
     Excitation::new(samples, RATE_HZ, 0.0, substeps)
 }
 
-fn model(effect: &str, form: &str, values: &[f64]) -> Model {
+fn model(effect: &str, form: &str, values: &[f64]) -> Chain {
     with(Effect::named(effect).unwrap(), form, values)
 }
 
 /// A law beside the list.
-fn rival(law: &str, form: &str, values: &[f64]) -> Model {
+fn rival(law: &str, form: &str, values: &[f64]) -> Chain {
     let found = RIVALS.iter().find(|rival| rival.name == law);
     with(found.unwrap(), form, values)
 }
 
-fn with(effect: &Effect, form: &str, values: &[f64]) -> Model {
+fn with(effect: &'static Effect, form: &str, values: &[f64]) -> Chain {
     let form = effect.form(Some(form)).unwrap();
-    Model {
-        mode: MODE,
-        gain: 1.0,
-        recorder: None,
-        shift: 0.0,
-        actions: vec![(form.stage, (form.build)(values))],
-    }
+    Chain::new(MODE, 1.0).with_links([Link::of(effect, form, values)])
 }
 
-fn plain() -> Model {
-    Model {
-        mode: MODE,
-        gain: 1.0,
-        recorder: None,
-        shift: 0.0,
-        actions: Vec::new(),
-    }
+fn plain() -> Chain {
+    Chain::new(MODE, 1.0)
 }
 
 fn rms(values: impl Iterator<Item = f64>) -> f64 {
@@ -95,8 +84,8 @@ fn linear(t: f64, s: [f64; 3]) -> f64 {
     w * w * (input_at(t) - s[0]) - 2.0 * MODE.damping_ratio * w * s[1]
 }
 
-fn error(model: &Model, truth: &[f64], substeps: usize) -> f64 {
-    let found = model.simulate_from(&input(substeps), State::default());
+fn error(model: &Chain, truth: &[f64], substeps: usize) -> f64 {
+    let found = model.simulate_from(&input(substeps), MotionState::default());
     rms(found.iter().zip(truth).map(|(a, b)| a - b)) / rms(truth.iter().copied())
 }
 
@@ -106,7 +95,7 @@ fn both_ways_of_the_linear_stand_agree_with_the_oracle() {
     let in_time = error(&plain(), &truth, 4);
     assert!(in_time < 4e-5, "{in_time:e}");
     // What the record is continued by backwards is forgotten in the second half.
-    let through_spectrum = plain().simulate(&input(4), State::default());
+    let through_spectrum = plain().simulate(&input(4), MotionState::default());
     let late = COUNT / 2;
     let difference = through_spectrum[late..]
         .iter()
@@ -132,14 +121,14 @@ fn held_samples_and_straight_lines_agree_with_the_oracle() {
     for (between, at) in ways {
         let damped = |s: [f64; 3]| -w * w * s[0] - 2.0 * MODE.damping_ratio * w * s[1];
         let truth = oracle(|t, s| [s[1], w * w * at(t * RATE_HZ) + damped(s), 0.0]);
-        let found = plain().simulate_from(&input(4).with_between(between), State::default());
+        let found = plain().simulate_from(&input(4).with_between(between), MotionState::default());
         let error = |found: &[f64]| {
             let left = found.iter().zip(&truth).map(|(a, b)| a - b);
             rms(left) / rms(truth.iter().copied())
         };
         let (with, without) = (
             error(&found),
-            error(&plain().simulate_from(&input(4), State::default())),
+            error(&plain().simulate_from(&input(4), MotionState::default())),
         );
         println!("{}: {with:e} instead of {without:e}", between.name());
         assert!(with < 3e-4 && with < 0.1 * without, "{with:e} {without:e}");
@@ -163,7 +152,7 @@ fn free_motion_is_the_closed_form() {
 }
 
 /// Error at two steps, which tells the order.
-fn converges(model: &Model, truth: &[f64], at_four: f64, at_sixteen: f64) {
+fn converges(model: &Chain, truth: &[f64], at_four: f64, at_sixteen: f64) {
     let (coarse, fine) = (error(model, truth, 4), error(model, truth, 16));
     println!("{coarse:e} {fine:e}");
     assert!(coarse < at_four, "{coarse:e}");
@@ -198,7 +187,7 @@ fn quadratic_damping() {
 #[test]
 fn laws_beside_the_list() {
     let w2 = MODE.omega_rad_s.powi(2);
-    let against = |model: &Model, torque: fn([f64; 3]) -> f64, at_four: f64, at_sixteen: f64| {
+    let against = |model: &Chain, torque: fn([f64; 3]) -> f64, at_four: f64, at_sixteen: f64| {
         let truth = oracle(|t, s| [s[1], linear(t, s) - w2 * torque(s), 0.0]);
         converges(model, &truth, at_four, at_sixteen);
     };
@@ -302,7 +291,7 @@ fn sharp_friction() {
 #[test]
 fn a_stand_that_sticks_stays() {
     let held = model("coulomb-friction", "sharp", &[100.0]);
-    let found = held.simulate_from(&input(4), State::default());
+    let found = held.simulate_from(&input(4), MotionState::default());
     assert!(
         found.iter().all(|x| *x == 0.0),
         "{:?}",
@@ -314,8 +303,8 @@ fn a_stand_that_sticks_stays() {
 fn a_delay_of_whole_samples_shifts_the_record() {
     let late = model("time-delay", "lag", &[5.0 / RATE_HZ]);
     let (now, then) = (
-        plain().simulate(&input(1), State::default()),
-        late.simulate(&input(1), State::default()),
+        plain().simulate(&input(1), MotionState::default()),
+        late.simulate(&input(1), MotionState::default()),
     );
     for i in 100..COUNT - 100 {
         assert!((then[i] - now[i - 5]).abs() < 1e-6);
@@ -324,7 +313,7 @@ fn a_delay_of_whole_samples_shifts_the_record() {
 
 #[test]
 fn effects_of_no_size_change_nothing() {
-    let base = plain().simulate_from(&input(4), State::default());
+    let base = plain().simulate_from(&input(4), MotionState::default());
     for (effect, form, values) in [
         ("cubic-stiffness", "beside", vec![0.0]),
         ("quadratic-stiffness", "even", vec![0.0]),
@@ -341,14 +330,14 @@ fn effects_of_no_size_change_nothing() {
         ("thermal-drift", "linear", vec![0.0]),
         ("capacitive-coupling", "slope-of-load", vec![0.0]),
     ] {
-        let with = model(effect, form, &values).simulate_from(&input(4), State::default());
+        let with = model(effect, form, &values).simulate_from(&input(4), MotionState::default());
         let change = rms(with.iter().zip(&base).map(|(a, b)| a - b));
         assert!(change < 1e-9, "{effect}: {change:e}");
     }
 }
 
 #[test]
-fn what_the_chain_does_can_be_undone() {
+fn distortions_are_inverted() {
     for (effect, form, values) in [
         ("gage-nonlinearity", "both", vec![0.02, 0.003]),
         ("saturation", "soft", vec![9.0]),
@@ -357,24 +346,18 @@ fn what_the_chain_does_can_be_undone() {
         ("thermal-drift", "sensitivity", vec![2.0]),
     ] {
         let model = model(effect, form, &values);
-        let (
-            _,
-            Action::Transform {
-                apply,
-                undo: Some(undo),
-            },
-        ) = &model.actions[0]
-        else {
-            panic!("{effect} has no way back");
+        let Action::Distortion(distortion) = &model.links()[0].action else {
+            panic!("{effect} is not a distortion");
         };
-        let clock = crate::effects::Clock {
+        let clock = crate::effects::SampleClock {
             step_s: 1.0 / RATE_HZ,
         };
         let before: Vec<f64> = (0..200).map(|i| 3.0 * (0.1 * f64::from(i)).sin()).collect();
         let mut samples = before.clone();
-        apply(clock, &mut samples);
+        distortion.forward(clock, &mut samples);
         assert!(samples != before);
-        undo(clock, &mut samples);
+        let lost = distortion.inverse(clock, 0.0, &mut samples);
+        assert!(lost.samples.is_empty(), "{effect}: {lost:?}");
         for (a, b) in samples.iter().zip(&before) {
             assert!((a - b).abs() < 1e-9, "{effect}: {a} {b}");
         }

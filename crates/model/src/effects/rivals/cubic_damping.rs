@@ -6,7 +6,7 @@
 //!
 //! Integration: for a fixed `x`, `x' = v/√(1 + 2 ω₀² d v² t)` exactly.
 
-use crate::effects::{Action, Effect, Form, Memory, Parameter, Stage, Torque};
+use crate::effects::{Action, Effect, EffectParameter, Form, Memory, Stage, Torque};
 
 pub(super) static EFFECT: Effect = Effect {
     name: "cubic-damping",
@@ -17,8 +17,9 @@ pub(super) static EFFECT: Effect = Effect {
     experiment: "free decays from three amplitudes, or the response at three levels",
     forms: &[Form {
         name: "cube",
+        law: "n = d x'^3",
         stage: Stage::Stand,
-        parameters: &[Parameter::motion("coefficient", -2, 3, 0.0, 20.0)],
+        parameters: &[EffectParameter::motion("coefficient", -2, 3, 0.0, 20.0)],
         starts: &[&[0.01]],
         build: |p| Action::beside(Cube { coefficient: p[0] }),
     }],

@@ -4,11 +4,15 @@
 //! piecewise linear oscillator*, J. Sound Vib. 90 (1983), 129. **Valid without impact losses.** Mistaken for
 //! `cubic-stiffness`, `saturation` and `bouc-wen-hysteresis`.
 
-use crate::effects::{Action, Effect, Form, Memory, Parameter, Ruler, Stage, Torque};
+use crate::effects::{
+    Action, Effect, EffectParameter, Form, Memory, ParameterScale, Stage, Torque,
+};
 
-const GAP: Parameter = Parameter::motion("gap", 1, 0, 0.05, 2.0).by(Ruler::Peak);
-const UPPER: Parameter = Parameter::motion("gap", 1, 0, -1.0, 2.0).by(Ruler::Peak);
-const STIFFNESS: Parameter = Parameter::number("stiffness_ratio", 0.0, 1e4);
+const GAP: EffectParameter =
+    EffectParameter::motion("gap", 1, 0, 0.05, 2.0).by(ParameterScale::Peak);
+const UPPER: EffectParameter =
+    EffectParameter::motion("gap", 1, 0, -1.0, 2.0).by(ParameterScale::Peak);
+const STIFFNESS: EffectParameter = EffectParameter::number("stiffness_ratio", 0.0, 1e4);
 const STARTS: &[&[f64]] = &[&[0.3, 0.5], &[0.5, 0.7], &[1.0, 0.85]];
 const TO_ONE_SIDE: &[&[f64]] = &[&[0.1, 0.05], &[0.3, 0.5], &[1.0, 0.8]];
 
@@ -23,6 +27,7 @@ pub(super) static EFFECT: Effect = Effect {
     forms: &[
         Form {
             name: "both",
+            law: "n = k (x - clamp(x, -g, g)); the gage shows x",
             stage: Stage::Stand,
             parameters: &[STIFFNESS, GAP],
             starts: STARTS,
@@ -30,13 +35,15 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "both-shown",
+            law: "n = k (x - clamp(x, -g, g)); the gage shows x + n",
             stage: Stage::Stand,
             parameters: &[STIFFNESS, GAP],
             starts: STARTS,
-            build: |p| Action::shown(Stop::both(p)),
+            build: |p| Action::in_gage_path(Stop::both(p)),
         },
         Form {
             name: "above",
+            law: "n = k max(x - g, 0)",
             stage: Stage::Stand,
             parameters: &[STIFFNESS, UPPER],
             starts: TO_ONE_SIDE,
@@ -44,6 +51,7 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "below",
+            law: "n = k min(x + g, 0)",
             stage: Stage::Stand,
             parameters: &[STIFFNESS, UPPER],
             starts: TO_ONE_SIDE,

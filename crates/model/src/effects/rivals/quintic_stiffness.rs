@@ -3,9 +3,10 @@
 //! `n = c x⁵`. I. Kovacic, M. J. Brennan (eds.), *The Duffing Equation* (2011), 1. **Valid where the cubic part is
 //! small.** Mistaken for `cubic-stiffness` and, through what four parameters can do, `bouc-wen-hysteresis`.
 
-use crate::effects::{Action, Effect, Form, Memory, Parameter, Stage, Torque};
+use crate::effects::{Action, Effect, EffectParameter, Form, Memory, Stage, Torque};
 
-const COEFFICIENT: &[Parameter] = &[Parameter::motion("coefficient", -4, 0, -0.02, 100.0)];
+const COEFFICIENT: &[EffectParameter] =
+    &[EffectParameter::motion("coefficient", -4, 0, -0.02, 100.0)];
 const STARTS: &[&[f64]] = &[&[1e-3], &[-3e-4]];
 
 pub(super) static EFFECT: Effect = Effect {
@@ -18,6 +19,7 @@ pub(super) static EFFECT: Effect = Effect {
     forms: &[
         Form {
             name: "beside",
+            law: "n = c x^5; the gage shows x",
             stage: Stage::Stand,
             parameters: COEFFICIENT,
             starts: STARTS,
@@ -25,10 +27,11 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "shown",
+            law: "n = c x^5; the gage shows x + n",
             stage: Stage::Stand,
             parameters: COEFFICIENT,
             starts: STARTS,
-            build: |p| Action::shown(Quintic { coefficient: p[0] }),
+            build: |p| Action::in_gage_path(Quintic { coefficient: p[0] }),
         },
     ],
 };

@@ -5,7 +5,7 @@
 //!
 //! Integration: for a fixed `x`, `x' = v e^{−ω₀² d x² t}` exactly.
 
-use crate::effects::{Action, Effect, Form, Memory, Parameter, Stage, Torque};
+use crate::effects::{Action, Effect, EffectParameter, Form, Memory, Stage, Torque};
 
 pub(super) static EFFECT: Effect = Effect {
     name: "squeezed-damping",
@@ -16,8 +16,9 @@ pub(super) static EFFECT: Effect = Effect {
     experiment: "free decays from two amplitudes with and without a preload",
     forms: &[Form {
         name: "square",
+        law: "n = d x^2 x'",
         stage: Stage::Stand,
-        parameters: &[Parameter::motion("coefficient", -2, 1, 0.0, 20.0)],
+        parameters: &[EffectParameter::motion("coefficient", -2, 1, 0.0, 20.0)],
         starts: &[&[0.01]],
         build: |p| Action::beside(Squeezed { coefficient: p[0] }),
     }],

@@ -3,9 +3,7 @@
 
 use std::ops::Range;
 
-use torqcomp_model::effects::Memory;
-
-use super::motion::{Link, View};
+use crate::effects::{Memory, Torque, bridge};
 
 /// Halvings of a bracket.
 const HALVINGS: usize = 60;
@@ -14,9 +12,9 @@ const WIDENINGS: usize = 40;
 /// Noise, in standard deviations, within which a signal counts as nothing.
 const NOTHING: f64 = 3.0;
 
-/// The torques that a gage shows, and where they are.
-pub struct Shown<'a> {
-    links: Vec<&'a Link<'a>>,
+/// The torques that a gage shows beside the displacement.
+pub struct GagePath<'a> {
+    torques: Vec<&'a dyn Torque>,
     memories: Vec<Memory>,
     shift: f64,
     /// Half the range in which nothing is shown.
@@ -27,32 +25,36 @@ pub struct Shown<'a> {
     kept: Option<Vec<f64>>,
 }
 
-impl<'a> Shown<'a> {
-    pub fn new(links: &'a [Link<'a>], view: &View) -> Self {
-        let links: Vec<&Link> = links.iter().filter(|link| link.shown).collect();
-        let hidden = links.iter().map(|link| link.torque.hidden()).sum();
+impl<'a> GagePath<'a> {
+    /// These torques, which see a displacement `shift` beside that in the signal; `noise_std` is the standard deviation
+    /// of a sample.
+    #[must_use]
+    pub fn new(torques: Vec<&'a dyn Torque>, shift: f64, noise_std: f64) -> Self {
         Self {
-            links,
+            hidden: torques.iter().map(|torque| torque.hidden()).sum(),
+            torques,
             memories: Vec::new(),
-            shift: view.shift,
-            hidden,
-            nothing: NOTHING * view.noise_std,
+            shift,
+            nothing: NOTHING * noise_std,
             kept: None,
         }
     }
 
-    pub fn is_there(&self) -> bool {
-        !self.links.is_empty()
+    /// Whether it holds no torque: the signal is then the displacement.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.torques.is_empty()
     }
 
-    /// Displacement over a window of the signal, and the places within `inner` where the signal does not tell it.
+    /// Displacement over a window of the signal, and the places within `inner` where the signal does not determine it.
+    /// Windows come in order of time; what a torque remembers moves on with them.
     pub fn displacement(&mut self, signal: &[f64], inner: Range<usize>) -> (Vec<f64>, Vec<usize>) {
         let mut x = signal.to_vec();
-        let mut untold = vec![false; signal.len()];
+        let mut unknown = vec![false; signal.len()];
         let mut last = signal[inner.start];
         if self.memories.is_empty() {
-            let begin = |link: &&Link| link.torque.begin(last + self.shift);
-            self.memories = self.links.iter().map(begin).collect();
+            let begin = |torque: &&dyn Torque| torque.begin(last + self.shift);
+            self.memories = self.torques.iter().map(begin).collect();
         }
         let mut memories = std::mem::take(&mut self.memories);
         let mut after = Vec::new();
@@ -61,7 +63,7 @@ impl<'a> Shown<'a> {
                 after = memories.clone();
             }
             let found = self.solve(&memories, signal[i], last);
-            untold[i] = found.is_none();
+            unknown[i] = found.is_none();
             last = found.unwrap_or(last);
             x[i] = last;
             let _ = self.sum(&mut memories, last);
@@ -69,10 +71,11 @@ impl<'a> Shown<'a> {
         self.memories = if after.is_empty() { memories } else { after };
         self.before(&mut x, signal, inner.start);
         if self.hidden > 0.0 {
-            self.bridge(&mut x, &mut untold, signal);
+            let shifted: Vec<f64> = signal.iter().map(|y| y + self.shift).collect();
+            bridge(&mut x, &mut unknown, &shifted, self.nothing);
         }
         self.kept = Some(x[inner.end - inner.start..inner.end].to_vec());
-        (x, inner.filter(|i| untold[*i]).collect())
+        (x, inner.filter(|i| unknown[*i]).collect())
     }
 
     /// What comes before the part that is solved: from the block before, or as far off as the first.
@@ -88,9 +91,9 @@ impl<'a> Shown<'a> {
 
     /// Torques at a displacement; memory moves on.
     fn sum(&self, memories: &mut [Memory], x: f64) -> f64 {
-        let pairs = self.links.iter().zip(memories);
+        let pairs = self.torques.iter().zip(memories);
         pairs
-            .map(|(link, memory)| link.torque.value(memory, x + self.shift, 0.0))
+            .map(|(torque, memory)| torque.value(memory, x + self.shift, 0.0))
             .sum()
     }
 
@@ -124,27 +127,6 @@ impl<'a> Shown<'a> {
         }
         None
     }
-
-    /// Where nothing is shown, leads from side to side by a cubic with the slopes at both ends.
-    fn bridge(&self, x: &mut [f64], untold: &mut [bool], signal: &[f64]) {
-        let inside = |y: &f64| (y + self.shift).abs() <= self.nothing;
-        let mut i = 0;
-        while i < x.len() {
-            if !inside(&signal[i]) {
-                i += 1;
-                continue;
-            }
-            let first = i;
-            let end = (first..x.len())
-                .find(|k| !inside(&signal[*k]))
-                .unwrap_or(x.len());
-            untold[first..end].fill(true);
-            if first >= 2 && end + 1 < x.len() {
-                cubic(x, first - 1, end);
-            }
-            i = end;
-        }
-    }
 }
 
 /// A root between two points of different sign, by the Illinois method.
@@ -163,19 +145,4 @@ fn root(f: impl Fn(f64) -> f64, mut a: (f64, f64), mut b: (f64, f64)) -> f64 {
         b = (c, fc);
     }
     b.0
-}
-
-/// The cubic between two places with the slopes at both of them.
-fn cubic(x: &mut [f64], from: usize, to: usize) {
-    let length = (to - from) as f64;
-    let (a, b) = (x[from], x[to]);
-    let (slope_a, slope_b) = (
-        (a - x[from - 1]) * length,
-        (x[(to + 1).min(x.len() - 1)] - b) * length,
-    );
-    for (i, x) in x[from + 1..to].iter_mut().enumerate() {
-        let t = (i + 1) as f64 / length;
-        let (u, t2) = (1.0 - t, t * t);
-        *x = u * u * ((1.0 + 2.0 * t) * a + t * slope_a) + t2 * ((3.0 - 2.0 * t) * b - u * slope_b);
-    }
 }

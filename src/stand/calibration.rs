@@ -21,7 +21,7 @@ pub struct Applied {
 
 /// How one channel of a record becomes the applied quantity.
 #[derive(Debug, Clone)]
-pub struct Chain {
+pub struct Calibration {
     /// SI units per unit of the record.
     pub recorded_factor: f64,
     /// From the record in SI units to the applied quantity in SI units, at rest.
@@ -88,16 +88,16 @@ pub fn applied_by_unit(text: &str, units: UnitSystem) -> Result<Applied, Failure
 }
 
 impl Stand {
-    /// The chain for a channel in that unit.
+    /// The calibration of a channel in that unit.
     ///
     /// # Errors
     /// If the unit is not known, or the stand does not say how it becomes torque.
-    pub fn chain(
+    pub fn calibration(
         &self,
         channel: &str,
         unit: Option<&NamedUnit>,
         units: UnitSystem,
-    ) -> Result<Chain, Failure> {
+    ) -> Result<Calibration, Failure> {
         let Some(named) = unit else {
             return Err(Failure::failed(format_args!(
                 "the channel \"{channel}\" does not say its unit; give it with --unit V (or mV, \
@@ -138,7 +138,7 @@ impl Stand {
                 )));
             }
         };
-        Ok(Chain {
+        Ok(Calibration {
             recorded_factor: named.unit.factor(),
             conversion: conversion.map_err(Failure::failed)?,
             zero: self.diagnosed.offset,
@@ -148,7 +148,8 @@ impl Stand {
         })
     }
 
-    fn static_gain(&self) -> Option<&super::StaticGain> {
+    /// Recorded over applied quantity at rest, if the stand file gives it.
+    pub(crate) fn static_gain(&self) -> Option<&super::StaticGain> {
         match &self.mechanics.as_ref()?.given {
             Given::Modal { static_gain, .. } => static_gain.as_ref(),
             Given::Constants { .. } => None,
@@ -161,7 +162,7 @@ impl Stand {
         named: &NamedUnit,
         gain: &super::StaticGain,
         units: UnitSystem,
-    ) -> Result<Chain, Failure> {
+    ) -> Result<Calibration, Failure> {
         let expected = Unit::parse(&gain.recorded_unit).map_err(Failure::failed)?;
         if expected.dimension() != named.unit.dimension() {
             return Err(Failure::failed(format_args!(
@@ -177,7 +178,7 @@ impl Stand {
             0.0
         };
         let slope = 1.0 / gain.value;
-        Ok(Chain {
+        Ok(Calibration {
             recorded_factor: named.unit.factor(),
             conversion: Conversion::linear(slope, -slope * zero).map_err(Failure::failed)?,
             zero: slope * self.diagnosed.offset,

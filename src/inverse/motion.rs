@@ -8,23 +8,14 @@
 use num_complex::Complex64;
 use torqcomp_dsp::band::Band;
 use torqcomp_dsp::compensate::{Fine, continued};
+use torqcomp_model::chain::GagePath;
 use torqcomp_model::effects::{Memory, Torque};
-
-use super::shown::Shown;
 
 /// Samples of a block, and those on both sides that are computed to spare.
 const BLOCK: usize = 16_384;
 const MARGIN: usize = 1024;
 /// Shortest block of a short record.
 const SHORTEST: usize = 256;
-
-/// A torque of the stand.
-pub struct Link<'a> {
-    /// The torque.
-    pub torque: &'a dyn Torque,
-    /// Whether the gage shows it.
-    pub shown: bool,
-}
 
 /// How the motion is looked at.
 pub struct View<'a> {
@@ -38,8 +29,6 @@ pub struct View<'a> {
     pub band: &'a Band,
     /// Standard uncertainty of the speed, per second.
     pub speed_std: f64,
-    /// Standard uncertainty of a sample.
-    pub noise_std: f64,
 }
 
 /// Displacement and torques at the samples.
@@ -49,25 +38,25 @@ pub struct Motion {
     pub x: Vec<f64>,
     /// Sum of the torques.
     pub torque: Vec<f64>,
-    /// Samples at which the gage's signal does not tell the displacement.
+    /// Samples at which the gage's signal does not determine the displacement.
     pub hidden: Vec<usize>,
     /// Part of the record in which the speed is within two standard uncertainties of zero.
-    pub still: f64,
+    pub stuck: f64,
 }
 
 /// Displacement and torques along a signal of the gage.
-pub fn motion(links: &[Link], signal: &[f64], view: &View) -> Motion {
+pub fn motion(torques: &[&dyn Torque], gage_path: GagePath, signal: &[f64], view: &View) -> Motion {
     let block = signal.len().next_multiple_of(SHORTEST).min(BLOCK);
     let margin = MARGIN.min(4 * block);
-    let mut walk = Walk {
-        links,
+    let mut walk = MotionPass {
+        torques,
         view,
         margin,
         fine: Fine::new(block + 2 * margin, margin, view.factor, view.rate_hz),
         memories: Vec::new(),
-        shown: Shown::new(links, view),
+        gage_path,
         kept: None,
-        still: 0,
+        stuck: 0,
         found: Motion::default(),
     };
     for start in (0..signal.len()).step_by(block) {
@@ -77,32 +66,32 @@ pub fn motion(links: &[Link], signal: &[f64], view: &View) -> Motion {
         walk.block(&window, start, block.min(signal.len() - start));
     }
     let steps = (signal.len() * view.factor) as f64;
-    walk.found.still = walk.still as f64 / steps;
+    walk.found.stuck = walk.stuck as f64 / steps;
     walk.found
 }
 
-struct Walk<'a> {
-    links: &'a [Link<'a>],
+struct MotionPass<'a> {
+    torques: &'a [&'a dyn Torque],
     view: &'a View<'a>,
     margin: usize,
     fine: Fine,
     memories: Vec<Memory>,
-    shown: Shown<'a>,
+    gage_path: GagePath<'a>,
     /// Torques of the end of the block before.
     kept: Option<Vec<f64>>,
-    still: usize,
+    stuck: usize,
     found: Motion,
 }
 
-impl Walk<'_> {
+impl MotionPass<'_> {
     fn block(&mut self, window: &[f64], start: usize, count: usize) {
         let (margin, factor) = (self.margin, self.view.factor);
         let inner = margin..margin + count;
         let mut lines = self.fine.spectrum(window);
-        if self.shown.is_there() {
+        if !self.gage_path.is_empty() {
             let signal = self.fine.refined(&lines, |_| Complex64::ONE);
             let part = margin * factor..(margin + count) * factor;
-            let (x, hidden) = self.shown.displacement(&signal, part);
+            let (x, hidden) = self.gage_path.displacement(&signal, part);
             lines = self.fine.spectrum_of_fine(&x);
             let base = self.fine.samples(&lines);
             self.found.x.extend_from_slice(&base[inner.clone()]);
@@ -127,8 +116,8 @@ impl Walk<'_> {
         });
         let (first, last) = (self.margin * factor, (self.margin + count) * factor);
         if self.memories.is_empty() {
-            let begin = |link: &Link| link.torque.begin(x[first] + self.view.shift);
-            self.memories = self.links.iter().map(begin).collect();
+            let begin = |torque: &&dyn Torque| torque.begin(x[first] + self.view.shift);
+            self.memories = self.torques.iter().map(begin).collect();
         }
         let mut torque = vec![0.0; x.len()];
         let mut memories = std::mem::take(&mut self.memories);
@@ -140,7 +129,7 @@ impl Walk<'_> {
             }
             let change = 0.5 * (speed[(i + 1).min(x.len() - 1)] - speed[i - 1]);
             torque[i] = self.sum(&mut memories, x[i], speed[i], change);
-            self.still += usize::from(i < last && speed[i].abs() < 2.0 * self.view.speed_std);
+            self.stuck += usize::from(i < last && speed[i].abs() < 2.0 * self.view.speed_std);
         }
         self.memories = after;
         match &self.kept {
@@ -157,9 +146,9 @@ impl Walk<'_> {
     fn sum(&self, memories: &mut [Memory], x: f64, speed: f64, change: f64) -> f64 {
         // Within a step the speed takes all values of the step.
         let std = self.view.speed_std.hypot(change / 12.0_f64.sqrt());
-        let pairs = self.links.iter().zip(memories);
+        let pairs = self.torques.iter().zip(memories);
         pairs
-            .map(|(link, memory)| link.torque.blurred(memory, x + self.view.shift, speed, std))
+            .map(|(torque, memory)| torque.blurred(memory, x + self.view.shift, speed, std))
             .sum()
     }
 }

@@ -1,31 +1,10 @@
-//! A stand with its effects, from input to record.
-
-use std::sync::Arc;
+//! From the applied quantity to the record.
 
 use num_complex::Complex64;
 
-use super::input::Excitation;
-use super::integrate::{State, free_motion};
-use super::run::{self, Link};
-use crate::effects::{Action, Clock, Mode, Stage};
-
-/// A response that is known and not fitted, such as that of the recorder: of the frequency in Hz.
-pub type Fixed = Arc<dyn Fn(f64) -> Complex64 + Send + Sync>;
-
-/// A stand with its effects.
-pub struct Model {
-    /// The linear mode.
-    pub mode: Mode,
-    /// Recorded per applied quantity, at rest.
-    pub gain: f64,
-    /// The recorder, as far as it is known.
-    pub recorder: Option<Fixed>,
-    /// Displacement, in units of the record, by a load that does not change and is not in the input: torques of
-    /// the stand see it; what the gage shows of it is left to the record's own constant.
-    pub shift: f64,
-    /// The effects.
-    pub actions: Vec<(Stage, Action)>,
-}
+use super::Chain;
+use crate::effects::{Action, SampleClock, Stage};
+use crate::simulate::{Excitation, MotionState, Torques, free_motion, integrate};
 
 /// A record on its way through the chain, in the domain that the last link left it in.
 enum Signal {
@@ -49,37 +28,29 @@ impl Signal {
     }
 }
 
-impl Model {
+impl Chain {
     /// The record for an input. Lines are not in it: their phase belongs to a record.
     ///
     /// With torques in the stand the motion starts from `start`; without, from the steady state of what
     /// continues the record backwards. Samples after the motion has left all bounds are NaN.
     #[must_use]
-    pub fn simulate(&self, input: &Excitation, start: State) -> Vec<f64> {
-        let torques = self.torques();
-        let moved = if torques.is_empty() {
-            self.respond(input)
-        } else {
-            let samples = run::run(&self.mode, self.gain, &torques, input, start, self.shift);
+    pub fn simulate(&self, input: &Excitation, start: MotionState) -> Vec<f64> {
+        let moved = if self.has_torques() {
+            let samples = self.integrated(input, start);
             if samples.last().is_none_or(|x| !x.is_finite()) {
                 return samples;
             }
             Signal::Samples(samples)
+        } else {
+            self.respond(input)
         };
         self.record(moved, input)
     }
 
     /// The record for an input when the stand is at rest before it, by integration in time.
     #[must_use]
-    pub fn simulate_from(&self, input: &Excitation, start: State) -> Vec<f64> {
-        let samples = run::run(
-            &self.mode,
-            self.gain,
-            &self.torques(),
-            input,
-            start,
-            self.shift,
-        );
+    pub fn simulate_from(&self, input: &Excitation, start: MotionState) -> Vec<f64> {
+        let samples = self.integrated(input, start);
         if samples.last().is_none_or(|x| !x.is_finite()) {
             return samples;
         }
@@ -128,11 +99,20 @@ impl Model {
         self.torques().iter().any(|(torque, _)| torque.has_zero())
     }
 
-    fn torques(&self) -> Vec<Link<'_>> {
-        self.actions
+    /// What the gage shows of the motion, integrated in time.
+    fn integrated(&self, input: &Excitation, start: MotionState) -> Vec<f64> {
+        let torques = self.torques();
+        integrate(&self.mode, self.gain, &torques, input, start, self.shift)
+    }
+
+    fn torques(&self) -> Torques<'_> {
+        self.links
             .iter()
-            .filter_map(|(_, action)| match action {
-                Action::Torque { torque, shown } => Some((torque.as_ref(), *shown)),
+            .filter_map(|link| match &link.action {
+                Action::Torque {
+                    torque,
+                    in_gage_path,
+                } => Some((torque.as_ref(), *in_gage_path)),
                 _ => None,
             })
             .collect()
@@ -144,34 +124,15 @@ impl Model {
         Signal::Spectrum(input.spectrum().iter().enumerate().map(line).collect())
     }
 
-    /// What the chain makes of the motion, place by place.
+    /// What the links after the stand make of the motion.
     fn record(&self, mut signal: Signal, input: &Excitation) -> Vec<f64> {
-        const ALONG: [Stage; 5] = [
-            Stage::Dynamics,
-            Stage::Gage,
-            Stage::Chain,
-            Stage::Limit,
-            Stage::Disturbance,
-        ];
-        let clock = Clock {
-            step_s: 1.0 / input.rate_hz(),
-        };
-        for place in ALONG {
-            if place == Stage::Chain
-                && let Some(recorder) = &self.recorder
-            {
-                signal = multiply(signal, input, |omega| {
-                    recorder(omega / std::f64::consts::TAU)
-                });
-            }
-            for (_, action) in self.actions.iter().filter(|(p, _)| *p == place) {
-                signal = self.apply(action, signal, input, clock);
-            }
+        for link in self.links.iter().filter(|link| link.stage > Stage::Stand) {
+            signal = self.apply(&link.action, signal, input);
         }
         signal.into_samples(input)
     }
 
-    fn apply(&self, action: &Action, signal: Signal, input: &Excitation, clock: Clock) -> Signal {
+    fn apply(&self, action: &Action, signal: Signal, input: &Excitation) -> Signal {
         match action {
             Action::Factor(factor) => multiply(signal, input, |omega| factor(&self.mode, omega)),
             Action::Feedthrough(term) => {
@@ -181,12 +142,25 @@ impl Model {
                 }
                 Signal::Spectrum(spectrum)
             }
-            Action::Transform { apply, .. } => {
+            Action::Recorder {
+                response,
+                is_ideal: false,
+            } => multiply(signal, input, |omega| {
+                response(omega / std::f64::consts::TAU)
+            }),
+            Action::Distortion(distortion) => {
+                let clock = SampleClock {
+                    step_s: 1.0 / input.rate_hz(),
+                };
                 let mut samples = signal.into_samples(input);
-                apply(clock, &mut samples);
+                distortion.forward(clock, &mut samples);
                 Signal::Samples(samples)
             }
-            Action::Torque { .. } | Action::Lines(_) | Action::Course(_) => signal,
+            // The phase of a line and a slow course belong to a record.
+            Action::Recorder { .. }
+            | Action::Torque { .. }
+            | Action::Lines(_)
+            | Action::Course(_) => signal,
         }
     }
 }

@@ -1,15 +1,11 @@
 //! From a record back to what was applied, with a stand that has effects no response over frequency can describe.
 //!
-//! Every link of `simulate` is taken back in reverse order: disturbances, the recorder's range, the chain, the gage,
-//! the linear dynamics, and last the stand itself, whose torques are evaluated along the motion
-//! (`motion`). Beyond the band nothing is added.
+//! The links of the stand's [`Chain`] are taken in reverse order: disturbances, the recorder's range, the chain, the
+//! gage, the linear dynamics, and last the stand itself, whose torques are evaluated along the motion
+//! ([`motion`]). How a single effect is inverted is in its own file in `torqcomp_model::effects`; here is what they
+//! share: the band, the continuation beyond the record's ends, the noise. Beyond the band nothing is added.
 
-mod curve;
-mod disturbance;
-mod links;
 mod motion;
-mod play;
-mod shown;
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -17,14 +13,13 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use torqcomp_dsp::band::Band;
 use torqcomp_dsp::compensate::{Extension, Inverse, InverseFilter};
-use torqcomp_model::effects::{Action, Clock, Line, Mode, Stage};
+use torqcomp_model::chain::{Chain, GagePath, Group, Link};
+use torqcomp_model::effects::{
+    self, Action, FoundLine, SampleClock, SpectralLine, Stage, Torque, Unrecovered,
+};
 
 use crate::failure::Failure;
 use crate::stand::Stand;
-
-pub use disturbance::FoundLine;
-use links::Group;
-pub use links::{Link, treatment};
 
 /// Rounds in which torques of the stand and a coupling past it are brought into agreement.
 const ROUNDS: usize = 40;
@@ -42,87 +37,67 @@ const HIGHEST: f64 = 0.8;
 const GROWTH: f64 = 1.5;
 
 /// How a record is taken back.
-pub struct Undo {
-    mode: Mode,
-    gain: f64,
-    shift: f64,
-    links: Arc<[Link]>,
+pub(crate) struct ChainInverse {
+    chain: Arc<Chain>,
     filter: InverseFilter,
-}
-
-/// Samples of which a record does not tell enough.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Lost {
-    /// The effect.
-    pub effect: &'static str,
-    /// What it is about them.
-    pub why: String,
-    /// Their indices, in order.
-    pub samples: Vec<usize>,
 }
 
 /// What came out.
 #[derive(Debug, Default)]
-pub struct Undone {
+pub(crate) struct InverseResult {
     /// The applied quantity, in SI units.
     pub applied: Vec<f64>,
-    /// Samples of which the record does not tell enough.
-    pub lost: Vec<Lost>,
-    /// Lines that were taken off.
+    /// Effects with the samples of which the record does not tell enough.
+    pub lost: Vec<(&'static str, Unrecovered)>,
+    /// Lines that were subtracted.
     pub lines: Vec<FoundLine>,
-    /// Rms of a slow course that was taken off, in units of the record.
-    pub course_rms: Option<f64>,
-    /// Part of the record in which the speed cannot be told from zero, where a torque depends on its sign.
-    pub still: Option<f64>,
+    /// Part of the record in which the speed is not significantly different from zero, where a torque depends on its
+    /// sign.
+    pub stuck: Option<f64>,
     /// Highest frequency that curves and torques have seen.
     pub seen_to_hz: Option<f64>,
 }
 
 /// A record on its way back.
-struct Way<'a> {
-    undo: &'a Undo,
+struct Pass<'a> {
+    inverse: &'a ChainInverse,
     extension: Extension,
-    clock: Clock,
+    clock: SampleClock,
     samples: Vec<f64>,
     /// Standard deviation of the noise of a sample.
     noise_std: f64,
     /// Torques of the stand, as far as they are known, for couplings past it.
     torque: Option<&'a [f64]>,
-    done: Undone,
+    result: InverseResult,
 }
 
-impl Undo {
+impl ChainInverse {
     /// Takes a stand apart for a band.
     ///
     /// # Errors
     /// If the stand has no mechanics, or effects that cannot be taken back together.
-    pub fn new(stand: &Stand, band: Band) -> Result<Self, Failure> {
-        let mode = stand.mode()?;
-        let links: Arc<[Link]> = links::of(stand)?.into();
-        let all = links.clone();
+    pub(crate) fn new(stand: &Stand, band: Band) -> Result<Self, Failure> {
+        let chain = Arc::new(stand.chain()?);
+        refuse_bent_coupling(stand, &chain)?;
+        let linear = chain.clone();
         let inverse: Inverse = Arc::new(move |hz| {
-            let regular = |link: &Link| link.dies_out(&mode);
-            mode.inverse(TAU * hz) / links::response(&all, &mode, hz, regular)
+            let regular = |link: &Link| link.dies_out(&linear.mode);
+            linear.mode.inverse(TAU * hz) / linear.response_of(hz, regular)
         });
         Ok(Self {
             filter: InverseFilter::design(inverse, band)?,
-            mode,
-            gain: stand.gain(),
-            shift: stand.diagnosed.shift,
-            links,
+            chain,
         })
     }
 
     /// The linear part of the way back, without factors whose inverse has no end in time.
-    #[must_use]
-    pub fn filter(&self) -> &InverseFilter {
+    pub(crate) fn filter(&self) -> &InverseFilter {
         &self.filter
     }
 
-    /// The links, in the order of `simulate`.
-    #[must_use]
-    pub fn links(&self) -> &[Link] {
-        &self.links
+    /// The links, in the order from torque to record.
+    pub(crate) fn links(&self) -> &[Link] {
+        self.chain.links()
     }
 
     /// Takes a record back, in SI units of the record; `noise_std` is the standard deviation of its
@@ -130,153 +105,129 @@ impl Undo {
     ///
     /// # Errors
     /// If a coupling past the stand and the torques in it do not come into agreement.
-    pub fn run(&self, record: &[f64], rate_hz: f64, noise_std: f64) -> Result<Undone, Failure> {
+    pub(crate) fn run(
+        &self,
+        record: &[f64],
+        rate_hz: f64,
+        noise_std: f64,
+    ) -> Result<InverseResult, Failure> {
         let lead = (4 * self.filter.half_length()).max(SHORTEST_LEAD);
         let extension = Extension::new(record.len(), rate_hz, lead);
-        let clock = Clock {
+        let clock = SampleClock {
             step_s: 1.0 / rate_hz,
         };
         let back = |torque: Option<&[f64]>| {
-            let way = Way {
-                undo: self,
+            let pass = Pass {
+                inverse: self,
                 extension: extension.clone(),
                 clock,
                 samples: record.to_vec(),
                 noise_std,
                 torque,
-                done: Undone::default(),
+                result: InverseResult::default(),
             };
-            way.back()
+            pass.back()
         };
-        if !self.couples() {
+        let couples = self.links().iter().any(Link::is_feedthrough);
+        if !(couples && self.chain.has_torques()) {
             return Ok(back(None).0);
         }
         let size = record.iter().map(|y| y * y).sum::<f64>().sqrt();
         let mut torque = vec![0.0; record.len()];
         for _ in 0..ROUNDS {
-            let (done, now) = back(Some(&torque));
+            let (result, now) = back(Some(&torque));
             let change = now.iter().zip(&torque).map(|(a, b)| (a - b).powi(2));
             let change = change.sum::<f64>().sqrt();
             torque = now;
             if change <= AGREED * size {
-                return Ok(done);
+                return Ok(result);
             }
         }
         Err(Failure::failed(
-            "the capacitive coupling past the stand and the torques in it do not come into agreement: one of \
-             them is too large to be taken back beside the other; leave one of the effects out of the stand file",
+            "the capacitive coupling past the stand and the torques in it do not converge: one of them is too large to \
+             be taken back beside the other; leave one of the effects out of the stand file",
         ))
     }
 
     fn band(&self) -> &Band {
         self.filter.band()
     }
+}
 
-    /// Whether what is applied reaches the record past torques of the stand.
-    fn couples(&self) -> bool {
-        let is = |f: &dyn Fn(&Action) -> bool| self.links.iter().any(|link| link.is(f));
-        is(&|a| matches!(a, Action::Feedthrough(_))) && self.has_torques()
-    }
-
-    fn has_torques(&self) -> bool {
-        let torque = |a: &Action| matches!(a, Action::Torque { .. });
-        self.links.iter().any(|link| link.is(&torque))
+/// Refuses a coupling past a curve: what reaches the record past the stand is bent with the rest of it.
+fn refuse_bent_coupling(stand: &Stand, chain: &Chain) -> Result<(), Failure> {
+    let links = chain.links();
+    let is_bent =
+        |link: &&Link| link.stage < Stage::Chain && matches!(link.action, Action::Distortion(_));
+    let coupled = links.iter().find(|link| link.is_feedthrough());
+    match (coupled, links.iter().find(is_bent)) {
+        (Some(coupled), Some(curve)) => Err(Failure::failed(format_args!(
+            "{}: \"{}\" reaches the record past the stand, and \"{}\" bends what comes through it; the two cannot \
+             be taken back together; leave the smaller one out",
+            stand.file, coupled.effect, curve.effect
+        ))),
+        _ => Ok(()),
     }
 }
 
-impl Way<'_> {
+impl Pass<'_> {
     /// All the way back, and the torques that were found in the stand.
-    fn back(mut self) -> (Undone, Vec<f64>) {
+    fn back(mut self) -> (InverseResult, Vec<f64>) {
         self.disturbances();
-        let groups = links::groups(&self.undo.links);
+        let groups = self.inverse.chain.groups();
         let mut rest: Vec<&Link> = Vec::new();
         for group in groups.iter().rev() {
             match group {
                 Group::Linear(links) => rest.clone_from(links),
-                Group::Curve(link) => {
+                Group::Distortion(link) => {
                     self.divide(&std::mem::take(&mut rest));
-                    self.curve(link);
+                    self.undistort(link);
                 }
-                Group::Stand(links) => {
+                Group::Torques(links) => {
                     self.divide(&std::mem::take(&mut rest));
                     let torque = self.stand(links);
-                    return (self.done, torque);
+                    return (self.result, torque);
                 }
             }
         }
         self.finish(&rest, None);
-        (self.done, Vec::new())
+        (self.result, Vec::new())
     }
 
     fn rate_hz(&self) -> f64 {
-        self.undo.band().sample_rate_hz()
+        self.inverse.band().sample_rate_hz()
     }
 
     fn disturbances(&mut self) {
-        let mut lines: Vec<Line> = Vec::new();
+        let mut lines: Vec<SpectralLine> = Vec::new();
         let mut waves = 0;
-        for link in self
-            .undo
-            .links
-            .iter()
-            .filter(|l| l.stage == Stage::Disturbance)
-        {
+        for link in self.inverse.links() {
             match &link.action {
-                Some(Action::Lines(more)) => lines.extend(more),
-                Some(Action::Course(more)) => waves = waves.max(*more),
+                Action::Lines(more) => lines.extend(more),
+                Action::Course(more) => waves = waves.max(*more),
                 _ => {}
             }
         }
         if !lines.is_empty() {
             let rate_hz = self.rate_hz();
-            self.done.lines =
-                disturbance::take_lines(&mut self.samples, rate_hz, &lines, self.noise_std);
+            self.result.lines =
+                effects::subtract_lines(&mut self.samples, rate_hz, &lines, self.noise_std);
         }
         if waves > 0 {
-            self.done.course_rms = Some(disturbance::take_course(&mut self.samples, waves));
+            effects::subtract_course(&mut self.samples, waves);
         }
     }
 
-    fn curve(&mut self, link: &Link) {
-        let Some(Action::Transform { apply, undo }) = &link.action else {
-            return;
-        };
-        let (why, samples) = match undo {
-            Some(undo) => {
-                let (branch, beyond) = curve::invert(apply, undo, self.clock, &mut self.samples);
-                let text = format!(
-                    "beyond {:.4} to {:.4} of the record in SI units the curve cannot be inverted",
-                    branch.ends[0], branch.ends[1]
-                );
-                (text, beyond)
-            }
-            None if link.stage == Stage::Limit => {
-                let (limits, at) = curve::at_limit(apply, &self.samples, self.noise_std);
-                let text = format!(
-                    "at the limits {:.4} and {:.4} of the record in SI units it holds no more than that",
-                    limits[0], limits[1]
-                );
-                (text, at)
-            }
-            None => {
-                let gap = link.values.first().copied().unwrap_or(0.0);
-                let still = play::invert(&mut self.samples, gap, self.noise_std);
-                (
-                    "the gage stands still while the play is gone through".to_owned(),
-                    still,
-                )
-            }
-        };
-        self.lose(link.effect, why, samples);
+    fn undistort(&mut self, link: &Link) {
+        if let Action::Distortion(distortion) = &link.action {
+            let lost = distortion.inverse(self.clock, self.noise_std, &mut self.samples);
+            self.lose(link.effect, lost);
+        }
     }
 
-    fn lose(&mut self, effect: &'static str, why: String, samples: Vec<usize>) {
-        if !samples.is_empty() {
-            self.done.lost.push(Lost {
-                effect,
-                why,
-                samples,
-            });
+    fn lose(&mut self, effect: &'static str, lost: Unrecovered) {
+        if !lost.samples.is_empty() {
+            self.result.lost.push((effect, lost));
         }
     }
 
@@ -286,46 +237,55 @@ impl Way<'_> {
         if links.is_empty() {
             return;
         }
-        let inverse = self.inverse(links);
+        let inverse = self.inverse_of(links);
         let band = self.wide(&inverse);
         let before = self.samples.clone();
         self.samples = self
             .extension
             .filter(&self.samples, |hz| held(&inverse, &band, hz));
-        links::level(links, self.undo.mode, &before, &mut self.samples);
+        self.level(links, &before);
         self.noise_std *= growth(&inverse, &band);
-        self.done.seen_to_hz = Some(band.top_hz());
+        self.result.seen_to_hz = Some(band.top_hz());
     }
 
-    /// The inverse of some of the linear links.
-    fn inverse<'b>(&self, some: &'b [&Link]) -> impl Fn(f64) -> Complex64 + 'b
-    where
-        Self: 'b,
-    {
-        let undo = self.undo;
-        move |hz| {
-            let one_of = |link: &Link| some.iter().any(|s| std::ptr::eq(*s, link));
-            links::response(&undo.links, &undo.mode, hz, one_of).inv()
+    /// Where a link blocks constants, takes off the slope that its inverse brings in.
+    fn level(&mut self, links: &[&Link], before: &[f64]) {
+        let mode = self.inverse.chain.mode;
+        if links.iter().any(|link| link.blocks_constants(&mode)) {
+            effects::level(before, &mut self.samples);
         }
     }
 
-    /// Takes off what torques of the stand contribute to a coupling past it.
+    /// The inverse of some of the linear links.
+    fn inverse_of<'b>(&self, some: &'b [&Link]) -> impl Fn(f64) -> Complex64 + 'b
+    where
+        Self: 'b,
+    {
+        let chain = &self.inverse.chain;
+        move |hz| {
+            let one_of = |link: &Link| some.iter().any(|s| std::ptr::eq(*s, link));
+            chain.response_of(hz, one_of).inv()
+        }
+    }
+
+    /// Subtracts what torques of the stand contribute to a coupling past it.
     fn uncouple(&mut self, links: &[&Link]) {
-        let Some(torque) = self.torque else { return };
-        let Some(coupled) = links::coupled(links, self.undo.mode) else {
-            return;
-        };
-        let band = self.undo.band();
-        let part = self.extension.filter(torque, |hz| held(&coupled, band, hz));
-        self.samples
-            .iter_mut()
-            .zip(&part)
-            .for_each(|(y, p)| *y -= p);
+        let chain = &self.inverse.chain;
+        if let Some(torque) = self.torque
+            && let Some(coupling) = chain.coupling(links)
+        {
+            let band = self.inverse.band();
+            let part = self
+                .extension
+                .filter(torque, |hz| held(&coupling, band, hz));
+            let pairs = self.samples.iter_mut().zip(&part);
+            pairs.for_each(|(y, p)| *y -= p);
+        }
     }
 
     /// The widest band in which an inverse does not blow noise up.
     fn wide(&self, inverse: &impl Fn(f64) -> Complex64) -> Band {
-        let band = self.undo.band();
+        let band = self.inverse.band();
         let rate_hz = band.sample_rate_hz();
         let highest = (WIDER * band.top_hz()).min(0.5 * HIGHEST * rate_hz);
         let steps = 200;
@@ -347,35 +307,43 @@ impl Way<'_> {
 
     /// The stand itself: displacement, torques, applied quantity.
     fn stand(&mut self, links: &[&Link]) -> Vec<f64> {
-        let torques: Vec<motion::Link> = links
+        let torques: Vec<(&dyn Torque, bool)> = links
             .iter()
             .filter_map(|link| match &link.action {
-                Some(Action::Torque { torque, shown }) => Some(motion::Link {
-                    torque: torque.as_ref(),
-                    shown: *shown,
-                }),
+                Action::Torque {
+                    torque,
+                    in_gage_path,
+                } => Some((torque.as_ref(), *in_gage_path)),
                 _ => None,
             })
             .collect();
         let rate_hz = self.rate_hz();
         let band = self.wide(&|_| Complex64::ONE);
-        let natural_hz = self.undo.mode.omega_rad_s / TAU;
+        let chain = &self.inverse.chain;
+        let natural_hz = chain.mode.natural_frequency_hz();
+        let gage_path = torques.iter().filter(|(_, in_path)| *in_path);
+        let gage_path = gage_path.map(|(torque, _)| *torque).collect();
         let view = motion::View {
             rate_hz,
             factor: torqcomp_model::simulate::substeps(natural_hz, rate_hz).max(FEWEST_STEPS),
-            shift: self.undo.shift,
+            shift: chain.shift,
             speed_std: self.noise_std * speed_gain(&band),
-            noise_std: self.noise_std,
             band: &band,
         };
-        let found = motion::motion(&torques, &self.samples, &view);
-        let why = "the gage shows nothing within the gap".to_owned();
-        self.lose(links[0].effect, why, found.hidden);
-        if links.iter().any(|link| link.effect == "coulomb-friction") {
-            self.done.still = Some(found.still);
+        let torques: Vec<&dyn Torque> = torques.iter().map(|(torque, _)| *torque).collect();
+        let gage_path = GagePath::new(gage_path, chain.shift, self.noise_std);
+        let found = motion::motion(&torques, gage_path, &self.samples, &view);
+        let hides = torques.iter().position(|torque| torque.hidden() > 0.0);
+        let lost = Unrecovered {
+            why: "the gage shows nothing within the gap".to_owned(),
+            samples: found.hidden,
+        };
+        self.lose(links[hides.unwrap_or(0)].effect, lost);
+        if torques.iter().any(|torque| torque.switches()) {
+            self.result.stuck = Some(found.stuck);
         }
-        let seen = self.done.seen_to_hz.unwrap_or(f64::INFINITY);
-        self.done.seen_to_hz = Some(band.top_hz().min(seen));
+        let seen = self.result.seen_to_hz.unwrap_or(f64::INFINITY);
+        self.result.seen_to_hz = Some(band.top_hz().min(seen));
         self.samples = found.x;
         self.finish(&[], Some(&found.torque));
         found.torque
@@ -383,12 +351,12 @@ impl Way<'_> {
 
     /// The linear stand, with what is left of linear links, in the band.
     fn finish(&mut self, rest: &[&Link], torque: Option<&[f64]>) {
-        let undo = self.undo;
-        let inverse = self.inverse(rest);
-        let band = undo.band();
+        let chain = &self.inverse.chain;
+        let inverse = self.inverse_of(rest);
+        let band = self.inverse.band();
         let stand = |hz: f64| {
             let omega = TAU * hz;
-            held(&inverse, band, hz) * undo.mode.inverse(omega)
+            held(&inverse, band, hz) * chain.mode.inverse(omega)
         };
         let mut spectrum = self
             .extension
@@ -398,11 +366,11 @@ impl Way<'_> {
             let in_band = |hz: f64| Complex64::from(band.gain(hz));
             spectrum = spectrum + self.extension.times(torque, in_band);
         }
-        let before = std::mem::take(&mut self.samples);
-        let mut applied = self.extension.samples(&spectrum);
-        links::level(rest, undo.mode, &before, &mut applied);
-        applied.iter_mut().for_each(|u| *u /= undo.gain);
-        self.done.applied = applied;
+        let applied = self.extension.samples(&spectrum);
+        let before = std::mem::replace(&mut self.samples, applied);
+        self.level(rest, &before);
+        let gain = self.inverse.chain.gain;
+        self.result.applied = self.samples.iter().map(|u| u / gain).collect();
     }
 }
 

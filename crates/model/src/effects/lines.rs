@@ -1,20 +1,38 @@
-//! Lines and slow courses that were added to a record: what belongs to the record is found in the record.
+//! Lines added to a record: the amplitude belongs to the stand, the phase is found in the record.
 
 use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
-use torqcomp_model::effects::Line;
 
 /// Distances from a line, in lines of the record's spectrum, at which the signal beside it is looked at: beyond
 /// the window's own width, and over more than the spacing of a usual comb.
 const BESIDE: std::ops::RangeInclusive<u32> = 3..=20;
-/// Half waves above those of a course, over as many as it has, that tell how much of them is signal.
-const COURSE_BESIDE: usize = 2;
 /// Variance of the signal at a line, over the square of what the record's own amplitude differs by from that of the
 /// stand, that is thought possible.
 const AGREEMENT: f64 = 8.0;
 /// Samples after which a turning phasor is set right.
 const TURNS: usize = 4096;
+
+/// A steady line, independent of what is applied; its phase belongs to the record.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpectralLine {
+    /// Frequency in Hz.
+    pub frequency_hz: f64,
+    /// Amplitude in units of the record.
+    pub amplitude: f64,
+}
+
+impl SpectralLine {
+    /// A frequency in Hz, then the amplitudes of it and of its orders 2, 3, …
+    #[must_use]
+    pub fn orders(p: &[f64]) -> Vec<Self> {
+        let line = |order: usize| Self {
+            frequency_hz: order as f64 * p[0],
+            amplitude: p[order],
+        };
+        (1..p.len()).map(line).collect()
+    }
+}
 
 /// A line as it was found in a record.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,13 +55,13 @@ pub struct FoundLine {
 /// the mean of `A e^{jφ}` is `A I₁(κ)/I₀(κ) e^{j arg P}`, `κ = 2 A |P|/σ²`. `σ²` is the largest
 /// power at the frequencies beside the line, since a comb may have one of its lines there, or less if `|P|` agrees with
 /// `A` better than that.
-pub fn take_lines(
+pub fn subtract_lines(
     samples: &mut [f64],
     rate_hz: f64,
-    lines: &[Line],
+    lines: &[SpectralLine],
     noise_std: f64,
 ) -> Vec<FoundLine> {
-    let lines: Vec<Line> = lines
+    let lines: Vec<SpectralLine> = lines
         .iter()
         .copied()
         .filter(|line| line.amplitude > 0.0 && line.frequency_hz < 0.5 * rate_hz)
@@ -136,41 +154,6 @@ fn bessel_ratio(kappa: f64) -> f64 {
     0.5 * kappa * one / zero
 }
 
-/// Takes a slow course of as many half waves off a record, its mean left; the rms of what was taken.
-///
-/// Each half wave is shrunk by `1 − S/c²`, `S` being what the half waves just above have, which are signal.
-pub fn take_course(samples: &mut [f64], half_waves: usize) -> f64 {
-    let count = samples.len() as f64;
-    let wave = |k: usize, i: usize| (PI * k as f64 * (i as f64 + 0.5) / count).cos();
-    let part = |samples: &[f64], k: usize| {
-        let sum: f64 = samples
-            .iter()
-            .enumerate()
-            .map(|(i, x)| x * wave(k, i))
-            .sum();
-        2.0 * sum / count
-    };
-    let mut beside: Vec<f64> = (half_waves + 1..=(1 + COURSE_BESIDE) * half_waves)
-        .map(|k| part(samples, k).powi(2))
-        .collect();
-    beside.sort_by(f64::total_cmp);
-    // Lines of a comb are few: the middle one is beside them. The square of a normal number has a median of 0.455.
-    let beside = beside.get(beside.len() / 2).map_or(0.0, |b| b / 0.455);
-    let mut square = 0.0;
-    for k in 1..=half_waves {
-        let own = part(samples, k);
-        let share = (1.0 - beside / (own * own)).max(0.0);
-        if share.is_nan() {
-            continue;
-        }
-        for (i, sample) in samples.iter_mut().enumerate() {
-            *sample -= share * own * wave(k, i);
-        }
-        square += 0.5 * (share * own).powi(2);
-    }
-    square.sqrt()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -189,7 +172,7 @@ mod tests {
         let clean: Vec<f64> = (0..2000)
             .map(|i| 5.0 * (TAU * 31.3 * f64::from(i) / rate_hz).sin() + 2.0)
             .collect();
-        let line = Line {
+        let line = SpectralLine {
             frequency_hz: 60.1,
             amplitude: 0.3,
         };
@@ -198,7 +181,7 @@ mod tests {
             .enumerate()
             .map(|(i, x)| x + 0.3 * (TAU * 60.1 * i as f64 / rate_hz + 1.1).sin())
             .collect();
-        let found = take_lines(&mut samples, rate_hz, &[line], 0.0);
+        let found = subtract_lines(&mut samples, rate_hz, &[line], 0.0);
         assert!((found[0].phase_rad - 1.1).abs() < 1e-3, "{found:?}");
         let left = samples.iter().zip(&clean).map(|(a, b)| (a - b).abs());
         assert!(left.fold(0.0, f64::max) < 1e-3, "{found:?}");
@@ -215,11 +198,11 @@ mod tests {
                     .sum()
             })
             .collect();
-        let line = Line {
+        let line = SpectralLine {
             frequency_hz: 60.0,
             amplitude: 0.1,
         };
-        let found = take_lines(&mut samples, rate_hz, &[line], 0.0);
+        let found = subtract_lines(&mut samples, rate_hz, &[line], 0.0);
         assert!(found[0].share < 0.3, "{found:?}");
     }
 }

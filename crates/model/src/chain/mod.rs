@@ -1,0 +1,260 @@
+//! The chain from the applied torque to the record, link by link, in both directions.
+//!
+//! ```text
+//! torque ─► stand, with its torques ─► dynamics ─► gage ─► recorder and chain ─► limit ─► record
+//!                                                                   disturbances ─┘
+//! ```
+//!
+//! Forwards: [`Chain::simulate`]. Backwards the links are taken in reverse order, those of
+//! [`Chain::groups`] together: every effect says in its own file how ([`Distortion::inverse`](crate::effects::Distortion),
+//! [`subtract_lines`](crate::effects::subtract_lines), [`Torque::blurred`](crate::effects::Torque)), and the linear ones
+//! are divided out of the spectrum ([`Chain::divide_out`], [`Chain::response_of`]).
+
+mod forward;
+mod gage_path;
+
+use std::f64::consts::TAU;
+
+use num_complex::Complex64;
+
+use crate::effects::{Action, Effect, Fixed, Form, Stage};
+use crate::mode::Mode;
+
+pub use gage_path::GagePath;
+
+/// Frequency, over the natural one, that is next to rest.
+const NEAR_REST: f64 = 1e-6;
+/// Step of a factor at rest, relative to the factor, that is none.
+const LARGEST_STEP: f64 = 1e-4;
+/// Response at rest, relative to that at the natural frequency, below which a link passes no constant.
+const NONE_AT_REST: f64 = 1e-9;
+
+/// A link of the chain: one effect, or the recorder.
+#[derive(Debug)]
+pub struct Link {
+    /// Its effect; `recorder` for the recorder.
+    pub effect: &'static str,
+    /// Its form.
+    pub form: &'static str,
+    /// Where it sits.
+    pub stage: Stage,
+    /// What it does.
+    pub action: Action,
+}
+
+/// A stand with its effects and its recorder, from the applied quantity to the record.
+#[derive(Debug)]
+pub struct Chain {
+    /// The linear mode.
+    pub mode: Mode,
+    /// Recorded per applied quantity, at rest.
+    pub gain: f64,
+    /// Displacement, in units of the record, by a load that does not change and is not in the input: torques of
+    /// the stand see it; what the gage shows of it is left to the record's own constant.
+    pub shift: f64,
+    /// In the order from torque to record.
+    links: Vec<Link>,
+}
+
+/// Links that are taken back together.
+#[derive(Debug)]
+pub enum Group<'a> {
+    /// Torques of the stand.
+    Torques(Vec<&'a Link>),
+    /// Factors and terms of the response.
+    Linear(Vec<&'a Link>),
+    /// A change of samples.
+    Distortion(&'a Link),
+}
+
+impl Link {
+    /// An effect in one of its forms, with parameters in units of the record, s and Hz.
+    #[must_use]
+    pub fn of(effect: &'static Effect, form: &'static Form, values: &[f64]) -> Self {
+        Self {
+            effect: effect.name,
+            form: form.name,
+            stage: form.stage,
+            action: (form.build)(values),
+        }
+    }
+
+    /// Whether it is a factor or a term of the response.
+    #[must_use]
+    pub fn is_linear(&self) -> bool {
+        matches!(
+            self.action,
+            Action::Factor(_) | Action::Feedthrough(_) | Action::Recorder { .. }
+        )
+    }
+
+    /// Whether what is applied reaches the record past the stand.
+    #[must_use]
+    pub fn is_feedthrough(&self) -> bool {
+        matches!(self.action, Action::Feedthrough(_))
+    }
+
+    /// Whether the impulse response of its inverse dies out: a factor goes over into a constant at rest that is not
+    /// zero, without a step.
+    #[must_use]
+    pub fn dies_out(&self, mode: &Mode) -> bool {
+        let Action::Factor(factor) = &self.action else {
+            return true;
+        };
+        let at_rest = factor(mode, 0.0);
+        let near = factor(mode, NEAR_REST * mode.omega_rad_s);
+        // Of both signs of frequency the constant is the same only if it is real.
+        let step = (near - at_rest).norm().max(near.im.abs());
+        at_rest.norm() > 0.0 && step < LARGEST_STEP * at_rest.norm()
+    }
+
+    /// Whether it passes no constant.
+    #[must_use]
+    pub fn blocks_constants(&self, mode: &Mode) -> bool {
+        let Action::Factor(factor) = &self.action else {
+            return false;
+        };
+        factor(mode, 0.0).norm() < NONE_AT_REST * factor(mode, mode.omega_rad_s).norm()
+    }
+
+    /// Its factor at a frequency; `before` is the response of the chain before it.
+    fn factor(&self, before: Complex64, mode: &Mode, frequency_hz: f64) -> Complex64 {
+        let omega = TAU * frequency_hz;
+        match &self.action {
+            Action::Factor(factor) => factor(mode, omega),
+            Action::Feedthrough(term) => 1.0 + term(mode, omega) / before,
+            Action::Recorder { response, .. } => response(frequency_hz),
+            _ => Complex64::ONE,
+        }
+    }
+}
+
+impl Chain {
+    /// A plain stand without a recorder.
+    #[must_use]
+    pub fn new(mode: Mode, gain: f64) -> Self {
+        Self {
+            mode,
+            gain,
+            shift: 0.0,
+            links: Vec::new(),
+        }
+    }
+
+    /// The same with a displacement by a constant load.
+    #[must_use]
+    pub fn with_shift(self, shift: f64) -> Self {
+        Self { shift, ..self }
+    }
+
+    /// The same with a recorder, which comes before all else in its stage.
+    #[must_use]
+    pub fn with_recorder(mut self, recorder: Option<Fixed>, is_ideal: bool) -> Self {
+        if let Some(response) = recorder {
+            let link = Link {
+                effect: "recorder",
+                form: "",
+                stage: Stage::Chain,
+                action: Action::Recorder { response, is_ideal },
+            };
+            let place = self.links.partition_point(|l| l.stage < Stage::Chain);
+            self.links.insert(place, link);
+        }
+        self
+    }
+
+    /// The same with more links; those of one stage stay in the order given.
+    #[must_use]
+    pub fn with_links(mut self, links: impl IntoIterator<Item = Link>) -> Self {
+        self.links.extend(links);
+        self.links.sort_by_key(|link| link.stage);
+        self
+    }
+
+    /// The links, in the order from torque to record.
+    #[must_use]
+    pub fn links(&self) -> &[Link] {
+        &self.links
+    }
+
+    /// Whether a response over frequency describes it, down to rest.
+    #[must_use]
+    pub fn is_a_response(&self) -> bool {
+        let regular = |link: &Link| link.is_linear() && link.dies_out(&self.mode);
+        self.links.iter().all(regular)
+    }
+
+    /// Links that are taken back together, in order; disturbances are not among them.
+    #[must_use]
+    pub fn groups(&self) -> Vec<Group<'_>> {
+        let mut groups = Vec::new();
+        let links = self.links.iter();
+        for link in links.filter(|link| link.stage != Stage::Disturbance) {
+            let is_torque = matches!(link.action, Action::Torque { .. });
+            match groups.last_mut() {
+                Some(Group::Torques(group)) if is_torque => group.push(link),
+                Some(Group::Linear(group)) if link.is_linear() => group.push(link),
+                _ if is_torque => groups.push(Group::Torques(vec![link])),
+                _ if link.is_linear() => groups.push(Group::Linear(vec![link])),
+                _ => groups.push(Group::Distortion(link)),
+            }
+        }
+        groups
+    }
+
+    /// What some of the linear links make of what comes to them, at a frequency.
+    #[must_use]
+    pub fn response_of(&self, frequency_hz: f64, some: impl Fn(&Link) -> bool) -> Complex64 {
+        let mut through = self.mode.response(TAU * frequency_hz);
+        let mut product = Complex64::ONE;
+        for link in self.links.iter().filter(|link| link.is_linear()) {
+            let factor = link.factor(through, &self.mode, frequency_hz);
+            through *= factor;
+            if some(link) {
+                product *= factor;
+            }
+        }
+        product
+    }
+
+    /// The inverse response of the plain stand divided by all linear links, at a frequency.
+    ///
+    /// ```
+    /// use torqcomp_model::effects::Effect;
+    /// use torqcomp_model::{Chain, Link, Mode};
+    /// // At ω₀ the plain stand has 2jζ = 1.2j; a gain of 1.5 in the chain divides it.
+    /// let mode = Mode { omega_rad_s: 5.0, damping_ratio: 0.6 };
+    /// let effect = Effect::named("gain-error").unwrap();
+    /// let gain = Link::of(effect, &effect.forms[0], &[0.5]);
+    /// let chain = Chain::new(mode, 1.0).with_links([gain]);
+    /// let inverse = chain.divide_out(mode.inverse(5.0), mode.natural_frequency_hz());
+    /// assert!((inverse.im - 0.8).abs() < 1e-12);
+    /// ```
+    #[must_use]
+    pub fn divide_out(&self, plain: Complex64, frequency_hz: f64) -> Complex64 {
+        let linear = || self.links.iter().filter(|link| link.is_linear());
+        let factor = |link: &Link| link.factor(Complex64::ONE, &self.mode, frequency_hz);
+        if linear().all(|link| matches!(link.action, Action::Recorder { .. })) {
+            return linear().fold(plain, |inverse, link| inverse / factor(link));
+        }
+        let along = |through: Complex64, link: &Link| match &link.action {
+            Action::Feedthrough(term) => through + term(&self.mode, TAU * frequency_hz),
+            _ => through * factor(link),
+        };
+        linear().fold(plain.inv(), along).inv()
+    }
+
+    /// What torques of the stand add to the record through couplings past it, at a frequency, if there are any among
+    /// these links.
+    #[must_use]
+    pub fn coupling<'a>(&'a self, some: &'a [&Link]) -> Option<impl Fn(f64) -> Complex64 + 'a> {
+        let any = some.iter().any(|link| link.is_feedthrough());
+        any.then_some(move |frequency_hz| {
+            let add = |sum: Complex64, link: &&Link| match &link.action {
+                Action::Feedthrough(term) => sum + term(&self.mode, TAU * frequency_hz),
+                _ => sum * link.factor(Complex64::ONE, &self.mode, frequency_hz),
+            };
+            some.iter().fold(Complex64::ZERO, add)
+        })
+    }
+}

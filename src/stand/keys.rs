@@ -1,0 +1,140 @@
+//! Every key of a stand file: what it takes and what it means. [`Section`](super::section::Section) reads no other,
+//! and `docs/stand-keys.md` is written from this list.
+
+use torqcomp_model::Kind;
+
+/// What a key takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Takes {
+    /// A text.
+    Text,
+    /// One of several words.
+    Word,
+    /// A whole number.
+    Whole,
+    /// A quantity with its unit.
+    Quantity(Kind),
+    /// A quantity whose unit follows from the record.
+    RecordQuantity,
+    /// A section of its own.
+    Section,
+}
+
+/// A key, what it takes, and what it means.
+pub(crate) type StandKey = (&'static str, Takes, &'static str);
+
+/// A section as it is written (empty for the top of the file), what it means, and its keys.
+pub(crate) type StandSection = (&'static str, &'static str, &'static [StandKey]);
+
+/// What a key of a section takes.
+pub(crate) fn takes(title: &str, name: &str) -> Option<Takes> {
+    let (_, _, keys) = SECTIONS.iter().find(|section| section.0 == title)?;
+    let (_, takes, _) = keys.iter().find(|key| key.0 == name)?;
+    Some(*takes)
+}
+
+use Takes::{Quantity, RecordQuantity, Section, Text, Whole, Word};
+
+/// All sections, in the order in which a stand file usually has them.
+#[rustfmt::skip]
+pub(crate) const SECTIONS: &[StandSection] = &[
+    ("", "What the file is, and its sections.", &[
+        ("schema", Text, "`\"torqcomp.stand/1\"`; required"),
+        ("name", Text, "name of the stand"),
+        ("mechanics", Section, "response of the stand"),
+        ("calibration", Section, "measured constant from volts to torque"),
+        ("beam", Section, "drawing of the beam"),
+        ("parts", Section, "parts that make up the inertia, one section each"),
+        ("friction", Section, "friction over speed, for the damping"),
+        ("gage", Section, "strain gage"),
+        ("bridge", Section, "bridge and its wiring"),
+        ("recorder", Section, "amplifier and recorder"),
+        ("effects", Section, "what the plain stand lacks, one section each"),
+        ("diagnosed", Section, "what `diagnose -o` wrote about itself"),
+    ]),
+    ("[mechanics]", "`J θ'' + f θ' + K θ = T`, as inertia, damping and stiffness, or as natural frequency and damping ratio.", &[
+        ("inertia", Quantity(Kind::Inertia), "`J`"),
+        ("damping", Quantity(Kind::AngularDamping), "`f`"),
+        ("stiffness", Quantity(Kind::AngularStiffness), "`K`"),
+        ("common_std", Quantity(Kind::Ratio), "relative standard uncertainty that these three share, as where two follow from a declared third (`identify` and `diagnose` write it); the `std` of each includes it, and it cancels in the response"),
+        ("natural_frequency", Quantity(Kind::Frequency), "`√(K/J)/2π`, in place of the three"),
+        ("damping_ratio", Quantity(Kind::Ratio), "`f/(2 √(K J))`, with `natural_frequency`"),
+        ("static_gain", RecordQuantity, "recorded over applied quantity at rest, `\"1 V/V\"` or `\"2.5 mV/N\"`, for stands that do not measure torque; with `natural_frequency` only"),
+    ]),
+    ("[calibration]", "A measured constant; it replaces gage, bridge and recorder gain.", &[
+        ("torque_per_volt", Quantity(Kind::TorquePerVolt), "torque per volt as recorded"),
+    ]),
+    ("[beam]", "The beam and where the gage sits on it.", &[
+        ("section", Word, "`rectangle` (default), `circle` or `tube`"),
+        ("width", Quantity(Kind::Length), "of a rectangle, across the force"),
+        ("depth", Quantity(Kind::Length), "of a rectangle, along the force"),
+        ("diameter", Quantity(Kind::Length), "of a circle"),
+        ("outer_diameter", Quantity(Kind::Length), "of a tube"),
+        ("inner_diameter", Quantity(Kind::Length), "of a tube"),
+        ("length", Quantity(Kind::Length), "from the clamp to the stator"),
+        ("elastic_modulus", Quantity(Kind::Pressure), "Young's modulus"),
+        ("radius", Quantity(Kind::Length), "from the shaft to where the beam meets the stator"),
+        ("gage_position", Quantity(Kind::Length), "distance of the gage from the clamp"),
+        ("shear_modulus", Quantity(Kind::Pressure), "adds shear (Timoshenko)"),
+        ("shear_coefficient", Quantity(Kind::Ratio), "follows from the section unless given"),
+        ("clamp_stiffness", Quantity(Kind::AngularStiffness), "stiffness of a compliant clamp; rigid by default"),
+        ("thread", Section, "a threaded piece"),
+    ]),
+    ("[beam.thread]", "A threaded piece of the beam.", &[
+        ("length", Quantity(Kind::Length), "of the thread"),
+        ("root_diameter", Quantity(Kind::Length), "of the thread"),
+        ("at", Word, "end of the beam: `stator` (default) or `clamp`"),
+    ]),
+    ("[[parts]]", "A part of the inertia.", &[
+        ("kind", Word, "`thin-ring`, `disc`, `hollow-cylinder` or `point-mass`"),
+        ("name", Text, "name of the part"),
+        ("mass", Quantity(Kind::Mass), "mass"),
+        ("radius", Quantity(Kind::Length), "of a thin ring or a disc, or distance of a point mass from the shaft"),
+        ("inner_radius", Quantity(Kind::Length), "of a hollow cylinder"),
+        ("outer_radius", Quantity(Kind::Length), "of a hollow cylinder"),
+    ]),
+    ("[friction]", "Slope of a friction force over speed, from which the damping is predicted.", &[
+        ("force_change", Quantity(Kind::Force), "rise of the force"),
+        ("speed_change", Quantity(Kind::AngularSpeed), "rise of the speed"),
+        ("radius", Quantity(Kind::Length), "at which the force acts"),
+    ]),
+    ("[gage]", "`ΔR/R₀ = GF (T₀/T) ε + C₂ (T₀/T)² ε²`.", &[
+        ("gage_factor", Quantity(Kind::Ratio), "`GF`"),
+        ("quadratic_coefficient", Quantity(Kind::Ratio), "`C₂`; 0 (default) for metal foil"),
+        ("resistance", Quantity(Kind::Resistance), "before bonding"),
+        ("bonded_resistance", Quantity(Kind::Resistance), "after bonding: the prestrain follows"),
+        ("reference_temperature", Quantity(Kind::TemperatureAbsolute), "`T₀`; 25 °C by default"),
+        ("bonding_temperature", Quantity(Kind::TemperatureAbsolute), "at which the bonded resistance was measured; that of use by default"),
+        ("temperature", Quantity(Kind::TemperatureAbsolute), "`T`, that of use; `T₀` by default"),
+        ("resistance_drift", Quantity(Kind::Ratio), "change of the unbonded resistance from bonding to use, as a fraction"),
+    ]),
+    ("[bridge]", "The bridge, its supply and its wires.", &[
+        ("layout", Word, "`quarter`, `half`, `half-opposite`, `half-poisson`, `full` or `full-poisson`"),
+        ("poisson_ratio", Quantity(Kind::Ratio), "for the two that need it"),
+        ("excitation", Quantity(Kind::Voltage), "constant voltage"),
+        ("excitation_current", Quantity(Kind::Current), "constant current, in place of `excitation`"),
+        ("wiring", Word, "`two-wire`, `three-wire` or `four-wire`"),
+        ("lead_resistance", Quantity(Kind::Resistance), "of one wire"),
+    ]),
+    ("[recorder]", "The amplifier and the recorder.", &[
+        ("gain", Quantity(Kind::Gain), "recorded volts per bridge volt; negative for an inverting amplifier"),
+        ("zero", Quantity(Kind::Voltage), "recorded volts at no load, subtracted from any record in volts"),
+        ("low_pass", Quantity(Kind::Frequency), "cut-off of a Butterworth low-pass"),
+        ("low_pass_order", Whole, "1 (default, an RC low-pass) to 16"),
+        ("delay", Quantity(Kind::Time), "time by which the record lags"),
+        ("input_resistance", Quantity(Kind::Resistance), "load of the bridge"),
+    ]),
+    ("[[effects]]", "What the plain stand lacks; with the parameters of its kind and form, see [effects.md](effects.md).", &[
+        ("kind", Word, "name of the effect, such as `cubic-stiffness`; required"),
+        ("form", Word, "its form; the first one by default"),
+        ("source", Text, "where the parameters come from, for people"),
+    ]),
+    ("[diagnosed]", "What `diagnose -o` wrote about the records; `simulate` and `compensate` use the unit and the constants.", &[
+        ("applied_unit", Text, "unit of the applied quantity, for people"),
+        ("verdict", Text, "how the diagnosis ended, for people"),
+        ("records", Text, "the records, for people"),
+        ("measured_unit", Text, "unit of the record"),
+        ("offset", RecordQuantity, "constant in the record"),
+        ("shift", RecordQuantity, "displacement by a constant load"),
+    ]),
+];
