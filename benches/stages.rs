@@ -3,12 +3,14 @@
 //! `cargo bench --bench stages`. The peer comparison is in `benches/peer`.
 
 use std::hint::black_box;
+use std::io::Cursor;
 use std::sync::Arc;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use num_complex::Complex64;
-use torqcomp::io::csv::{Delimiter, Dialect, RowPlan, Rows};
+use torqcomp::io::Reading;
 use torqcomp::io::digits::{self, Digits};
+use torqcomp::recording::text::{ChannelRows, TextFile};
 use torqcomp_dsp::band::Band;
 use torqcomp_dsp::bridge::{ArmLaw, Bridge, BridgeLayout, Supply};
 use torqcomp_dsp::compensate::{BlockConvolver, InverseFilter, whole_record};
@@ -40,18 +42,13 @@ fn filter() -> InverseFilter {
 }
 
 fn parse(c: &mut Criterion) {
-    let plan = RowPlan {
-        dialect: Dialect {
-            delimiter: Delimiter::Byte(b','),
-            decimal: b'.',
-        },
-        time: Some(0),
-        value: 1,
-    };
+    let head = Cursor::new(format!("time_s,bridge_V\n{}", text(100)));
+    let file = TextFile::open("bench", Box::new(head), &Reading::default()).expect("a table");
+    let plan = file.stream(0, true).plan;
     let mut group = c.benchmark_group("parse");
     for (name, count) in SIZES {
         let text = text(count);
-        let mut rows = Rows::default();
+        let mut rows = ChannelRows::default();
         group.throughput(Throughput::Bytes(text.len() as u64));
         group.bench_function(name, |b| {
             b.iter(|| rows.read(black_box(text.as_bytes()), &plan))

@@ -90,7 +90,7 @@ fn columns() {
         good().as_bytes(),
         &["--time-column", "tiem"],
         1,
-        &["tiem", "did you mean \"time_s\""],
+        &["tiem", "did you mean \"time\""],
     );
 }
 
@@ -120,7 +120,7 @@ fn units() {
         no_time_unit.as_bytes(),
         &[],
         1,
-        &["\"time\" does not say its unit", "--time-unit"],
+        &["\"time\" gives no unit", "--time-unit"],
     );
     refused(
         no_time_unit.as_bytes(),
@@ -129,7 +129,7 @@ fn units() {
         &["no unit of time"],
     );
     let no_headings: String = good().lines().skip(1).map(|l| format!("{l}\n")).collect();
-    refused(no_headings.as_bytes(), &[], 1, &["no headings", "--rate"]);
+    refused(no_headings.as_bytes(), &[], 1, &["no heading", "--rate"]);
 }
 
 #[test]

@@ -2,11 +2,11 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use torqcomp::io::Reading as Options;
+use torqcomp::io::Reading;
 use torqcomp::recording::text;
 
 fuzz_target!(|bytes: &[u8]| {
-    if let Ok(recording) = text::read("fuzz", bytes.to_vec(), &Options::default()) {
+    if let Ok(recording) = text::read("fuzz", bytes.to_vec(), &Reading::default()) {
         assert!(!recording.channels.is_empty());
     }
 });

@@ -3,10 +3,10 @@
 use std::ops::Range;
 
 use crate::failure::Failure;
-use crate::io::csv::place_of;
 use crate::io::digits::{self, Decimal, Digits};
 use crate::io::output::Output;
 use crate::io::text::Text;
+use crate::recording::text::place_of;
 use crate::recording::{Block, StampGrid};
 
 /// Rows whose numbers are taken apart together.

@@ -1,6 +1,5 @@
 //! Files in and out.
 
-pub mod csv;
 pub mod digits;
 mod input;
 pub mod mcap;
@@ -10,5 +9,5 @@ mod reading;
 pub mod text;
 
 pub use input::Input;
-pub use reading::{ChannelChoice, DialectOverride, Flags, Reading};
+pub use reading::{ChannelChoice, Delimiter, DialectOverride, Flags, Reading};
 pub(crate) use reading::{frequency, positive_frequency};

@@ -2,9 +2,19 @@
 
 use clap::Args;
 
-use super::csv::Delimiter;
 use super::mcap::TimeChoice;
 use torqcomp_model::Kind;
+
+/// How cells are separated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Delimiter {
+    /// By one such byte.
+    Byte(u8),
+    /// By any number of spaces or tabs.
+    Spaces,
+    /// Not at all: one column.
+    None,
+}
 
 /// How a recording is read, the same for every verb.
 #[derive(Debug, Clone, Default, Args)]

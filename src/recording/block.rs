@@ -1,14 +1,9 @@
 //! Blocks of samples, as the pipeline moves them.
 
-use std::io::Read;
-
 use super::stamps::{IrregularStep, StampGrid};
+use super::text::{ChannelPlan, ChannelRows, Chunks, Piece};
 use crate::failure::Failure;
-use crate::io::csv::{Chunks, Piece, RowPlan, Rows};
 use crate::warning::Warning;
-
-/// Bytes of a block of text: large enough to be quick, small enough to stay in cache.
-const TEXT_BYTES: usize = 1 << 17;
 
 /// What gives the blocks of a channel, in order.
 pub(crate) trait BlockSource: Send {
@@ -36,7 +31,7 @@ pub(crate) struct Block {
     /// The bytes of a text.
     pub(crate) text: Vec<u8>,
     /// What they say.
-    pub(crate) rows: Rows,
+    pub(crate) rows: ChannelRows,
     /// Whether the last line has no line feed.
     pub(super) unended: bool,
     /// First irregular time stamp within the block.
@@ -45,7 +40,7 @@ pub(crate) struct Block {
 
 impl Block {
     /// Reads the rows of a text and checks the stamps. Needs no other block.
-    pub(crate) fn read_rows(&mut self, plan: Option<&RowPlan>, grid: Option<&StampGrid>) {
+    pub(crate) fn read_rows(&mut self, plan: Option<&ChannelPlan>, grid: Option<&StampGrid>) {
         if let Some(plan) = plan {
             self.rows.read(&self.text, plan);
         }
@@ -55,38 +50,20 @@ impl Block {
 
 /// The rows of a text.
 pub(super) struct TextBlocks {
-    source: String,
-    chunks: Chunks,
+    pub(super) source: String,
+    pub(super) chunks: Chunks,
     /// Mean length of a row, in bytes.
-    row_bytes: usize,
-}
-
-impl TextBlocks {
-    /// The rows that follow in `input`; `head` has been read from it already.
-    pub(super) fn new(
-        source: String,
-        head: Vec<u8>,
-        input: Box<dyn Read + Send>,
-        row_bytes: usize,
-    ) -> Self {
-        Self {
-            source,
-            chunks: Chunks::new(head, input, TEXT_BYTES),
-            row_bytes,
-        }
-    }
+    pub(super) row_bytes: usize,
 }
 
 impl BlockSource for TextBlocks {
     fn set_fewest(&mut self, samples: usize) {
-        self.chunks
-            .set_size((samples * self.row_bytes).max(TEXT_BYTES));
+        self.chunks.set_size(samples * self.row_bytes);
     }
 
     fn next(&mut self, block: &mut Block) -> Result<bool, Failure> {
-        let piece = self.chunks.next(&mut block.text).map_err(|error| {
-            Failure::failed(format_args!("{}: cannot be read: {error}", self.source))
-        })?;
+        let piece = self.chunks.next(&mut block.text);
+        let piece = piece.map_err(|failure| failure.at(&self.source))?;
         block.unended = piece == Piece::Unended;
         Ok(piece != Piece::End)
     }

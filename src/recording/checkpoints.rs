@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 
 use crate::io::Input;
-use crate::io::csv::{RowPlan, Rows};
+use crate::recording::text::{ChannelPlan, ChannelRows};
 
 /// Bytes that are read at the first checkpoint behind the head, and at each.
 const PIECE: u64 = 1 << 12;
@@ -32,7 +32,7 @@ pub(super) fn sharpened(step: f64, first: f64, later: &[f64]) -> Option<f64> {
 
 /// Stamps of a text at distances that double, and its last one. `from` is the byte behind the head. Empty where the
 /// place cannot be sought, and where a row cannot be read as it stands.
-pub(super) fn of_text(input: &Input, from: u64, plan: &RowPlan) -> Vec<f64> {
+pub(super) fn of_text(input: &Input, from: u64, plan: &ChannelPlan) -> Vec<f64> {
     let Input::File(path) = input else {
         return Vec::new();
     };
@@ -65,14 +65,14 @@ pub(super) fn of_text(input: &Input, from: u64, plan: &RowPlan) -> Vec<f64> {
 }
 
 /// The stamp of the first whole line behind a byte, or of the last one.
-fn stamp_behind(file: &mut File, at: u64, plan: &RowPlan, last: bool) -> Option<f64> {
+fn stamp_behind(file: &mut File, at: u64, plan: &ChannelPlan, last: bool) -> Option<f64> {
     file.seek(SeekFrom::Start(at)).ok()?;
     let mut bytes = Vec::new();
     file.take(PIECE).read_to_end(&mut bytes).ok()?;
     // What stands before the first line end, and behind the last, may be cut.
     let start = memchr::memchr(b'\n', &bytes)? + 1;
     let end = memchr::memrchr(b'\n', &bytes)? + 1;
-    let mut rows = Rows::default();
+    let mut rows = ChannelRows::default();
     rows.read(bytes.get(start..end)?, plan);
     let stamp = if last {
         rows.times.last()

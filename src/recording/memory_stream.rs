@@ -67,7 +67,7 @@ impl ChannelStream {
 }
 
 /// The stamps of a channel, if its samples are placed by them.
-fn used_stamps(channel: &Channel, reading: &Reading) -> Option<Arc<Vec<f64>>> {
+pub(super) fn used_stamps(channel: &Channel, reading: &Reading) -> Option<Arc<Vec<f64>>> {
     let by_stamps = matches!(channel.axis.rate_from, RateFrom::Stamps(_) | RateFrom::None);
     let wanted = reading.resample || (by_stamps && reading.rate_hz.is_none());
     channel.axis.stamps_s.clone().filter(|_| wanted)

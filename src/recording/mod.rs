@@ -14,7 +14,6 @@ mod messages;
 mod part;
 mod stamps;
 mod stream;
-mod table;
 pub mod text;
 mod uniform;
 mod validator;

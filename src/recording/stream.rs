@@ -1,21 +1,22 @@
 //! One channel of a recording, open for reading block by block, whatever the format of the file.
 
 use std::io::{Cursor, Read};
+use std::sync::Arc;
 
-use super::block::BlockSource;
+use super::block::{BlockSource, TextBlocks};
+use super::memory_stream::used_stamps;
 use super::message_stream::MessageOrigin;
-use super::validator::{StreamValidator, TextRows};
-use super::{TimeAxis, table, text};
+use super::stamps::{StampGrid, is_uniform};
+use super::text::{ChannelPlan, TextFile, TextStream};
+use super::validator::{StreamValidator, TextLines};
+use super::{RateFrom, TimeAxis, checkpoints};
 use crate::failure::Failure;
-use crate::io::csv::RowPlan;
 use crate::io::{ChannelChoice, Input, Reading};
 use crate::unit::NamedUnit;
 use crate::warning::Warning;
 
-/// Bytes that are read before the format is known.
-const HEAD: u64 = 1 << 16;
-/// Bytes that tell whether a text is a plain table.
-const FRONT: usize = 1 << 14;
+/// Bytes that tell the format.
+const MAGIC: u64 = 8;
 
 /// A channel of a recording, chosen and open for reading.
 pub(crate) struct ChannelStream {
@@ -41,7 +42,7 @@ pub(crate) struct ChannelStream {
     pub(super) warnings: Vec<Warning>,
     pub(super) blocks: Box<dyn BlockSource>,
     /// How the rows are written, if they are of text.
-    pub(super) text: Option<TextRows>,
+    pub(super) text: Option<TextLines>,
 }
 
 impl ChannelStream {
@@ -58,23 +59,95 @@ impl ChannelStream {
         let mut bytes = input.open()?;
         let unreadable = |error| Failure::failed(format_args!("{name}: cannot be read: {error}"));
         let mut head = Vec::new();
-        let start = (&mut bytes).take(HEAD).read_to_end(&mut head);
-        let complete = start.map_err(unreadable)? < HEAD as usize;
-        if head.starts_with(::mcap::MAGIC) {
+        let start = (&mut bytes).take(MAGIC).read_to_end(&mut head);
+        start.map_err(unreadable)?;
+        let is_mcap = head.starts_with(::mcap::MAGIC);
+        let bytes = Box::new(Cursor::new(head).chain(bytes));
+        if is_mcap {
             super::refuse_for_messages(reading)?;
-            let bytes = Box::new(Cursor::new(head).chain(bytes));
             return Self::of_messages(input, bytes, choice, reading);
         }
         super::refuse_for_text(choice, reading)?;
-        let front = &head[..head.len().min(FRONT)];
-        let is_whole = complete && front.len() == head.len();
-        if complete && head.is_empty() || text::is_plain(front, is_whole, reading) {
-            let bytes = Box::new(Cursor::new(head).chain(bytes));
-            return table::open(input, bytes, choice, reading).map_err(|f| f.at(&name));
+        let file = TextFile::open(&name, bytes, reading).map_err(|f| f.at(&name))?;
+        if file.held_whole.is_some() {
+            let recording = file.read().map_err(|f| f.at(&name))?;
+            return Self::of_recording(recording, choice, reading);
         }
-        bytes.read_to_end(&mut head).map_err(unreadable)?;
-        let recording = text::read(&name, head, reading).map_err(|f| f.at(&name))?;
-        Self::of_recording(recording, choice, reading)
+        Self::of_text(input, file, choice, reading).map_err(|f| f.at(&name))
+    }
+
+    /// The channel of a text that is chosen, row by row.
+    fn of_text(
+        input: &Input,
+        file: TextFile,
+        choice: &ChannelChoice,
+        reading: &Reading,
+    ) -> Result<Self, Failure> {
+        let first_rows = file.recording.clone();
+        let place = first_rows.place(choice)?;
+        let selection = first_rows.select_at(place, choice, reading)?;
+        let axis = &selection.channel.axis;
+        // A rate in the head is better than that of rounded stamps, but only stamps show a gap.
+        let are_uniform = |stamps_s: &Arc<Vec<f64>>| is_uniform(stamps_s, selection.rate_hz);
+        let is_checked =
+            reading.rate_hz.is_none() && axis.stamps_s.as_ref().is_some_and(are_uniform);
+        let has_stamps = is_checked || used_stamps(selection.channel, reading).is_some();
+        let TextStream {
+            chunks,
+            plan,
+            layout,
+            stamps,
+            row_bytes,
+            behind_first_rows,
+        } = file.stream(place, has_stamps);
+        let time = match stamps {
+            Some(stamps) => {
+                let later = behind_first_rows
+                    .map_or_else(Vec::new, |from| checkpoints::of_text(input, from, &plan));
+                let grid = StampGrid {
+                    unit: stamps.unit.to_owned(),
+                    seconds_per_unit: stamps.seconds_per_unit,
+                    copied: stamps.copied,
+                    ..StampGrid::of_seconds()
+                };
+                let found =
+                    TimeAxis::of_stream(&stamps.heading, grid, &stamps.first, &later, reading)?;
+                match &axis.rate_from {
+                    RateFrom::Header(_) if !reading.resample => TimeAxis {
+                        rate_hz: axis.rate_hz,
+                        rate_from: axis.rate_from.clone(),
+                        ..found
+                    },
+                    _ => found,
+                }
+            }
+            None if reading.rate_hz.is_some() => TimeAxis::given(selection.rate_hz),
+            None => TimeAxis {
+                stamps_s: None,
+                start_s: Some(selection.start_s),
+                ..axis.clone()
+            },
+        };
+        let mut warnings = first_rows.warnings.clone();
+        warnings.extend(selection.warnings);
+        Ok(Self {
+            dialect: first_rows.dialect.clone(),
+            name: selection.channel.name.clone(),
+            unit: selection.unit,
+            rate_hz: time.rate_hz.unwrap_or(selection.rate_hz),
+            start_s: time.start_s.unwrap_or(0.0),
+            time,
+            origin: None,
+            any_steps: reading.any_steps,
+            warnings,
+            blocks: Box::new(TextBlocks {
+                source: first_rows.source.clone(),
+                chunks,
+                row_bytes,
+            }),
+            text: Some(TextLines::new(plan, layout)),
+            source: first_rows.source,
+        })
     }
 
     /// Splits the stream into the parts that run side by side: getting blocks of at least so many
@@ -82,9 +155,9 @@ impl ChannelStream {
     pub(crate) fn into_parts(
         mut self,
         fewest: usize,
-    ) -> (Box<dyn BlockSource>, Option<RowPlan>, StreamValidator) {
+    ) -> (Box<dyn BlockSource>, Option<ChannelPlan>, StreamValidator) {
         self.blocks.set_fewest(fewest);
-        let plan = self.text.as_ref().map(|text| text.plan);
+        let plan = self.text.as_ref().map(|text| text.plan.clone());
         let validator = StreamValidator::new(
             self.source,
             self.blocks.row_name(),

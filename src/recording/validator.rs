@@ -3,8 +3,8 @@
 use super::TimeAxis;
 use super::block::{Block, BlockSource};
 use super::stamps::IrregularStep;
+use super::text::{ChannelPlan, Layout, LineNotes, Problem, is_end_of_data, truncated};
 use crate::failure::Failure;
-use crate::io::csv::{Defect, Problem, RowPlan, Rows};
 use crate::warning::Warning;
 
 /// Code of the warning that stamps are irregular.
@@ -19,14 +19,14 @@ pub(crate) struct StreamValidator {
     /// What a row is called: `line`, `message`.
     row_name: &'static str,
     /// Of a text, how it is written.
-    text: Option<TextRows>,
+    text: Option<TextLines>,
     time: TimeAxis,
     /// Lines before the next block.
     lines: usize,
     samples: usize,
     first_stamp: Option<f64>,
     last_stamp: Option<f64>,
-    /// An empty line at the end of the blockes so far, without stamps.
+    /// An empty line at the end of the blocks so far, without stamps.
     empty_line: Option<usize>,
     lost: Option<Warning>,
     warnings: Vec<Warning>,
@@ -34,17 +34,26 @@ pub(crate) struct StreamValidator {
     any_steps: bool,
 }
 
-/// How the rows of a text are written, as far as messages need it.
-#[derive(Debug, Clone)]
-pub(super) struct TextRows {
-    /// Which cells are wanted.
-    pub(super) plan: RowPlan,
-    /// Headings.
-    pub(super) columns: Vec<String>,
-    /// Fewest characters of a value in the head.
-    pub(super) shortest_value: usize,
-    /// Lines above the first row.
-    pub(super) lines_before: usize,
+/// How the rows of a text are written, and what is known of its lines so far.
+#[derive(Debug)]
+pub(super) struct TextLines {
+    pub(super) plan: ChannelPlan,
+    layout: Layout,
+    notes: LineNotes,
+    /// Whether a line said that the data end.
+    ended: bool,
+}
+
+impl TextLines {
+    /// The lines of a table.
+    pub(super) fn new(plan: ChannelPlan, layout: Layout) -> Self {
+        Self {
+            plan,
+            layout,
+            notes: LineNotes::default(),
+            ended: false,
+        }
+    }
 }
 
 /// What a whole stream held.
@@ -60,7 +69,7 @@ impl StreamValidator {
     pub(super) fn new(
         source: String,
         row_name: &'static str,
-        text: Option<TextRows>,
+        text: Option<TextLines>,
         time: TimeAxis,
         warnings: Vec<Warning>,
         any_steps: bool,
@@ -68,7 +77,7 @@ impl StreamValidator {
         Self {
             source,
             row_name,
-            lines: text.as_ref().map_or(0, |text| text.lines_before),
+            lines: text.as_ref().map_or(0, |text| text.layout.line - 1),
             text,
             time,
             samples: 0,
@@ -86,6 +95,11 @@ impl StreamValidator {
     /// # Errors
     /// The first row that cannot be read, and the first stamp that is not uniform, with its line.
     pub(crate) fn accept(&mut self, block: &mut Block) -> Result<(), Failure> {
+        if self.text.as_ref().is_some_and(|text| text.ended) {
+            block.rows.clear();
+            return Ok(());
+        }
+        self.pass_midnights(block);
         if let Some(found) = self.irregular_step(block) {
             let line = self.line_of_row(block, found.row);
             let is_last = found.row + 1 == block.rows.times.len();
@@ -110,14 +124,28 @@ impl StreamValidator {
         Ok(())
     }
 
+    /// Adds the days that passed before a block to its times of day.
+    fn pass_midnights(&self, block: &mut Block) {
+        let is_time_of_day = self
+            .text
+            .as_ref()
+            .is_some_and(|text| text.plan.is_time_of_day);
+        if let Some(last) = self.last_stamp.filter(|_| is_time_of_day) {
+            let days_s = super::text::days_between(last, &block.rows.times);
+            block.rows.times.iter_mut().for_each(|time| *time += days_s);
+            if let Some(found) = &mut block.irregular {
+                found.before += days_s;
+                found.after += days_s;
+            }
+        }
+    }
+
     /// The file was cut within its last stamp.
     fn drop_cut_stamp(&mut self, block: &mut Block, line: usize) {
         block.rows.times.pop();
         block.rows.time_text.pop();
         block.rows.values.pop();
-        let start = memchr::memrchr(b'\n', &block.text).map_or(0, |place| place + 1);
-        let text = String::from_utf8_lossy(&block.text[start..]).into_owned();
-        self.lose_last_line(line, &text);
+        self.lose_last_line(line, &last_line(&block.text));
     }
 
     /// Says once that the stamps are irregular.
@@ -133,20 +161,39 @@ impl StreamValidator {
     /// What only lines of text can have wrong with them.
     fn look_at_lines(&mut self, block: &Block) -> Result<(), Failure> {
         let rows = &block.rows;
+        if let Some(text) = &mut self.text {
+            text.notes.join(&rows.notes, self.lines);
+        }
         if let Some(line) = self.empty_line
             && !rows.values.is_empty()
         {
-            let what = self.describe(self.value_cell(), &Defect::Empty, "");
-            return Err(self.at(line, what));
+            return Err(self.at(line, self.describe(self.value_cell(), "")));
         }
         if let Some(line) = rows.empty_at {
             self.empty_line = self.empty_line.or(Some(self.lines + line + 1));
         }
-        if let Some(problem) = &rows.problem {
-            self.bad_row(block, problem)?;
-        } else if block.unended {
+        if let Some(problem) = rows.problem {
+            return self.bad_row(block, problem);
+        }
+        if rows.ends {
+            return self.end(block);
+        }
+        if block.unended {
             self.look_at_unended_line(block);
         }
+        Ok(())
+    }
+
+    /// Ends the data before a line that is no row, unless another table begins there.
+    fn end(&mut self, block: &Block) -> Result<(), Failure> {
+        let line = nth_line(&block.text, block.rows.lines);
+        if !is_end_of_data(&line) {
+            return Err(self.at(
+                self.lines + block.rows.lines + 1,
+                "another table begins here; split the file there",
+            ));
+        }
+        self.text.iter_mut().for_each(|text| text.ended = true);
         Ok(())
     }
 
@@ -165,6 +212,10 @@ impl StreamValidator {
         }
         self.lost = self.lost.or(lost);
         self.warnings.extend(warnings);
+        if let Some(text) = &self.text {
+            let more = text.layout.warnings(&text.notes, self.samples);
+            self.warnings.extend(more);
+        }
         if let Some(grid) = self.time.grid.as_ref().filter(|grid| !grid.resampled)
             && let Some((first, last)) = self.first_stamp.zip(self.last_stamp)
         {
@@ -194,14 +245,14 @@ impl StreamValidator {
     /// Line, from 1, of a row of the next block.
     fn line_of_row(&self, block: &Block, row: usize) -> usize {
         let within = match &self.text {
-            Some(text) => line_of_row(&block.text, &text.plan, row),
+            Some(text) => text.plan.line_of_row(&block.text, row),
             None => row,
         };
         self.lines + within + 1
     }
 
     fn value_cell(&self) -> usize {
-        self.text.as_ref().map_or(0, |text| text.plan.value)
+        self.text.as_ref().map_or(0, |text| text.plan.value_cell())
     }
 
     fn explain(&self, found: &IrregularStep) -> String {
@@ -216,88 +267,40 @@ impl StreamValidator {
             .or(block.irregular)
     }
 
+    fn lose_last_line(&mut self, line: usize, text: &str) {
+        let place = format!("{}, line {line}", self.source);
+        self.lost = Some(truncated(&place, text));
+    }
+
     /// A row that cannot be read is an error, unless the file was cut there.
-    fn bad_row(&mut self, block: &Block, problem: &Problem) -> Result<(), Failure> {
+    fn bad_row(&mut self, block: &Block, problem: Problem) -> Result<(), Failure> {
         let line = self.lines + problem.line + 1;
-        let text = String::from_utf8_lossy(&block.text[problem.offset..]);
-        let is_last = block.unended && !text.contains('\n');
-        if is_last {
+        let text = nth_line(&block.text, problem.line);
+        let is_last = memchr::memchr_iter(b'\n', &block.text).count() == problem.line;
+        if block.unended && is_last {
             self.lines += 1;
             self.lose_last_line(line, &text);
             return Ok(());
         }
-        Err(self.at(
-            line,
-            self.describe(
-                problem.cell,
-                &problem.what,
-                text.lines().next().unwrap_or(""),
-            ),
-        ))
+        Err(self.at(line, self.describe(problem.cell, &text)))
     }
 
-    fn lose_last_line(&mut self, line: usize, text: &str) {
-        self.lost = Some(Warning::new(
-            "truncated-last-line",
-            format!(
-                "{}, line {line}: the file ends in the middle of this line (\"{}\"); it was left \
-                 out, everything before it was used",
-                self.source,
-                shorten(text)
-            ),
-        ));
-    }
-
-    fn describe(&self, cell: usize, what: &Defect, line: &str) -> String {
-        let column = cell + 1;
-        let headings = self.text.as_ref().map(|text| &text.columns);
-        let name = headings
-            .and_then(|headings| headings.get(cell))
-            .map_or("", String::as_str);
-        let decimal = self
-            .text
-            .as_ref()
-            .map_or(b'.', |text| text.plan.dialect.decimal);
-        match what {
-            Defect::Missing => format!(
-                "column {column} (\"{name}\") is missing: the line \"{}\" has too few cells; \
-                 complete or remove it",
-                shorten(line)
-            ),
-            Defect::Empty => format!(
-                "column {column} (\"{name}\") is empty; fill in the value or remove the line, and \
-                 use --resample to bridge the gap"
-            ),
-            Defect::NonFinite(text) => format!(
-                "column {column} (\"{name}\") reads \"{text}\", which is not a finite number; \
-                 remove the line, and use --resample to bridge the gap"
-            ),
-            Defect::NotANumber(text) => format!(
-                "column {column} (\"{name}\") reads \"{}\", expected a number{}; correct or remove \
-                 the line",
-                shorten(text),
-                other_mark(text, decimal)
-            ),
-        }
+    fn describe(&self, cell: usize, line: &str) -> String {
+        let text = self.text.as_ref();
+        text.map_or_else(String::new, |text| text.plan.describe(line, cell))
     }
 
     /// A last line without a line feed may have been cut within its last number.
     fn look_at_unended_line(&mut self, block: &Block) {
-        let Some(rows) = &self.text else {
-            return;
-        };
-        let start = memchr::memrchr(b'\n', &block.text).map_or(0, |place| place + 1);
-        let text = String::from_utf8_lossy(&block.text[start..]);
-        let cells = rows.plan.dialect.cells(&text);
-        let is_last = cells.len() == rows.plan.value + 1;
-        let length = cells.get(rows.plan.value).map_or(0, String::len);
-        if is_last && length > 0 && length < rows.shortest_value {
+        let line = last_line(&block.text);
+        let plan = self.text.as_ref().map(|text| &text.plan);
+        if let Some(value) = plan.and_then(|plan| plan.short_last_value(&line)) {
             self.warnings.push(Warning::new(
                 "unended-last-line",
                 format!(
-                    "{}: the last line has no line end and its value \"{}\" is shorter than usual; \
+                    "{}: the last line has no line end and its value \"{value}\" is shorter than usual; \
                      if the file was cut there, do not trust the last sample",
-                    self.source, cells[rows.plan.value]
+                    self.source
                 ),
             ));
         }
@@ -325,35 +328,13 @@ impl StreamValidator {
     }
 }
 
-/// Line, from 0, that a row of a piece stands on.
-fn line_of_row(text: &[u8], plan: &RowPlan, row: usize) -> usize {
-    let mut before = 0;
-    let mut rows = Rows::default();
-    for (line, bytes) in text.split_inclusive(|byte| *byte == b'\n').enumerate() {
-        rows.read(bytes, plan);
-        before += rows.values.len();
-        if before > row {
-            return line;
-        }
-    }
-    0
+/// A line of a piece, by its number from 0.
+fn nth_line(text: &[u8], line: usize) -> String {
+    let line = text.split(|byte| *byte == b'\n').nth(line);
+    String::from_utf8_lossy(line.unwrap_or_default()).into_owned()
 }
 
-fn shorten(text: &str) -> String {
-    let text = text.trim();
-    if text.chars().count() <= 60 {
-        text.to_owned()
-    } else {
-        text.chars().take(57).chain("...".chars()).collect()
-    }
-}
-
-/// A hint if the number would do with the other decimal mark.
-fn other_mark(text: &str, decimal: u8) -> &'static str {
-    let other = if decimal == b'.' { b',' } else { b'.' };
-    match crate::io::number::cell(text, other) {
-        Some(_) if decimal == b'.' => " with a decimal point (see --decimal)",
-        Some(_) => " with a decimal comma (see --decimal)",
-        None => "",
-    }
+/// What stands behind the last line feed.
+fn last_line(text: &[u8]) -> String {
+    nth_line(text, memchr::memchr_iter(b'\n', text).count())
 }

@@ -1,92 +1,6 @@
 //! Names of columns that hold time, the horizontal axis, or the number of the sample.
 
-/// Words that stand for time.
-const TIMES: &[&str] = &[
-    "时间",
-    "时刻",
-    "日期",
-    "時間戳",
-    "시간",
-    "시각",
-    "время",
-    "дата",
-    "czas",
-    "čas",
-    "idő",
-    "χρόνος",
-    "aika",
-    "zaman",
-    "heure",
-    "horodatage",
-    "durée",
-    "hora",
-    "時間",
-    "時刻",
-    "日時",
-    "日付",
-    "ms",
-    "msec",
-    "millisecond",
-    "milliseconds",
-    "millisekunden",
-    "us",
-    "usec",
-    "microsecond",
-    "microseconds",
-    "mikrosekunden",
-    "nanoseconds",
-    "subsec",
-    "sec",
-    "t",
-    "time",
-    "times",
-    "zeit",
-    "uhrzeit",
-    "zeitstempel",
-    "messzeit",
-    "timestamp",
-    "datum",
-    "date",
-    "datetime",
-    "elapsed",
-    "seconds",
-    "secs",
-    "second",
-    "sekunden",
-    "sekunde",
-    "millis",
-    "micros",
-    "tijd",
-    "temps",
-    "tiempo",
-    "tempo",
-    "reltime",
-    "abstime",
-    "systemtime",
-    "epoch",
-    "utc",
-    "clock",
-    "laufzeit",
-];
-/// Words before those that stand for time.
-const QUALIFIED: [&str; 16] = [
-    "rel",
-    "abs",
-    "elapsed",
-    "relative",
-    "absolute",
-    "test",
-    "sample",
-    "run",
-    "latest",
-    "total",
-    "local",
-    "system",
-    "ros",
-    "log",
-    "measurement",
-    "x",
-];
+use super::vocabulary::has;
 
 /// Whether a name stands for time, or for the axis that is time in a recorder's export.
 #[must_use]
@@ -107,7 +21,7 @@ pub fn is_time_name(name: &str) -> bool {
         let is_compound = (stem.ends_with("zeit") || stem.ends_with("time"))
             && !["lifetime", "risetime", "deadtime", "totzeit", "overtime"].contains(&stem);
         // t5 beside other words is no time.
-        let is_known = TIMES.contains(&stem) && (stem != "t" || word == "t");
+        let is_known = has("time", stem) && (stem != "t" || word == "t");
         is_known || is_compound
     };
     match words.as_slice() {
@@ -117,7 +31,7 @@ pub fn is_time_name(name: &str) -> bool {
         [first, .., last] => {
             let first_is = is(first) && *first != "t" && *first != "second";
             first_is && !["constant", "delay", "konstante"].contains(last)
-                || QUALIFIED.contains(first) && is(last)
+                || has("before time", first) && is(last)
         }
     }
 }
@@ -167,67 +81,18 @@ pub fn time_stem(name: &str) -> Option<String> {
 /// Whether a name stands for the horizontal axis, which is time unless the file says otherwise.
 #[must_use]
 pub fn is_axis_name(name: &str) -> bool {
-    const NAMES: [&str; 12] = [
-        "x", "x-axis", "x_axis", "xaxis", "x axis", "x-achse", "x_value", "x value", "x values",
-        "x-value", "x-wert", "abscissa",
-    ];
-    NAMES.contains(&name.trim().to_lowercase().as_str())
+    has("axis", name.trim().to_lowercase().as_str())
 }
 
 /// Whether a name stands for a number that counts samples.
 #[must_use]
 pub fn is_index_name(name: &str) -> bool {
-    const NAMES: &[&str] = &[
-        "frame",
-        "番号",
-        "序号",
-        "번호",
-        "номер",
-        "№",
-        "x",
-        "#",
-        "nummer",
-        "store no.",
-        "sweep #",
-        "n",
-        "i",
-        "nr",
-        "nr.",
-        "no",
-        "no.",
-        "index",
-        "idx",
-        "sample",
-        "samples",
-        "scan",
-        "sequence",
-        "seq",
-        "point",
-        "points",
-        "record",
-        "row",
-        "count",
-        "counter",
-        "messpunkt",
-        "messwert",
-        "punkt",
-        "zeile",
-        "lfd. nr.",
-        "sample number",
-        "sample no.",
-        "sample no",
-        "sample #",
-        "sample nr.",
-        "sample index",
-        "number",
-        "datapoint",
-    ];
     let name = name.trim().trim_matches('"').to_lowercase();
     // Nummer n, Index i
     let with_symbol = name
         .strip_suffix(['n', 'i'])
         .and_then(|name| name.strip_suffix(' '));
-    NAMES.contains(&name.as_str()) || with_symbol.is_some_and(|name| NAMES.contains(&name))
+    has("index", &name) || with_symbol.is_some_and(|name| has("index", name))
 }
 
 #[cfg(test)]

@@ -1,29 +1,100 @@
 //! Blocks of rows below each other: where one ends and the next begins.
 
 use super::axes::Role;
+use super::head::is_end;
+use super::header::Header;
 use super::keys::{self, Entry, Topic};
-use super::rows::{Column, Rows};
-use crate::io::csv::Dialect;
+use super::rows::{ColumnKind, Rows};
+use crate::recording::text::dialect::Dialect;
 
 /// Most blocks under the same headings.
 const MOST: usize = 1000;
 /// How near to its start time begins anew, as a part of the time since.
 const NEAR: f64 = 0.1;
 
+/// What ends a table before the end of the file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TableEnd {
+    /// The line of its headings, if it stands there again.
+    pub names: Option<String>,
+    /// Keys of its head that are about channels or their rate: with one of them another table begins.
+    pub keys: Vec<String>,
+    /// How lines begin that end it.
+    pub marks: &'static [&'static str],
+    /// How keys and values are parted.
+    pub dialect: Dialect,
+}
+
+impl TableEnd {
+    /// What ends a table under a head.
+    pub fn of(header: &Header, kinds: &[ColumnKind], dialect: Dialect) -> Self {
+        let mut entries = header.entries.clone();
+        if let Some(names) = &header.names {
+            entries.extend(keys::entries(0, names, dialect));
+        }
+        // Rows that begin with a text look like keys themselves.
+        let is_named = kinds.first() == Some(&ColumnKind::Nothing);
+        entries.retain(|entry| is_of_block(entry) && !is_named);
+        Self {
+            names: header.names.clone(),
+            keys: entries.into_iter().map(|entry| entry.key).collect(),
+            marks: &[],
+            dialect,
+        }
+    }
+
+    /// Marks of a maker.
+    pub fn of_marks(marks: &'static [&'static str], dialect: Dialect) -> Self {
+        Self {
+            names: None,
+            keys: Vec::new(),
+            marks,
+            dialect,
+        }
+    }
+
+    /// Whether a table ends before a line that is no plain row.
+    pub fn is_at(&self, line: &str) -> bool {
+        is_end(line)
+            || self.names.as_deref() == Some(line)
+            || self.marks.iter().any(|mark| line.starts_with(mark))
+            || self.begins_anew(line)
+    }
+
+    /// Whether a line repeats a key of the head: there a block of its own begins, with its own head.
+    pub fn begins_anew(&self, line: &str) -> bool {
+        let is_text = |c: char| c.is_alphabetic() || c == '"';
+        if self.keys.is_empty() || !line.trim_start().starts_with(is_text) {
+            return false;
+        }
+        let found = keys::entries(0, line, self.dialect);
+        found
+            .first()
+            .filter(|entry| is_of_block(entry))
+            .is_some_and(|entry| {
+                self.keys
+                    .iter()
+                    .any(|key| key.eq_ignore_ascii_case(&entry.key))
+            })
+    }
+}
+
+fn is_of_block(entry: &Entry) -> bool {
+    use Topic::{Count, Interval, Name, Rate, Unit};
+    matches!(entry.topic(), Some(Name | Unit | Rate | Interval | Count))
+}
+
 /// The rows at which time begins anew after lines that are no rows, such as empty ones or `# run 2`.
-pub fn restarts(rows: &Rows, roles: &[Role]) -> Vec<usize> {
-    let is_time = |(column, role): &(&Column, &Role)| {
-        **role == Role::Time && column.first_clock.is_none() && column.first_ticks.is_none()
-    };
-    let Some((time, _)) = rows.columns.iter().zip(roles).find(is_time) else {
+pub fn restarts(rows: &Rows, kinds: &[ColumnKind], roles: &[Role]) -> Vec<usize> {
+    let is_time =
+        |place: &usize| roles[*place] == Role::Time && kinds[*place] == ColumnKind::Numbers;
+    let Some(place) = (0..roles.len()).find(is_time) else {
         return Vec::new();
     };
+    let values = &rows.columns[place].values;
     let (mut starts, mut first) = (Vec::new(), 0);
-    for row in rows
-        .after_other_lines()
-        .filter(|row| *row < time.values.len())
-    {
-        let [start, before, now] = [first, row - 1, row].map(|row| time.values[row]);
+    for row in rows.after_other_lines().filter(|row| *row < values.len()) {
+        let [start, before, now] = [first, row - 1, row].map(|row| values[row]);
         if now < before && now - start <= NEAR * (before - start) {
             starts.push(row);
             first = row;
@@ -31,30 +102,4 @@ pub fn restarts(rows: &Rows, roles: &[Role]) -> Vec<usize> {
     }
     starts.truncate(if starts.len() > MOST { 0 } else { MOST });
     starts
-}
-
-/// Whether a line among the rows repeats a key of the head that is about a channel or its rate: there a
-/// block of its own begins, with a head of its own.
-pub fn begins_anew(line: &str, entries: &[Entry], dialect: Dialect) -> bool {
-    let is_of_block = |entry: &Entry| {
-        use Topic::{Count, Interval, Name, Rate, Unit};
-        matches!(entry.topic(), Some(Name | Unit | Rate | Interval | Count))
-    };
-    if entries.is_empty()
-        || !line
-            .trim_start()
-            .starts_with(|c: char| c.is_alphabetic() || c == '"')
-    {
-        return false;
-    }
-    let mut found = keys::entries(0, line, dialect);
-    found.truncate(1);
-    found
-        .iter()
-        .filter(|entry| is_of_block(entry))
-        .any(|entry| {
-            entries
-                .iter()
-                .any(|other| other.key.eq_ignore_ascii_case(&entry.key))
-        })
 }

@@ -1,7 +1,6 @@
 //! What a cell holds: a number (perhaps with a thousands mark), a date or time, a text, nothing.
 
 use super::clock::Clock;
-use crate::io::csv::is_not_a_number;
 use crate::io::number;
 
 /// What a cell holds.
@@ -68,6 +67,13 @@ impl Cell {
     }
 }
 
+/// Whether a cell says that there is no number: NaN, infinity and their Windows spellings.
+fn is_not_a_number(cell: &str) -> bool {
+    const WORDS: [&str; 6] = ["nan", "inf", "infinity", "1.#qnan", "1.#ind", "1.#inf"];
+    let text = cell.trim_start_matches(['+', '-']);
+    WORDS.iter().any(|word| text.eq_ignore_ascii_case(word))
+}
+
 /// `1.5D-03`, as programs in Fortran write numbers of double precision.
 fn fortran(text: &str, decimal: u8) -> Option<f64> {
     let (mantissa, exponent) = text.split_once(['D', 'd'])?;
@@ -83,7 +89,7 @@ fn fortran(text: &str, decimal: u8) -> Option<f64> {
 }
 
 /// Ways to say that there is no number, besides those of floating point: over range, no value.
-fn is_non_finite(text: &str) -> bool {
+pub fn is_non_finite(text: &str) -> bool {
     const WORDS: [&str; 19] = [
         "burnout",
         "open",

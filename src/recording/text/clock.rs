@@ -7,7 +7,7 @@
 /// Nanoseconds of a second.
 const SECOND: i64 = 1_000_000_000;
 /// Nanoseconds of a day.
-pub const DAY: i64 = 86_400 * SECOND;
+const DAY: i64 = 86_400 * SECOND;
 
 /// A date, a time of day, or both.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -86,11 +86,33 @@ impl Clock {
         })
     }
 
-    /// Nanoseconds since 1970, or since midnight without a date.
+    /// Seconds after another one.
     #[must_use]
-    pub fn total(self) -> i64 {
+    pub fn seconds_after(self, first: Self) -> f64 {
+        (self.total() - first.total()) as f64 * 1e-9
+    }
+
+    /// Nanoseconds since 1970, or since midnight without a date.
+    fn total(self) -> i64 {
         i64::from(self.day.unwrap_or(0)) * DAY + self.nanoseconds.unwrap_or(0)
     }
+}
+
+/// Adds a day to times of day whenever they step back by more than half of one: past midnight.
+pub fn unwrap_midnights(seconds: &mut [f64]) {
+    let mut last = f64::NAN;
+    for time in seconds.iter_mut().filter(|time| !time.is_nan()) {
+        *time += days_between(last, &[*time]);
+        last = *time;
+    }
+}
+
+/// Seconds of the days that passed between a time and the first of the times of day after it.
+pub fn days_between(last: f64, times: &[f64]) -> f64 {
+    const DAY_S: f64 = 86_400.0;
+    let first = times.first().copied().unwrap_or(last);
+    let days = ((last - first + 0.5 * DAY_S) / DAY_S).floor();
+    if days > 0.0 { days * DAY_S } else { 0.0 }
 }
 
 /// Whether a text has a mark of dates or times in it, or ends in a year, as `2 May 2022` does.

@@ -1,146 +1,223 @@
-//! Bytes of any encoding and with any line ends to text with line feeds.
+//! Bytes of any encoding and with any line ends as lines of UTF-8 that end with a line feed, piece by
+//! piece. Windows-1252 and UTF-8 stay as they are: [`crate::recording::text::dialect::decode_line`] reads both.
+
+use std::io::{self, Read};
+
+use encoding_rs::{Decoder, Encoding, UTF_16BE, UTF_16LE};
 
 use super::encoding;
 use crate::failure::Failure;
 use crate::warning::Warning;
 
-/// Bytes whose lines end with a line feed: UTF-8, or a superset of ASCII with one byte a character.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Text {
-    /// The bytes.
-    pub bytes: Vec<u8>,
-    /// What was unusual, for the name of the dialect: `UTF-16`, `lines end with CR`.
+/// Bytes that are decoded at a time.
+const PIECE: usize = 1 << 16;
+const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
+
+/// How the bytes of a text are to be read.
+#[derive(Debug)]
+pub struct Decoding {
+    encoding: Option<&'static Encoding>,
+    line_ends: LineEnds,
+    /// What is unusual, for the name of the dialect: `UTF-16 LE`, `lines end with CR`.
     pub oddities: Vec<&'static str>,
-    /// What was wrong and passed over.
+    /// What is wrong in the head.
     pub warnings: Vec<Warning>,
 }
 
-/// Bytes that the encoding and the line ends are told from.
-const HEAD: usize = 1 << 16;
-
-/// Decodes a file.
-///
-/// # Errors
-/// If it is another format that is often handed over in place of text, or binary.
-pub fn decode(bytes: Vec<u8>) -> Result<Text, Failure> {
-    let mut oddities = Vec::new();
-    let mut warnings = Vec::new();
-    let mut bytes = match utf16(&bytes) {
-        Some(is_big) => {
-            oddities.push(if is_big { "UTF-16 BE" } else { "UTF-16 LE" });
-            from_utf16(&bytes, is_big)
-        }
-        None => bytes,
-    };
-    crate::io::csv::refuse_other_formats(&bytes[..bytes.len().min(HEAD)])?;
-    if bytes.starts_with(b"\xEF\xBB\xBF") {
-        bytes.drain(..3);
-    }
-    let zeros = memchr::memchr_iter(0, &bytes).count();
-    if zeros > 0 {
-        bytes.retain(|byte| *byte != 0);
-        warnings.push(Warning::new(
-            "zero-bytes",
-            format!("{zeros} zero byte(s) stand in the text; they were left out"),
-        ));
-    }
-    if let Some(encoding) = encoding::told(&bytes[..bytes.len().min(HEAD)]) {
-        oddities.push(encoding::name(encoding));
-        let (text, has_faults) = encoding.decode_without_bom_handling(&bytes);
-        if has_faults {
-            warnings.push(Warning::new(
-                "unreadable-characters",
-                format!(
-                    "some bytes are no characters of {}; they were replaced by \u{FFFD}",
-                    encoding::name(encoding)
-                ),
-            ));
-        }
-        bytes = text.into_owned().into_bytes();
-    }
-    while bytes.last() == Some(&0x1A) {
-        bytes.pop();
-    }
-    if let Some(oddity) = line_ends(&mut bytes) {
-        oddities.push(oddity);
-    }
-    Ok(Text {
-        bytes,
-        oddities,
-        warnings,
-    })
+/// What ends the lines.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum LineEnds {
+    /// LF, or CR LF, which is read like it.
+    Lf,
+    Cr,
+    CrCrLf,
 }
 
-/// Whether it is UTF-16, and then whether the high byte comes first: by its mark, or by every second
-/// byte of the head being zero.
-fn utf16(bytes: &[u8]) -> Option<bool> {
-    if bytes.starts_with(b"\xFF\xFE") {
-        return Some(false);
+impl Decoding {
+    /// By the first bytes of a file.
+    ///
+    /// # Errors
+    /// If it is another format that is often handed over in place of text, or binary.
+    pub fn of(head: &[u8]) -> Result<Self, Failure> {
+        let (mut oddities, mut warnings) = (Vec::new(), Vec::new());
+        let encoding = match utf16(head) {
+            Some(wide) => Some(wide),
+            None => {
+                refuse_other_formats(head)?;
+                encoding::told(head)
+            }
+        };
+        let mut text = head.to_vec();
+        if let Some(encoding) = encoding {
+            oddities.push(encoding::name(encoding));
+            let last_line = head.iter().rposition(|byte| *byte == b'\n');
+            let whole = last_line.map_or(head, |end| &head[..end]);
+            let (decoded, has_faults) = encoding.decode_with_bom_removal(whole);
+            if has_faults && !is_wide(encoding) {
+                warnings.push(Warning::new(
+                    "unreadable-characters",
+                    format!(
+                        "some bytes are no characters of {}; they were replaced by \u{FFFD}",
+                        encoding::name(encoding)
+                    ),
+                ));
+            }
+            text = decoded.into_owned().into_bytes();
+            refuse_other_formats(&text)?;
+        }
+        let line_ends = LineEnds::of(&text);
+        oddities.extend(match line_ends {
+            LineEnds::Lf => None,
+            LineEnds::Cr => Some("lines end with CR"),
+            LineEnds::CrCrLf => Some("lines end with CR CR LF"),
+        });
+        Ok(Self {
+            encoding,
+            line_ends,
+            oddities,
+            warnings,
+        })
     }
-    if bytes.starts_with(b"\xFE\xFF") {
-        return Some(true);
-    }
-    let head = &bytes[..bytes.len().min(HEAD) & !1];
-    let zeros = |first: usize| {
-        head.iter()
-            .skip(first)
-            .step_by(2)
-            .filter(|byte| **byte == 0)
-            .count()
-    };
-    let (even, odd) = (zeros(0), zeros(1));
-    let most = head.len() / 2 * 9 / 10;
-    if head.len() < 8 {
-        None
-    } else if odd > most && even == 0 {
-        Some(false)
-    } else if even > most && odd == 0 {
-        Some(true)
-    } else {
-        None
+
+    /// The text of an input whose first bytes were read already.
+    pub fn reader(&self, mut head: Vec<u8>, input: Box<dyn Read + Send>) -> Box<dyn Read + Send> {
+        if head.starts_with(BYTE_ORDER_MARK) {
+            head.drain(..BYTE_ORDER_MARK.len());
+        }
+        let input = Box::new(io::Cursor::new(head).chain(input));
+        if self.encoding.is_none() && self.line_ends == LineEnds::Lf {
+            return input;
+        }
+        Box::new(Decoded {
+            input,
+            decoder: self.encoding.map(Encoding::new_decoder_with_bom_removal),
+            line_ends: self.line_ends,
+            raw: vec![0; PIECE],
+            text: Vec::new(),
+            at: 0,
+            at_end: false,
+        })
     }
 }
 
-fn from_utf16(bytes: &[u8], is_big: bool) -> Vec<u8> {
-    let units = bytes.chunks_exact(2).map(|pair| {
-        let pair = [pair[0], pair[1]];
-        if is_big {
-            u16::from_be_bytes(pair)
+/// An input with its bytes brought to UTF-8 and its line ends to LF.
+struct Decoded {
+    input: Box<dyn Read + Send>,
+    decoder: Option<Decoder>,
+    line_ends: LineEnds,
+    raw: Vec<u8>,
+    /// What was decoded, and how much of it was handed out.
+    text: Vec<u8>,
+    at: usize,
+    at_end: bool,
+}
+
+impl Read for Decoded {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        while self.at == self.text.len() && !self.at_end {
+            self.refill()?;
+        }
+        let count = out.len().min(self.text.len() - self.at);
+        out[..count].copy_from_slice(&self.text[self.at..self.at + count]);
+        self.at += count;
+        Ok(count)
+    }
+}
+
+impl Decoded {
+    fn refill(&mut self) -> io::Result<()> {
+        let count = self.input.read(&mut self.raw)?;
+        self.at_end = count == 0;
+        let raw = &self.raw[..count];
+        let mut text = match &mut self.decoder {
+            None => raw.to_vec(),
+            Some(decoder) => {
+                let most = decoder.max_utf8_buffer_length(count).unwrap_or(4 * count);
+                let mut text = String::with_capacity(most);
+                let (_, _, has_faults) = decoder.decode_to_string(raw, &mut text, self.at_end);
+                // Half a character at the end of a file that was cut there.
+                if self.at_end && has_faults && is_wide(decoder.encoding()) {
+                    text.truncate(text.trim_end_matches('\u{FFFD}').len());
+                }
+                text.into_bytes()
+            }
+        };
+        match self.line_ends {
+            LineEnds::Lf => {}
+            LineEnds::CrCrLf => text.retain(|byte| *byte != b'\r'),
+            LineEnds::Cr => text
+                .iter_mut()
+                .filter(|byte| **byte == b'\r')
+                .for_each(|byte| *byte = b'\n'),
+        }
+        (self.text, self.at) = (text, 0);
+        Ok(())
+    }
+}
+
+impl LineEnds {
+    fn of(text: &[u8]) -> Self {
+        if memchr::memmem::find(text, b"\r\r\n").is_some() {
+            Self::CrCrLf
+        } else if !text.contains(&b'\n') && text.contains(&b'\r') {
+            Self::Cr
         } else {
-            u16::from_le_bytes(pair)
+            Self::Lf
         }
-    });
-    let mut text = String::with_capacity(bytes.len() / 2);
-    text.extend(char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER)));
-    let text = text.into_bytes();
-    match text.strip_prefix(b"\xEF\xBB\xBF") {
-        Some(rest) => rest.to_vec(),
-        None => text,
     }
 }
 
-/// Brings line ends of CR alone and of CR CR LF to LF. CR LF stays: the readers take it.
-fn line_ends(bytes: &mut Vec<u8>) -> Option<&'static str> {
-    let head = &bytes[..bytes.len().min(HEAD)];
-    if memchr::memmem::find(head, b"\r\r\n").is_some() {
-        let mut out = Vec::with_capacity(bytes.len());
-        let mut rest = bytes.as_slice();
-        while let Some(at) = memchr::memmem::find(rest, b"\r\r\n") {
-            out.extend_from_slice(&rest[..at]);
-            out.push(b'\n');
-            rest = &rest[at + 3..];
-        }
-        out.extend_from_slice(rest);
-        *bytes = out;
-        return Some("lines end with CR CR LF");
+fn is_wide(encoding: &'static Encoding) -> bool {
+    encoding == UTF_16LE || encoding == UTF_16BE
+}
+
+/// UTF-16, by its mark or by every second byte of the head being zero.
+fn utf16(head: &[u8]) -> Option<&'static Encoding> {
+    if head.starts_with(b"\xFF\xFE") {
+        return Some(UTF_16LE);
     }
-    if !head.contains(&b'\n') && head.contains(&b'\r') {
-        for byte in bytes.iter_mut().filter(|byte| **byte == b'\r') {
-            *byte = b'\n';
-        }
-        return Some("lines end with CR");
+    if head.starts_with(b"\xFE\xFF") {
+        return Some(UTF_16BE);
     }
-    None
+    let pairs = head.chunks_exact(2);
+    let most = pairs.len() * 9 / 10;
+    let [even, odd] = [0, 1].map(|place| pairs.clone().filter(|pair| pair[place] == 0).count());
+    match head.len() {
+        ..8 => None,
+        _ if odd > most && even == 0 => Some(UTF_16LE),
+        _ if even > most && odd == 0 => Some(UTF_16BE),
+        _ => None,
+    }
+}
+
+/// Names the formats that are often handed over in place of text.
+fn refuse_other_formats(head: &[u8]) -> Result<(), Failure> {
+    let known: [(&[u8], &str); 3] = [
+        (
+            b"PK\x03\x04",
+            "a zip archive or a spreadsheet; export the sheet as CSV",
+        ),
+        (
+            b"\x1F\x8B",
+            "compressed with gzip; pipe it: gunzip -c FILE | torqcomp … -",
+        ),
+        (
+            b"\x28\xB5\x2F\xFD",
+            "compressed with zstd; pipe it: zstdcat FILE | torqcomp … -",
+        ),
+    ];
+    match known.iter().find(|(magic, _)| head.starts_with(magic)) {
+        Some((_, what)) => Err(Failure::failed(format_args!("the file is {what}"))),
+        None if is_binary(head) => Err(Failure::failed(
+            "the file is binary; expected a text table (CSV, TSV or a recorder's export)",
+        )),
+        None => Ok(()),
+    }
+}
+
+/// Whether there are more zero bytes than a fault in a text would leave.
+fn is_binary(head: &[u8]) -> bool {
+    head.iter().filter(|byte| **byte == 0).count() > head.len() / 100
 }
 
 #[cfg(test)]
@@ -148,7 +225,11 @@ mod tests {
     use super::*;
 
     fn text(bytes: &[u8]) -> String {
-        String::from_utf8(decode(bytes.to_vec()).unwrap().bytes).unwrap()
+        let decoding = Decoding::of(bytes).unwrap();
+        let mut text = String::new();
+        let mut reader = decoding.reader(bytes.to_vec(), Box::new(io::empty()));
+        reader.read_to_string(&mut text).unwrap();
+        text
     }
 
     #[test]
@@ -170,22 +251,36 @@ mod tests {
             let bytes = [mark, &wide(big)].concat();
             assert_eq!(text(&bytes), "Zeit;\u{b5}m\n1;2\n", "{mark:?} {big}");
         }
+        // Cut within its last character.
+        assert_eq!(
+            text(&[b"\xFF\xFE", &wide(false)[..19]].concat()),
+            "Zeit;\u{b5}m\n1;"
+        );
     }
 
     #[test]
-    fn line_ends_and_stray_bytes() {
+    fn line_ends() {
         assert_eq!(text(b"a\r\r\n1\r\r\n"), "a\n1\n");
         assert_eq!(text(b"a\r1\r2\r"), "a\n1\n2\n");
-        assert_eq!(text(b"a\r\n1\r\n\x1A"), "a\r\n1\r\n");
-        let mut long = b"a,b\n".repeat(100);
-        long[4] = 0;
-        let found = decode(long).unwrap();
-        assert_eq!(found.warnings[0].code, "zero-bytes");
+        assert_eq!(text(b"a\r\n1\r\n"), "a\r\n1\r\n");
+    }
+
+    #[test]
+    fn a_character_between_two_pieces_is_whole() {
+        let words = "Zeit;\u{b5}m\n".repeat(PIECE / 8);
+        let bytes: Vec<u8> = words.encode_utf16().flat_map(u16::to_le_bytes).collect();
+        let (head, rest) = bytes.split_at(999);
+        let decoding = Decoding::of(&bytes[..PIECE]).unwrap();
+        let mut text = String::new();
+        let input = Box::new(io::Cursor::new(rest.to_vec()));
+        let mut reader = decoding.reader(head.to_vec(), input);
+        reader.read_to_string(&mut text).unwrap();
+        assert_eq!(text, words);
     }
 
     #[test]
     fn other_formats_are_named() {
-        let error = decode(b"PK\x03\x04......".to_vec()).unwrap_err();
+        let error = Decoding::of(b"PK\x03\x04......").unwrap_err();
         assert!(error.to_string().contains("zip"), "{error}");
     }
 }

@@ -36,6 +36,8 @@ pub fn told(head: &[u8]) -> Option<&'static Encoding> {
 pub fn name(encoding: &'static Encoding) -> &'static str {
     match encoding.name() {
         "Shift_JIS" => "Shift-JIS",
+        "UTF-16LE" => "UTF-16 LE",
+        "UTF-16BE" => "UTF-16 BE",
         name => name,
     }
 }
@@ -93,7 +95,17 @@ fn is_shift_jis(whole: &[u8]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recording::text::decode::decode;
+    use crate::recording::text::decode::Decoding;
+    use std::io::Read;
+
+    /// The text of bytes, and what is unusual about them.
+    fn decoded(bytes: &[u8]) -> (Vec<u8>, Vec<&'static str>) {
+        let decoding = Decoding::of(bytes).unwrap();
+        let mut text = Vec::new();
+        let mut reader = decoding.reader(bytes.to_vec(), Box::new(std::io::empty()));
+        reader.read_to_end(&mut text).unwrap();
+        (text, decoding.oddities)
+    }
 
     #[test]
     fn words_of_other_scripts_tell_the_encoding() {
@@ -106,9 +118,9 @@ mod tests {
             ("Prędkość;Siła [N]\n0;1\n", encoding_rs::WINDOWS_1250),
         ] {
             let (bytes, _, _) = encoding.encode(words);
-            let text = decode(bytes.into_owned()).unwrap();
-            assert_eq!(String::from_utf8(text.bytes).unwrap(), words);
-            assert_eq!(text.oddities, [encoding.name()]);
+            let (text, oddities) = decoded(&bytes);
+            assert_eq!(String::from_utf8(text).unwrap(), words);
+            assert_eq!(oddities, [encoding.name()]);
         }
     }
 
@@ -144,9 +156,9 @@ mod tests {
     fn japanese_is_told_from_western_letters() {
         let japanese = "時間,トルク[N・m],回転数\n0,1.5,60\n";
         let (bytes, _, _) = SHIFT_JIS.encode(japanese);
-        let text = decode(bytes.into_owned()).unwrap();
-        assert_eq!(String::from_utf8(text.bytes).unwrap(), japanese);
-        assert_eq!(text.oddities, ["Shift-JIS"]);
+        let (text, oddities) = decoded(&bytes);
+        assert_eq!(String::from_utf8(text).unwrap(), japanese);
+        assert_eq!(oddities, ["Shift-JIS"]);
         // Latin-1 and Windows-1252, with quotation marks and a dash.
         for western in [
             &b"Kr\xE4nge [\xB5m/m];Temperatur [\xB0C]\n1;2\n"[..],
@@ -154,8 +166,8 @@ mod tests {
             b"it\x92s \x93good\x94 \x96 it\x92s;b\n1;2\n",
             b"Acc\xE9l\xE9ration [m/s\xB2];d\xE9bit\n1;2\n",
         ] {
-            let found = decode(western.to_vec()).unwrap();
-            assert_eq!((found.bytes.as_slice(), found.oddities.len()), (western, 0));
+            let (text, oddities) = decoded(western);
+            assert_eq!((text.as_slice(), oddities.len()), (western, 0));
         }
     }
 }

@@ -3,12 +3,15 @@
 use std::collections::BTreeMap;
 
 use super::cell::Cell;
+use super::chunks::Chunks;
+use super::rows::cleaned;
+use super::table::FIRST_ROWS;
 use crate::failure::Failure;
 use crate::io::DialectOverride;
-use crate::io::csv::{Delimiter, Dialect, decode_line, dialects, is_skipped};
+use crate::recording::text::dialect::{Delimiter, Dialect, dialects, is_skipped};
 
 /// Bytes that a table is looked for in, and more if there is none.
-const HEADS: [usize; 4] = [1 << 15, 1 << 17, 1 << 20, 1 << 23];
+const HEADS: [usize; 4] = [FIRST_ROWS, 1 << 18, 1 << 20, 1 << 23];
 /// Part of the lines from the first row on that must be rows.
 const MOSTLY: f64 = 0.8;
 
@@ -56,21 +59,16 @@ pub fn starts(text: &str, with: &str) -> bool {
 }
 
 impl Head {
-    /// The lines within so many bytes from an offset; `number` is that of the first line.
+    /// The lines of a text, the first of which has a number; `complete` says that no more follow.
     #[must_use]
-    pub fn of(text: &[u8], from: usize, number: usize, bytes: usize) -> Self {
-        let end = from.saturating_add(bytes).min(text.len());
-        let complete = end == text.len();
+    pub fn of(text: &[u8], complete: bool, number: usize) -> Self {
         let mut lines = Vec::new();
-        let mut offset = from;
-        for piece in text[from..end].split_inclusive(|byte| *byte == b'\n') {
+        let mut offset = 0;
+        for piece in text.split_inclusive(|byte| *byte == b'\n') {
             // A line that goes on after the head says nothing for sure.
             if complete || piece.ends_with(b"\n") {
-                let text = decode_line(piece);
-                lines.push(Line {
-                    offset,
-                    text: text.trim_end_matches(['\r', '\n']).to_owned(),
-                });
+                let (text, _) = cleaned(piece);
+                lines.push(Line { offset, text });
             }
             offset += piece.len();
             if lines.last().is_some_and(|line| is_end(&line.text)) {
@@ -105,24 +103,24 @@ impl Head {
     }
 }
 
-/// Finds the table in what follows an offset.
+/// Finds the next table in a text; `number` is that of its first line.
 ///
 /// # Errors
 /// If there is none, or more than one way to read it.
 pub fn find(
-    text: &[u8],
-    from: usize,
+    chunks: &mut Chunks,
     number: usize,
-    told: &DialectOverride,
+    marks: &DialectOverride,
 ) -> Result<(Head, Table), Failure> {
     let mut failure = None;
     for bytes in HEADS {
-        let head = Head::of(text, from, number, bytes);
-        match find_in(&head, told) {
+        let (text, complete) = chunks.peek(bytes)?;
+        let head = Head::of(text, complete, number);
+        match find_in(&head, marks) {
             Ok(table) => return Ok((head, table)),
             Err(error) => failure = Some(error),
         }
-        if head.complete {
+        if complete {
             break;
         }
     }
@@ -130,19 +128,16 @@ pub fn find(
 }
 
 /// The table in a head.
-///
-/// # Errors
-/// See [`find`].
-pub fn find_in(head: &Head, told: &DialectOverride) -> Result<Table, Failure> {
+fn find_in(head: &Head, marks: &DialectOverride) -> Result<Table, Failure> {
     let quoted = head.lines.iter().any(|line| line.text.contains('"'));
     let occurs = |byte: u8| {
         head.lines
             .iter()
             .any(|line| line.text.as_bytes().contains(&byte))
     };
-    let mut all = dialects(told, quoted);
+    let mut all = dialects(marks, quoted);
     all.retain(|dialect| match dialect.delimiter {
-        Delimiter::Byte(byte) => told.delimiter.is_some() || occurs(byte),
+        Delimiter::Byte(byte) => marks.delimiter.is_some() || occurs(byte),
         Delimiter::Spaces | Delimiter::None => true,
     });
     let strict: Vec<Found> = all

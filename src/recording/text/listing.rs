@@ -2,9 +2,9 @@
 
 use super::cell::Cell;
 use super::head::{Head, Table};
-use super::rows::Wanted;
+use super::rows::ColumnKind;
 use crate::failure::Failure;
-use crate::io::csv::is_skipped;
+use crate::recording::text::dialect::is_skipped;
 
 /// Most columns of text, as a part of all, in a table that is a recording.
 const TEXTS: f64 = 0.34;
@@ -60,20 +60,18 @@ pub fn refuse(head: &Head, table: &Table) -> Result<(), Failure> {
 ///
 /// # Errors
 /// If it is one.
-pub fn refuse_variables(head: &Head, table: &Table, wanted: &[Wanted]) -> Result<(), Failure> {
-    let has = |kind: Wanted| wanted.contains(&kind);
-    if !has(Wanted::Nothing) || !has(Wanted::Clock) {
-        return Ok(());
-    }
+pub fn refuse_variables(head: &Head, table: &Table, kinds: &[ColumnKind]) -> Result<(), Failure> {
+    let is_text = |place: &usize| kinds[*place] == ColumnKind::Nothing;
+    let is_clock = |place: &usize| matches!(kinds[*place], ColumnKind::Clock(_));
     let rows = first_cells(head, table);
-    let of = |kind: Wanted| (0..wanted.len()).filter(move |place| wanted[*place] == kind);
-    let listed = of(Wanted::Nothing).find_map(|place| {
+    let listed = (0..kinds.len()).filter(is_text).find_map(|place| {
         let count = cycle(&rows, place)?;
         let same = |time: usize| {
             rows.chunks_exact(count)
                 .all(|cycle| cycle.iter().all(|row| row.get(time) == cycle[0].get(time)))
         };
-        of(Wanted::Clock)
+        (0..kinds.len())
+            .filter(is_clock)
             .any(same)
             .then(|| (count, &rows[0][place]))
     });

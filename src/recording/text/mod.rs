@@ -1,37 +1,56 @@
-//! Recordings in text: decoding the bytes, telling the dialect, reading every column.
+//! Recordings in text: one way from bytes to channels, whatever the dialect.
 //!
-//! `decode` brings the bytes to lines; `makers` knows who writes how; `head` finds the table and
-//! `header` reads what stands above it, with the help of `keys` and `units`; `rows` reads the
-//! numbers and `axes` finds the time.
+//! `decode` brings the bytes to lines and `chunks` cuts them into pieces; `makers` knows who writes how;
+//! `head` finds the table and `header` reads what stands above it, with the help of `keys` and `units`;
+//! `axes` finds the time; `rows` reads the numbers. The first rows decide all of that: then the table is
+//! read as a whole, or one channel of it piece by piece (`stream`).
 
 mod axes;
 mod axis_names;
 mod blocks;
 mod cell;
+mod chunks;
 mod clock;
 mod decode;
+mod dialect;
 mod encoding;
 mod head;
 mod header;
+mod heading;
 mod keys;
 mod listing;
 mod makers;
+mod row_template;
 mod rows;
 mod sparse;
+mod stream;
 mod summary;
 mod table;
 mod units;
+mod vocabulary;
+
+use std::io::{Cursor, Read};
 
 use super::{Recording, Segment};
 use crate::failure::Failure;
-use crate::io::csv::{self, Options};
+use crate::io::Reading;
+use crate::recording::text::dialect::decode_line;
 
+pub use chunks::{Chunks, Piece};
 pub use clock::Clock;
-use decode::Text;
+pub use clock::days_between;
+use decode::Decoding;
 use head::Head;
+pub use head::is_end as is_end_of_data;
 use keys::Entry;
-use table::Hints;
+use makers::Maker;
+pub use rows::{LineNotes, place_of};
+pub use stream::{ChannelPlan, ChannelRows, Problem, TextStream};
+use table::{FIRST_ROWS, Hints, Part};
+pub use table::{Layout, truncated};
 
+/// Bytes that the encoding is told from.
+const FOR_ENCODING: u64 = 1 << 16;
 /// Bytes that a maker is told from.
 const FOR_MAKER: usize = 1 << 14;
 /// Fewest numbers in a text of one line that are the samples of one channel.
@@ -41,166 +60,160 @@ const MOST_TABLES: usize = 1000;
 /// Most details that are kept.
 const DETAILS: usize = 100;
 
+/// A text that is open, its first table found.
+pub struct TextFile {
+    /// What its first rows and the lines above them say: channels without samples. Without channels if
+    /// a maker's reader needs the whole text.
+    pub recording: Recording,
+    /// Why it has to be read as a whole, if it has to.
+    pub held_whole: Option<&'static str>,
+    chunks: Chunks,
+    /// What is said of its maker and its encoding.
+    words: Vec<&'static str>,
+    /// Whether its bytes are not those of the file.
+    is_decoded: bool,
+    maker: Option<Maker>,
+    /// Unless a maker's reader looks for it.
+    layout: Option<Layout>,
+    reading: Reading,
+}
+
+impl TextFile {
+    /// Opens a text and looks at its first rows; `source` is its name for people.
+    ///
+    /// # Errors
+    /// If it is no recording, or leaves open how it is to be read.
+    pub fn open(
+        source: &str,
+        mut input: Box<dyn Read + Send>,
+        reading: &Reading,
+    ) -> Result<Self, Failure> {
+        let mut bytes = Vec::new();
+        let mut head = (&mut input).take(FOR_ENCODING);
+        head.read_to_end(&mut bytes)
+            .map_err(|error| Failure::failed(format_args!("cannot be read: {error}")))?;
+        let decoding = Decoding::of(&bytes)?;
+        let mut chunks = Chunks::new(decoding.reader(bytes, input));
+        let one_line = one_line(&mut chunks, reading)?;
+        let (text, complete) = chunks.peek(FOR_MAKER)?;
+        let maker = makers::recognise(&Head::of(text, complete, 1));
+        let mut held_whole = one_line.then_some("all its samples stand in one line");
+        let mut recording = Recording::empty("csv", source.to_owned());
+        let layout = match maker.filter(|maker| maker.read.is_some()) {
+            Some(_) => {
+                held_whole = Some("its maker writes more than one table of samples");
+                None
+            }
+            None => {
+                let hints = maker.map_or(Hints::default(), |maker| maker.hints);
+                let layout = Layout::find(&mut chunks, 1, hints, reading)?;
+                held_whole = held_whole.or(layout.held_whole);
+                recording.channels = layout.channels(layout.first_rows.clone());
+                recording.details = details(&layout.header.entries);
+                Some(layout)
+            }
+        };
+        recording.warnings = decoding.warnings;
+        let mut words: Vec<&'static str> = maker.iter().map(|maker| maker.name).collect();
+        let is_decoded = !decoding.oddities.is_empty();
+        words.extend(decoding.oddities);
+        let mut file = Self {
+            recording,
+            held_whole,
+            chunks,
+            words,
+            is_decoded,
+            maker,
+            layout,
+            reading: reading.clone(),
+        };
+        let Some(layout) = &file.layout else {
+            return Ok(file);
+        };
+        file.recording.dialect = file.describe(&layout.plan.dialect.describe());
+        for channel in &mut file.recording.channels {
+            channel.samples.clear();
+            channel.holes.clear();
+        }
+        match file.recording.channels.is_empty() {
+            true => Err(no_channel()),
+            false => Ok(file),
+        }
+    }
+
+    /// How it is written, for people.
+    fn describe(&self, table: &str) -> String {
+        let words = self.words.iter().copied().chain([table]);
+        words.collect::<Vec<&str>>().join(", ")
+    }
+
+    /// Reads all of it.
+    ///
+    /// # Errors
+    /// If it cannot be read, or leaves open how.
+    pub fn read(mut self) -> Result<Recording, Failure> {
+        let reader = self.maker.and_then(|maker| maker.read);
+        let mut read = match (self.layout.take(), reader) {
+            (Some(layout), _) => {
+                let hints = self.maker.map_or(Hints::default(), |maker| maker.hints);
+                general(&mut self.chunks, layout, hints, &self.reading)?
+            }
+            (None, Some(read)) => read(&mut self.chunks, &self.reading)?,
+            (None, None) => return Err(no_channel()),
+        };
+        if read.channels.is_empty() {
+            return Err(no_channel());
+        }
+        read.dialect = self.describe(&read.dialect);
+        if read.segments.len() > 1 {
+            read.dialect += &format!(", {} segments", read.segments.len());
+        }
+        read.source = self.recording.source;
+        read.warnings.splice(0..0, self.recording.warnings);
+        Ok(read)
+    }
+
+    /// Reads one of its channels, by its place, piece by piece, unless it is held whole.
+    pub fn stream(self, channel: usize, with_stamps: bool) -> TextStream {
+        let layout = self.layout.expect("a text that streams has one table");
+        let place = layout.channel_places().nth(channel).unwrap_or(0);
+        TextStream::new(self.chunks, layout, place, with_stamps, self.is_decoded)
+    }
+}
+
+fn no_channel() -> Failure {
+    Failure::failed("there is no column besides the time; expected one with the signal")
+}
+
 /// Reads a text file of any dialect; `source` is its name for people.
 ///
 /// # Errors
 /// If it is no recording, or leaves open how it is to be read.
-pub fn read(source: &str, bytes: Vec<u8>, options: &Options) -> Result<Recording, Failure> {
-    let text = decode::decode(bytes)?;
-    let head = Head::of(&text.bytes, 0, 1, FOR_MAKER);
-    let maker = makers::recognise(&head);
-    let mut recording = match maker.and_then(|maker| maker.read) {
-        Some(read) => read(&text, options)?,
-        None => general(
-            &text,
-            maker.map_or(Hints::default(), |maker| maker.hints),
-            options,
-        )?,
-    };
-    if recording.channels.is_empty() {
-        return Err(Failure::failed(
-            "there is no column besides the time; expected one with the signal",
-        ));
-    }
-    source.clone_into(&mut recording.source);
-    let mut words: Vec<String> = maker.iter().map(|maker| maker.name.to_owned()).collect();
-    words.extend(text.oddities.iter().map(|word| (*word).to_owned()));
-    words.push(recording.dialect);
-    if recording.segments.len() > 1 {
-        words.push(format!("{} segments", recording.segments.len()));
-    }
-    recording.dialect = words.join(", ");
-    recording.warnings.splice(0..0, text.warnings);
-    Ok(recording)
-}
-
-/// Whether the quick reader of plain tables ([`crate::io::csv::Table`]) sees in a file what this one
-/// sees: by its encoding and line ends, no maker's reader is needed, and both find the same table with
-/// the same headings, units and at most one column of time, which holds numbers. `head` are the first
-/// bytes of the file, `complete` says that there are no more.
-#[must_use]
-pub fn is_plain(head: &[u8], complete: bool, options: &Options) -> bool {
-    let Ok(text) = decode::decode(head.to_vec()) else {
-        return false;
-    };
-    // Only a mark at the start is taken away from a plain table.
-    let mark = if head.starts_with(b"\xEF\xBB\xBF") {
-        3
-    } else {
-        0
-    };
-    if text.bytes != head[mark..] || !text.oddities.is_empty() {
-        return false;
-    }
-    let lines = Head::of(&text.bytes, 0, 1, FOR_MAKER);
-    let is_special =
-        |maker: &makers::Maker| maker.read.is_some() || maker.hints != Hints::default();
-    if makers::recognise(&lines).is_some_and(is_special) {
-        return false;
-    }
-    let Ok(layout) = csv::find_layout_in(head, complete, &options.dialect) else {
-        return false;
-    };
-    let Ok((head, table)) = head::find(&text.bytes, 0, 1, &options.dialect) else {
-        return false;
-    };
-    let wanted = table::wanted(&head, &table);
-    let used: Vec<bool> = wanted.iter().map(Option::is_some).collect();
-    let header = header::read(&head, &table, &used);
-    let same_columns = layout.columns.len() == header.fields.len()
-        && layout.columns.iter().zip(&header.fields).all(is_same);
-    let times = header
-        .fields
-        .iter()
-        .filter(|field| field.is_named_time())
-        .count();
-    let first_row = head.number(table::first_row(&head, &table, &header));
-    same_columns
-        && !has_marks(&head, &table)
-        && !has_slow_column(&head, &table)
-        && !summary::may_be_count(&head, &table)
-        && layout.dialect == table.dialect
-        && (layout.data_line == first_row || begins_with_number(&layout, &text.bytes))
-        && wanted
-            .iter()
-            .all(|kind| *kind == Some(rows::Wanted::Numbers))
-        && times <= 1
-        // What their values say is not looked at there.
-        && !header
-            .fields
-            .iter()
-            .any(|field| units::is_weak_time_name(&field.name))
-}
-
-/// Whether both readers take a column for the same.
-fn is_same((column, field): (&csv::Column, &header::Field)) -> bool {
-    column.heading == field.heading && column.name == field.name && column.unit == field.unit
-}
-
-/// Whether numbers have marks between their thousands.
-fn has_marks(head: &Head, table: &head::Table) -> bool {
-    head.lines[table.first..].iter().any(|line| {
-        let cells = table.dialect.cells(&line.text);
-        let read = |cell: &String| cell::Cell::read(cell, table.dialect.decimal);
-        cells
-            .iter()
-            .any(|cell| matches!(read(cell), cell::Cell::Grouped(_)))
-    })
-}
-
-/// Whether a column has a value in fewer than half of the first rows, but in some.
-fn has_slow_column(head: &Head, table: &head::Table) -> bool {
-    let mut filled = vec![0_usize; table.width];
-    let mut rows = 0;
-    for line in &head.lines[table.first..] {
-        let cells = table.dialect.cells(&line.text);
-        rows += 1;
-        for (count, cell) in filled.iter_mut().zip(&cells) {
-            *count += usize::from(!cell.is_empty());
-        }
-    }
-    filled.iter().any(|count| *count > 0 && 2 * count < rows)
-}
-
-/// Whether the first row that the quick reader sees begins as a row does: with something wrong behind
-/// that, it refuses the row, while this reader would begin after it.
-fn begins_with_number(layout: &csv::Layout, text: &[u8]) -> bool {
-    let line = text.split(|byte| *byte == b'\n').nth(layout.data_line - 1);
-    let line = csv::decode_line(line.unwrap_or(&[]));
-    let cells = layout.dialect.cells(&line);
-    cells
-        .first()
-        .is_some_and(|cell| crate::io::number::cell(cell, layout.dialect.decimal).is_some())
+pub fn read(source: &str, bytes: Vec<u8>, reading: &Reading) -> Result<Recording, Failure> {
+    TextFile::open(source, Box::new(Cursor::new(bytes)), reading)?.read()
 }
 
 /// A table, or several below each other under the same headings.
-fn general(text: &Text, hints: Hints, options: &Options) -> Result<Recording, Failure> {
+fn general(
+    chunks: &mut Chunks,
+    first: Layout,
+    hints: Hints,
+    reading: &Reading,
+) -> Result<Recording, Failure> {
+    let dialect = first.plan.dialect.describe();
     let mut parts = Vec::new();
-    let (mut from, mut number, mut begins_anew) = (0, 1, false);
-    if let Some(column) = one_line(&text.bytes, options) {
-        let part = table::read(&column, 0, 1, hints, options, &|_| false)?;
-        return Ok(recording_of(vec![part]));
-    }
+    let mut next = Ok(first);
     loop {
-        let part = match table::read(&text.bytes, from, number, hints, options, &|_| false) {
-            Ok(part) => part,
-            Err(failure) if begins_anew => {
-                return Err(Failure::failed(format_args!(
-                    "line {number}: a block of its own begins here, and cannot be read: {failure}; split \
-                     the file"
-                )));
-            }
+        let part = match next {
+            Ok(layout) => layout.read(chunks)?,
             // What follows the last table need not be one.
-            Err(_) if !parts.is_empty() => break,
-            Err(failure) => return Err(failure),
+            Err(_) => break,
         };
-        let is_last = part.end >= text.bytes.len()
-            || part.end <= from
-            || head::is_end(&csv::decode_line(line_at(&text.bytes, part.end)));
-        (from, number) = (part.end, part.next_line);
-        begins_anew = part.begins_anew;
+        let (number, begins_anew) = (part.next_line, part.begins_anew);
         parts.push(part);
-        if is_last {
+        let (rest, _) = chunks.peek(FIRST_ROWS)?;
+        let line = decode_line(rest.split(|byte| *byte == b'\n').next().unwrap_or(&[]));
+        if rest.is_empty() || head::is_end(&line) {
             break;
         }
         if parts.len() > MOST_TABLES {
@@ -209,33 +222,47 @@ fn general(text: &Text, hints: Hints, options: &Options) -> Result<Recording, Fa
                  file"
             )));
         }
+        next = Layout::find(chunks, number, hints, reading);
+        if let Err(failure) = &next
+            && begins_anew
+        {
+            return Err(Failure::failed(format_args!(
+                "line {number}: a block of its own begins here, and cannot be read: {failure}; split \
+                 the file"
+            )));
+        }
     }
-    Ok(recording_of(parts))
+    Ok(recording_of(parts, dialect))
 }
 
-/// The line that begins at an offset.
-fn line_at(text: &[u8], offset: usize) -> &[u8] {
-    let rest = &text[offset..];
-    &rest[..memchr::memchr(b'\n', rest).unwrap_or(rest.len())]
-}
-
-/// The numbers of a text that is one line of them, each in a line of its own: some oscilloscopes write
+/// Puts the numbers of a text that is one line of them into lines of their own: some oscilloscopes write
 /// the samples so.
-fn one_line(text: &[u8], options: &Options) -> Option<Vec<u8>> {
-    let line = text.trim_ascii();
-    if line.contains(&b'\n') || options.dialect.delimiter.is_some() {
-        return None;
+fn one_line(chunks: &mut Chunks, reading: &Reading) -> Result<bool, Failure> {
+    let (text, complete) = chunks.peek(FIRST_ROWS)?;
+    if text.trim_ascii().contains(&b'\n') || reading.dialect.delimiter.is_some() {
+        return Ok(false);
     }
+    let text = match complete {
+        true => text.to_vec(),
+        false => chunks.take_all()?,
+    };
+    let column = in_lines(&text, reading.dialect.decimal.unwrap_or(b'.'));
+    let is_found = column.is_some();
+    *chunks = Chunks::new(Box::new(Cursor::new(column.unwrap_or(text))));
+    Ok(is_found)
+}
+
+fn in_lines(text: &[u8], decimal: u8) -> Option<Vec<u8>> {
+    let line = text.trim_ascii();
     let mark = *[b'\t', b';', b',', b' ']
         .iter()
         .find(|mark| line.contains(mark))?;
-    let decimal = options.dialect.decimal.unwrap_or(b'.');
     let cells = line.split(|byte| *byte == mark);
     let numbers = cells.clone().filter(|cell| !cell.is_empty()).all(|cell| {
         std::str::from_utf8(cell).is_ok_and(|cell| crate::io::number::cell(cell, decimal).is_some())
     });
-    let is_long = cells.count() >= ONE_LINE;
-    (numbers && is_long).then(|| {
+    let is_one_line = !line.contains(&b'\n') && cells.count() >= ONE_LINE;
+    (numbers && is_one_line).then(|| {
         line.iter()
             .map(|byte| if *byte == mark { b'\n' } else { *byte })
             .collect()
@@ -243,13 +270,13 @@ fn one_line(text: &[u8], options: &Options) -> Option<Vec<u8>> {
 }
 
 /// Puts tables together as the segments of a recording.
-fn recording_of(parts: Vec<table::Part>) -> Recording {
+fn recording_of(parts: Vec<Part>, dialect: String) -> Recording {
     let blocks: usize = parts.iter().map(|part| part.blocks.len()).sum();
     let mut recording = Recording::empty("csv", String::new());
+    recording.dialect = dialect;
     for (place, part) in parts.into_iter().enumerate() {
         if place == 0 {
-            recording.dialect = part.dialect.describe();
-            recording.details = details(&part.entries);
+            recording.details = details(&part.header.entries);
         }
         for channels in part.blocks {
             let segment = recording.segments.len();
@@ -257,7 +284,7 @@ fn recording_of(parts: Vec<table::Part>) -> Recording {
                 recording.segments.push(Segment {
                     name: format!("segment {}", segment + 1),
                     start_s: None,
-                    start_text: keys::date_text(&part.entries),
+                    start_text: keys::date_text(&part.header.entries),
                 });
             }
             for mut channel in channels {

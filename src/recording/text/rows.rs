@@ -1,26 +1,50 @@
-//! Reading the rows of a table: every column at once, plain numbers quickly, the rest with care.
+//! Rows of numbers out of lines, for every column that is wanted.
+//!
+//! Nearly all rows are written like the one before ([`RowTemplate`]) or hold plain numbers between
+//! marks. Whatever else stands in a line (quotes, thousands marks, remarks, faults) is read with care.
+//! All three ways give the same numbers.
 
 mod cut;
+mod plain_row;
 
-use self::cut::line_of;
+use super::blocks::TableEnd;
 use super::cell::Cell;
-use super::clock::{Clock, DAY};
+use super::clock::Clock;
+use super::row_template::RowTemplate;
 use crate::failure::Failure;
-use crate::io::csv::{Delimiter, Dialect, is_skipped};
-use crate::io::number;
+use crate::recording::text::dialect::{Dialect, decode_line, is_comment, is_skipped};
 use crate::recording::{Hole, HoleKind};
+use cut::line_of;
 
-/// What is wanted of a column.
+/// What a column holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Wanted {
-    /// Its numbers.
+pub enum ColumnKind {
+    /// Numbers.
     Numbers,
-    /// Dates and times of day, as seconds after the first of them.
-    Clock,
-    /// Integers too long for an `f64`, as differences to the first of them.
-    Ticks,
-    /// Nothing: it holds texts.
+    /// Dates and times of day, taken as seconds after this one.
+    Clock(Clock),
+    /// Integers too long for an `f64`, taken as differences to this one.
+    Ticks(i64),
+    /// Texts, or nothing that is wanted.
     Nothing,
+}
+
+/// How rows are written and what is wanted of them.
+#[derive(Debug, Clone)]
+pub struct RowPlan {
+    /// How cells and numbers are written.
+    pub dialect: Dialect,
+    /// What the columns hold, up to the last one that is wanted.
+    pub kinds: Vec<ColumnKind>,
+    /// Columns of the table; numbers beyond them are noted.
+    pub width: usize,
+    /// Column of the time stamps in use. Without any, a line that is no row may be a lost sample.
+    pub stamps: Option<usize>,
+    /// Whether the place of each stamp's text is kept, to be copied. Such stamps are compared with a
+    /// tolerance, so that their last bit does not matter.
+    pub keeps_stamp_text: bool,
+    /// What ends the table.
+    pub end: TableEnd,
 }
 
 /// A column as read.
@@ -30,31 +54,21 @@ pub struct Column {
     pub values: Vec<f64>,
     /// Cells without a number, up to the same row.
     pub holes: Vec<Hole>,
-    /// The first date or time, as nanoseconds and as written.
-    pub first_clock: Option<(Clock, String)>,
-    /// The first of integers that differences were taken to.
-    pub first_ticks: Option<i64>,
-    /// Nanoseconds of the last one, with the midnights that were passed.
-    last_clock: i64,
 }
 
 /// Rows as read.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Rows {
     /// The columns.
     pub columns: Vec<Column>,
+    /// Where the text of each stamp stands: offset in the upper, length in the lower half.
+    pub stamp_text: Vec<u64>,
     /// How many rows there are.
     pub count: usize,
-    /// Byte at which reading stopped: the end, or the line that `stop` told.
-    pub end: usize,
-    /// Lines read, rows and others.
-    pub lines: usize,
-    /// Lines among the rows that are none: line number and text.
-    pub odd: Vec<(usize, String)>,
-    /// How many of them there are.
-    pub odd_count: usize,
-    /// Rows with more cells than columns; the first one's line.
-    pub too_wide: Option<usize>,
+    /// Number of the next line.
+    pub line: usize,
+    /// What should be known of the lines.
+    pub notes: LineNotes,
     /// Empty cells that may still be filled in; they cost memory that the file need not have.
     budget: usize,
     /// Line at which there was no budget left.
@@ -63,80 +77,113 @@ pub struct Rows {
     breaks: Vec<(usize, usize)>,
 }
 
+/// What should be known of the lines of a table.
+#[derive(Debug, Clone, Default)]
+pub struct LineNotes {
+    /// The first line among the rows that is none, and its text.
+    pub odd: Option<(usize, String)>,
+    /// How many of them there are.
+    pub odd_count: usize,
+    /// The first row with numbers beyond the columns.
+    pub too_wide: Option<usize>,
+    /// Zero bytes that were passed over.
+    pub zeros: usize,
+}
+
 /// Empty cells that any file may have, besides one for each byte.
 const FREE_CELLS: usize = 1 << 20;
-/// Odd lines that are kept to be shown.
-const ODD_LINES: usize = 5;
-
-/// Reads rows from `text[from..]`, whose first line has the number `line`, until `stop` says so of a
-/// line that is no row.
-///
-/// # Errors
-/// If the rows have so different lengths that the cells between would need far more memory than the
-/// file.
-pub fn read(
-    text: &[u8],
-    from: usize,
-    line: usize,
-    dialect: Dialect,
-    wanted: &[Wanted],
-    stop: &dyn Fn(&str) -> bool,
-) -> Result<Rows, Failure> {
-    let mut rows = Rows {
-        budget: text.len() + FREE_CELLS,
-        columns: vec![Column::default(); wanted.len()],
-        end: text.len(),
-        ..Rows::default()
-    };
-    let plan = Plan { dialect, wanted };
-    let mut at = from;
-    while at < text.len() {
-        let end = memchr::memchr(b'\n', &text[at..]).map_or(text.len(), |place| at + place);
-        let content = trimmed(&text[at..end]);
-        let number = line + rows.lines;
-        if !rows.accept(content, number, &plan, stop) {
-            rows.end = at;
-            break;
-        }
-        rows.lines += 1;
-        at = end + 1;
-    }
-    match rows.too_ragged {
-        None => Ok(rows),
-        Some(line) => Err(Failure::failed(format_args!(
-            "line {line} is so much longer than the rows before it that these would need more memory \
-             than the whole file; expected rows of about the same number of cells"
-        ))),
-    }
-}
-
-/// Without the carriage returns at the end.
-fn trimmed(mut line: &[u8]) -> &[u8] {
-    while let [rest @ .., b'\r'] = line {
-        line = rest;
-    }
-    line
-}
-
-struct Plan<'a> {
-    dialect: Dialect,
-    wanted: &'a [Wanted],
-}
+/// Characters of an odd line that are shown.
+const SHOWN: usize = 60;
 
 impl Rows {
-    /// Takes a line in; `false` if reading is to stop before it.
-    #[inline]
-    fn accept(
-        &mut self,
-        line: &[u8],
-        number: usize,
-        plan: &Plan,
-        stop: &dyn Fn(&str) -> bool,
-    ) -> bool {
-        if self.quick(line, number, plan) {
-            return true;
+    /// No rows yet; the next line has this number.
+    pub fn begin(&mut self, line: usize, columns: usize) {
+        let mut kept = std::mem::take(&mut self.columns);
+        for column in &mut kept {
+            column.values.clear();
+            column.holes.clear();
         }
-        self.careful(line, number, plan, stop)
+        kept.resize_with(columns, Column::default);
+        let mut stamp_text = std::mem::take(&mut self.stamp_text);
+        stamp_text.clear();
+        *self = Self {
+            columns: kept,
+            stamp_text,
+            line,
+            budget: FREE_CELLS,
+            ..Self::default()
+        };
+    }
+
+    /// Reads the lines of a piece, after those of the pieces before. Every line ends with a line feed
+    /// but perhaps the last. Returns the bytes read: fewer than there are if the table ends before.
+    ///
+    /// # Errors
+    /// If the rows have so different lengths that the cells between would need far more memory than
+    /// the file.
+    pub fn read(&mut self, text: &[u8], plan: &RowPlan) -> Result<usize, Failure> {
+        self.budget += text.len();
+        let mut template = RowTemplate::of(plan);
+        let mut at = 0;
+        while at < text.len() {
+            at = self.rows_like(&mut template, text, at, plan);
+            if at == text.len() {
+                break;
+            }
+            let end = match self.plain_row(text, at, plan) {
+                Some(end) => end,
+                None => {
+                    let end = line_end(text, at);
+                    if !self.careful_row(&text[at..end], at, plan) {
+                        break;
+                    }
+                    end
+                }
+            };
+            self.line += 1;
+            template.learn(text, at, plan);
+            at = end;
+        }
+        match self.too_ragged {
+            None => Ok(at),
+            Some(line) => Err(Failure::failed(format_args!(
+                "line {line} is so much longer than the rows before it that these would need more \
+                 memory than the whole file; expected rows of about the same number of cells"
+            ))),
+        }
+    }
+
+    /// Reads the rows from `at` on that are written as the template says; returns where they end.
+    #[inline]
+    fn rows_like(
+        &mut self,
+        template: &mut RowTemplate,
+        text: &[u8],
+        mut at: usize,
+        plan: &RowPlan,
+    ) -> usize {
+        let (row, line) = (self.count, self.line);
+        let [first, second, ..] = self.columns.as_mut_slice() else {
+            return at;
+        };
+        if first.values.len() != row || second.values.len() != row {
+            return at;
+        }
+        while let Some(found) = template.row(text, at, plan) {
+            first.values.push(found.values[0]);
+            second.values.push(found.values[1]);
+            if plan.keeps_stamp_text {
+                self.stamp_text.push(found.stamp_text);
+            }
+            at = found.end;
+        }
+        let count = first.values.len() - row;
+        if count > 0 {
+            self.note_break(line);
+            self.count += count;
+            self.line += count;
+        }
+        at
     }
 
     fn note_break(&mut self, number: usize) {
@@ -149,96 +196,19 @@ impl Rows {
         }
     }
 
-    /// A row of plain numbers, empty cells, dates and texts without quotes.
-    #[inline]
-    fn quick(&mut self, line: &[u8], number: usize, plan: &Plan) -> bool {
-        let row = self.count;
-        let places = plan.wanted.len();
-        let (mut at, mut numbers) = (0, 0);
-        for place in 0..places {
-            at = plan.skip_to_cell(line, at, place);
-            let Some((value, end)) = self.quick_cell(line, at, place, plan) else {
-                // Taken back: the careful way reads the whole line anew.
-                for column in &mut self.columns[..place] {
-                    column.values.truncate(row);
-                }
-                return false;
-            };
-            if let Some(value) = value {
-                let column = &mut self.columns[place];
-                if column.values.len() != row {
-                    let empty = row - column.values.len();
-                    if empty > self.budget {
-                        self.too_ragged = Some(number);
-                        return false;
-                    }
-                    self.budget -= empty;
-                    column.fill(row, &self.breaks);
-                }
-                column.values.push(value);
-                numbers += 1;
-            }
-            at = end;
-        }
-        if numbers == 0 {
-            return false;
-        }
-        self.note_break(number);
-        self.count += 1;
-        true
-    }
-
-    /// Value of a cell, if it has one, and where the next begins; `None` if it needs care.
-    #[inline]
-    fn quick_cell(
-        &mut self,
-        line: &[u8],
-        at: usize,
-        place: usize,
-        plan: &Plan,
-    ) -> Option<(Option<f64>, usize)> {
-        let is_last = place + 1 == plan.wanted.len();
-        if plan.wanted[place] == Wanted::Numbers
-            && let Some((value, end)) = number::read(line, at, plan.dialect.decimal)
-        {
-            return Some((Some(value), plan.cell_end(line, end, is_last)?));
-        }
-        let Delimiter::Byte(mark) = plan.dialect.delimiter else {
-            return None;
-        };
-        let length = memchr::memchr2(mark, b'"', &line[at..]).unwrap_or(line.len() - at);
-        let end = at + length;
-        let next = plan.cell_end(line, end, is_last)?;
-        match plan.wanted[place] {
-            _ if length == 0 => Some((None, next)),
-            Wanted::Nothing => Some((None, next)),
-            Wanted::Numbers => None,
-            Wanted::Ticks => {
-                let text = std::str::from_utf8(&line[at..end]).ok()?;
-                let ticks = text.trim().parse().ok()?;
-                Some((Some(self.columns[place].ticks(ticks)), next))
-            }
-            Wanted::Clock => {
-                let text = std::str::from_utf8(&line[at..end]).ok()?;
-                let clock = Clock::parse(text)?;
-                Some((Some(self.columns[place].seconds(clock, text.trim())), next))
-            }
-        }
-    }
-
+    /// Takes in a line that is no plain row; `false` if the table ends before it.
     #[cold]
-    fn careful(
-        &mut self,
-        line: &[u8],
-        number: usize,
-        plan: &Plan,
-        stop: &dyn Fn(&str) -> bool,
-    ) -> bool {
-        let text = crate::io::csv::decode_line(line);
-        if stop(&text) || self.too_ragged.is_some() {
+    fn careful_row(&mut self, line: &[u8], at: usize, plan: &RowPlan) -> bool {
+        let (text, zeros) = cleaned(line);
+        self.notes.zeros += zeros;
+        if self.too_ragged.is_some() || plan.end.is_at(&text) {
             return false;
         }
-        if is_skipped(&text) && !is_all_separators(&text, plan.dialect) {
+        let number = self.line;
+        if is_skipped(&text) {
+            if !is_comment(&text) {
+                self.add_empty_row(plan);
+            }
             return true;
         }
         let cells = plan.dialect.cells(&text);
@@ -246,172 +216,220 @@ impl Rows {
             .iter()
             .map(|cell| Cell::read(cell, plan.dialect.decimal))
             .collect();
-        if !is_row(&read, plan.wanted) {
-            self.odd_count += 1;
-            if self.odd.len() < ODD_LINES {
-                self.odd
-                    .push((number, text.trim().chars().take(60).collect()));
-            }
+        if is_of_other_columns(&read, plan) {
+            self.add_empty_row(plan);
             return true;
         }
-        if self.too_wide.is_none()
-            && read
-                .iter()
-                .skip(plan.wanted.len())
-                .any(|cell| cell.is_number())
-        {
-            self.too_wide = Some(number);
+        if !is_row(&read, plan) && !is_damaged_row(&text, &read) {
+            self.notes.odd_count += 1;
+            let shown = || (number, text.trim().chars().take(SHOWN).collect());
+            self.notes.odd.get_or_insert_with(shown);
+            self.add_empty_row(plan);
+            return true;
+        }
+        if read.iter().skip(plan.width).any(|cell| cell.is_number()) {
+            self.notes.too_wide.get_or_insert(number);
         }
         self.note_break(number);
-        for (place, (cell, text)) in read.iter().zip(&cells).enumerate().take(plan.wanted.len()) {
-            self.put(place, *cell, text, number, plan.wanted[place]);
+        for (place, (cell, text)) in read.iter().zip(&cells).enumerate().take(plan.kinds.len()) {
+            self.put(place, *cell, text, plan.kinds[place]);
+        }
+        if plan.keeps_stamp_text {
+            // The same text elsewhere in the line does as well, as long as it is not quoted.
+            let cell = plan.stamps.and_then(|place| cells.get(place));
+            let cell = cell.map_or(&b""[..], |cell| cell.as_bytes());
+            let found = memchr::memmem::find(line, cell);
+            self.stamp_text
+                .push(found.map_or(0, |offset| span(at + offset, cell.len())));
         }
         self.count += 1;
         true
     }
 
-    fn put(&mut self, place: usize, cell: Cell, text: &str, line: usize, wanted: Wanted) {
-        let row = self.count;
-        let column = &mut self.columns[place];
-        let value = match (wanted, cell) {
-            (Wanted::Nothing, _) | (_, Cell::Empty) => return,
-            (Wanted::Numbers, Cell::Number(value) | Cell::Grouped(value)) => Ok(value),
-            (Wanted::Clock, Cell::Clock(clock)) => Ok(column.seconds(clock, text)),
-            (Wanted::Ticks, Cell::Number(_)) => match text.parse() {
-                Ok(ticks) => Ok(column.ticks(ticks)),
+    /// Takes a line without numbers for a row, unless stamps would show that a sample is missing there.
+    fn add_empty_row(&mut self, plan: &RowPlan) {
+        if plan.stamps.is_none() {
+            self.note_break(self.line);
+            self.count += 1;
+        }
+    }
+
+    fn put(&mut self, place: usize, cell: Cell, text: &str, kind: ColumnKind) {
+        let value = match (kind, cell) {
+            (ColumnKind::Nothing, _) | (_, Cell::Empty) => return,
+            (ColumnKind::Numbers, Cell::Number(value) | Cell::Grouped(value)) => Ok(value),
+            (ColumnKind::Clock(first), Cell::Clock(clock)) => Ok(clock.seconds_after(first)),
+            (ColumnKind::Ticks(first), Cell::Number(_)) => match text.parse() {
+                Ok(ticks) => Ok(ticks_after(first, ticks)),
                 Err(_) => Err(HoleKind::Text),
             },
             (_, Cell::NonFinite) => Err(HoleKind::NonFinite),
             _ => Err(HoleKind::Text),
         };
-        let empty = row - column.values.len().min(row);
-        if empty > self.budget {
-            self.too_ragged = Some(line);
-            return;
-        }
-        self.budget -= empty;
-        if column.values.len() < row {
-            column.fill(row, &self.breaks);
-        }
-        column.values.push(value.unwrap_or(f64::NAN));
-        if let Err(what) = value {
-            column.holes.push(Hole {
-                index: row,
-                line,
+        self.push(place, value.unwrap_or(f64::NAN));
+        if let Err(what) = value
+            && self.columns[place].values.len() > self.count
+        {
+            self.columns[place].holes.push(Hole {
+                index: self.count,
+                line: self.line,
                 what,
             });
         }
     }
-}
 
-/// Whether there is something in the line, but only separators.
-fn is_all_separators(text: &str, dialect: Dialect) -> bool {
-    let Delimiter::Byte(byte) = dialect.delimiter else {
-        return false;
-    };
-    byte != b'\t'
-        && text.contains(char::from(byte))
-        && text.chars().all(|c| !c.is_alphanumeric())
-        && !text.trim_start().starts_with(['#', '%', '!', '/'])
-}
+    /// Adds a value to a column; the rows in which it had none become holes.
+    #[inline]
+    fn push(&mut self, place: usize, value: f64) {
+        if self.columns[place].values.len() != self.count {
+            self.fill(place);
+        }
+        self.columns[place].values.push(value);
+    }
 
-/// Whether cells make a row: a number or a date where one is wanted, or nothing at all.
-fn is_row(cells: &[Cell], wanted: &[Wanted]) -> bool {
-    let all_empty = cells.iter().all(|cell| *cell == Cell::Empty);
-    let good = cells
-        .iter()
-        .zip(wanted)
-        .filter(|(cell, wanted)| match wanted {
-            Wanted::Numbers | Wanted::Ticks => cell.is_number() || **cell == Cell::NonFinite,
-            Wanted::Clock => matches!(cell, Cell::Clock(_)),
-            Wanted::Nothing => false,
-        })
-        .count();
-    let bad = cells
-        .iter()
-        .zip(wanted)
-        .filter(|(cell, wanted)| **wanted != Wanted::Nothing && **cell == Cell::Text)
-        .count();
-    all_empty || good > 0 && good >= bad
-}
-
-impl Column {
-    /// Fills up to a row with holes: the cells before it were empty.
+    /// Fills a column up to the present row with holes: the cells before it were empty.
     #[cold]
-    fn fill(&mut self, row: usize, breaks: &[(usize, usize)]) {
-        for index in self.values.len()..row {
-            self.holes.push(Hole {
+    fn fill(&mut self, place: usize) {
+        let column = &mut self.columns[place];
+        let empty = self.count - column.values.len();
+        if empty > self.budget {
+            self.too_ragged = Some(self.line);
+            return;
+        }
+        self.budget -= empty;
+        for index in column.values.len()..self.count {
+            column.holes.push(Hole {
                 index,
-                line: line_of(breaks, index),
+                line: line_of(&self.breaks, index),
                 what: HoleKind::Empty,
             });
-            self.values.push(f64::NAN);
+            column.values.push(f64::NAN);
         }
     }
 
-    /// The difference of an integer to the first one.
-    fn ticks(&mut self, ticks: i64) -> f64 {
-        let first = *self.first_ticks.get_or_insert(ticks);
-        ticks.wrapping_sub(first) as f64
-    }
-
-    /// Seconds of a date or time after the first one. Without a date, a step back by more than half a
-    /// day passes midnight.
-    fn seconds(&mut self, clock: Clock, text: &str) -> f64 {
-        let mut total = clock.total();
-        match &self.first_clock {
-            None => self.first_clock = Some((clock, text.to_owned())),
-            Some(_) if clock.day.is_none() => {
-                let back = self.last_clock - total;
-                total += (back + DAY / 2).div_euclid(DAY).max(0) * DAY;
-            }
-            Some(_) => {}
-        }
-        self.last_clock = total;
-        let first = self.first_clock.as_ref().map_or(total, |(c, _)| c.total());
-        (total - first) as f64 * 1e-9
+    /// Fills columns up to the last row in which any of them has a value.
+    pub fn fill_together(&mut self, places: &[usize]) {
+        let lengths = places.iter().map(|place| self.columns[*place].values.len());
+        let count = std::mem::replace(&mut self.count, lengths.max().unwrap_or(0));
+        places.iter().for_each(|place| self.fill(*place));
+        self.count = count;
     }
 }
 
-impl Plan<'_> {
-    /// Where the text of a cell begins, spaces passed.
-    #[inline]
-    fn skip_to_cell(&self, line: &[u8], mut at: usize, place: usize) -> usize {
-        let is_spaces = self.dialect.delimiter == Delimiter::Spaces;
-        if is_spaces && place > 0 && at < line.len() && !is_space(line[at]) {
-            return line.len();
+impl LineNotes {
+    /// Adds those of the lines after `before` others.
+    pub fn join(&mut self, more: &Self, before: usize) {
+        if let Some((line, text)) = &more.odd {
+            self.odd
+                .get_or_insert_with(|| (before + line, text.clone()));
         }
-        while at < line.len() && (line[at] == b' ' || is_spaces && line[at] == b'\t') {
-            at += 1;
-        }
-        at
-    }
-
-    /// Where the next cell begins, if the cell's number ends here.
-    #[inline]
-    fn cell_end(&self, line: &[u8], mut at: usize, is_last: bool) -> Option<usize> {
-        if self.dialect.delimiter != Delimiter::Spaces {
-            while line.get(at) == Some(&b' ') {
-                at += 1;
-            }
-        }
-        match (line.get(at), self.dialect.delimiter) {
-            // The cells that the row ends before are empty.
-            (None, _) => Some(at),
-            (Some(byte), Delimiter::Byte(mark)) if *byte == mark => {
-                // After the last column there may be empty cells only.
-                let rest_is_empty = || line[at..].iter().all(|byte| *byte == mark || *byte == b' ');
-                (!is_last || rest_is_empty()).then_some(at + 1)
-            }
-            (Some(byte), Delimiter::Spaces) if is_space(*byte) => {
-                let rest_is_empty = || line[at..].iter().all(|byte| is_space(*byte));
-                (!is_last || rest_is_empty()).then_some(at)
-            }
-            _ => None,
-        }
+        self.odd_count += more.odd_count;
+        self.too_wide = self.too_wide.or(more.too_wide.map(|line| before + line));
+        self.zeros += more.zeros;
     }
 }
 
-fn is_space(byte: u8) -> bool {
-    byte == b' ' || byte == b'\t'
+/// Rows of a maker's own table with numbers in some columns, up to a line that begins with one of
+/// `marks`; and where they end.
+pub fn of_numbers(
+    text: &[u8],
+    line: usize,
+    dialect: Dialect,
+    numbers: impl IntoIterator<Item = usize>,
+    marks: &'static [&'static str],
+) -> Result<(Rows, usize), Failure> {
+    let mut kinds = Vec::new();
+    for place in numbers {
+        kinds.resize(kinds.len().max(place + 1), ColumnKind::Nothing);
+        kinds[place] = ColumnKind::Numbers;
+    }
+    let plan = RowPlan {
+        dialect,
+        width: usize::MAX,
+        stamps: Some(0),
+        keeps_stamp_text: false,
+        end: TableEnd::of_marks(marks, dialect),
+        kinds,
+    };
+    let mut rows = Rows::default();
+    rows.begin(line, plan.kinds.len());
+    let end = rows.read(text, &plan)?;
+    Ok((rows, end))
+}
+
+/// A line as text, without zero bytes and its end, and how many zero bytes there were.
+pub(super) fn cleaned(line: &[u8]) -> (String, usize) {
+    let zeros = memchr::memchr_iter(0, line).count();
+    let text = match zeros {
+        0 => decode_line(line),
+        _ => decode_line(
+            &line
+                .iter()
+                .copied()
+                .filter(|b| *b != 0)
+                .collect::<Vec<u8>>(),
+        ),
+    };
+    let text = text.trim_end_matches(['\r', '\n', '\u{1a}']).to_owned();
+    (text, zeros)
+}
+
+/// The difference of integers.
+fn ticks_after(first: i64, ticks: i64) -> f64 {
+    ticks.wrapping_sub(first) as f64
+}
+
+/// Whether cells make a row: a number or a date where one is wanted, and no more texts than those.
+fn is_row(cells: &[Cell], plan: &RowPlan) -> bool {
+    let wanted = || cells.iter().zip(&plan.kinds);
+    let is_good = |(cell, kind): &(&Cell, &ColumnKind)| match kind {
+        ColumnKind::Numbers | ColumnKind::Ticks(_) => cell.is_number() || **cell == Cell::NonFinite,
+        ColumnKind::Clock(_) => matches!(cell, Cell::Clock(_)),
+        ColumnKind::Nothing => false,
+    };
+    let is_bad =
+        |(cell, kind): &(&Cell, &ColumnKind)| **kind != ColumnKind::Nothing && **cell == Cell::Text;
+    let good = wanted().filter(is_good).count();
+    good > 0 && good >= wanted().filter(is_bad).count()
+}
+
+/// Whether a row has data in other columns than those that are wanted, and nothing in these.
+fn is_of_other_columns(cells: &[Cell], plan: &RowPlan) -> bool {
+    let is_wanted = |place: usize| {
+        let kind = plan.kinds.get(place);
+        kind.is_some_and(|kind| *kind != ColumnKind::Nothing)
+    };
+    let mut cells = cells.iter().take(plan.width).enumerate();
+    cells
+        .clone()
+        .any(|(place, cell)| !is_wanted(place) && cell.is_datum())
+        && cells.all(|(place, cell)| !is_wanted(place) || *cell == Cell::Empty)
+}
+
+/// Whether a line that cannot be read was meant for a row: it begins with a digit, has no letters, and
+/// is no date.
+fn is_damaged_row(text: &str, cells: &[Cell]) -> bool {
+    let text = text.trim_start_matches([' ', '\t', '"', '-', '+', '.']);
+    text.starts_with(|c: char| c.is_ascii_digit())
+        && !text.chars().any(char::is_alphabetic)
+        && !cells.iter().any(|cell| matches!(cell, Cell::Clock(_)))
+}
+
+/// Offset and length of a text in one number.
+#[inline]
+pub(super) fn span(offset: usize, length: usize) -> u64 {
+    (offset as u64) << 32 | length as u64
+}
+
+/// Offset and length of the text of a stamp.
+#[inline]
+#[must_use]
+pub fn place_of(span: u64) -> (usize, usize) {
+    ((span >> 32) as usize, (span & 0xFFFF_FFFF) as usize)
+}
+
+/// Position after the line feed that ends the line at `at`.
+#[inline]
+pub(super) fn line_end(text: &[u8], at: usize) -> usize {
+    memchr::memchr(b'\n', &text[at..]).map_or(text.len(), |place| at + place + 1)
 }

@@ -12,9 +12,7 @@ const FEWEST: usize = 3;
 /// out of its axis: what is left is a channel of its own, slower than the rows. Without stamps the
 /// values must lie evenly, and the rate is divided by the rows between them.
 pub fn thin(column: &mut Column, axis: &mut Axis) {
-    let rows = column.values.len();
-    let filled_count = rows.saturating_sub(column.holes.len());
-    if filled_count < FEWEST || 2 * filled_count > rows {
+    if !is_slow(column) {
         return;
     }
     let filled = filled(column);
@@ -38,6 +36,13 @@ pub fn thin(column: &mut Column, axis: &mut Axis) {
     column.values = filled.iter().map(|row| column.values[*row]).collect();
     column.holes = Vec::new();
     *axis = thinned;
+}
+
+/// Whether a column has a value in half of the rows or fewer, but in some.
+pub fn is_slow(column: &Column) -> bool {
+    let rows = column.values.len();
+    let filled = rows.saturating_sub(column.holes.len());
+    filled >= FEWEST && 2 * filled <= rows
 }
 
 /// Rows with a value, if all others are empty.

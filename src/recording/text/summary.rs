@@ -1,7 +1,6 @@
 //! Rows that are no samples: their number above them, largest, least and mean values and totals below.
 
 use super::axes::Role;
-use super::head::{Head, Table};
 use super::rows::{Column, Rows};
 use crate::recording::HoleKind;
 use crate::warning::Warning;
@@ -14,17 +13,19 @@ const PART: usize = 10;
 const DENSE: usize = 100;
 
 /// Leaves out a first row that says how many follow, in each of several columns or beside an empty cell of
-/// time: it is no sample.
-pub fn leave_out_count(rows: &mut Rows) -> Option<Warning> {
-    let below = rows.count.checked_sub(1).filter(|count| *count >= ROWS)?;
+/// time: it is no sample. Of the first rows only (not `is_all`), it may be.
+pub fn leave_out_count(rows: &mut Rows, is_all: bool) -> Option<Warning> {
+    let below = rows.count.checked_sub(1).filter(|count| *count >= ROWS)? as f64;
     let mut first = rows
         .columns
         .iter()
         .filter_map(|column| column.values.first())
         .filter(|value| !value.is_nan())
         .peekable();
-    let is_one_of_many = rows.columns.len() > 1 && first.peek().is_some();
-    if !is_one_of_many || !first.all(|value| *value == below as f64) {
+    let is_one_of_many = rows.columns.len() > 1;
+    let said = **first.peek()?;
+    let may_be = said == below || !is_all && said > below && said.fract() == 0.0;
+    if !is_one_of_many || !may_be || !first.all(|value| *value == said) {
         return None;
     }
     let line = rows.line_of(0);
@@ -33,16 +34,6 @@ pub fn leave_out_count(rows: &mut Rows) -> Option<Warning> {
         "lines-skipped",
         format!("line {line} says how many rows follow, {below}; it was left out"),
     ))
-}
-
-/// Whether the first row may say how many follow: the same whole number in each cell.
-pub fn may_be_count(head: &Head, table: &Table) -> bool {
-    let cells = table.dialect.cells(&head.lines[table.first].text);
-    let mut filled = cells.iter().filter(|cell| !cell.is_empty());
-    let first = filled.next().and_then(|cell| cell.parse::<usize>().ok());
-    cells.len() > 1
-        && first.is_some_and(|first| first >= ROWS)
-        && filled.all(|cell| cell.parse().ok() == first)
 }
 
 /// Leaves out the rows behind the last time stamp whose cells of time hold texts or nothing: they are no
@@ -79,7 +70,7 @@ pub fn leave_out(rows: &mut Rows, roles: &[Role]) -> Option<Warning> {
     }
     let line = rows.line_of(samples);
     rows.truncate(samples);
-    rows.too_wide = rows.too_wide.filter(|wide| *wide < line);
+    rows.notes.too_wide = rows.notes.too_wide.filter(|wide| *wide < line);
     Some(Warning::new(
         "lines-skipped",
         format!(

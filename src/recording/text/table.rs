@@ -1,20 +1,29 @@
-//! One table of numbers with the lines above it, as channels.
+//! One table of numbers with the lines above it: found by the first bytes of a text, then read.
 
-use super::axes::{Axes, Role, Sources};
-use super::blocks;
+mod warnings;
+
+use std::sync::Arc;
+
+use super::axes::{AxisPlan, Role, Sources, StampRule};
+use super::blocks::{self, TableEnd};
 use super::cell::Cell;
+use super::chunks::{Chunks, Piece};
+use super::clock::Clock;
 use super::head::{self, Head, Table};
-use super::header::{self, Header};
-use super::keys::{Entry, Topic};
-use super::rows::{self, Rows, Wanted};
-use super::summary;
+use super::header::{self, Field, Header};
+use super::rows::{Column, ColumnKind, RowPlan, Rows, cleaned};
+use super::{listing, sparse, summary};
 use crate::failure::Failure;
-use crate::io::csv::{Dialect, Options, is_skipped};
-use crate::recording::Channel;
+use crate::io::Reading;
+use crate::recording::text::dialect::{decode_line, is_skipped};
+use crate::recording::{Axis, Channel, HoleKind};
 use crate::warning::Warning;
+pub use warnings::{shortened, truncated};
 
 /// Rows that tell what a column holds.
 const SAMPLE: usize = 400;
+/// Bytes of rows by which the columns and their time are told.
+pub const FIRST_ROWS: usize = 1 << 16;
 
 /// What is known beforehand of a maker's tables.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -25,168 +34,396 @@ pub struct Hints {
     pub unit: Option<&'static str>,
 }
 
+/// A table as its first rows and the lines above them show it.
+#[derive(Debug)]
+pub struct Layout {
+    /// Its columns, and the keys and values above it.
+    pub header: Header,
+    /// How its rows are read.
+    pub plan: RowPlan,
+    /// What its columns are.
+    pub axes: AxisPlan,
+    /// Bytes before its first row.
+    pub offset: usize,
+    /// Line of its first row.
+    pub line: usize,
+    /// Its first rows, and how many bytes they are.
+    pub first_rows: Rows,
+    /// Bytes of the first rows.
+    pub first_bytes: usize,
+    /// Fewest characters of a value in each column.
+    pub shortest: Vec<usize>,
+    /// Zero bytes in the lines above it.
+    zeros_above: usize,
+    /// Rows of each block, if the head says that there are several.
+    pub block_rows: Option<usize>,
+    /// Why it cannot be read row by row, if so.
+    pub held_whole: Option<&'static str>,
+}
+
 /// A table as read.
 #[derive(Debug)]
 pub struct Part {
     /// Its channels, for each block of rows in which time begins anew.
     pub blocks: Vec<Vec<Channel>>,
-    /// How it is written.
-    pub dialect: Dialect,
-    /// Keys and values above it.
-    pub entries: Vec<Entry>,
+    /// Its head.
+    pub header: Header,
     /// What should be known.
     pub warnings: Vec<Warning>,
     /// What is missing.
     pub lost: Option<Warning>,
-    /// Byte after its last row.
-    pub end: usize,
-    /// Number of the line there.
+    /// Number of the line after it.
     pub next_line: usize,
     /// Whether a line there repeats a key of the head.
     pub begins_anew: bool,
 }
 
-/// Reads the table that follows an offset, up to the end or to a line that `stop` tells.
-///
-/// # Errors
-/// If there is no table, or it leaves open how it is to be read.
-pub fn read(
-    text: &[u8],
-    from: usize,
-    number: usize,
-    hints: Hints,
-    options: &Options,
-    stop: &dyn Fn(&str) -> bool,
-) -> Result<Part, Failure> {
-    let (head, table) = head::find(text, from, number, &options.dialect)?;
-    read_at(text, &head, &table, hints, options, stop)
-}
-
-/// The same where the table has been found.
-///
-/// # Errors
-/// See [`read`].
-pub fn read_at(
-    text: &[u8],
-    head: &Head,
-    table: &Table,
-    hints: Hints,
-    options: &Options,
-    stop: &dyn Fn(&str) -> bool,
-) -> Result<Part, Failure> {
-    let wanted = wanted(head, table);
-    let used: Vec<bool> = wanted.iter().map(|kind| kind.is_some()).collect();
-    let mut header = header::read(head, table, &used);
-    let first = first_row(head, table, &header);
-    let wanted: Vec<Wanted> = wanted_from(head, table, first)
-        .into_iter()
-        .map(|kind| kind.unwrap_or(Wanted::Numbers))
-        .collect();
-    super::listing::refuse_variables(head, table, &wanted)?;
-    let names = header.names.clone();
-    let mut entries = header.entries.clone();
-    if let Some(names) = &names {
-        entries.extend(super::keys::entries(0, names, table.dialect));
+impl Layout {
+    /// Finds the next table in a text; `line` is the number of the first line there.
+    ///
+    /// # Errors
+    /// If there is no table, or it leaves open how it is to be read.
+    pub fn find(
+        chunks: &mut Chunks,
+        line: usize,
+        hints: Hints,
+        reading: &Reading,
+    ) -> Result<Self, Failure> {
+        let (head, table) = head::find(chunks, line, &reading.dialect)?;
+        let has_data: Vec<bool> = column_kinds(&head, &table, table.first)
+            .iter()
+            .map(|(kind, _)| kind.is_some())
+            .collect();
+        let mut header = header::read(&head, &table, &has_data);
+        let first = first_row(&head, &table, &header);
+        let (kinds, clock_texts): (Vec<ColumnKind>, Vec<Option<String>>) =
+            column_kinds(&head, &table, first)
+                .into_iter()
+                .map(|(kind, text)| (kind.unwrap_or(ColumnKind::Numbers), text))
+                .unzip();
+        listing::refuse_variables(&head, &table, &kinds)?;
+        if let Some(unit) = hints.unit {
+            header.set_default_units(unit);
+        }
+        let plan = RowPlan {
+            dialect: table.dialect,
+            width: table.width,
+            stamps: Some(0),
+            keeps_stamp_text: false,
+            end: TableEnd::of(&header, &kinds, table.dialect),
+            kinds,
+        };
+        let offset = head.lines[first].offset;
+        let mut found = Self {
+            axes: AxisPlan::default(),
+            offset,
+            line: head.number(first),
+            first_rows: Rows::default(),
+            first_bytes: 0,
+            shortest: shortest_values(&head.lines[first..], &table),
+            zeros_above: 0,
+            block_rows: None,
+            held_whole: None,
+            header,
+            plan,
+        };
+        found.look_at_first_rows(chunks, &clock_texts, hints, reading)?;
+        Ok(found)
     }
-    let is_named = wanted.first() == Some(&Wanted::Nothing);
-    let begins_anew = |line: &str| !is_named && blocks::begins_anew(line, &entries, table.dialect);
-    let is_next = |line: &str| {
-        stop(line) || head::is_end(line) || names.as_deref() == Some(line) || begins_anew(line)
-    };
-    let offset = head.lines[first].offset;
-    let number = head.number(first);
-    let mut rows = rows::read(text, offset, number, table.dialect, &wanted, &is_next)?;
-    let lost = drop_cut_row(text, table.dialect, &mut rows);
-    if let Some(unit) = hints.unit {
-        default_units(&mut header, unit);
-    }
-    let next = crate::io::csv::decode_line(super::line_at(text, rows.end));
-    Ok(Part {
-        end: rows.end,
-        next_line: number + rows.lines,
-        begins_anew: begins_anew(next.trim_end_matches('\r')),
-        lost,
-        ..part_of(header, rows, table.dialect, hints, options)?
-    })
-}
 
-/// Channels of rows as read, and what should be known of them.
-fn part_of(
-    header: Header,
-    mut rows: Rows,
-    dialect: Dialect,
-    hints: Hints,
-    options: &Options,
-) -> Result<Part, Failure> {
-    let find = |rows: &Rows| {
+    /// Reads the first rows and finds the time of the columns by them.
+    fn look_at_first_rows(
+        &mut self,
+        chunks: &mut Chunks,
+        clock_texts: &[Option<String>],
+        hints: Hints,
+        reading: &Reading,
+    ) -> Result<(), Failure> {
+        let (bytes, complete) = chunks.peek(self.offset + FIRST_ROWS)?;
+        self.zeros_above = memchr::memchr_iter(0, &bytes[..self.offset]).count();
+        let text = &bytes[self.offset..];
+        let last = memchr::memrchr(b'\n', text).map_or(0, |place| place + 1);
+        let text = if complete { text } else { &text[..last] };
+        let mut rows = Rows::default();
+        rows.begin(self.line, self.plan.kinds.len());
+        let end = rows.read(text, &self.plan)?;
+        if end < text.len() {
+            self.held_whole = Some("there are several tables, or other lines, below each other");
+        }
+        self.first_bytes = end;
+        if summary::leave_out_count(&mut rows, complete).is_some() {
+            self.held_whole = Some("its first row may say how many follow");
+        }
+        self.axes = self.find_axes(&rows, clock_texts, hints, reading)?;
+        if complete && summary::leave_out(&mut rows, &self.axes.roles).is_some() {
+            self.held_whole = Some("rows of sums follow the samples");
+            self.axes = self.find_axes(&rows, clock_texts, hints, reading)?;
+        }
+        let mut rules = self
+            .axes
+            .rules
+            .iter()
+            .filter_map(|rule| rule.stamps.as_ref());
+        if !rules.all(StampRule::is_of_one_cell) {
+            self.held_whole = Some("its time stands in two columns, or is the sum of steps");
+        }
+        let is_time = |role: &Role| *role == Role::Time;
+        self.plan.stamps = self.axes.roles.iter().position(is_time);
+        if !blocks::restarts(&rows, &self.plan.kinds, &self.axes.roles).is_empty() {
+            self.held_whole = Some("time begins anew within it");
+        }
+        if self
+            .channel_places()
+            .any(|place| sparse::is_slow(&rows.columns[place]))
+        {
+            self.held_whole = Some("some of its channels are slower than its rows");
+        }
+        self.first_rows = rows;
+        Ok(())
+    }
+
+    fn find_axes(
+        &self,
+        rows: &Rows,
+        clock_texts: &[Option<String>],
+        hints: Hints,
+        reading: &Reading,
+    ) -> Result<AxisPlan, Failure> {
         Sources {
-            fields: &header.fields,
+            fields: &self.header.fields,
+            kinds: &self.plan.kinds,
+            clock_texts,
             columns: &rows.columns,
-            entries: &header.entries,
-            decimal: dialect.decimal,
+            entries: &self.header.entries,
+            decimal: self.plan.dialect.decimal,
             default_time_unit: hints.time_unit,
-            options,
+            reading,
         }
         .find()
-    };
-    let count = summary::leave_out_count(&mut rows);
-    let mut axes = find(&rows)?;
-    let summary = summary::leave_out(&mut rows, &axes.roles);
-    if summary.is_some() {
-        axes = find(&rows)?;
     }
-    let mut warnings = warnings(&header, &rows, &axes, dialect);
-    warnings.extend(count.into_iter().chain(summary));
-    let starts = blocks::restarts(&rows, &axes.roles);
-    let mut further: Vec<Rows> = starts
-        .iter()
-        .rev()
-        .map(|row| rows.split_off(*row))
-        .collect();
-    if !further.is_empty() {
-        axes = find(&rows)?;
+
+    /// The columns of the channels.
+    pub fn channel_places(&self) -> impl Iterator<Item = usize> {
+        let roles = self.axes.roles.iter().enumerate();
+        roles.filter_map(|(place, role)| matches!(role, Role::Channel(_)).then_some(place))
     }
-    let mut blocks = vec![channels(&header, rows, &axes)];
-    while let Some(rows) = further.pop() {
-        let axes = find(&rows)?;
-        blocks.push(channels(&header, rows, &axes));
+
+    /// Reads the whole table.
+    ///
+    /// # Errors
+    /// Those of the input, and rows of too different lengths.
+    pub fn read(self, chunks: &mut Chunks) -> Result<Part, Failure> {
+        chunks.skip(self.offset);
+        let mut rows = Rows::default();
+        rows.begin(self.line, self.plan.kinds.len());
+        let (mut piece, mut lost, mut begins_anew) = (Vec::new(), None, false);
+        loop {
+            let kind = chunks.next(&mut piece)?;
+            let end = rows.read(&piece, &self.plan)?;
+            if end < piece.len() {
+                let next = decode_line(piece[end..].split(|b| *b == b'\n').next().unwrap_or(&[]));
+                begins_anew = self.plan.end.begins_anew(next.trim_end_matches('\r'));
+                chunks.put_back(&piece[end..]);
+                break;
+            }
+            if kind == Piece::Unended {
+                lost = self.drop_cut_row(&piece, &mut rows);
+            }
+            if kind != Piece::Lines {
+                break;
+            }
+        }
+        Ok(Part {
+            lost,
+            next_line: rows.line,
+            begins_anew,
+            ..self.part_of(rows)
+        })
     }
-    Ok(Part {
-        blocks,
-        dialect,
-        entries: header.entries,
-        warnings,
-        lost: None,
-        end: 0,
-        next_line: 0,
-        begins_anew: false,
-    })
+
+    /// Channels of rows as read, and what should be known of them.
+    fn part_of(self, mut rows: Rows) -> Part {
+        let mut skipped: Vec<Warning> = summary::leave_out_count(&mut rows, true)
+            .into_iter()
+            .collect();
+        skipped.extend(summary::leave_out(&mut rows, &self.axes.roles));
+        let longest = rows.columns.iter().map(|column| column.values.len()).max();
+        let mut warnings = self.warnings(&rows.notes, longest.unwrap_or(0));
+        warnings.extend(skipped);
+        let starts = match self.block_rows {
+            Some(size) => (size..rows.count).step_by(size).collect(),
+            None => blocks::restarts(&rows, &self.plan.kinds, &self.axes.roles),
+        };
+        let further: Vec<Rows> = starts
+            .iter()
+            .rev()
+            .map(|row| rows.split_off(*row))
+            .collect();
+        let blocks = std::iter::once(rows)
+            .chain(further.into_iter().rev())
+            .map(|rows| self.channels(rows))
+            .collect();
+        Part {
+            blocks,
+            header: self.header,
+            warnings,
+            lost: None,
+            next_line: 0,
+            begins_anew: false,
+        }
+    }
+
+    /// The channels of rows.
+    pub fn channels(&self, mut rows: Rows) -> Vec<Channel> {
+        let mut channels: Vec<Channel> = Vec::new();
+        let mut last: Option<(usize, Axis)> = None;
+        for (place, role) in self.axes.roles.iter().enumerate() {
+            let Role::Channel(rule) = *role else {
+                continue;
+            };
+            // Channels with the same time share their stamps.
+            let axis = match &last {
+                Some((other, axis)) if self.axes.rules[*other] == self.axes.rules[rule] => {
+                    axis.clone()
+                }
+                _ => self.axes.rules[rule].axis(&rows.columns),
+            };
+            last = Some((rule, axis.clone()));
+            let column = match self.is_stamp(place) {
+                true => rows.columns[place].clone(),
+                false => std::mem::take(&mut rows.columns[place]),
+            };
+            channels.push(channel(&self.header.fields[place], column, axis));
+        }
+        channels
+    }
+
+    /// Fewest characters of a value of a column in the first rows.
+    pub fn shortest_value(&self, place: usize) -> usize {
+        self.shortest.get(place).copied().unwrap_or(0)
+    }
+
+    /// Whether stamps are made of a column.
+    fn is_stamp(&self, place: usize) -> bool {
+        let rules = self
+            .axes
+            .rules
+            .iter()
+            .filter_map(|rule| rule.stamps.as_ref());
+        let mut rules =
+            rules.filter(|rule| rule.place == place || rule.milliseconds == Some(place));
+        rules.next().is_some()
+    }
+
+    /// Takes the last row away if the file ends within it: without a line end, and with fewer cells than
+    /// the rows before, a cell that cannot be read, or a stamp that falls.
+    fn drop_cut_row(&self, text: &[u8], rows: &mut Rows) -> Option<Warning> {
+        let mut lines = text
+            .rsplit(|byte| *byte == b'\n')
+            .map(|line| cleaned(line).0);
+        let last = lines.next()?;
+        let cells = |line: &str| self.plan.dialect.cells(line).len();
+        let usual = lines.next().map_or(self.plan.width, |line| cells(&line));
+        let is_unreadable = |column: &Column| {
+            let hole = column.holes.last();
+            hole.is_some_and(|hole| hole.index + 1 == rows.count && hole.what == HoleKind::Text)
+        };
+        let falls = |place: usize| match rows.columns[place].values.as_slice() {
+            [.., before, last] => last < before && place + 1 == self.plan.width,
+            _ => false,
+        };
+        let is_cut = cells(&last) < usual
+            || rows.columns.iter().any(is_unreadable)
+            || self.plan.stamps.is_some_and(falls);
+        if rows.count < 2 || is_skipped(&last) || !is_cut {
+            return None;
+        }
+        rows.truncate(rows.count - 1);
+        Some(truncated(&format!("line {}", rows.line - 1), &last))
+    }
 }
 
-/// What should be known of a table.
-fn warnings(header: &Header, rows: &Rows, axes: &Axes, dialect: Dialect) -> Vec<Warning> {
-    let longest = rows.columns.iter().map(|column| column.values.len()).max();
-    let differs = count_differs(&header.entries, longest.unwrap_or(0), dialect);
-    let mut warnings = odd_lines(rows);
-    warnings.extend(assumptions(axes));
-    warnings.extend(axes.warnings.iter().cloned());
-    warnings.extend(differs);
-    warnings
-}
-
-/// What each column holds in the first rows; `None` if nothing.
-pub fn wanted(head: &Head, table: &Table) -> Vec<Option<Wanted>> {
-    wanted_from(head, table, table.first)
-}
-
-fn wanted_from(head: &Head, table: &Table, first: usize) -> Vec<Option<Wanted>> {
-    #[derive(Clone, Copy, Default)]
-    struct Counts {
-        numbers: usize,
-        ticks: usize,
-        clocks: usize,
-        texts: usize,
+/// A channel out of a column.
+pub fn channel(field: &Field, mut column: Column, mut axis: Axis) -> Channel {
+    sparse::thin(&mut column, &mut axis);
+    if let Some(stamps) = &axis.stamps_s
+        && stamps.len() > column.values.len()
+    {
+        axis.stamps_s = Some(Arc::new(stamps[..column.values.len()].to_vec()));
     }
+    Channel {
+        name: field.name.clone(),
+        heading: field.heading.clone(),
+        unit: field.unit.clone(),
+        unit_text: field.unit_text.clone(),
+        samples: column.values,
+        holes: column.holes,
+        axis,
+        segment: None,
+    }
+}
+
+/// How often a column holds what in the first rows.
+#[derive(Clone, Default)]
+struct Counts {
+    numbers: usize,
+    texts: usize,
+    /// Dates and times, and the first of them.
+    clocks: usize,
+    first_clock: Option<(Clock, String)>,
+    /// Long integers, and the first of them.
+    ticks: usize,
+    first_ticks: i64,
+}
+
+impl Counts {
+    fn add(&mut self, text: &str, decimal: u8) {
+        match Cell::read(text, decimal) {
+            Cell::Number(_) | Cell::Grouped(_) | Cell::NonFinite => {
+                self.numbers += 1;
+                if let Some(ticks) = text.parse().ok().filter(|_| text.len() > 12) {
+                    self.first_ticks = if self.ticks == 0 {
+                        ticks
+                    } else {
+                        self.first_ticks
+                    };
+                    self.ticks += 1;
+                }
+            }
+            Cell::Clock(clock) => {
+                self.clocks += 1;
+                self.first_clock
+                    .get_or_insert_with(|| (clock, text.to_owned()));
+            }
+            Cell::Text => self.texts += 1,
+            Cell::Empty => {}
+        }
+    }
+
+    /// What the column holds; `None` if nothing. And its first date or time, as written.
+    fn kind(self) -> (Option<ColumnKind>, Option<String>) {
+        if self.numbers + self.clocks + self.texts == 0 {
+            return (None, None);
+        }
+        if self.texts > self.numbers + self.clocks {
+            return (Some(ColumnKind::Nothing), None);
+        }
+        match self.first_clock {
+            Some((first, text)) if self.clocks > self.numbers => {
+                (Some(ColumnKind::Clock(first)), Some(text))
+            }
+            _ if self.ticks == self.numbers => (Some(ColumnKind::Ticks(self.first_ticks)), None),
+            _ => (Some(ColumnKind::Numbers), None),
+        }
+    }
+}
+
+/// What each column holds in the rows from a line on, and its first date or time.
+fn column_kinds(
+    head: &Head,
+    table: &Table,
+    first: usize,
+) -> Vec<(Option<ColumnKind>, Option<String>)> {
     let mut counts = vec![Counts::default(); table.width];
     let rows = head.lines[first..]
         .iter()
@@ -195,38 +432,31 @@ fn wanted_from(head: &Head, table: &Table, first: usize) -> Vec<Option<Wanted>> 
     for line in rows {
         let cells = table.dialect.cells(&line.text);
         for (count, cell) in counts.iter_mut().zip(&cells) {
-            match Cell::read(cell, table.dialect.decimal) {
-                Cell::Number(_) | Cell::Grouped(_) | Cell::NonFinite => {
-                    count.numbers += 1;
-                    let is_long = cell.len() > 12 && cell.parse::<i64>().is_ok();
-                    count.ticks += usize::from(is_long);
-                }
-                Cell::Clock(_) => count.clocks += 1,
-                Cell::Text => count.texts += 1,
-                Cell::Empty => {}
-            }
+            count.add(cell, table.dialect.decimal);
         }
     }
-    counts
-        .into_iter()
-        .map(|count| match count {
-            Counts {
-                numbers: 0,
-                clocks: 0,
-                texts: 0,
-                ..
-            } => None,
-            c if c.texts > c.numbers + c.clocks => Some(Wanted::Nothing),
-            c if c.clocks > c.numbers => Some(Wanted::Clock),
-            c if c.ticks == c.numbers => Some(Wanted::Ticks),
-            _ => Some(Wanted::Numbers),
-        })
-        .collect()
+    counts.into_iter().map(Counts::kind).collect()
+}
+
+/// Fewest characters of a value in each column.
+fn shortest_values(rows: &[head::Line], table: &Table) -> Vec<usize> {
+    let mut shortest = vec![usize::MAX; table.width];
+    for line in rows
+        .iter()
+        .filter(|line| !is_skipped(&line.text))
+        .take(SAMPLE)
+    {
+        let cells = table.dialect.cells(&line.text);
+        for (least, cell) in shortest.iter_mut().zip(&cells) {
+            *least = (*least).min(cell.len().max(1));
+        }
+    }
+    shortest
 }
 
 /// The first row: a row with something wrong in it may stand between the headings and the first good
-/// one; it belongs to the table, so that what is wrong is seen.
-pub fn first_row(head: &Head, table: &Table, header: &Header) -> usize {
+/// one; it belongs to the table, so that what is wrong is seen. A whole number alone may count the rows.
+fn first_row(head: &Head, table: &Table, header: &Header) -> usize {
     let Some(names) = &header.names else {
         return table.first;
     };
@@ -245,121 +475,12 @@ pub fn first_row(head: &Head, table: &Table, header: &Header) -> usize {
                 .collect();
             let numbers = read.iter().filter(|cell| cell.is_number()).count();
             numbers > 0
-                && read.len() >= table.width
+                && (read.len() >= table.width
+                    || cells[0].contains(char::from(table.dialect.decimal)))
                 && !cells[0].is_empty()
                 && read[0] != Cell::Text
                 && !head::is_numbering(&cells)
         })
         .last()
         .unwrap_or(table.first)
-}
-
-/// Takes the last row away if the file ends within it: without a line end, with fewer cells than the
-/// rows before.
-fn drop_cut_row(text: &[u8], dialect: Dialect, rows: &mut Rows) -> Option<Warning> {
-    if rows.end != text.len() || text.last().is_none_or(|byte| *byte == b'\n') || rows.count < 2 {
-        return None;
-    }
-    let line_at = |end: usize| memchr::memrchr(b'\n', &text[..end]).map_or(0, |place| place + 1);
-    let last = line_at(text.len());
-    let before = line_at(last.saturating_sub(1));
-    let cells = |bytes: &[u8]| dialect.cells(&crate::io::csv::decode_line(bytes)).len();
-    if cells(&text[last..]) >= cells(&text[before..last.max(1) - 1]) {
-        return None;
-    }
-    rows.truncate(rows.count - 1);
-    Some(Warning::new(
-        "truncated-last-line",
-        "the file ends within its last line; that line was left out",
-    ))
-}
-
-fn default_units(header: &mut Header, unit: &str) {
-    for field in &mut header.fields {
-        let is_other = field.unit_text.is_some()
-            || field.is_named_time()
-            || super::units::is_axis_name(&field.name)
-            || super::units::is_index_name(&field.name);
-        if !is_other {
-            field.unit = super::units::read(unit);
-            field.unit_text = Some(unit.to_owned());
-        }
-    }
-}
-
-/// The channels of a table.
-fn channels(header: &Header, rows: Rows, axes: &Axes) -> Vec<Channel> {
-    let mut channels = Vec::new();
-    for ((field, column), role) in header.fields.iter().zip(rows.columns).zip(&axes.roles) {
-        let Role::Channel(axis) = role else {
-            continue;
-        };
-        channels.push(super::makers::channel(
-            field,
-            column,
-            axes.axes[*axis].clone(),
-            None,
-        ));
-    }
-    channels
-}
-
-fn odd_lines(rows: &Rows) -> Vec<Warning> {
-    let mut warnings = Vec::new();
-    if let Some((line, text)) = rows.odd.first() {
-        // A last word such as EOF is no fault.
-        let is_footer = rows.odd_count == 1 && !text.chars().any(|c| c.is_ascii_digit());
-        if !is_footer {
-            warnings.push(Warning::new(
-                "lines-skipped",
-                format!(
-                    "{} line(s) among the rows are no rows and were left out; the first is line \
-                     {line}: \"{text}\"",
-                    rows.odd_count
-                ),
-            ));
-        }
-    }
-    if let Some(line) = rows.too_wide {
-        warnings.push(Warning::new(
-            "extra-cells",
-            format!("line {line} has more cells than there are columns; they were left out"),
-        ));
-    }
-    warnings
-}
-
-fn assumptions(axes: &Axes) -> Vec<Warning> {
-    let mut said: Vec<&String> = axes
-        .axes
-        .iter()
-        .filter_map(|a| a.assumed.as_ref())
-        .collect();
-    said.dedup();
-    said.into_iter()
-        .map(|text| {
-            Warning::new(
-                "time-assumed",
-                format!("{text}; confirm it with --time-column and --time-unit, or give --rate HZ"),
-            )
-        })
-        .collect()
-}
-
-/// A warning if the head announces another number of samples than there are rows.
-fn count_differs(entries: &[Entry], rows: usize, dialect: Dialect) -> Option<Warning> {
-    let entry = entries
-        .iter()
-        .find(|entry| entry.topic() == Some(Topic::Count))?;
-    let (said, _) = super::keys::quantity(entry.value()?, dialect.decimal)?;
-    let is_count = said.fract() == 0.0 && said >= 2.0;
-    (is_count && said != rows as f64).then(|| {
-        Warning::new(
-            "sample-count",
-            format!(
-                "the head says \"{}\" {said}, but there are {rows} rows",
-                entry.key
-            ),
-        )
-    })
 }

@@ -3,28 +3,36 @@
 use proptest::prelude::*;
 
 use crate::failure::Failure;
-use crate::io::csv::Options;
+use crate::io::Reading;
 use crate::recording::{HoleKind, Recording};
 
 fn read(text: &str) -> Result<Recording, Failure> {
-    super::read("sample", text.as_bytes().to_vec(), &Options::default())
+    super::read("sample", text.as_bytes().to_vec(), &Reading::default())
 }
 
 #[test]
-fn plain_tables_are_told_from_others() {
-    let is = |text: &str| super::is_plain(text.as_bytes(), true, &Options::default());
-    assert!(is("time_s,bridge_V\n0,0.5\n0.1,0.6\n0.2,0.7\n"));
-    assert!(is(
-        "\u{feff}Time [s];Torque [N m]\r\n0,0;1,5\r\n0,1;1,6\r\n"
-    ));
+fn what_has_one_table_of_samples_streams() {
+    let held = |text: &str| {
+        let bytes = Box::new(std::io::Cursor::new(text.as_bytes().to_vec()));
+        let file = super::TextFile::open("sample", bytes, &Reading::default()).unwrap();
+        file.held_whole
+    };
     for text in [
+        "time_s,bridge_V\n0,0.5\n0.1,0.6\n0.2,0.7\n",
+        "\u{feff}Time [s];Torque [N m]\r\n0,0;1,5\r\n0,1;1,6\r\n",
         "time_s,bridge_V\r\r\n0,0.5\r\r\n0.1,0.6\r\r\n",
         "Time;Force [N]\n12:00:00;1\n12:00:01;2\n",
         "t1 [s],a [V],t2 [s],b [V]\n0,1,0,2\n1,2,1,3\n",
-        "X,CH1,Start,Increment,\nSequence,Volt,-1,0.5,\n0,1,\n1,2,\n",
         "time_s,load_N\n0,\"1,234.5\"\n1,\"2,345.5\"\n",
     ] {
-        assert!(!is(text), "{text}");
+        assert_eq!(held(text), None, "{text}");
+    }
+    for text in [
+        "X,CH1,Start,Increment,\nSequence,Volt,-1,0.5,\n0,1,\n1,2,\n",
+        "time_s,a_V\n0,1\n1,2\n\ntime_s,a_V\n0,1\n1,2\n",
+        "Time;ms;Force [N]\n12:00:00;0;1\n12:00:00;500;2\n12:00:01;0;2\n12:00:01;500;2\n",
+    ] {
+        assert!(held(text).is_some(), "{text}");
     }
 }
 
@@ -91,7 +99,7 @@ proptest! {
         if is_cut && !bytes.is_empty() {
             bytes.truncate(cut.index(bytes.len()));
         }
-        let read = super::read("sample", bytes, &Options::default());
+        let read = super::read("sample", bytes, &Reading::default());
         if let Ok(recording) = read {
             for channel in &recording.channels {
                 let finite = channel.samples.iter().filter(|value| value.is_finite()).count();

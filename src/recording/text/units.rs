@@ -7,96 +7,14 @@ use crate::unit::NamedUnit;
 pub use super::axis_names::{
     is_axis_name, is_index_name, is_time_name, is_weak_time_name, spaced, time_stem,
 };
-
-/// Other ways to write a unit, in lower case, and how torqcomp writes it.
-const SYNONYMS: &[(&str, &str)] = &[
-    ("秒", "s"),
-    ("毫秒", "ms"),
-    ("sekunde", "s"),
-    ("sekunden", "s"),
-    ("sek", "s"),
-    ("sek.", "s"),
-    ("secs", "s"),
-    ("sec.", "s"),
-    ("millisekunden", "ms"),
-    ("msek", "ms"),
-    ("msecs", "ms"),
-    ("millis", "ms"),
-    ("mikrosekunden", "us"),
-    ("micros", "us"),
-    ("minuten", "min"),
-    ("mins", "min"),
-    ("stunden", "h"),
-    ("std", "h"),
-    ("hours", "h"),
-    ("vdc", "V"),
-    ("vac", "V"),
-    ("vrms", "V"),
-    ("vpp", "V"),
-    ("adc", "A"),
-    ("aac", "A"),
-    ("arms", "A"),
-    ("ampere", "A"),
-    ("grad", "deg"),
-    ("grd", "deg"),
-    ("°", "deg"),
-    ("grad c", "degC"),
-    ("deg c", "degC"),
-    ("deg. c", "degC"),
-    ("deg f", "degF"),
-    ("u/min", "rpm"),
-    ("upm", "rpm"),
-    ("1/min", "rpm"),
-    ("min-1", "rpm"),
-    ("min^-1", "rpm"),
-    ("r/min", "rpm"),
-    ("rev/min", "rpm"),
-    ("tr/min", "rpm"),
-    ("ot/min", "rpm"),
-    ("obr/min", "rpm"),
-    ("nm", "N m"),
-    ("n.m", "N m"),
-    ("n-m", "N m"),
-    ("ustr", "ustrain"),
-    ("µe", "ustrain"),
-];
-
-/// Units in Cyrillic letters, of which great and small ones differ: с is a second, С stands for °C, нм is a length.
-const CYRILLIC: &[(&str, &str)] = &[
-    ("с", "s"),
-    ("сек", "s"),
-    ("мс", "ms"),
-    ("мкс", "us"),
-    ("Н·м", "N m"),
-    ("Нм", "N m"),
-    ("Н", "N"),
-    ("кН", "kN"),
-    ("В", "V"),
-    ("мВ", "mV"),
-    ("А", "A"),
-    ("Гц", "Hz"),
-    ("кГц", "kHz"),
-    ("об/мин", "rpm"),
-    ("мм", "mm"),
-];
-
-/// Units that no reckoning is done with, told from other words in round brackets all the same.
-const OTHERS: [&str; 35] = [
-    "C", "W", "kW", "MW", "mW", "VA", "kVA", "var", "kvar", "J", "kJ", "Wh", "kWh", "Ah", "mAh",
-    "dB", "dBV", "dBm", "dBA", "counts", "cnt", "LSB", "digits", "inc", "ppm", "lx", "lm", "cd",
-    "mol", "T", "mT", "F", "Ohm", "kOhm", "F/s",
-];
-
-/// Words in the place of a unit that say there is none.
-const NO_UNITS: [&str; 12] = [
-    "", "-", "--", "none", "(none)", "n/a", "without", "no unit", "keine", "ohne", "ts", "rn",
-];
+use super::heading::split;
+use super::vocabulary::{has, meaning};
 
 /// Reads a unit, in brackets or not.
 #[must_use]
 pub fn read(text: &str) -> Option<NamedUnit> {
     let text = unbracketed(text);
-    if NO_UNITS.contains(&text.to_lowercase().as_str()) || text.chars().count() > 24 {
+    if says_none(text) || text.chars().count() > 24 {
         return None;
     }
     if let Some(unit) = NamedUnit::parse(text) {
@@ -112,22 +30,24 @@ pub fn read(text: &str) -> Option<NamedUnit> {
     }
     let lower = text.to_lowercase();
     // NM, Nm and N.m are torque; nm is a length.
-    let synonym = SYNONYMS
-        .iter()
-        .find(|(word, _)| *word == lower && (*word != "nm" || text.starts_with('N')))
-        .or_else(|| CYRILLIC.iter().find(|(word, _)| *word == text))?;
+    let known = meaning("units", &lower).filter(|_| lower != "nm" || text.starts_with('N'));
+    let meaning = known.or_else(|| meaning("units by case", text))?;
     Some(NamedUnit {
         text: text.to_owned(),
-        unit: Unit::parse(synonym.1).ok()?,
+        unit: Unit::parse(meaning).ok()?,
     })
+}
+
+/// Whether a text in the place of a unit says that there is none.
+fn says_none(text: &str) -> bool {
+    text.is_empty() || has("no units", &text.to_lowercase())
 }
 
 /// A unit as written, if the cell names one at all.
 #[must_use]
 pub fn as_written(text: &str) -> Option<String> {
     let text = unbracketed(text);
-    let is_none = NO_UNITS.contains(&text.to_lowercase().as_str());
-    (!is_none && text.chars().count() <= 40).then(|| text.to_owned())
+    (!says_none(text) && text.chars().count() <= 40).then(|| text.to_owned())
 }
 
 /// Without the brackets around the whole.
@@ -159,16 +79,15 @@ pub struct Heading {
     pub unit_text: Option<String>,
 }
 
-/// Reads a heading: what [`crate::io::csv::Column::read`] knows, and `C1 in V`, `U/V`, `Kraft, N`,
+/// Reads a heading: what [`split`] knows, and `C1 in V`, `U/V`, `Kraft, N`,
 /// `Torque Nm`, a unit in brackets before other words, units in square brackets that are not known.
 #[must_use]
 pub fn heading(text: &str) -> Heading {
     // "Zeit" t / s
     let unquoted = text.replace('"', "");
     let text = unquoted.trim();
-    let column = crate::io::csv::Column::read(text, None);
-    if let Some(unit) = column.unit {
-        return Heading::new(column.name, Some(unit), None);
+    if let (name, Some(unit)) = split(text) {
+        return Heading::new(name.to_owned(), Some(unit), None);
     }
     if let Some((name, inside)) = bracket(text) {
         let is_seconds = inside == "S" && is_time_name(&name);
@@ -199,7 +118,7 @@ pub fn heading(text: &str) -> Heading {
     }
     // Vitesse tr/min, Torque Nm
     if let Some((name, word)) = text.rsplit_once(' ')
-        && (is_speed(word) || ONLY_UNITS.contains(&word) && can_end_before_unit(name))
+        && (is_speed(word) || has("units after names", word) && can_end_before_unit(name))
         && ![" in", " en", " em", " /", ","]
             .iter()
             .any(|mark| name.ends_with(mark))
@@ -223,12 +142,6 @@ pub fn heading(text: &str) -> Heading {
     Heading::new(text.to_owned(), time_word(text), None)
 }
 
-/// Words at the end of a name that are units and nothing else; `in`, `min` and `N` are not among them.
-const ONLY_UNITS: &[&str] = &[
-    "Nm", "N·m", "N.m", "N*m", "mNm", "kNm", "Н·м", "Нм", "mN", "kN", "mV", "µV", "uV", "kV", "mA",
-    "Hz", "kHz", "rpm", "kPa", "MPa", "hPa", "lbf", "µm/m", "°C", "°F",
-];
-
 /// Whether a unit can stand behind a text: not behind a number (`lowpass 100 Hz`) nor a word that asks for more
 /// (`mV per Nm`).
 fn can_end_before_unit(name: &str) -> bool {
@@ -240,54 +153,23 @@ fn can_end_before_unit(name: &str) -> bool {
 
 /// Whether a word is a speed, so that its bar parts no name from a unit.
 fn is_speed(word: &str) -> bool {
-    const WORDS: [&str; 15] = [
-        "tr/min", "ot/min", "obr/min", "r/min", "rev/min", "u/min", "1/min", "1/s", "rad/s",
-        "deg/s", "°/s", "m/s", "mm/s", "km/h", "m/min",
-    ];
-    WORDS.contains(&word.to_lowercase().as_str())
+    has("speeds", &word.to_lowercase())
 }
 
 /// The unit of time that is part of a name of time: `millis`, `Time ms`, `elapsed seconds`.
 fn time_word(text: &str) -> Option<NamedUnit> {
-    const WORDS: &[(&str, &str)] = &[
-        ("s", "s"),
-        ("ms", "ms"),
-        ("msec", "ms"),
-        ("millis", "ms"),
-        ("millisecond", "ms"),
-        ("milliseconds", "ms"),
-        ("millisekunden", "ms"),
-        ("us", "us"),
-        ("usec", "us"),
-        ("micros", "us"),
-        ("microsecond", "us"),
-        ("microseconds", "us"),
-        ("mikrosekunden", "us"),
-        ("ns", "ns"),
-        ("nsec", "ns"),
-        ("nanoseconds", "ns"),
-        ("sec", "s"),
-        ("secs", "s"),
-        ("second", "s"),
-        ("seconds", "s"),
-        ("sekunden", "s"),
-        ("sekunde", "s"),
-        ("minutes", "min"),
-        ("minuten", "min"),
-        ("hours", "h"),
-    ];
     let lower = spaced(text).to_lowercase();
     let mut words = lower
         .rsplit(|c: char| !c.is_alphanumeric())
         .filter(|word| !word.is_empty());
-    let known = |word: &str| WORDS.iter().find(|(known, _)| *known == word);
+    let known = |word: &str| meaning("time units", word);
     let last = words.next()?;
     // ms_since_boot; but whole seconds may be counted, as in second_run.
-    let before = || words.filter_map(known).find(|(_, unit)| unit.len() == 2);
-    let (_, unit) = known(last).or_else(before)?;
+    let before = || words.filter_map(known).find(|unit| unit.len() == 2);
+    let unit = known(last).or_else(before)?;
     let meaning = Unit::parse(unit).ok().filter(|_| is_time_name(text))?;
     Some(NamedUnit {
-        text: (*unit).to_owned(),
+        text: unit.to_owned(),
         unit: meaning,
     })
 }
@@ -324,7 +206,7 @@ fn bracket(text: &str) -> Option<(String, &str)> {
                 && !inside.contains(odd)
                 || read(inside).is_some()
                 || inside == "S"
-                || OTHERS.contains(&inside)
+                || has("other units", inside)
                 || inside.len() <= 8 && inside.contains(['/', '%', '°', '²', '^', 'µ']);
             if looks_like_unit && !inside.is_empty() {
                 let rest = [text[..start].trim(), text[start + length + 1..].trim()];
@@ -429,13 +311,6 @@ mod tests {
         for text in ["ms_since_boot", "millis()", "TimeMs", "timeMillis"] {
             let unit = heading(text).unit.expect(text);
             assert_eq!(unit.unit.factor(), 1e-3, "{text}");
-        }
-    }
-
-    #[test]
-    fn every_synonym_leads_to_a_unit() {
-        for (_, unit) in SYNONYMS.iter().chain(CYRILLIC) {
-            assert!(Unit::parse(unit).is_ok(), "{unit}");
         }
     }
 }

@@ -1,8 +1,7 @@
 //! Columns whose names are those of time, but whose values are not used so.
 
-use super::Sources;
 use super::groups::Group;
-use crate::recording::Axis;
+use super::{AxisRule, Sources};
 use crate::warning::Warning;
 
 /// Fewest rows that two columns of time are compared by.
@@ -27,17 +26,18 @@ impl Sources<'_> {
 
     /// Warnings of columns of numbers that were left out beside the time because of their names, but do
     /// not run as it does.
-    pub(super) fn other_times(&self, group: &Group, axis: &Axis) -> Vec<Warning> {
-        let Some(stamps) = axis.stamps_s.as_ref() else {
+    pub(super) fn other_times(&self, group: &Group, rule: &AxisRule) -> Vec<Warning> {
+        let Some(rule) = &rule.stamps else {
             return Vec::new();
         };
+        let stamps = rule.stamps(self.columns);
         let is_other = |place: &&usize| {
             let values = &self.columns[**place].values;
             !self.fields[**place].is_label
                 && !self.is_clock(**place)
                 && values.len() >= ROWS
                 && values.windows(2).all(|pair| pair[1] >= pair[0])
-                && runs_otherwise(values, stamps)
+                && runs_otherwise(values, &stamps)
         };
         let warning = |place: &usize| {
             Warning::new(

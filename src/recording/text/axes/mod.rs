@@ -11,12 +11,13 @@ use torqcomp_dsp::quality::rounding::rounded;
 
 use super::header::Field;
 use super::keys::{self, Entry};
-use super::rows::Column;
+use super::rows::{Column, ColumnKind};
 use crate::failure::Failure;
-use crate::io::csv::Options;
+use crate::io::Reading;
 use crate::recording::{Axis, RateFrom};
 use crate::warning::Warning;
 use groups::{Group, groups};
+pub use stamps::StampRule;
 
 /// Largest difference of a rate in the head from that of the stamps for both to mean the same.
 const SAME: f64 = 0.02;
@@ -28,7 +29,7 @@ const QUANTA: f64 = 1.2;
 /// What a column is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
-    /// A channel, and the place among the axes of its time.
+    /// A channel, and the place among the rules of its time.
     Channel(usize),
     /// Time stamps.
     Time,
@@ -38,22 +39,39 @@ pub enum Role {
     Nothing,
 }
 
-/// The roles of all columns and the axes they refer to.
-#[derive(Debug, Clone)]
-pub struct Axes {
+/// What the columns of a table are and where their time comes from, as its first rows show.
+#[derive(Debug, Clone, Default)]
+pub struct AxisPlan {
     /// One for each column.
     pub roles: Vec<Role>,
-    /// The axes.
-    pub axes: Vec<Axis>,
+    /// Where time comes from.
+    pub rules: Vec<AxisRule>,
     /// What should be known of columns named as time.
     pub warnings: Vec<Warning>,
+}
+
+/// Where the time of channels comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AxisRule {
+    /// The stamps, if there are any.
+    pub stamps: Option<StampRule>,
+    /// The rate in the head and the words that give it.
+    header: Option<(String, f64)>,
+    header_start_s: Option<f64>,
+    given_hz: Option<f64>,
+    start_text: Option<String>,
+    assumed: Option<String>,
 }
 
 /// What the axes are found from.
 pub struct Sources<'a> {
     /// The columns' headings.
     pub fields: &'a [Field],
-    /// Their values.
+    /// What they hold.
+    pub kinds: &'a [ColumnKind],
+    /// The first date or time of each, as written.
+    pub clock_texts: &'a [Option<String>],
+    /// Their values in the first rows.
     pub columns: &'a [Column],
     /// What the head says.
     pub entries: &'a [Entry],
@@ -62,98 +80,39 @@ pub struct Sources<'a> {
     /// Unit of time where a maker's files never name it.
     pub default_time_unit: Option<&'a str>,
     /// What the user says.
-    pub options: &'a Options,
+    pub reading: &'a Reading,
 }
 
-impl Sources<'_> {
-    /// Finds roles and axes.
-    ///
-    /// # Errors
-    /// If the user names a column that is not there, or a unit that is none.
-    pub fn find(&self) -> Result<Axes, Failure> {
-        let count = self.fields.len();
-        let has_data = |place: &usize| !self.columns[*place].values.is_empty();
-        let used: Vec<usize> = (0..count).filter(has_data).collect();
-        let mut roles = vec![Role::Nothing; count];
-        let steps: Vec<usize> = used.iter().copied().filter(|p| self.is_steps(*p)).collect();
-        for place in &steps {
-            roles[*place] = Role::Time;
-        }
-        let used: Vec<usize> = used.into_iter().filter(|p| !steps.contains(p)).collect();
-        let named = self.time_places(&used)?;
-        let index: Vec<usize> = used
-            .iter()
-            .copied()
-            .filter(|place| !named.times.contains(place) && self.is_index(*place, &used))
-            .collect();
-        for place in &index {
-            roles[*place] = Role::Index;
-        }
-        let rest: Vec<usize> = used
-            .iter()
-            .copied()
-            .filter(|p| !index.contains(p))
-            .collect();
-        let (mut axes, mut warnings) = (Vec::new(), Vec::new());
-        warnings.extend(self.falling_time(&rest, &named.times));
-        for group in groups(&named.times, &rest) {
-            for place in &group.times {
-                roles[*place] = Role::Time;
-            }
-            let axis = self.axis(&group, named.assumed.as_deref())?;
-            warnings.extend(self.other_times(&group, &axis));
-            // The time of columns without numbers is no channel.
-            let is_channel = |place: &&usize| !self.fields[**place].is_label;
-            for place in group.channels.iter().filter(is_channel) {
-                roles[*place] = Role::Channel(axes.len());
-                axes.push(self.with_own_rate(axis.clone(), *place));
-            }
-        }
-        Ok(Axes {
-            roles,
-            axes,
-            warnings,
-        })
+impl AxisRule {
+    /// What was taken for granted and should be confirmed.
+    pub fn assumed(&self) -> Option<&str> {
+        self.assumed.as_deref().filter(|_| self.given_hz.is_none())
     }
 
-    /// The axis of a group.
-    fn axis(&self, group: &Group, assumed: Option<&str>) -> Result<Axis, Failure> {
-        let header = self.header_rate(group.channels.first().or(group.times.first()).copied());
-        let stamps = self.stamps(group, header.as_ref().map(|(_, hz)| *hz))?;
-        let mut axis = match stamps.or_else(|| self.stamps_of_steps()) {
-            Some(found) => {
-                let mut axis = Axis::of_stamps(&found.heading, Arc::new(found.stamps_s));
-                axis.assumed = match (assumed, found.assumed) {
-                    (Some(a), Some(b)) => Some(format!("{a}; {b}")),
-                    (a, b) => a.map(str::to_owned).or(b),
-                };
-                axis.start_text = found.start_text;
-                axis
-            }
-            None => match &header {
-                Some((words, hz)) => Axis::of_header(words, *hz, self.header_start()),
+    /// The axis of columns.
+    pub fn axis(&self, columns: &[Column]) -> Axis {
+        let mut axis = match &self.stamps {
+            Some(rule) => Axis::of_stamps(&rule.heading, Arc::new(rule.stamps(columns))),
+            None => match &self.header {
+                Some((words, hz)) => Axis::of_header(words, *hz, self.header_start_s),
                 None => Axis::default(),
             },
         };
-        axis.header_rate_hz = header.as_ref().map(|(_, hz)| *hz);
-        self.prefer_header(&mut axis, header);
-        if let Some(rate_hz) = self.options.rate_hz {
+        axis.header_rate_hz = self.header.as_ref().map(|(_, hz)| *hz);
+        self.prefer_header(&mut axis);
+        axis.assumed = self.assumed().map(str::to_owned);
+        axis.start_text.clone_from(&self.start_text);
+        if let Some(rate_hz) = self.given_hz {
             axis.rate_hz = Some(rate_hz);
             axis.rate_from = RateFrom::Given;
-            axis.assumed = None;
         }
-        // Date and time in words are better than a count of ticks.
-        let is_count = |text: &String| text.bytes().all(|byte| byte.is_ascii_digit());
-        if axis.start_text.as_ref().is_none_or(is_count) {
-            axis.start_text = keys::date_text(self.entries).or(axis.start_text);
-        }
-        Ok(axis)
+        axis
     }
 
     /// Where stamps are too coarse to give the rate but agree with the head on the whole, or differ from
     /// it by their rounding only, the head's rate is the better one.
-    fn prefer_header(&self, axis: &mut Axis, header: Option<(String, f64)>) {
-        let (Some(stamps), Some((words, hz))) = (&axis.stamps_s, header) else {
+    fn prefer_header(&self, axis: &mut Axis) {
+        let (Some(stamps), Some((words, hz))) = (&axis.stamps_s, &self.header) else {
             return;
         };
         let (Some(first), Some(last)) = (stamps.first(), stamps.last()) else {
@@ -169,22 +128,83 @@ impl Sources<'_> {
                 ahead_s <= QUANTA * line.quantum_s
             });
         if coarse && difference < SAME || difference < ROUNDED || is_rounding {
-            axis.rate_hz = Some(hz);
-            axis.rate_from = RateFrom::Header(words);
+            axis.rate_hz = Some(*hz);
+            axis.rate_from = RateFrom::Header(words.clone());
         }
+    }
+}
+
+impl Sources<'_> {
+    /// Finds what the columns are, and the rules of their time.
+    ///
+    /// # Errors
+    /// If the user names a column that is not there, or a unit that is none.
+    pub fn find(&self) -> Result<AxisPlan, Failure> {
+        let count = self.fields.len();
+        let has_data = |place: &usize| !self.columns[*place].values.is_empty();
+        let (steps, used): (Vec<usize>, Vec<usize>) =
+            (0..count).filter(has_data).partition(|p| self.is_steps(*p));
+        let mut roles = vec![Role::Nothing; count];
+        steps.iter().for_each(|place| roles[*place] = Role::Time);
+        let named = self.time_places(&used)?;
+        let (index, rest): (Vec<usize>, Vec<usize>) = used
+            .iter()
+            .partition(|place| !named.times.contains(place) && self.is_index(**place, &used));
+        index.iter().for_each(|place| roles[*place] = Role::Index);
+        let (mut rules, mut warnings) = (Vec::new(), Vec::new());
+        warnings.extend(self.falling_time(&rest, &named.times));
+        for group in groups(&named.times, &rest) {
+            group
+                .times
+                .iter()
+                .for_each(|place| roles[*place] = Role::Time);
+            let rule = self.rule(&group, named.assumed.as_deref())?;
+            warnings.extend(self.other_times(&group, &rule));
+            // The time of columns without numbers is no channel.
+            let is_channel = |place: &&usize| !self.fields[**place].is_label;
+            for place in group.channels.iter().filter(is_channel) {
+                roles[*place] = Role::Channel(rules.len());
+                rules.push(self.with_own_rate(rule.clone(), *place));
+            }
+        }
+        Ok(AxisPlan {
+            roles,
+            rules,
+            warnings,
+        })
+    }
+
+    /// Where the time of a group comes from.
+    fn rule(&self, group: &Group, assumed: Option<&str>) -> Result<AxisRule, Failure> {
+        let header = self.header_rate(group.channels.first().or(group.times.first()).copied());
+        let stamps = self.stamp_rule(group, header.as_ref().map(|(_, hz)| *hz))?;
+        let stamps = stamps.or_else(|| self.rule_of_steps());
+        let of_stamps = stamps.as_ref().and_then(|rule| rule.assumed.as_deref());
+        // Date and time in words are better than a count of ticks.
+        let is_count = |text: &String| text.bytes().all(|byte| byte.is_ascii_digit());
+        let mut start_text = stamps.as_ref().and_then(|rule| rule.start_text.clone());
+        if start_text.as_ref().is_none_or(is_count) {
+            start_text = keys::date_text(self.entries).or(start_text);
+        }
+        Ok(AxisRule {
+            assumed: match (assumed.filter(|_| stamps.is_some()), of_stamps) {
+                (Some(a), Some(b)) => Some(format!("{a}; {b}")),
+                (a, b) => a.or(b).map(str::to_owned),
+            },
+            header_start_s: self.header_start(),
+            given_hz: self.reading.rate_hz,
+            stamps,
+            header,
+            start_text,
+        })
     }
 
     /// The rate of a channel that the head gives for it alone.
-    fn with_own_rate(&self, mut axis: Axis, place: usize) -> Axis {
-        if axis.stamps_s.is_none()
-            && self.options.rate_hz.is_none()
-            && let Some((words, hz)) = self.header_rate(Some(place))
-        {
-            axis.rate_hz = Some(hz);
-            axis.header_rate_hz = Some(hz);
-            axis.rate_from = RateFrom::Header(words);
+    fn with_own_rate(&self, mut rule: AxisRule, place: usize) -> AxisRule {
+        if rule.stamps.is_none() {
+            rule.header = self.header_rate(Some(place)).or(rule.header);
         }
-        axis
+        rule
     }
 
     /// Rate in the head for a column (or for all), and the words that give it.

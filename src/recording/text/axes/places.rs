@@ -3,8 +3,9 @@
 use super::stamps::seconds_of_step;
 use super::{Sources, is_counting};
 use crate::failure::Failure;
-use crate::recording::table::time_column;
+use crate::recording::choice::{Label, choose};
 use crate::recording::text::header::Field;
+use crate::recording::text::rows::ColumnKind;
 use crate::recording::text::units;
 use crate::recording::typical_step;
 
@@ -30,18 +31,8 @@ impl Sources<'_> {
     /// The columns of time: the one the user names, those named as time, the one with a unit of time,
     /// or a first column that can be nothing else.
     pub(super) fn time_places(&self, used: &[usize]) -> Result<TimePlaces, Failure> {
-        if self.options.time_column.is_some() {
-            let columns: Vec<crate::io::csv::Column> = self
-                .fields
-                .iter()
-                .map(|field| crate::io::csv::Column {
-                    heading: field.heading.clone(),
-                    name: field.name.clone(),
-                    unit: field.unit.clone(),
-                })
-                .collect();
-            let place = time_column(&columns, self.options)?;
-            return Ok(TimePlaces::sure(place.into_iter().collect()));
+        if let Some(wanted) = &self.reading.time_column {
+            return Ok(TimePlaces::sure(vec![self.given_time(wanted)?]));
         }
         let field = |place: usize| &self.fields[place];
         let named: Vec<usize> = used
@@ -75,6 +66,13 @@ impl Sources<'_> {
             return Ok(TimePlaces::sure(self.weakly_named(used)));
         }
         Ok(axis)
+    }
+
+    /// The column that the user names, by its number among all columns as well.
+    fn given_time(&self, wanted: &str) -> Result<usize, Failure> {
+        let label = |field| Field::label(field);
+        let labels: Vec<Label> = self.fields.iter().map(label).collect();
+        choose(&labels, Some(wanted), "--time-column")
     }
 
     /// Whether a column is called `t2` where the first is `t`.
@@ -217,7 +215,7 @@ impl Sources<'_> {
     }
 
     pub(super) fn is_clock(&self, place: usize) -> bool {
-        self.columns[place].first_clock.is_some()
+        matches!(self.kinds[place], ColumnKind::Clock(_))
     }
 
     /// Whether a column only counts the samples.

@@ -3,53 +3,111 @@
 use super::groups::Group;
 use super::{SAME, Sources, is_counting};
 use crate::failure::Failure;
-use crate::recording::text::clock::Clock;
+use crate::recording::text::clock::unwrap_midnights;
+use crate::recording::text::rows::{Column, ColumnKind};
 use crate::recording::text::units;
 use crate::recording::typical_step;
 use crate::unit::NamedUnit;
 use torqcomp_model::Unit;
 
-/// Stamps as one column gives them.
-pub(super) struct Stamps {
-    pub(super) heading: String,
-    pub(super) stamps_s: Vec<f64>,
-    pub(super) start_text: Option<String>,
-    pub(super) assumed: Option<String>,
+/// How stamps come out of the columns of a table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StampRule {
+    /// Heading of the column.
+    pub heading: String,
+    /// Its place.
+    pub place: usize,
+    /// Seconds per unit of its values.
+    pub seconds_per_unit: f64,
+    /// Unit of its values, for messages.
+    pub unit: &'static str,
+    /// Whether they are times of day, which begin anew at midnight.
+    pub is_time_of_day: bool,
+    /// The column with the milliseconds of each stamp, if they stand in one of their own.
+    pub milliseconds: Option<usize>,
+    /// Whether each value is the time since the row before.
+    pub is_sum: bool,
+    /// Date and time of the first one as written.
+    pub start_text: Option<String>,
+    /// What was taken for granted.
+    pub assumed: Option<String>,
+}
+
+impl StampRule {
+    /// The stamps in seconds.
+    pub fn stamps(&self, columns: &[Column]) -> Vec<f64> {
+        let mut stamps: Vec<f64> = columns[self.place]
+            .values
+            .iter()
+            .map(|stamp| stamp * self.seconds_per_unit)
+            .collect();
+        if self.is_time_of_day {
+            unwrap_midnights(&mut stamps);
+        }
+        if let Some(place) = self.milliseconds {
+            let parts = &columns[place].values;
+            let first = parts.first().copied().unwrap_or(0.0);
+            for (stamp, part) in stamps.iter_mut().zip(parts) {
+                *stamp += (part - first) * 1e-3;
+            }
+        }
+        if self.is_sum {
+            let mut sum = 0.0;
+            for (row, stamp) in stamps.iter_mut().enumerate() {
+                sum += if row == 0 { 0.0 } else { *stamp };
+                *stamp = sum;
+            }
+        }
+        stamps
+    }
+
+    /// Stamps of a column in seconds.
+    pub fn of_seconds(heading: &str, place: usize) -> Self {
+        Self {
+            heading: heading.to_owned(),
+            place,
+            seconds_per_unit: 1.0,
+            unit: "s",
+            is_time_of_day: false,
+            milliseconds: None,
+            is_sum: false,
+            start_text: None,
+            assumed: None,
+        }
+    }
+
+    /// Whether each row has its stamp in one cell, whatever the other rows say.
+    pub fn is_of_one_cell(&self) -> bool {
+        !self.is_sum && self.milliseconds.is_none()
+    }
 }
 
 impl Sources<'_> {
-    /// Stamps of a group in seconds: of the ways the file writes them, the first that has a step.
-    pub(super) fn stamps(
+    /// How a group's stamps are found: of the ways the file writes them, the finest that has a step.
+    pub(super) fn stamp_rule(
         &self,
         group: &Group,
         header_hz: Option<f64>,
-    ) -> Result<Option<Stamps>, Failure> {
+    ) -> Result<Option<StampRule>, Failure> {
         let mut found = Vec::new();
         for place in &group.times {
-            let column = &self.columns[*place];
-            let stamps = match &column.first_clock {
-                Some((clock, text)) => self.clock_stamps(*place, *clock, text, group),
-                None => self.number_stamps(*place, header_hz)?,
+            let rule = match self.kinds[*place] {
+                ColumnKind::Clock(first) if first.nanoseconds.is_none() => None,
+                ColumnKind::Clock(first) => Some(self.clock_rule(*place, first.day, group)),
+                _ => self.number_rule(*place, header_hz)?,
             };
-            found.extend(stamps);
+            found.extend(rule);
         }
         if found.len() < 2 {
             return Ok(found.pop());
         }
-        // The finest is the one that repeats the fewest stamps.
-        let repeats = |stamps: &Stamps| {
-            stamps
-                .stamps_s
-                .windows(2)
-                .filter(|pair| pair[0] == pair[1])
-                .count()
-        };
+        let repeats = |stamps: &[f64]| stamps.windows(2).filter(|pair| pair[0] == pair[1]).count();
         let best = (0..found.len())
-            .filter(|place| typical_step(&found[*place].stamps_s).is_some())
-            .filter(|place| rises(&found[*place].stamps_s))
-            .min_by_key(|place| repeats(&found[*place]));
-        let date = found.iter().find_map(|stamps| stamps.start_text.clone());
-        let mut best = found.swap_remove(best.unwrap_or(0));
+            .map(|place| (place, found[place].stamps(self.columns)))
+            .filter(|(_, stamps)| typical_step(stamps).is_some() && rises(stamps))
+            .min_by_key(|(_, stamps)| repeats(stamps));
+        let date = found.iter().find_map(|rule| rule.start_text.clone());
+        let mut best = found.swap_remove(best.map_or(0, |(place, _)| place));
         best.start_text = best.start_text.or(date);
         Ok(Some(best))
     }
@@ -73,84 +131,65 @@ impl Sources<'_> {
     }
 
     /// Stamps as the sum of the times from sample to sample, where their unit is known.
-    pub(super) fn stamps_of_steps(&self) -> Option<Stamps> {
+    pub(super) fn rule_of_steps(&self) -> Option<StampRule> {
         let place = (0..self.fields.len()).find(|place| self.is_steps(*place))?;
-        let unit = self.fields[place]
-            .unit
-            .as_ref()
-            .filter(|unit| units::is_time(unit))?;
-        let mut sum = 0.0;
-        let stamps_s = self.columns[place]
-            .values
-            .iter()
-            .enumerate()
-            .map(|(row, step)| {
-                sum += if row == 0 { 0.0 } else { *step };
-                sum * unit.unit.factor()
-            });
-        Some(Stamps {
-            heading: self.fields[place].heading.clone(),
-            stamps_s: stamps_s.collect(),
-            start_text: None,
-            assumed: None,
+        let field = &self.fields[place];
+        let unit = field.unit.as_ref().filter(|unit| units::is_time(unit))?;
+        Some(StampRule {
+            seconds_per_unit: unit.unit.factor(),
+            is_sum: true,
+            ..StampRule::of_seconds(&field.heading, place)
         })
     }
 
-    fn clock_stamps(
-        &self,
-        place: usize,
-        clock: Clock,
-        text: &str,
-        group: &Group,
-    ) -> Option<Stamps> {
-        clock.nanoseconds?;
-        let mut stamps_s = self.columns[place].values.clone();
+    fn clock_rule(&self, place: usize, day: Option<i32>, group: &Group) -> StampRule {
         // Seconds in one column, milliseconds in the next.
-        let part = group.times.iter().find(|p| **p == place + 1).filter(|p| {
-            let values = &self.columns[**p].values;
-            !self.is_clock(**p)
-                && values.iter().all(|v| (0.0..1000.0).contains(v))
-                && !rises(values)
-        });
-        if let Some(part) = part {
-            let first = self.columns[*part].values.first().copied().unwrap_or(0.0);
-            for (stamp, part) in stamps_s.iter_mut().zip(&self.columns[*part].values) {
-                *stamp += (part - first) * 1e-3;
-            }
-        }
-        let date = group.times.iter().find_map(|p| {
-            let (clock, text) = self.columns[*p].first_clock.as_ref()?;
-            (clock.nanoseconds.is_none()).then_some(text)
-        });
-        Some(Stamps {
-            heading: self.fields[place].heading.clone(),
-            stamps_s,
-            start_text: Some(match date.filter(|_| clock.day.is_none()) {
+        let milliseconds = group
+            .times
+            .iter()
+            .copied()
+            .find(|p| *p == place + 1)
+            .filter(|p| {
+                let values = &self.columns[*p].values;
+                !self.is_clock(*p)
+                    && values.iter().all(|v| (0.0..1000.0).contains(v))
+                    && !rises(values)
+            });
+        let text = self.clock_texts[place].clone().unwrap_or_default();
+        let date = group
+            .times
+            .iter()
+            .filter(|p| matches!(self.kinds[**p], ColumnKind::Clock(first) if first.nanoseconds.is_none()))
+            .find_map(|p| self.clock_texts[*p].as_ref());
+        StampRule {
+            is_time_of_day: day.is_none(),
+            milliseconds,
+            start_text: Some(match date.filter(|_| day.is_none()) {
                 Some(date) => format!("{date} {text}"),
-                None => text.to_owned(),
+                None => text,
             }),
-            assumed: None,
-        })
+            ..StampRule::of_seconds(&self.fields[place].heading, place)
+        }
     }
 
-    fn number_stamps(
+    fn number_rule(
         &self,
         place: usize,
         header_hz: Option<f64>,
-    ) -> Result<Option<Stamps>, Failure> {
-        let (field, column) = (&self.fields[place], &self.columns[place]);
+    ) -> Result<Option<StampRule>, Failure> {
+        let field = &self.fields[place];
         let Some((seconds_per_unit, assumed)) = self.seconds_per_unit(place, header_hz)? else {
             return Ok(None);
         };
-        Ok(Some(Stamps {
-            heading: field.heading.clone(),
-            stamps_s: column
-                .values
-                .iter()
-                .map(|stamp| stamp * seconds_per_unit)
-                .collect(),
-            start_text: column.first_ticks.map(|ticks| ticks.to_string()),
+        Ok(Some(StampRule {
+            seconds_per_unit,
+            unit: name_of_unit(seconds_per_unit),
+            start_text: match self.kinds[place] {
+                ColumnKind::Ticks(first) => Some(first.to_string()),
+                _ => None,
+            },
             assumed,
+            ..StampRule::of_seconds(&field.heading, place)
         }))
     }
 
@@ -161,7 +200,7 @@ impl Sources<'_> {
         header_hz: Option<f64>,
     ) -> Result<Option<(f64, Option<String>)>, Failure> {
         let field = &self.fields[place];
-        if let Some(text) = &self.options.time_unit {
+        if let Some(text) = &self.reading.time_unit {
             let unit = Unit::parse(text)
                 .map_err(|error| Failure::usage(format_args!("--time-unit {text}: {error}")))?;
             let named = NamedUnit {
@@ -197,9 +236,9 @@ impl Sources<'_> {
     /// assumed.
     fn seconds_by_size(&self, place: usize) -> (f64, Option<String>) {
         let (field, values) = (&self.fields[place], &self.columns[place].values);
-        let first = match self.columns[place].first_ticks {
-            Some(ticks) => ticks as f64,
-            None => values.first().copied().unwrap_or(0.0).abs(),
+        let first = match self.kinds[place] {
+            ColumnKind::Ticks(first) => first as f64,
+            _ => values.first().copied().unwrap_or(0.0).abs(),
         };
         if let Some(seconds) = epoch_unit(first) {
             return (seconds, None);
@@ -220,6 +259,21 @@ impl Sources<'_> {
         let assumed = format!("\"{}\" gives no unit: seconds were assumed", field.heading);
         (1.0, Some(assumed))
     }
+}
+
+/// What a unit of time is called in messages.
+fn name_of_unit(seconds: f64) -> &'static str {
+    const UNITS: [(f64, &str); 7] = [
+        (1.0, "s"),
+        (1e-3, "ms"),
+        (1e-6, "us"),
+        (1e-9, "ns"),
+        (60.0, "min"),
+        (3600.0, "h"),
+        (86_400.0, "d"),
+    ];
+    let known = UNITS.iter().find(|(factor, _)| *factor == seconds);
+    known.map_or("units", |(_, name)| *name)
 }
 
 /// Seconds per unit of time stamps whose steps are those of a rate.

@@ -1,5 +1,6 @@
 //! A column as its headings describe it.
 
+use crate::recording::choice::Label;
 use crate::recording::text::units::{self, Heading};
 use crate::unit::NamedUnit;
 
@@ -98,6 +99,15 @@ impl Field {
             unit: unit.and_then(|unit| unit_of(name, unit)),
             unit_text: unit.and_then(units::as_written),
             is_label: false,
+        }
+    }
+
+    /// What it goes by.
+    pub(crate) fn label(&self) -> Label<'_> {
+        Label {
+            heading: &self.heading,
+            name: &self.name,
+            segment: None,
         }
     }
 

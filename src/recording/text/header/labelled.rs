@@ -5,40 +5,16 @@ use super::field::Field;
 use super::positional::is_nothing_but_units;
 use crate::recording::text::keys::{self, Topic};
 use crate::recording::text::units;
+use crate::recording::text::vocabulary::has;
 
 /// Whether a cell labels the row of names.
 pub(super) fn is_name_label(cell: &str) -> bool {
-    const LABELS: [&str; 23] = [
-        "tag",
-        "tag name",
-        "tag no.",
-        "channeltitle",
-        "channel title",
-        "name",
-        "names",
-        "channel name",
-        "channel names",
-        "tracename",
-        "trace name",
-        "signal",
-        "signals",
-        "kanal",
-        "kanalname",
-        "channel",
-        "channels",
-        "source",
-        "label",
-        "labels",
-        "bezeichnung",
-        "signal name",
-        "messstelle",
-    ];
     let cell = cell
         .trim()
         .trim_end_matches([':', '='])
         .trim()
         .to_lowercase();
-    LABELS.contains(&cell.as_str())
+    has("names of rows", &cell)
 }
 
 /// A header whose rows are labelled in the first column (and again above every further column of

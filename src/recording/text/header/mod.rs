@@ -9,7 +9,7 @@ mod positional;
 use super::head::{Head, Table};
 use super::keys::{self, Entry};
 use super::units;
-use crate::io::csv::{Delimiter, Dialect};
+use crate::recording::text::dialect::{Delimiter, Dialect};
 pub use field::Field;
 use fill::{fill_axis_unit, fill_from_list, fill_names, fill_time_unit, fill_units};
 use labelled::labelled;
@@ -24,6 +24,22 @@ pub struct Header {
     pub entries: Vec<Entry>,
     /// Text of the line with the names.
     pub names: Option<String>,
+}
+
+impl Header {
+    /// Gives the channels without a unit the one that a maker's files never name.
+    pub fn set_default_units(&mut self, unit: &str) {
+        for field in &mut self.fields {
+            let is_other = field.unit_text.is_some()
+                || field.is_named_time()
+                || units::is_axis_name(&field.name)
+                || units::is_index_name(&field.name);
+            if !is_other {
+                field.unit = units::read(unit);
+                field.unit_text = Some(unit.to_owned());
+            }
+        }
+    }
 }
 
 /// A line above the table, split.

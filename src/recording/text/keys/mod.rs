@@ -3,7 +3,7 @@
 mod values;
 mod words;
 
-use crate::io::csv::{Delimiter, Dialect};
+use crate::recording::text::dialect::{Delimiter, Dialect};
 pub use values::{date_text, quantity, rate_hz, seconds};
 pub use words::{is_vague, topic};
 
@@ -37,6 +37,23 @@ pub enum Topic {
     AxisUnit,
     /// Names of the channels.
     Name,
+}
+
+impl Topic {
+    /// By its name in the vocabulary.
+    fn of(name: &str) -> Option<Self> {
+        Some(match name {
+            "rate" => Self::Rate,
+            "interval" => Self::Interval,
+            "start" => Self::Start,
+            "date" => Self::Date,
+            "count" => Self::Count,
+            "unit" => Self::Unit,
+            "axis unit" => Self::AxisUnit,
+            "name" => Self::Name,
+            _ => return None,
+        })
+    }
 }
 
 impl Entry {

@@ -2,35 +2,30 @@
 //! (GDS-2000 user manual, page 121: "one division includes 25 points of horizontal and vertical data";
 //! GDS-2000A user manual, page 187: fast data are "recorded as integers").
 
-use super::Maker;
+use super::{Maker, Rule};
 use crate::failure::Failure;
-use crate::io::csv::Options;
-use crate::recording::text::decode::Text;
+use crate::io::Reading;
+use crate::recording::text::chunks::Chunks;
 use crate::recording::text::keys;
-use crate::recording::text::table::Hints;
+use crate::recording::text::table::Layout;
 use crate::recording::{Channel, Recording};
 use crate::warning::Warning;
 
 /// Steps of a division of the screen.
 const STEPS: f64 = 25.0;
 
-/// The rule.
-pub const ALL: &[Maker] = &[Maker {
-    name: "GW Instek",
-    is: |head| {
-        head.any(|line| line.starts_with("Waveform Data"))
-            && (head.starts(0, "Format,1.") || head.starts(0, "Memory Length,"))
-            || head.any(|line| line.starts_with("IntpDistance"))
-    },
-    hints: Hints {
-        time_unit: Some("s"),
-        unit: None,
-    },
-    read: Some(read),
-}];
+const MAKER: Maker = Maker::of_seconds("GW Instek").with_reader(read);
 
-fn read(text: &Text, options: &Options) -> Result<Recording, Failure> {
-    let mut recording = crate::recording::text::general(text, ALL[0].hints, options)?;
+/// The rule.
+pub const ALL: &[Rule] = &[(MAKER, |head| {
+    head.any(|line| line.starts_with("Waveform Data"))
+        && (head.starts(0, "Format,1.") || head.starts(0, "Memory Length,"))
+        || head.any(|line| line.starts_with("IntpDistance"))
+})];
+
+fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
+    let layout = Layout::find(chunks, 1, MAKER.hints, reading)?;
+    let mut recording = crate::recording::text::general(chunks, layout, MAKER.hints, reading)?;
     let details = std::mem::take(&mut recording.details);
     let (mut scaled, mut bare) = (Vec::new(), Vec::new());
     for (place, channel) in recording.channels.iter_mut().enumerate() {

@@ -1,30 +1,20 @@
 //! Teledyne LeCroy text export: `LECROY` with the model, `Segments,2,SegmentSize,1252`, a line for each
 //! segment's trigger, then time and amplitude of all segments below each other.
 
-use std::sync::Arc;
-
-use super::Maker;
+use super::{Maker, Rule};
 use crate::failure::Failure;
-use crate::io::csv::Options;
-use crate::recording::text::decode::Text;
+use crate::io::Reading;
+use crate::recording::text::chunks::Chunks;
 use crate::recording::text::head::Head;
-use crate::recording::text::table::{self, Hints};
+use crate::recording::text::table::Layout;
 use crate::recording::text::{FOR_MAKER, recording_of};
-use crate::recording::{Axis, Channel, Hole, RateFrom, Recording, Segment};
+use crate::recording::{Channel, Recording, Segment};
 use crate::warning::Warning;
 
-const HINTS: Hints = Hints {
-    time_unit: Some("s"),
-    unit: None,
-};
+const MAKER: Maker = Maker::of_seconds("LeCroy").with_reader(read);
 
 /// The rule.
-pub const ALL: &[Maker] = &[Maker {
-    name: "LeCroy",
-    is: |head| head.starts(0, "LECROY"),
-    hints: HINTS,
-    read: Some(read),
-}];
+pub const ALL: &[Rule] = &[(MAKER, |head| head.starts(0, "LECROY"))];
 
 /// Segments as the head lists them.
 struct Segments {
@@ -32,49 +22,51 @@ struct Segments {
     list: Vec<Segment>,
 }
 
-fn read(text: &Text, options: &Options) -> Result<Recording, Failure> {
-    let part = table::read(&text.bytes, 0, 1, HINTS, options, &|_| false)?;
-    let mut recording = recording_of(vec![part]);
-    let Some(segments) = segments(&Head::of(&text.bytes, 0, 1, FOR_MAKER)) else {
+fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
+    let (text, complete) = chunks.peek(FOR_MAKER)?;
+    let segments = segments(&Head::of(text, complete, 1));
+    let mut layout = Layout::find(chunks, 1, MAKER.hints, reading)?;
+    let is_cut = |segments: &&Segments| segments.list.len() > 1;
+    layout.block_rows = segments
+        .as_ref()
+        .filter(is_cut)
+        .map(|segments| segments.size);
+    let dialect = layout.plan.dialect.describe();
+    let mut recording = recording_of(vec![layout.read(chunks)?], dialect);
+    let Some(Segments { size, list }) = segments else {
         return Ok(recording);
     };
-    let said = segments.size * segments.list.len();
     recording
         .warnings
         .retain(|warning| warning.code != "sample-count");
-    let there = recording
-        .channels
-        .iter()
-        .map(|channel| channel.samples.len())
-        .max();
-    if there.is_some_and(|there| there < said) {
+    let said = size * list.len();
+    let there = samples_of_a_channel(&recording);
+    if there < said {
         recording.lost = Some(Warning::new(
             "samples-missing",
-            format!(
-                "the head announces {said} samples, but there are {}",
-                there.unwrap_or(0)
-            ),
+            format!("the head announces {said} samples, but there are {there}"),
         ));
     }
-    if segments.list.len() > 1 {
-        let channels = std::mem::take(&mut recording.channels);
-        for place in 0..segments.list.len() {
-            let parts = channels
-                .iter()
-                .filter_map(|channel| part_of(channel, place, &segments));
-            recording.channels.extend(parts);
-        }
-        recording.segments = segments.list;
-    } else if let Some(start) = segments
-        .list
-        .first()
-        .and_then(|one| one.start_text.as_ref())
-    {
-        for channel in &mut recording.channels {
-            channel.axis.start_text = Some(start.clone());
-        }
+    let is_listed = |channel: &Channel| channel.segment.is_none_or(|place| place < list.len());
+    recording.channels.retain(is_listed);
+    for channel in &mut recording.channels {
+        let place = channel.segment.unwrap_or(0);
+        let start = list[place].start_text.clone();
+        channel.axis.start_text = start.or(channel.axis.start_text.take());
+        channel.segment = (list.len() > 1).then_some(place);
     }
+    recording.segments = if list.len() > 1 { list } else { Vec::new() };
     Ok(recording)
+}
+
+/// Samples of the first channel in all segments together.
+fn samples_of_a_channel(recording: &Recording) -> usize {
+    let heading = recording.channels.first().map(|channel| &channel.heading);
+    let same = recording
+        .channels
+        .iter()
+        .filter(|channel| Some(&channel.heading) == heading);
+    same.map(|channel| channel.samples.len()).sum()
 }
 
 /// The cells of a line above the table: between commas, semicolons, tabs or spaces, the date and the
@@ -126,52 +118,4 @@ fn segments(head: &Head) -> Option<Segments> {
         })
         .collect();
     (!list.is_empty()).then_some(Segments { size, list })
-}
-
-/// The samples of one segment.
-fn part_of(channel: &Channel, place: usize, segments: &Segments) -> Option<Channel> {
-    let from = (place * segments.size).min(channel.samples.len());
-    let to = (from + segments.size).min(channel.samples.len());
-    if from == to {
-        return None;
-    }
-    let axis = match &channel.axis.stamps_s {
-        Some(stamps) => {
-            let heading = match &channel.axis.rate_from {
-                RateFrom::Stamps(heading) => heading.clone(),
-                _ => "Time".to_owned(),
-            };
-            let to = to.min(stamps.len());
-            let mut axis = Axis::of_stamps(&heading, Arc::new(stamps[from.min(to)..to].to_vec()));
-            if channel.axis.rate_from == RateFrom::Given {
-                axis.rate_hz = channel.axis.rate_hz;
-                axis.rate_from = RateFrom::Given;
-            }
-            axis
-        }
-        None => channel.axis.clone(),
-    };
-    Some(Channel {
-        samples: channel.samples[from..to].to_vec(),
-        holes: channel
-            .holes
-            .iter()
-            .filter(|hole| (from..to).contains(&hole.index))
-            .map(|hole| Hole {
-                index: hole.index - from,
-                ..*hole
-            })
-            .collect(),
-        axis: Axis {
-            start_text: segments.list[place].start_text.clone(),
-            header_rate_hz: channel.axis.header_rate_hz,
-            assumed: channel.axis.assumed.clone(),
-            ..axis
-        },
-        segment: Some(place),
-        name: channel.name.clone(),
-        heading: channel.heading.clone(),
-        unit: channel.unit.clone(),
-        unit_text: channel.unit_text.clone(),
-    })
 }

@@ -4,14 +4,15 @@
 
 use std::sync::Arc;
 
-use super::{Maker, channel};
+use super::{Maker, Rule};
 use crate::failure::Failure;
-use crate::io::csv::{Delimiter, Dialect, Options};
+use crate::io::Reading;
 use crate::io::number;
-use crate::recording::text::decode::Text;
+use crate::recording::text::chunks::Chunks;
+use crate::recording::text::dialect::{Delimiter, Dialect};
 use crate::recording::text::header::Field;
-use crate::recording::text::rows::{self, Column, Wanted};
-use crate::recording::text::table::Hints;
+use crate::recording::text::rows::{self, Column};
+use crate::recording::text::table::channel;
 use crate::recording::without_rounding;
 use crate::recording::{Axis, Channel, RateFrom, Recording, Segment};
 use crate::warning::Warning;
@@ -19,19 +20,13 @@ use crate::warning::Warning;
 const END: &str = "***End_of_Header***";
 
 /// The rule.
-pub const ALL: &[Maker] = &[Maker {
-    name: "LabVIEW LVM",
-    is: |head| {
+pub const ALL: &[Rule] = &[
+    (Maker::of_seconds("LabVIEW LVM").with_reader(read), |head| {
         // The header of the file may be cut off.
         let is_segment = || head.starts(0, "Channels") && head.any(|line| line.starts_with(END));
         head.starts(0, "LabVIEW Measurement") || is_segment()
-    },
-    hints: Hints {
-        time_unit: Some("s"),
-        unit: None,
-    },
-    read: Some(read),
-}];
+    }),
+];
 
 /// Where the times of the samples stand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,13 +56,14 @@ struct Header {
     steps: Vec<String>,
 }
 
-fn read(text: &Text, options: &Options) -> Result<Recording, Failure> {
+fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
+    let text = chunks.take_all()?;
     let mut lines = Cursor {
-        text: &text.bytes,
+        text: &text,
         at: 0,
         number: 1,
     };
-    let file = file_header(&mut lines, options);
+    let file = file_header(&mut lines, reading);
     let mut recording = Recording::empty("csv", String::new());
     recording.dialect = file.dialect.describe();
     recording.details.clone_from(&file.details);
@@ -81,7 +77,7 @@ fn read(text: &Text, options: &Options) -> Result<Recording, Failure> {
             start_text: joined(&header.dates, &header.times, 0),
         };
         let channels =
-            segment_channels(&mut lines, &file, &header, &names, options, &mut recording)?;
+            segment_channels(&mut lines, &file, &header, &names, reading, &mut recording)?;
         segment.start_s = channels.first().and_then(|channel| channel.axis.start_s);
         recording.channels.extend(channels);
         recording.segments.push(segment);
@@ -115,7 +111,7 @@ impl Cursor<'_> {
         }
         let end =
             memchr::memchr(b'\n', &self.text[self.at..]).map_or(self.text.len(), |p| self.at + p);
-        let line = crate::io::csv::decode_line(&self.text[self.at..end]);
+        let line = crate::recording::text::dialect::decode_line(&self.text[self.at..end]);
         self.at = end + 1;
         self.number += 1;
         Some(line.trim_end_matches('\r').to_owned())
@@ -154,7 +150,7 @@ impl Cursor<'_> {
     }
 }
 
-fn file_header(lines: &mut Cursor, options: &Options) -> File {
+fn file_header(lines: &mut Cursor, reading: &Reading) -> File {
     let mut separator = b'\t';
     let mut decimal = None;
     let mut stamps = Stamps::No;
@@ -186,11 +182,11 @@ fn file_header(lines: &mut Cursor, options: &Options) -> File {
         }
     }
     let dialect = Dialect {
-        delimiter: options
+        delimiter: reading
             .dialect
             .delimiter
             .unwrap_or(Delimiter::Byte(separator)),
-        decimal: options
+        decimal: reading
             .dialect
             .decimal
             .or(decimal)
@@ -253,7 +249,7 @@ fn segment_channels(
     file: &File,
     header: &Header,
     names: &str,
-    options: &Options,
+    reading: &Reading,
     recording: &mut Recording,
 ) -> Result<Vec<Channel>, Failure> {
     let names = file.dialect.cells(names);
@@ -280,12 +276,15 @@ fn segment_channels(
             || Field::new(&format!("channel {}", place + 1), unit),
             |heading| Field::new(heading, unit),
         );
-        let axis = axis(file, header, place, &columns[time], options);
+        let axis = axis(file, header, place, &columns[time], reading);
         let column = columns[value].clone();
         if let Some(missing) = missing(header, place, &field, &column) {
             recording.lost = recording.lost.take().or(Some(missing));
         }
-        channels.push(channel(&field, column, axis, Some(segment)));
+        channels.push(Channel {
+            segment: Some(segment),
+            ..channel(&field, column, axis)
+        });
     }
     Ok(channels)
 }
@@ -303,29 +302,21 @@ fn count(file: &File, header: &Header, names: &[String]) -> usize {
     }
 }
 
-/// Reads the columns of a segment.
+/// Reads the columns of a segment; a remark may stand in the column after the last channel.
 fn columns(lines: &mut Cursor, file: &File, count: usize) -> Result<Vec<Column>, Failure> {
-    let mut wanted = match file.stamps {
-        Stamps::Multi => vec![Wanted::Numbers; 2 * count],
-        Stamps::No | Stamps::One => vec![Wanted::Numbers; 1 + count],
+    let numbers = match file.stamps {
+        Stamps::Multi => 0..2 * count,
+        Stamps::No | Stamps::One => 0..1 + count,
     };
-    // A remark stands in the column after the last channel.
-    wanted.push(Wanted::Nothing);
-    let is_next = |line: &str| line.starts_with("Channels") || line.starts_with("***");
-    let read = rows::read(
-        lines.text,
-        lines.at,
-        lines.number,
-        file.dialect,
-        &wanted,
-        &is_next,
-    )?;
-    lines.at = read.end;
-    lines.number += read.lines;
+    let text = &lines.text[lines.at.min(lines.text.len())..];
+    let marks = &["Channels", "***"];
+    let (read, end) = rows::of_numbers(text, lines.number, file.dialect, numbers, marks)?;
+    lines.at += end;
+    lines.number = read.line;
     Ok(read.columns)
 }
 
-fn axis(file: &File, header: &Header, place: usize, times: &Column, options: &Options) -> Axis {
+fn axis(file: &File, header: &Header, place: usize, times: &Column, reading: &Reading) -> Axis {
     let number = |values: &[String]| {
         // Where one value stands for all channels, it is the first.
         let text = of(values, place).or_else(|| of(values, 0))?;
@@ -346,7 +337,7 @@ fn axis(file: &File, header: &Header, place: usize, times: &Column, options: &Op
     axis.header_rate_hz = header_hz.filter(|_| is_time);
     axis.start_text = joined(&header.dates, &header.times, place)
         .or_else(|| joined(&header.dates, &header.times, 0));
-    if let Some(rate_hz) = options.rate_hz {
+    if let Some(rate_hz) = reading.rate_hz {
         axis.rate_hz = Some(rate_hz);
         axis.rate_from = RateFrom::Given;
     }
@@ -363,7 +354,7 @@ fn no_time(file: &File, header: &Header, values: &Column) -> Option<(Option<Chan
     let dimension = other_dimension(header, 0)?;
     let is_there = file.stamps == Stamps::One && !values.values.is_empty();
     let field = Field::new(dimension, None);
-    let axis = is_there.then(|| channel(&field, values.clone(), Axis::default(), None));
+    let axis = is_there.then(|| channel(&field, values.clone(), Axis::default()));
     let warning = Warning::new(
         "no-time-axis",
         format!(

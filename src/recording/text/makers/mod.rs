@@ -1,20 +1,16 @@
-//! Makers' ways to write recordings. To add one: a file with its rule, and a line in [`MAKERS`].
+//! Makers' ways to write recordings. To add one: a line in the list `makers`
+//! of the vocabulary, or a file with its rule and a line in [`RULES`].
 //!
 //! Most exports differ from a plain table only by what stands above it, and the general reader takes
 //! them as they are: their rule tells their name, and what the files leave unsaid. Those with a
 //! structure of their own have a reader.
 
-use std::sync::Arc;
-
-use super::decode::Text;
+use super::chunks::Chunks;
 use super::head::Head;
-use super::header::Field;
-use super::rows::Column;
-use super::sparse;
 use super::table::Hints;
 use crate::failure::Failure;
-use crate::io::csv::Options;
-use crate::recording::{Axis, Channel, Recording};
+use crate::io::Reading;
+use crate::recording::Recording;
 
 mod gwinstek;
 mod lecroy;
@@ -24,11 +20,10 @@ mod rigol;
 mod tektronix;
 
 /// A way to write recordings.
+#[derive(Debug, Clone, Copy)]
 pub struct Maker {
     /// Its name, for people.
     pub name: &'static str,
-    /// Whether a file is written so, by its first lines.
-    pub is: fn(&Head) -> bool,
     /// What its files leave unsaid.
     pub hints: Hints,
     /// Its reader, if the general one does not do.
@@ -36,10 +31,13 @@ pub struct Maker {
 }
 
 /// Reads a text into a recording without source and dialect.
-pub type Reader = fn(&Text, &Options) -> Result<Recording, Failure>;
+pub type Reader = fn(&mut Chunks, &Reading) -> Result<Recording, Failure>;
 
-/// All ways that have a name, the most particular first.
-pub const MAKERS: &[&[Maker]] = &[
+/// A maker, and whether a file is written so, by its first lines.
+pub type Rule = (Maker, fn(&Head) -> bool);
+
+/// The rules, the most particular first.
+const RULES: &[&[Rule]] = &[
     lvm::ALL,
     lecroy::ALL,
     tektronix::ALL,
@@ -48,37 +46,44 @@ pub const MAKERS: &[&[Maker]] = &[
     names::ALL,
 ];
 
-/// The maker of a file.
-#[must_use]
-pub fn recognise(head: &Head) -> Option<&'static Maker> {
-    MAKERS
-        .iter()
-        .copied()
-        .flatten()
-        .find(|maker| (maker.is)(head))
+impl Maker {
+    /// One whose tables the general reader takes as they are.
+    const fn plain(name: &'static str) -> Self {
+        Self {
+            name,
+            hints: Hints {
+                time_unit: None,
+                unit: None,
+            },
+            read: None,
+        }
+    }
+
+    /// One that never names the unit of time, which is the second.
+    const fn of_seconds(name: &'static str) -> Self {
+        Self {
+            hints: Hints {
+                time_unit: Some("s"),
+                unit: None,
+            },
+            ..Self::plain(name)
+        }
+    }
+
+    /// One with a reader of its own.
+    const fn with_reader(self, read: Reader) -> Self {
+        Self {
+            read: Some(read),
+            ..self
+        }
+    }
 }
 
-/// A channel out of a column.
-pub fn channel(
-    field: &Field,
-    mut column: Column,
-    mut axis: Axis,
-    segment: Option<usize>,
-) -> Channel {
-    sparse::thin(&mut column, &mut axis);
-    if let Some(stamps) = &axis.stamps_s
-        && stamps.len() > column.values.len()
-    {
-        axis.stamps_s = Some(Arc::new(stamps[..column.values.len()].to_vec()));
-    }
-    Channel {
-        name: field.name.clone(),
-        heading: field.heading.clone(),
-        unit: field.unit.clone(),
-        unit_text: field.unit_text.clone(),
-        samples: column.values,
-        holes: column.holes,
-        axis,
-        segment,
-    }
+/// The maker of a file.
+#[must_use]
+pub fn recognise(head: &Head) -> Option<Maker> {
+    let ruled = RULES.iter().copied().flatten().find(|(_, is)| is(head));
+    ruled
+        .map(|(maker, _)| *maker)
+        .or_else(|| names::listed(head))
 }

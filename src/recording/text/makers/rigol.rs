@@ -2,42 +2,34 @@
 //! `X,CH1,CH2,Start,Increment` above `Sequence,Volt,Volt,-3.5e-03,5e-06`; the first column only counts.
 //! The other ways of this maker are plain tables.
 
-use super::{Maker, channel};
+use super::{Maker, Rule};
 use crate::failure::Failure;
-use crate::io::csv::{Delimiter, Dialect, Options};
+use crate::io::Reading;
 use crate::io::number;
 use crate::recording::text::FOR_MAKER;
-use crate::recording::text::decode::Text;
+use crate::recording::text::chunks::Chunks;
+use crate::recording::text::dialect::{Delimiter, Dialect};
 use crate::recording::text::head::Head;
 use crate::recording::text::header::Field;
-use crate::recording::text::rows::{self, Wanted};
-use crate::recording::text::table::Hints;
+use crate::recording::text::rows;
+use crate::recording::text::table::channel;
 use crate::recording::without_rounding;
 use crate::recording::{Axis, RateFrom, Recording};
 
-const HINTS: Hints = Hints {
-    time_unit: Some("s"),
-    unit: None,
-};
 const DIALECT: Dialect = Dialect {
     delimiter: Delimiter::Byte(b','),
     decimal: b'.',
 };
 
 /// The rules.
-pub const ALL: &[Maker] = &[
-    Maker {
-        name: "Rigol, start and increment in the head",
-        is: |head| Start::of(head).is_some(),
-        hints: HINTS,
-        read: Some(read),
-    },
-    Maker {
-        name: "Rigol",
-        is: |head| head.any(|line| line.contains("tInc =") || line.starts_with("\"PosOrig (V)")),
-        hints: HINTS,
-        read: None,
-    },
+pub const ALL: &[Rule] = &[
+    (
+        Maker::of_seconds("Rigol, start and increment in the head").with_reader(read),
+        |head| Start::of(head).is_some(),
+    ),
+    (Maker::of_seconds("Rigol"), |head| {
+        head.any(|line| line.contains("tInc =") || line.starts_with("\"PosOrig (V)"))
+    }),
 ];
 
 /// What the two lines of the head say.
@@ -72,13 +64,15 @@ impl Start {
     }
 }
 
-fn read(text: &Text, options: &Options) -> Result<Recording, Failure> {
-    let head = Head::of(&text.bytes, 0, 1, FOR_MAKER);
+fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
+    let (text, complete) = chunks.peek(FOR_MAKER)?;
+    let head = Head::of(text, complete, 1);
     let (Some(start), Some(first)) = (Start::of(&head), head.lines.get(2)) else {
         return Err(Failure::failed("the file ends before its first sample"));
     };
-    let wanted = vec![Wanted::Numbers; start.width];
-    let read = rows::read(&text.bytes, first.offset, 3, DIALECT, &wanted, &|_| false)?;
+    chunks.skip(first.offset);
+    let text = chunks.take_all()?;
+    let (read, _) = rows::of_numbers(&text, 3, DIALECT, 0..start.width, &[])?;
     let mut recording = Recording::empty("csv", String::new());
     recording.dialect = DIALECT.describe();
     let mut axis = Axis::of_header(
@@ -86,7 +80,7 @@ fn read(text: &Text, options: &Options) -> Result<Recording, Failure> {
         without_rounding(1.0 / start.step_s),
         Some(start.start_s),
     );
-    if let Some(rate_hz) = options.rate_hz {
+    if let Some(rate_hz) = reading.rate_hz {
         axis.rate_hz = Some(rate_hz);
         axis.rate_from = RateFrom::Given;
     }
@@ -108,7 +102,7 @@ fn read(text: &Text, options: &Options) -> Result<Recording, Failure> {
         let field = Field::new(&start.names[place], unit);
         recording
             .channels
-            .push(channel(&field, column, axis.clone(), None));
+            .push(channel(&field, column, axis.clone()));
     }
     Ok(recording)
 }

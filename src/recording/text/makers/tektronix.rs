@@ -4,54 +4,34 @@
 
 use std::sync::Arc;
 
-use super::{Maker, channel};
+use super::{Maker, Rule};
 use crate::failure::Failure;
-use crate::io::csv::{Delimiter, Dialect, Options};
-use crate::recording::text::decode::Text;
+use crate::io::Reading;
+use crate::recording::text::chunks::Chunks;
+use crate::recording::text::dialect::{Delimiter, Dialect};
 use crate::recording::text::head::Head;
 use crate::recording::text::header::Field;
 use crate::recording::text::keys::{self, Entry, Topic};
-use crate::recording::text::rows::{self, Wanted};
-use crate::recording::text::table::Hints;
+use crate::recording::text::rows;
+use crate::recording::text::table::channel;
 use crate::recording::text::{FOR_MAKER, details, units};
 use crate::recording::{Axis, RateFrom, Recording};
 use crate::warning::Warning;
 
-const HINTS: Hints = Hints {
-    time_unit: Some("s"),
-    unit: None,
-};
-
 /// The rules.
-pub const ALL: &[Maker] = &[
-    Maker {
-        name: "Tektronix, keys beside the samples",
-        is: |head| side_by_side(head).is_some(),
-        hints: HINTS,
-        read: Some(read),
-    },
-    Maker {
-        name: "Tektronix",
-        is: |head| {
-            let is_model = |line: &str| {
-                [
-                    "Model,MSO",
-                    "Model,DPO",
-                    "Model,MDO",
-                    "Model,TDS",
-                    "Model,TBS",
-                    "Model,TPS",
-                    "Model,DSA",
-                    "Model,LPD",
-                ]
-                .iter()
-                .any(|start| line.starts_with(start))
-            };
-            head.any(is_model) && head.any(|line| line.starts_with("TIME,"))
-        },
-        hints: HINTS,
-        read: None,
-    },
+pub const ALL: &[Rule] = &[
+    (
+        Maker::of_seconds("Tektronix, keys beside the samples").with_reader(read),
+        |head| side_by_side(head).is_some(),
+    ),
+    (Maker::of_seconds("Tektronix"), |head| {
+        const MODELS: [&str; 8] = ["MSO", "DPO", "MDO", "TDS", "TBS", "TPS", "DSA", "LPD"];
+        let is_model = |line: &str| {
+            let model = line.strip_prefix("Model,").unwrap_or_default();
+            MODELS.iter().any(|start| model.starts_with(start))
+        };
+        head.any(is_model) && head.any(|line| line.starts_with("TIME,"))
+    }),
 ];
 
 /// The dialect and the columns at which keys begin, if the first line is so.
@@ -85,19 +65,20 @@ fn side_by_side(head: &Head) -> Option<(Dialect, Vec<usize>, usize)> {
     None
 }
 
-fn read(text: &Text, options: &Options) -> Result<Recording, Failure> {
-    let head = Head::of(&text.bytes, 0, 1, FOR_MAKER);
-    let Some((dialect, blocks, width)) = side_by_side(&head) else {
+fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
+    let text = chunks.take_all()?;
+    let head = Head::of(
+        &text[..text.len().min(FOR_MAKER)],
+        text.len() <= FOR_MAKER,
+        1,
+    );
+    let Some((dialect, blocks, _)) = side_by_side(&head) else {
         return Err(Failure::failed(
             "the first line has no time and value beside its key",
         ));
     };
-    let mut wanted = vec![Wanted::Nothing; width];
-    for place in &blocks {
-        wanted[place + 3] = Wanted::Numbers;
-        wanted[place + 4] = Wanted::Numbers;
-    }
-    let read = rows::read(&text.bytes, 0, 1, dialect, &wanted, &|_| false)?;
+    let numbers = blocks.iter().flat_map(|place| [place + 3, place + 4]);
+    let (read, _) = rows::of_numbers(&text, 1, dialect, numbers, &[])?;
     let mut recording = Recording::empty("csv", String::new());
     recording.dialect = dialect.describe();
     for place in blocks {
@@ -111,7 +92,7 @@ fn read(text: &Text, options: &Options) -> Result<Recording, Failure> {
         };
         let name = value("Source").unwrap_or_else(|| "voltage".to_owned());
         let field = Field::new(&name, value("Vertical Units").as_deref());
-        let axis = axis(&entries, read.columns[place + 3].values.clone(), options);
+        let axis = axis(&entries, read.columns[place + 3].values.clone(), reading);
         let said = entries
             .iter()
             .find(|entry| entry.topic() == Some(Topic::Count));
@@ -128,7 +109,7 @@ fn read(text: &Text, options: &Options) -> Result<Recording, Failure> {
             ));
         }
         recording.details.extend(details(&entries));
-        recording.channels.push(channel(&field, column, axis, None));
+        recording.channels.push(channel(&field, column, axis));
     }
     Ok(recording)
 }
@@ -149,7 +130,7 @@ fn entries(head: &Head, dialect: Dialect, place: usize) -> Vec<Entry> {
         .collect()
 }
 
-fn axis(entries: &[Entry], stamps: Vec<f64>, options: &Options) -> Axis {
+fn axis(entries: &[Entry], stamps: Vec<f64>, reading: &Reading) -> Axis {
     let unit = entries
         .iter()
         .find(|entry| entry.topic() == Some(Topic::AxisUnit));
@@ -164,7 +145,7 @@ fn axis(entries: &[Entry], stamps: Vec<f64>, options: &Options) -> Axis {
         .iter()
         .find_map(|entry| keys::rate_hz(entry, None, b'.'));
     axis.start_text = keys::date_text(entries);
-    if let Some(rate_hz) = options.rate_hz {
+    if let Some(rate_hz) = reading.rate_hz {
         axis.rate_hz = Some(rate_hz);
         axis.rate_from = RateFrom::Given;
     }

@@ -45,12 +45,7 @@ impl Rows {
             let kept = column.holes.partition_point(|hole| hole.index < row);
             let mut holes = column.holes.split_off(kept);
             holes.iter_mut().for_each(|hole| hole.index -= row);
-            Column {
-                values,
-                holes,
-                first_clock: column.first_clock.clone(),
-                ..Column::default()
-            }
+            Column { values, holes }
         });
         let further = Self {
             columns: columns.collect(),

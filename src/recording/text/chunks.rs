@@ -2,13 +2,17 @@
 
 use std::io::{self, Read};
 
+use crate::failure::Failure;
+
 /// Longest line that is accepted.
 const LONGEST_LINE: usize = 1 << 24;
+/// Bytes of a piece: large enough to be quick, small enough to stay in cache.
+const PIECE: usize = 1 << 17;
 
 /// Cuts a stream into pieces of whole lines.
 pub struct Chunks {
     input: Box<dyn Read + Send>,
-    /// The start of the line that the last piece ended in.
+    /// What was read and not handed out: the head of the file, the start of a line.
     carry: Vec<u8>,
     size: usize,
     at_end: bool,
@@ -26,27 +30,63 @@ pub enum Piece {
 }
 
 impl Chunks {
-    /// Pieces of about `size` bytes; `head` has been read from the input already.
+    /// Pieces of an input.
     #[must_use]
-    pub fn new(head: Vec<u8>, input: Box<dyn Read + Send>, size: usize) -> Self {
+    pub fn new(input: Box<dyn Read + Send>) -> Self {
         Self {
             input,
-            carry: head,
-            size,
+            carry: Vec::new(),
+            size: PIECE,
             at_end: false,
         }
     }
 
-    /// Makes the pieces about so many bytes long.
+    /// Makes the pieces at least so long.
     pub fn set_size(&mut self, bytes: usize) {
-        self.size = bytes;
+        self.size = bytes.max(PIECE);
+    }
+
+    /// The next bytes, as many as there are up to `count`, and whether there are no more. They stay the
+    /// next ones.
+    ///
+    /// # Errors
+    /// Those of the input.
+    pub fn peek(&mut self, count: usize) -> Result<(&[u8], bool), Failure> {
+        let missing = count.saturating_sub(self.carry.len());
+        if missing > 0 && !self.at_end {
+            let mut more = (&mut self.input).take(missing as u64);
+            let read = more.read_to_end(&mut self.carry).map_err(unreadable)?;
+            self.at_end = read < missing;
+        }
+        let end = count.min(self.carry.len());
+        let is_all = self.at_end && end == self.carry.len();
+        Ok((&self.carry[..end], is_all))
+    }
+
+    /// All bytes that are left.
+    ///
+    /// # Errors
+    /// Those of the input.
+    pub fn take_all(&mut self) -> Result<Vec<u8>, Failure> {
+        self.peek(usize::MAX)?;
+        Ok(std::mem::take(&mut self.carry))
+    }
+
+    /// Leaves out bytes that were looked at.
+    pub fn skip(&mut self, count: usize) {
+        self.carry.drain(..count);
+    }
+
+    /// Makes bytes of the last piece the next ones again.
+    pub fn put_back(&mut self, rest: &[u8]) {
+        self.carry.splice(0..0, rest.iter().copied());
     }
 
     /// Fills `piece` with the next whole lines.
     ///
     /// # Errors
-    /// Those of the input, and [`io::ErrorKind::InvalidData`] for a line beyond 16 MiB.
-    pub fn next(&mut self, piece: &mut Vec<u8>) -> io::Result<Piece> {
+    /// Those of the input, and a line beyond 16 MiB.
+    pub fn next(&mut self, piece: &mut Vec<u8>) -> Result<Piece, Failure> {
         // What is carried may be more than one piece: the head of the file.
         let carried = self.carry.len().min(self.size);
         if piece.len() < carried {
@@ -58,7 +98,7 @@ impl Chunks {
         let mut filled = carried;
         loop {
             if self.carry.is_empty() {
-                self.fill(piece, filled)?;
+                self.fill(piece, filled).map_err(unreadable)?;
             } else {
                 piece.truncate(filled);
             }
@@ -67,7 +107,7 @@ impl Chunks {
                 if self.at_end && self.carry.is_empty() && !rest.is_empty() {
                     return Ok(Piece::Unended);
                 }
-                self.carry.splice(0..0, rest);
+                self.put_back(&rest);
                 piece.truncate(last + 1);
                 return Ok(Piece::Lines);
             }
@@ -79,8 +119,7 @@ impl Chunks {
                 });
             }
             if piece.len() > LONGEST_LINE {
-                return Err(io::Error::new(
-                    io::ErrorKind::InvalidData,
+                return Err(Failure::failed(
                     "a line is longer than 16 MiB: this is no table of numbers",
                 ));
             }
@@ -107,14 +146,8 @@ impl Chunks {
     }
 }
 
-/// Reads the first bytes of an input, as many as there are up to `size`.
-///
-/// # Errors
-/// Those of the input.
-pub fn head(input: &mut dyn Read, size: usize) -> io::Result<Vec<u8>> {
-    let mut head = Vec::new();
-    input.take(size as u64).read_to_end(&mut head)?;
-    Ok(head)
+fn unreadable(error: io::Error) -> Failure {
+    Failure::failed(format_args!("cannot be read: {error}"))
 }
 
 #[cfg(test)]
@@ -123,8 +156,10 @@ mod tests {
     use proptest::prelude::*;
 
     fn pieces(head: &[u8], rest: &[u8], size: usize) -> (Vec<Vec<u8>>, Piece) {
-        let input = Box::new(io::Cursor::new(rest.to_vec()));
-        let mut chunks = Chunks::new(head.to_vec(), input, size);
+        let input = io::Cursor::new([head, rest].concat());
+        let mut chunks = Chunks::new(Box::new(input));
+        chunks.peek(head.len()).unwrap();
+        chunks.size = size;
         let (mut all, mut piece) = (Vec::new(), Vec::new());
         loop {
             match chunks.next(&mut piece).unwrap() {

@@ -2,34 +2,43 @@
 //!
 //! Recorders write every number with the same digits. Once the places of a row's signs, digits and
 //! marks are known, the next row need not be searched for them: they are checked where they are
-//! expected, all digits of a run at once. A row that differs is read the usual way and is the new
-//! habit. Both ways give the same bits.
+//! expected, all digits of a run at once. A row that differs is read the usual way and is the next
+//! template. Both ways give the same bits.
 
-use super::layout::Delimiter;
-use super::scan::{QuickRow, RowPlan, end_of_row, span};
+use super::rows::{ColumnKind, RowPlan, span};
 use crate::io::number::{self, Parts};
+use crate::recording::text::dialect::Delimiter;
 
-/// Rows in a row that make a habit worth following at once when it changes.
+/// Rows in a row that make a template worth following at once when it changes.
 const STEADY: usize = 8;
 /// Most rows that are read the usual way before the next attempt.
 const LONGEST_PAUSE: usize = 64;
-
 /// Digits that are read at once.
 const LONGEST_RUN: usize = 8;
 /// Digits up to which every number is an `f64` times a power of ten.
 const MOST_DIGITS: usize = 15;
 
-/// How the numbers of a row are written, as far as it is the same from row to row.
+/// How the two numbers of a row are written, as far as it is the same from row to row.
 #[derive(Debug)]
-pub(super) struct Habit {
-    /// Whether rows can have one: two numbers beside each other at their start.
-    possible: bool,
-    shape: Option<[Shape; 2]>,
+pub(super) struct RowTemplate {
+    /// What parts the cells, where rows can have a template: two numbers beside each other at their start.
+    separator: Option<u8>,
+    /// Which of the two is a stamp whose last bit does not matter.
+    stamp: Option<usize>,
+    shapes: Option<[Shape; 2]>,
     /// Rows that followed it.
     followed: usize,
     /// Rows until the next attempt.
     pause: usize,
     last_pause: usize,
+}
+
+/// A row as read.
+pub(super) struct TemplateRow {
+    pub(super) values: [f64; 2],
+    pub(super) stamp_text: u64,
+    /// Where the next line begins.
+    pub(super) end: usize,
 }
 
 /// Places within a number, its sign left out, and what does not change with them.
@@ -53,12 +62,16 @@ struct Run {
     scale: u64,
 }
 
-impl Habit {
+impl RowTemplate {
     pub(super) fn of(plan: &RowPlan) -> Self {
-        let at_start = matches!((plan.time, plan.value), (Some(0), 1) | (Some(1), 0));
+        let is_pair = plan.kinds == [ColumnKind::Numbers; 2];
         Self {
-            possible: at_start && matches!(plan.dialect.delimiter, Delimiter::Byte(_)),
-            shape: None,
+            separator: match plan.dialect.delimiter {
+                Delimiter::Byte(mark) if is_pair => Some(mark),
+                _ => None,
+            },
+            stamp: plan.stamps.filter(|_| plan.keeps_stamp_text),
+            shapes: None,
             followed: 0,
             pause: 0,
             last_pause: 0,
@@ -67,75 +80,70 @@ impl Habit {
 
     /// The row at `at`, if it is written like the one before.
     #[inline(always)]
-    pub(super) fn row(&mut self, text: &[u8], at: usize, plan: &RowPlan) -> Option<QuickRow> {
-        let shape = self.shape.as_ref()?;
-        let Delimiter::Byte(separator) = plan.dialect.delimiter else {
-            return None;
-        };
+    pub(super) fn row(&mut self, text: &[u8], at: usize, plan: &RowPlan) -> Option<TemplateRow> {
+        let shapes = self.shapes.as_ref()?;
         let decimal = plan.dialect.decimal;
-        let (first, first_end) = shape[0].read(text, at, decimal)?;
-        if *text.get(first_end)? != separator {
+        let (first, first_end) = shapes[0].read(text, at, decimal)?;
+        if text.get(first_end).copied() != self.separator {
             return None;
         }
         let second_start = first_end + 1;
-        let (second, second_end) = shape[1].read(text, second_start, decimal)?;
-        let end = end_of_row(text, second_end, separator)?;
-        self.followed += 1;
-        let row = if plan.value == 1 {
-            QuickRow {
-                time: first.nearly()?,
-                time_text: span(at, first_end - at),
-                value: second.exactly()?,
-                end,
-            }
-        } else {
-            QuickRow {
-                time: second.nearly()?,
-                time_text: span(second_start, second_end - second_start),
-                value: first.exactly()?,
-                end,
-            }
+        let (second, second_end) = shapes[1].read(text, second_start, decimal)?;
+        let end = plan.row_end(text, second_end)?;
+        let (values, stamp_text) = match self.stamp {
+            Some(0) => (
+                [first.nearly()?, second.exactly()?],
+                span(at, first_end - at),
+            ),
+            Some(_) => (
+                [first.exactly()?, second.nearly()?],
+                span(second_start, second_end - second_start),
+            ),
+            None => ([first.exactly()?, second.exactly()?], 0),
         };
-        Some(row)
+        self.followed += 1;
+        Some(TemplateRow {
+            values,
+            stamp_text,
+            end,
+        })
     }
 
-    /// Takes the row at `at`, which was read the usual way, for the new habit.
+    /// Takes the row at `at`, which was read the usual way, for the next template.
     #[inline]
     pub(super) fn learn(&mut self, text: &[u8], at: usize, plan: &RowPlan) {
-        if !self.possible {
+        let Some(separator) = self.separator else {
             return;
-        }
+        };
         if self.pause > 0 {
             self.pause -= 1;
             return;
         }
-        self.last_pause = if self.followed >= STEADY || self.shape.is_none() {
+        self.last_pause = if self.followed >= STEADY || self.shapes.is_none() {
             0
         } else {
             (2 * self.last_pause + 1).min(LONGEST_PAUSE)
         };
         self.followed = 0;
         self.pause = self.last_pause;
-        self.shape = if self.pause == 0 {
-            Self::shapes(text, at, plan)
+        self.shapes = if self.pause == 0 {
+            Shape::of_row(text, at, separator, plan.dialect.decimal)
         } else {
             None
         };
     }
-
-    #[cold]
-    fn shapes(text: &[u8], at: usize, plan: &RowPlan) -> Option<[Shape; 2]> {
-        let Delimiter::Byte(separator) = plan.dialect.delimiter else {
-            return None;
-        };
-        let (first, end) = Shape::of(text, at, plan.dialect.decimal)?;
-        (text.get(end) == Some(&separator)).then_some(())?;
-        let (second, _) = Shape::of(text, end + 1, plan.dialect.decimal)?;
-        Some([first, second])
-    }
 }
 
 impl Shape {
+    /// The shapes of the two numbers of a row.
+    #[cold]
+    fn of_row(text: &[u8], at: usize, separator: u8, decimal: u8) -> Option<[Self; 2]> {
+        let (first, end) = Self::of(text, at, decimal)?;
+        (text.get(end) == Some(&separator)).then_some(())?;
+        let (second, _) = Self::of(text, end + 1, decimal)?;
+        Some([first, second])
+    }
+
     /// The shape of the number at `at`, and its end.
     fn of(text: &[u8], at: usize, decimal: u8) -> Option<(Self, usize)> {
         let digits = |from: usize| {
@@ -220,9 +228,10 @@ impl Run {
 
 #[cfg(test)]
 mod tests {
-    use super::super::layout::Dialect;
-    use super::super::scan::Rows;
+    use super::super::blocks::TableEnd;
+    use super::super::rows::Rows;
     use super::*;
+    use crate::recording::text::dialect::Dialect;
     use proptest::prelude::*;
 
     const COMMA: Dialect = Dialect {
@@ -230,32 +239,38 @@ mod tests {
         decimal: b'.',
     };
 
-    fn plan(time: usize, value: usize) -> RowPlan {
+    fn plan(time: usize) -> RowPlan {
         RowPlan {
             dialect: COMMA,
-            time: Some(time),
-            value,
+            kinds: vec![ColumnKind::Numbers; 2],
+            width: 2,
+            stamps: Some(time),
+            keeps_stamp_text: true,
+            end: TableEnd::of_marks(&[], COMMA),
         }
     }
 
-    /// Rows read together, and each on its own, where there is no habit.
-    fn both(lines: &[String], plan: RowPlan) -> (Rows, Rows) {
+    /// Rows read together, and each on its own, where there is no template.
+    fn both(lines: &[String], plan: &RowPlan) -> (Rows, Rows) {
         let (mut together, mut single, mut line) =
             (Rows::default(), Rows::default(), Rows::default());
-        together.read(lines.concat().as_bytes(), &plan);
+        for rows in [&mut together, &mut single] {
+            rows.begin(0, 2);
+        }
+        together.read(lines.concat().as_bytes(), plan).unwrap();
         let mut offset = 0;
         for text in lines {
-            line.read(text.as_bytes(), &plan);
-            single.times.extend(&line.times);
-            single.values.extend(&line.values);
-            let moved = line.time_text.iter().map(|s| s + ((offset as u64) << 32));
-            single.time_text.extend(moved);
-            single.lines += line.lines;
-            offset += text.len();
-            if line.problem.is_some() {
-                single.problem.clone_from(&line.problem);
-                break;
+            line.begin(single.line, 2);
+            line.read(text.as_bytes(), plan).unwrap();
+            line.fill_together(&[0, 1]);
+            for (all, more) in single.columns.iter_mut().zip(&line.columns) {
+                all.values.extend(&more.values);
             }
+            let moved = line.stamp_text.iter().map(|s| s + ((offset as u64) << 32));
+            single.stamp_text.extend(moved);
+            single.line = line.line;
+            single.count += line.count;
+            offset += text.len();
         }
         (together, single)
     }
@@ -265,15 +280,18 @@ mod tests {
     }
 
     fn follows(text: &str) -> bool {
-        let plan = plan(0, 1);
-        let mut habit = Habit::of(&plan);
-        habit.learn(text.as_bytes(), 0, &plan);
+        let plan = RowPlan {
+            width: 3,
+            ..plan(0)
+        };
+        let mut template = RowTemplate::of(&plan);
+        template.learn(text.as_bytes(), 0, &plan);
         let second = text.find('\n').unwrap() + 1;
-        habit.row(text.as_bytes(), second, &plan).is_some()
+        template.row(text.as_bytes(), second, &plan).is_some()
     }
 
     #[test]
-    fn what_makes_a_habit() {
+    fn what_makes_a_template() {
         let padding = " ".repeat(16);
         let follows = |text: &str| follows(&format!("{text}{padding}"));
         assert!(follows("0.00,1.5\n0.01,2.5\n"));
@@ -287,6 +305,8 @@ mod tests {
         assert!(!follows("0.00,1.5\n0.01;1.5\n"));
         assert!(!follows("0,1.000000000000000\n1,1.000000000000000\n"));
         assert!(!follows("0.00,nan\n0.01,nan\n"));
+        // A number goes on before a column that is not wanted.
+        assert!(!follows("0.00,1.5,7\n0.01,2.55,7\n"));
     }
 
     proptest! {
@@ -297,7 +317,7 @@ mod tests {
             swapped: bool,
             crlf: bool,
         ) {
-            // The style changes only now and then, as habits need.
+            // The style changes only now and then, as templates need.
             let (mut digits, mut scientific) = (5, false);
             let lines: Vec<String> = rows.iter().map(|(i, value, new_digits, new_form, change)| {
                 if *change == 0 {
@@ -318,13 +338,14 @@ mod tests {
                 let end = if crlf { "\r\n" } else { "\n" };
                 if swapped { format!("{value},{time}{end}") } else { format!("{time},{value}{end}") }
             }).collect();
-            let plan = if swapped { plan(1, 0) } else { plan(0, 1) };
-            let (together, single) = both(&lines, plan);
-            prop_assert_eq!(bits(&together.values), bits(&single.values));
-            prop_assert_eq!(bits(&together.times), bits(&single.times));
-            prop_assert_eq!(together.time_text, single.time_text);
-            prop_assert_eq!(together.lines, single.lines);
-            prop_assert_eq!(together.problem.map(|p| p.what), single.problem.map(|p| p.what));
+            let plan = plan(usize::from(swapped));
+            let (mut together, single) = both(&lines, &plan);
+            together.fill_together(&[0, 1]);
+            for (a, b) in together.columns.iter().zip(&single.columns) {
+                prop_assert_eq!(bits(&a.values), bits(&b.values));
+            }
+            prop_assert_eq!(together.stamp_text, single.stamp_text);
+            prop_assert_eq!((together.line, together.count), (single.line, single.count));
         }
     }
 }

@@ -1,0 +1,118 @@
+//! How cells and numbers are written, and the cells of a line.
+
+pub use crate::io::Delimiter;
+use crate::io::DialectOverride;
+
+/// How numbers and cells are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Dialect {
+    /// What separates cells.
+    pub delimiter: Delimiter,
+    /// Decimal mark: `.` or `,`.
+    pub decimal: u8,
+}
+
+impl Dialect {
+    /// Cells of a line, spaces around them taken off; quoted cells are unquoted.
+    #[must_use]
+    pub fn cells(self, line: &str) -> Vec<String> {
+        let line = line.trim_end_matches(['\r', '\n']);
+        match self.delimiter {
+            Delimiter::None => vec![line.trim().to_owned()],
+            Delimiter::Spaces => line.split_whitespace().map(str::to_owned).collect(),
+            Delimiter::Byte(byte) if line.contains('"') => quoted_cells(line, byte),
+            Delimiter::Byte(byte) => line
+                .split(char::from(byte))
+                .map(|cell| cell.trim().to_owned())
+                .collect(),
+        }
+    }
+
+    /// Name for people.
+    #[must_use]
+    pub fn describe(self) -> String {
+        let delimiter = match self.delimiter {
+            Delimiter::Byte(b'\t') => "tab-separated".to_owned(),
+            Delimiter::Byte(b',') => "comma-separated".to_owned(),
+            Delimiter::Byte(b';') => "semicolon-separated".to_owned(),
+            Delimiter::Byte(byte) => format!("separated by \"{}\"", char::from(byte)),
+            Delimiter::Spaces => "separated by spaces".to_owned(),
+            Delimiter::None => "one column".to_owned(),
+        };
+        let decimal = if self.decimal == b',' {
+            "comma"
+        } else {
+            "point"
+        };
+        format!("{delimiter}, decimal {decimal}")
+    }
+}
+
+/// Cells of a line with quotes, as the `csv` crate reads them.
+fn quoted_cells(line: &str, delimiter: u8) -> Vec<String> {
+    let mut reader = csv::ReaderBuilder::new()
+        .delimiter(delimiter)
+        .has_headers(false)
+        .flexible(true)
+        .from_reader(line.as_bytes());
+    let mut record = csv::StringRecord::new();
+    match reader.read_record(&mut record) {
+        Ok(true) => record.iter().map(|cell| cell.trim().to_owned()).collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// Whether a line is empty, a comment, or has nothing but separators.
+#[must_use]
+pub fn is_skipped(line: &str) -> bool {
+    let text = line.trim();
+    is_comment(text) || text.chars().all(|c| matches!(c, ',' | ';' | '\t' | ' '))
+}
+
+/// Whether a line is a comment.
+#[must_use]
+pub fn is_comment(line: &str) -> bool {
+    let text = line.trim_start();
+    text.starts_with(['#', '%', '!']) || text.starts_with("//")
+}
+
+/// UTF-8, or else the Windows-1252 of older recorders (Latin-1 with quotation marks and dashes), in
+/// which any byte is a character.
+#[must_use]
+pub fn decode_line(bytes: &[u8]) -> String {
+    match std::str::from_utf8(bytes) {
+        Ok(text) => text.to_owned(),
+        Err(_) => encoding_rs::WINDOWS_1252
+            .decode_without_bom_handling(bytes)
+            .0
+            .into_owned(),
+    }
+}
+
+/// Dialects in the order of preference between equals. A decimal comma between commas needs quotes.
+pub fn dialects(told: &DialectOverride, quoted: bool) -> Vec<Dialect> {
+    let delimiters = match told.delimiter {
+        Some(delimiter) => vec![delimiter],
+        None => vec![
+            Delimiter::Byte(b'\t'),
+            Delimiter::Byte(b';'),
+            Delimiter::Byte(b','),
+            Delimiter::Byte(b'|'),
+            Delimiter::Spaces,
+            Delimiter::None,
+        ],
+    };
+    let decimals = match told.decimal {
+        Some(decimal) => vec![decimal],
+        None => vec![b'.', b','],
+    };
+    let mut all = Vec::new();
+    for delimiter in delimiters {
+        for &decimal in &decimals {
+            if delimiter != Delimiter::Byte(decimal) || quoted {
+                all.push(Dialect { delimiter, decimal });
+            }
+        }
+    }
+    all
+}

@@ -1,0 +1,166 @@
+//! A row of plain numbers, read without looking twice.
+
+use super::{ColumnKind, RowPlan, Rows, line_end, span, ticks_after};
+use crate::io::number;
+use crate::recording::text::clock::Clock;
+use crate::recording::text::dialect::Delimiter;
+
+/// A cell that was read: its value, if it has one, and where it ends.
+type PlainCell = (Option<f64>, usize);
+
+impl Rows {
+    /// Reads a row of plain numbers, empty cells, dates and texts without quotes; where the next line
+    /// begins, or `None` if it needs care.
+    #[inline]
+    pub(super) fn plain_row(&mut self, text: &[u8], at: usize, plan: &RowPlan) -> Option<usize> {
+        let row = self.count;
+        let before = self.stamp_text.len();
+        let read = self.plain_cells(text, at, plan);
+        if read.is_none() {
+            // Taken back: the careful way reads the whole line anew.
+            for column in &mut self.columns {
+                column.values.truncate(row);
+            }
+            self.stamp_text.truncate(before);
+            return None;
+        }
+        self.note_break(self.line);
+        self.count += 1;
+        read
+    }
+
+    #[inline]
+    fn plain_cells(&mut self, text: &[u8], start: usize, plan: &RowPlan) -> Option<usize> {
+        // A remark begins like a text.
+        let begins_with_text = plan.kinds.first() == Some(&ColumnKind::Nothing);
+        if begins_with_text && matches!(text.get(start), Some(b'#' | b'%' | b'!' | b'/')) {
+            return None;
+        }
+        let (mut at, mut numbers) = (start, 0);
+        for (place, kind) in plan.kinds.iter().enumerate() {
+            if place > 0 {
+                at = plan.next_cell(text, at)?;
+            }
+            at = plan.skip_blanks(text, at);
+            let is_copied = plan.keeps_stamp_text && plan.stamps == Some(place);
+            let (value, end) = plan.cell(text, at, *kind, is_copied)?;
+            if is_copied {
+                self.stamp_text.push(span(at, end - at));
+            }
+            if let Some(value) = value {
+                self.push(place, value);
+                numbers += 1;
+            }
+            at = plan.cell_end(text, end)?;
+        }
+        if numbers == 0 {
+            return None;
+        }
+        plan.row_end(text, at)
+    }
+}
+
+impl RowPlan {
+    #[inline]
+    fn cell(&self, text: &[u8], at: usize, kind: ColumnKind, is_copied: bool) -> Option<PlainCell> {
+        let decimal = self.dialect.decimal;
+        if kind == ColumnKind::Numbers {
+            let number = match is_copied {
+                true => number::read_nearly(text, at, decimal),
+                false => number::read(text, at, decimal),
+            };
+            return match number {
+                Some((value, end)) => Some((Some(value), end)),
+                None => Some((None, at)),
+            };
+        }
+        let end = self.text_end(text, at)?;
+        let cell = &text[at..end];
+        if cell.is_empty() || kind == ColumnKind::Nothing {
+            return Some((None, end));
+        }
+        let cell = std::str::from_utf8(cell).ok()?.trim();
+        let value = match kind {
+            ColumnKind::Clock(first) => Clock::parse(cell)?.seconds_after(first),
+            ColumnKind::Ticks(first) => ticks_after(first, cell.parse().ok()?),
+            ColumnKind::Numbers | ColumnKind::Nothing => return None,
+        };
+        Some((Some(value), end))
+    }
+
+    /// Where a cell without quotes ends.
+    #[inline]
+    fn text_end(&self, text: &[u8], at: usize) -> Option<usize> {
+        let rest = &text[at..];
+        let found = match self.dialect.delimiter {
+            Delimiter::Byte(mark) => memchr::memchr3(mark, b'\n', b'"', rest),
+            Delimiter::Spaces => memchr::memchr3(b' ', b'\t', b'\n', rest),
+            Delimiter::None => memchr::memchr2(b'\n', b'"', rest),
+        };
+        let mut end = found.map_or(text.len(), |place| at + place);
+        if text.get(end) == Some(&b'"') {
+            return None;
+        }
+        while end > at && text[end - 1] == b'\r' {
+            end -= 1;
+        }
+        Some(end)
+    }
+
+    /// Where the text of a cell begins.
+    #[inline]
+    fn skip_blanks(&self, text: &[u8], mut at: usize) -> usize {
+        let is_spaces = self.dialect.delimiter == Delimiter::Spaces;
+        while at < text.len() && (text[at] == b' ' || is_spaces && text[at] == b'\t') {
+            at += 1;
+        }
+        at
+    }
+
+    /// The mark or line end after a cell that was read up to `at`.
+    #[inline]
+    fn cell_end(&self, text: &[u8], at: usize) -> Option<usize> {
+        let at = match self.dialect.delimiter {
+            Delimiter::Spaces => at,
+            Delimiter::Byte(_) | Delimiter::None => self.skip_blanks(text, at),
+        };
+        match (text.get(at), self.dialect.delimiter) {
+            (None | Some(b'\n' | b'\r'), _) => Some(at),
+            (Some(byte), Delimiter::Byte(mark)) if *byte == mark => Some(at),
+            (Some(b' ' | b'\t'), Delimiter::Spaces) => Some(at),
+            _ => None,
+        }
+    }
+
+    /// Where the next cell begins, from the end of the one before; the cells that a row ends before are
+    /// empty.
+    #[inline]
+    fn next_cell(&self, text: &[u8], at: usize) -> Option<usize> {
+        match text.get(at) {
+            None | Some(b'\n' | b'\r') => Some(at),
+            Some(_) if self.dialect.delimiter == Delimiter::Spaces => Some(at),
+            Some(_) => Some(at + 1),
+        }
+    }
+
+    /// Where the next line begins, from the end of the last cell that is wanted. After the last column
+    /// there may be empty cells only.
+    #[inline]
+    pub(in crate::recording::text) fn row_end(&self, text: &[u8], at: usize) -> Option<usize> {
+        match text.get(at) {
+            None => Some(at),
+            Some(b'\n') => Some(at + 1),
+            Some(b'\r') if text.get(at + 1) == Some(&b'\n') => Some(at + 2),
+            Some(byte) => {
+                let is_blank = |byte: &u8| {
+                    matches!(byte, b' ' | b'\t' | b'\r' | b'\n')
+                        || self.dialect.delimiter == Delimiter::Byte(*byte)
+                };
+                let end = line_end(text, at);
+                let is_last = self.kinds.len() == self.width;
+                let good = is_blank(byte) && (!is_last || text[at..end].iter().all(is_blank));
+                good.then_some(end)
+            }
+        }
+    }
+}

@@ -1,0 +1,281 @@
+//! One channel of a table, piece by piece.
+
+use super::axes::Role;
+use super::cell::is_non_finite;
+use super::chunks::Chunks;
+use super::clock::unwrap_midnights;
+use super::rows::{ColumnKind, LineNotes, RowPlan, Rows};
+use super::table::{Layout, shortened};
+use crate::io::number;
+
+/// A channel that is read piece by piece: the pieces in order, each of which can be read on its own.
+pub struct TextStream {
+    /// Pieces of whole lines.
+    pub chunks: Chunks,
+    /// How their rows are read.
+    pub plan: ChannelPlan,
+    /// The table.
+    pub layout: Layout,
+    /// How its stamps are written, if they are read.
+    pub stamps: Option<StampColumn>,
+    /// Mean length of a row, in bytes.
+    pub row_bytes: usize,
+    /// Byte of the file behind the first rows, if further rows can be read there as they are.
+    pub behind_first_rows: Option<u64>,
+}
+
+/// A column of stamps.
+pub struct StampColumn {
+    /// Its heading.
+    pub heading: String,
+    /// Unit of its values, for messages.
+    pub unit: &'static str,
+    /// Seconds per unit.
+    pub seconds_per_unit: f64,
+    /// Whether their text is a number of seconds as the output writes it.
+    pub copied: bool,
+    /// Those of the first rows, in their unit.
+    pub first: Vec<f64>,
+}
+
+/// Which cells of a row are the channel's.
+#[derive(Debug, Clone)]
+pub struct ChannelPlan {
+    rows: RowPlan,
+    time: Option<usize>,
+    value: usize,
+    /// Whether stamps are times of day, which begin anew at midnight.
+    pub is_time_of_day: bool,
+    headings: Vec<String>,
+    /// Fewest characters of a value in the first rows.
+    shortest_value: usize,
+}
+
+/// Rows of one channel, of a piece of a file.
+#[derive(Debug, Default)]
+pub struct ChannelRows {
+    /// Time stamps as written (in the file's unit); empty without a time column.
+    pub times: Vec<f64>,
+    /// Where the text of each time stamp stands: offset in the upper, length in the lower half.
+    pub time_text: Vec<u64>,
+    /// The channel's values as written.
+    pub values: Vec<f64>,
+    /// Lines seen, rows and others.
+    pub lines: usize,
+    /// First of the lines without numbers that no row follows yet; only without stamps, where such a
+    /// line may be a lost sample.
+    pub empty_at: Option<usize>,
+    /// The row that could not be read, if any; nothing after it counts.
+    pub problem: Option<Problem>,
+    /// Whether the table ends within the piece.
+    pub ends: bool,
+    /// What should be known of the lines.
+    pub notes: LineNotes,
+    rows: Rows,
+}
+
+/// A row that could not be read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Problem {
+    /// Line within the piece, from 0.
+    pub line: usize,
+    /// Place of the cell, from 0.
+    pub cell: usize,
+}
+
+impl TextStream {
+    /// A channel of a table by its column.
+    pub(super) fn new(
+        mut chunks: Chunks,
+        layout: Layout,
+        value: usize,
+        with_stamps: bool,
+        is_decoded: bool,
+    ) -> Self {
+        let rule = match layout.axes.roles[value] {
+            Role::Channel(rule) => layout.axes.rules[rule].stamps.clone(),
+            _ => None,
+        };
+        let stamps = rule.filter(|_| with_stamps);
+        let plan = ChannelPlan::new(&layout, stamps.as_ref().map(|rule| rule.place), value);
+        chunks.skip(layout.offset);
+        let rows = &layout.first_rows;
+        let stamps = stamps.map(|rule| {
+            let mut first = rows.columns[rule.place].values.clone();
+            if plan.is_time_of_day {
+                unwrap_midnights(&mut first);
+            }
+            StampColumn {
+                copied: rule.seconds_per_unit == 1.0
+                    && layout.plan.kinds[rule.place] == ColumnKind::Numbers
+                    && layout.plan.dialect.decimal == b'.',
+                heading: rule.heading,
+                unit: rule.unit,
+                seconds_per_unit: rule.seconds_per_unit,
+                first,
+            }
+        });
+        Self {
+            row_bytes: layout.first_bytes / rows.count.max(1) + 1,
+            behind_first_rows: (!is_decoded && !plan.is_time_of_day)
+                .then_some((layout.offset + layout.first_bytes) as u64),
+            plan,
+            layout,
+            stamps,
+            chunks,
+        }
+    }
+}
+
+impl ChannelPlan {
+    fn new(layout: &Layout, time: Option<usize>, value: usize) -> Self {
+        let last = value.max(time.unwrap_or(0));
+        let kind = |place: usize| match Some(place) == time || place == value {
+            true => layout.plan.kinds[place],
+            false => ColumnKind::Nothing,
+        };
+        Self {
+            rows: RowPlan {
+                kinds: (0..=last).map(kind).collect(),
+                stamps: time,
+                keeps_stamp_text: time.is_some(),
+                ..layout.plan.clone()
+            },
+            is_time_of_day: time.is_some_and(|place| {
+                matches!(layout.plan.kinds[place], ColumnKind::Clock(first) if first.day.is_none())
+            }),
+            time,
+            value,
+            headings: layout
+                .header
+                .fields
+                .iter()
+                .map(|field| field.heading.clone())
+                .collect(),
+            shortest_value: layout.shortest_value(value),
+        }
+    }
+
+    /// Place of the channel's column.
+    pub fn value_cell(&self) -> usize {
+        self.value
+    }
+
+    /// What is wrong with a cell of a line, and what to do.
+    pub fn describe(&self, line: &str, cell: usize) -> String {
+        let column = cell + 1;
+        let name = self.headings.get(cell).map_or("", String::as_str);
+        let decimal = self.rows.dialect.decimal;
+        let cells = self.rows.dialect.cells(line);
+        match cells.get(cell).map(String::as_str) {
+            None if line.trim().is_empty() => self.describe_empty(column, name),
+            None => format!(
+                "column {column} (\"{name}\") is missing: the line \"{}\" has too few cells; \
+                 complete or remove it",
+                shortened(line)
+            ),
+            Some("") => self.describe_empty(column, name),
+            Some(text) if is_non_finite(text) => format!(
+                "column {column} (\"{name}\") reads \"{text}\", which is not a finite number; \
+                 remove the line, and use --resample to bridge the gap"
+            ),
+            Some(text) => format!(
+                "column {column} (\"{name}\") reads \"{}\", expected a number{}; correct or remove \
+                 the line",
+                shortened(text),
+                other_mark(text, decimal)
+            ),
+        }
+    }
+
+    fn describe_empty(&self, column: usize, name: &str) -> String {
+        format!(
+            "column {column} (\"{name}\") is empty; fill in the value or remove the line, and use \
+             --resample to bridge the gap"
+        )
+    }
+
+    /// The value in a last line without a line end, if it is shorter than usual: it may be cut.
+    pub fn short_last_value(&self, line: &str) -> Option<String> {
+        let cells = self.rows.dialect.cells(line);
+        let is_last = cells.len() == self.value + 1;
+        let value = cells.into_iter().nth(self.value).unwrap_or_default();
+        (is_last && !value.is_empty() && value.len() < self.shortest_value).then_some(value)
+    }
+
+    /// Line, from 0, that a row of a piece stands on.
+    pub fn line_of_row(&self, text: &[u8], row: usize) -> usize {
+        let mut rows = ChannelRows::default();
+        rows.read(text, self);
+        rows.rows.line_of(row)
+    }
+}
+
+impl ChannelRows {
+    /// Empties the rows, keeping their memory.
+    pub fn clear(&mut self) {
+        self.times.clear();
+        self.time_text.clear();
+        self.values.clear();
+        self.lines = 0;
+        self.empty_at = None;
+        self.problem = None;
+        self.ends = false;
+        self.notes = LineNotes::default();
+    }
+
+    /// Reads all lines of a piece. Every line ends with a line feed but perhaps the last.
+    pub fn read(&mut self, text: &[u8], plan: &ChannelPlan) {
+        self.clear();
+        self.exchange(plan);
+        self.rows.begin(0, plan.rows.kinds.len());
+        let end = self.rows.read(text, &plan.rows);
+        self.ends = end.is_ok_and(|end| end < text.len());
+        let places = [plan.time.unwrap_or(plan.value), plan.value];
+        self.rows.fill_together(&places);
+        let holes = places.iter().filter_map(|place| {
+            let hole = self.rows.columns[*place].holes.first()?;
+            Some((hole.index, hole.line, *place))
+        });
+        // The leftmost cell of the first line that is wrong.
+        let first = holes.min_by_key(|(index, _, place)| (*index, *place));
+        let filled = self.rows.columns[plan.value].values.len();
+        if filled < self.rows.count && plan.time.is_none() {
+            self.empty_at = Some(self.rows.line_of(filled));
+        }
+        self.lines = self.rows.line;
+        self.notes = std::mem::take(&mut self.rows.notes);
+        self.exchange(plan);
+        if let Some((row, line, cell)) = first {
+            self.times.truncate(row);
+            self.time_text.truncate(row);
+            self.values.truncate(row);
+            self.lines = line;
+            self.problem = Some(Problem { line, cell });
+        }
+        if plan.is_time_of_day {
+            unwrap_midnights(&mut self.times);
+        }
+    }
+
+    /// Puts the columns into the reader, or takes them out.
+    fn exchange(&mut self, plan: &ChannelPlan) {
+        let columns = &mut self.rows.columns;
+        columns.resize_with(plan.rows.kinds.len(), Default::default);
+        std::mem::swap(&mut columns[plan.value].values, &mut self.values);
+        if let Some(time) = plan.time {
+            std::mem::swap(&mut columns[time].values, &mut self.times);
+        }
+        std::mem::swap(&mut self.rows.stamp_text, &mut self.time_text);
+    }
+}
+
+/// A hint if the number would do with the other decimal mark.
+fn other_mark(text: &str, decimal: u8) -> &'static str {
+    let other = if decimal == b'.' { b',' } else { b'.' };
+    match number::cell(text, other) {
+        Some(_) if decimal == b'.' => " with a decimal point (see --decimal)",
+        Some(_) => " with a decimal comma (see --decimal)",
+        None => "",
+    }
+}

@@ -1,0 +1,95 @@
+//! What should be known of how a table was read.
+
+use super::Layout;
+use crate::recording::text::keys::{Topic, quantity};
+use crate::recording::text::rows::LineNotes;
+use crate::warning::Warning;
+
+impl Layout {
+    /// What should be known of its lines, and of what was taken for granted; `rows` is their number.
+    pub fn warnings(&self, notes: &LineNotes, rows: usize) -> Vec<Warning> {
+        let mut warnings: Vec<Warning> = of_lines(notes, notes.zeros + self.zeros_above);
+        warnings.extend(self.assumptions());
+        warnings.extend(self.axes.warnings.iter().cloned());
+        warnings.extend(self.count_differs(rows));
+        warnings
+    }
+
+    fn assumptions(&self) -> Vec<Warning> {
+        let rules = self.axes.rules.iter();
+        let mut said: Vec<&str> = rules.filter_map(|rule| rule.assumed()).collect();
+        said.dedup();
+        let confirm = "confirm it with --time-column and --time-unit, or give --rate HZ";
+        said.into_iter()
+            .map(|text| Warning::new("time-assumed", format!("{text}; {confirm}")))
+            .collect()
+    }
+
+    /// A warning if the head announces another number of samples than there are rows.
+    fn count_differs(&self, rows: usize) -> Option<Warning> {
+        let mut entries = self.header.entries.iter();
+        let entry = entries.find(|entry| entry.topic() == Some(Topic::Count))?;
+        let (said, _) = quantity(entry.value()?, self.plan.dialect.decimal)?;
+        let is_count = said.fract() == 0.0 && said >= 2.0;
+        (is_count && said != rows as f64).then(|| {
+            Warning::new(
+                "sample-count",
+                format!(
+                    "the head says \"{}\" {said}, but there are {rows} rows",
+                    entry.key
+                ),
+            )
+        })
+    }
+}
+
+fn of_lines(notes: &LineNotes, zeros: usize) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    if zeros > 0 {
+        warnings.push(Warning::new(
+            "zero-bytes",
+            format!("{zeros} zero byte(s) stand in the text; they were left out"),
+        ));
+    }
+    // A last word such as EOF is no fault.
+    let is_footer = |text: &str| notes.odd_count == 1 && !text.chars().any(|c| c.is_ascii_digit());
+    if let Some((line, text)) = notes.odd.as_ref().filter(|(_, text)| !is_footer(text)) {
+        warnings.push(Warning::new(
+            "lines-skipped",
+            format!(
+                "{} line(s) among the rows are no rows and were left out; the first is line \
+                 {line}: \"{text}\"",
+                notes.odd_count
+            ),
+        ));
+    }
+    if let Some(line) = notes.too_wide {
+        warnings.push(Warning::new(
+            "extra-cells",
+            format!("line {line} has more cells than there are columns; they were left out"),
+        ));
+    }
+    warnings
+}
+
+/// What was lost if a file ends within a line, `line 7`.
+pub fn truncated(line: &str, text: &str) -> Warning {
+    Warning::new(
+        "truncated-last-line",
+        format!(
+            "{line}: the file ends in the middle of this line (\"{}\"); it was left out, \
+             everything before it was used",
+            shortened(text)
+        ),
+    )
+}
+
+/// A text of at most 60 characters.
+pub fn shortened(text: &str) -> String {
+    let text = text.trim();
+    if text.chars().count() <= 60 {
+        text.to_owned()
+    } else {
+        text.chars().take(57).chain("...".chars()).collect()
+    }
+}
