@@ -102,34 +102,54 @@ impl<'a> Drawing<'a> {
     fn constants(&self, units: UnitSystem) -> Result<Vec<PredictedConstant>, Failure> {
         let measured = &self.measured;
         let slender = self.stiffness.as_ref().map(|s| &s.slender);
-        let inertia = self.inertia.as_ref();
-        let damping = self.damping.as_ref();
+        let (inertia, damping) = (self.inertia.as_ref(), self.damping.as_ref());
+        let given = |name, predicted, measured, by, kind| PredictedConstant {
+            by,
+            ..constant(name, predicted, measured, kind, units)
+        };
 
-        let mut stiffness = constant(
+        let mut stiffness = given(
             "stiffness",
             slender,
             &measured.stiffness,
+            "slender beam (Euler-Bernoulli) in a rigid clamp",
             Kind::AngularStiffness,
-            units,
         );
-        stiffness.by = "slender beam (Euler-Bernoulli) in a rigid clamp";
         self.refine(&mut stiffness, |k| {
             Some(Kind::AngularStiffness.to(units, k))
         });
-
-        let mut ring = constant("inertia", inertia, &measured.inertia, Kind::Inertia, units);
-        ring.by = "sum of the parts";
-
-        let mut loss = constant(
+        let ring = given(
+            "inertia",
+            inertia,
+            &measured.inertia,
+            "sum of the parts",
+            Kind::Inertia,
+        );
+        let mut loss = given(
             "damping",
             damping,
             &measured.damping,
+            "slope of friction over speed, times radius",
             Kind::AngularDamping,
-            units,
         );
-        loss.by = "slope of friction over speed, times radius";
         loss.note = damping_note(&loss);
+        let [natural, damping_ratio] = self.modal(units)?;
+        let per_volt = self.torque_per_volt(units)?;
+        Ok(vec![
+            stiffness,
+            ring,
+            loss,
+            natural,
+            damping_ratio,
+            per_volt,
+        ])
+    }
 
+    /// Natural frequency and damping ratio.
+    fn modal(&self, units: UnitSystem) -> Result<[PredictedConstant; 2], Failure> {
+        let measured = &self.measured;
+        let slender = self.stiffness.as_ref().map(|s| &s.slender);
+        let (inertia, damping) = (self.inertia.as_ref(), self.damping.as_ref());
         let frequency = |x: &[f64]| {
             SecondOrder::new(x[0], 0.0, x[1]).map_or(f64::NAN, |stand| stand.natural_frequency_hz())
         };
@@ -148,22 +168,17 @@ impl<'a> Drawing<'a> {
             SecondOrder::new(x[0], x[1], x[2]).map_or(f64::NAN, |stand| stand.damping_ratio())
         };
         let predicted = self.derive(Kind::Ratio, &[inertia, damping, slender], ratio)?;
-        let mut damping_ratio = constant(
-            "damping_ratio",
-            predicted.as_ref(),
-            &measured.damping_ratio,
-            Kind::Ratio,
-            units,
-        );
-        damping_ratio.by = "stiffness, inertia and damping above";
-        Ok(vec![
-            stiffness,
-            ring,
-            loss,
-            natural,
-            damping_ratio,
-            self.torque_per_volt(units)?,
-        ])
+        let damping_ratio = PredictedConstant {
+            by: "stiffness, inertia and damping above",
+            ..constant(
+                "damping_ratio",
+                predicted.as_ref(),
+                &measured.damping_ratio,
+                Kind::Ratio,
+                units,
+            )
+        };
+        Ok([natural, damping_ratio])
     }
 
     /// An estimate that follows from others, if all of them are there.
