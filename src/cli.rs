@@ -23,7 +23,7 @@ use values::{digits, orders, percent, range};
 /// True torque from the records of a reaction-torque stand.
 ///
 /// The beam and the stator of a stand ring; torqcomp divides the stand's response out of a record.
-/// Results go to standard output or -o, everything said to a person to standard error.
+/// Results go to standard output or -o, messages to standard error.
 ///
 /// Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but data were lost (or --strict turned a
 /// warning into a failure).
@@ -38,23 +38,23 @@ pub struct Cli {
 /// The verbs.
 #[derive(Debug, Subcommand)]
 pub enum Verb {
-    /// Turn a recorded signal into the torque that acted
+    /// Convert a recorded signal to the applied torque
     Compensate(Compensate),
-    /// Magnitude and phase of component torques at a fundamental and its orders
+    /// Fit magnitude and phase of component torques at a fundamental and its orders
     Harmonics(Harmonics),
-    /// The inverse transfer function over frequency
+    /// Tabulate the inverse transfer function over frequency
     Table(Table),
-    /// Constants that follow from the drawing, beside the measured ones
+    /// Calculate stand constants from the drawing, beside the measured ones
     Predict(Predict),
-    /// One channel of a recording as plain rows of time and value
+    /// Write one channel of a recording as plain rows of time and value
     Extract(Extract),
-    /// What recordings hold, and what is wrong with them
+    /// List the channels of recordings and what is wrong with them
     Inspect(Inspect),
-    /// Constants of the stand from records, with their uncertainties
+    /// Identify stand constants from records, with their uncertainties
     Identify(identify::Identify),
-    /// The stand's answer to a given input
+    /// Simulate the stand's response to a given input
     Simulate(Simulate),
-    /// Find what a stand lacks, and the error before and after it is added
+    /// Find the effects that a stand model lacks, with the error before and after
     Diagnose(Diagnose),
 }
 
@@ -81,7 +81,7 @@ impl From<Units> for UnitSystem {
 pub enum Format {
     /// Comma-separated text
     Csv,
-    /// A copy of the MCAP file that is read, with the torque as one channel more
+    /// A copy of the input MCAP file with the torque as an additional channel
     Mcap,
 }
 
@@ -127,7 +127,7 @@ pub struct Work {
     /// Threads to use [default: one for each core, at most 8]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     pub threads: Option<u16>,
-    /// Say nothing on standard error but warnings
+    /// Print only warnings to standard error
     #[arg(short, long)]
     pub quiet: bool,
 }
@@ -153,37 +153,37 @@ pub struct Compensate {
     /// Stand file
     #[arg(long, value_name = "FILE")]
     pub stand: PathBuf,
-    /// Compensate up to this frequency [default: 2400 Hz, or less if the rate demands it]
+    /// Compensate up to this frequency [default: 2400 Hz, or less at low sampling rates]
     #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = positive_frequency)]
     pub band: Option<f64>,
     /// Units of the result
     #[arg(long, value_enum, default_value = "si")]
     pub units: Units,
-    /// Format of the result [default: mcap if the output is called so, else csv]
+    /// Format of the result [default: mcap if the output file ends in .mcap, else csv]
     #[arg(long, value_enum)]
     pub format: Option<Format>,
     /// Topic of the result in an MCAP file [default: /torqcomp/torque]
     #[arg(long, value_name = "TOPIC")]
     pub output_topic: Option<String>,
-    /// Significant digits of the result, 1 to 15, or "shortest" for as many as bring back every bit
+    /// Significant digits of the result, 1 to 15, or "shortest" for the fewest that restore every bit
     #[arg(long, value_name = "N", default_value = "12", value_parser = digits)]
     pub digits: Digits,
     /// Add the recorded torque, before compensation, as a third column
     #[arg(long)]
     pub with_recorded: bool,
-    /// Transform the record as a whole, in memory that grows with it, instead of as a stream
+    /// Transform the record as a whole in memory instead of as a stream
     #[arg(long)]
     pub whole_record: bool,
-    /// Draw the recorded and the compensated torque into an SVG file
+    /// Plot the recorded and the compensated torque to an SVG file
     #[arg(long, value_name = "FILE")]
     pub plot: Option<PathBuf>,
-    /// Part of the record to draw, in seconds of its time axis
+    /// Time range to plot, in seconds
     #[arg(long, value_name = "FROM..TO", value_parser = range, requires = "plot")]
     pub plot_range: Option<(f64, f64)>,
     /// Print a report as JSON to standard output (the samples then need -o FILE)
     #[arg(long)]
     pub json: bool,
-    /// End with code 3 if there are warnings
+    /// Exit with code 3 if there are warnings
     #[arg(long)]
     pub strict: bool,
     /// How it works.
@@ -200,13 +200,13 @@ pub struct Extract {
     /// The result.
     #[command(flatten)]
     pub result: OutputArgs,
-    /// Significant digits, 1 to 15, or "shortest" for as many as bring back every bit
+    /// Significant digits, 1 to 15, or "shortest" for the fewest that restore every bit
     #[arg(long, value_name = "N", default_value = "shortest", value_parser = digits)]
     pub digits: Digits,
-    /// End with code 3 if there are warnings
+    /// Exit with code 3 if there are warnings
     #[arg(long)]
     pub strict: bool,
-    /// Say nothing on standard error but warnings
+    /// Print only warnings to standard error
     #[arg(short, long)]
     pub quiet: bool,
 }
@@ -229,10 +229,10 @@ pub struct Harmonics {
     /// Orders of the fundamental: ranges and single ones, as in 1-20 or 0.5,1,2
     #[arg(long, value_name = "LIST", default_value = "1-20", value_parser = orders)]
     pub orders: Orders,
-    /// Find the fundamental in the data, near the one given
+    /// Estimate the fundamental from the data, near the given one
     #[arg(long)]
     pub refine: bool,
-    /// How far from the given fundamental to search, in per cent of it
+    /// Search range around the given fundamental, in percent
     #[arg(long, value_name = "PERCENT", default_value = "2", requires = "refine", allow_negative_numbers = true, value_parser = percent)]
     pub refine_span: f64,
     /// Units of the result
@@ -241,7 +241,7 @@ pub struct Harmonics {
     /// Print JSON instead of a table
     #[arg(long)]
     pub json: bool,
-    /// End with code 3 if there are warnings
+    /// Exit with code 3 if there are warnings
     #[arg(long)]
     pub strict: bool,
 }
@@ -261,11 +261,10 @@ pub struct Table {
     /// Last frequency
     #[arg(long, value_name = "HZ", default_value = "2500", allow_negative_numbers = true, value_parser = frequency)]
     pub to: f64,
-    /// Step of the frequency
+    /// Frequency step
     #[arg(long, value_name = "HZ", default_value = "10", allow_negative_numbers = true, value_parser = positive_frequency)]
     pub step: f64,
-    /// Add the standard uncertainties that follow from those of the stand's constants; empty with effects, of which
-    /// none is known
+    /// Add standard uncertainties, propagated from those of the stand's constants; empty if the stand has effects
     #[arg(long)]
     pub uncertainty: bool,
     /// Print JSON instead of CSV
@@ -293,7 +292,7 @@ pub struct Predict {
 /// Arguments of `inspect`.
 #[derive(Debug, Args)]
 pub struct Inspect {
-    /// Recordings to look at, or - for standard input; several are also compared with each other
+    /// Recordings to inspect, or - for standard input; several are also compared with each other
     #[arg(value_name = "FILE", required = true)]
     pub files: Vec<String>,
     /// The result.
@@ -302,13 +301,13 @@ pub struct Inspect {
     /// How the files are read.
     #[command(flatten)]
     pub reading: Reading,
-    /// Draw the channels into an SVG file
+    /// Plot the channels to an SVG file
     #[arg(long, value_name = "FILE")]
     pub plot: Option<PathBuf>,
     /// Print JSON instead of a table
     #[arg(long)]
     pub json: bool,
-    /// End with code 3 if there are warnings
+    /// Exit with code 3 if there are warnings
     #[arg(long)]
     pub strict: bool,
 }

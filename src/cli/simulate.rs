@@ -25,7 +25,7 @@ pub struct Simulate {
     /// field, as '/joint_states.effort[name=motor]', or the field of --topic
     #[arg(long, value_name = "COL")]
     pub applied: Option<String>,
-    /// What the applied quantity does between its samples
+    /// Course of the applied quantity between its samples
     #[arg(long, value_enum, default_value = "band-limited")]
     pub between: Between,
     /// Unit of the applied quantity, if its heading does not say
@@ -34,16 +34,16 @@ pub struct Simulate {
     /// How the recording is read.
     #[command(flatten)]
     pub reading: Reading,
-    /// Significant digits of the result, 1 to 15, or "shortest" for as many as bring back every bit
+    /// Significant digits of the result, 1 to 15, or "shortest" for the fewest that restore every bit
     #[arg(long, value_name = "N", default_value = "12", value_parser = digits)]
     pub digits: Digits,
     /// Print a JSON report to standard output; the record then needs -o
     #[arg(long)]
     pub json: bool,
-    /// End with code 3 if there are warnings
+    /// Exit with code 3 if there are warnings
     #[arg(long)]
     pub strict: bool,
-    /// Say nothing on standard error but warnings
+    /// Print only warnings to standard error
     #[arg(short, long)]
     pub quiet: bool,
 }
@@ -55,7 +55,7 @@ pub enum Between {
     BandLimited,
     /// Straight lines
     StraightLines,
-    /// Each sample until the next one, as a converter holds it
+    /// Each sample held until the next one, as by a D/A converter
     Held,
 }
 
