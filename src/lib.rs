@@ -1,8 +1,8 @@
 #![doc = include_str!("../README.md")]
 
 mod chart;
-pub mod cli;
-pub mod commands;
+mod cli;
+mod commands;
 mod diagnose;
 #[cfg(test)]
 mod docs_tests;
@@ -11,10 +11,37 @@ pub mod identify;
 pub mod inverse;
 pub mod io;
 mod parallel;
-pub mod pipeline;
+mod pipeline;
 pub mod print;
 pub mod quality;
 pub mod recording;
 pub mod stand;
 pub mod unit;
 pub mod warning;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use commands::Outcome;
+
+/// Runs the command line of this process.
+#[must_use]
+pub fn run() -> ExitCode {
+    if let Err(error) = io::output::clean_up_when_interrupted() {
+        let message = "interrupting this run may leave a temporary file behind";
+        print::say(&format!("torqcomp: {message}: {error}\n"));
+    }
+    // clap itself exits with code 2 for wrong usage, and with 0 for help.
+    match commands::run(cli::Cli::parse()) {
+        Ok(Outcome::Done) => ExitCode::SUCCESS,
+        Ok(Outcome::WithLoss) => ExitCode::from(3),
+        Err(failure) => {
+            let code = failure.exit_code();
+            if code != 0 {
+                print::say(&format!("torqcomp: {failure}\n"));
+            }
+            ExitCode::from(code)
+        }
+    }
+}
