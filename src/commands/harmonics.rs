@@ -195,7 +195,7 @@ fn visible_orders(
         warnings.push(Warning::new(
             "orders-above-nyquist",
             format!(
-                "orders {} to {} were left out: they lie above half the sampling rate of {} Hz",
+                "orders {} to {} are omitted: they lie above half the sampling rate of {} Hz",
                 short(*first),
                 short(*last),
                 short(rate_hz)
@@ -249,8 +249,8 @@ fn mains_warning(components: &[ComponentTorque], duration_s: f64) -> Option<Warn
         Warning::new(
             "order-or-mains",
             format!(
-                "orders {} lie where lines of the mains lie; at one speed order and mains cannot be told apart: record at \
-                 another speed, where an order moves and the mains stay",
+                "orders {} coincide with mains lines and cannot be separated from them at one speed: record at another \
+                 speed, where the orders move and the mains lines stay",
                 doubtful.join(", ")
             ),
         )
@@ -267,7 +267,7 @@ fn lost_warning(components: &[ComponentTorque]) -> Option<Warning> {
         Warning::new(
             "components-lost-in-noise",
             format!(
-                "orders {} do not exceed twice their own uncertainty: they may be zero",
+                "orders {} are below twice their own uncertainty: they may be zero",
                 lost.join(", ")
             ),
         )

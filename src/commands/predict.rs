@@ -28,7 +28,7 @@ pub fn run(args: &Predict) -> Result<Outcome, Failure> {
     let constants = drawing.constants(args.units.into())?;
     if constants.iter().all(|c| c.predicted.is_none()) {
         return Err(Failure::failed(format_args!(
-            "{}: nothing follows from a drawing that is not there; add [beam], [[parts]], \
+            "{}: there is no drawing to calculate constants from; add [beam], [[parts]], \
              [friction], or [gage] and [bridge]",
             stand.file
         )));
@@ -394,8 +394,8 @@ fn damping_note(damping: &PredictedConstant) -> Option<String> {
     let ratio = damping.predicted? / damping.measured?;
     (ratio < FAR_TOO_SMALL).then(|| {
         format!(
-            "friction over speed gives {} of the measured damping; the rest is lost where the drawing \
-             says nothing, most likely in the beam and its joints",
+            "friction over speed gives {} of the measured damping; the rest is not in the drawing, most \
+             likely it is lost in the beam and its joints",
             rounded(ratio, 2)
         )
     })

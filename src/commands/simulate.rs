@@ -50,7 +50,7 @@ pub fn run(args: &cli::Simulate) -> Result<Outcome, Failure> {
     let chosen = &read.channels[0];
     if args.json && args.result.is_stdout() {
         return Err(Failure::usage(
-            "the record and the JSON document cannot both go to standard output; give -o FILE",
+            "the record and the JSON document cannot both go to standard output; give the record a file with -o",
         ));
     }
     if chosen.samples.len() < 2 {
@@ -173,7 +173,7 @@ fn applied_unit(
             warnings.push(Warning::new(
                 "unit-assumed",
                 format!(
-                    "the channel \"{}\" does not say its unit: {expected} was assumed, as the stand takes it; --unit says it",
+                    "the channel \"{}\" gives no unit: {expected} was assumed, as the stand takes it; give another with --unit",
                     chosen.name
                 ),
             ));
@@ -197,7 +197,7 @@ fn refined(chain: &Chain, input: &Excitation) -> Result<(Vec<f64>, usize), Failu
         let size = rms(&mut finer.iter().copied());
         if !size.is_finite() {
             return Err(Failure::failed(
-                "the simulated motion leaves all bounds: with these effects the stand is not stable for this input",
+                "the simulated motion diverges: with these effects the stand is unstable for this input",
             ));
         }
         if change <= FINE * size || steps >= MOST_SUBSTEPS {
