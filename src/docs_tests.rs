@@ -110,7 +110,7 @@ fn parameter(parameter: &EffectParameter) -> String {
     };
     let [lower, upper] = match (parameter.reciprocal, parameter.lower, parameter.upper) {
         // A fit moves the period.
-        (true, lower, upper) if lower == 0.0 => [upper.recip(), f64::INFINITY],
+        (true, 0.0, upper) => [upper.recip(), f64::INFINITY],
         (true, lower, upper) => [upper.recip(), lower.recip()],
         (false, lower, upper) => [lower, upper],
     };

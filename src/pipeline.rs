@@ -15,16 +15,22 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 /// The stages of a stream of jobs `J`; `E` is what stops it, `S` what each thread owns.
 pub struct Stages<'a, J, S, E> {
     /// Fills a job; `false` at the end of the stream.
-    pub read: Box<dyn FnMut(&mut J) -> Result<bool, E> + Send + 'a>,
+    pub read: Box<Serial<'a, J, bool, E>>,
     /// Does what needs no neighbour.
     pub prepare: Box<dyn Fn(&mut J) + Sync + 'a>,
     /// Takes jobs in order (`None` at the end) and hands on those that are complete, in order.
     pub join: Box<Join<'a, J, E>>,
     /// Does what needs neighbours, with the thread's own scratch.
-    pub work: Box<dyn Fn(&mut S, &mut J) + Sync + 'a>,
+    pub work: Box<WithScratch<'a, S, J>>,
     /// Takes the finished jobs in order.
-    pub deliver: Box<dyn FnMut(&mut J) -> Result<(), E> + Send + 'a>,
+    pub deliver: Box<Serial<'a, J, (), E>>,
 }
+
+/// A stage that sees one job after the other.
+type Serial<'a, J, T, E> = dyn FnMut(&mut J) -> Result<T, E> + Send + 'a;
+
+/// A stage that any thread runs, with scratch of its own.
+type WithScratch<'a, S, J> = dyn Fn(&mut S, &mut J) + Sync + 'a;
 
 /// Takes a job and hands on others.
 type Join<'a, J, E> = dyn FnMut(Option<J>, &mut dyn FnMut(J)) -> Result<(), E> + Send + 'a;
@@ -33,11 +39,11 @@ type Join<'a, J, E> = dyn FnMut(Option<J>, &mut dyn FnMut(J)) -> Result<(), E> +
 struct SharedStages<'a, J, S, E> {
     state: Mutex<State<J, E>>,
     changed: Condvar,
-    read: Mutex<Box<dyn FnMut(&mut J) -> Result<bool, E> + Send + 'a>>,
+    read: Mutex<Box<Serial<'a, J, bool, E>>>,
     prepare: Box<dyn Fn(&mut J) + Sync + 'a>,
     join: Mutex<Box<Join<'a, J, E>>>,
-    work: Box<dyn Fn(&mut S, &mut J) + Sync + 'a>,
-    deliver: Mutex<Box<dyn FnMut(&mut J) -> Result<(), E> + Send + 'a>>,
+    work: Box<WithScratch<'a, S, J>>,
+    deliver: Mutex<Box<Serial<'a, J, (), E>>>,
 }
 
 struct State<J, E> {

@@ -125,7 +125,7 @@ fn units() {
     refused(
         no_time_unit.as_bytes(),
         &["--time-unit", "V"],
-        1,
+        2,
         &["no unit of time"],
     );
     let no_headings: String = good().lines().skip(1).map(|l| format!("{l}\n")).collect();

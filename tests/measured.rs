@@ -325,10 +325,7 @@ fn silverbox(folder: &Path) -> Result<(), Failed> {
     check(code == 0, &err)?;
     check(out.starts_with("time_s,applied_v\n"), &out[..40])?;
     let (code, _, err) = run(stand, &["compensate", path])?;
-    check(
-        code == 1 && err.contains("\"v1_in_V\" or \"v2_out_V\""),
-        &err,
-    )
+    check(code == 1 && err.contains("\"v1_in\" or \"v2_out\""), &err)
 }
 
 fn number(report: &Value, name: &str) -> Result<f64, Failed> {

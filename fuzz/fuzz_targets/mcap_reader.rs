@@ -23,8 +23,7 @@ fuzz_target!(|bytes: &[u8]| {
                 signal: None,
             };
             let options = TimeOptions::default();
-            let reader =
-                SignalReader::with_stream(&Input::Stdin, stream(bytes), &choice, &options);
+            let reader = SignalReader::with_stream(&Input::Stdin, stream(bytes), &choice, &options);
             let Ok(mut reader) = reader else {
                 continue;
             };

@@ -171,7 +171,10 @@ fn rounded_stamps_of_a_text_are_not_interpolated() {
         vec![channel("a", gap.clone(), wave), channel("b", gap, wave)],
     );
     let refused = both(&record).unwrap_err().to_string();
-    assert!(refused.contains("(sample 201) lies 20 steps"), "{refused}");
+    assert!(
+        refused.contains("sample 201 of \"a\"") && refused.contains("21 times the usual one"),
+        "{refused}"
+    );
 }
 
 #[test]

@@ -171,8 +171,13 @@ impl Recording {
             (None, None) => return Err(without_rate(channel)),
         };
         if let (Some(assumed), None) = (&axis.assumed, reading.rate_hz) {
+            // A column without a heading is named by its number.
+            let heading = axis.stamps_in.as_deref().unwrap_or_default();
+            let number = heading
+                .strip_prefix("column ")
+                .map_or_else(String::new, |number| format!(" {number}"));
             return Err(Failure::failed(format_args!(
-                "{assumed}; confirm it with --time-column and --time-unit, or give --rate HZ"
+                "{assumed}; confirm it with --time-column{number} and --time-unit, or give --rate HZ"
             )));
         }
         let stamps = axis.stamps_s.as_ref();

@@ -61,7 +61,7 @@ fn columns(
     run: &FreeRun,
     directions: &Directions,
     split: bool,
-    smooth: &dyn Fn(&[f64]) -> Result<Vec<f64>, torqcomp_dsp::Error>,
+    smooth: impl Fn(&[f64]) -> Result<Vec<f64>, torqcomp_dsp::Error>,
 ) -> Result<Vec<Vec<f64>>, Failure> {
     let rate = run.rate_hz;
     let filtered = smooth(run.motion)?;

@@ -138,6 +138,9 @@ impl SignalReader {
     }
 }
 
+/// What was read of a number, or why it was not.
+pub type FieldResult = Result<(SelectedSignal, SignalSummary), Failure>;
+
 /// Reads several numbers of any topics in one pass and calls `each` with the place of the choice, times in
 /// ns and values. The samples of a choice are in order of time; choices take turns. One result for each
 /// choice: an error for one that is not in the file.
@@ -149,7 +152,7 @@ pub fn read_fields(
     choices: &[FieldChoice],
     options: &TimeOptions,
     mut each: impl FnMut(usize, &[i64], &[f64]),
-) -> Result<Vec<Result<(SelectedSignal, SignalSummary), Failure>>, Failure> {
+) -> Result<Vec<FieldResult>, Failure> {
     let wanted = choices
         .iter()
         .map(|choice| RequestedSignal::new(input, choice));

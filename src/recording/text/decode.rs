@@ -251,10 +251,10 @@ mod tests {
             let bytes = [mark, &wide(big)].concat();
             assert_eq!(text(&bytes), "Zeit;\u{b5}m\n1;2\n", "{mark:?} {big}");
         }
-        // Cut within its last character.
+        // Cut within its last character, of which nothing is kept.
         assert_eq!(
             text(&[b"\xFF\xFE", &wide(false)[..19]].concat()),
-            "Zeit;\u{b5}m\n1;"
+            "Zeit;\u{b5}m\n1"
         );
     }
 

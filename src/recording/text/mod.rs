@@ -203,12 +203,9 @@ fn general(
     let dialect = first.plan.dialect.describe();
     let mut parts = Vec::new();
     let mut next = Ok(first);
-    loop {
-        let part = match next {
-            Ok(layout) => layout.read(chunks)?,
-            // What follows the last table need not be one.
-            Err(_) => break,
-        };
+    // What follows the last table need not be one.
+    while let Ok(layout) = next {
+        let part = layout.read(chunks)?;
         let (number, begins_anew) = (part.next_line, part.begins_anew);
         parts.push(part);
         let (rest, _) = chunks.peek(FIRST_ROWS)?;

@@ -98,12 +98,12 @@ mod tests {
             line: row + 2,
             what: HoleKind::Empty,
         };
-        let mut column = Column::default();
-        column.values = (0..rows)
-            .map(|row| if has(row) { row as f64 } else { f64::NAN })
-            .collect();
-        column.holes = (0..rows).filter(|row| !has(*row)).map(empty).collect();
-        column
+        let value = |row: usize| if has(row) { row as f64 } else { f64::NAN };
+        Column {
+            values: (0..rows).map(value).collect(),
+            holes: (0..rows).filter(|row| !has(*row)).map(empty).collect(),
+            ..Column::default()
+        }
     }
 
     #[test]
