@@ -28,7 +28,7 @@ pub(super) fn identify(
     let rate = run.rate_hz;
     let corner_hz = (rate / half as f64).min(0.2 * rate);
     let smooth = |samples: &[f64]| low_pass(samples, rate, corner_hz, ORDER);
-    let columns = columns(run, directions, split, &smooth)?;
+    let columns = columns(run, directions, split, smooth)?;
     let effort = smooth(run.effort)?;
     let step = (rate / (4.0 * corner_hz)).floor().max(1.0) as usize;
     // Without the ends, where differences and filters are inexact.

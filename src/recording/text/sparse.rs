@@ -102,7 +102,6 @@ mod tests {
         Column {
             values: (0..rows).map(value).collect(),
             holes: (0..rows).filter(|row| !has(*row)).map(empty).collect(),
-            ..Column::default()
         }
     }
 
