@@ -2,7 +2,7 @@
 //!
 //! The links of the stand's [`Chain`] are taken in reverse order: disturbances, the recorder's range, the chain, the
 //! gage, the linear dynamics, and last the stand itself, whose torques are evaluated along the motion
-//! ([`motion`]). How a single effect is inverted is in its own file in `torqcomp_model::effects`; here is what they
+//! (`motion`). How a single effect is inverted is in its own file in `torqcomp_model::effects`; here is what they
 //! share: the band, the continuation beyond the record's ends, the noise. Beyond the band nothing is added.
 
 mod motion;
