@@ -307,16 +307,8 @@ impl Pass<'_> {
 
     /// The stand itself: displacement, torques, applied quantity.
     fn stand(&mut self, links: &[&Link]) -> Vec<f64> {
-        let torques: Vec<(&dyn Torque, bool)> = links
-            .iter()
-            .filter_map(|link| match &link.action {
-                Action::Torque {
-                    torque,
-                    in_gage_path,
-                } => Some((torque.as_ref(), *in_gage_path)),
-                _ => None,
-            })
-            .collect();
+        let torques: Vec<(&dyn Torque, bool)> =
+            links.iter().filter_map(|link| link.torque()).collect();
         let rate_hz = self.rate_hz();
         let band = self.wide(&|_| Complex64::ONE);
         let chain = &self.inverse.chain;

@@ -126,6 +126,25 @@ impl ChannelChoice {
             flags,
         }
     }
+
+    /// The channel that a flag of the verb names, with its unit if another flag gives it.
+    #[must_use]
+    pub fn named([channel, unit]: [&'static str; 2], name: &str, unit_text: Option<&str>) -> Self {
+        let flags = Flags {
+            channel,
+            unit: Some(unit),
+        };
+        Self::of(flags, Some(name), unit_text)
+    }
+
+    /// The channels that `--applied` and `--measured` name, each with its unit if one is given.
+    #[must_use]
+    pub fn applied_and_measured(names: [&str; 2], units: [Option<&str>; 2]) -> [Self; 2] {
+        [
+            Self::named(["--applied", "--applied-unit"], names[0], units[0]),
+            Self::named(["--measured", "--measured-unit"], names[1], units[1]),
+        ]
+    }
 }
 
 /// A frequency: a number of Hz, or a number with a unit.

@@ -27,7 +27,7 @@ use crate::warning::Warning;
 
 pub(crate) use aligned::{AlignedChannel, AlignedChannels};
 pub(crate) use axis::without_rounding;
-pub use axis::{RateFrom, TimeAxis, TimeAxis as Axis, typical_step};
+pub use axis::{RateFrom, TimeAxis, typical_step};
 pub(crate) use block::Block;
 pub(crate) use choice::{Selection, unit_of};
 pub(crate) use memory_stream::check_holes;

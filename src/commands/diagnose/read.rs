@@ -12,7 +12,7 @@ use crate::diagnose::{
     Case, ChannelUnits, InitialState, PlainStand, Records, SourceFiles, StandRecord,
 };
 use crate::failure::Failure;
-use crate::io::{ChannelChoice, Flags, Input};
+use crate::io::{ChannelChoice, Input};
 use crate::print::short;
 use crate::recording::AlignedChannels;
 use crate::stand::{Given, Stand, si_unit};
@@ -106,27 +106,10 @@ fn pair(args: &Diagnose, file: &str) -> Result<Pair, Failure> {
             "--applied and --measured name the same column",
         ));
     }
-    let choice = |flags: [&'static str; 2], name: &str, unit: Option<&str>| {
-        let [channel, unit_flag] = flags;
-        let flags = Flags {
-            channel,
-            unit: Some(unit_flag),
-        };
-        ChannelChoice::of(flags, Some(name), unit)
-    };
-    let (applied_unit, measured_unit) = (&args.applied_unit, &args.measured_unit);
-    let choices = [
-        choice(
-            ["--applied", "--applied-unit"],
-            &args.applied,
-            applied_unit.as_deref(),
-        ),
-        choice(
-            ["--measured", "--measured-unit"],
-            &args.measured,
-            measured_unit.as_deref(),
-        ),
-    ];
+    let choices = ChannelChoice::applied_and_measured(
+        [&args.applied, &args.measured],
+        [args.applied_unit.as_deref(), args.measured_unit.as_deref()],
+    );
     let read = AlignedChannels::read(&Input::of(file), &choices, &args.reading)?;
     let mut channels = read.channels.into_iter();
     let (Some(applied), Some(measured)) = (channels.next(), channels.next()) else {

@@ -14,7 +14,7 @@ use super::{Outcome, conclude};
 use crate::cli::identify::{Findings, Identify, Test};
 use crate::failure::Failure;
 use crate::identify::{Identification, NamedEstimate};
-use crate::io::{ChannelChoice, Flags, output};
+use crate::io::output;
 use crate::print::Report;
 use crate::stand::update::Entry;
 use crate::stand::{self, update};
@@ -160,19 +160,6 @@ fn write_stand(
     }?;
     let force = findings.result.force || existing.is_some();
     output::write_all(Some(output), force, read, &text)
-}
-
-/// A channel that a flag of the verb names, with its unit if another flag gives it.
-fn choice(
-    [channel, unit]: [&'static str; 2],
-    name: &str,
-    unit_text: Option<&str>,
-) -> ChannelChoice {
-    let flags = Flags {
-        channel,
-        unit: Some(unit),
-    };
-    ChannelChoice::of(flags, Some(name), unit_text)
 }
 
 /// The unit of a channel of that name.

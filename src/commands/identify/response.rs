@@ -1,31 +1,22 @@
 //! `identify response`.
 
 use super::constants::{Ratios, from_ratios, from_residue};
-use super::{ONE_MODE, Recorded, TORQUE, choice, deliver};
+use super::{ONE_MODE, Recorded, TORQUE, deliver};
 use crate::cli::identify::Response;
 use crate::commands::Outcome;
 use crate::failure::Failure;
 use crate::identify::response::{Driven, ResponseOptions, identify};
 use crate::identify::{Identification, Motion};
-use crate::io::Input;
+use crate::io::{ChannelChoice, Input};
 use crate::recording::AlignedChannels;
 use crate::stand::update::Entry;
 
 /// Runs the test.
 pub fn run(args: &Response) -> Result<Outcome, Failure> {
-    let (applied_unit, measured_unit) = (&args.applied_unit, &args.measured_unit);
-    let choices = [
-        choice(
-            ["--applied", "--applied-unit"],
-            &args.applied,
-            applied_unit.as_deref(),
-        ),
-        choice(
-            ["--measured", "--measured-unit"],
-            &args.measured,
-            measured_unit.as_deref(),
-        ),
-    ];
+    let choices = ChannelChoice::applied_and_measured(
+        [&args.applied, &args.measured],
+        [args.applied_unit.as_deref(), args.measured_unit.as_deref()],
+    );
     let mut recorded = Recorded::default();
     let mut loaded = Vec::new();
     for input in &args.inputs {

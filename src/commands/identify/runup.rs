@@ -2,13 +2,13 @@
 
 use torqcomp_model::{Dimension, Kind, Unit};
 
-use super::{FORCE, Recorded, TORQUE, choice, deliver, entry, quantity, unit_or};
+use super::{FORCE, Recorded, TORQUE, deliver, entry, quantity, unit_or};
 use crate::cli::identify::Runup;
 use crate::commands::Outcome;
 use crate::failure::Failure;
 use crate::identify::runup::{Body, FreeRun, RunupOptions, identify};
 use crate::identify::{Identification, Motion};
-use crate::io::Input;
+use crate::io::{ChannelChoice, Input};
 use crate::print::short;
 use crate::recording::{AlignedChannel, AlignedChannels};
 use crate::stand::update::Entry;
@@ -17,8 +17,8 @@ use crate::stand::update::Entry;
 pub fn run(args: &Runup) -> Result<Outcome, Failure> {
     let (motion_unit, torque_unit) = (args.motion_unit.as_deref(), args.torque_unit.as_deref());
     let choices = [
-        choice(["--motion", "--motion-unit"], &args.motion, motion_unit),
-        choice(["--torque", "--torque-unit"], &args.torque, torque_unit),
+        ChannelChoice::named(["--motion", "--motion-unit"], &args.motion, motion_unit),
+        ChannelChoice::named(["--torque", "--torque-unit"], &args.torque, torque_unit),
     ];
     let read = AlignedChannels::read(&Input::of(&args.input), &choices, &args.reading)?;
     let (motion, torque) = (&read.channels[0], &read.channels[1]);

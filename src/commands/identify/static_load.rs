@@ -2,7 +2,7 @@
 
 use torqcomp_model::{Dimension, Kind};
 
-use super::{FORCE, Recorded, TORQUE, choice, deliver, entry, quantity, unit_or};
+use super::{FORCE, Recorded, TORQUE, deliver, entry, quantity, unit_or};
 use crate::cli::identify::Static;
 use crate::commands::Outcome;
 use crate::failure::Failure;
@@ -65,8 +65,8 @@ impl Columns {
         };
         let (load_unit, unit) = (args.load_unit.as_deref(), args.reading_unit.as_deref());
         Self {
-            load: choice(["--load", "--load-unit"], &args.load, load_unit),
-            reading: choice(["--reading", "--reading-unit"], &args.reading, unit),
+            load: ChannelChoice::named(["--load", "--load-unit"], &args.load, load_unit),
+            reading: ChannelChoice::named(["--reading", "--reading-unit"], &args.reading, unit),
             series: plain("--series", &args.series),
             position: plain("--position", &args.position),
             std: plain("--std", &args.std),

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::rows::Column;
-use crate::recording::{Axis, HoleKind, RateFrom};
+use crate::recording::{HoleKind, RateFrom, TimeAxis};
 
 /// Fewest values that tell a slow channel.
 const FEWEST: usize = 3;
@@ -11,7 +11,7 @@ const FEWEST: usize = 3;
 /// Takes the empty cells out of a column of which more than half are empty, and the stamps beside them
 /// out of its axis: what is left is a channel of its own, slower than the rows. Without stamps the
 /// values must lie evenly, and the rate is divided by the rows between them.
-pub fn thin(column: &mut Column, axis: &mut Axis) {
+pub fn thin(column: &mut Column, axis: &mut TimeAxis) {
     if !is_slow(column) {
         return;
     }
@@ -63,22 +63,22 @@ fn spacing(filled: &[usize]) -> Option<usize> {
     even.then_some(every)
 }
 
-fn of_stamps(axis: &Axis, stamps: &[f64], filled: &[usize]) -> Option<Axis> {
+fn of_stamps(axis: &TimeAxis, stamps: &[f64], filled: &[usize]) -> Option<TimeAxis> {
     let own: Option<Vec<f64>> = filled.iter().map(|row| stamps.get(*row).copied()).collect();
     let heading = match &axis.rate_from {
         RateFrom::Stamps(heading) => heading.clone(),
         _ => "time".to_owned(),
     };
-    Some(Axis {
+    Some(TimeAxis {
         start_text: axis.start_text.clone(),
         assumed: axis.assumed.clone(),
-        ..Axis::of_stamps(&heading, Arc::new(own?))
+        ..TimeAxis::of_stamps(&heading, Arc::new(own?))
     })
 }
 
-fn of_rate(axis: &Axis, first: usize, every: usize) -> Option<Axis> {
+fn of_rate(axis: &TimeAxis, first: usize, every: usize) -> Option<TimeAxis> {
     let rows_hz = axis.rate_hz?;
-    Some(Axis {
+    Some(TimeAxis {
         rate_hz: Some(crate::recording::without_rounding(rows_hz / every as f64)),
         start_s: axis.start_s.map(|start_s| start_s + first as f64 / rows_hz),
         stamps_s: None,
@@ -108,7 +108,7 @@ mod tests {
     #[test]
     fn every_fourth_row() {
         let mut slow = column(42, |row| row % 4 == 1);
-        let mut axis = Axis::of_header("rate", 100.0, Some(5.0));
+        let mut axis = TimeAxis::of_header("rate", 100.0, Some(5.0));
         thin(&mut slow, &mut axis);
         assert_eq!(slow.values[..3], [1.0, 5.0, 9.0]);
         assert!(slow.holes.is_empty());
@@ -120,7 +120,7 @@ mod tests {
         let rows = [0, 3, 10, 13, 20, 23, 29];
         let mut slow = column(30, |row| rows.contains(&row));
         let stamps = (0..30).map(|row| f64::from(row) * 0.5).collect();
-        let mut axis = Axis::of_stamps("t", Arc::new(stamps));
+        let mut axis = TimeAxis::of_stamps("t", Arc::new(stamps));
         thin(&mut slow, &mut axis);
         assert_eq!(slow.values.len(), rows.len());
         assert_eq!(axis.stamps_s.unwrap()[..3], [0.0, 1.5, 5.0]);
@@ -129,7 +129,7 @@ mod tests {
     #[test]
     fn gaps_stay_gaps() {
         let mut gappy = column(30, |row| row != 7 && row != 8);
-        let mut axis = Axis::of_header("rate", 100.0, None);
+        let mut axis = TimeAxis::of_header("rate", 100.0, None);
         let (before, same) = (gappy.values.len(), axis.clone());
         thin(&mut gappy, &mut axis);
         assert_eq!((gappy.values.len(), gappy.holes.len()), (before, 2));

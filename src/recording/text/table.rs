@@ -16,7 +16,7 @@ use super::{listing, sparse, summary};
 use crate::failure::Failure;
 use crate::io::Reading;
 use crate::recording::text::dialect::{decode_line, is_skipped};
-use crate::recording::{Axis, Channel, HoleKind};
+use crate::recording::{Channel, HoleKind, TimeAxis};
 use crate::warning::Warning;
 pub use warnings::{shortened, truncated};
 
@@ -276,7 +276,7 @@ impl Layout {
     /// The channels of rows.
     pub fn channels(&self, mut rows: Rows) -> Vec<Channel> {
         let mut channels: Vec<Channel> = Vec::new();
-        let mut last: Option<(usize, Axis)> = None;
+        let mut last: Option<(usize, TimeAxis)> = None;
         for (place, role) in self.axes.roles.iter().enumerate() {
             let Role::Channel(rule) = *role else {
                 continue;
@@ -344,7 +344,7 @@ impl Layout {
 }
 
 /// A channel out of a column.
-pub fn channel(field: &Field, mut column: Column, mut axis: Axis) -> Channel {
+pub fn channel(field: &Field, mut column: Column, mut axis: TimeAxis) -> Channel {
     sparse::thin(&mut column, &mut axis);
     if let Some(stamps) = &axis.stamps_s
         && stamps.len() > column.values.len()

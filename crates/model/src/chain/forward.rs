@@ -2,7 +2,7 @@
 
 use num_complex::Complex64;
 
-use super::Chain;
+use super::{Chain, Link};
 use crate::effects::{Action, SampleClock, Stage};
 use crate::simulate::{Excitation, MotionState, Torques, free_motion, integrate};
 
@@ -106,16 +106,7 @@ impl Chain {
     }
 
     fn torques(&self) -> Torques<'_> {
-        self.links
-            .iter()
-            .filter_map(|link| match &link.action {
-                Action::Torque {
-                    torque,
-                    in_gage_path,
-                } => Some((torque.as_ref(), *in_gage_path)),
-                _ => None,
-            })
-            .collect()
+        self.links.iter().filter_map(Link::torque).collect()
     }
 
     fn respond(&self, input: &Excitation) -> Signal {

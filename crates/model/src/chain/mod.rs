@@ -17,7 +17,7 @@ use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 
-use crate::effects::{Action, Effect, Fixed, Form, Stage};
+use crate::effects::{Action, Effect, Fixed, Form, Stage, Torque};
 use crate::mode::Mode;
 
 pub use gage_path::GagePath;
@@ -68,6 +68,18 @@ pub enum Group<'a> {
 }
 
 impl Link {
+    /// Its torque in the stand, and whether the gage shows it; `None` for any other action.
+    #[must_use]
+    pub fn torque(&self) -> Option<(&dyn Torque, bool)> {
+        match &self.action {
+            Action::Torque {
+                torque,
+                in_gage_path,
+            } => Some((torque.as_ref(), *in_gage_path)),
+            _ => None,
+        }
+    }
+
     /// An effect in one of its forms, with parameters in units of the record, s and Hz.
     #[must_use]
     pub fn of(effect: &'static Effect, form: &'static Form, values: &[f64]) -> Self {

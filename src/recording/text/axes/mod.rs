@@ -14,7 +14,7 @@ use super::keys::{self, Entry};
 use super::rows::{Column, ColumnKind};
 use crate::failure::Failure;
 use crate::io::Reading;
-use crate::recording::{Axis, RateFrom};
+use crate::recording::{RateFrom, TimeAxis};
 use crate::warning::Warning;
 use groups::{Group, groups};
 pub use stamps::StampRule;
@@ -90,12 +90,12 @@ impl AxisRule {
     }
 
     /// The axis of columns.
-    pub fn axis(&self, columns: &[Column]) -> Axis {
+    pub fn axis(&self, columns: &[Column]) -> TimeAxis {
         let mut axis = match &self.stamps {
-            Some(rule) => Axis::of_stamps(&rule.heading, Arc::new(rule.stamps(columns))),
+            Some(rule) => TimeAxis::of_stamps(&rule.heading, Arc::new(rule.stamps(columns))),
             None => match &self.header {
-                Some((words, hz)) => Axis::of_header(words, *hz, self.header_start_s),
-                None => Axis::default(),
+                Some((words, hz)) => TimeAxis::of_header(words, *hz, self.header_start_s),
+                None => TimeAxis::default(),
             },
         };
         axis.header_rate_hz = self.header.as_ref().map(|(_, hz)| *hz);
@@ -111,7 +111,7 @@ impl AxisRule {
 
     /// Where stamps are too coarse to give the rate but agree with the head on the whole, or differ from
     /// it by their rounding only, the head's rate is the better one.
-    fn prefer_header(&self, axis: &mut Axis) {
+    fn prefer_header(&self, axis: &mut TimeAxis) {
         let (Some(stamps), Some((words, hz))) = (&axis.stamps_s, &self.header) else {
             return;
         };

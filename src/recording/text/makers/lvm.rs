@@ -14,7 +14,7 @@ use crate::recording::text::header::Field;
 use crate::recording::text::rows::{self, Column};
 use crate::recording::text::table::channel;
 use crate::recording::without_rounding;
-use crate::recording::{Axis, Channel, RateFrom, Recording, Segment};
+use crate::recording::{Channel, RateFrom, Recording, Segment, TimeAxis};
 use crate::warning::Warning;
 
 const END: &str = "***End_of_Header***";
@@ -316,7 +316,7 @@ fn columns(lines: &mut Cursor, file: &File, count: usize) -> Result<Vec<Column>,
     Ok(read.columns)
 }
 
-fn axis(file: &File, header: &Header, place: usize, times: &Column, reading: &Reading) -> Axis {
+fn axis(file: &File, header: &Header, place: usize, times: &Column, reading: &Reading) -> TimeAxis {
     let number = |values: &[String]| {
         // Where one value stands for all channels, it is the first.
         let text = of(values, place).or_else(|| of(values, 0))?;
@@ -328,11 +328,13 @@ fn axis(file: &File, header: &Header, place: usize, times: &Column, reading: &Re
         .map(|step| without_rounding(1.0 / step));
     let is_time = other_dimension(header, place).is_none();
     let mut axis = if !is_time {
-        Axis::default()
+        TimeAxis::default()
     } else if file.stamps != Stamps::No || !times.values.is_empty() {
-        Axis::of_stamps("X_Value", Arc::new(times.values.clone()))
+        TimeAxis::of_stamps("X_Value", Arc::new(times.values.clone()))
     } else {
-        header_hz.map_or_else(Axis::default, |hz| Axis::of_header("Delta_X", hz, start_s))
+        header_hz.map_or_else(TimeAxis::default, |hz| {
+            TimeAxis::of_header("Delta_X", hz, start_s)
+        })
     };
     axis.header_rate_hz = header_hz.filter(|_| is_time);
     axis.start_text = joined(&header.dates, &header.times, place)
@@ -354,7 +356,7 @@ fn no_time(file: &File, header: &Header, values: &Column) -> Option<(Option<Chan
     let dimension = other_dimension(header, 0)?;
     let is_there = file.stamps == Stamps::One && !values.values.is_empty();
     let field = Field::new(dimension, None);
-    let axis = is_there.then(|| channel(&field, values.clone(), Axis::default()));
+    let axis = is_there.then(|| channel(&field, values.clone(), TimeAxis::default()));
     let warning = Warning::new(
         "no-time-axis",
         format!(

@@ -14,7 +14,7 @@ use crate::recording::text::header::Field;
 use crate::recording::text::rows;
 use crate::recording::text::table::channel;
 use crate::recording::without_rounding;
-use crate::recording::{Axis, RateFrom, Recording};
+use crate::recording::{RateFrom, Recording, TimeAxis};
 
 const DIALECT: Dialect = Dialect {
     delimiter: Delimiter::Byte(b','),
@@ -75,7 +75,7 @@ fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
     let (read, _) = rows::of_numbers(&text, 3, DIALECT, 0..start.width, &[])?;
     let mut recording = Recording::empty("csv", String::new());
     recording.dialect = DIALECT.describe();
-    let mut axis = Axis::of_header(
+    let mut axis = TimeAxis::of_header(
         "Increment",
         without_rounding(1.0 / start.step_s),
         Some(start.start_s),

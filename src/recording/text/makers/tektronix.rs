@@ -15,7 +15,7 @@ use crate::recording::text::keys::{self, Entry, Topic};
 use crate::recording::text::rows;
 use crate::recording::text::table::channel;
 use crate::recording::text::{FOR_MAKER, details, units};
-use crate::recording::{Axis, RateFrom, Recording};
+use crate::recording::{RateFrom, Recording, TimeAxis};
 use crate::warning::Warning;
 
 /// The rules.
@@ -130,7 +130,7 @@ fn entries(head: &Head, dialect: Dialect, place: usize) -> Vec<Entry> {
         .collect()
 }
 
-fn axis(entries: &[Entry], stamps: Vec<f64>, reading: &Reading) -> Axis {
+fn axis(entries: &[Entry], stamps: Vec<f64>, reading: &Reading) -> TimeAxis {
     let unit = entries
         .iter()
         .find(|entry| entry.topic() == Some(Topic::AxisUnit));
@@ -140,7 +140,7 @@ fn axis(entries: &[Entry], stamps: Vec<f64>, reading: &Reading) -> Axis {
         .filter(units::is_time)
         .map_or(1.0, |unit| unit.unit.factor());
     let stamps = stamps.into_iter().map(|stamp| stamp * factor).collect();
-    let mut axis = Axis::of_stamps("time", Arc::new(stamps));
+    let mut axis = TimeAxis::of_stamps("time", Arc::new(stamps));
     axis.header_rate_hz = entries
         .iter()
         .find_map(|entry| keys::rate_hz(entry, None, b'.'));
