@@ -3,7 +3,6 @@
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
-use realfft::RealFftPlanner;
 use serde::Serialize;
 
 use super::fit::RecordResidual;
@@ -17,7 +16,7 @@ pub struct SegmentSpectra {
 
 /// Transforms segments of a record; the mean of each is removed.
 pub fn spectra(samples: &[f64], length: usize) -> SegmentSpectra {
-    let plan = RealFftPlanner::<f64>::new().plan_fft_forward(length);
+    let plan = torqcomp_fourier::forward(length);
     let window: Vec<f64> = (0..length)
         .map(|i| 0.5 - 0.5 * (TAU * i as f64 / length as f64).cos())
         .collect();
@@ -134,7 +133,7 @@ pub fn lines_of(residuals: &[RecordResidual], to_hz: f64, count: usize) -> Vec<S
 
 /// Mean squared amplitude of residuals at each frequency, with a Hann window, padded with zeros to `total` samples.
 fn padded_power(residuals: &[RecordResidual], total: usize) -> Vec<f64> {
-    let plan = RealFftPlanner::<f64>::new().plan_fft_forward(total);
+    let plan = torqcomp_fourier::forward(total);
     let mut power = vec![0.0; total / 2 + 1];
     for residual in residuals {
         let samples = &residual.samples;

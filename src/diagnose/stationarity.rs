@@ -5,7 +5,6 @@ use std::f64::consts::TAU;
 use std::ops::{Range, RangeInclusive};
 
 use num_complex::Complex64;
-use realfft::RealFftPlanner;
 use torqcomp_model::Mode;
 
 use super::columns::Columns;
@@ -197,10 +196,9 @@ fn shifted(values: &[f64], shift: usize) -> Vec<f64> {
 fn slopes(modelled: &[f64], mode: &Mode, rate_hz: f64) -> [Vec<f64>; 3] {
     let count = modelled.len();
     let own = without_mean(modelled);
-    let mut planner = RealFftPlanner::<f64>::new();
     let (forward, back) = (
-        planner.plan_fft_forward(count),
-        planner.plan_fft_inverse(count),
+        torqcomp_fourier::forward(count),
+        torqcomp_fourier::inverse(count),
     );
     let mut spectrum = forward.make_output_vec();
     let _ = forward.process(&mut own.clone(), &mut spectrum);

@@ -2,8 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use realfft::RealFftPlanner;
-use realfft::num_complex::Complex64;
+use num_complex::Complex64;
 
 use super::draw::Draw;
 use super::excitation::{RATE_HZ, SAMPLES};
@@ -166,10 +165,9 @@ fn complex_stiffness(constants: Constants, loss: f64, place: &Place) -> Vec<f64>
     let mut padded = place.input.all_samples();
     let length = 4 * SAMPLES;
     padded.resize(length, 0.0);
-    let mut planner = RealFftPlanner::<f64>::new();
     let (forward, inverse) = (
-        planner.plan_fft_forward(length),
-        planner.plan_fft_inverse(length),
+        torqcomp_fourier::forward(length),
+        torqcomp_fourier::inverse(length),
     );
     let mut spectrum = forward.make_output_vec();
     forward

@@ -2,7 +2,6 @@
 
 use nalgebra::DMatrix;
 use num_complex::Complex64;
-use realfft::RealFftPlanner;
 use serde_json::Value;
 use torqcomp::identify::{Identification, response};
 
@@ -14,7 +13,7 @@ use crate::util::{Folder, assert_close};
 fn driven(count: usize, noise: &mut Noise) -> (Vec<f64>, Vec<f64>) {
     let length = (count * 3 / 2).next_power_of_two();
     let step = RATE_HZ / length as f64;
-    let plan = RealFftPlanner::new().plan_fft_inverse(length);
+    let plan = torqcomp_fourier::inverse(length);
     let mut spectrum = vec![Complex64::ZERO; length / 2 + 1];
     for line in &mut spectrum[1..(250.0 / step) as usize] {
         *line = Complex64::new(noise.normal(), noise.normal());
@@ -278,7 +277,7 @@ fn responses_to_noise_are_as_exact_as_the_noise_allows() {
     let how = response::Excitation::Random;
     let (squares, std) = squares_at_40_decibels(how, &applied, &shown, &mut noise);
     let mut spectrum = vec![Complex64::ZERO; count / 2 + 1];
-    let plan = RealFftPlanner::new().plan_fft_forward(count);
+    let plan = torqcomp_fourier::forward(count);
     plan.process(&mut applied.clone(), &mut spectrum)
         .expect("lengths match");
     let step = RATE_HZ / count as f64;

@@ -1,7 +1,5 @@
 //! The strongest line of a record, as a start for a fit.
 
-use realfft::RealFftPlanner;
-
 /// A peak of a power spectrum.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Peak {
@@ -22,7 +20,7 @@ fn power(samples: &[f64]) -> (Vec<f64>, usize) {
     let size = (2 * used.len()).next_power_of_two().max(16);
     let mut padded = used.to_vec();
     padded.resize(size, 0.0);
-    let transform = RealFftPlanner::new().plan_fft_forward(size);
+    let transform = torqcomp_fourier::forward(size);
     let mut spectrum = transform.make_output_vec();
     transform
         .process(&mut padded, &mut spectrum)

@@ -1,7 +1,6 @@
 //! Power spectral density of a record.
 
 use num_complex::Complex64;
-use realfft::RealFftPlanner;
 
 use crate::Error;
 
@@ -47,7 +46,7 @@ impl PowerSum {
     /// Adds all half-overlapping blocks that fit into the samples, the mean taken off each.
     pub fn add_samples(&mut self, samples: &[f64]) {
         let length = self.block_length;
-        let transform = RealFftPlanner::new().plan_fft_forward(length);
+        let transform = torqcomp_fourier::forward(length);
         let mut spectrum = transform.make_output_vec();
         for block in samples.windows(length).step_by(length / 2) {
             let mean = block.iter().sum::<f64>() / length as f64;
@@ -135,7 +134,7 @@ impl Density {
 #[must_use]
 pub fn periodogram(samples: &[f64], sample_rate_hz: f64) -> Density {
     let length = samples.len();
-    let transform = RealFftPlanner::new().plan_fft_forward(length);
+    let transform = torqcomp_fourier::forward(length);
     let mut spectrum = transform.make_output_vec();
     transform
         .process(&mut samples.to_vec(), &mut spectrum)
@@ -224,7 +223,7 @@ mod tests {
     fn window_in_the_frequency_domain_is_the_window_in_time() {
         let mut block: Vec<f64> = (0..64).map(|i| ((i * i) % 17) as f64 - 3.0).collect();
         let expected = slow_hann_power(&block);
-        let transform = RealFftPlanner::new().plan_fft_forward(64);
+        let transform = torqcomp_fourier::forward(64);
         let mut spectrum = transform.make_output_vec();
         transform.process(&mut block, &mut spectrum).unwrap();
         let mut power = PowerSum::new(64);

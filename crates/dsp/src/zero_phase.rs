@@ -1,7 +1,5 @@
 //! Low-pass without phase, for whole records.
 
-use realfft::RealFftPlanner;
-
 use crate::Error;
 
 /// Passes a record through a Butterworth low-pass of that order forwards and backwards: the factor is
@@ -55,8 +53,7 @@ pub fn low_pass(
         .for_each(|(i, v)| *v -= line(i, length));
     let size = length.next_power_of_two();
     padded.resize(size, 0.0);
-    let mut planner = RealFftPlanner::new();
-    let forward = planner.plan_fft_forward(size);
+    let forward = torqcomp_fourier::forward(size);
     let mut spectrum = forward.make_output_vec();
     forward
         .process(&mut padded, &mut spectrum)
@@ -65,8 +62,7 @@ pub fn low_pass(
         let ratio = k as f64 * rate_hz / size as f64 / corner_hz;
         *bin *= 1.0 / (1.0 + ratio.powi(2 * order as i32)) / size as f64;
     }
-    planner
-        .plan_fft_inverse(size)
+    torqcomp_fourier::inverse(size)
         .process(&mut spectrum, &mut padded)
         .expect("buffers were made for this length");
     Ok((0..count)

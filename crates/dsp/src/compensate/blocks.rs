@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use num_complex::Complex64;
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+use torqcomp_fourier::{ComplexToReal, RealToComplex};
 
 use super::InverseFilter;
 use crate::spectrum::PowerSum;
@@ -47,9 +47,8 @@ impl BlockConvolver {
     #[must_use]
     pub fn new(filter: &InverseFilter) -> Self {
         let length = block_length(filter.taps().len());
-        let mut planner = RealFftPlanner::new();
-        let forward = planner.plan_fft_forward(length);
-        let backward = planner.plan_fft_inverse(length);
+        let forward = torqcomp_fourier::forward(length);
+        let backward = torqcomp_fourier::inverse(length);
         let mut taps = forward.make_input_vec();
         taps[..filter.taps().len()].copy_from_slice(filter.taps());
         let mut kernel = forward.make_output_vec();

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use num_complex::Complex64;
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+use torqcomp_fourier::{ComplexToReal, RealToComplex};
 
 use super::continued;
 use super::whole::fast_length;
@@ -34,14 +34,13 @@ impl Extension {
     #[must_use]
     pub fn new(count: usize, rate_hz: f64, lead: usize) -> Self {
         let total = fast_length(count + 2 * lead);
-        let mut planner = RealFftPlanner::new();
         Self {
             count,
             lead,
             total,
             rate_hz,
-            forward: planner.plan_fft_forward(total),
-            backward: planner.plan_fft_inverse(total),
+            forward: torqcomp_fourier::forward(total),
+            backward: torqcomp_fourier::inverse(total),
         }
     }
 

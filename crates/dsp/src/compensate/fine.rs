@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use num_complex::Complex64;
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+use torqcomp_fourier::{ComplexToReal, RealToComplex};
 
 /// Goes between a window of samples and the same window at a rate that is a whole number of times higher.
 ///
@@ -24,10 +24,10 @@ struct Pair {
 }
 
 impl Pair {
-    fn new(planner: &mut RealFftPlanner<f64>, length: usize) -> Self {
+    fn new(length: usize) -> Self {
         Self {
-            forward: planner.plan_fft_forward(length),
-            backward: planner.plan_fft_inverse(length),
+            forward: torqcomp_fourier::forward(length),
+            backward: torqcomp_fourier::inverse(length),
         }
     }
 }
@@ -36,14 +36,13 @@ impl Fine {
     /// Windows of `length` samples with `margin` of them at both sides to spare, refined `factor` times.
     #[must_use]
     pub fn new(length: usize, margin: usize, factor: usize, rate_hz: f64) -> Self {
-        let mut planner = RealFftPlanner::new();
         Self {
             length,
             factor,
             margin,
             rate_hz,
-            coarse: Pair::new(&mut planner, length),
-            fine: Pair::new(&mut planner, length * factor),
+            coarse: Pair::new(length),
+            fine: Pair::new(length * factor),
         }
     }
 

@@ -29,7 +29,6 @@ use std::fmt;
 use std::sync::Arc;
 
 use num_complex::Complex64;
-use realfft::RealFftPlanner;
 
 use crate::Error;
 use crate::band::Band;
@@ -196,8 +195,7 @@ fn response_on_grid(
 /// Impulse response on a circle of `length` samples, time zero at index 0.
 fn impulse_response(mut spectrum: Vec<Complex64>, length: usize) -> Vec<f64> {
     let mut response = vec![0.0; length];
-    RealFftPlanner::new()
-        .plan_fft_inverse(length)
+    torqcomp_fourier::inverse(length)
         .process(&mut spectrum, &mut response)
         .expect("lengths come from one number and the ends are real");
     let scale = 1.0 / length as f64;

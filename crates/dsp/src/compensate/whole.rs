@@ -1,7 +1,5 @@
 //! Compensation of a record as a whole, with one transform.
 
-use realfft::RealFftPlanner;
-
 use super::{InverseFilter, continued, response_on_grid};
 use crate::Error;
 
@@ -58,8 +56,7 @@ pub fn whole_record(filter: &InverseFilter, samples: &[f64]) -> Result<Vec<f64>,
         })
         .collect();
 
-    let mut planner = RealFftPlanner::new();
-    let forward = planner.plan_fft_forward(length);
+    let forward = torqcomp_fourier::forward(length);
     let mut spectrum = forward.make_output_vec();
     forward
         .process(&mut padded, &mut spectrum)
@@ -72,8 +69,7 @@ pub fn whole_record(filter: &InverseFilter, samples: &[f64]) -> Result<Vec<f64>,
     {
         *bin *= gain * scale;
     }
-    planner
-        .plan_fft_inverse(length)
+    torqcomp_fourier::inverse(length)
         .process(&mut spectrum, &mut padded)
         .expect("buffers were made for this length and the ends are real");
     padded.truncate(samples.len());

@@ -1,7 +1,6 @@
 //! Cutting records into blocks, and their spectra.
 
 use num_complex::Complex64;
-use realfft::RealFftPlanner;
 
 use super::Block;
 
@@ -46,7 +45,7 @@ fn of_both<T: Send>(
 
 /// A transform for blocks of one length, with its plan and weights.
 struct Transform {
-    plan: std::sync::Arc<dyn realfft::RealToComplex<f64>>,
+    plan: std::sync::Arc<dyn torqcomp_fourier::RealToComplex<f64>>,
     /// Empty without a window.
     weights: Vec<f64>,
     without_mean: bool,
@@ -60,7 +59,7 @@ impl Transform {
             Window::Exponential(tau) => (-(i as f64) / tau).exp(),
         };
         Self {
-            plan: RealFftPlanner::new().plan_fft_forward(count),
+            plan: torqcomp_fourier::forward(count),
             weights: match window {
                 Window::None => Vec::new(),
                 _ => (0..count).map(weight).collect(),
@@ -180,15 +179,14 @@ pub fn find_period(samples: &[f64]) -> Option<usize> {
         }))
         .collect();
     padded.resize(size, 0.0);
-    let mut planner = RealFftPlanner::new();
-    let forward = planner.plan_fft_forward(size);
+    let forward = torqcomp_fourier::forward(size);
     let mut bins = forward.make_output_vec();
     forward
         .process(&mut padded, &mut bins)
         .expect("buffers were made for this length");
     bins.iter_mut()
         .for_each(|b| *b = Complex64::new(b.norm_sqr() / size as f64, 0.0));
-    let inverse = planner.plan_fft_inverse(size);
+    let inverse = torqcomp_fourier::inverse(size);
     inverse
         .process(&mut bins, &mut padded)
         .expect("buffers were made for this length");

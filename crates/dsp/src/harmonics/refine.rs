@@ -2,7 +2,6 @@
 
 use nalgebra::DVector;
 use num_complex::Complex64;
-use realfft::RealFftPlanner;
 use std::f64::consts::TAU;
 
 use super::{Fundamental, SineFit, density_near, residual_density, rotate, sum_squares};
@@ -71,7 +70,7 @@ fn search(samples: &[f64], rate_hz: f64, start_hz: f64, span: f64, orders: &[f64
         let turn = TAU * (i as f64 + 0.5) / samples.len() as f64;
         *slot = (x - mean) * (0.5 - 0.5 * turn.cos());
     }
-    let transform = RealFftPlanner::new().plan_fft_forward(length);
+    let transform = torqcomp_fourier::forward(length);
     let mut spectrum: Vec<Complex64> = transform.make_output_vec();
     transform
         .process(&mut padded, &mut spectrum)

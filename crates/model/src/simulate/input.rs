@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use num_complex::Complex64;
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+use torqcomp_fourier::{ComplexToReal, RealToComplex};
 
 use super::between::Between;
 
@@ -48,9 +48,8 @@ impl Excitation {
             .min(count.saturating_sub(1))
             .max(2);
         let total = quick_length(count + 2 * lead);
-        let mut planner = RealFftPlanner::new();
-        let forward = planner.plan_fft_forward(total);
-        let backward = planner.plan_fft_inverse(total);
+        let forward = torqcomp_fourier::forward(total);
+        let backward = torqcomp_fourier::inverse(total);
         let mut input = Self {
             periods: periods(&samples),
             samples,
@@ -170,7 +169,7 @@ impl Excitation {
     /// Interpolation of what acts: its spectrum, padded with zeros.
     fn refine(&self, substeps: usize) -> Vec<f64> {
         let long = self.total * substeps;
-        let plan = RealFftPlanner::new().plan_fft_inverse(long);
+        let plan = torqcomp_fourier::inverse(long);
         let mut spectrum = plan.make_input_vec();
         spectrum[..self.spectrum.len()].copy_from_slice(&self.spectrum);
         if substeps > 1 && self.total.is_multiple_of(2) {
