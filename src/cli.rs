@@ -12,7 +12,7 @@ use torqcomp_model::UnitSystem;
 
 use crate::failure::Failure;
 use crate::io::digits::Digits;
-use crate::io::output::Output;
+use crate::io::output::{Output, Policy};
 use crate::io::{ChannelChoice, Reading, frequency, positive_frequency};
 
 pub use diagnose::Diagnose;
@@ -108,12 +108,30 @@ pub struct OutputArgs {
     /// Replace the output if it exists
     #[arg(long)]
     pub force: bool,
+    /// Leave it to the system when outputs reach the disk: quicker, but a power cut may leave empty files
+    #[arg(long)]
+    pub no_sync: bool,
 }
 
 impl OutputArgs {
     /// Opens the output; `inputs` are the files that it must not replace.
     pub(crate) fn open(&self, inputs: &[&Path]) -> Result<Output, Failure> {
-        Output::open(self.output.as_deref(), self.force, inputs)
+        let place = self.output.as_deref().map(Path::new);
+        Output::open(place, self.policy(), inputs)
+    }
+
+    /// Opens another output of the same run.
+    pub(crate) fn open_beside(&self, place: &Path, inputs: &[&Path]) -> Result<Output, Failure> {
+        let first = self.output.as_deref().map(Path::new);
+        let taken: Vec<&Path> = inputs.iter().copied().chain(first).collect();
+        Output::open(Some(place), self.policy(), &taken)
+    }
+
+    pub(crate) fn policy(&self) -> Policy {
+        Policy {
+            replace: self.force,
+            sync: !self.no_sync,
+        }
     }
 
     pub(crate) fn is_stdout(&self) -> bool {

@@ -28,7 +28,7 @@ use commands::Outcome;
 /// Runs the command line of this process.
 #[must_use]
 pub fn run() -> ExitCode {
-    if let Err(error) = io::output::clean_up_when_interrupted() {
+    if let Err(error) = io::remove_when_interrupted() {
         let message = "interrupting this run may leave a temporary file behind";
         print::say(&format!("torqcomp: {message}: {error}\n"));
     }

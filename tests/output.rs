@@ -262,3 +262,260 @@ fn a_plot_is_an_svg_file() {
     assert!(svg.starts_with("<svg ") && svg.contains("compensated") && !svg.contains("NaN"));
     folder.run(&args).says(1, &["exists"]);
 }
+
+#[test]
+fn one_file_cannot_be_two_outputs_or_input_and_output() {
+    let folder = folder();
+    std::fs::create_dir(folder.path("sub")).unwrap();
+    let spelled = ["-o", "a.csv", "--plot", "sub/../a.csv"];
+    let both = [&COMPENSATE[..], &spelled].concat();
+    folder.run(&both).says(2, &["a.csv as well"]);
+    let diagnose = [
+        "diagnose",
+        "--train",
+        "in.csv",
+        "--applied",
+        "2",
+        "--measured",
+        "3",
+        "-o",
+        "a.html",
+        "--html",
+        "./a.html",
+    ];
+    folder.run(&diagnose).says(2, &["a.html as well"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn standard_input_is_not_replaced_while_it_is_read() {
+    let folder = folder();
+    let before = folder.read("in.csv");
+    let args = [
+        "compensate",
+        "-",
+        "--stand",
+        "stand.toml",
+        "-o",
+        "in.csv",
+        "--force",
+    ];
+    let ran = command(&folder.path(""), &args)
+        .stdin(std::fs::File::open(folder.path("in.csv")).unwrap())
+        .output()
+        .expect("it ends");
+    assert_eq!(ran.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&ran.stderr).contains("is standard input as well"));
+    assert!(folder.read("in.csv") == before);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_link_to_nothing_stays_one() {
+    let folder = folder();
+    std::fs::create_dir(folder.path("sub")).unwrap();
+    std::os::unix::fs::symlink("sub/new.csv", folder.path("link.csv")).unwrap();
+    let args = [&COMPENSATE[..], &["-o", "link.csv"]].concat();
+    folder.run(&args).says(1, &["link.csv exists"]);
+    let forced = [&args[..], &["--force"]].concat();
+    assert_eq!(folder.run(&forced).code, 0);
+    assert!(folder.path("link.csv").is_symlink());
+    assert_eq!(folder.read("sub/new.csv").lines().count(), 60_001);
+}
+
+/// The plot cannot take its name, since a folder comes to be there during the run: the table must not appear either.
+#[cfg(unix)]
+#[test]
+fn two_outputs_appear_both_or_neither() {
+    for old in [None, Some("precious\n")] {
+        let folder = folder();
+        if let Some(old) = old {
+            folder.write("out.csv", old);
+        }
+        let args = [
+            "compensate",
+            "-",
+            "--stand",
+            "stand.toml",
+            "-o",
+            "out.csv",
+            "--plot",
+            "out.svg",
+            "--force",
+            "--json",
+        ];
+        let mut child = command(&folder.path(""), &args)
+            .stdin(Stdio::piped())
+            .spawn()
+            .expect("the binary starts");
+        let mut pipe = child.stdin.take().expect("a pipe");
+        std::io::Write::write_all(&mut pipe, folder.read("in.csv").as_bytes()).expect("rows");
+        let parts = || {
+            folder
+                .names()
+                .iter()
+                .filter(|name| name.ends_with(".part"))
+                .count()
+        };
+        while parts() < 2 {
+            std::thread::sleep(std::time::Duration::from_millis(10));
+        }
+        std::fs::create_dir(folder.path("out.svg")).unwrap();
+        drop(pipe);
+        let ran = child.wait_with_output().expect("it ends");
+        assert_eq!(
+            ran.status.code(),
+            Some(1),
+            "{}",
+            String::from_utf8_lossy(&ran.stderr)
+        );
+        std::fs::remove_dir(folder.path("out.svg")).unwrap();
+        match old {
+            None => assert_eq!(folder.names(), ["in.csv", "stand.toml"]),
+            Some(old) => {
+                assert_eq!(folder.names(), ["in.csv", "out.csv", "stand.toml"]);
+                assert_eq!(folder.read("out.csv"), old);
+            }
+        }
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_device_for_one_output_leaves_the_other_unwritten() {
+    let folder = folder();
+    let args = [&COMPENSATE[..], &["-o", "out.csv", "--plot", "/dev/full"]].concat();
+    folder.run(&args).says(1, &["/dev/full", "no space left"]);
+    assert_eq!(folder.names(), ["in.csv", "stand.toml"]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn what_a_killed_run_left_is_removed_by_the_next() {
+    let folder = folder();
+    let args = ["compensate", "-", "--stand", "stand.toml", "-o", "out.csv"];
+    let start = || {
+        let mut child = command(&folder.path(""), &args)
+            .stdin(Stdio::piped())
+            .spawn()
+            .expect("the binary starts");
+        let mut pipe = child.stdin.take().expect("a pipe");
+        std::io::Write::write_all(&mut pipe, folder.read("in.csv").as_bytes()).expect("rows");
+        (child, pipe)
+    };
+    let parts = || {
+        folder
+            .names()
+            .iter()
+            .filter(|name| name.ends_with(".part"))
+            .count()
+    };
+    let wait = |count: usize| {
+        while parts() < count {
+            std::thread::sleep(std::time::Duration::from_millis(10));
+        }
+    };
+    let (mut killed, killed_pipe) = start();
+    wait(1);
+    // Another run that goes on keeps its own.
+    let (mut alive, alive_pipe) = start();
+    wait(2);
+    killed.kill().unwrap();
+    killed.wait().unwrap();
+    drop(killed_pipe);
+    assert_eq!(parts(), 2);
+    let done = [&COMPENSATE[..], &["-o", "third.csv"]].concat();
+    assert_eq!(folder.run(&done).code, 0);
+    assert_eq!(parts(), 1);
+    drop(alive_pipe);
+    assert_eq!(alive.wait().unwrap().code(), Some(0));
+    assert_eq!(
+        folder.names(),
+        ["in.csv", "out.csv", "stand.toml", "third.csv"]
+    );
+}
+
+/// Every signal that can be caught leaves nothing; those that are ignored, as by `nohup`, stay so.
+#[cfg(target_os = "linux")]
+#[test]
+fn signals_leave_nothing_or_are_ignored() {
+    for (signal, number) in [
+        ("TERM", 15),
+        ("HUP", 1),
+        ("QUIT", 3),
+        ("XCPU", 24),
+        ("INT", 2),
+    ] {
+        for ignored in [false, true] {
+            let folder = folder();
+            let trap = match ignored {
+                true => format!("trap '' {signal}; "),
+                false => String::new(),
+            };
+            let script = format!("{trap}exec \"$0\" compensate - --stand stand.toml -o out.csv");
+            let mut child = std::process::Command::new("sh")
+                .args(["-c", &script, env!("CARGO_BIN_EXE_torqcomp")])
+                .current_dir(folder.path(""))
+                .stdin(Stdio::piped())
+                .stderr(Stdio::null())
+                .spawn()
+                .expect("the shell starts");
+            let mut pipe = child.stdin.take().expect("a pipe");
+            std::io::Write::write_all(&mut pipe, folder.read("in.csv").as_bytes()).expect("rows");
+            while !folder.names().iter().any(|name| name.ends_with(".part")) {
+                std::thread::sleep(std::time::Duration::from_millis(10));
+            }
+            let send = ["-s", signal, &child.id().to_string()].map(str::to_owned);
+            assert!(
+                std::process::Command::new("kill")
+                    .args(send)
+                    .status()
+                    .unwrap()
+                    .success()
+            );
+            if !ignored {
+                let code = child.wait().expect("it ends").code();
+                assert_eq!(code, Some(128 + number), "{signal}");
+                assert_eq!(folder.names(), ["in.csv", "stand.toml"], "{signal}");
+                continue;
+            }
+            std::thread::sleep(std::time::Duration::from_millis(50));
+            drop(pipe);
+            assert_eq!(child.wait().expect("it ends").code(), Some(0), "{signal}");
+            assert_eq!(
+                folder.names(),
+                ["in.csv", "out.csv", "stand.toml"],
+                "{signal}"
+            );
+        }
+    }
+}
+
+/// `ulimit -f` ends writing with a signal unless that is handled.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_limit_of_file_sizes_leaves_nothing() {
+    let folder = folder();
+    let ran = std::process::Command::new("sh")
+        .args([
+            "-c",
+            "ulimit -f 64; exec \"$0\" compensate in.csv --stand stand.toml -o out.csv",
+        ])
+        .arg(env!("CARGO_BIN_EXE_torqcomp"))
+        .current_dir(folder.path(""))
+        .output()
+        .expect("the shell starts");
+    assert_eq!(ran.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&ran.stderr).contains("out.csv: cannot be written"));
+    assert_eq!(folder.names(), ["in.csv", "stand.toml"]);
+}
+
+#[test]
+fn an_impossible_output_of_identify_is_refused_before_the_work() {
+    let folder = folder();
+    // The record could not be read either: the output is looked at first.
+    let args = ["identify", "decay", "none.csv", "-o", "none/stand.toml"];
+    folder
+        .run(&args)
+        .says(1, &["the folder none does not exist"]);
+}

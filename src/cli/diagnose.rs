@@ -4,11 +4,12 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::Work;
+use super::{OutputArgs, Work};
 use crate::io::Reading;
 
 /// Arguments of `diagnose`.
 #[derive(Debug, Args)]
+#[command(mut_arg("output", |output| output.help("Write the refined stand file, for simulate and compensate")))]
 pub struct Diagnose {
     /// Stand file [default: fit a plain second-order stand]
     #[arg(long, value_name = "FILE")]
@@ -38,12 +39,9 @@ pub struct Diagnose {
     /// Write an HTML report with charts of records, models and residuals
     #[arg(long, value_name = "FILE")]
     pub html: Option<String>,
-    /// Write the refined stand file, for simulate and compensate
-    #[arg(short, long, value_name = "OUT")]
-    pub output: Option<String>,
-    /// Replace existing outputs
-    #[arg(long)]
-    pub force: bool,
+    /// The refined stand file.
+    #[command(flatten)]
+    pub result: OutputArgs,
     /// Print JSON instead of text
     #[arg(long)]
     pub json: bool,

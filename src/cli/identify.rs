@@ -30,6 +30,19 @@ pub enum Test {
     Static(Static),
 }
 
+impl Test {
+    /// What is written, and the records that must not be replaced.
+    #[must_use]
+    pub fn target(&self) -> (&Findings, &[String]) {
+        match self {
+            Self::Decay(test) => (&test.findings, &test.inputs),
+            Self::Response(test) => (&test.findings, &test.inputs),
+            Self::Runup(test) => (&test.findings, std::slice::from_ref(&test.input)),
+            Self::Static(test) => (&test.findings, std::slice::from_ref(&test.input)),
+        }
+    }
+}
+
 /// Output: the stand file of `-o` is written, or updated if it exists.
 #[derive(Debug, Args)]
 pub struct Findings {

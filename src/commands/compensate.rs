@@ -20,7 +20,7 @@ use crate::cli::{self, OneChannel};
 use crate::failure::Failure;
 use crate::inverse::ChainInverse;
 use crate::io::Input;
-use crate::io::output::{self, Output};
+use crate::io::output;
 use crate::print::{self, Report};
 use crate::recording::{ChannelStream, StreamSummary};
 use crate::stand::{self, Calibration, Stand};
@@ -71,10 +71,9 @@ pub fn run(args: &cli::Compensate) -> Result<Outcome, Failure> {
         plot.write(traces.svg(&report.unit).as_bytes())?;
     }
     if args.json {
-        output::write_all(None, false, &[], &report.document(true))?;
+        output::print(&report.document(true))?;
     }
-    sink.finish(args, &report)?;
-    plot.map_or(Ok(()), Output::finish)?;
+    output::finish_all(plot.into_iter().chain([sink.finish(args, &report)?]))?;
     if !args.work.quiet {
         print::say(&report.text());
     }

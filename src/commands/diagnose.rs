@@ -8,12 +8,12 @@ mod text;
 use std::io::IsTerminal;
 use std::path::Path;
 
-use super::{Outcome, conclude, publish};
+use super::{Outcome, conclude};
 use crate::cli::Diagnose;
 use crate::diagnose::{self, Workers};
 use crate::failure::Failure;
-use crate::io::output::Output;
-use crate::print;
+use crate::io::output;
+use crate::print::{self, Report};
 use crate::stand::{self, Stand};
 
 /// Runs the verb.
@@ -27,10 +27,16 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
     };
     let records = args.train.iter().chain(&args.holdout).map(Path::new);
     let files: Vec<&Path> = records.chain(args.stand.as_deref()).collect();
-    let open = |place: &String| Output::open(Some(place), args.force, &files);
-    let refined = args.output.as_ref().map(open).transpose()?;
-    let html = args.html.as_ref().map(open).transpose()?;
-    let output = Output::open(None, args.force, &files)?;
+    let result = &args.result;
+    let mut refined = result
+        .output
+        .as_ref()
+        .map(|_| result.open(&files))
+        .transpose()?;
+    let html = args.html.as_deref().map(Path::new);
+    let mut html = html
+        .map(|page| result.open_beside(page, &files))
+        .transpose()?;
     let (case, is_lossy) = read::read(args, stand.as_ref().map(|(stand, _)| stand))?;
     let is_shown = !args.work.quiet && std::io::stderr().is_terminal();
     let progress = |done: usize, of: usize| {
@@ -44,18 +50,14 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
         progress: &progress,
     };
     let diagnosis = diagnose::run(case, workers)?;
-    if let Some(refined) = refined {
+    if let Some(refined) = &mut refined {
         let declared = stand.as_ref().map(|(stand, text)| (stand, text.as_str()));
-        write(refined, &refined::stand_file(&diagnosis, declared)?)?;
+        refined.write(refined::stand_file(&diagnosis, declared)?.as_bytes())?;
     }
-    if let Some(html) = html {
-        write(html, &page::page(&diagnosis))?;
+    if let Some(html) = &mut html {
+        html.write(page::page(&diagnosis).as_bytes())?;
     }
-    publish(&diagnosis, args.json, output)?;
+    output::print(&diagnosis.document(args.json))?;
+    output::finish_all(refined.into_iter().chain(html))?;
     Ok(conclude(&diagnosis.warnings, is_lossy, args.strict))
-}
-
-fn write(mut output: Output, text: &str) -> Result<(), Failure> {
-    output.write(text.as_bytes())?;
-    output.finish()
 }

@@ -60,7 +60,7 @@ fn publish(report: &impl Report, as_json: bool, mut output: Output) -> Result<()
 /// Gives the report of a verb whose result is a record: the document to standard output, the text to a person.
 fn report_beside(report: &impl Report, as_json: bool, quiet: bool) -> Result<(), Failure> {
     if as_json {
-        output::write_all(None, false, &[], &report.document(true))?;
+        output::print(&report.document(true))?;
     }
     if !quiet {
         print::say(&report.text());
@@ -91,13 +91,10 @@ fn open_plot(
     let Some(path) = path else {
         return Ok(None);
     };
-    let text = path
-        .to_str()
-        .filter(|text| *text != "-")
-        .ok_or_else(|| Failure::usage("--plot needs the name of a file, in UTF-8"))?;
-    let mut taken = inputs.to_vec();
-    taken.extend(result.output.as_deref().map(Path::new));
-    Output::open(Some(text), result.force, &taken).map(Some)
+    if path == Path::new("-") {
+        return Err(Failure::usage("--plot needs the name of a file"));
+    }
+    result.open_beside(path, inputs).map(Some)
 }
 
 /// A unit as written in the file; empty if there is none.

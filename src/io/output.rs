@@ -3,29 +3,22 @@
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
 
 use tempfile::NamedTempFile;
 
+use super::parts;
 use crate::failure::Failure;
 
-/// Files that are not complete, to be removed if the run is interrupted.
-static PARTS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
-/// Exit code of an interrupted run: 128 and the number of the signal, as shells have it.
-const INTERRUPTED: i32 = 130;
+/// Most links that lead to one file.
+const LINKS: usize = 40;
 
-/// Has incomplete outputs removed when the run is interrupted or told to end.
-///
-/// # Errors
-/// If the system does not let signals be handled.
-pub fn clean_up_when_interrupted() -> Result<(), ctrlc::Error> {
-    ctrlc::set_handler(|| {
-        for part in PARTS.lock().unwrap_or_else(|e| e.into_inner()).drain(..) {
-            // It may have got its name already, or be gone.
-            let _ = std::fs::remove_file(part);
-        }
-        std::process::exit(INTERRUPTED);
-    })
+/// How files are written.
+#[derive(Debug, Clone, Copy)]
+pub struct Policy {
+    /// Whether a file that exists is replaced.
+    pub replace: bool,
+    /// Whether a file is on the disk before it takes its name.
+    pub sync: bool,
 }
 
 /// An output: standard output, a device, or a file that takes its name when it is complete.
@@ -41,30 +34,37 @@ enum Kind {
     File {
         part: NamedTempFile,
         path: PathBuf,
-        /// Whether a file that came in the meantime may be replaced.
-        force: bool,
+        policy: Policy,
     },
 }
 
 impl Output {
-    /// Opens an output. `taken` are the files that it must not replace: the inputs and the other
+    /// Standard output.
+    #[must_use]
+    pub fn stdout() -> Self {
+        Self {
+            name: "standard output".to_owned(),
+            kind: Kind::Stdout(io::stdout()),
+        }
+    }
+
+    /// Opens an output. `taken` are the files that it must not replace: the inputs, with `-` for standard input, and the other
     /// outputs.
     ///
     /// # Errors
-    /// If the output is one of them, exists without `force`, or its folder cannot be written.
-    pub fn open(place: Option<&str>, force: bool, taken: &[&Path]) -> Result<Self, Failure> {
-        let Some(text) = place.filter(|text| *text != "-") else {
-            return Ok(Self {
-                name: "standard output".to_owned(),
-                kind: Kind::Stdout(io::stdout()),
-            });
+    /// If the output is one of them, exists and may not be replaced, or its folder cannot be written.
+    pub fn open(place: Option<&Path>, policy: Policy, taken: &[&Path]) -> Result<Self, Failure> {
+        let Some(path) = place.filter(|path| *path != Path::new("-")) else {
+            return Ok(Self::stdout());
         };
-        let name = text.to_owned();
-        let path = Path::new(text);
-        if let Some(other) = taken.iter().find(|other| same_file(other, path)) {
+        let name = path.display().to_string();
+        if let Some(other) = taken.iter().find(|other| is_same_file(other, path)) {
+            let other = match *other {
+                input if input == Path::new("-") => "standard input".to_owned(),
+                file => file.display().to_string(),
+            };
             return Err(Failure::usage(format_args!(
-                "the output {name} is {} as well; write to another file",
-                other.display()
+                "the output {name} is {other} as well; write to another file"
             )));
         }
         // A link is followed, so that it stays one; also one that leads nowhere counts as existing.
@@ -79,20 +79,21 @@ impl Output {
                 let file = File::options().write(true).open(path);
                 Kind::Device(file.map_err(|e| Failure::writing(&name, &e))?)
             }
-            _ if exists && !force => {
+            _ if exists && !policy.replace => {
                 return Err(Failure::failed(format_args!(
                     "the output {name} exists; give --force to replace it, or another name"
                 )));
             }
             found => {
-                let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
-                let part = part_beside(&path).map_err(|e| folder_failure(&path, &e))?;
+                let path = end_of_links(path);
+                let part =
+                    parts::create_in(folder_of(&path)).map_err(|e| folder_failure(&path, &e))?;
                 if let Ok(meta) = found {
                     // What is replaced hands on its permissions.
                     let kept = part.as_file().set_permissions(meta.permissions());
                     kept.map_err(|e| Failure::writing(&name, &e))?;
                 }
-                Kind::File { part, path, force }
+                Kind::File { part, path, policy }
             }
         };
         Ok(Self { name, kind })
@@ -116,19 +117,17 @@ impl Output {
     /// # Errors
     /// As [`Output::write`].
     pub fn finish(self) -> Result<(), Failure> {
-        let result = match self.kind {
-            Kind::Stdout(mut out) => out.flush(),
-            Kind::Device(mut file) => file.flush(),
-            Kind::File { part, path, force } => {
-                let done = if force {
-                    part.persist(path)
-                } else {
-                    part.persist_noclobber(path)
-                };
-                done.map(drop).map_err(|e| e.error)
-            }
-        };
-        result.map_err(|error| Failure::writing(&self.name, &error))
+        finish_all([self])
+    }
+
+    /// Does whatever can fail before the file takes its name.
+    fn seal(&mut self) -> io::Result<()> {
+        match &mut self.kind {
+            Kind::Stdout(out) => out.flush(),
+            Kind::Device(file) => file.flush(),
+            Kind::File { part, policy, .. } if policy.sync => part.as_file().sync_all(),
+            Kind::File { .. } => Ok(()),
+        }
     }
 
     /// Name for people.
@@ -156,26 +155,95 @@ impl Write for Output {
     }
 }
 
-/// A nameless-to-be file in the folder of the output, removed if it is not completed.
-fn part_beside(path: &Path) -> io::Result<NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".torqcomp-").suffix(".part");
-    set_permissions(&mut builder);
-    let part = builder.tempfile_in(folder_of(path))?;
-    let mut parts = PARTS.lock().unwrap_or_else(|e| e.into_inner());
-    parts.push(part.path().to_owned());
-    Ok(part)
+/// Completes the outputs of one run: all files get their names, or none does.
+///
+/// # Errors
+/// As [`Output::write`].
+pub fn finish_all(outputs: impl IntoIterator<Item = Output>) -> Result<(), Failure> {
+    let mut outputs: Vec<Output> = outputs.into_iter().collect();
+    for output in &mut outputs {
+        let sealed = output.seal();
+        sealed.map_err(|error| Failure::writing(&output.name, &error))?;
+    }
+    let files = outputs.into_iter().filter_map(|output| match output.kind {
+        Kind::File { part, path, policy } => Some((output.name, part, path, policy)),
+        _ => None,
+    });
+    let files: Vec<_> = files.collect();
+    let several = files.len() > 1;
+    let mut done: Vec<Renamed> = Vec::new();
+    for (name, part, path, policy) in files {
+        let renamed = Renamed::new(part, path, policy, several);
+        match renamed {
+            Ok(renamed) => done.push(renamed),
+            Err(error) => {
+                done.into_iter().for_each(Renamed::undo);
+                return Err(Failure::writing(&name, &error));
+            }
+        }
+    }
+    done.iter().for_each(Renamed::settle);
+    Ok(())
 }
 
-/// The finished file gets the permissions of any other new file.
-#[cfg(unix)]
-fn set_permissions(builder: &mut tempfile::Builder<'_, '_>) {
-    use std::os::unix::fs::PermissionsExt;
-    builder.permissions(std::fs::Permissions::from_mode(0o666));
+/// A file that has taken its name.
+struct Renamed {
+    path: PathBuf,
+    /// Whether there was nothing of that name before.
+    is_new: bool,
+    /// What it replaced, under another name as long as that may have to come back.
+    replaced: Option<tempfile::TempPath>,
+    sync: bool,
 }
 
-#[cfg(not(unix))]
-fn set_permissions(_: &mut tempfile::Builder<'_, '_>) {}
+impl Renamed {
+    fn new(part: NamedTempFile, path: PathBuf, policy: Policy, keep: bool) -> io::Result<Self> {
+        let is_new = std::fs::symlink_metadata(&path).is_err();
+        let replaced = match keep && !is_new {
+            true => second_name(&path),
+            false => None,
+        };
+        let renamed = match policy.replace {
+            true => part.persist(&path),
+            false => part.persist_noclobber(&path),
+        };
+        renamed.map_err(|e| e.error)?;
+        Ok(Self {
+            path,
+            is_new,
+            replaced,
+            sync: policy.sync,
+        })
+    }
+
+    /// Puts back what was there before.
+    fn undo(self) {
+        // The failure that led here is the one to tell.
+        let _ = match self.replaced {
+            Some(old) => old.persist(&self.path).map_err(|e| e.error),
+            None if self.is_new => std::fs::remove_file(&self.path),
+            // Without a copy of the old file, the new one is all there is.
+            None => Ok(()),
+        };
+    }
+
+    /// Has the new name on the disk, too. Where folders cannot be synced, the system does so in its time.
+    fn settle(&self) {
+        if self.sync
+            && let Ok(folder) = File::open(folder_of(&self.path))
+        {
+            let _ = folder.sync_all();
+        }
+    }
+}
+
+/// A second name for a file that exists, removed when it is dropped; `None` where file systems have no such thing.
+fn second_name(path: &Path) -> Option<tempfile::TempPath> {
+    let part = parts::create_in(folder_of(path)).ok()?.into_temp_path();
+    std::fs::remove_file(&part).ok()?;
+    std::fs::hard_link(path, &part).ok()?;
+    Some(part)
+}
 
 fn folder_failure(path: &Path, error: &io::Error) -> Failure {
     let folder = folder_of(path);
@@ -201,29 +269,52 @@ fn folder_of(path: &Path) -> &Path {
     }
 }
 
-/// Whether two paths lead to the same file.
-fn same_file(a: &Path, b: &Path) -> bool {
-    match (a.canonicalize(), b.canonicalize()) {
-        (Ok(a), Ok(b)) => a == b,
-        // Outputs that are not there yet.
-        (Err(_), Err(_)) => {
-            a == b || folder_of(a) == folder_of(b) && a.file_name() == b.file_name()
-        }
-        _ => false,
+/// The file that a name leads to, whether it is there or not.
+fn end_of_links(path: &Path) -> PathBuf {
+    let mut path = path.to_owned();
+    for _ in 0..LINKS {
+        let Ok(next) = std::fs::read_link(&path) else {
+            break;
+        };
+        path = folder_of(&path).join(next);
+    }
+    let folder = folder_of(&path).canonicalize();
+    match (folder, path.file_name()) {
+        (Ok(folder), Some(name)) => folder.join(name),
+        _ => path,
     }
 }
 
-/// Writes a small result in one go.
+/// Whether an input or another output is the file of that path.
+fn is_same_file(other: &Path, path: &Path) -> bool {
+    match other == Path::new("-") {
+        true => is_stdin(path),
+        false => end_of_links(other) == end_of_links(path),
+    }
+}
+
+#[cfg(unix)]
+fn is_stdin(path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let id = |path: &Path| {
+        let meta = std::fs::metadata(path).ok().filter(|meta| meta.is_file());
+        meta.map(|meta| (meta.dev(), meta.ino()))
+    };
+    let stdin = id(Path::new("/dev/stdin"));
+    stdin.is_some() && stdin == id(path)
+}
+
+#[cfg(not(unix))]
+fn is_stdin(_: &Path) -> bool {
+    false
+}
+
+/// Writes a text to standard output.
 ///
 /// # Errors
-/// As [`Output::open`] and [`Output::write`].
-pub fn write_all(
-    place: Option<&str>,
-    force: bool,
-    taken: &[&Path],
-    text: &str,
-) -> Result<(), Failure> {
-    let mut output = Output::open(place, force, taken)?;
+/// As [`Output::write`].
+pub fn print(text: &str) -> Result<(), Failure> {
+    let mut output = Output::stdout();
     output.write(text.as_bytes())?;
     output.finish()
 }

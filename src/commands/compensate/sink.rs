@@ -92,17 +92,15 @@ impl Sink {
         }
     }
 
-    /// Writes what comes after the last sample and gives the output its name.
+    /// Writes what comes after the last sample; the output is whole then.
     pub(super) fn finish(
         self,
         args: &Compensate,
         report: &CompensateReport,
-    ) -> Result<(), Failure> {
+    ) -> Result<Output, Failure> {
         match self.target {
-            Target::Text(output) => output.finish(),
-            Target::Messages(messages) => {
-                messages.writer.finish(&provenance(args, report)?)?.finish()
-            }
+            Target::Text(output) => Ok(output),
+            Target::Messages(messages) => messages.writer.finish(&provenance(args, report)?),
         }
     }
 

@@ -14,7 +14,7 @@ use super::{Outcome, conclude};
 use crate::cli::identify::{Findings, Identify, Test};
 use crate::failure::Failure;
 use crate::identify::{Identification, NamedEstimate};
-use crate::io::output;
+use crate::io::output::{self, Output, Policy};
 use crate::print::Report;
 use crate::stand::update::Entry;
 use crate::stand::{self, update};
@@ -26,6 +26,9 @@ const FORCE: Dimension = Dimension::new([1, 1, -2, 0, 0, 0]);
 
 /// Runs the verb.
 pub fn run(args: &Identify) -> Result<Outcome, Failure> {
+    let (findings, inputs) = args.test.target();
+    // What cannot be written is refused before the work.
+    Targets::open(findings, inputs)?;
     match &args.test {
         Test::Decay(args) => decay::run(args),
         Test::Runup(args) => runup::run(args),
@@ -117,22 +120,18 @@ fn deliver(
     result.rate_hz = recorded.rate_hz;
     result.warnings.extend(recorded.warnings);
     result.convert(UnitSystem::from(findings.units));
-    let target = &findings.result;
-    let output = target.output.as_deref();
-    let read: Vec<&Path> = result.inputs.iter().map(Path::new).collect();
-    if let Some(output) = output {
-        write_stand(output, findings, &read, entries)?;
+    let mut targets = Targets::open(findings, &result.inputs)?;
+    if let Some(stand) = &mut targets.stand {
+        stand.write(stand_file(findings, entries)?.as_bytes())?;
     }
-    if let Some(page) = findings.html.as_deref() {
-        let others: Vec<&Path> = read.into_iter().chain(output.map(Path::new)).collect();
-        output::write_all(Some(page), target.force, &others, &result.page())?;
+    if let Some(page) = &mut targets.page {
+        page.write(result.page().as_bytes())?;
     }
-    let printed = match (findings.json, output) {
-        // Standard output has the stand file.
-        (false, Some("-")) => String::new(),
-        (as_json, _) => result.document(as_json),
-    };
-    output::write_all(None, false, &[], &printed)?;
+    // Standard output has the stand file.
+    if findings.json || findings.result.output.is_none() || !findings.result.is_stdout() {
+        output::print(&result.document(findings.json))?;
+    }
+    output::finish_all(targets.stand.into_iter().chain(targets.page))?;
     Ok(conclude(
         &result.warnings,
         recorded.is_lossy,
@@ -140,26 +139,47 @@ fn deliver(
     ))
 }
 
-/// Writes the entries into a stand file: the existing one, a copy of that of `--stand`, or a new one.
-fn write_stand(
-    output: &str,
-    findings: &Findings,
-    read: &[&Path],
-    entries: &[Entry],
-) -> Result<(), Failure> {
-    if output == "-" && findings.json {
-        return Err(Failure::usage(
-            "the stand file and the JSON document cannot both go to standard output; give -o FILE",
-        ));
+/// The files that the verb writes.
+struct Targets {
+    stand: Option<Output>,
+    page: Option<Output>,
+}
+
+impl Targets {
+    /// Opens them; a stand file that is there is updated.
+    fn open(findings: &Findings, inputs: &[String]) -> Result<Self, Failure> {
+        let result = &findings.result;
+        if result.output.as_deref() == Some("-") && findings.json {
+            return Err(Failure::usage(
+                "the stand file and the JSON document cannot both go to standard output; give -o FILE",
+            ));
+        }
+        let inputs: Vec<&Path> = inputs.iter().map(Path::new).collect();
+        let policy = Policy {
+            replace: result.force || existing(findings).is_some(),
+            ..result.policy()
+        };
+        let place = result.output.as_deref().map(Path::new);
+        let stand = place.map(|_| Output::open(place, policy, &inputs));
+        let page = findings.html.as_deref().map(Path::new);
+        let page = page.map(|page| result.open_beside(page, &inputs));
+        Ok(Self {
+            stand: stand.transpose()?,
+            page: page.transpose()?,
+        })
     }
-    let existing = existing(findings);
-    let basis = existing.or(findings.stand.as_deref());
-    let text = match basis.map(stand::text).transpose()? {
+}
+
+/// The stand file with the entries: the existing one, a copy of that of `--stand`, or a new one.
+fn stand_file(findings: &Findings, entries: &[Entry]) -> Result<String, Failure> {
+    let basis = existing(findings).or(findings.stand.as_deref());
+    match basis.map(stand::text).transpose()? {
         Some((name, text)) => update::update(&name, Some(&text), entries),
-        None => update::update(output, None, entries),
-    }?;
-    let force = findings.result.force || existing.is_some();
-    output::write_all(Some(output), force, read, &text)
+        None => {
+            let name = findings.result.output.as_deref().unwrap_or("-");
+            update::update(name, None, entries)
+        }
+    }
 }
 
 /// The unit of a channel of that name.

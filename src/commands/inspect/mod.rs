@@ -13,12 +13,12 @@ use std::path::Path;
 
 use self::content::Content;
 use self::report::{ChannelWarning, InspectReport, Inspected};
-use super::{Outcome, open_plot, publish};
+use super::{Outcome, open_plot};
 use crate::cli::Inspect;
 use crate::failure::Failure;
 use crate::io::Input;
-use crate::io::output::Output;
-use crate::print;
+use crate::io::output::{self, Output};
+use crate::print::{self, Report};
 use crate::quality::copies;
 use crate::recording::Recording;
 
@@ -88,16 +88,16 @@ fn finish(
     args: &Inspect,
     report: &InspectReport,
     read: &[Result<Content, Failure>],
-    output: Output,
-    plot: Option<Output>,
+    mut output: Output,
+    mut plot: Option<Output>,
 ) -> Result<Outcome, Failure> {
-    publish(report, args.json, output)?;
-    if let Some(mut plot) = plot {
+    output.write(report.document(args.json).as_bytes())?;
+    if let Some(plot) = &mut plot {
         let contents = read.iter().flatten();
         let recordings: Vec<&Recording> = contents.map(|content| &content.recording).collect();
         plot.write(plot::svg(&recordings, report).as_bytes())?;
-        plot.finish()?;
     }
+    output::finish_all(plot.into_iter().chain([output]))?;
     let failed: Vec<&Failure> = read.iter().filter_map(|r| r.as_ref().err()).collect();
     if let Some((last, others)) = failed.split_last() {
         for failure in others {

@@ -1,0 +1,152 @@
+//! Temporary files of outputs that are not complete, and their removal when a run ends early.
+
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use tempfile::NamedTempFile;
+
+/// Files to be removed if the run is interrupted.
+static OPEN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+/// How the names of all of them begin and end.
+const PREFIX: &str = ".torqcomp-";
+const SUFFIX: &str = ".part";
+
+fn open() -> MutexGuard<'static, Vec<PathBuf>> {
+    OPEN.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes what is not complete.
+fn remove_open() {
+    for part in open().drain(..) {
+        // It may have got its name already, or be gone.
+        let _ = std::fs::remove_file(part);
+    }
+}
+
+/// Has incomplete outputs removed when the run is told to end; the exit code is 128 and the number of the signal, as shells
+/// have it. A signal that is ignored at the start, as under `nohup`, stays ignored.
+///
+/// # Errors
+/// If the system does not let signals be handled.
+#[cfg(unix)]
+pub fn remove_when_interrupted() -> io::Result<()> {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGXCPU, SIGXFSZ};
+    let ends = [SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGXCPU];
+    let ends = ends.into_iter().filter(|signal| !is_ignored(*signal));
+    let mut signals = signal_hook::iterator::Signals::new(ends)?;
+    // The write beyond the limit then fails like any other.
+    signal_hook::flag::register(SIGXFSZ, std::sync::Arc::default())?;
+    std::thread::Builder::new()
+        .name("signals".to_owned())
+        .spawn(move || {
+            if let Some(signal) = signals.forever().next() {
+                remove_open();
+                std::process::exit(128 + signal);
+            }
+        })?;
+    Ok(())
+}
+
+#[cfg(not(unix))]
+pub fn remove_when_interrupted() -> io::Result<()> {
+    ctrlc::set_handler(|| {
+        remove_open();
+        std::process::exit(130);
+    })
+    .map_err(io::Error::other)
+}
+
+/// Whether this process ignores a signal, as far as the system says.
+#[cfg(unix)]
+fn is_ignored(signal: i32) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    mask.is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
+}
+
+/// A file in a folder that gets another name when it is complete, and is removed otherwise. Its own name says which process
+/// made it and when.
+pub fn create_in(folder: &Path) -> io::Result<NamedTempFile> {
+    let owner = Owner::of_this_process();
+    remove_orphans(folder, &owner);
+    let since_epoch = SystemTime::now().duration_since(UNIX_EPOCH);
+    let seconds = since_epoch.map_or(0, |since| since.as_secs());
+    let prefix = format!("{PREFIX}{}-{}-{seconds}-", owner.place, owner.process);
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(&prefix).suffix(SUFFIX);
+    set_permissions(&mut builder);
+    let part = builder.tempfile_in(folder)?;
+    open().push(part.path().to_owned());
+    Ok(part)
+}
+
+/// The finished file gets the permissions of any other new file.
+#[cfg(unix)]
+fn set_permissions(builder: &mut tempfile::Builder<'_, '_>) {
+    use std::os::unix::fs::PermissionsExt;
+    builder.permissions(std::fs::Permissions::from_mode(0o666));
+}
+
+#[cfg(not(unix))]
+fn set_permissions(_: &mut tempfile::Builder<'_, '_>) {}
+
+/// Who makes a temporary file.
+struct Owner {
+    /// The machine and, where it has several, its space of process numbers; no hyphens.
+    place: String,
+    process: u32,
+}
+
+impl Owner {
+    fn of_this_process() -> Self {
+        let host = std::fs::read_to_string("/proc/sys/kernel/hostname").ok();
+        let host = host.or_else(|| std::env::var("COMPUTERNAME").ok());
+        let space = std::fs::read_link("/proc/self/ns/pid").unwrap_or_default();
+        let mut place = host.unwrap_or_else(|| "host".to_owned());
+        place.push_str(
+            &space
+                .to_string_lossy()
+                .replace(|c: char| !c.is_ascii_digit(), ""),
+        );
+        place.retain(|c| c.is_ascii_alphanumeric());
+        Self {
+            place,
+            process: std::process::id(),
+        }
+    }
+}
+
+/// Removes the temporary files of processes that are surely gone: of this machine and user, with a number that no process
+/// has. Failing to is no failure of the run.
+#[cfg(target_os = "linux")]
+fn remove_orphans(folder: &Path, owner: &Owner) {
+    use std::os::unix::fs::MetadataExt;
+    let Ok(this) = std::fs::metadata("/proc/self") else {
+        return;
+    };
+    let own = format!("{PREFIX}{}-", owner.place);
+    let Ok(files) = std::fs::read_dir(folder) else {
+        return;
+    };
+    for file in files.flatten() {
+        let name = file.file_name();
+        let name = name.to_string_lossy();
+        let rest = name.strip_prefix(&own).filter(|_| name.ends_with(SUFFIX));
+        let Some((process, _)) = rest.and_then(|rest| rest.split_once('-')) else {
+            continue;
+        };
+        let is_number = !process.is_empty() && process.bytes().all(|b| b.is_ascii_digit());
+        let is_gone = is_number && !Path::new("/proc").join(process).exists();
+        // Processes of others may be hidden.
+        let is_ours = file.metadata().is_ok_and(|meta| meta.uid() == this.uid());
+        if is_gone && is_ours {
+            let _ = std::fs::remove_file(file.path());
+        }
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+fn remove_orphans(_: &Path, _: &Owner) {}
