@@ -229,6 +229,14 @@ torque_per_volt = "1 N m/V"
 [diagnosed]
 "#;
 
+/// The other form of its calibration.
+const POINTS: &str = r#"[[calibration.points]]
+reading = "1 V"
+torque = "1 N m"
+[[calibration.points]]
+reading = "2 V"
+torque = "2 N m""#;
+
 /// The keys that reading asks for in a section: those which the refusal of an unknown key lists.
 fn asked(title: &str) -> Vec<String> {
     let variants = [
@@ -253,6 +261,10 @@ fn asked(title: &str) -> Vec<String> {
     for (beam, part) in variants {
         let whole = COMPLETE.replace("BEAM", beam).replace("PART", part);
         for text in [whole.clone(), whole.replace(modal.0, modal.1)] {
+            let text = match title {
+                "[[calibration.points]]" => text.replace("torque_per_volt = \"1 N m/V\"", POINTS),
+                _ => text,
+            };
             let text = match title {
                 "" => format!("zzz = 1\n{text}"),
                 title => text.replace(&format!("{title}\n"), &format!("{title}\nzzz = 1\n")),

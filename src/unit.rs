@@ -51,6 +51,17 @@ impl NamedUnit {
     }
 }
 
+/// A channel of a record: its name, its unit, and its unit as written, known or not.
+#[derive(Debug, Clone, Copy)]
+pub struct RecordedChannel<'a> {
+    /// Name of the channel.
+    pub name: &'a str,
+    /// Its unit, if it is known.
+    pub unit: Option<&'a NamedUnit>,
+    /// Its unit as the file writes it.
+    pub unit_text: Option<&'a str>,
+}
+
 /// Text before and inside a bracket at the end of a heading.
 pub(crate) fn inside_brackets(heading: &str) -> Option<(&str, &str)> {
     [('(', ')'), ('[', ']'), ('{', '}'), ('<', '>')]

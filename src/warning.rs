@@ -41,6 +41,12 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["short-record", "every sample depends on the extrapolation beyond the record's ends", "record for longer"],
         ["signal-above-band", "much of the signal lies above the band and is left out", "choose a higher --band"],
     ]),
+    ("Stand file", &[
+        ["calibration-not-used", "a record in strain was taken through the beam's drawing although a calibration is given", "record in the unit of the calibration"],
+        ["damping-above-one", "the damping ratio is above 1", "write 7 % as 0.07"],
+        ["gain-assumed", "the gain between bridge and record is not given; 1 was assumed", "add [recorder] gain"],
+        ["modulus-unusual", "the elastic modulus is that of no usual beam", "check its unit: steel has 200 GPa"],
+    ]),
     ("Simulate and diagnose", &[
         ["no-record-held-out", "no hold-out record was given; the last 30 % of each training record are held out instead", "give --holdout"],
         ["records-apart", "no one stand fits both training and hold-out records", "use records of one stand and one setting"],

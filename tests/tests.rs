@@ -13,6 +13,7 @@ mod golden;
 mod harmonics;
 mod identify;
 mod inspect;
+mod measuring_chains;
 mod messages;
 mod noise;
 mod output;

@@ -207,9 +207,12 @@ pub struct Static {
     /// Unit of the load, if its heading does not give it
     #[arg(long, value_name = "UNIT")]
     pub load_unit: Option<String>,
-    /// Radius at which a load given as a force acts
+    /// Radius at which a load given as a force or a mass acts
     #[arg(long, value_name = "QUANTITY")]
     pub radius: Option<String>,
+    /// Local acceleration of gravity, for a load given as a mass
+    #[arg(long, value_name = "QUANTITY")]
+    pub gravity: Option<String>,
     /// Column of the reading
     #[arg(long, value_name = "NAME")]
     pub reading: String,

@@ -94,7 +94,7 @@ impl Plan {
             reading,
         } = &args.record;
         let stream = ChannelStream::open(&Input::of(input), choice, reading)?;
-        let chain = stand.calibration(&stream.name, stream.unit.as_ref(), args.units.into())?;
+        let chain = stand.calibration(stream.channel(), args.units.into())?;
         let band = match args.band {
             Some(band_hz) => Band::new(stream.rate_hz, band_hz),
             None => Band::fitting(stream.rate_hz, DEFAULT_BAND_HZ),
@@ -139,6 +139,7 @@ impl Plan {
             band_end_hz: band.end_hz(),
             edge_s: self.filter.half_length() as f64 / band.sample_rate_hz(),
             noise: self.noise(),
+            warnings: [self.stand.warnings.as_slice(), &chain.warnings].concat(),
             ..CompensateReport::default()
         }
     }

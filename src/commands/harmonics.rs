@@ -85,7 +85,7 @@ pub fn run(args: &cli::Harmonics) -> Result<Outcome, Failure> {
         reading,
     } = &args.record;
     let stream = ChannelStream::open(&Input::of(input), choice, reading)?;
-    let chain = stand.calibration(&stream.name, stream.unit.as_ref(), args.units.into())?;
+    let chain = stand.calibration(stream.channel(), args.units.into())?;
     let inputs = [args.record.input.as_ref(), args.stand.as_path()];
     let output = args.result.open(&inputs)?;
     let source = stream.source.clone();
@@ -114,6 +114,7 @@ fn fit(
     let duration_s = samples.len() as f64 / record.rate_hz;
     let mut warnings: Vec<Warning> = record.summary.lost.iter().cloned().collect();
     warnings.extend(record.summary.warnings.clone());
+    warnings.extend(stand.warnings.iter().chain(&chain.warnings).cloned());
     let orders = visible_orders(args, record.rate_hz, &mut warnings)?;
     let fundamental = if args.refine {
         let span = 0.01 * args.refine_span;

@@ -109,11 +109,7 @@ fn uncertainty(
     chain: &Calibration,
     frequency_hz: f64,
 ) -> Option<InverseUncertainty> {
-    let mechanics = stand.mechanics.as_ref()?;
-    let mut std = mechanics.std;
-    std.static_gain_relative = chain.relative_std;
-    let found = mechanics.response.inverse_uncertainty(frequency_hz, &std);
-    found.ok().flatten()
+    stand.inverse_uncertainty(frequency_hz, chain.relative_std)
 }
 
 /// Largest magnitude that is taken for a measurement: squares and sums of it stay finite.

@@ -8,11 +8,11 @@ use torqcomp_model::damping::viscous_from_friction_slope_n_m_s_per_rad;
 use torqcomp_model::{Estimate, Kind, SecondOrder, UnitSystem};
 
 use self::report::{PredictReport, PredictedConstant, Refinement, residual_percent};
-use super::{Outcome, publish};
+use super::{Outcome, conclude, publish};
 use crate::cli::Predict;
 use crate::failure::Failure;
 use crate::print::rounded;
-use crate::stand::{self, BeamDrawing, Given, Stand};
+use crate::stand::{self, BeamDrawing, BridgeData, Given, Stand};
 
 /// Part of a residual that must be left at most for an effect to explain it.
 const EXPLAINED: f64 = 0.5;
@@ -39,7 +39,7 @@ pub fn run(args: &Predict) -> Result<Outcome, Failure> {
         constants,
     };
     publish(&report, args.json, output)?;
-    Ok(Outcome::Done)
+    Ok(conclude(&stand.warnings, false, false))
 }
 
 /// Constants that follow from the drawing, in SI units, and the measured ones.
@@ -227,7 +227,8 @@ impl<'a> Drawing<'a> {
 
     fn torque_per_volt(&self, units: UnitSystem) -> Result<PredictedConstant, Failure> {
         let stand = self.stand;
-        let given = stand.gage.is_some() && stand.bridge.is_some();
+        let is_whole = |bridge: &BridgeData| bridge.layout.is_some() && bridge.supply.is_some();
+        let given = stand.gage.is_some() && stand.bridge.as_ref().is_some_and(is_whole);
         let placed = stand
             .beam
             .as_ref()
@@ -247,10 +248,15 @@ impl<'a> Drawing<'a> {
             let made = Estimate::new(Kind::TorquePerVolt, gain, None, "drawing");
             predicted = Some(made.map_err(Failure::failed)?);
         }
+        let measured = stand
+            .calibration
+            .as_ref()
+            .and_then(|c| c.torque_per_volt())
+            .cloned();
         let mut made = constant(
             "torque_per_volt",
             predicted.as_ref(),
-            &stand.torque_per_volt,
+            &measured,
             Kind::TorquePerVolt,
             units,
         );
@@ -266,7 +272,7 @@ impl<'a> Drawing<'a> {
         layout: BridgeLayout,
         loading: f64,
     ) -> Option<String> {
-        let factor = self.stand.torque_per_volt.as_ref()?.value() / predicted;
+        let factor = self.stand.calibration.as_ref()?.torque_per_volt()?.value() / predicted;
         if factor.abs() < LARGE_FACTOR {
             return None;
         }

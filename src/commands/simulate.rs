@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use torqcomp_model::simulate::{Excitation, MotionState, substeps};
-use torqcomp_model::{Chain, Estimate, Kind, Unit};
+use torqcomp_model::{Chain, Unit, UnitSystem};
 
 use super::{Outcome, conclude, report_beside, rows};
 use crate::cli;
@@ -10,8 +10,8 @@ use crate::failure::Failure;
 use crate::io::{ChannelChoice, Flags, Input};
 use crate::print::{Report, short};
 use crate::recording::{AlignedChannel, AlignedChannels};
-use crate::stand::{self, Stand};
-use crate::unit::NamedUnit;
+use crate::stand::{self, Calibration, Signal, Stand};
+use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
 
 /// Relative change of the result at which the step of integration is fine enough.
@@ -60,7 +60,7 @@ pub fn run(args: &cli::Simulate) -> Result<Outcome, Failure> {
     }
     let inputs = [args.input.as_ref(), args.stand.as_path()];
     let mut output = args.result.open(&inputs)?;
-    let mut warnings = read.warnings.clone();
+    let mut warnings = [read.warnings.as_slice(), &stand.warnings].concat();
     let units = ChannelUnits::of(&stand, chosen, &mut warnings)?;
     let applied: Vec<f64> = chosen.samples.iter().map(|u| u * units.applied).collect();
     let chain = stand.chain()?;
@@ -68,7 +68,15 @@ pub fn run(args: &cli::Simulate) -> Result<Outcome, Failure> {
     let input = Excitation::new(applied, read.rate_hz, read.start_s, 1).with_between(between);
     let (mut simulated, steps) = refined(&chain, &input)?;
     for value in &mut simulated {
-        *value = (*value + stand.diagnosed.offset) / units.measured;
+        let torque = *value + stand.diagnosed.offset;
+        let recorded = match &units.calibration {
+            Some(calibration) => calibration
+                .conversion
+                .record(torque)
+                .map_err(Failure::failed)?,
+            None => torque,
+        };
+        *value = recorded / units.measured;
     }
     output.write(b"time_s,measured\n")?;
     let axis = (read.rate_hz, read.start_s);
@@ -121,6 +129,8 @@ struct ChannelUnits {
     applied_text: String,
     /// SI units per unit of the result.
     measured: f64,
+    /// What makes torque of the result, if it is in another unit.
+    calibration: Option<Calibration>,
     measured_text: String,
 }
 
@@ -140,13 +150,26 @@ impl ChannelUnits {
             (None, None) => applied.text.clone(),
         };
         let unit = Unit::parse(&text).map_err(Failure::failed)?;
-        // A record in volts of a stand with a calibration is torque over that constant.
-        let is_volts = gain.is_none() && Kind::Voltage.parse(&format!("1 {text}")).is_ok();
-        let per_volt = stand.torque_per_volt.as_ref().filter(|_| is_volts);
+        // A record of another unit than torque is what the calibration makes torque of.
+        let is_signal = gain.is_none() && Signal::of(&unit).is_some();
+        let named = NamedUnit {
+            text: text.clone(),
+            unit,
+        };
+        let channel = RecordedChannel {
+            name: "measured",
+            unit: Some(&named),
+            unit_text: None,
+        };
+        let calibration = is_signal.then(|| stand.calibration(channel, UnitSystem::Si));
+        let calibration = calibration.transpose()?;
         Ok(Self {
             applied: applied.unit.factor(),
             applied_text: applied.text,
-            measured: unit.factor() * per_volt.map_or(1.0, Estimate::value),
+            measured: calibration
+                .as_ref()
+                .map_or(unit.factor(), |c| c.recorded_factor),
+            calibration,
             measured_text: text,
         })
     }
@@ -168,6 +191,11 @@ fn applied_unit(
             "the channel \"{}\" is in {}, and what acts on this stand is in {expected}; choose another column with \
              --applied, or give the right unit with --unit",
             chosen.name, given.text
+        ))),
+        None if chosen.unit_text.is_some() => Err(Failure::failed(format_args!(
+            "the unit \"{}\" of the channel \"{}\" is unknown; this stand takes {expected}; give the right unit with --unit",
+            chosen.unit_text.as_deref().unwrap_or_default(),
+            chosen.name
         ))),
         None => {
             warnings.push(Warning::new(

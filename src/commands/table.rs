@@ -4,7 +4,7 @@ use num_complex::Complex64;
 use serde::Serialize;
 use torqcomp_dsp::compensate::Inverse;
 
-use super::{Outcome, publish};
+use super::{Outcome, conclude, publish};
 use crate::cli;
 use crate::failure::Failure;
 use crate::print::{Report, rounded};
@@ -66,10 +66,10 @@ pub fn run(args: &cli::Table) -> Result<Outcome, Failure> {
         with_uncertainty: args.uncertainty,
     };
     publish(&report, args.json, output)?;
-    Ok(Outcome::Done)
+    Ok(conclude(&stand.warnings, false, false))
 }
 
-/// A row, of the refined stand if there is one. Its uncertainty is then unknown, since that of the effects is.
+/// A row, of the refined stand if there is one.
 fn row(
     stand: &Stand,
     mechanics: &Mechanics,
@@ -84,12 +84,7 @@ fn row(
     let (more, phase_of_effects) = of_effects.unwrap_or(Complex64::ONE).to_polar();
     let magnitude = more * mechanical.norm() / recorded.norm();
     let phase_rad = mechanical.arg() - recorder.phase_rad(frequency_hz) + phase_of_effects;
-    let std = mechanics
-        .response
-        .inverse_uncertainty(frequency_hz, &mechanics.std)
-        .ok()
-        .flatten()
-        .filter(|_| refined.is_none());
+    let std = stand.inverse_uncertainty(frequency_hz, None);
     TableRow {
         frequency_hz,
         magnitude,

@@ -117,6 +117,11 @@ impl NamedEstimates {
         self
     }
 
+    /// Correlation coefficient of two of them, by place.
+    pub(crate) fn correlation(&self, i: usize, j: usize) -> Option<f64> {
+        self.covariance.correlation(i, j)
+    }
+
     /// Pairs with a correlation of at least [`STRONG`].
     pub(crate) fn correlations(&self) -> Vec<Correlation> {
         let names: Vec<&str> = self.list.iter().map(|c| c.name.as_str()).collect();
@@ -197,6 +202,9 @@ pub struct Identification {
     pub laws: Vec<decay::LawFit>,
     /// Terms of the calibration standards (`static`).
     pub terms: Vec<static_load::Term>,
+    /// Mean readings at each load (`static`), for a calibration curve.
+    #[serde(skip)]
+    pub steps: Vec<static_load::CalibrationStep>,
     /// Relative hold-out error with 0, 1, 2, … modes (`response`); NaN, which becomes `null`, where it was not tried.
     pub held_out_errors: Vec<f64>,
     /// The method, a sentence each.

@@ -28,6 +28,8 @@ pub(crate) struct AlignedChannel {
     pub(crate) samples: Vec<f64>,
     /// That unit, if it is known.
     pub(crate) unit: Option<NamedUnit>,
+    /// That unit as the file writes it, known or not.
+    pub(crate) unit_text: Option<String>,
 }
 
 /// Channels with a sample each at every moment.
@@ -212,6 +214,7 @@ fn aligned_channel(selection: &Selection, samples: Vec<f64>) -> AlignedChannel {
         name: selection.channel.name.clone(),
         samples,
         unit: selection.unit.clone(),
+        unit_text: selection.channel.unit_text.clone(),
     }
 }
 

@@ -48,6 +48,7 @@ impl ChannelStream {
             dialect: recording.dialect.clone(),
             name: channel.name.clone(),
             unit: selection.unit.clone(),
+            unit_text: channel.unit_text.clone(),
             rate_hz: time.rate_hz.unwrap_or(selection.rate_hz),
             start_s: time.start_s.unwrap_or(0.0),
             time,

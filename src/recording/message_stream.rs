@@ -73,6 +73,7 @@ impl ChannelStream {
             dialect: format!("MCAP, {}", messages::describe(&chosen)),
             name: channel,
             unit,
+            unit_text: chosen.unit.as_ref().map(|found| found.unit.clone()),
             rate_hz: time.rate_hz.unwrap_or(f64::NAN),
             start_s: time.start_s.unwrap_or(0.0),
             time,

@@ -12,7 +12,7 @@ use super::validator::{StreamValidator, TextLines};
 use super::{RateFrom, TimeAxis, checkpoints};
 use crate::failure::Failure;
 use crate::io::{ChannelChoice, Input, Reading};
-use crate::unit::NamedUnit;
+use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
 
 /// Bytes that tell the format.
@@ -28,6 +28,8 @@ pub(crate) struct ChannelStream {
     pub(crate) name: String,
     /// Unit of its samples, if it is known.
     pub(crate) unit: Option<NamedUnit>,
+    /// Its unit as the file writes it, known or not.
+    pub(crate) unit_text: Option<String>,
     /// How its samples lie in time.
     pub(crate) time: TimeAxis,
     /// Samples a second.
@@ -46,6 +48,15 @@ pub(crate) struct ChannelStream {
 }
 
 impl ChannelStream {
+    /// The channel as a stand takes it.
+    pub(crate) fn channel(&self) -> RecordedChannel<'_> {
+        RecordedChannel {
+            name: &self.name,
+            unit: self.unit.as_ref(),
+            unit_text: self.unit_text.as_deref(),
+        }
+    }
+
     /// Opens a file, finds the channel and its time axis.
     ///
     /// # Errors
@@ -134,6 +145,7 @@ impl ChannelStream {
             dialect: first_rows.dialect.clone(),
             name: selection.channel.name.clone(),
             unit: selection.unit,
+            unit_text: selection.channel.unit_text.clone(),
             rate_hz: time.rate_hz.unwrap_or(selection.rate_hz),
             start_s: time.start_s.unwrap_or(0.0),
             time,

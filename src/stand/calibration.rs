@@ -1,12 +1,13 @@
 //! From the recorded channel to the applied quantity: unit, calibration, response.
 
-use torqcomp_dsp::bridge::{ArmLaw, Bridge};
 use torqcomp_dsp::conversion::Conversion;
-use torqcomp_model::{Dimension, Kind, Unit, UnitSystem};
+use torqcomp_model::{Dimension, Kind, RatioOf, Unit, UnitSystem};
 
-use super::{Given, Stand};
+use super::static_law::StaticLaw;
+use super::{Given, Signal, Stand};
 use crate::failure::Failure;
-use crate::unit::NamedUnit;
+use crate::unit::{NamedUnit, RecordedChannel};
+use crate::warning::Warning;
 
 /// What acts on the stand: its name, and the unit it is printed in.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,9 +35,10 @@ pub struct Calibration {
     pub described: String,
     /// Relative standard uncertainty of the static constant, if known.
     pub relative_std: Option<f64>,
+    /// What was assumed on the way.
+    pub warnings: Vec<Warning>,
 }
 
-const VOLTAGE: Dimension = Dimension::new([1, 2, -3, -1, 0, 0]);
 const TORQUE: Dimension = Dimension::new([1, 2, -2, 0, 0, 0]);
 const FORCE: Dimension = Dimension::new([1, 1, -2, 0, 0, 0]);
 
@@ -88,63 +90,43 @@ pub fn applied_by_unit(text: &str, units: UnitSystem) -> Result<Applied, Failure
 }
 
 impl Stand {
-    /// The calibration of a channel in that unit.
+    /// The calibration of a channel.
     ///
     /// # Errors
-    /// If the unit is not known, or the stand does not say how it becomes torque.
+    /// If its unit is not known, or the stand does not say how it becomes torque.
     pub fn calibration(
         &self,
-        channel: &str,
-        unit: Option<&NamedUnit>,
+        channel: RecordedChannel,
         units: UnitSystem,
     ) -> Result<Calibration, Failure> {
-        let Some(named) = unit else {
-            return Err(Failure::failed(format_args!(
-                "the channel \"{channel}\" does not say its unit; give it with --unit V (or mV, \
-                 \"N m\", \"ft lbf\", ustrain)"
-            )));
-        };
-        let torque = || Applied::of(Kind::Torque, "torque", units);
+        let named = channel.unit.ok_or_else(|| without_unit(channel))?;
         if let Some(gain) = self.static_gain() {
-            return self.by_static_gain(channel, named, &gain.clone(), units);
+            return self.by_static_gain(channel.name, named, gain, units);
         }
-        let described;
-        let mut relative_std = None;
-        let conversion = match named.unit.dimension() {
-            TORQUE => {
-                described = format!("the record is torque in {}", named.text);
-                Conversion::linear(1.0, 0.0)
+        let signal = Signal::of(&named.unit);
+        let law = match (named.unit.dimension(), signal) {
+            (_, Some(signal)) => self.by_signal(signal, channel.name, named, units)?,
+            (TORQUE, _) => StaticLaw {
+                described: format!("the record is torque in {}", named.text),
+                ..StaticLaw::of(Conversion::linear(1.0, 0.0))?
+            },
+            (FORCE, _) => {
+                let radius = self.radius(channel.name, &named.text)?;
+                StaticLaw {
+                    described: format!("force times the radius of {radius} m"),
+                    ..StaticLaw::of(Conversion::linear(radius, 0.0))?
+                }
             }
-            VOLTAGE => {
-                let (conversion, text, std) = self.volts_to_torque(units)?;
-                described = text;
-                relative_std = std;
-                Ok(conversion)
-            }
-            FORCE => {
-                let radius = self.radius(channel, &named.text)?;
-                described = format!("force times the radius of {radius} m");
-                Conversion::linear(radius, 0.0)
-            }
-            Dimension::NONE => {
-                described = "strain through the beam's drawing".to_owned();
-                Conversion::strain(self.torque_per_strain()?)
-            }
-            other => {
-                return Err(Failure::failed(format_args!(
-                    "the channel \"{channel}\" is in \"{}\" ({other}), which does not become \
-                     torque; expected volts, torque, force or strain",
-                    named.text
-                )));
-            }
+            _ => return Err(no_torque(channel.name, named)),
         };
         Ok(Calibration {
-            recorded_factor: named.unit.factor(),
-            conversion: conversion.map_err(Failure::failed)?,
+            recorded_factor: signal.map_or(named.unit.factor(), |s| s.factor(&named.unit)),
+            conversion: law.conversion,
             zero: self.diagnosed.offset,
-            applied: torque(),
-            described,
-            relative_std,
+            applied: Applied::of(Kind::Torque, "torque", units),
+            described: law.described,
+            relative_std: law.relative_std,
+            warnings: law.warnings,
         })
     }
 
@@ -164,18 +146,18 @@ impl Stand {
         units: UnitSystem,
     ) -> Result<Calibration, Failure> {
         let expected = Unit::parse(&gain.recorded_unit).map_err(Failure::failed)?;
-        if expected.dimension() != named.unit.dimension() {
+        let is_other = expected.dimension() != named.unit.dimension();
+        if is_other || expected.ratio_of() != named.unit.ratio_of() {
             return Err(Failure::failed(format_args!(
                 "the channel \"{channel}\" is in \"{}\", but the static_gain of {} expects \"{}\"; \
                  choose another channel, or say the unit with --unit",
                 named.text, self.file, gain.recorded_unit
             )));
         }
-        // A zero is given in volts: it belongs to a record in volts.
-        let zero = if named.unit.dimension() == VOLTAGE {
-            self.recorder.zero_v
-        } else {
-            0.0
+        // A zero in volts belongs to a record in volts.
+        let zero = match (self.recorder.zero, Signal::of(&named.unit)) {
+            (Some((of, zero)), Some(signal)) if of == signal => zero,
+            _ => 0.0,
         };
         let slope = 1.0 / gain.value;
         Ok(Calibration {
@@ -184,93 +166,9 @@ impl Stand {
             zero: slope * self.diagnosed.offset,
             applied: applied_by_unit(&gain.applied_unit, units)?,
             described: "static gain of the stand file".to_owned(),
-            relative_std: None,
+            relative_std: gain.relative_std,
+            warnings: Vec::new(),
         })
-    }
-
-    /// Conversion of recorded volts: the measured constant, or else gage and bridge.
-    fn volts_to_torque(
-        &self,
-        units: UnitSystem,
-    ) -> Result<(Conversion, String, Option<f64>), Failure> {
-        if let Some(constant) = &self.torque_per_volt {
-            let offset = -constant.value() * self.recorder.zero_v;
-            let conversion =
-                Conversion::linear(constant.value(), offset).map_err(Failure::failed)?;
-            let std = constant
-                .std_uncertainty()
-                .map(|std| std / constant.value().abs());
-            let text = format!("measured constant of {}", constant.text(units));
-            return Ok((conversion, text, std));
-        }
-        let bridge = self.bridge()?;
-        let conversion = Conversion::bridge(
-            bridge,
-            self.recorder.recorder.gain(),
-            self.recorder.zero_v,
-            self.torque_per_strain()?,
-        )
-        .map_err(Failure::failed)?;
-        let small = Kind::TorquePerVolt.to(units, conversion.small_signal_gain());
-        let text = format!(
-            "from drawing, gage and bridge: {} {} for small signals",
-            crate::io::digits::text(small, 5),
-            Kind::TorquePerVolt.unit(units)
-        );
-        Ok((conversion, text, None))
-    }
-
-    /// The bridge with its gage, leads and load.
-    ///
-    /// # Errors
-    /// If the stand file does not give the gage and the bridge, or they do not fit.
-    pub fn bridge(&self) -> Result<Bridge, Failure> {
-        let (Some(gage), Some(bridge)) = (&self.gage, &self.bridge) else {
-            return Err(Failure::failed(format_args!(
-                "{}: volts cannot be turned into torque; add [calibration] torque_per_volt = \
-                 \"1.23e3 ft lbf/V\", or the sections [beam], [gage] and [bridge]",
-                self.file
-            )));
-        };
-        let wrong =
-            |error: &dyn std::fmt::Display| Failure::failed(format_args!("{}: {error}", self.file));
-        let unbonded = gage.gage.unbonded_resistance_ohm();
-        let bonded = gage
-            .gage
-            .bond(
-                gage.bonded_resistance_ohm.unwrap_or(unbonded),
-                gage.bonding_temperature_k,
-            )
-            .map_err(|e| wrong(&e))?;
-        let law = ArmLaw::from_gage(&bonded, gage.temperature_k, gage.resistance_drift)
-            .map_err(|e| wrong(&e))?;
-        let resistance = bonded.bonded_resistance_ohm();
-        let made = Bridge::new(bridge.layout, law, resistance, bridge.supply)
-            .and_then(|b| b.with_leads(bridge.leads))
-            .and_then(|b| match self.recorder.input_resistance_ohm {
-                Some(ohm) => b.with_input_resistance_ohm(ohm),
-                None => Ok(b),
-            });
-        made.map_err(|e| wrong(&e))
-    }
-
-    /// Torque per strain at the gage, in N m.
-    ///
-    /// # Errors
-    /// If the stand file does not say where the gage sits on the beam.
-    pub fn torque_per_strain(&self) -> Result<f64, Failure> {
-        let beam = self.beam.as_ref();
-        let placed = beam.and_then(|b| b.gage_position.as_ref().map(|p| (b, p)));
-        let Some((beam, position)) = placed else {
-            return Err(Failure::failed(format_args!(
-                "{}: strain cannot be turned into torque; add [beam] with gage_position, or \
-                 [calibration] torque_per_volt",
-                self.file
-            )));
-        };
-        beam.full
-            .torque_per_strain_n_m(beam.radius.value(), position.value())
-            .map_err(|error| Failure::failed(format_args!("{}: {error}", self.file)))
     }
 
     fn radius(&self, channel: &str, unit: &str) -> Result<f64, Failure> {
@@ -284,4 +182,53 @@ impl Stand {
             ))),
         }
     }
+}
+
+/// The question for a unit.
+fn without_unit(channel: RecordedChannel) -> Failure {
+    let name = channel.name;
+    match channel.unit_text {
+        None => Failure::failed(format_args!(
+            "the channel \"{name}\" does not give its unit; give it with --unit V (or mV/V, mA, Hz, ustrain, \"N m\", N)"
+        )),
+        Some(text) => {
+            let why = Unit::parse(text)
+                .err()
+                .map_or_else(String::new, |error| format!(": {error}"));
+            Failure::failed(format_args!(
+                "the unit \"{text}\" of the channel \"{name}\" is unknown{why}; give a known one with --unit, such as V, \
+                 mV/V, \"N m\""
+            ))
+        }
+    }
+}
+
+/// Why a unit gives no torque, with the question that settles it.
+fn no_torque(channel: &str, named: &NamedUnit) -> Failure {
+    let text = &named.text;
+    if named.unit.ratio_of() == Some(RatioOf::Anything) {
+        return Failure::failed(format_args!(
+            "the channel \"{channel}\" is in \"{text}\", which could be the output of a bridge over its excitation, a strain, \
+             or part of a full scale; give --unit \"{text} V/V\" for the first or \"{text} strain\" for the second"
+        ));
+    }
+    if let Some([force, mass]) = Unit::readings_of_weight(text) {
+        let size = Kind::Torque.parse(&format!("1 {force}"));
+        let torque = size.map_or_else(
+            |_| format!("as a force, write --unit \"{force}\""),
+            |size| {
+                let size = crate::io::digits::text(size, 5);
+                format!("if it is a torque, give --unit \"{force}\" (1 {force} = {size} N m)")
+            },
+        );
+        return Failure::failed(format_args!(
+            "the channel \"{channel}\" is in \"{text}\", which can be read with a force or with a mass; {torque}; \"{mass}\" \
+             does not become torque"
+        ));
+    }
+    Failure::failed(format_args!(
+        "the channel \"{channel}\" is in \"{text}\" ({}), which does not become torque; expected volts, mV/V, mA, Hz, strain, \
+         torque or force",
+        named.unit.dimension()
+    ))
 }

@@ -5,6 +5,27 @@ use torqcomp_model::{Beam, CrossSection, Estimate, Kind, ModelError, Part, Segme
 use super::section::Section;
 use super::{BeamDrawing, Friction, NamedPart};
 use crate::failure::Failure;
+use crate::print::short;
+use crate::warning::Warning;
+
+/// Elastic moduli of solids, from rubber to diamond.
+const SOLID_PA: std::ops::RangeInclusive<f64> = 1e6..=1.3e12;
+/// Elastic moduli of beams, from plastics to hard metal.
+const BEAM_PA: std::ops::RangeInclusive<f64> = 1e9..=7e11;
+
+/// A warning about a modulus that no usual beam has.
+pub(super) fn unusual_modulus(beam: &BeamDrawing) -> Option<Warning> {
+    let modulus_pa = beam.modulus.value();
+    (!BEAM_PA.contains(&modulus_pa)).then(|| {
+        Warning::new(
+            "modulus-unusual",
+            format!(
+                "[beam] elastic_modulus is {} GPa, which no usual beam has: steel has 200 GPa; check its unit",
+                short(modulus_pa / 1e9)
+            ),
+        )
+    })
+}
 
 /// The shape of a beam's section and the lengths that it is made of.
 struct BeamShape {
@@ -52,6 +73,12 @@ pub(super) fn beam(section: &Section) -> Result<BeamDrawing, Failure> {
     let shape = BeamShape::read(section)?;
     let length = section.positive("length", Kind::Length)?;
     let modulus = section.positive("elastic_modulus", Kind::Pressure)?;
+    if !SOLID_PA.contains(&modulus.value()) {
+        return Err(section.fail(
+            "elastic_modulus",
+            "no solid has such a modulus; steel has \"200 GPa\", aluminium \"70 GPa\"",
+        ));
+    }
     let radius = section.positive("radius", Kind::Length)?;
     let gage_position = section.quantity("gage_position", Kind::Length)?;
     let shear_modulus = section.positive_if_any("shear_modulus", Kind::Pressure)?;
@@ -85,6 +112,7 @@ pub(super) fn beam(section: &Section) -> Result<BeamDrawing, Failure> {
     Ok(BeamDrawing {
         slender_stiffness: slender_stiffness(section, &shape, &length, &modulus, &radius)?,
         full,
+        modulus,
         radius,
         gage_position,
     })

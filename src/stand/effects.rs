@@ -19,6 +19,8 @@ pub struct DeclaredEffect {
     pub form: &'static Form,
     /// Its parameters, in SI units of the record, s and Hz.
     pub values: Vec<f64>,
+    /// Their standard uncertainties, if known.
+    pub stds: Vec<Option<f64>>,
 }
 
 impl DeclaredEffect {
@@ -41,16 +43,15 @@ pub(super) fn effect(section: &Section, recorded_unit: &str) -> Result<DeclaredE
         .ok_or_else(|| section.fail("kind", format_args!("\"{kind}\" has no form")))?;
     // Where the value comes from is for people.
     let _ = section.text("source")?;
-    let values = form
-        .parameters
-        .iter()
-        .map(|parameter| value(section, parameter, recorded_unit))
-        .collect::<Result<_, _>>()?;
+    let read = |parameter| value(section, parameter, recorded_unit);
+    let parameters: Result<Vec<_>, Failure> = form.parameters.iter().map(read).collect();
+    let (values, stds) = parameters?.into_iter().unzip();
     section.finish()?;
     Ok(DeclaredEffect {
         effect,
         form,
         values,
+        stds,
     })
 }
 
@@ -58,39 +59,42 @@ fn value(
     section: &Section,
     parameter: &EffectParameter,
     recorded_unit: &str,
-) -> Result<f64, Failure> {
+) -> Result<(f64, Option<f64>), Failure> {
     let name = parameter.name;
     let unit = parameter.unit.text(recorded_unit);
     let example = || format!("{name} = \"0.01 {unit}\"").replace(" \"", "\"");
-    let Some(text) = section.raw(name)? else {
+    let Some((text, std)) = section.raw_with_std(name)? else {
         // Orders of a line that are not there have no amplitude.
         if name.starts_with("amplitude_") {
-            return Ok(0.0);
+            return Ok((0.0, None));
         }
         return Err(section.fail("", format_args!("{name} is missing; write {}", example())));
     };
-    let wrong = |why: &dyn std::fmt::Display| {
-        section.fail(
-            name,
-            format_args!("\"{text}\": {why}; expected {}", example()),
-        )
+    let number = |text: &str| -> Result<f64, Failure> {
+        let wrong = |why: &dyn std::fmt::Display| {
+            section.fail(
+                name,
+                format_args!("\"{text}\": {why}; expected {}", example()),
+            )
+        };
+        let (number, written) = text.trim().split_once(' ').unwrap_or((text.trim(), ""));
+        let number: f64 = number.parse().map_err(|_| wrong(&"there is no number"))?;
+        if !number.is_finite() {
+            return Err(wrong(&"the number is not finite"));
+        }
+        let written = TextUnit::parse(written).map_err(|error| wrong(&error))?;
+        let expected = TextUnit::parse(&unit).map_err(|error| wrong(&error))?;
+        if written.dimension() != expected.dimension() {
+            return Err(wrong(&"the unit does not fit the record"));
+        }
+        // One hertz is one cycle, whatever its angle.
+        let factor = match parameter.unit {
+            Unit::Hertz => written.factor() / expected.factor(),
+            _ => written.factor(),
+        };
+        Ok(number * factor)
     };
-    let (number, written) = text.trim().split_once(' ').unwrap_or((text.trim(), ""));
-    let number: f64 = number.parse().map_err(|_| wrong(&"there is no number"))?;
-    if !number.is_finite() {
-        return Err(wrong(&"the number is not finite"));
-    }
-    let written = TextUnit::parse(written).map_err(|error| wrong(&error))?;
-    let expected = TextUnit::parse(&unit).map_err(|error| wrong(&error))?;
-    if written.dimension() != expected.dimension() {
-        return Err(wrong(&"the unit does not fit the record"));
-    }
-    // One hertz is one cycle, whatever its angle.
-    let factor = match parameter.unit {
-        Unit::Hertz => written.factor() / expected.factor(),
-        _ => written.factor(),
-    };
-    Ok(number * factor)
+    Ok((number(&text)?, std.map(|std| number(&std)).transpose()?))
 }
 
 impl Stand {

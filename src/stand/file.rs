@@ -5,12 +5,16 @@ use std::path::Path;
 use toml_edit::Document;
 use torqcomp_model::{Estimate, Kind, ParameterStd, SecondOrder, Unit};
 
-use super::drawing::{beam, friction, part};
+use super::drawing::{beam, friction, part, unusual_modulus};
 use super::effects::effect;
+use super::measured::calibration;
 use super::measuring::{bridge, gage, recorder};
 use super::section::{Section, SourceText};
-use super::{Diagnosed, Given, Mechanics, Stand, StaticGain};
+use super::update::CORRELATIONS;
+use super::{Diagnosed, Given, Mechanics, Signal, Stand, StaticGain};
 use crate::failure::Failure;
+use crate::print::short;
+use crate::warning::Warning;
 
 /// The schema of a stand file.
 const SCHEMA: &str = "torqcomp.stand/1";
@@ -57,7 +61,7 @@ pub fn parse(name: &str, text: &str) -> Result<Stand, Failure> {
         name: top.text("name")?.unwrap_or("unnamed stand").to_owned(),
         file: name.to_owned(),
         mechanics: one(&top, "mechanics", mechanics)?,
-        torque_per_volt: one(&top, "calibration", calibration)?,
+        calibration: one(&top, "calibration", calibration)?,
         beam: one(&top, "beam", beam)?,
         parts: top
             .sections("parts")?
@@ -70,11 +74,13 @@ pub fn parse(name: &str, text: &str) -> Result<Stand, Failure> {
         recorder: recorder(top.section("recorder")?.as_ref())?,
         effects: Vec::new(),
         diagnosed: Diagnosed::default(),
+        warnings: Vec::new(),
     };
     let effect_sections = top.sections("effects")?;
     stand.diagnosed = one(&top, "diagnosed", diagnosed)?.unwrap_or_default();
     top.finish()?;
     one_calibration(&top, &stand)?;
+    stand.warnings = oddities(&stand);
     stand.effects = effect_sections
         .iter()
         .map(|section| effect(section, stand.recorded_unit()))
@@ -105,12 +111,44 @@ fn check_schema(top: &Section) -> Result<(), Failure> {
     }
 }
 
-/// A static gain and a torque per volt would say the same thing twice.
+/// What can hardly be meant.
+fn oddities(stand: &Stand) -> Vec<Warning> {
+    let ratio = stand.mechanics.as_ref().map(|m| m.response.damping_ratio());
+    let overdamped = ratio.filter(|ratio| *ratio > 1.0).map(|ratio| {
+        Warning::new(
+            "damping-above-one",
+            format!(
+                "{}: the damping ratio is {}, so that the stand does not ring; if a percentage is meant, write 7 % as 0.07",
+                stand.file,
+                short(ratio)
+            ),
+        )
+    });
+    let modulus = stand.beam.as_ref().and_then(unusual_modulus);
+    overdamped.into_iter().chain(modulus).collect()
+}
+
+/// What would convert the record twice, or give its zero twice.
 fn one_calibration(top: &Section, stand: &Stand) -> Result<(), Failure> {
-    if stand.static_gain().is_some() && stand.torque_per_volt.is_some() {
+    if stand.static_gain().is_some() && stand.calibration.is_some() {
         return Err(top.fail(
             "calibration",
-            "torque_per_volt and the static_gain of [mechanics] both convert the record to torque; keep one of them",
+            "this section and the static_gain of [mechanics] both convert the record to torque; keep one of them",
+        ));
+    }
+    let zero = stand
+        .calibration
+        .as_ref()
+        .and_then(|calibration| calibration.zero);
+    if zero.is_some()
+        && stand
+            .recorder
+            .zero
+            .is_some_and(|(of, _)| of == Signal::Frequency)
+    {
+        return Err(top.fail(
+            "recorder",
+            "zero and zero_frequency of [calibration] both give the record at no load; keep one of them",
         ));
     }
     Ok(())
@@ -132,6 +170,13 @@ fn mechanics(section: &Section) -> Result<Mechanics, Failure> {
         let damping = section.not_negative("damping", Kind::AngularDamping)?;
         let stiffness = section.positive("stiffness", Kind::AngularStiffness)?;
         let common = common_std(section)?;
+        let correlations = correlations(section)?;
+        if common > 0.0 && correlations != [0.0; 3] {
+            return Err(section.fail(
+                "common_std",
+                "the correlations include what the three constants share; keep one of them",
+            ));
+        }
         let own = |estimate: &Estimate| own_std(section, estimate, common);
         let response = SecondOrder::new(inertia.value(), damping.value(), stiffness.value())
             .map_err(|error| section.fail("", error))?;
@@ -147,6 +192,7 @@ fn mechanics(section: &Section) -> Result<Mechanics, Failure> {
                 damping_n_m_s_per_rad: own(&damping)?,
                 stiffness_n_m_per_rad: own(&stiffness)?,
                 static_gain_relative: None,
+                correlations,
             },
             given: Given::Constants {
                 inertia,
@@ -168,6 +214,20 @@ fn common_std(section: &Section) -> Result<f64, Failure> {
         return Ok(common.value());
     }
     Err(section.fail("common_std", "expected a ratio of zero or more"))
+}
+
+/// Correlation coefficients of inertia and damping, inertia and stiffness, damping and stiffness.
+fn correlations(section: &Section) -> Result<[f64; 3], Failure> {
+    let mut found = [0.0; 3];
+    for (key, value) in CORRELATIONS.into_iter().zip(&mut found) {
+        if let Some(given) = section.quantity(key, Kind::Ratio)? {
+            *value = given.value();
+        }
+        if value.abs() > 1.0 {
+            return Err(section.fail(key, "expected a correlation from -1 to 1"));
+        }
+    }
+    Ok(found)
 }
 
 /// Largest part by which the common uncertainty may exceed the whole one: both are rounded.
@@ -206,8 +266,7 @@ fn modal_mechanics(section: &Section) -> Result<Mechanics, Failure> {
             2.0 * std * response.stiffness_n_m_per_rad()
                 / (std::f64::consts::TAU * natural_frequency.value())
         }),
-        stiffness_n_m_per_rad: None,
-        static_gain_relative: None,
+        ..ParameterStd::default()
     };
     Ok(Mechanics {
         response,
@@ -222,9 +281,30 @@ fn modal_mechanics(section: &Section) -> Result<Mechanics, Failure> {
 
 /// `"1 V/V"`: recorded over applied, each in its own unit.
 fn static_gain(section: &Section) -> Result<Option<StaticGain>, Failure> {
-    let Some(text) = section.raw("static_gain")? else {
+    let Some((text, std)) = section.raw_with_std("static_gain")? else {
         return Ok(None);
     };
+    let (value, recorded_unit, applied_unit) = gain(section, &text)?;
+    if value == 0.0 || !value.is_finite() {
+        return Err(section.fail(
+            "static_gain",
+            "the gain must be a finite number other than zero",
+        ));
+    }
+    let std = std.map(|std| gain(section, &std)).transpose()?;
+    if std.as_ref().is_some_and(|(std, ..)| *std < 0.0) {
+        return Err(section.fail("static_gain", "std must be zero or more"));
+    }
+    Ok(Some(StaticGain {
+        value,
+        recorded_unit,
+        applied_unit,
+        relative_std: std.map(|(std, ..)| std / value.abs()),
+    }))
+}
+
+/// A gain in SI units, and the units of record and applied quantity as written.
+fn gain(section: &Section, text: &str) -> Result<(f64, String, String), Failure> {
     let expected = "expected recorded over applied unit, as in \"1 V/V\" or \"2.5 mV/N\"";
     let wrong = || section.fail("static_gain", format_args!("\"{text}\": {expected}"));
     let (number, units) = text.trim().split_once(' ').ok_or_else(wrong)?;
@@ -237,17 +317,7 @@ fn static_gain(section: &Section) -> Result<Option<StaticGain>, Failure> {
             .map_err(|error| section.fail("static_gain", error))
     };
     let value = value * factor(recorded)? / factor(applied)?;
-    if value == 0.0 || !value.is_finite() {
-        return Err(section.fail(
-            "static_gain",
-            "the gain must be a finite number other than zero",
-        ));
-    }
-    Ok(Some(StaticGain {
-        value,
-        recorded_unit: recorded.trim().to_owned(),
-        applied_unit: applied.to_owned(),
-    }))
+    Ok((value, recorded.trim().to_owned(), applied.to_owned()))
 }
 
 /// What a diagnosis wrote about itself; what is not used is for people.
@@ -277,15 +347,6 @@ fn diagnosed(section: &Section) -> Result<Diagnosed, Failure> {
     };
     section.finish()?;
     Ok(found)
-}
-
-fn calibration(section: &Section) -> Result<Estimate, Failure> {
-    let constant = section.required("torque_per_volt", Kind::TorquePerVolt)?;
-    if constant.value() == 0.0 {
-        return Err(section.fail("torque_per_volt", "the constant must not be zero"));
-    }
-    section.finish()?;
-    Ok(constant)
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ use torqcomp_dsp::recorder::{LowPass, Recorder};
 use torqcomp_model::{Estimate, Kind};
 
 use super::section::Section;
+use super::signal::Signal;
 use super::{BridgeData, GageData, RecorderData};
 use crate::failure::Failure;
 
@@ -45,28 +46,24 @@ pub(super) fn bridge(section: &Section) -> Result<BridgeData, Failure> {
         "full",
         "full-poisson",
     ];
-    let Some(layout) = section.word("layout", &layouts)? else {
-        return Err(section.fail(
-            "",
-            format_args!("layout is missing; one of {}", layouts.join(", ")),
-        ));
-    };
+    let word = section.word("layout", &layouts)?;
     let poisson = || {
         section
             .positive("poisson_ratio", Kind::Ratio)
             .map(|e| e.value())
     };
-    let layout = match layout {
-        "half" => BridgeLayout::HalfBending,
-        "half-opposite" => BridgeLayout::HalfOpposite,
-        "half-poisson" => BridgeLayout::HalfPoisson {
+    let layout = match word {
+        None => None,
+        Some("half") => Some(BridgeLayout::HalfBending),
+        Some("half-opposite") => Some(BridgeLayout::HalfOpposite),
+        Some("half-poisson") => Some(BridgeLayout::HalfPoisson {
             poisson_ratio: poisson()?,
-        },
-        "full" => BridgeLayout::Full,
-        "full-poisson" => BridgeLayout::FullPoisson {
+        }),
+        Some("full") => Some(BridgeLayout::Full),
+        Some("full-poisson") => Some(BridgeLayout::FullPoisson {
             poisson_ratio: poisson()?,
-        },
-        _ => BridgeLayout::Quarter,
+        }),
+        Some(_) => Some(BridgeLayout::Quarter),
     };
     let supply = supply(section)?;
     let leads = leads(section)?;
@@ -78,19 +75,20 @@ pub(super) fn bridge(section: &Section) -> Result<BridgeData, Failure> {
     })
 }
 
-fn supply(section: &Section) -> Result<Supply, Failure> {
+fn supply(section: &Section) -> Result<Option<Supply>, Failure> {
     let volts = section.positive_if_any("excitation", Kind::Voltage)?;
     let amperes = section.positive_if_any("excitation_current", Kind::Current)?;
     match (volts, amperes) {
-        (Some(volts), None) => Ok(Supply::ConstantVoltage {
+        (None, None) => Ok(None),
+        (Some(volts), None) => Ok(Some(Supply::ConstantVoltage {
             volts: volts.value(),
-        }),
-        (None, Some(amperes)) => Ok(Supply::ConstantCurrent {
+        })),
+        (None, Some(amperes)) => Ok(Some(Supply::ConstantCurrent {
             amperes: amperes.value(),
-        }),
-        _ => Err(section.fail(
-            "",
-            "give either excitation = \"22.5 V\" or excitation_current = \"2 mA\"",
+        })),
+        (Some(_), Some(_)) => Err(section.fail(
+            "excitation_current",
+            "give either excitation = \"5 V\" or excitation_current = \"2 mA\"",
         )),
     }
 }
@@ -121,8 +119,12 @@ pub(super) fn recorder(section: Option<&Section>) -> Result<RecorderData, Failur
         let recorder = Recorder::new(1.0, None, 0.0).expect("a plain recorder is a recorder");
         return Ok(RecorderData {
             recorder,
+            low_pass: None,
+            cutoff_std_hz: None,
+            delay_std_s: None,
+            has_gain: false,
             input_resistance_ohm: None,
-            zero_v: 0.0,
+            zero: None,
         });
     };
     let optional = |key, kind| {
@@ -131,10 +133,9 @@ pub(super) fn recorder(section: Option<&Section>) -> Result<RecorderData, Failur
             .map(|e| e.map(|e| e.value()))
     };
     // An amplifier may invert.
-    let gain = section
-        .quantity("gain", Kind::Gain)?
-        .map_or(1.0, |gain| gain.value());
-    let cutoff = optional("low_pass", Kind::Frequency)?;
+    let given = section.quantity("gain", Kind::Gain)?;
+    let gain = given.as_ref().map_or(1.0, Estimate::value);
+    let cutoff = section.positive_if_any("low_pass", Kind::Frequency)?;
     let order = section.whole("low_pass_order")?;
     if order.is_some() && cutoff.is_none() {
         return Err(section.fail(
@@ -144,21 +145,24 @@ pub(super) fn recorder(section: Option<&Section>) -> Result<RecorderData, Failur
     }
     let order = u32::try_from(order.unwrap_or(1))
         .map_err(|_| section.fail("low_pass_order", "expected a whole number from 1 to 16"))?;
-    let delay_s = match section.quantity("delay", Kind::Time)? {
-        Some(delay) => delay.value(),
-        None => 0.0,
-    };
-    let low_pass = cutoff.map(|cutoff_hz| LowPass { cutoff_hz, order });
+    let delay = section.quantity("delay", Kind::Time)?;
+    let delay_s = delay.as_ref().map_or(0.0, Estimate::value);
+    let low_pass = cutoff.as_ref().map(|cutoff| LowPass {
+        cutoff_hz: cutoff.value(),
+        order,
+    });
     let recorder =
         Recorder::new(gain, low_pass, delay_s).map_err(|error| section.fail("", error))?;
     let input_resistance_ohm = optional("input_resistance", Kind::Resistance)?;
-    let zero_v = section
-        .quantity("zero", Kind::Voltage)?
-        .map_or(0.0, |zero| zero.value());
+    let zero = Signal::read(section, "zero")?;
     section.finish()?;
     Ok(RecorderData {
         recorder,
+        low_pass,
+        cutoff_std_hz: cutoff.and_then(|cutoff| cutoff.std_uncertainty()),
+        delay_std_s: delay.and_then(|delay| delay.std_uncertainty()),
+        has_gain: given.is_some(),
         input_resistance_ohm,
-        zero_v,
+        zero: zero.map(|(signal, zero)| (signal, zero.value())),
     })
 }

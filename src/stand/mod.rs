@@ -5,19 +5,27 @@ mod drawing;
 mod effects;
 mod file;
 pub(crate) mod keys;
+mod measured;
 mod measuring;
 mod refine;
 mod section;
+mod signal;
+mod static_law;
+mod uncertainty;
 pub mod update;
 
 use torqcomp_dsp::bridge::{BridgeLayout, Leads, Supply};
-use torqcomp_dsp::recorder::Recorder;
+use torqcomp_dsp::recorder::{LowPass, Recorder};
 use torqcomp_model::{Estimate, ParameterStd, SecondOrder};
+
+use crate::warning::Warning;
 
 pub use calibration::{Applied, Calibration, applied_by_unit};
 pub use effects::DeclaredEffect;
 pub use file::{parse, read, text};
+pub use measured::{CalibrationLaw, MeasuredCalibration};
 pub use refine::{Refined, refine, si_unit};
+pub use signal::Signal;
 
 /// A stand: its mechanics, and how its record becomes torque.
 #[derive(Debug, Clone)]
@@ -28,8 +36,8 @@ pub struct Stand {
     pub file: String,
     /// Inertia, damping and stiffness.
     pub mechanics: Option<Mechanics>,
-    /// Measured torque per recorded volt.
-    pub torque_per_volt: Option<Estimate>,
+    /// Measured torque over the recorded signal.
+    pub calibration: Option<MeasuredCalibration>,
     /// The beam's drawing.
     pub beam: Option<BeamDrawing>,
     /// Parts that make up the inertia.
@@ -46,6 +54,8 @@ pub struct Stand {
     pub effects: Vec<DeclaredEffect>,
     /// What a diagnosis wrote about itself.
     pub diagnosed: Diagnosed,
+    /// What is odd about the file.
+    pub warnings: Vec<Warning>,
 }
 
 /// What a diagnosis wrote about the records that it refined the stand with.
@@ -102,6 +112,8 @@ pub struct StaticGain {
     pub recorded_unit: String,
     /// Unit of the applied quantity, as written.
     pub applied_unit: String,
+    /// Relative standard uncertainty, if known.
+    pub relative_std: Option<f64>,
 }
 
 /// The beam and where the gage sits on it.
@@ -111,6 +123,8 @@ pub struct BeamDrawing {
     pub slender_stiffness: Estimate,
     /// The beam with all that the drawing gives: shear, clamp, threads.
     pub full: torqcomp_model::Beam,
+    /// Elastic modulus.
+    pub modulus: Estimate,
     /// Radius at which the beam meets the stator.
     pub radius: Estimate,
     /// Distance of the gage from the clamp.
@@ -155,10 +169,10 @@ pub struct GageData {
 /// A bridge.
 #[derive(Debug, Clone)]
 pub struct BridgeData {
-    /// Which arms are gages.
-    pub layout: BridgeLayout,
-    /// What drives it.
-    pub supply: Supply,
+    /// Which arms are gages, if it is given.
+    pub layout: Option<BridgeLayout>,
+    /// What drives it, if it is given.
+    pub supply: Option<Supply>,
     /// Its wires.
     pub leads: Leads,
 }
@@ -168,10 +182,18 @@ pub struct BridgeData {
 pub struct RecorderData {
     /// Gain, low-pass and delay.
     pub recorder: Recorder,
+    /// Its low-pass.
+    pub low_pass: Option<LowPass>,
+    /// Standard uncertainty of the low-pass's cut-off in Hz, if known.
+    pub cutoff_std_hz: Option<f64>,
+    /// Standard uncertainty of the delay in s, if known.
+    pub delay_std_s: Option<f64>,
+    /// Whether the file gives the gain.
+    pub has_gain: bool,
     /// Input resistance in Ω that loads the bridge.
     pub input_resistance_ohm: Option<f64>,
-    /// Recorded volts at no load.
-    pub zero_v: f64,
+    /// Record at no load in SI units, if it is given.
+    pub zero: Option<(Signal, f64)>,
 }
 
 impl Stand {

@@ -4,7 +4,7 @@ use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, value};
 
 use torqcomp_model::Estimate;
 
-use super::update::COMMON;
+use super::update::{COMMON, CORRELATIONS};
 use super::{Given, Stand};
 use crate::failure::Failure;
 use crate::io::digits;
@@ -94,6 +94,9 @@ impl Refined<'_> {
             mechanics["damping"] = self.quantity(damping, "N m s/rad");
             if let Some(table) = mechanics.as_table_like_mut() {
                 table.remove(COMMON);
+                for key in CORRELATIONS {
+                    table.remove(key);
+                }
             }
             if let Some(common) = stiffness.relative_std() {
                 mechanics[COMMON] = value(digits::text(common, 9));

@@ -114,7 +114,11 @@ impl<'a> Section<'a> {
         let Some(item) = self.item(key) else {
             return Ok(Vec::new());
         };
-        let title = format!("[[{key}]]");
+        let outer = self.title.trim_matches(['[', ']']);
+        let title = match outer {
+            "" => format!("[[{key}]]"),
+            outer => format!("[[{outer}.{key}]]"),
+        };
         if let Some(tables) = item.as_array_of_tables() {
             return Ok(tables
                 .iter()
@@ -177,6 +181,11 @@ impl<'a> Section<'a> {
     /// A quantity: a text such as `"22.5 V"`, or a table of `value`, `std` and `source`.
     pub fn quantity(&self, key: &'static str, kind: Kind) -> Result<Option<Estimate>, Failure> {
         debug_assert_eq!(self.listed(key), Some(Takes::Quantity(kind)), "{key}");
+        self.quantity_of(key, kind)
+    }
+
+    /// The same of a key that takes several kinds.
+    pub fn quantity_of(&self, key: &'static str, kind: Kind) -> Result<Option<Estimate>, Failure> {
         let Some(item) = self.item(key) else {
             return Ok(None);
         };
@@ -306,11 +315,19 @@ impl<'a> Section<'a> {
 
     /// The raw text of a quantity whose unit tells its kind, out of a table of `value`, `std` and `source` as well.
     pub fn raw(&self, key: &'static str) -> Result<Option<String>, Failure> {
+        Ok(self.raw_with_std(key)?.map(|(text, _)| text))
+    }
+
+    /// The same, with the raw text of its `std`.
+    pub fn raw_with_std(
+        &self,
+        key: &'static str,
+    ) -> Result<Option<(String, Option<String>)>, Failure> {
         let Some(item) = self.item(key) else {
             return Ok(None);
         };
         let Some(table) = item.as_table_like() else {
-            return self.quantity_text(key, item).map(Some);
+            return Ok(Some((self.quantity_text(key, item)?, None)));
         };
         let start = item.span().map(|span| span.start);
         let inner = Section::new(self.source, format!("{} {key}", self.title), table, start);
@@ -318,12 +335,11 @@ impl<'a> Section<'a> {
             .item("value")
             .ok_or_else(|| inner.fail("", "expected value = \"…\""))?;
         let text = inner.quantity_text("value", value)?;
-        if let Some(std) = inner.item("std") {
-            inner.quantity_text("std", std)?;
-        }
+        let std = inner.item("std");
+        let std = std.map(|std| inner.quantity_text("std", std)).transpose()?;
         inner.text("source")?;
         inner.finish()?;
-        Ok(Some(text))
+        Ok(Some((text, std)))
     }
 
     /// Refuses the keys that nobody asked for.

@@ -1,25 +1,78 @@
 //! Writing what was found into a stand file, leaving the rest of it as it is.
 
-use toml_edit::{DocumentMut, InlineTable, Item, Table, value};
-use torqcomp_model::Kind;
+use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, Value, value};
+use torqcomp_model::{Estimate, Kind};
 
 use crate::failure::Failure;
 
 /// One entry of a stand file.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Entry {
     /// Its section, such as `mechanics`.
     pub section: &'static str,
     /// Its key, such as `stiffness`.
     pub key: &'static str,
-    /// Value in SI units.
-    pub value: f64,
-    /// Its standard uncertainty.
-    pub std: Option<f64>,
-    /// Unit to write; empty for a ratio.
-    pub unit: String,
-    /// Where it comes from.
-    pub source: String,
+    /// What is written.
+    content: Value,
+}
+
+impl Entry {
+    /// A quantity with its standard uncertainty, and where it comes from.
+    #[must_use]
+    pub fn quantity(
+        section: &'static str,
+        key: &'static str,
+        estimate: &Estimate,
+        source: &str,
+    ) -> Self {
+        let unit = estimate.unit();
+        let text = |number: f64| format!("{} {unit}", number_text(number)).trim().to_owned();
+        let mut table = InlineTable::new();
+        table.insert("value", text(estimate.value()).into());
+        if let Some(std) = estimate.std_uncertainty() {
+            table.insert("std", text(std).into());
+        }
+        table.insert("source", source.into());
+        let content = Value::InlineTable(table);
+        Self {
+            section,
+            key,
+            content,
+        }
+    }
+
+    /// A whole number.
+    #[must_use]
+    pub fn whole(section: &'static str, key: &'static str, number: i64) -> Self {
+        let content = number.into();
+        Self {
+            section,
+            key,
+            content,
+        }
+    }
+
+    /// Points of `[calibration]`: reading, torque and its standard uncertainty, each as text.
+    #[must_use]
+    pub fn points(points: &[[String; 3]]) -> Self {
+        let mut array = Array::new();
+        for texts in points {
+            let mut table = InlineTable::new();
+            for (key, text) in ["reading", "torque", "std"].into_iter().zip(texts) {
+                table.insert(key, text.as_str().into());
+            }
+            let mut point = Value::InlineTable(table);
+            point.decor_mut().set_prefix("\n    ");
+            array.push_formatted(point);
+        }
+        array.set_trailing_comma(true);
+        array.set_trailing("\n");
+        Self {
+            section: "calibration",
+            key: "points",
+            content: Value::Array(array),
+        }
+    }
 }
 
 const SCHEMA: &str = "torqcomp.stand/1";
@@ -27,6 +80,12 @@ const SCHEMA: &str = "torqcomp.stand/1";
 const CONSTANTS: [&str; 3] = ["inertia", "damping", "stiffness"];
 /// Relative standard uncertainty that these three share.
 pub const COMMON: &str = "common_std";
+/// Correlation coefficients of these three, in pairs.
+pub const CORRELATIONS: [&str; 3] = [
+    "correlation_inertia_damping",
+    "correlation_inertia_stiffness",
+    "correlation_damping_stiffness",
+];
 const MODAL: [&str; 2] = ["natural_frequency", "damping_ratio"];
 
 /// The text of a stand file with the entries put in; `existing` is its text so far, if there is one.
@@ -56,6 +115,7 @@ pub fn update(name: &str, existing: Option<&str>, entries: &[Entry]) -> Result<S
             )));
         }
     }
+    make_room(name, &mut document, entries)?;
     if entries.iter().any(|entry| CONSTANTS.contains(&entry.key)) {
         // It belongs to the constants that are replaced.
         if let Some(mechanics) = document
@@ -63,12 +123,54 @@ pub fn update(name: &str, existing: Option<&str>, entries: &[Entry]) -> Result<S
             .and_then(Item::as_table_like_mut)
         {
             mechanics.remove(COMMON);
+            for key in CORRELATIONS {
+                mechanics.remove(key);
+            }
         }
     }
     for entry in entries {
         put(name, &mut document, entry)?;
     }
     Ok(document.to_string())
+}
+
+/// Takes out a calibration in another form, which would stand beside the new one.
+fn make_room(name: &str, document: &mut DocumentMut, entries: &[Entry]) -> Result<(), Failure> {
+    let is_new = |key: &str| {
+        entries
+            .iter()
+            .any(|e| e.section == "calibration" && e.key == key)
+    };
+    if !entries.iter().any(|e| e.section == "calibration") {
+        return Ok(());
+    }
+    let gain = document.get("mechanics").and_then(|m| m.get("static_gain"));
+    if gain.is_some() {
+        return Err(Failure::failed(format_args!(
+            "{name}: [mechanics] has static_gain, which converts the record already; remove it, or write to another file"
+        )));
+    }
+    if let Some(table) = document
+        .get_mut("calibration")
+        .and_then(Item::as_table_like_mut)
+    {
+        let keys: Vec<String> = table.iter().map(|(key, _)| key.to_owned()).collect();
+        for key in keys.iter().filter(|key| !is_new(key)) {
+            table.remove(key);
+        }
+    }
+    let zero = entries
+        .iter()
+        .any(|e| e.section == "recorder" && e.key == "zero");
+    if !zero
+        && let Some(table) = document
+            .get_mut("recorder")
+            .and_then(Item::as_table_like_mut)
+    {
+        // It belongs to the calibration that is replaced.
+        table.remove("zero");
+    }
+    Ok(())
 }
 
 fn put(name: &str, document: &mut DocumentMut, entry: &Entry) -> Result<(), Failure> {
@@ -93,29 +195,18 @@ fn put(name: &str, document: &mut DocumentMut, entry: &Entry) -> Result<(), Fail
             entry.section, entry.key
         )));
     }
-    let text = |number: f64| {
-        format!("{} {}", number_text(number), entry.unit)
-            .trim()
-            .to_owned()
-    };
-    let mut inline = InlineTable::new();
-    inline.insert("value", text(entry.value).into());
-    if let Some(std) = entry.std {
-        inline.insert("std", text(std).into());
-    }
-    inline.insert("source", entry.source.as_str().into());
     match table.get_mut(entry.key) {
         Some(item) => {
             // The comment after the value belongs to the user.
             let decor = item.as_value().map(|v| v.decor().clone());
-            let mut new = toml_edit::Value::InlineTable(inline);
+            let mut new = entry.content.clone();
             if let Some(decor) = decor {
                 *new.decor_mut() = decor;
             }
             *item = Item::Value(new);
         }
         None => {
-            table.insert(entry.key, value(inline));
+            table.insert(entry.key, Item::Value(entry.content.clone()));
         }
     }
     Ok(())
@@ -163,14 +254,8 @@ mod tests {
     use super::*;
 
     fn stiffness(section: &'static str) -> Entry {
-        Entry {
-            section,
-            key: "stiffness",
-            value: 1.5e5,
-            std: Some(20.0),
-            unit: "N m/rad".to_owned(),
-            source: "fitted: decay.csv".to_owned(),
-        }
+        let stiffness = Estimate::of(Kind::AngularStiffness, 1.5e5, Some(20.0));
+        Entry::quantity(section, "stiffness", &stiffness, "fitted: decay.csv")
     }
 
     #[test]

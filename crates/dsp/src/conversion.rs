@@ -4,6 +4,7 @@
 //! unit the applied quantity has, sample by sample, and back.
 
 use crate::bridge::{Bridge, BridgeError};
+use crate::curve::Curve;
 
 /// What can be wrong with a conversion or a sample.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -33,6 +34,38 @@ pub enum ConversionError {
     /// The bridge cannot have given the value.
     #[error(transparent)]
     Bridge(#[from] BridgeError),
+    /// Points or coefficients that make no curve.
+    #[error(
+        "the calibration must have two points or more and rise or fall throughout; \
+         correct its points, or choose a lower degree"
+    )]
+    NoCurve,
+    /// A recorded value far beyond a calibration curve.
+    #[error(
+        "the calibration runs from {low} to {high} and is continued by 20 % of that, got {got}; \
+         calibrate over the whole range of the record"
+    )]
+    BeyondCurve {
+        /// Least calibrated value.
+        low: f64,
+        /// Greatest calibrated value.
+        high: f64,
+        /// What was given.
+        got: f64,
+    },
+    /// An applied value that a calibration curve does not reach.
+    #[error(
+        "the calibration reaches from {low} to {high}, got {got}; \
+         calibrate over the whole range"
+    )]
+    NotOnCurve {
+        /// Least applied value.
+        low: f64,
+        /// Greatest applied value.
+        high: f64,
+        /// What was given.
+        got: f64,
+    },
     /// A sample of a slice failed.
     #[error("sample {index} must convert like those before it, got: {source}")]
     Sample {
@@ -72,6 +105,16 @@ pub enum Conversion {
         recorded_zero_v: f64,
         /// Applied unit per unit strain.
         torque_per_strain: f64,
+    },
+    /// `applied = curve(scale × recorded + shift)`: a measured curve.
+    #[non_exhaustive]
+    Curve {
+        /// Applied over calibrated quantity.
+        curve: Box<Curve>,
+        /// Calibrated quantity per recorded unit.
+        scale: f64,
+        /// Calibrated quantity at a record of zero.
+        shift: f64,
     },
     /// `applied = torque_per_strain × recorded`: the record is strain.
     #[non_exhaustive]
@@ -159,6 +202,28 @@ impl Conversion {
         })
     }
 
+    /// A measured curve, `applied = curve(scale × recorded + shift)`.
+    ///
+    /// # Errors
+    /// [`ConversionError::InvalidCoefficient`] when the scale is zero or a
+    /// coefficient is not finite.
+    ///
+    /// ```
+    /// use torqcomp_dsp::{conversion::Conversion, curve::Curve};
+    /// // 10 V are 2 mV/V of a bridge at 5 V behind a gain of 1000: 50 N m.
+    /// let curve = Curve::through(&[(0.0, 0.0), (2e-3, 50.0)])?;
+    /// let conversion = Conversion::curve(curve, 1.0 / (1000.0 * 5.0), 0.0)?;
+    /// assert!((conversion.convert(10.0)? - 50.0).abs() < 1e-12);
+    /// # Ok::<(), torqcomp_dsp::conversion::ConversionError>(())
+    /// ```
+    pub fn curve(curve: Curve, scale: f64, shift: f64) -> Result<Self, ConversionError> {
+        Ok(Self::Curve {
+            curve: Box::new(curve),
+            scale: factor("scale", scale)?,
+            shift: finite_coefficient("shift", shift)?,
+        })
+    }
+
     /// The applied value of one recorded value.
     ///
     /// # Errors
@@ -168,6 +233,14 @@ impl Conversion {
         let applied = match self {
             Self::Linear { gain, offset } => gain * recorded + offset,
             Self::Strain { torque_per_strain } => torque_per_strain * recorded,
+            Self::Curve {
+                curve,
+                scale,
+                shift,
+            } => {
+                finite("recorded sample", recorded, recorded)?;
+                curve.applied(scale * recorded + shift)?
+            }
             Self::Bridge {
                 bridge,
                 amplifier_gain,
@@ -198,6 +271,11 @@ impl Conversion {
         let recorded = match self {
             Self::Linear { gain, offset } => (applied - offset) / gain,
             Self::Strain { torque_per_strain } => applied / torque_per_strain,
+            Self::Curve {
+                curve,
+                scale,
+                shift,
+            } => (curve.recorded(applied)? - shift) / scale,
             Self::Bridge {
                 bridge,
                 amplifier_gain,
@@ -231,13 +309,17 @@ impl Conversion {
             Self::Strain { torque_per_strain } => {
                 self.convert_lines(samples, |v| torque_per_strain * v)
             }
-            Self::Bridge { .. } => self.convert_each(samples, 0),
+            Self::Bridge { .. } | Self::Curve { .. } => self.convert_each(samples, 0),
         }
     }
 
-    /// Applied unit per recorded unit about no load.
+    /// Applied unit per recorded unit about no load; of a curve in the middle of its range.
     pub fn small_signal_gain(&self) -> f64 {
         match self {
+            Self::Curve { curve, scale, .. } => {
+                let (low, high) = curve.range();
+                scale * curve.slope(0.5 * (low + high))
+            }
             Self::Linear { gain, .. } => *gain,
             Self::Strain { torque_per_strain } => *torque_per_strain,
             Self::Bridge {
@@ -333,9 +415,16 @@ mod tests {
         Conversion::bridge(bridge, -10.0, 0.25, 3.5e6).unwrap()
     }
 
-    fn all() -> [Conversion; 3] {
+    fn all() -> [Conversion; 4] {
         let linear = Conversion::linear(-1230.0, 0.5).unwrap();
-        [linear, Conversion::strain(3.5e6).unwrap(), unbalanced()]
+        let cubic = Curve::polynomial(vec![1.0, 2500.0, 0.3, 40.0], -1.0, 1.0).unwrap();
+        let cubic = Conversion::curve(cubic, 1.0, 0.0).unwrap();
+        [
+            linear,
+            Conversion::strain(3.5e6).unwrap(),
+            cubic,
+            unbalanced(),
+        ]
     }
 
     proptest! {

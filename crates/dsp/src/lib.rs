@@ -20,6 +20,7 @@ pub mod band;
 pub mod bridge;
 pub mod compensate;
 pub mod conversion;
+pub mod curve;
 pub mod decimate;
 mod error;
 pub mod frf;

@@ -74,7 +74,8 @@ pub use error::ModelError;
 pub use inertia::Part;
 pub use mode::Mode;
 pub use quantity::{
-    Covariance, Dimension, Estimate, Estimates, Kind, Measure, QuantityError, Unit, UnitSystem,
+    Covariance, Dimension, Estimate, Estimates, Kind, Measure, QuantityError, RatioOf, Unit,
+    UnitSystem,
 };
 pub use response::SecondOrder;
 pub use section::CrossSection;

@@ -30,6 +30,8 @@ pub struct ParameterStd {
     pub stiffness_n_m_per_rad: Option<f64>,
     /// Of the static gain (torque per volt), as a fraction of it.
     pub static_gain_relative: Option<f64>,
+    /// Correlation coefficients of inertia and damping, inertia and stiffness, damping and stiffness, −1 to 1.
+    pub correlations: [f64; 3],
 }
 
 impl ParameterStd {
@@ -62,11 +64,18 @@ impl ParameterStd {
                 non_negative(name, unit, value)?;
             }
         }
+        for value in self.correlations {
+            non_negative("1 − |correlation|", "(ratio)", 1.0 - value.abs())?;
+        }
         Ok(())
     }
 
     fn is_empty(&self) -> bool {
-        *self == Self::default()
+        let exact = Self {
+            correlations: self.correlations,
+            ..Self::default()
+        };
+        *self == exact
     }
 }
 
@@ -128,9 +137,9 @@ impl SecondOrder {
 
     /// Standard uncertainty of the inverse transfer function at `frequency_hz` (ω/2π in Hz).
     ///
-    /// u²(ln|G|) = Σ (∂ln|G|/∂p)² u²(p) over p = J, f, K, plus the relative u² of the static gain;
-    /// u²(φ) = Σ (∂φ/∂p)² u²(p). J, f, K and the gain count as uncorrelated; for correlated ones
-    /// use [`SecondOrder::inverse_gradient`]. `None` if no uncertainty is known at all. Valid
+    /// u²(ln|G|) = Σ Σ ∂ln|G|/∂p ∂ln|G|/∂q u(p) u(q) r(p, q) over p, q = J, f, K with their
+    /// correlations r, plus the relative u² of the static gain; u²(φ) likewise without the gain (JCGM 100:2008,
+    /// clause 5.2.2, equation 16). `None` if no uncertainty is known at all. Valid
     /// while the changes are small against |G|: close to the natural frequency of a lightly
     /// damped stand u(K)/K and u(J)/J must be well below 2ζ.
     ///
@@ -144,6 +153,16 @@ impl SecondOrder {
     /// let std = ParameterStd { damping_n_m_s_per_rad: Some(0.6), ..ParameterStd::default() };
     /// let got = stand.inverse_uncertainty(5.0 / std::f64::consts::TAU, &std)?.unwrap();
     /// assert!((got.magnitude_relative - 0.05).abs() < 1e-12);
+    /// // J, f and K of one relative error: a common factor, which the ratio of them does not show.
+    /// let common = ParameterStd {
+    ///     inertia_kg_m2: Some(0.02),
+    ///     damping_n_m_s_per_rad: Some(0.12),
+    ///     stiffness_n_m_per_rad: Some(0.5),
+    ///     correlations: [1.0; 3],
+    ///     ..ParameterStd::default()
+    /// };
+    /// let got = stand.inverse_uncertainty(1.0, &common)?.unwrap();
+    /// assert!(got.magnitude_relative < 1e-9 && got.phase_rad < 1e-9);
     /// # Ok::<(), torqcomp_model::ModelError>(())
     /// ```
     pub fn inverse_uncertainty(
@@ -162,16 +181,19 @@ impl SecondOrder {
             std.stiffness_n_m_per_rad,
         ];
         // The static gain scales the torque and does not turn its phase.
-        let mut magnitude_relative = std.static_gain_relative.unwrap_or(0.0);
-        let mut phase_rad = 0.0_f64;
-        for (i, parameter) in parameters.into_iter().enumerate() {
-            let Some(parameter) = parameter else { continue };
-            magnitude_relative = magnitude_relative.hypot(gradient.ln_magnitude[i] * parameter);
-            phase_rad = phase_rad.hypot(gradient.phase_rad[i] * parameter);
-        }
+        let stds = parameters.map(|std| std.unwrap_or(0.0));
+        let [jf, jk, fk] = std.correlations;
+        let spread = |gradient: [f64; 3]| {
+            let part = |i: usize| gradient[i] * stds[i];
+            let own = (0..3).map(|i| part(i) * part(i)).sum::<f64>();
+            let mixed = jf * part(0) * part(1) + jk * part(0) * part(2) + fk * part(1) * part(2);
+            // Rounded correlations may leave a little less than nothing.
+            (own + 2.0 * mixed).max(0.0).sqrt()
+        };
+        let of_gain = std.static_gain_relative.unwrap_or(0.0);
         Ok(Some(InverseUncertainty {
-            magnitude_relative,
-            phase_rad,
+            magnitude_relative: spread(gradient.ln_magnitude).hypot(of_gain),
+            phase_rad: spread(gradient.phase_rad),
         }))
     }
 }

@@ -271,10 +271,13 @@ fn pound_is_a_mass_and_only_a_mass() {
         (Kind::Torque, "5 foot-pounds"),
         (Kind::Inertia, "5 lb ft^2"),
         (Kind::Pressure, "5 lb/in^2"),
+        (Kind::Torque, "16 oz-in"),
+        (Kind::Torque, "3 in-lb"),
+        (Kind::Torque, "100 g cm"),
     ] {
         let got = kind.parse(text);
         assert!(
-            matches!(got, Err(QuantityError::AmbiguousPound { .. })),
+            matches!(got, Err(QuantityError::AmbiguousWeight { .. })),
             "{text}: {got:?}"
         );
     }
@@ -419,4 +422,70 @@ fn no_text_makes_the_reader_panic() {
         read > 100,
         "the pieces must form readable text now and then: {read}"
     );
+}
+
+/// Worked by hand: 1 lbf in = 4.4482216152605 N × 0.0254 m, 1 ozf = 1/16 lbf, 1 kp = 9.80665 N.
+#[test]
+fn units_of_torque_that_motors_and_screws_are_sold_with() {
+    for (text, want) in [
+        ("1 cN m", 0.01),
+        ("1 cNm", 0.01),
+        ("1 dyn cm", 1e-7),
+        ("1 gf cm", 9.80665e-5),
+        ("1 gf-cm", 9.80665e-5),
+        ("1 ozf in", 4.448_221_615_260_5 / 16.0 * 0.0254),
+        ("1 in-lbf", 4.448_221_615_260_5 * 0.0254),
+        ("1 kp m", 9.80665),
+        ("1 kgfm", 9.80665),
+        ("1 kgf cm", 0.098_066_5),
+    ] {
+        let got = Kind::Torque.parse(text).unwrap();
+        assert!((got / want - 1.0).abs() < 1e-12, "{text}: {got} {want}");
+    }
+}
+
+#[test]
+fn speeds_angles_and_frequencies_in_other_spellings() {
+    let speed = |text| Kind::AngularSpeed.parse(text).unwrap();
+    assert!((speed("1500 1/min") / (50.0 * std::f64::consts::PI) - 1.0).abs() < 1e-12);
+    assert!((speed("1.5 krpm") / (50.0 * std::f64::consts::PI) - 1.0).abs() < 1e-12);
+    assert!((Kind::Frequency.parse("1500 min^-1").unwrap() - 25.0).abs() < 1e-12);
+    let angle = |text| Kind::Angle.parse(text).unwrap();
+    assert!((angle("180000 mdeg") - std::f64::consts::PI).abs() < 1e-12);
+    assert!((angle("200 gon") - std::f64::consts::PI).abs() < 1e-12);
+    let asked = Kind::Angle.parse("200 grad").unwrap_err().to_string();
+    assert!(asked.contains("write deg or gon"), "{asked}");
+    for text in ["60 khz", "60 KHz", "60000 hz", "60000 HZ"] {
+        assert!(
+            (Kind::Frequency.parse(text).unwrap() - 6e4).abs() < 1e-6,
+            "{text}"
+        );
+    }
+    assert_eq!(Kind::Voltage.parse("5 mVolt").unwrap(), 5e-3);
+}
+
+#[test]
+fn an_inverted_unit_is_answered_with_the_right_number() {
+    let message = |kind: Kind, text| kind.parse(text).unwrap_err().to_string();
+    // 80 mV per N m are 1/0.08 = 12.5 N m per V.
+    let got = message(Kind::TorquePerVolt, "80 mV/(N m)");
+    assert!(got.contains("write \"12.5 N m/V\""), "{got}");
+    // 0.04 mV/V per N m are 25 N m per mV/V.
+    let got = message(Kind::TorquePerRatio, "0.04 (mV/V)/(N m)");
+    assert!(got.contains("write \"25000 N m/(V/V)\""), "{got}");
+}
+
+#[test]
+fn ratios_of_voltages_are_neither_strain_nor_torque() {
+    assert_eq!(Kind::TorquePerRatio.parse("25 N m/(mV/V)").unwrap(), 25e3);
+    let wrong = |kind: Kind, text| {
+        let got = kind.parse(text);
+        assert!(
+            matches!(got, Err(QuantityError::WrongRatio { .. })),
+            "{text}: {got:?}"
+        );
+    };
+    wrong(Kind::TorquePerRatio, "25 N m");
+    wrong(Kind::Torque, "25 N m/(mV/V)");
+    wrong(Kind::Strain, "1 mV/V");
 }

@@ -185,6 +185,7 @@ fn uncertainty_matches_monte_carlo() {
         damping_n_m_s_per_rad: Some(relative[1] * STAND[1]),
         stiffness_n_m_per_rad: Some(relative[2] * STAND[2]),
         static_gain_relative: Some(gain),
+        ..ParameterStd::default()
     };
     let mut random = Random::new(20_240_229);
     for frequency_hz in [100.0, 450.0, 592.0, 700.0, 2400.0] {

@@ -15,8 +15,8 @@ use crate::failure::Failure;
 use crate::io::{ChannelChoice, Input};
 use crate::print::short;
 use crate::recording::AlignedChannels;
-use crate::stand::{Given, Stand, si_unit};
-use crate::unit::NamedUnit;
+use crate::stand::{Given, Signal, Stand, si_unit};
+use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
 
 /// Minimum number of samples of a record.
@@ -27,7 +27,6 @@ const FIRST_STEPS: usize = 2;
 const EXCLUDED: usize = 32;
 
 const TORQUE: Dimension = Dimension::new([1, 2, -2, 0, 0, 0]);
-const VOLTAGE: Dimension = Dimension::new([1, 2, -3, -1, 0, 0]);
 
 struct Pair {
     source: String,
@@ -39,6 +38,17 @@ struct Pair {
     measured_unit: Option<NamedUnit>,
     warnings: Vec<Warning>,
     is_lossy: bool,
+}
+
+impl Pair {
+    /// The measured channel as a stand takes it.
+    fn measured_channel(&self) -> RecordedChannel<'_> {
+        RecordedChannel {
+            name: "measured",
+            unit: self.measured_unit.as_ref(),
+            unit_text: None,
+        }
+    }
 }
 
 /// Reads all records, and what the stand file declares of them; whether something of a record was lost.
@@ -61,6 +71,11 @@ pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<(Case, bool), Fail
     let mut warnings: Vec<Warning> = all.flat_map(|pair| pair.warnings.clone()).collect();
     let is_lossy = train.iter().chain(&holdout).any(|pair| pair.is_lossy);
     let calibrated = stand.filter(|_| is_calibrated);
+    warnings.extend(stand.iter().flat_map(|stand| stand.warnings.clone()));
+    if let Some(stand) = calibrated {
+        let calibration = stand.calibration(train[0].measured_channel(), UnitSystem::Si)?;
+        warnings.extend(calibration.warnings);
+    }
     let convert = |pairs: Vec<Pair>| -> Result<Vec<StandRecord>, Failure> {
         let each = pairs.into_iter();
         each.map(|p| record(p, calibrated, &units)).collect()
@@ -194,12 +209,19 @@ fn units(pair: &Pair, stand: Option<&Stand>) -> (ChannelUnits, bool) {
     let [applied, measured] = channels.map(|unit| unit.as_ref().map(|u| u.unit.dimension()));
     let factors = channels.map(|unit| unit.as_ref().map_or(1.0, |u| u.unit.factor()));
     let is_torque_stand = static_gain(stand).is_none();
+    let signal = pair
+        .measured_unit
+        .as_ref()
+        .and_then(|named| Signal::of(&named.unit));
     let has_calibration = stand.is_some_and(|s| {
+        let of = s.calibration.as_ref().map(|c| c.signal);
+        let is_of_bridge = matches!(signal, Some(Signal::Voltage | Signal::Ratio));
         is_torque_stand
             && s.mechanics.is_some()
-            && (s.torque_per_volt.is_some() || s.bridge.is_some())
+            && (is_of_bridge && (of.is_some() || s.bridge.is_some())
+                || signal.is_some() && of == signal)
     });
-    let is_calibrated = applied == Some(TORQUE) && measured == Some(VOLTAGE) && has_calibration;
+    let is_calibrated = applied == Some(TORQUE) && has_calibration;
     let is_torque = applied == Some(TORQUE) && measured == Some(TORQUE) || is_calibrated;
     let diagnosed = match is_torque {
         true => "N m".to_owned(),
@@ -244,8 +266,7 @@ fn record(
     let measured: Vec<f64> = match calibrated {
         None => pair.measured.iter().map(|y| y * measured_factor).collect(),
         Some(stand) => {
-            let unit = pair.measured_unit.as_ref();
-            let chain = stand.calibration("measured", unit, UnitSystem::Si)?;
+            let chain = stand.calibration(pair.measured_channel(), UnitSystem::Si)?;
             let mut values = pair.measured;
             convert(&chain, &mut values).map_err(|(row, why)| {
                 Failure::failed(format_args!("{}: sample {}: {why}", pair.source, row + 1))

@@ -1,13 +1,13 @@
 //! Constants of the stand that follow from a mode, and their entries in a stand file.
 
-use torqcomp_model::Kind;
+use torqcomp_model::{Estimate, Kind};
 
 use super::{declared, entry, quantity, stand_text};
 use crate::cli::identify::{Anchors, Findings};
 use crate::failure::Failure;
 use crate::identify::{Identification, KnownConstant, ModalPole, NamedEstimate};
 use crate::print::{rounded, short};
-use crate::stand::update::{COMMON, Entry};
+use crate::stand::update::{COMMON, CORRELATIONS, Entry};
 
 /// The ratios that a test determines.
 #[derive(Clone, Copy)]
@@ -63,10 +63,11 @@ pub(super) fn from_ratios(
         "scaled with the declared {}; this test alone gives only ratios",
         scale.name
     ));
-    let declared = Entry {
-        std: None,
-        ..entries(std::slice::from_ref(scale), "declared").remove(0)
+    let exact = NamedEstimate {
+        name: scale.name.clone(),
+        estimate: Estimate::of(scale.estimate.unit().to_owned(), scale.value(), None),
     };
+    let declared = entries(&[exact], "declared").remove(0);
     let mut all = entries(others, source);
     if is_given {
         all.insert(0, declared);
@@ -81,14 +82,12 @@ pub(super) fn from_ratios(
             ),
         ),
         // All three constants share the relative uncertainty of the known one.
-        Some(std) => all.push(Entry {
-            section: "mechanics",
-            key: COMMON,
-            value: std / scale.value(),
-            std: None,
-            unit: String::new(),
-            source: format!("of the declared {}", scale.name),
-        }),
+        Some(std) => all.push(Entry::quantity(
+            "mechanics",
+            COMMON,
+            &Estimate::of("", std / scale.value(), None),
+            &format!("of the declared {}", scale.name),
+        )),
     }
     Ok(all)
 }
@@ -188,7 +187,15 @@ pub(super) fn from_residue(
         "inertia, damping and stiffness from the ratio of motion to torque, without a declared constant"
             .to_owned(),
     );
-    let entries = entries(&constants.list, source);
+    let mut entries = entries(&constants.list, source);
+    // The pairs of inertia, damping and stiffness, in this order.
+    for (key, (i, j)) in CORRELATIONS.into_iter().zip([(0, 1), (0, 2), (1, 2)]) {
+        let coefficient = constants.correlation(i, j);
+        entries.extend(
+            coefficient
+                .map(|c| Entry::quantity("mechanics", key, &Estimate::of("", c, None), source)),
+        );
+    }
     result.add(constants);
     Ok(entries)
 }

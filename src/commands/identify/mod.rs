@@ -98,14 +98,7 @@ fn entry(
     constant: &NamedEstimate,
     source: &str,
 ) -> Entry {
-    Entry {
-        section,
-        key,
-        value: constant.value(),
-        std: constant.std(),
-        unit: constant.estimate.unit().to_owned(),
-        source: source.to_owned(),
-    }
+    Entry::quantity(section, key, &constant.estimate, source)
 }
 
 /// Completes the result, writes the stand file and the HTML page, and prints the result.

@@ -1,19 +1,20 @@
 //! `identify static`.
 
-use torqcomp_model::{Dimension, Kind};
+use torqcomp_model::{Dimension, Estimate, Kind, RatioOf, Unit};
 
 use super::{FORCE, Recorded, TORQUE, deliver, entry, quantity, unit_or};
 use crate::cli::identify::Static;
 use crate::commands::Outcome;
 use crate::failure::Failure;
 use crate::identify::Identification;
-use crate::identify::static_load::{LoadUnits, Point, identify, series_of};
-use crate::io::{ChannelChoice, Flags, Input, Reading};
+use crate::identify::static_load::{CalibrationStep, LoadUnits, Point, identify, series_of};
+use crate::io::{ChannelChoice, Flags, Input, Reading, digits};
 use crate::recording::{Recording, check_holes, unit_of};
+use crate::stand::Signal;
 use crate::stand::update::Entry;
 use crate::unit::NamedUnit;
 
-const VOLTAGE: Dimension = Dimension::new([1, 2, -3, -1, 0, 0]);
+const MASS: Dimension = Dimension::new([1, 0, 0, 0, 0, 0]);
 
 /// Runs the test.
 pub fn run(args: &Static) -> Result<Outcome, Failure> {
@@ -31,11 +32,11 @@ pub fn run(args: &Static) -> Result<Outcome, Failure> {
     let recording = Recording::read(&Input::of(&args.input), &columns.all(), &reading)?;
     let (points, units) = points(args, &columns, &recording)?;
     let result = identify(&points, args.degree, &units)?;
-    let entries = entries(args, &result);
+    let entries = entries(args, &result, &units);
     if entries.is_empty() && args.findings.result.output.is_some() {
         return Err(Failure::failed(
-            "a stand file has a place only for torque per volt; omit -o, or give the load as a torque and the reading \
-             in volts",
+            "a stand file takes a calibration of torque; give the load as a torque, or as a force or mass with --radius, and \
+             the reading in V, mV/V, mA, Hz or ustrain; or omit -o",
         ));
     }
     let mut recorded = Recorded::default();
@@ -92,17 +93,14 @@ fn points(
     let (loads, load_unit) = column(recording, &columns.load)?;
     let (readings, unit) = column(recording, &columns.reading)?;
     let is_effort = [TORQUE, FORCE].contains(&unit.unit.dimension());
-    if load_unit.unit.dimension() == VOLTAGE && is_effort {
+    if Signal::of(&load_unit.unit).is_some() && is_effort {
         return Err(Failure::usage(format_args!(
             "--load \"{}\" is in {} and --reading \"{}\" in {}; the columns are swapped",
             args.load, load_unit.text, args.reading, unit.text
         )));
     }
     let (load_factor, load) = load_of(args, &load_unit)?;
-    let (factor, reading) = match unit.unit.dimension() {
-        VOLTAGE => (unit.unit.factor(), "V".to_owned()),
-        _ => (1.0, unit.text.clone()),
-    };
+    let (factor, reading) = reading_of(args, &unit)?;
     let loads: Vec<f64> = loads.iter().map(|v| v * load_factor).collect();
     let series = numbers(recording, columns.series.as_ref())?.unwrap_or_else(|| series_of(&loads));
     let positions = numbers(recording, columns.position.as_ref())?;
@@ -177,21 +175,64 @@ fn column(recording: &Recording, choice: &ChannelChoice) -> Result<(Vec<f64>, Na
 /// SI units per unit of the load, and their name.
 fn load_of(args: &Static, unit: &NamedUnit) -> Result<(f64, String), Failure> {
     let factor = unit.unit.factor();
-    let radius = args
-        .radius
-        .as_deref()
-        .map(|text| quantity("--radius", text, Kind::Length))
-        .transpose()?;
+    let of = |flag: &str, text: &Option<String>, kind| -> Result<Option<f64>, Failure> {
+        let text = text.as_deref();
+        text.map(|text| quantity(flag, text, kind)).transpose()
+    };
+    let radius = of("--radius", &args.radius, Kind::Length)?;
+    let gravity = of("--gravity", &args.gravity, Kind::Acceleration)?;
+    let is_mass = unit.unit.dimension() == MASS;
+    if unit.unit.has_bare_weight()
+        && let Some([force, mass]) = Unit::readings_of_weight(&unit.text)
+    {
+        return Err(Failure::usage(format_args!(
+            "--load \"{}\" is in \"{}\", which can be read with a force or with a mass; give --load-unit \"{force}\" or \
+             --load-unit \"{mass}\"",
+            args.load, unit.text
+        )));
+    }
+    if gravity.is_some() && !is_mass {
+        return Err(Failure::usage(format_args!(
+            "--gravity goes with a load that is a mass; \"{}\" is in {}",
+            args.load, unit.text
+        )));
+    }
     match (unit.unit.dimension(), radius) {
         (TORQUE, None) => Ok((factor, "N m".to_owned())),
         (FORCE, Some(radius)) => Ok((factor * radius, "N m".to_owned())),
         (FORCE, None) => Ok((factor, "N".to_owned())),
+        (_, radius) if is_mass => match (gravity, radius) {
+            (None, _) => Err(Failure::usage(format_args!(
+                "--load \"{}\" is in {}, a mass; give the local gravity, as --gravity \"9.81 m/s^2\" (9.780 m/s^2 at the \
+                 equator, 9.832 at the poles)",
+                args.load, unit.text
+            ))),
+            (Some(gravity), Some(radius)) => Ok((factor * gravity * radius, "N m".to_owned())),
+            (Some(gravity), None) => Ok((factor * gravity, "N".to_owned())),
+        },
         (_, Some(_)) => Err(Failure::usage(format_args!(
-            "--radius goes with a load that is a force; \"{}\" is in {}",
+            "--radius goes with a load that is a force or a mass; \"{}\" is in {}",
             args.load, unit.text
         ))),
         (_, None) => Ok((1.0, unit.text.clone())),
     }
+}
+
+/// Units of the readings in which they are evaluated per unit of the file, and their name.
+fn reading_of(args: &Static, unit: &NamedUnit) -> Result<(f64, String), Failure> {
+    if let Some(signal) = Signal::of(&unit.unit) {
+        let (usual, factor) = signal.usual_unit();
+        return Ok((signal.factor(&unit.unit) / factor, usual.to_owned()));
+    }
+    if unit.unit.ratio_of() == Some(RatioOf::Anything) {
+        let text = &unit.text;
+        return Err(Failure::usage(format_args!(
+            "--reading \"{}\" is in \"{text}\", which could be a ratio of voltages or a strain; give --reading-unit \"{text} \
+             V/V\" or \"{text} strain\"",
+            args.reading
+        )));
+    }
+    Ok((1.0, unit.text.clone()))
 }
 
 /// Numbers the different values from 0, by first appearance.
@@ -208,14 +249,65 @@ fn ranks(values: &[f64]) -> Vec<usize> {
         .collect()
 }
 
-/// The entries of the stand file: torque per volt, and the zero.
-fn entries(args: &Static, result: &Identification) -> Vec<Entry> {
+/// The entries of the stand file: the calibration in the form of the readings' unit, and the zero.
+fn entries(args: &Static, result: &Identification, units: &LoadUnits) -> Vec<Entry> {
     let source = format!("identify static: {}", args.input);
-    let Some(constant) = result.get("torque_per_volt") else {
+    let is_signal = |signal: &Signal| signal.usual_unit().0 == units.reading;
+    let Some(signal) = Signal::ALL.into_iter().find(is_signal) else {
         return Vec::new();
     };
-    let constant = entry("calibration", "torque_per_volt", constant, &source);
+    if units.load != "N m" {
+        return Vec::new();
+    }
+    if args.degree > 1 {
+        let point = |step: &CalibrationStep| {
+            let reading = format!("{} {}", digits::text(step.reading, 9), units.reading);
+            let torque = |number: f64| format!("{} N m", digits::text(number, 9));
+            [reading, torque(step.load), torque(step.load_std)]
+        };
+        let points: Vec<_> = result.steps.iter().map(point).collect();
+        let degree = Entry::whole("calibration", "degree", args.degree as i64);
+        return vec![Entry::points(&points), degree];
+    }
+    let found = |name: &str, key| Some((key, result.get(name)?));
+    let mut entries = Vec::new();
+    match signal {
+        Signal::Voltage => entries.extend(found("torque_per_volt", "torque_per_volt")),
+        Signal::Ratio => entries.extend(found("torque_per_ratio", "torque_per_ratio")),
+        Signal::Current | Signal::Frequency | Signal::Strain => {}
+    }
+    let mut entries: Vec<Entry> = entries
+        .into_iter()
+        .map(|(key, constant)| entry("calibration", key, constant, &source))
+        .collect();
+    if entries.is_empty()
+        && let Some(slope) = result.get("sensitivity")
+    {
+        let largest = result
+            .steps
+            .iter()
+            .map(|s| s.load)
+            .fold(0.0, |m: f64, l| if l.abs() > m.abs() { l } else { m });
+        let change = Estimate::of(
+            units.reading.clone(),
+            slope.value() * largest,
+            slope.std().map(|std| std * largest.abs()),
+        );
+        entries.push(Entry::quantity(
+            "calibration",
+            "sensitivity",
+            &change,
+            &source,
+        ));
+        let rated = Estimate::of(Kind::Torque, largest, None);
+        entries.push(Entry::quantity(
+            "calibration",
+            "rated_torque",
+            &rated,
+            &source,
+        ));
+    }
     let zero = result.get("zero");
-    let zero = zero.map(|zero| entry("recorder", "zero", zero, &source));
-    [constant].into_iter().chain(zero).collect()
+    entries.extend(zero.map(|zero| entry("recorder", "zero", zero, &source)));
+    entries
 }

@@ -35,6 +35,17 @@ pub struct LoadUnits {
     pub reading: String,
 }
 
+/// The readings at one load.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CalibrationStep {
+    /// The load.
+    pub load: f64,
+    /// Mean reading.
+    pub reading: f64,
+    /// Standard uncertainty of the load by the scatter of the readings.
+    pub load_std: f64,
+}
+
 /// A term of a calibration standard; the formulas are those of `terms`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Term {
@@ -119,9 +130,40 @@ pub fn identify(
         points.len()
     ));
     result.terms = terms::terms(points, &steps, &curve, largest);
+    result.steps = calibration_points(points, &steps, &fit, largest);
     draw(&mut result, points, &curve, units);
     warnings(&mut result, points, degree);
     Ok(result)
+}
+
+/// Mean reading at each load, and the standard uncertainty of the load that the readings' scatter gives it.
+fn calibration_points(
+    points: &[Point],
+    steps: &[f64],
+    fit: &LinearFit,
+    largest: f64,
+) -> Vec<CalibrationStep> {
+    let count = fit.degrees_of_freedom.max(1) as f64;
+    let square = |p: &Point| {
+        let powers = (0i32..).zip(&fit.values);
+        let curve: f64 = powers.map(|(k, c)| c * (p.load / largest).powi(k)).sum();
+        (p.reading - curve) * (p.reading - curve)
+    };
+    let scatter = (points.iter().map(square).sum::<f64>() / count).sqrt();
+    let slope = (fit.values[1] / largest).abs();
+    let step = |load: &f64| {
+        let at = points
+            .iter()
+            .filter(|p| (p.load - load).abs() <= SAME * largest);
+        let readings: Vec<f64> = at.map(|p| p.reading).collect();
+        let number = readings.len() as f64;
+        CalibrationStep {
+            load: *load,
+            reading: readings.iter().sum::<f64>() / number,
+            load_std: scatter / (slope * number.sqrt()),
+        }
+    };
+    steps.iter().map(step).collect()
 }
 
 /// The unweighted residual, over the swing of the readings.
@@ -150,12 +192,13 @@ fn constants(fit: &LinearFit, largest: f64, units: &LoadUnits) -> Vec<NamedEstim
     let slope_std = fit.std[1].map(|s| s / largest);
     // K = 1/S: u(K)/K = u(S)/S.
     let constant_std = slope_std.map(|s| s / (slope * slope));
-    let per = |a: &str, b: &str| match b.contains(' ') {
+    let per = |a: &str, b: &str| match b.contains([' ', '/']) {
         true => format!("{a}/({b})"),
         false => format!("{a}/{b}"),
     };
     let inverse = match (load.as_str(), reading.as_str()) {
         ("N m", "V") => "torque_per_volt",
+        ("N m", "mV/V") => "torque_per_ratio",
         _ => "load_per_reading",
     };
     let mut found = vec![

@@ -1,6 +1,6 @@
 //! Units and headings as recorders write them, in English, German and some other languages.
 
-use torqcomp_model::{Dimension, Unit};
+use torqcomp_model::{Dimension, RatioOf, Unit};
 
 use crate::unit::NamedUnit;
 
@@ -126,6 +126,9 @@ pub fn heading(text: &str) -> Heading {
     {
         return Heading::new(name.trim().to_owned(), Some(unit), None);
     }
+    if let Some((name, unit)) = ratio(text) {
+        return Heading::new(name.to_owned(), Some(unit), None);
+    }
     for mark in [" in ", " en ", " em ", " / ", "/", ", ", ";"] {
         if let Some((name, unit)) = text.rsplit_once(mark)
             && read(text).is_none()
@@ -140,6 +143,24 @@ pub fn heading(text: &str) -> Heading {
         return Heading::new(name.to_owned(), Some(unit), None);
     }
     Heading::new(text.to_owned(), time_word(text), None)
+}
+
+/// Name and unit of a heading that ends in a ratio of voltages or lengths, whose bar parts no name from a unit:
+/// `bridge mV/V`, `eps_µm/m`.
+fn ratio(text: &str) -> Option<(&str, NamedUnit)> {
+    let above = text.rfind('/')?;
+    let start = text[..above].trim_end().rfind([' ', '_', ',', ';', ':'])?;
+    let unit = read(&text[start + 1..])?;
+    let is_ratio = matches!(
+        unit.unit.ratio_of(),
+        Some(RatioOf::Voltages | RatioOf::Lengths)
+    );
+    let name = text[..start].trim_end_matches([' ', '_', ',', ';', ':']);
+    let name = [" in", " en", " em"]
+        .iter()
+        .find_map(|word| name.strip_suffix(word))
+        .unwrap_or(name);
+    (is_ratio && !name.is_empty()).then(|| (name.trim(), unit))
 }
 
 /// Whether a unit can stand behind a text: not behind a number (`lowpass 100 Hz`) nor a word that asks for more
@@ -294,6 +315,15 @@ mod tests {
             ("Speed r/min", "Speed", Some("r/min"), true),
             ("n / r/min", "n", Some("r/min"), true),
             ("Weg s/mm", "Weg s", Some("mm"), true),
+            ("bridge mV/V", "bridge", Some("mV/V"), true),
+            ("bridge_mV/V", "bridge", Some("mV/V"), true),
+            ("bridge_mv_v", "bridge", Some("mV/V"), true),
+            ("Bridge output in mV/V", "Bridge output", Some("mV/V"), true),
+            ("S1, uV/V", "S1", Some("uV/V"), true),
+            ("bridge [mV/V]", "bridge", Some("mV/V"), true),
+            ("eps_µm/m", "eps", Some("µm/m"), true),
+            ("U / mV/V", "U", Some("mV/V"), true),
+            ("Torque [blorps]", "Torque", Some("blorps"), false),
         ] {
             let want = (name.to_owned(), unit.map(str::to_owned), known);
             assert_eq!(told(text), want, "{text}");

@@ -61,14 +61,38 @@ pub enum QuantityError {
         /// What is wrong with it and what to write.
         problem: &'static str,
     },
-    /// `lb` is used where it could be a mass or a force.
+    /// `lb` or `oz` is used where it could be a mass or a force.
     #[error(
-        "\"lb\" in \"{unit}\" is a mass; write \"lbf\" for pound-force, or \"lbm\" if the mass is \
-         meant"
+        "\"{unit}\" can be read with a force or with a mass; write \"{force}\" for the force, or \
+         \"{mass}\" if the mass is meant"
     )]
-    AmbiguousPound {
+    AmbiguousWeight {
         /// Unit text got.
         unit: String,
+        /// The same with a force.
+        force: String,
+        /// The same with a mass.
+        mass: String,
+    },
+    /// The unit is the inverse of one that fits.
+    #[error("\"{text}\" is the inverse of a {expected}; write \"{right}\"")]
+    Inverted {
+        /// Text got.
+        text: String,
+        /// Name of the kind expected.
+        expected: &'static str,
+        /// The text that is right.
+        right: String,
+    },
+    /// A ratio of another kind.
+    #[error("\"{unit}\" is not {expected}; write it as in \"{example}\"")]
+    WrongRatio {
+        /// Unit text got.
+        unit: String,
+        /// Name of the kind expected.
+        expected: &'static str,
+        /// A text that would do.
+        example: &'static str,
     },
     /// The unit does not fit the kind of quantity.
     #[error(

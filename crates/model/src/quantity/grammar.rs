@@ -11,6 +11,42 @@ const MAX_DEPTH: usize = 4;
 /// Greatest power read. The limits together keep the exponents far inside their range.
 const MAX_POWER: i32 = 9;
 
+/// Speeds in turns per minute, as recorders write them.
+const PER_MINUTE: [&str; 4] = ["1/min", "min^-1", "min-1", "/min"];
+/// Symbols of mass that are also used for force, with that force.
+const WEIGHTS: [(&[&str], &str); 4] = [
+    (&["lb", "lbs", "pound", "pounds"], "lbf"),
+    (&["oz", "ounce", "ounces"], "ozf"),
+    (&["kg"], "kgf"),
+    (&["g"], "gf"),
+];
+
+/// A unit text with its masses as forces, and as masses beyond doubt: `in-lb` becomes `in-lbf` and `in-lbm`; `None`
+/// without a mass.
+pub(super) fn readings_of_weight(text: &str) -> Option<[String; 2]> {
+    let plain = plain_signs(text.trim());
+    let mut readings = [String::new(), String::new()];
+    let mut found = false;
+    let mut rest = plain.as_str();
+    while let Some(sign) = rest.chars().next() {
+        let letters = rest.find(|c: char| !is_letter(c)).unwrap_or(rest.len());
+        let (word, after) = rest.split_at(letters.max(sign.len_utf8()));
+        let lower = word.to_lowercase();
+        let force = WEIGHTS
+            .iter()
+            .find(|(names, _)| names.contains(&lower.as_str()));
+        found |= force.is_some();
+        readings[0] += force.map_or(word, |(_, force)| force);
+        readings[1] += match force {
+            Some((_, "lbf")) => "lbm",
+            Some((_, "ozf")) => "ozm",
+            _ => word,
+        };
+        rest = after;
+    }
+    found.then_some(readings)
+}
+
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Token {
     Symbol(&'static Symbol),
@@ -27,7 +63,11 @@ pub(super) fn read(text: &str) -> Result<Unit, QuantityError> {
     if text.len() > MAX_LENGTH {
         return Err(syntax(text, "it is too long"));
     }
-    let plain = plain_signs(text.trim());
+    let mut plain = plain_signs(text.trim());
+    if PER_MINUTE.contains(&plain.as_str()) {
+        // Turns a minute: no angle is counted in rad per minute.
+        plain = "rpm".to_owned();
+    }
     let tokens = Lexer { text, rest: &plain }.tokens()?;
     if tokens.is_empty() {
         return Ok(Unit::ONE);
@@ -224,6 +264,12 @@ impl<'a> Lexer<'a> {
     }
 
     fn find(&self, symbol: &str) -> Result<&'static Symbol, QuantityError> {
+        if symbol.eq_ignore_ascii_case("grad") {
+            return Err(syntax(
+                self.text,
+                "\"grad\" is a degree to some and a gradian (0.9 degrees) to others; write deg or gon",
+            ));
+        }
         symbols::find(symbol).ok_or_else(|| QuantityError::UnknownUnit {
             symbol: symbol.to_owned(),
             unit: self.text.to_owned(),

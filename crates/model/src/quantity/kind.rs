@@ -1,8 +1,10 @@
 //! Kinds of quantity: which units fit, and which are printed.
 
+use super::dimension::Dimension;
 use super::error::QuantityError;
+use super::grammar;
 use super::kind_table::{KindRow, PrintUnit, ROWS};
-use super::unit::Unit;
+use super::unit::{RatioOf, Unit};
 
 /// Units that results are printed in. All computation is in SI.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -58,6 +60,8 @@ pub enum Kind {
     Resistance,
     /// Torque per output voltage, N m/V.
     TorquePerVolt,
+    /// Torque per bridge output over excitation, N m/(V/V).
+    TorquePerRatio,
     /// Friction force per angular speed, N s/rad (or N s).
     ForcePerAngularSpeed,
     /// Force per deflection, N/m.
@@ -66,6 +70,8 @@ pub enum Kind {
     Acceleration,
     /// Strain, m/m. A bare number is refused, as it could mean strain or microstrain.
     Strain,
+    /// Output of a bridge over its excitation, V/V.
+    VoltageRatio,
     /// Pure number, such as a damping ratio. May stand without a unit.
     Ratio,
     /// Output per input of the same kind, such as V/V. May stand without a unit.
@@ -169,7 +175,12 @@ impl Kind {
     /// ```
     pub fn parse(self, text: &str) -> Result<f64, QuantityError> {
         let (number, unit) = self.split(text)?;
-        let scale = self.scale(text, unit)?;
+        let scale = match self.scale(text, unit) {
+            Err(QuantityError::WrongDimension { .. }) if self.is_inverse(number, unit) => {
+                return Err(self.inverted(text, number, unit));
+            }
+            scale => scale?,
+        };
         let value = finite(text, number * scale.factor + scale.zero)?;
         if self == Self::TemperatureAbsolute && value < 0.0 {
             return Err(QuantityError::BelowAbsoluteZero {
@@ -257,13 +268,20 @@ impl Kind {
             });
         }
         let unit = Unit::parse(unit_text)?;
-        if unit.has_bare_pound() && self != Self::Mass {
-            return Err(QuantityError::AmbiguousPound {
+        let accepts = self.row().accepts;
+        let fits = |unit: &Unit| accepts.iter().find(|(d, _)| *d == unit.dimension());
+        if self != Self::Mass
+            && let Some([force, mass]) = grammar::readings_of_weight(unit_text)
+            && (unit.has_bare_weight() || Unit::parse(&force).is_ok_and(|u| fits(&u).is_some()))
+            && fits(&unit).is_none_or(|_| unit.has_bare_weight())
+        {
+            return Err(QuantityError::AmbiguousWeight {
                 unit: unit_text.to_owned(),
+                force,
+                mass,
             });
         }
-        let accepts = self.row().accepts;
-        let Some((_, factor)) = accepts.iter().find(|(d, _)| *d == unit.dimension()) else {
+        let Some((_, factor)) = fits(&unit) else {
             return Err(QuantityError::WrongDimension {
                 unit: unit_text.to_owned(),
                 got: unit.dimension(),
@@ -272,6 +290,20 @@ impl Kind {
                 example: self.example(),
             });
         };
+        let is_other_ratio = match self {
+            Self::Strain => unit.ratio_of() == Some(RatioOf::Voltages),
+            // A ratio of voltages cancels: only its symbols tell it from a torque.
+            Self::TorquePerRatio | Self::VoltageRatio => !unit.has_voltage(),
+            Self::Torque => unit.has_voltage(),
+            _ => false,
+        };
+        if is_other_ratio {
+            return Err(QuantityError::WrongRatio {
+                unit: unit_text.to_owned(),
+                expected: self.name(),
+                example: self.example(),
+            });
+        }
         let zero = if self == Self::TemperatureAbsolute {
             unit.zero()
         } else {
@@ -281,6 +313,28 @@ impl Kind {
             factor: unit.factor() * factor,
             zero,
         })
+    }
+}
+
+impl Kind {
+    /// Whether a number in that unit is one over a quantity of this kind.
+    fn is_inverse(self, number: f64, unit_text: &str) -> bool {
+        let wanted = self.row().accepts[0].0;
+        let is = |unit: Unit| unit.dimension() == wanted.power(-1);
+        number != 0.0 && wanted != Dimension::NONE && Unit::parse(unit_text).is_ok_and(is)
+    }
+
+    /// The error about a number in the inverse unit, with the number that is right.
+    fn inverted(self, text: &str, number: f64, unit_text: &str) -> QuantityError {
+        let factor = Unit::parse(unit_text).map_or(1.0, |unit| unit.factor());
+        let value = self.to(UnitSystem::Si, 1.0 / (number * factor));
+        // Six digits, without zeros at the end.
+        let short: f64 = format!("{value:.5e}").parse().unwrap_or(value);
+        QuantityError::Inverted {
+            text: text.trim().to_owned(),
+            expected: self.name(),
+            right: format!("{short} {}", self.unit(UnitSystem::Si)),
+        }
     }
 }
 
@@ -300,7 +354,7 @@ fn finite(text: &str, value: f64) -> Result<f64, QuantityError> {
 }
 
 /// Length of the decimal number at the front: `[+-] digits [. digits] [e [+-] digits]`.
-fn number_length(text: &str) -> usize {
+pub(super) fn number_length(text: &str) -> usize {
     let bytes = text.as_bytes();
     let digits_from = |start: usize| {
         start

@@ -106,7 +106,7 @@ const PER_KELVIN: &[(Dimension, f64)] = &[(dimension([0, 0, 0, 0, -1, 0]), 1.0)]
 
 /// One row per kind, in the order of [`Kind`].
 #[rustfmt::skip]
-pub(super) const ROWS: [KindRow; 30] = [
+pub(super) const ROWS: [KindRow; 32] = [
     row(Kind::Inertia, "mass moment of inertia", "5.85e-3 slug ft^2", INERTIA,
         "kg m^2", print("slug ft^2", SLUG * FOOT * FOOT)),
     row(Kind::AngularDamping, "angular damping", "3.07 ft lbf s/rad", DAMPING,
@@ -147,6 +147,8 @@ pub(super) const ROWS: [KindRow; 30] = [
         "ohm", print("ohm", 1.0)),
     row(Kind::TorquePerVolt, "torque per volt", "1.23e3 ft lbf/V", TORQUE_PER_VOLT,
         "N m/V", print("ft lbf/V", FOOT_POUND)),
+    row(Kind::TorquePerRatio, "torque per ratio of voltages", "25 N m/(mV/V)", TORQUE,
+        "N m/(V/V)", print("ft lbf/(V/V)", FOOT_POUND)),
     row(Kind::ForcePerAngularSpeed, "force per angular speed", "3.8e-4 lbf s/rad", FORCE_PER_SPEED,
         "N s/rad", print("lbf s/rad", POUND_FORCE)),
     row(Kind::LinearStiffness, "linear stiffness", "1.4e5 lbf/in", FORCE_PER_LENGTH,
@@ -155,6 +157,8 @@ pub(super) const ROWS: [KindRow; 30] = [
         "m/s^2", print("ft/s^2", FOOT)),
     row(Kind::Strain, "strain", "50 ustrain", NUMBER,
         "m/m", print("in/in", 1.0)),
+    row(Kind::VoltageRatio, "ratio of voltages", "2 mV/V", NUMBER,
+        "V/V", print("V/V", 1.0)),
     row(Kind::Ratio, "ratio", "0.07", NUMBER,
         "1", print("1", 1.0)),
     row(Kind::Gain, "gain", "1 V/V", NUMBER,

@@ -15,6 +15,11 @@
 //! A product after a division, as in `N m/rad s`, is refused: write `N m/(rad s)` or
 //! `N m s/rad`. Symbols are case-sensitive (`mN` is not `MN`), words (`volts`, `RPM`) are not.
 //!
+//! # Ratios
+//!
+//! `mV/V` and `ustrain` have no dimension, and a bridge makes them different things: [`Unit::ratio_of`] tells them apart.
+//! `%` and `ppm` alone say neither; `% V/V` and `% strain` do.
+//!
 //! # Angles and cycles
 //!
 //! The radian is kept as a dimension of its own, and a hertz is one cycle of 2π rad per second.
@@ -36,4 +41,4 @@ pub use error::QuantityError;
 pub use estimate::{Estimate, Measure};
 pub use estimates::{Covariance, Estimates};
 pub use kind::{Kind, UnitSystem};
-pub use unit::Unit;
+pub use unit::{RatioOf, Unit};

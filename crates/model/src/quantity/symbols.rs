@@ -43,9 +43,24 @@ pub(super) struct Symbol {
 }
 
 impl Symbol {
-    /// True for the pound that may be a mass or a force.
-    pub(super) fn is_bare_pound(&self) -> bool {
-        self.names.contains(&"lb")
+    /// True for a pound or an ounce that may be a mass or a force.
+    pub(super) fn is_bare_weight(&self) -> bool {
+        self.names.contains(&"lb") || self.names.contains(&"oz")
+    }
+
+    /// True for strain and what strain is a ratio of.
+    pub(super) fn is_of_strain(&self) -> bool {
+        self.dimension == LENGTH || self.words.iter().any(|word| word.ends_with("strain"))
+    }
+
+    /// True for volts.
+    pub(super) fn is_voltage(&self) -> bool {
+        self.dimension == VOLTAGE
+    }
+
+    /// True for hertz, which count cycles of a signal, unlike turns of a shaft.
+    pub(super) fn is_hertz(&self) -> bool {
+        self.words.iter().any(|word| word.ends_with("hertz"))
     }
 }
 
@@ -125,6 +140,13 @@ pub(super) const SYMBOLS: &[Symbol] = &[
     unit(&["mg"], &["milligram", "milligrams"], 1e-6, MASS),
     unit(&[], &["lbm", "pound-mass", "pounds-mass"], POUND, MASS),
     unit(&["lb", "lbs"], &["pound", "pounds"], POUND, MASS),
+    unit(&["oz"], &["ounce", "ounces"], POUND / 16.0, MASS),
+    unit(
+        &[],
+        &["ozm", "ounce-mass", "ounces-mass"],
+        POUND / 16.0,
+        MASS,
+    ),
     unit(&[], &["slug", "slugs"], SLUG, MASS),
     // Force.
     unit(&["N"], &["newton", "newtons"], 1.0, FORCE),
@@ -147,15 +169,31 @@ pub(super) const SYMBOLS: &[Symbol] = &[
     unit(&[], &["kip", "kips"], 1e3 * POUND_FORCE, FORCE),
     unit(
         &[],
-        &["kgf", "kilogram-force", "kilograms-force"],
+        &["kgf", "kilogram-force", "kilograms-force", "kilopond"],
         GRAVITY,
         FORCE,
     ),
+    unit(&["kp"], &[], GRAVITY, FORCE),
+    unit(
+        &["gf"],
+        &["gram-force", "grams-force", "pond"],
+        1e-3 * GRAVITY,
+        FORCE,
+    ),
+    unit(&["cN"], &["centinewton", "centinewtons"], 1e-2, FORCE),
+    unit(&["dyn"], &["dyne", "dynes"], 1e-5, FORCE),
     // Torque, written as one word.
     unit(&["Nm"], &[], 1.0, TORQUE),
     unit(&["uNm"], &[], 1e-6, TORQUE),
     unit(&["mNm", "Nmm"], &[], 1e-3, TORQUE),
-    unit(&["Ncm"], &[], 1e-2, TORQUE),
+    unit(&["Ncm", "cNm"], &[], 1e-2, TORQUE),
+    unit(&["kgfm", "kpm"], &[], GRAVITY, TORQUE),
+    unit(&["kgfcm", "kpcm"], &[], 1e-2 * GRAVITY, TORQUE),
+    unit(&["gfcm"], &[], 1e-5 * GRAVITY, TORQUE),
+    unit(&["dyncm"], &[], 1e-7, TORQUE),
+    unit(&[], &["ftlbf", "lbfft"], FOOT * POUND_FORCE, TORQUE),
+    unit(&[], &["inlbf", "lbfin"], INCH * POUND_FORCE, TORQUE),
+    unit(&[], &["inozf", "ozfin"], INCH * POUND_FORCE / 16.0, TORQUE),
     unit(&["kNm"], &[], 1e3, TORQUE),
     unit(&["MNm"], &[], 1e6, TORQUE),
     // Time.
@@ -181,21 +219,50 @@ pub(super) const SYMBOLS: &[Symbol] = &[
     unit(&["urad"], &["microradian", "microradians"], 1e-6, ANGLE),
     unit(&[], &["deg", "degree", "degrees"], PI / 180.0, ANGLE),
     unit(
+        &["mdeg"],
+        &["millidegree", "millidegrees"],
+        1e-3 * PI / 180.0,
+        ANGLE,
+    ),
+    unit(&[], &["gon", "gradian", "gradians"], PI / 200.0, ANGLE),
+    unit(
         &[],
         &["rev", "revolution", "revolutions", "cycle", "cycles"],
         TAU,
         ANGLE,
     ),
-    unit(&["Hz"], &["hertz"], TAU, SPEED),
+    unit(&["Hz", "hz", "HZ"], &["hertz"], TAU, SPEED),
     unit(&["mHz"], &["millihertz"], 1e-3 * TAU, SPEED),
-    unit(&["kHz"], &["kilohertz"], 1e3 * TAU, SPEED),
+    unit(
+        &["kHz", "khz", "KHz", "KHZ", "Khz"],
+        &["kilohertz"],
+        1e3 * TAU,
+        SPEED,
+    ),
     unit(&["MHz"], &["megahertz"], 1e6 * TAU, SPEED),
     unit(&[], &["rpm"], TAU / 60.0, SPEED),
+    unit(&[], &["krpm"], 1e3 * TAU / 60.0, SPEED),
     // Electricity.
     unit(&["V"], &["volt", "volts"], 1.0, VOLTAGE),
-    unit(&["uV"], &["microvolt", "microvolts"], 1e-6, VOLTAGE),
-    unit(&["mV"], &["millivolt", "millivolts"], 1e-3, VOLTAGE),
-    unit(&["kV"], &["kilovolt", "kilovolts"], 1e3, VOLTAGE),
+    unit(&["nV"], &["nanovolt", "nanovolts"], 1e-9, VOLTAGE),
+    unit(
+        &["uV", "uVolt", "uVolts", "uvolt", "uvolts"],
+        &["microvolt", "microvolts"],
+        1e-6,
+        VOLTAGE,
+    ),
+    unit(
+        &["mV", "mVolt", "mVolts", "mvolt", "mvolts"],
+        &["millivolt", "millivolts"],
+        1e-3,
+        VOLTAGE,
+    ),
+    unit(
+        &["kV", "kVolt", "kVolts"],
+        &["kilovolt", "kilovolts"],
+        1e3,
+        VOLTAGE,
+    ),
     unit(&["A"], &["amp", "amps", "ampere", "amperes"], 1.0, CURRENT),
     unit(
         &["uA"],
@@ -303,7 +370,7 @@ mod tests {
 
     #[test]
     fn a_wrong_case_or_letter_finds_the_unit_meant() {
-        assert_eq!(nearest("hz"), Some("Hz"));
+        assert_eq!(nearest("hZ"), Some("Hz"));
         assert_eq!(nearest("lbff"), Some("lbf"));
         assert_eq!(nearest("newtns"), Some("newtons"));
         assert_eq!(nearest("xyzzy"), None);

@@ -3,6 +3,7 @@
 use super::dimension::Dimension;
 use super::error::QuantityError;
 use super::grammar;
+use super::kind::number_length;
 use super::symbols::Symbol;
 
 /// A unit of measure, read from text.
@@ -16,7 +17,38 @@ pub struct Unit {
     dimension: Dimension,
     /// Kelvin at zero of the scale, not 0 only for a lone °C or °F.
     zero: f64,
-    has_bare_pound: bool,
+    parts: Parts,
+}
+
+/// What a unit is made of, as far as its dimension does not show it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Parts {
+    bare_weight: bool,
+    voltage: bool,
+    strain: bool,
+    hertz: bool,
+}
+
+impl Parts {
+    fn and(self, other: Self) -> Self {
+        Self {
+            bare_weight: self.bare_weight || other.bare_weight,
+            voltage: self.voltage || other.voltage,
+            strain: self.strain || other.strain,
+            hertz: self.hertz || other.hertz,
+        }
+    }
+}
+
+/// What a unit without a dimension is a ratio of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum RatioOf {
+    /// Output of a bridge over its excitation: `mV/V`, `uV/V`, `% V/V`.
+    Voltages,
+    /// Lengths: `ustrain`, `µm/m`, `in/in`, `% strain`.
+    Lengths,
+    /// Anything: `%`, `ppm`, counts, divisions.
+    Anything,
 }
 
 impl Unit {
@@ -25,7 +57,12 @@ impl Unit {
         factor: 1.0,
         dimension: Dimension::NONE,
         zero: 0.0,
-        has_bare_pound: false,
+        parts: Parts {
+            bare_weight: false,
+            voltage: false,
+            strain: false,
+            hertz: false,
+        },
     };
 
     /// Reads a unit. Empty text and `1` are the unit of pure numbers.
@@ -44,6 +81,34 @@ impl Unit {
         grammar::read(text)
     }
 
+    /// The unit behind the number of a quantity such as `2.0012 mV/V`.
+    ///
+    /// # Errors
+    /// As [`Unit::parse`].
+    ///
+    /// ```
+    /// use torqcomp_model::{RatioOf, Unit};
+    /// let unit = Unit::of_quantity("-2.0012 mV/V")?;
+    /// assert_eq!((unit.factor(), unit.ratio_of()), (1e-3, Some(RatioOf::Voltages)));
+    /// # Ok::<(), torqcomp_model::QuantityError>(())
+    /// ```
+    pub fn of_quantity(text: &str) -> Result<Self, QuantityError> {
+        let text = text.trim();
+        Self::parse(&text[number_length(text)..])
+    }
+
+    /// A unit text with its masses as forces, and as masses beyond doubt; `None` without a mass.
+    ///
+    /// ```
+    /// use torqcomp_model::Unit;
+    /// let [force, mass] = Unit::readings_of_weight("in-lb").unwrap();
+    /// assert_eq!((force.as_str(), mass.as_str()), ("in-lbf", "in-lbm"));
+    /// ```
+    #[must_use]
+    pub fn readings_of_weight(text: &str) -> Option<[String; 2]> {
+        grammar::readings_of_weight(text)
+    }
+
     /// SI units per unit. For °C and °F this is the size of the degree.
     pub fn factor(&self) -> f64 {
         self.factor
@@ -59,9 +124,41 @@ impl Unit {
         self.zero
     }
 
-    /// True if `lb` appears in the unit, which could be a mass or a force.
-    pub(super) fn has_bare_pound(&self) -> bool {
-        self.has_bare_pound
+    /// True if `lb` or `oz` appears in the unit, which could be a mass or a force.
+    pub fn has_bare_weight(&self) -> bool {
+        self.parts.bare_weight
+    }
+
+    /// True if volts are part of the unit, even where they cancel.
+    pub(super) fn has_voltage(&self) -> bool {
+        self.parts.voltage
+    }
+
+    /// True for a frequency in hertz, false for a speed in rpm or rad/s.
+    pub fn is_hertz(&self) -> bool {
+        self.parts.hertz && self.dimension == Dimension::new([0, 0, -1, 0, 0, 1])
+    }
+
+    /// What a unit without a dimension is a ratio of; `None` for a unit with a dimension.
+    ///
+    /// ```
+    /// use torqcomp_model::{RatioOf, Unit};
+    /// let of = |text| Unit::parse(text).unwrap().ratio_of();
+    /// assert_eq!(of("mV/V"), Some(RatioOf::Voltages));
+    /// assert_eq!(of("um/m"), Some(RatioOf::Lengths));
+    /// // Percent of what?
+    /// assert_eq!(of("%"), Some(RatioOf::Anything));
+    /// assert_eq!(of("V"), None);
+    /// ```
+    pub fn ratio_of(&self) -> Option<RatioOf> {
+        if self.dimension != Dimension::NONE {
+            return None;
+        }
+        Some(match self.parts {
+            Parts { voltage: true, .. } => RatioOf::Voltages,
+            Parts { strain: true, .. } => RatioOf::Lengths,
+            _ => RatioOf::Anything,
+        })
     }
 
     /// The unit of a symbol that stands alone, with the zero of its scale.
@@ -78,7 +175,12 @@ impl Unit {
             factor: symbol.factor,
             dimension: symbol.dimension,
             zero: 0.0,
-            has_bare_pound: symbol.is_bare_pound(),
+            parts: Parts {
+                bare_weight: symbol.is_bare_weight(),
+                voltage: symbol.is_voltage(),
+                strain: symbol.is_of_strain(),
+                hertz: symbol.is_hertz(),
+            },
         }
     }
 
@@ -87,7 +189,7 @@ impl Unit {
             factor: self.factor * other.factor,
             dimension: self.dimension.times(other.dimension),
             zero: 0.0,
-            has_bare_pound: self.has_bare_pound || other.has_bare_pound,
+            parts: self.parts.and(other.parts),
         }
     }
 
@@ -96,7 +198,7 @@ impl Unit {
             factor: self.factor.powi(exponent),
             dimension: self.dimension.power(exponent),
             zero: 0.0,
-            has_bare_pound: self.has_bare_pound,
+            parts: self.parts,
         }
     }
 }

@@ -1,0 +1,301 @@
+//! Reading `[calibration]`: what certificates and data sheets say.
+
+use nalgebra::DMatrix;
+use torqcomp_dsp::curve::Curve;
+use torqcomp_model::fit::linear;
+use torqcomp_model::{Estimate, Kind, UnitSystem};
+
+use super::section::Section;
+use super::signal::Signal;
+use crate::failure::Failure;
+
+/// A measured calibration: torque over a signal.
+#[derive(Debug, Clone)]
+pub struct MeasuredCalibration {
+    /// What becomes torque.
+    pub signal: Signal,
+    /// How.
+    pub law: CalibrationLaw,
+    /// Signal at no load, in SI units, where the calibration itself gives it.
+    pub zero: Option<f64>,
+    /// Relative standard uncertainty of the torque, if known; of a curve that at its largest torque.
+    pub relative_std: Option<f64>,
+}
+
+/// How a signal becomes torque.
+#[derive(Debug, Clone)]
+pub enum CalibrationLaw {
+    /// Torque per signal, in SI units.
+    Constant(Estimate),
+    /// Torque over signal, both in SI units.
+    Curve(Curve),
+}
+
+impl MeasuredCalibration {
+    /// The constant, if it is one of volts.
+    #[must_use]
+    pub fn torque_per_volt(&self) -> Option<&Estimate> {
+        match &self.law {
+            CalibrationLaw::Constant(constant) if self.signal == Signal::Voltage => Some(constant),
+            _ => None,
+        }
+    }
+
+    /// The calibration in words.
+    #[must_use]
+    pub fn described(&self, units: UnitSystem) -> String {
+        match &self.law {
+            CalibrationLaw::Constant(constant) => match self.signal {
+                Signal::Voltage => format!("measured constant of {}", constant.text(units)),
+                signal => {
+                    let (unit, factor) = signal.usual_unit();
+                    let per = if unit.contains('/') {
+                        format!("({unit})")
+                    } else {
+                        unit.to_owned()
+                    };
+                    let scaled = |v: f64| Kind::Torque.to(units, v) * factor;
+                    let unit = format!("{}/{per}", Kind::Torque.unit(units));
+                    let std = constant.std_uncertainty().map(scaled);
+                    let printed = Estimate::of(unit, scaled(constant.value()), std);
+                    format!("measured constant of {}", printed.text(units))
+                }
+            },
+            CalibrationLaw::Curve(curve) => {
+                let (low, high) = curve.range();
+                let [low, high] = [low, high].map(|end| self.signal.text(end));
+                format!("measured curve from {low} to {high}")
+            }
+        }
+    }
+}
+
+/// Keys that each begin another form.
+const FORMS: [&str; 5] = [
+    "torque_per_volt",
+    "torque_per_ratio",
+    "sensitivity",
+    "frequency_at_rated",
+    "points",
+];
+
+/// Reads the section.
+pub(super) fn calibration(section: &Section) -> Result<MeasuredCalibration, Failure> {
+    let given: Vec<&str> = FORMS.into_iter().filter(|key| section.has(key)).collect();
+    if let [first, second, ..] = given[..] {
+        return Err(section.fail(
+            second,
+            format_args!(
+                "{first} and {second} both convert the record to torque; keep one of them"
+            ),
+        ));
+    }
+    let read = match given.first() {
+        Some(&"torque_per_ratio") => constant(section, "torque_per_ratio", Signal::Ratio)?,
+        Some(&"sensitivity") => sensitivity(section)?,
+        Some(&"frequency_at_rated") => frequency(section)?,
+        Some(&"points") => points(section)?,
+        Some(_) => constant(section, "torque_per_volt", Signal::Voltage)?,
+        None => {
+            finish(section)?;
+            return Err(section.fail("", HOW));
+        }
+    };
+    finish(section)?;
+    Ok(read)
+}
+
+/// What to write where the section holds none of the forms.
+const HOW: &str = "write one of torque_per_volt = \"12.5 N m/V\"; torque_per_ratio = \"25 N m/(mV/V)\"; sensitivity = \
+    \"2.0012 mV/V\" with rated_torque = \"50 N m\"; zero_frequency = \"60 kHz\", frequency_at_rated = \"90 kHz\" and \
+    rated_torque = \"50 N m\"; points = [{ reading = \"1 mV/V\", torque = \"25 N m\" }, …]";
+
+/// Refuses the keys that the form does not take; the message lists those of all forms.
+fn finish(section: &Section) -> Result<(), Failure> {
+    let Err(of_another_form) = section.finish() else {
+        return Ok(());
+    };
+    for key in ["rated_torque", "zero_frequency", "degree"]
+        .into_iter()
+        .chain(FORMS)
+    {
+        let _ = section.raw(key);
+    }
+    section.finish()?;
+    Err(of_another_form)
+}
+
+fn constant(
+    section: &Section,
+    key: &'static str,
+    signal: Signal,
+) -> Result<MeasuredCalibration, Failure> {
+    let kind = match signal {
+        Signal::Ratio => Kind::TorquePerRatio,
+        _ => Kind::TorquePerVolt,
+    };
+    let constant = section.required(key, kind)?;
+    if constant.value() == 0.0 {
+        return Err(section.fail(key, "the constant must not be zero"));
+    }
+    Ok(MeasuredCalibration {
+        signal,
+        relative_std: constant.relative_std(),
+        law: CalibrationLaw::Constant(constant),
+        zero: None,
+    })
+}
+
+/// `sensitivity` at `rated_torque`, as data sheets say: the change of the output from no load to the rated torque.
+fn sensitivity(section: &Section) -> Result<MeasuredCalibration, Failure> {
+    let read = Signal::read(section, "sensitivity")?;
+    let (signal, change) =
+        read.ok_or_else(|| section.fail("sensitivity", "expected a quantity"))?;
+    per_change(section, signal, &change, "sensitivity", None)
+}
+
+/// `zero_frequency` and `frequency_at_rated`.
+fn frequency(section: &Section) -> Result<MeasuredCalibration, Failure> {
+    let zero = section.required("zero_frequency", Kind::Frequency)?;
+    let rated = section.required("frequency_at_rated", Kind::Frequency)?;
+    let change = Estimate::derive(Kind::Frequency, "stand file", &[&rated, &zero], |x| {
+        x[0] - x[1]
+    })
+    .map_err(|error| section.fail("frequency_at_rated", error))?;
+    let key = "frequency_at_rated";
+    per_change(section, Signal::Frequency, &change, key, Some(zero.value()))
+}
+
+/// The constant that follows from the change of the signal at the rated torque.
+fn per_change(
+    section: &Section,
+    signal: Signal,
+    change: &Estimate,
+    key: &'static str,
+    zero: Option<f64>,
+) -> Result<MeasuredCalibration, Failure> {
+    let rated = section.required("rated_torque", Kind::Torque)?;
+    for (key, value) in [(key, change.value()), ("rated_torque", rated.value())] {
+        if value == 0.0 {
+            return Err(section.fail(
+                key,
+                "the output must change with torque, and the torque must not be zero",
+            ));
+        }
+    }
+    let relative = [rated.relative_std(), change.relative_std()];
+    let known = relative.into_iter().flatten();
+    let relative_std = known.fold(None, |sum: Option<f64>, std| {
+        Some(std.hypot(sum.unwrap_or(0.0)))
+    });
+    let value = rated.value() / change.value();
+    let unit = Kind::TorquePerVolt;
+    let law = match signal {
+        Signal::Voltage => Estimate::of(unit, value, relative_std.map(|r| r * value.abs())),
+        _ => Estimate::of("", value, relative_std.map(|r| r * value.abs())),
+    };
+    Ok(MeasuredCalibration {
+        signal,
+        law: CalibrationLaw::Constant(law.with_source("stand file")),
+        zero,
+        relative_std,
+    })
+}
+
+/// One point of a table.
+struct CalibrationPoint {
+    reading: f64,
+    torque: Estimate,
+}
+
+/// `points`, joined by straight lines or by a polynomial of `degree`.
+fn points(section: &Section) -> Result<MeasuredCalibration, Failure> {
+    let mut signal = None;
+    let mut points = Vec::new();
+    for point in section.sections("points")? {
+        let missing = || {
+            point.fail(
+                "",
+                "expected reading = \"1.0003 mV/V\", torque = \"25 N m\"",
+            )
+        };
+        let (of, reading) = Signal::read(&point, "reading")?.ok_or_else(missing)?;
+        let torque = point.required("torque", Kind::Torque)?;
+        let std = point.quantity("std", Kind::Torque)?.map(|std| std.value());
+        point.finish()?;
+        if signal.is_some_and(|signal| signal != of) {
+            return Err(point.fail(
+                "reading",
+                "the readings are in different kinds of units; use one",
+            ));
+        }
+        signal = Some(of);
+        let std = std.or(torque.std_uncertainty());
+        let torque = Estimate::new(Kind::Torque, torque.value(), std, "stand file")
+            .map_err(|error| point.fail("std", error))?;
+        let reading = reading.value();
+        points.push(CalibrationPoint { reading, torque });
+    }
+    let Some(signal) = signal else {
+        return Err(section.fail("points", "the table has no points"));
+    };
+    let wrong = |error: &dyn std::fmt::Display| section.fail("points", error);
+    let (curve, relative_std) = match section.whole("degree")? {
+        None => {
+            let pairs: Vec<_> = points
+                .iter()
+                .map(|p| (p.reading, p.torque.value()))
+                .collect();
+            let largest = points
+                .iter()
+                .max_by(|a, b| a.torque.value().abs().total_cmp(&b.torque.value().abs()));
+            let std = largest.and_then(|point| point.torque.relative_std());
+            (Curve::through(&pairs).map_err(|error| wrong(&error))?, std)
+        }
+        Some(degree @ 1..=3) => {
+            polynomial(&points, degree as usize).map_err(|error| wrong(&error))?
+        }
+        Some(_) => return Err(section.fail("degree", "expected 1, 2 or 3")),
+    };
+    Ok(MeasuredCalibration {
+        signal,
+        law: CalibrationLaw::Curve(curve),
+        zero: None,
+        relative_std,
+    })
+}
+
+/// The polynomial through points by least squares, weighted where every point has a `std`, and the relative standard
+/// uncertainty of the torque that it gives at the largest reading.
+fn polynomial(
+    points: &[CalibrationPoint],
+    degree: usize,
+) -> Result<(Curve, Option<f64>), Box<dyn std::error::Error>> {
+    let largest = points.iter().fold(0.0_f64, |m, p| m.max(p.reading.abs()));
+    let design = DMatrix::from_fn(points.len(), degree + 1, |row, power| {
+        (points[row].reading / largest).powi(power as i32)
+    });
+    let torques: Vec<f64> = points.iter().map(|p| p.torque.value()).collect();
+    let weights: Option<Vec<f64>> = points
+        .iter()
+        .map(|p| {
+            p.torque
+                .std_uncertainty()
+                .filter(|std| *std > 0.0)
+                .map(f64::recip)
+        })
+        .collect();
+    let fit = linear::solve(&design, &torques, weights.as_deref(), weights.is_some())?;
+    let scaled = (0i32..).zip(&fit.values).map(|(k, c)| c / largest.powi(k));
+    let readings = points.iter().map(|p| p.reading);
+    let low = readings.clone().fold(f64::INFINITY, f64::min);
+    let high = readings.fold(f64::NEG_INFINITY, f64::max);
+    let curve = Curve::polynomial(scaled.collect(), low, high)?;
+    let end = if high >= -low { high } else { low };
+    let gradient: Vec<f64> = (0..=degree as i32)
+        .map(|k| (end / largest).powi(k))
+        .collect();
+    let relative = |std: f64| Some(std / curve.applied(end).ok()?.abs());
+    let relative_std = fit.covariance.std_of(&gradient).and_then(relative);
+    Ok((curve, relative_std.filter(|std| std.is_finite())))
+}

@@ -1,0 +1,122 @@
+//! What a recorder stores before anything is calibrated: volts, a ratio of voltages, a current, a frequency, a strain.
+
+use std::f64::consts::TAU;
+
+use torqcomp_model::{Dimension, Estimate, Kind, RatioOf, Unit};
+
+use super::section::Section;
+use crate::failure::Failure;
+
+/// The quantity that a transducer or its amplifier gives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Signal {
+    /// V.
+    Voltage,
+    /// Output of a bridge over its excitation, V/V.
+    Ratio,
+    /// A.
+    Current,
+    /// Hz.
+    Frequency,
+    /// Strain, m/m.
+    Strain,
+}
+
+impl Signal {
+    /// All of them.
+    pub const ALL: [Self; 5] = [
+        Self::Voltage,
+        Self::Ratio,
+        Self::Current,
+        Self::Frequency,
+        Self::Strain,
+    ];
+
+    /// What a record in that unit is; `None` for torque, force, plain ratios and all else.
+    #[must_use]
+    pub fn of(unit: &Unit) -> Option<Self> {
+        const VOLTAGE: Dimension = Dimension::new([1, 2, -3, -1, 0, 0]);
+        const CURRENT: Dimension = Dimension::new([0, 0, 0, 1, 0, 0]);
+        match (unit.dimension(), unit.ratio_of()) {
+            (VOLTAGE, _) => Some(Self::Voltage),
+            (CURRENT, _) => Some(Self::Current),
+            (_, Some(RatioOf::Voltages)) => Some(Self::Ratio),
+            (_, Some(RatioOf::Lengths)) => Some(Self::Strain),
+            _ if unit.is_hertz() => Some(Self::Frequency),
+            _ => None,
+        }
+    }
+
+    /// The kind of its quantities.
+    #[must_use]
+    pub fn kind(self) -> Kind {
+        match self {
+            Self::Voltage => Kind::Voltage,
+            Self::Ratio => Kind::VoltageRatio,
+            Self::Current => Kind::Current,
+            Self::Frequency => Kind::Frequency,
+            Self::Strain => Kind::Strain,
+        }
+    }
+
+    /// SI units of its kind per unit of a record.
+    #[must_use]
+    pub fn factor(self, unit: &Unit) -> f64 {
+        match self {
+            // One hertz is a cycle of 2π rad.
+            Self::Frequency => unit.factor() / TAU,
+            _ => unit.factor(),
+        }
+    }
+
+    /// The unit that people give it in, and SI units per that unit.
+    #[must_use]
+    pub fn usual_unit(self) -> (&'static str, f64) {
+        match self {
+            Self::Voltage => ("V", 1.0),
+            Self::Ratio => ("mV/V", 1e-3),
+            Self::Current => ("mA", 1e-3),
+            Self::Frequency => ("Hz", 1.0),
+            Self::Strain => ("ustrain", 1e-6),
+        }
+    }
+
+    /// A value in SI units with its usual unit, for people and stand files.
+    #[must_use]
+    pub fn text(self, value: f64) -> String {
+        let (unit, factor) = self.usual_unit();
+        format!("{} {unit}", crate::io::digits::text(value / factor, 9))
+    }
+
+    /// A quantity of a stand file whose unit says which signal it is of.
+    ///
+    /// # Errors
+    /// If it cannot be read, or its unit is that of none.
+    pub(super) fn read(
+        section: &Section,
+        key: &'static str,
+    ) -> Result<Option<(Self, Estimate)>, Failure> {
+        let Some(text) = section.raw(key)? else {
+            return Ok(None);
+        };
+        let unit = Unit::of_quantity(&text).map_err(|error| section.fail(key, error))?;
+        let Some(signal) = Self::of(&unit) else {
+            return Err(section.fail(key, unknown(&text, &unit)));
+        };
+        let estimate = section.quantity_of(key, signal.kind())?;
+        Ok(estimate.map(|estimate| (signal, estimate)))
+    }
+}
+
+/// Why a text is no signal.
+fn unknown(text: &str, unit: &Unit) -> String {
+    match unit.ratio_of() {
+        Some(_) => format!(
+            "\"{text}\" could be a ratio of voltages or a strain; write it in mV/V (or \"% V/V\"), or in ustrain (or \
+             \"% strain\")"
+        ),
+        None => format!(
+            "\"{text}\" is no output of a transducer; expected V, mV/V, mA, Hz or ustrain, as in \"2.0012 mV/V\""
+        ),
+    }
+}

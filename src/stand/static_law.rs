@@ -1,0 +1,324 @@
+//! From a transducer's or a bridge's signal to torque: by the measured calibration, or by beam, gage and bridge.
+
+use torqcomp_dsp::bridge::{ArmLaw, Bridge, Supply};
+use torqcomp_dsp::conversion::{Conversion, ConversionError};
+use torqcomp_model::{Kind, UnitSystem};
+
+use super::{CalibrationLaw, MeasuredCalibration, Signal, Stand};
+use crate::failure::Failure;
+use crate::unit::NamedUnit;
+use crate::warning::Warning;
+
+/// From a record in SI units to torque in N m, at rest.
+pub(super) struct StaticLaw {
+    pub(super) conversion: Conversion,
+    /// How it came about, for people.
+    pub(super) described: String,
+    /// Of the static constant, if known.
+    pub(super) relative_std: Option<f64>,
+    /// What was assumed on the way.
+    pub(super) warnings: Vec<Warning>,
+}
+
+impl StaticLaw {
+    pub(super) fn of(conversion: Result<Conversion, ConversionError>) -> Result<Self, Failure> {
+        Ok(Self {
+            conversion: conversion.map_err(Failure::failed)?,
+            described: String::new(),
+            relative_std: None,
+            warnings: Vec::new(),
+        })
+    }
+}
+
+impl Stand {
+    /// From the signal of a transducer or bridge to torque: by the measured calibration, or else by the drawing.
+    pub(super) fn by_signal(
+        &self,
+        signal: Signal,
+        channel: &str,
+        named: &NamedUnit,
+        units: UnitSystem,
+    ) -> Result<StaticLaw, Failure> {
+        let zero = self.zero_of(signal)?;
+        let Some(measured) = &self.calibration else {
+            return self.by_drawing(signal, zero.unwrap_or(0.0), units);
+        };
+        if let Some(scale) = self.per_signal(signal, measured.signal)? {
+            return self.by_measured(measured, signal, scale, zero, units);
+        }
+        if signal == Signal::Strain && self.beam.is_some() {
+            let mut law = self.by_drawing(signal, zero.unwrap_or(0.0), units)?;
+            law.warnings.push(Warning::new(
+                "calibration-not-used",
+                format!(
+                    "the channel \"{channel}\" is strain, and [calibration] of {} is in {}: strain was taken through \
+                     the beam's drawing; record in {} to use the calibration",
+                    self.file,
+                    measured.signal.usual_unit().0,
+                    measured.signal.usual_unit().0
+                ),
+            ));
+            return Ok(law);
+        }
+        Err(Failure::failed(format_args!(
+            "the channel \"{channel}\" is in \"{}\", and [calibration] of {} is in {}; choose another channel, say \
+             the unit with --unit, or give the calibration in {}",
+            named.text,
+            self.file,
+            measured.signal.usual_unit().0,
+            signal.usual_unit().0
+        )))
+    }
+
+    /// The record at no load, if it is given for such a signal.
+    fn zero_of(&self, signal: Signal) -> Result<Option<f64>, Failure> {
+        use Signal::{Ratio, Voltage};
+        match self.recorder.zero {
+            Some((of, zero)) if of == signal => Ok(Some(zero)),
+            // The same signal in two forms.
+            Some((of @ (Voltage | Ratio), zero))
+                if matches!(signal, Voltage | Ratio) && zero != 0.0 =>
+            {
+                Err(Failure::failed(format_args!(
+                    "{}: [recorder] zero is in {} and the record in {}; give the zero as the record has it, as in zero = \
+                     \"0.01 {}\"",
+                    self.file,
+                    of.usual_unit().0,
+                    signal.usual_unit().0,
+                    signal.usual_unit().0
+                )))
+            }
+            _ => Ok(None),
+        }
+    }
+
+    /// SI units of a signal per SI unit of another one; `None` where none is the other one in another form.
+    fn per_signal(&self, recorded: Signal, wanted: Signal) -> Result<Option<f64>, Failure> {
+        let volts_per_ratio =
+            || -> Result<f64, Failure> { Ok(self.recorder.recorder.gain() * self.excitation_v()?) };
+        Ok(match (recorded, wanted) {
+            (a, b) if a == b => Some(1.0),
+            (Signal::Voltage, Signal::Ratio) => Some(1.0 / volts_per_ratio()?),
+            (Signal::Ratio, Signal::Voltage) => Some(volts_per_ratio()?),
+            _ => None,
+        })
+    }
+
+    /// The bridge's supply in V.
+    fn excitation_v(&self) -> Result<f64, Failure> {
+        match self.bridge.as_ref().and_then(|bridge| bridge.supply) {
+            Some(Supply::ConstantVoltage { volts }) => Ok(volts),
+            _ => Err(Failure::failed(format_args!(
+                "{}: between volts and a ratio such as mV/V stands the voltage of the bridge's supply, which is not \
+                 given; add [bridge] excitation = \"5 V\"",
+                self.file
+            ))),
+        }
+    }
+
+    /// By a measured constant or curve; `scale` is of its signal per recorded one.
+    fn by_measured(
+        &self,
+        measured: &MeasuredCalibration,
+        signal: Signal,
+        scale: f64,
+        zero: Option<f64>,
+        units: UnitSystem,
+    ) -> Result<StaticLaw, Failure> {
+        let conversion = match &measured.law {
+            CalibrationLaw::Constant(constant) => {
+                let zero = match zero.or(measured.zero) {
+                    Some(zero) => zero,
+                    None if matches!(signal, Signal::Current | Signal::Frequency) => {
+                        return Err(self.without_live_zero(signal));
+                    }
+                    None => 0.0,
+                };
+                let slope = constant.value() * scale;
+                Conversion::linear(slope, -slope * zero)
+            }
+            CalibrationLaw::Curve(curve) => {
+                // A zero of today moves the curve.
+                let shift = match zero {
+                    Some(zero) => curve.recorded(0.0).map_err(Failure::failed)? - scale * zero,
+                    None => 0.0,
+                };
+                Conversion::curve(curve.clone(), scale, shift)
+            }
+        };
+        let is_other = signal != measured.signal;
+        Ok(StaticLaw {
+            described: measured.described(units),
+            relative_std: measured.relative_std,
+            warnings: is_other
+                .then(|| self.assumed_gain())
+                .flatten()
+                .into_iter()
+                .collect(),
+            ..StaticLaw::of(conversion)?
+        })
+    }
+
+    fn without_live_zero(&self, signal: Signal) -> Failure {
+        let example = match signal {
+            Signal::Current => {
+                "[recorder] zero = \"4 mA\" (or \"12 mA\" for 4 to 20 mA in both directions)"
+            }
+            _ => {
+                "[recorder] zero = \"60 kHz\", or [calibration] with zero_frequency and frequency_at_rated"
+            }
+        };
+        Failure::failed(format_args!(
+            "{}: a current or a frequency is seldom zero at no load, and the output there is not given; add {example}",
+            self.file
+        ))
+    }
+
+    /// A warning if the gain between bridge and record is not given.
+    fn assumed_gain(&self) -> Option<Warning> {
+        (!self.recorder.has_gain).then(|| {
+            Warning::new(
+                "gain-assumed",
+                format!(
+                    "{} does not give the gain between bridge and record: 1 was assumed; add [recorder] gain",
+                    self.file
+                ),
+            )
+        })
+    }
+
+    /// By beam, gage and bridge.
+    fn by_drawing(
+        &self,
+        signal: Signal,
+        zero: f64,
+        units: UnitSystem,
+    ) -> Result<StaticLaw, Failure> {
+        let per_bridge_volt = match signal {
+            Signal::Strain => {
+                let torque_per_strain = self.torque_per_strain()?;
+                let offset = -torque_per_strain * zero;
+                return Ok(StaticLaw {
+                    described: "strain through the beam's drawing".to_owned(),
+                    ..StaticLaw::of(Conversion::linear(torque_per_strain, offset))?
+                });
+            }
+            Signal::Voltage => self.recorder.recorder.gain(),
+            Signal::Ratio => 1.0 / self.ratio_excitation_v()?,
+            Signal::Current | Signal::Frequency => {
+                let unit = signal.usual_unit().0;
+                return Err(Failure::failed(format_args!(
+                    "{}: a record in {unit} cannot be converted to torque; add [calibration] with sensitivity = \
+                     \"8 {unit}\" and rated_torque = \"50 N m\"",
+                    self.file
+                )));
+            }
+        };
+        let bridge = self.bridge_fed_by(match signal {
+            Signal::Ratio => Some(Supply::ConstantVoltage {
+                volts: self.ratio_excitation_v()?,
+            }),
+            _ => None,
+        })?;
+        let torque_per_strain = self.torque_per_strain()?;
+        let law = Conversion::bridge(bridge, per_bridge_volt, zero, torque_per_strain);
+        let law = StaticLaw::of(law)?;
+        let gain = law.conversion.small_signal_gain();
+        let (of_signal, factor) = match signal {
+            Signal::Ratio => ("/(mV/V)", 1e-3),
+            _ => ("/V", 1.0),
+        };
+        let small = Kind::Torque.to(units, gain) * factor;
+        Ok(StaticLaw {
+            described: format!(
+                "from drawing, gage and bridge: {} {}{of_signal} for small signals",
+                crate::io::digits::text(small, 5),
+                Kind::Torque.unit(units)
+            ),
+            warnings: match signal {
+                Signal::Voltage => self.assumed_gain().into_iter().collect(),
+                _ => Vec::new(),
+            },
+            ..law
+        })
+    }
+
+    /// The voltage that a recorded ratio refers to: any, if the supply is one of voltage.
+    fn ratio_excitation_v(&self) -> Result<f64, Failure> {
+        match self.bridge.as_ref().and_then(|bridge| bridge.supply) {
+            None => Ok(1.0),
+            Some(Supply::ConstantVoltage { volts }) => Ok(volts),
+            Some(_) => Err(Failure::failed(format_args!(
+                "{}: a ratio of voltages refers to a supply of constant voltage, and [bridge] has excitation_current; \
+                 give excitation = \"5 V\", or record in volts",
+                self.file
+            ))),
+        }
+    }
+
+    /// The bridge with its gage, leads and load.
+    ///
+    /// # Errors
+    /// If the stand file does not give the gage and the bridge, or they do not fit.
+    pub fn bridge(&self) -> Result<Bridge, Failure> {
+        self.bridge_fed_by(None)
+    }
+
+    /// The same with another supply than that of the file.
+    fn bridge_fed_by(&self, supply: Option<Supply>) -> Result<Bridge, Failure> {
+        let (Some(gage), Some(bridge)) = (&self.gage, &self.bridge) else {
+            return Err(Failure::failed(format_args!(
+                "{}: the record cannot be converted to torque; add [calibration], as torque_per_volt = \"12.5 N m/V\" \
+                 or torque_per_ratio = \"25 N m/(mV/V)\", or the sections [beam], [gage] and [bridge]",
+                self.file
+            )));
+        };
+        let lacks =
+            |what: &str| Failure::failed(format_args!("{}: [bridge] lacks {what}", self.file));
+        let layout = bridge.layout.ok_or_else(|| {
+            lacks("its layout; write layout = \"quarter\", \"half\", \"half-opposite\", \"half-poisson\", \"full\" or \"full-poisson\"")
+        })?;
+        let supply = supply.or(bridge.supply).ok_or_else(|| {
+            lacks("its supply; write excitation = \"5 V\" or excitation_current = \"2 mA\"")
+        })?;
+        let wrong =
+            |error: &dyn std::fmt::Display| Failure::failed(format_args!("{}: {error}", self.file));
+        let unbonded = gage.gage.unbonded_resistance_ohm();
+        let bonded = gage
+            .gage
+            .bond(
+                gage.bonded_resistance_ohm.unwrap_or(unbonded),
+                gage.bonding_temperature_k,
+            )
+            .map_err(|e| wrong(&e))?;
+        let law = ArmLaw::from_gage(&bonded, gage.temperature_k, gage.resistance_drift)
+            .map_err(|e| wrong(&e))?;
+        let resistance = bonded.bonded_resistance_ohm();
+        let made = Bridge::new(layout, law, resistance, supply)
+            .and_then(|b| b.with_leads(bridge.leads))
+            .and_then(|b| match self.recorder.input_resistance_ohm {
+                Some(ohm) => b.with_input_resistance_ohm(ohm),
+                None => Ok(b),
+            });
+        made.map_err(|e| wrong(&e))
+    }
+    /// Torque per strain at the gage, in N m.
+    ///
+    /// # Errors
+    /// If the stand file does not say where the gage sits on the beam.
+    pub fn torque_per_strain(&self) -> Result<f64, Failure> {
+        let beam = self.beam.as_ref();
+        let placed = beam.and_then(|b| b.gage_position.as_ref().map(|p| (b, p)));
+        let Some((beam, position)) = placed else {
+            return Err(Failure::failed(format_args!(
+                "{}: strain cannot be converted to torque; add [beam] with gage_position, or \
+                 [calibration] with torque_per_volt or torque_per_ratio",
+                self.file
+            )));
+        };
+        beam.full
+            .torque_per_strain_n_m(beam.radius.value(), position.value())
+            .map_err(|error| Failure::failed(format_args!("{}: {error}", self.file)))
+    }
+}
