@@ -2,6 +2,7 @@
 
 pub mod diagnose;
 pub mod identify;
+pub mod init;
 pub mod simulate;
 mod values;
 
@@ -38,6 +39,8 @@ pub struct Cli {
 /// The verbs.
 #[derive(Debug, Subcommand)]
 pub enum Verb {
+    /// Write a commented stand file for what you have
+    Init(Box<init::Init>),
     /// Convert a recorded signal to the applied torque
     Compensate(Compensate),
     /// Fit magnitude and phase of component torques at a fundamental and its orders

@@ -204,6 +204,9 @@ fn what_could_be_strain_or_ratio_is_asked() {
     assert!(said.contains("in-lbm"), "{said}");
 }
 
+/// Name, lines of `[calibration]`, heading, swing and middle of the record, relative standard uncertainty.
+type Form<'a> = (&'a str, String, &'a str, f64, f64, Option<f64>);
+
 /// One transducer of 25 N m per mV/V in every form that its papers give, recorded in every way.
 #[test]
 fn every_form_of_a_calibration_gives_one_torque_and_its_uncertainty() {
@@ -212,7 +215,7 @@ fn every_form_of_a_calibration_gives_one_torque_and_its_uncertainty() {
         { reading = \"1 mV/V\", torque = \"25 N m\" },\n\
         { reading = \"2 mV/V\", torque = { value = \"50 N m\", std = \"0.1 N m\" } },\n]\n";
     let fifth = |line: &str| format!("{line}\n[recorder]\nzero = \"2.5 V\"\n");
-    let cases: Vec<(&str, String, &str, f64, f64, Option<f64>)> = vec![
+    let cases: Vec<Form> = vec![
         ("per volt", "torque_per_volt = { value = \"12.5 N m/V\", std = \"0.025 N m/V\" }".into(), "U [V]", 2.0, 0.0, Some(0.002)),
         ("per ratio", "torque_per_ratio = { value = \"25 N m/(mV/V)\", std = \"0.05 N m/(mV/V)\" }".into(), "U [mV/V]", 1.0, 0.0, Some(0.002)),
         ("sensitivity", "sensitivity = { value = \"2 mV/V\", std = \"0.004 mV/V\" }\nrated_torque = \"50 N m\"".into(), "U [mV/V]", 1.0, 0.0, Some(0.002)),
@@ -525,4 +528,118 @@ fn every_std_of_the_stand_file_is_stated() {
     let part = amplitude(&folder, &[]).1["components"][0].clone();
     let stated = part["std_stand"].as_f64().unwrap() / part["torque"].as_f64().unwrap();
     assert!((stated - 0.01).abs() < 1e-9, "{stated}");
+}
+
+/// Every example of `docs/stand-file.md`, on a recording in its unit: "Each `1 mV/V` reads 25 N m".
+#[test]
+fn the_examples_of_the_stand_file_read_what_they_say() {
+    let page = include_str!("../docs/stand-file.md");
+    let mut examples = 0;
+    for part in page.split("\n### ").skip(1) {
+        let Some((_, toml)) = part.split_once("```toml\n") else {
+            continue;
+        };
+        let (toml, _) = toml.split_once("```").unwrap();
+        let (_, said) = part.split_once("Each `1 ").expect(part);
+        let (unit, said) = said.split_once("` reads ").unwrap();
+        let want: f64 = said.split_once(' ').unwrap().0.parse().unwrap();
+        let folder = Folder::new();
+        folder.write("stand.toml", toml);
+        folder.write(
+            "in.csv",
+            record(
+                "signal",
+                None,
+                |c| if unit == "V" { 0.013 } else { 0.0 } + 0.5 * c,
+            ),
+        );
+        let (got, report) = amplitude(&folder, &["--unit", unit]);
+        close(got, 0.5 * want, &format!("{toml}{report}"));
+        let warnings = report["warnings"].as_array().unwrap();
+        let of_stand = ["gain-assumed", "calibration-not-used"];
+        assert!(
+            !warnings
+                .iter()
+                .any(|w| of_stand.contains(&w["code"].as_str().unwrap())),
+            "{report}"
+        );
+        examples += 1;
+    }
+    assert_eq!(examples, 11);
+}
+
+/// What `init` writes is a stand file that converts a record: 25 N m at 1 mV/V from papers and weights, 22.2 N m from the
+/// drawing.
+#[test]
+fn init_writes_a_stand_file_that_converts() {
+    let mechanics = [
+        "--natural-frequency",
+        "590 Hz",
+        "--damping-ratio",
+        "0.02",
+        "-o",
+        "stand.toml",
+        "--force",
+    ];
+    let transducer = ["--sensitivity", "2 mV/V", "--rated-torque", "50 N m"];
+    let bridge = ["--torque-per-ratio", "25 N m/(mV/V)"];
+    let drawing = [
+        "--width",
+        "20 mm",
+        "--depth",
+        "10 mm",
+        "--length",
+        "200 mm",
+        "--elastic-modulus",
+        "200 GPa",
+        "--radius",
+        "100 mm",
+        "--gage-position",
+        "50 mm",
+        "--gage-factor",
+        "2",
+        "--gage-resistance",
+        "350 ohm",
+        "--layout",
+        "full",
+    ];
+    let ways: [(&str, &[&str], &str, f64); 4] = [
+        ("transducer", &transducer, "U [mV/V]", 25.0),
+        ("bridge", &bridge, "U [mV/V]", 25.0),
+        ("drawing", &drawing, "U [mV/V]", N_M_PER_STRAIN * 500e-6),
+        ("unknown", &[], "T [N m]", 1.0),
+    ];
+    for (from, flags, heading, want) in ways {
+        let folder = Folder::new();
+        let ran = folder.run(&[&["init", "--from", from], flags, &mechanics].concat());
+        assert_eq!(ran.code, 0, "{from}: {}", ran.stderr);
+        folder.write("in.csv", record(heading, None, |c| c));
+        close(amplitude(&folder, &[]).0, want, from);
+    }
+    let folder = Folder::new();
+    let ran = folder.run(&["init", "--from", "transducer", "--sensitivity", "2 mV/V"]);
+    assert!(
+        ran.code == 2 && ran.stderr.contains("--rated-torque \"50 N m\""),
+        "{}",
+        ran.stderr
+    );
+    let ran = folder.run(&["init", "--from", "bridge", "--layout", "full"]);
+    assert!(
+        ran.code == 2 && ran.stderr.contains("--layout does not belong"),
+        "{}",
+        ran.stderr
+    );
+    let ran = folder.run(&["init"]);
+    assert!(
+        ran.code == 2 && ran.stderr.contains("--from"),
+        "{}",
+        ran.stderr
+    );
+    // Without mechanics it says how to get them.
+    let ran = folder.run(&["init", "--from", "unknown"]);
+    assert!(
+        ran.code == 0 && ran.stdout.contains("identify decay"),
+        "{}",
+        ran.stdout
+    );
 }

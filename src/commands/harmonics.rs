@@ -113,8 +113,8 @@ fn fit(
     let samples = &record.samples;
     let duration_s = samples.len() as f64 / record.rate_hz;
     let mut warnings: Vec<Warning> = record.summary.lost.iter().cloned().collect();
-    warnings.extend(record.summary.warnings.clone());
-    warnings.extend(stand.warnings.iter().chain(&chain.warnings).cloned());
+    let said = [&record.summary.warnings, &stand.warnings, &chain.warnings];
+    warnings.extend(said.into_iter().flatten().cloned());
     let orders = visible_orders(args, record.rate_hz, &mut warnings)?;
     let fundamental = if args.refine {
         let span = 0.01 * args.refine_span;

@@ -5,6 +5,7 @@ mod diagnose;
 mod extract;
 mod harmonics;
 mod identify;
+mod init;
 mod inspect;
 mod predict;
 mod rows;
@@ -39,6 +40,7 @@ pub enum Outcome {
 /// Whatever kept it from being done.
 pub fn run(cli: Cli) -> Result<Outcome, Failure> {
     match cli.verb {
+        Verb::Init(args) => init::run(&args),
         Verb::Compensate(args) => compensate::run(&args),
         Verb::Extract(args) => extract::run(&args),
         Verb::Harmonics(args) => harmonics::run(&args),

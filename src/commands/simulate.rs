@@ -10,7 +10,7 @@ use crate::failure::Failure;
 use crate::io::{ChannelChoice, Flags, Input};
 use crate::print::{Report, short};
 use crate::recording::{AlignedChannel, AlignedChannels};
-use crate::stand::{self, Calibration, Signal, Stand};
+use crate::stand::{self, Calibration, Stand, TransducerSignal};
 use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
 
@@ -151,7 +151,7 @@ impl ChannelUnits {
         };
         let unit = Unit::parse(&text).map_err(Failure::failed)?;
         // A record of another unit than torque is what the calibration makes torque of.
-        let is_signal = gain.is_none() && Signal::of(&unit).is_some();
+        let is_signal = gain.is_none() && TransducerSignal::of(&unit).is_some();
         let named = NamedUnit {
             text: text.clone(),
             unit,

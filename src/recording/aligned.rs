@@ -10,7 +10,7 @@ use super::{Recording, Selection, typical_step};
 use crate::failure::Failure;
 use crate::io::{ChannelChoice, Input, Reading};
 use crate::print;
-use crate::unit::NamedUnit;
+use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
 
 /// Largest distance of the stamps of two channels that count as the same, in steps.
@@ -30,6 +30,17 @@ pub(crate) struct AlignedChannel {
     pub(crate) unit: Option<NamedUnit>,
     /// That unit as the file writes it, known or not.
     pub(crate) unit_text: Option<String>,
+}
+
+impl AlignedChannel {
+    /// The channel as a stand takes it.
+    pub(crate) fn channel(&self) -> RecordedChannel<'_> {
+        RecordedChannel {
+            name: &self.name,
+            unit: self.unit.as_ref(),
+            unit_text: self.unit_text.as_deref(),
+        }
+    }
 }
 
 /// Channels with a sample each at every moment.

@@ -4,7 +4,7 @@ use torqcomp_dsp::conversion::Conversion;
 use torqcomp_model::{Dimension, Kind, RatioOf, Unit, UnitSystem};
 
 use super::static_law::StaticLaw;
-use super::{Given, Signal, Stand};
+use super::{Given, Stand, TransducerSignal};
 use crate::failure::Failure;
 use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
@@ -103,7 +103,7 @@ impl Stand {
         if let Some(gain) = self.static_gain() {
             return self.by_static_gain(channel.name, named, gain, units);
         }
-        let signal = Signal::of(&named.unit);
+        let signal = TransducerSignal::of(&named.unit);
         let law = match (named.unit.dimension(), signal) {
             (_, Some(signal)) => self.by_signal(signal, channel.name, named, units)?,
             (TORQUE, _) => StaticLaw {
@@ -155,7 +155,7 @@ impl Stand {
             )));
         }
         // A zero in volts belongs to a record in volts.
-        let zero = match (self.recorder.zero, Signal::of(&named.unit)) {
+        let zero = match (self.recorder.zero, TransducerSignal::of(&named.unit)) {
             (Some((of, zero)), Some(signal)) if of == signal => zero,
             _ => 0.0,
         };

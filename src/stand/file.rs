@@ -11,7 +11,7 @@ use super::measured::calibration;
 use super::measuring::{bridge, gage, recorder};
 use super::section::{Section, SourceText};
 use super::update::CORRELATIONS;
-use super::{Diagnosed, Given, Mechanics, Signal, Stand, StaticGain};
+use super::{Diagnosed, Given, Mechanics, Stand, StaticGain, TransducerSignal};
 use crate::failure::Failure;
 use crate::print::short;
 use crate::warning::Warning;
@@ -144,7 +144,7 @@ fn one_calibration(top: &Section, stand: &Stand) -> Result<(), Failure> {
         && stand
             .recorder
             .zero
-            .is_some_and(|(of, _)| of == Signal::Frequency)
+            .is_some_and(|(of, _)| of == TransducerSignal::Frequency)
     {
         return Err(top.fail(
             "recorder",

@@ -1,22 +1,22 @@
 //! Reading `[calibration]`: what certificates and data sheets say.
 
 use nalgebra::DMatrix;
-use torqcomp_dsp::curve::Curve;
+use torqcomp_dsp::curve::CalibrationCurve;
 use torqcomp_model::fit::linear;
 use torqcomp_model::{Estimate, Kind, UnitSystem};
 
 use super::section::Section;
-use super::signal::Signal;
+use super::signal::TransducerSignal;
 use crate::failure::Failure;
 
 /// A measured calibration: torque over a signal.
 #[derive(Debug, Clone)]
 pub struct MeasuredCalibration {
     /// What becomes torque.
-    pub signal: Signal,
+    pub signal: TransducerSignal,
     /// How.
     pub law: CalibrationLaw,
-    /// Signal at no load, in SI units, where the calibration itself gives it.
+    /// TransducerSignal at no load, in SI units, where the calibration itself gives it.
     pub zero: Option<f64>,
     /// Relative standard uncertainty of the torque, if known; of a curve that at its largest torque.
     pub relative_std: Option<f64>,
@@ -28,7 +28,7 @@ pub enum CalibrationLaw {
     /// Torque per signal, in SI units.
     Constant(Estimate),
     /// Torque over signal, both in SI units.
-    Curve(Curve),
+    Curve(CalibrationCurve),
 }
 
 impl MeasuredCalibration {
@@ -36,7 +36,9 @@ impl MeasuredCalibration {
     #[must_use]
     pub fn torque_per_volt(&self) -> Option<&Estimate> {
         match &self.law {
-            CalibrationLaw::Constant(constant) if self.signal == Signal::Voltage => Some(constant),
+            CalibrationLaw::Constant(constant) if self.signal == TransducerSignal::Voltage => {
+                Some(constant)
+            }
             _ => None,
         }
     }
@@ -46,7 +48,9 @@ impl MeasuredCalibration {
     pub fn described(&self, units: UnitSystem) -> String {
         match &self.law {
             CalibrationLaw::Constant(constant) => match self.signal {
-                Signal::Voltage => format!("measured constant of {}", constant.text(units)),
+                TransducerSignal::Voltage => {
+                    format!("measured constant of {}", constant.text(units))
+                }
                 signal => {
                     let (unit, factor) = signal.usual_unit();
                     let per = if unit.contains('/') {
@@ -91,11 +95,13 @@ pub(super) fn calibration(section: &Section) -> Result<MeasuredCalibration, Fail
         ));
     }
     let read = match given.first() {
-        Some(&"torque_per_ratio") => constant(section, "torque_per_ratio", Signal::Ratio)?,
+        Some(&"torque_per_ratio") => {
+            constant(section, "torque_per_ratio", TransducerSignal::Ratio)?
+        }
         Some(&"sensitivity") => sensitivity(section)?,
         Some(&"frequency_at_rated") => frequency(section)?,
         Some(&"points") => points(section)?,
-        Some(_) => constant(section, "torque_per_volt", Signal::Voltage)?,
+        Some(_) => constant(section, "torque_per_volt", TransducerSignal::Voltage)?,
         None => {
             finish(section)?;
             return Err(section.fail("", HOW));
@@ -128,10 +134,10 @@ fn finish(section: &Section) -> Result<(), Failure> {
 fn constant(
     section: &Section,
     key: &'static str,
-    signal: Signal,
+    signal: TransducerSignal,
 ) -> Result<MeasuredCalibration, Failure> {
     let kind = match signal {
-        Signal::Ratio => Kind::TorquePerRatio,
+        TransducerSignal::Ratio => Kind::TorquePerRatio,
         _ => Kind::TorquePerVolt,
     };
     let constant = section.required(key, kind)?;
@@ -148,7 +154,7 @@ fn constant(
 
 /// `sensitivity` at `rated_torque`, as data sheets say: the change of the output from no load to the rated torque.
 fn sensitivity(section: &Section) -> Result<MeasuredCalibration, Failure> {
-    let read = Signal::read(section, "sensitivity")?;
+    let read = TransducerSignal::read(section, "sensitivity")?;
     let (signal, change) =
         read.ok_or_else(|| section.fail("sensitivity", "expected a quantity"))?;
     per_change(section, signal, &change, "sensitivity", None)
@@ -163,13 +169,19 @@ fn frequency(section: &Section) -> Result<MeasuredCalibration, Failure> {
     })
     .map_err(|error| section.fail("frequency_at_rated", error))?;
     let key = "frequency_at_rated";
-    per_change(section, Signal::Frequency, &change, key, Some(zero.value()))
+    per_change(
+        section,
+        TransducerSignal::Frequency,
+        &change,
+        key,
+        Some(zero.value()),
+    )
 }
 
 /// The constant that follows from the change of the signal at the rated torque.
 fn per_change(
     section: &Section,
-    signal: Signal,
+    signal: TransducerSignal,
     change: &Estimate,
     key: &'static str,
     zero: Option<f64>,
@@ -191,7 +203,9 @@ fn per_change(
     let value = rated.value() / change.value();
     let unit = Kind::TorquePerVolt;
     let law = match signal {
-        Signal::Voltage => Estimate::of(unit, value, relative_std.map(|r| r * value.abs())),
+        TransducerSignal::Voltage => {
+            Estimate::of(unit, value, relative_std.map(|r| r * value.abs()))
+        }
         _ => Estimate::of("", value, relative_std.map(|r| r * value.abs())),
     };
     Ok(MeasuredCalibration {
@@ -219,7 +233,7 @@ fn points(section: &Section) -> Result<MeasuredCalibration, Failure> {
                 "expected reading = \"1.0003 mV/V\", torque = \"25 N m\"",
             )
         };
-        let (of, reading) = Signal::read(&point, "reading")?.ok_or_else(missing)?;
+        let (of, reading) = TransducerSignal::read(&point, "reading")?.ok_or_else(missing)?;
         let torque = point.required("torque", Kind::Torque)?;
         let std = point.quantity("std", Kind::Torque)?.map(|std| std.value());
         point.finish()?;
@@ -250,7 +264,10 @@ fn points(section: &Section) -> Result<MeasuredCalibration, Failure> {
                 .iter()
                 .max_by(|a, b| a.torque.value().abs().total_cmp(&b.torque.value().abs()));
             let std = largest.and_then(|point| point.torque.relative_std());
-            (Curve::through(&pairs).map_err(|error| wrong(&error))?, std)
+            (
+                CalibrationCurve::through(&pairs).map_err(|error| wrong(&error))?,
+                std,
+            )
         }
         Some(degree @ 1..=3) => {
             polynomial(&points, degree as usize).map_err(|error| wrong(&error))?
@@ -270,7 +287,7 @@ fn points(section: &Section) -> Result<MeasuredCalibration, Failure> {
 fn polynomial(
     points: &[CalibrationPoint],
     degree: usize,
-) -> Result<(Curve, Option<f64>), Box<dyn std::error::Error>> {
+) -> Result<(CalibrationCurve, Option<f64>), Box<dyn std::error::Error>> {
     let largest = points.iter().fold(0.0_f64, |m, p| m.max(p.reading.abs()));
     let design = DMatrix::from_fn(points.len(), degree + 1, |row, power| {
         (points[row].reading / largest).powi(power as i32)
@@ -290,7 +307,7 @@ fn polynomial(
     let readings = points.iter().map(|p| p.reading);
     let low = readings.clone().fold(f64::INFINITY, f64::min);
     let high = readings.fold(f64::NEG_INFINITY, f64::max);
-    let curve = Curve::polynomial(scaled.collect(), low, high)?;
+    let curve = CalibrationCurve::polynomial(scaled.collect(), low, high)?;
     let end = if high >= -low { high } else { low };
     let gradient: Vec<f64> = (0..=degree as i32)
         .map(|k| (end / largest).powi(k))

@@ -6,7 +6,7 @@ use torqcomp_dsp::recorder::{LowPass, Recorder};
 use torqcomp_model::{Estimate, Kind};
 
 use super::section::Section;
-use super::signal::Signal;
+use super::signal::TransducerSignal;
 use super::{BridgeData, GageData, RecorderData};
 use crate::failure::Failure;
 
@@ -154,7 +154,7 @@ pub(super) fn recorder(section: Option<&Section>) -> Result<RecorderData, Failur
     let recorder =
         Recorder::new(gain, low_pass, delay_s).map_err(|error| section.fail("", error))?;
     let input_resistance_ohm = optional("input_resistance", Kind::Resistance)?;
-    let zero = Signal::read(section, "zero")?;
+    let zero = TransducerSignal::read(section, "zero")?;
     section.finish()?;
     Ok(RecorderData {
         recorder,

@@ -25,7 +25,7 @@ pub use effects::DeclaredEffect;
 pub use file::{parse, read, text};
 pub use measured::{CalibrationLaw, MeasuredCalibration};
 pub use refine::{Refined, refine, si_unit};
-pub use signal::Signal;
+pub use signal::TransducerSignal;
 
 /// A stand: its mechanics, and how its record becomes torque.
 #[derive(Debug, Clone)]
@@ -193,7 +193,7 @@ pub struct RecorderData {
     /// Input resistance in Ω that loads the bridge.
     pub input_resistance_ohm: Option<f64>,
     /// Record at no load in SI units, if it is given.
-    pub zero: Option<(Signal, f64)>,
+    pub zero: Option<(TransducerSignal, f64)>,
 }
 
 impl Stand {

@@ -9,7 +9,7 @@ use crate::failure::Failure;
 
 /// The quantity that a transducer or its amplifier gives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Signal {
+pub enum TransducerSignal {
     /// V.
     Voltage,
     /// Output of a bridge over its excitation, V/V.
@@ -22,7 +22,7 @@ pub enum Signal {
     Strain,
 }
 
-impl Signal {
+impl TransducerSignal {
     /// All of them.
     pub const ALL: [Self; 5] = [
         Self::Voltage,

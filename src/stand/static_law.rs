@@ -4,7 +4,7 @@ use torqcomp_dsp::bridge::{ArmLaw, Bridge, Supply};
 use torqcomp_dsp::conversion::{Conversion, ConversionError};
 use torqcomp_model::{Kind, UnitSystem};
 
-use super::{CalibrationLaw, MeasuredCalibration, Signal, Stand};
+use super::{CalibrationLaw, MeasuredCalibration, Stand, TransducerSignal};
 use crate::failure::Failure;
 use crate::unit::NamedUnit;
 use crate::warning::Warning;
@@ -35,7 +35,7 @@ impl Stand {
     /// From the signal of a transducer or bridge to torque: by the measured calibration, or else by the drawing.
     pub(super) fn by_signal(
         &self,
-        signal: Signal,
+        signal: TransducerSignal,
         channel: &str,
         named: &NamedUnit,
         units: UnitSystem,
@@ -47,7 +47,7 @@ impl Stand {
         if let Some(scale) = self.per_signal(signal, measured.signal)? {
             return self.by_measured(measured, signal, scale, zero, units);
         }
-        if signal == Signal::Strain && self.beam.is_some() {
+        if signal == TransducerSignal::Strain && self.beam.is_some() {
             let mut law = self.by_drawing(signal, zero.unwrap_or(0.0), units)?;
             law.warnings.push(Warning::new(
                 "calibration-not-used",
@@ -72,8 +72,8 @@ impl Stand {
     }
 
     /// The record at no load, if it is given for such a signal.
-    fn zero_of(&self, signal: Signal) -> Result<Option<f64>, Failure> {
-        use Signal::{Ratio, Voltage};
+    fn zero_of(&self, signal: TransducerSignal) -> Result<Option<f64>, Failure> {
+        use TransducerSignal::{Ratio, Voltage};
         match self.recorder.zero {
             Some((of, zero)) if of == signal => Ok(Some(zero)),
             // The same signal in two forms.
@@ -94,13 +94,17 @@ impl Stand {
     }
 
     /// SI units of a signal per SI unit of another one; `None` where none is the other one in another form.
-    fn per_signal(&self, recorded: Signal, wanted: Signal) -> Result<Option<f64>, Failure> {
+    fn per_signal(
+        &self,
+        recorded: TransducerSignal,
+        wanted: TransducerSignal,
+    ) -> Result<Option<f64>, Failure> {
         let volts_per_ratio =
             || -> Result<f64, Failure> { Ok(self.recorder.recorder.gain() * self.excitation_v()?) };
         Ok(match (recorded, wanted) {
             (a, b) if a == b => Some(1.0),
-            (Signal::Voltage, Signal::Ratio) => Some(1.0 / volts_per_ratio()?),
-            (Signal::Ratio, Signal::Voltage) => Some(volts_per_ratio()?),
+            (TransducerSignal::Voltage, TransducerSignal::Ratio) => Some(1.0 / volts_per_ratio()?),
+            (TransducerSignal::Ratio, TransducerSignal::Voltage) => Some(volts_per_ratio()?),
             _ => None,
         })
     }
@@ -121,7 +125,7 @@ impl Stand {
     fn by_measured(
         &self,
         measured: &MeasuredCalibration,
-        signal: Signal,
+        signal: TransducerSignal,
         scale: f64,
         zero: Option<f64>,
         units: UnitSystem,
@@ -130,7 +134,11 @@ impl Stand {
             CalibrationLaw::Constant(constant) => {
                 let zero = match zero.or(measured.zero) {
                     Some(zero) => zero,
-                    None if matches!(signal, Signal::Current | Signal::Frequency) => {
+                    None if matches!(
+                        signal,
+                        TransducerSignal::Current | TransducerSignal::Frequency
+                    ) =>
+                    {
                         return Err(self.without_live_zero(signal));
                     }
                     None => 0.0,
@@ -160,9 +168,9 @@ impl Stand {
         })
     }
 
-    fn without_live_zero(&self, signal: Signal) -> Failure {
+    fn without_live_zero(&self, signal: TransducerSignal) -> Failure {
         let example = match signal {
-            Signal::Current => {
+            TransducerSignal::Current => {
                 "[recorder] zero = \"4 mA\" (or \"12 mA\" for 4 to 20 mA in both directions)"
             }
             _ => {
@@ -191,12 +199,12 @@ impl Stand {
     /// By beam, gage and bridge.
     fn by_drawing(
         &self,
-        signal: Signal,
+        signal: TransducerSignal,
         zero: f64,
         units: UnitSystem,
     ) -> Result<StaticLaw, Failure> {
         let per_bridge_volt = match signal {
-            Signal::Strain => {
+            TransducerSignal::Strain => {
                 let torque_per_strain = self.torque_per_strain()?;
                 let offset = -torque_per_strain * zero;
                 return Ok(StaticLaw {
@@ -204,9 +212,9 @@ impl Stand {
                     ..StaticLaw::of(Conversion::linear(torque_per_strain, offset))?
                 });
             }
-            Signal::Voltage => self.recorder.recorder.gain(),
-            Signal::Ratio => 1.0 / self.ratio_excitation_v()?,
-            Signal::Current | Signal::Frequency => {
+            TransducerSignal::Voltage => self.recorder.recorder.gain(),
+            TransducerSignal::Ratio => 1.0 / self.ratio_excitation_v()?,
+            TransducerSignal::Current | TransducerSignal::Frequency => {
                 let unit = signal.usual_unit().0;
                 return Err(Failure::failed(format_args!(
                     "{}: a record in {unit} cannot be converted to torque; add [calibration] with sensitivity = \
@@ -216,7 +224,7 @@ impl Stand {
             }
         };
         let bridge = self.bridge_fed_by(match signal {
-            Signal::Ratio => Some(Supply::ConstantVoltage {
+            TransducerSignal::Ratio => Some(Supply::ConstantVoltage {
                 volts: self.ratio_excitation_v()?,
             }),
             _ => None,
@@ -226,7 +234,7 @@ impl Stand {
         let law = StaticLaw::of(law)?;
         let gain = law.conversion.small_signal_gain();
         let (of_signal, factor) = match signal {
-            Signal::Ratio => ("/(mV/V)", 1e-3),
+            TransducerSignal::Ratio => ("/(mV/V)", 1e-3),
             _ => ("/V", 1.0),
         };
         let small = Kind::Torque.to(units, gain) * factor;
@@ -237,7 +245,7 @@ impl Stand {
                 Kind::Torque.unit(units)
             ),
             warnings: match signal {
-                Signal::Voltage => self.assumed_gain().into_iter().collect(),
+                TransducerSignal::Voltage => self.assumed_gain().into_iter().collect(),
                 _ => Vec::new(),
             },
             ..law

@@ -4,7 +4,7 @@
 //! unit the applied quantity has, sample by sample, and back.
 
 use crate::bridge::{Bridge, BridgeError};
-use crate::curve::Curve;
+use crate::curve::CalibrationCurve;
 
 /// What can be wrong with a conversion or a sample.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -110,7 +110,7 @@ pub enum Conversion {
     #[non_exhaustive]
     Curve {
         /// Applied over calibrated quantity.
-        curve: Box<Curve>,
+        curve: Box<CalibrationCurve>,
         /// Calibrated quantity per recorded unit.
         scale: f64,
         /// Calibrated quantity at a record of zero.
@@ -209,14 +209,14 @@ impl Conversion {
     /// coefficient is not finite.
     ///
     /// ```
-    /// use torqcomp_dsp::{conversion::Conversion, curve::Curve};
+    /// use torqcomp_dsp::{conversion::Conversion, curve::CalibrationCurve};
     /// // 10 V are 2 mV/V of a bridge at 5 V behind a gain of 1000: 50 N m.
-    /// let curve = Curve::through(&[(0.0, 0.0), (2e-3, 50.0)])?;
+    /// let curve = CalibrationCurve::through(&[(0.0, 0.0), (2e-3, 50.0)])?;
     /// let conversion = Conversion::curve(curve, 1.0 / (1000.0 * 5.0), 0.0)?;
     /// assert!((conversion.convert(10.0)? - 50.0).abs() < 1e-12);
     /// # Ok::<(), torqcomp_dsp::conversion::ConversionError>(())
     /// ```
-    pub fn curve(curve: Curve, scale: f64, shift: f64) -> Result<Self, ConversionError> {
+    pub fn curve(curve: CalibrationCurve, scale: f64, shift: f64) -> Result<Self, ConversionError> {
         Ok(Self::Curve {
             curve: Box::new(curve),
             scale: factor("scale", scale)?,
@@ -417,7 +417,7 @@ mod tests {
 
     fn all() -> [Conversion; 4] {
         let linear = Conversion::linear(-1230.0, 0.5).unwrap();
-        let cubic = Curve::polynomial(vec![1.0, 2500.0, 0.3, 40.0], -1.0, 1.0).unwrap();
+        let cubic = CalibrationCurve::polynomial(vec![1.0, 2500.0, 0.3, 40.0], -1.0, 1.0).unwrap();
         let cubic = Conversion::curve(cubic, 1.0, 0.0).unwrap();
         [
             linear,

@@ -12,21 +12,21 @@ const HALVINGS: u32 = 200;
 
 /// A curve that rises or falls throughout.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Curve {
-    shape: Shape,
+pub struct CalibrationCurve {
+    shape: CurveShape,
     low: f64,
     high: f64,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-enum Shape {
+enum CurveShape {
     /// Recorded and applied value, rising in the recorded one.
     Points(Vec<(f64, f64)>),
     /// Coefficients over rising powers of the recorded value.
     Polynomial(Vec<f64>),
 }
 
-impl Curve {
+impl CalibrationCurve {
     /// Straight lines between points of recorded and applied value, in any order.
     ///
     /// # Errors
@@ -34,9 +34,9 @@ impl Curve {
     /// rise or fall throughout.
     ///
     /// ```
-    /// use torqcomp_dsp::curve::Curve;
+    /// use torqcomp_dsp::curve::CalibrationCurve;
     /// // Between (0, 0) and (2, 50): 25 per unit; from there to (3, 80): 30 per unit.
-    /// let curve = Curve::through(&[(2.0, 50.0), (0.0, 0.0), (3.0, 80.0)])?;
+    /// let curve = CalibrationCurve::through(&[(2.0, 50.0), (0.0, 0.0), (3.0, 80.0)])?;
     /// assert_eq!(curve.applied(1.0)?, 25.0);
     /// assert_eq!(curve.applied(2.5)?, 65.0);
     /// assert!((curve.recorded(65.0)? - 2.5).abs() < 1e-12);
@@ -58,7 +58,7 @@ impl Curve {
         }
         let (low, high) = (points[0].0, points[points.len() - 1].0);
         Ok(Self {
-            shape: Shape::Points(points),
+            shape: CurveShape::Points(points),
             low,
             high,
         })
@@ -70,13 +70,13 @@ impl Curve {
     /// [`ConversionError::NoCurve`] if it does not rise or fall throughout that range.
     ///
     /// ```
-    /// use torqcomp_dsp::curve::Curve;
+    /// use torqcomp_dsp::curve::CalibrationCurve;
     /// // 25·2 + 0.5·2³ = 54.
-    /// let curve = Curve::polynomial(vec![0.0, 25.0, 0.0, 0.5], -2.0, 2.0)?;
+    /// let curve = CalibrationCurve::polynomial(vec![0.0, 25.0, 0.0, 0.5], -2.0, 2.0)?;
     /// assert_eq!(curve.applied(2.0)?, 54.0);
     /// assert!((curve.recorded(54.0)? - 2.0).abs() < 1e-12);
     /// // 3 x − x³ turns back at x = 1.
-    /// assert!(Curve::polynomial(vec![0.0, 3.0, 0.0, -1.0], 0.0, 2.0).is_err());
+    /// assert!(CalibrationCurve::polynomial(vec![0.0, 3.0, 0.0, -1.0], 0.0, 2.0).is_err());
     /// # Ok::<(), torqcomp_dsp::conversion::ConversionError>(())
     /// ```
     pub fn polynomial(
@@ -85,7 +85,7 @@ impl Curve {
         high: f64,
     ) -> Result<Self, ConversionError> {
         let curve = Self {
-            shape: Shape::Polynomial(coefficients),
+            shape: CurveShape::Polynomial(coefficients),
             low,
             high,
         };
@@ -154,11 +154,11 @@ impl Curve {
     #[must_use]
     pub fn slope(&self, recorded: f64) -> f64 {
         match &self.shape {
-            Shape::Points(points) => {
+            CurveShape::Points(points) => {
                 let [a, b] = around(points, recorded);
                 (b.1 - a.1) / (b.0 - a.0)
             }
-            Shape::Polynomial(c) => (1..c.len())
+            CurveShape::Polynomial(c) => (1..c.len())
                 .rev()
                 .fold(0.0, |sum, k| sum * recorded + k as f64 * c[k]),
         }
@@ -166,11 +166,11 @@ impl Curve {
 
     fn within(&self, recorded: f64) -> f64 {
         match &self.shape {
-            Shape::Points(points) => {
+            CurveShape::Points(points) => {
                 let [a, b] = around(points, recorded);
                 a.1 + (b.1 - a.1) * (recorded - a.0) / (b.0 - a.0)
             }
-            Shape::Polynomial(c) => c.iter().rev().fold(0.0, |sum, c| sum * recorded + c),
+            CurveShape::Polynomial(c) => c.iter().rev().fold(0.0, |sum, c| sum * recorded + c),
         }
     }
 

@@ -15,7 +15,7 @@ use crate::failure::Failure;
 use crate::io::{ChannelChoice, Input};
 use crate::print::short;
 use crate::recording::AlignedChannels;
-use crate::stand::{Given, Signal, Stand, si_unit};
+use crate::stand::{Given, Stand, TransducerSignal, si_unit};
 use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
 
@@ -212,10 +212,13 @@ fn units(pair: &Pair, stand: Option<&Stand>) -> (ChannelUnits, bool) {
     let signal = pair
         .measured_unit
         .as_ref()
-        .and_then(|named| Signal::of(&named.unit));
+        .and_then(|named| TransducerSignal::of(&named.unit));
     let has_calibration = stand.is_some_and(|s| {
         let of = s.calibration.as_ref().map(|c| c.signal);
-        let is_of_bridge = matches!(signal, Some(Signal::Voltage | Signal::Ratio));
+        let is_of_bridge = matches!(
+            signal,
+            Some(TransducerSignal::Voltage | TransducerSignal::Ratio)
+        );
         is_torque_stand
             && s.mechanics.is_some()
             && (is_of_bridge && (of.is_some() || s.bridge.is_some())

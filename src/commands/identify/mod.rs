@@ -18,7 +18,7 @@ use crate::io::output::{self, Output, Policy};
 use crate::print::Report;
 use crate::stand::update::Entry;
 use crate::stand::{self, update};
-use crate::unit::NamedUnit;
+use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
 
 const TORQUE: Dimension = Dimension::new([1, 2, -2, 0, 0, 0]);
@@ -175,12 +175,18 @@ fn stand_file(findings: &Findings, entries: &[Entry]) -> Result<String, Failure>
     }
 }
 
-/// The unit of a channel of that name.
-fn unit_or(unit: Option<&NamedUnit>, name: &str, flag: &str) -> Result<NamedUnit, Failure> {
-    unit.cloned().ok_or_else(|| {
-        Failure::failed(format_args!(
-            "channel \"{name}\" has no unit; give it with {flag}"
-        ))
+/// The unit of a channel, which is given with that flag if the file does not say it.
+fn unit_or(channel: RecordedChannel, flag: &str) -> Result<NamedUnit, Failure> {
+    channel.unit.cloned().ok_or_else(|| {
+        let name = channel.name;
+        match channel.unit_text {
+            None => Failure::failed(format_args!(
+                "channel \"{name}\" has no unit; give it with {flag}"
+            )),
+            Some(text) => Failure::failed(format_args!(
+                "the unit \"{text}\" of channel \"{name}\" is unknown; give a known one with {flag}"
+            )),
+        }
     })
 }
 

@@ -22,7 +22,7 @@ pub fn run(args: &Runup) -> Result<Outcome, Failure> {
     ];
     let read = AlignedChannels::read(&Input::of(&args.input), &choices, &args.reading)?;
     let (motion, torque) = (&read.channels[0], &read.channels[1]);
-    let motion_unit = unit_or(motion.unit.as_ref(), &motion.name, "--motion-unit")?;
+    let motion_unit = unit_or(motion.channel(), "--motion-unit")?;
     let (kind, turning) = Motion::of(motion_unit.unit.dimension()).ok_or_else(|| {
         Failure::failed(format_args!(
             "the unit of the motion \"{}\" is \"{}\"; expected an angle, a length, or their first or second derivative",
@@ -82,7 +82,7 @@ fn effort_factor(args: &Runup, torque: &AlignedChannel, turning: bool) -> Result
     let (factor, dimension) = match &args.torque_factor {
         Some(text) => factor_of(text)?,
         None => {
-            let unit = unit_or(torque.unit.as_ref(), &torque.name, "--torque-unit")?;
+            let unit = unit_or(torque.channel(), "--torque-unit")?;
             (unit.unit.factor(), unit.unit.dimension())
         }
     };

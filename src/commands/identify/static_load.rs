@@ -10,9 +10,9 @@ use crate::identify::Identification;
 use crate::identify::static_load::{CalibrationStep, LoadUnits, Point, identify, series_of};
 use crate::io::{ChannelChoice, Flags, Input, Reading, digits};
 use crate::recording::{Recording, check_holes, unit_of};
-use crate::stand::Signal;
+use crate::stand::TransducerSignal;
 use crate::stand::update::Entry;
-use crate::unit::NamedUnit;
+use crate::unit::{NamedUnit, RecordedChannel};
 
 const MASS: Dimension = Dimension::new([1, 0, 0, 0, 0, 0]);
 
@@ -93,7 +93,7 @@ fn points(
     let (loads, load_unit) = column(recording, &columns.load)?;
     let (readings, unit) = column(recording, &columns.reading)?;
     let is_effort = [TORQUE, FORCE].contains(&unit.unit.dimension());
-    if Signal::of(&load_unit.unit).is_some() && is_effort {
+    if TransducerSignal::of(&load_unit.unit).is_some() && is_effort {
         return Err(Failure::usage(format_args!(
             "--load \"{}\" is in {} and --reading \"{}\" in {}; the columns are swapped",
             args.load, load_unit.text, args.reading, unit.text
@@ -168,7 +168,12 @@ fn column(recording: &Recording, choice: &ChannelChoice) -> Result<(Vec<f64>, Na
     check_holes(channel)?;
     let (unit, _) = unit_of(choice, &channel.heading, channel.unit.as_ref())?;
     let flag = choice.flags.unit.unwrap_or_default();
-    let unit = unit_or(unit.as_ref(), &channel.name, flag)?;
+    let named = RecordedChannel {
+        name: &channel.name,
+        unit: unit.as_ref(),
+        unit_text: channel.unit_text.as_deref(),
+    };
+    let unit = unit_or(named, flag)?;
     Ok((channel.samples.clone(), unit))
 }
 
@@ -220,7 +225,7 @@ fn load_of(args: &Static, unit: &NamedUnit) -> Result<(f64, String), Failure> {
 
 /// Units of the readings in which they are evaluated per unit of the file, and their name.
 fn reading_of(args: &Static, unit: &NamedUnit) -> Result<(f64, String), Failure> {
-    if let Some(signal) = Signal::of(&unit.unit) {
+    if let Some(signal) = TransducerSignal::of(&unit.unit) {
         let (usual, factor) = signal.usual_unit();
         return Ok((signal.factor(&unit.unit) / factor, usual.to_owned()));
     }
@@ -252,8 +257,8 @@ fn ranks(values: &[f64]) -> Vec<usize> {
 /// The entries of the stand file: the calibration in the form of the readings' unit, and the zero.
 fn entries(args: &Static, result: &Identification, units: &LoadUnits) -> Vec<Entry> {
     let source = format!("identify static: {}", args.input);
-    let is_signal = |signal: &Signal| signal.usual_unit().0 == units.reading;
-    let Some(signal) = Signal::ALL.into_iter().find(is_signal) else {
+    let is_signal = |signal: &TransducerSignal| signal.usual_unit().0 == units.reading;
+    let Some(signal) = TransducerSignal::ALL.into_iter().find(is_signal) else {
         return Vec::new();
     };
     if units.load != "N m" {
@@ -269,45 +274,39 @@ fn entries(args: &Static, result: &Identification, units: &LoadUnits) -> Vec<Ent
         let degree = Entry::whole("calibration", "degree", args.degree as i64);
         return vec![Entry::points(&points), degree];
     }
-    let found = |name: &str, key| Some((key, result.get(name)?));
-    let mut entries = Vec::new();
-    match signal {
-        Signal::Voltage => entries.extend(found("torque_per_volt", "torque_per_volt")),
-        Signal::Ratio => entries.extend(found("torque_per_ratio", "torque_per_ratio")),
-        Signal::Current | Signal::Frequency | Signal::Strain => {}
-    }
-    let mut entries: Vec<Entry> = entries
-        .into_iter()
-        .map(|(key, constant)| entry("calibration", key, constant, &source))
-        .collect();
-    if entries.is_empty()
-        && let Some(slope) = result.get("sensitivity")
-    {
-        let largest = result
-            .steps
-            .iter()
-            .map(|s| s.load)
-            .fold(0.0, |m: f64, l| if l.abs() > m.abs() { l } else { m });
-        let change = Estimate::of(
-            units.reading.clone(),
-            slope.value() * largest,
-            slope.std().map(|std| std * largest.abs()),
-        );
-        entries.push(Entry::quantity(
-            "calibration",
-            "sensitivity",
-            &change,
-            &source,
-        ));
-        let rated = Estimate::of(Kind::Torque, largest, None);
-        entries.push(Entry::quantity(
-            "calibration",
-            "rated_torque",
-            &rated,
-            &source,
-        ));
-    }
+    let constant = match signal {
+        TransducerSignal::Voltage => Some("torque_per_volt"),
+        TransducerSignal::Ratio => Some("torque_per_ratio"),
+        _ => None,
+    };
+    let mut entries: Vec<Entry> = match constant {
+        Some(key) => {
+            let found = result.get(key);
+            let made = found.map(|found| entry("calibration", key, found, &source));
+            made.into_iter().collect()
+        }
+        None => at_largest_load(result, units, &source),
+    };
     let zero = result.get("zero");
     entries.extend(zero.map(|zero| entry("recorder", "zero", zero, &source)));
     entries
+}
+
+/// `sensitivity` and `rated_torque`: the change of the reading at the largest load.
+fn at_largest_load(result: &Identification, units: &LoadUnits, source: &str) -> Vec<Entry> {
+    let Some(slope) = result.get("sensitivity") else {
+        return Vec::new();
+    };
+    let farther = |m: f64, l: f64| if l.abs() > m.abs() { l } else { m };
+    let largest = result.steps.iter().map(|s| s.load).fold(0.0, farther);
+    let change = Estimate::of(
+        units.reading.clone(),
+        slope.value() * largest,
+        slope.std().map(|std| std * largest.abs()),
+    );
+    let rated = Estimate::of(Kind::Torque, largest, None);
+    vec![
+        Entry::quantity("calibration", "sensitivity", &change, source),
+        Entry::quantity("calibration", "rated_torque", &rated, source),
+    ]
 }

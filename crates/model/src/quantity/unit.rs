@@ -17,19 +17,19 @@ pub struct Unit {
     dimension: Dimension,
     /// Kelvin at zero of the scale, not 0 only for a lone °C or °F.
     zero: f64,
-    parts: Parts,
+    parts: UnitParts,
 }
 
 /// What a unit is made of, as far as its dimension does not show it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-struct Parts {
+struct UnitParts {
     bare_weight: bool,
     voltage: bool,
     strain: bool,
     hertz: bool,
 }
 
-impl Parts {
+impl UnitParts {
     fn and(self, other: Self) -> Self {
         Self {
             bare_weight: self.bare_weight || other.bare_weight,
@@ -57,7 +57,7 @@ impl Unit {
         factor: 1.0,
         dimension: Dimension::NONE,
         zero: 0.0,
-        parts: Parts {
+        parts: UnitParts {
             bare_weight: false,
             voltage: false,
             strain: false,
@@ -155,8 +155,8 @@ impl Unit {
             return None;
         }
         Some(match self.parts {
-            Parts { voltage: true, .. } => RatioOf::Voltages,
-            Parts { strain: true, .. } => RatioOf::Lengths,
+            UnitParts { voltage: true, .. } => RatioOf::Voltages,
+            UnitParts { strain: true, .. } => RatioOf::Lengths,
             _ => RatioOf::Anything,
         })
     }
@@ -175,7 +175,7 @@ impl Unit {
             factor: symbol.factor,
             dimension: symbol.dimension,
             zero: 0.0,
-            parts: Parts {
+            parts: UnitParts {
                 bare_weight: symbol.is_bare_weight(),
                 voltage: symbol.is_voltage(),
                 strain: symbol.is_of_strain(),

@@ -1,0 +1,460 @@
+//! `init`: a commented stand file for what the user has.
+
+use std::fmt::Write as _;
+use std::io::{BufRead, IsTerminal, Write};
+
+use torqcomp_model::Kind;
+
+use super::{Outcome, conclude};
+use crate::cli::init::{Init, InitFrom};
+use crate::failure::Failure;
+use crate::stand;
+
+/// One entry of the file: where it goes, how it is asked for, and what it means.
+struct Question {
+    section: &'static str,
+    key: &'static str,
+    /// The flag without its dashes.
+    flag: &'static str,
+    /// The kind of its quantity; `None` where the unit or a list of words says more.
+    kind: Option<Kind>,
+    example: &'static str,
+    meaning: &'static str,
+    is_needed: bool,
+}
+
+const fn needed(
+    [section, key, flag]: [&'static str; 3],
+    kind: Option<Kind>,
+    example: &'static str,
+    meaning: &'static str,
+) -> Question {
+    Question {
+        section,
+        key,
+        flag,
+        kind,
+        example,
+        meaning,
+        is_needed: true,
+    }
+}
+
+const fn optional(question: Question) -> Question {
+    Question {
+        is_needed: false,
+        ..question
+    }
+}
+
+const MECHANICS: [Question; 2] = [
+    optional(needed(
+        ["mechanics", "natural_frequency", "natural-frequency"],
+        Some(Kind::Frequency),
+        "590 Hz",
+        "at which the stand rings",
+    )),
+    optional(needed(
+        ["mechanics", "damping_ratio", "damping-ratio"],
+        Some(Kind::Ratio),
+        "0.02",
+        "2 % is 0.02",
+    )),
+];
+
+const TRANSDUCER: [Question; 5] = [
+    needed(
+        ["calibration", "sensitivity", "sensitivity"],
+        None,
+        "2 mV/V",
+        "change of the output from no load to rated torque; also in V, mA or Hz",
+    ),
+    needed(
+        ["calibration", "rated_torque", "rated-torque"],
+        Some(Kind::Torque),
+        "50 N m",
+        "torque of that change",
+    ),
+    EXCITATION,
+    GAIN,
+    ZERO,
+];
+
+const BRIDGE: [Question; 5] = [
+    optional(needed(
+        ["calibration", "torque_per_ratio", "torque-per-ratio"],
+        Some(Kind::TorquePerRatio),
+        "25 N m/(mV/V)",
+        "torque per bridge output over excitation",
+    )),
+    optional(needed(
+        ["calibration", "torque_per_volt", "torque-per-volt"],
+        Some(Kind::TorquePerVolt),
+        "12.5 N m/V",
+        "torque per recorded volt",
+    )),
+    EXCITATION,
+    GAIN,
+    ZERO,
+];
+
+const DRAWING: [Question; 12] = [
+    length("width", "20 mm", "across the force"),
+    length("depth", "10 mm", "along the force"),
+    length("length", "200 mm", "from the clamp to the stator"),
+    needed(
+        ["beam", "elastic_modulus", "elastic-modulus"],
+        Some(Kind::Pressure),
+        "200 GPa",
+        "200 GPa for steel, 70 GPa for aluminium",
+    ),
+    length(
+        "radius",
+        "100 mm",
+        "from the shaft to where the beam meets the stator",
+    ),
+    needed(
+        ["beam", "gage_position", "gage-position"],
+        Some(Kind::Length),
+        "50 mm",
+        "distance of the gage from the clamp",
+    ),
+    needed(
+        ["gage", "gage_factor", "gage-factor"],
+        Some(Kind::Ratio),
+        "2.05",
+        "of the gage's data sheet",
+    ),
+    needed(
+        ["gage", "resistance", "gage-resistance"],
+        Some(Kind::Resistance),
+        "350 ohm",
+        "of one gage",
+    ),
+    needed(
+        ["bridge", "layout", "layout"],
+        None,
+        "full",
+        "quarter, half, half-opposite or full",
+    ),
+    EXCITATION,
+    GAIN,
+    ZERO,
+];
+
+const EXCITATION: Question = optional(needed(
+    ["bridge", "excitation", "excitation"],
+    Some(Kind::Voltage),
+    "5 V",
+    "supply of the bridge; needed between volts and mV/V",
+));
+const GAIN: Question = optional(needed(
+    ["recorder", "gain", "gain"],
+    Some(Kind::Gain),
+    "200",
+    "recorded volts per bridge volt; needed between volts and mV/V",
+));
+const ZERO: Question = optional(needed(
+    ["recorder", "zero", "zero"],
+    None,
+    "12 mA",
+    "record at no load, in the unit of the record",
+));
+
+const fn length(key: &'static str, example: &'static str, meaning: &'static str) -> Question {
+    needed(["beam", key, key], Some(Kind::Length), example, meaning)
+}
+
+/// Sections as the file has them, each with the line above it.
+const SECTIONS: [(&str, &str); 6] = [
+    (
+        "mechanics",
+        "The response that is divided out of the record: J θ'' + f θ' + K θ = T.",
+    ),
+    ("calibration", "From the record to torque."),
+    (
+        "beam",
+        "The drawing of the beam: from torque to strain at the gage.",
+    ),
+    ("gage", "The strain gage: from strain to resistance."),
+    ("bridge", "The bridge."),
+    ("recorder", "Amplifier and recorder."),
+];
+
+/// Runs the verb.
+pub fn run(args: &Init) -> Result<Outcome, Failure> {
+    let (input, mut errors) = (std::io::stdin(), std::io::stderr());
+    let can_ask = input.is_terminal() && errors.is_terminal();
+    let mut asked = can_ask.then(|| Dialogue {
+        input: input.lock(),
+        output: &mut errors,
+    });
+    let text = match &mut asked {
+        Some(dialogue) => compose(args, Some(dialogue))?,
+        None => compose(args, None::<&mut Dialogue<std::io::Empty, std::io::Sink>>)?,
+    };
+    let stand = stand::parse("the new stand file", &text)
+        .map_err(|failure| Failure::usage(failure.to_string()))?;
+    let mut output = args.result.open(&[])?;
+    output.write(text.as_bytes())?;
+    output.finish()?;
+    Ok(conclude(&stand.warnings, false, false))
+}
+
+/// A person at a terminal.
+struct Dialogue<R, W> {
+    input: R,
+    output: W,
+}
+
+impl<R: BufRead, W: Write> Dialogue<R, W> {
+    /// The answer to a question, empty for none; asked again until `check` takes it.
+    fn ask(
+        &mut self,
+        question: &str,
+        check: impl Fn(&str) -> Result<(), String>,
+    ) -> Result<String, Failure> {
+        let broken = |error: std::io::Error| Failure::failed(format_args!("no answer: {error}"));
+        loop {
+            write!(self.output, "{question}: ").map_err(broken)?;
+            self.output.flush().map_err(broken)?;
+            let mut line = String::new();
+            if self.input.read_line(&mut line).map_err(broken)? == 0 {
+                return Err(Failure::failed(
+                    "the answers ended before the last question",
+                ));
+            }
+            let answer = line.trim().to_owned();
+            match check(&answer) {
+                Ok(()) => return Ok(answer),
+                Err(why) => writeln!(self.output, "{why}").map_err(broken)?,
+            }
+        }
+    }
+}
+
+/// The text of the file.
+fn compose<R: BufRead, W: Write>(
+    args: &Init,
+    mut dialogue: Option<&mut Dialogue<R, W>>,
+) -> Result<String, Failure> {
+    let from = match (args.from, &mut dialogue) {
+        (Some(from), _) => from,
+        (None, Some(dialogue)) => {
+            let question = "What do you have: a transducer with its papers, a bridge that was calibrated with weights, \
+                            the drawing of the beam, or is it unknown? (transducer, bridge, drawing, unknown)";
+            let known = |text: &str| source(text).map(|_| ());
+            source(&dialogue.ask(question, known)?).map_err(Failure::failed)?
+        }
+        (None, None) => {
+            return Err(Failure::usage(
+                "give --from transducer, bridge, drawing or unknown; without a terminal nothing is asked",
+            ));
+        }
+    };
+    let questions: Vec<&Question> = of(from).iter().chain(&MECHANICS).collect();
+    let mut answers: Vec<(&Question, String)> = Vec::new();
+    let mut missing = Vec::new();
+    for question in questions {
+        let given = args.given(question.flag).map(str::to_owned);
+        let answer = match (given, &mut dialogue) {
+            (Some(given), _) => Some(given),
+            (None, Some(dialogue)) => {
+                let answer = dialogue.ask(&question.text(), |text| question.check(text))?;
+                Some(answer).filter(|answer| !answer.is_empty())
+            }
+            (None, None) if question.is_needed => {
+                missing.push(format!("--{} \"{}\"", question.flag, question.example));
+                None
+            }
+            (None, None) => None,
+        };
+        answers.extend(answer.map(|answer| (question, answer)));
+    }
+    if let Some(flag) = args.given_beside(from) {
+        return Err(Failure::usage(format_args!(
+            "--{flag} does not belong to --from {}",
+            word(from)
+        )));
+    }
+    if !missing.is_empty() {
+        return Err(Failure::usage(format_args!(
+            "--from {} needs also {}",
+            word(from),
+            missing.join(", ")
+        )));
+    }
+    Ok(page(args, from, &answers))
+}
+
+/// What the file says, section by section; what is missing stands there as a comment.
+fn page(args: &Init, from: InitFrom, answers: &[(&Question, String)]) -> String {
+    let name = args.name.as_deref().unwrap_or("my stand");
+    let mut text = format!(
+        "schema = \"torqcomp.stand/1\"\nname = {}\n\n# Every number has its unit; a known uncertainty is written as\n\
+         #     {{ value = \"50 N m\", std = \"0.1 N m\", source = \"certificate\" }}\n",
+        toml_edit::Value::from(name)
+    );
+    for (section, about) in SECTIONS {
+        let of_section: Vec<_> = answers.iter().filter(|a| a.0.section == section).collect();
+        if of_section.is_empty() {
+            text += match (section, from) {
+                ("mechanics", _) => NO_MECHANICS,
+                ("calibration", InitFrom::Bridge | InitFrom::Unknown) => NO_CALIBRATION,
+                _ => "",
+            };
+            continue;
+        }
+        let _ = write!(text, "\n# {about}\n[{section}]\n");
+        for (question, answer) in of_section {
+            let value = toml_edit::Value::from(answer.as_str());
+            let _ = writeln!(text, "{} = {value}  # {}", question.key, question.meaning);
+        }
+    }
+    text
+}
+
+const NO_MECHANICS: &str = "\n# [mechanics] is still missing: the response that is divided out. Record how the stand rings after a tap, and run\n\
+    #     torqcomp identify decay hit.csv -o FILE\n# with the name of this file, or add\n\
+    # [mechanics]\n# natural_frequency = \"590 Hz\"\n# damping_ratio = 0.02\n";
+const NO_CALIBRATION: &str = "\n# A record in N m needs no [calibration]. For one in V, mV/V, mA or Hz load the stand with known weights, and run\n\
+    #     torqcomp identify static loads.csv --load LOAD --reading READING --radius \"0.5 m\" -o FILE\n\
+    # with the name of this file, or add one of\n# [calibration]\n# torque_per_volt = \"12.5 N m/V\"\n\
+    # torque_per_ratio = \"25 N m/(mV/V)\"\n";
+
+fn of(from: InitFrom) -> &'static [Question] {
+    match from {
+        InitFrom::Transducer => &TRANSDUCER,
+        InitFrom::Bridge => &BRIDGE,
+        InitFrom::Drawing => &DRAWING,
+        InitFrom::Unknown => &[],
+    }
+}
+
+const SOURCES: [InitFrom; 4] = [
+    InitFrom::Transducer,
+    InitFrom::Bridge,
+    InitFrom::Drawing,
+    InitFrom::Unknown,
+];
+
+fn word(from: InitFrom) -> &'static str {
+    match from {
+        InitFrom::Transducer => "transducer",
+        InitFrom::Bridge => "bridge",
+        InitFrom::Drawing => "drawing",
+        InitFrom::Unknown => "unknown",
+    }
+}
+
+fn source(text: &str) -> Result<InitFrom, String> {
+    let found = SOURCES
+        .into_iter()
+        .find(|from| word(*from) == text.to_lowercase());
+    found.ok_or_else(|| "write transducer, bridge, drawing or unknown".to_owned())
+}
+
+impl Question {
+    fn text(&self) -> String {
+        let skip = if self.is_needed {
+            ""
+        } else {
+            "; Enter to leave it out"
+        };
+        format!(
+            "{} ({}), as {}{skip}",
+            self.key.replace('_', " "),
+            self.meaning,
+            self.example
+        )
+    }
+
+    fn check(&self, answer: &str) -> Result<(), String> {
+        match (answer, self.kind) {
+            ("", _) if self.is_needed => Err(format!("it is needed, as {}", self.example)),
+            ("", _) | (_, None) => Ok(()),
+            (text, Some(kind)) => kind
+                .parse(text)
+                .map(|_| ())
+                .map_err(|error| error.to_string()),
+        }
+    }
+}
+
+impl Init {
+    /// What a flag says.
+    fn given(&self, flag: &str) -> Option<&str> {
+        let found = self.flags().into_iter().find(|(name, _)| *name == flag)?;
+        found.1
+    }
+
+    /// A flag that was given and that such a file has no place for.
+    fn given_beside(&self, from: InitFrom) -> Option<&'static str> {
+        let known: Vec<&str> = of(from).iter().chain(&MECHANICS).map(|q| q.flag).collect();
+        let mut given = self.flags().into_iter().filter(|(_, text)| text.is_some());
+        given
+            .find(|(flag, _)| !known.contains(flag))
+            .map(|(flag, _)| flag)
+    }
+
+    fn flags(&self) -> [(&'static str, Option<&str>); 18] {
+        [
+            ("natural-frequency", &self.natural_frequency),
+            ("damping-ratio", &self.damping_ratio),
+            ("sensitivity", &self.sensitivity),
+            ("rated-torque", &self.rated_torque),
+            ("torque-per-ratio", &self.torque_per_ratio),
+            ("torque-per-volt", &self.torque_per_volt),
+            ("width", &self.width),
+            ("depth", &self.depth),
+            ("length", &self.length),
+            ("elastic-modulus", &self.elastic_modulus),
+            ("radius", &self.radius),
+            ("gage-position", &self.gage_position),
+            ("gage-factor", &self.gage_factor),
+            ("gage-resistance", &self.gage_resistance),
+            ("layout", &self.layout),
+            ("excitation", &self.excitation),
+            ("gain", &self.gain),
+            ("zero", &self.zero),
+        ]
+        .map(|(flag, text)| (flag, text.as_deref()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+    use crate::cli::{Cli, Verb};
+
+    #[test]
+    fn a_wrong_answer_is_asked_again_and_an_empty_one_leaves_out() {
+        let cli = Cli::parse_from(["torqcomp", "init", "--rated-torque", "50 N m"]);
+        let Verb::Init(args) = cli.verb else {
+            unreachable!()
+        };
+        let answers = "data sheet\ntransducer\n2 mV/V\n\n\n\n590\n590 Hz\n0.02\n";
+        let mut said = Vec::new();
+        let mut dialogue = Dialogue {
+            input: answers.as_bytes(),
+            output: &mut said,
+        };
+        let text = compose(&args, Some(&mut dialogue)).unwrap();
+        assert!(
+            text.contains("sensitivity = \"2 mV/V\"") && text.contains("rated_torque = \"50 N m\""),
+            "{text}"
+        );
+        assert!(
+            text.contains("natural_frequency = \"590 Hz\"") && !text.contains("[recorder]"),
+            "{text}"
+        );
+        let said = String::from_utf8(said).unwrap();
+        assert!(
+            said.contains("write transducer, bridge") && said.contains("\"590\" has no unit"),
+            "{said}"
+        );
+        stand::parse("s", &text).unwrap();
+    }
+}
