@@ -366,7 +366,7 @@ fn stand_files() {
     );
     with(
         "[calibration]\n",
-        "[calibration]\nsensitivity = 3\n",
+        "[calibration]\nsensitivty = 3\n",
         &["line 7", "unknown key", "torque_per_volt"],
     );
     with(

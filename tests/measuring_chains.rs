@@ -365,7 +365,7 @@ fn known_loads_calibrate_every_kind_of_reading() {
         folder.write("new.toml", MECHANICS);
         let mut rows = format!("load [N m],reading [{unit}]\n");
         for load in [
-            0.0, 10.0, 25.0, 40.0, 50.0, 25.0, 10.0, 0.0, 0.0, 25.0, 50.0, 0.0,
+            0.0, 10.0, 25.0, 40.0, 50.0, 25.0, 0.0, -10.0, -25.0, -50.0, -25.0, 0.0,
         ] {
             rows += &format!("{load},{}\n", zero + swing * load / 25.0);
         }

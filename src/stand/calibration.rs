@@ -189,7 +189,7 @@ fn without_unit(channel: RecordedChannel) -> Failure {
     let name = channel.name;
     match channel.unit_text {
         None => Failure::failed(format_args!(
-            "the channel \"{name}\" does not give its unit; give it with --unit V (or mV/V, mA, Hz, ustrain, \"N m\", N)"
+            "the channel \"{name}\" does not say its unit; give it with --unit V (or mV/V, mA, Hz, ustrain, \"N m\", N)"
         )),
         Some(text) => {
             let why = Unit::parse(text)

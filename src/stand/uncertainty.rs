@@ -45,7 +45,7 @@ impl Stand {
         found.ok().flatten()
     }
 
-    /// By central differences over one standard uncertainty of each parameter; `None` if the stand with its effects has
+    /// By the slopes over each parameter, from central differences; `None` if the stand with its effects has
     /// no inverse response.
     fn of_mechanics_and_effects(&self, frequency_hz: f64) -> Option<Option<InverseUncertainty>> {
         let has_std = |effect: &super::DeclaredEffect| effect.stds.iter().any(Option::is_some);
@@ -149,9 +149,12 @@ impl Mechanics {
     }
 }
 
-/// Half the change of the logarithm of the inverse response from one side of a parameter to the other.
+/// Part of a standard uncertainty over which a slope is taken: far above rounding, far below where the response bends.
+const STEP: f64 = 1e-3;
+
+/// Change of the logarithm of the inverse response for one standard uncertainty of a parameter, by its slope.
 fn change(with: &dyn Fn(f64) -> Option<Stand>, frequency_hz: f64) -> Option<Complex64> {
-    let at = |side: f64| Some(with(side)?.inverse().ok()?(frequency_hz));
-    let half = (at(1.0)? / at(-1.0)?).ln() / 2.0;
+    let at = |side: f64| Some(with(side * STEP)?.inverse().ok()?(frequency_hz));
+    let half = (at(1.0)? / at(-1.0)?).ln() / (2.0 * STEP);
     half.is_finite().then_some(half)
 }

@@ -42,7 +42,7 @@ pub enum ConversionError {
     NoCurve,
     /// A recorded value far beyond a calibration curve.
     #[error(
-        "the calibration runs from {low} to {high} and is continued by 20 % of that, got {got}; \
+        "the calibration runs from {low} to {high} (SI units of its signal) and is continued by 20 % of that, got {got}; \
          calibrate over the whole range of the record"
     )]
     BeyondCurve {
@@ -55,7 +55,7 @@ pub enum ConversionError {
     },
     /// An applied value that a calibration curve does not reach.
     #[error(
-        "the calibration reaches from {low} to {high}, got {got}; \
+        "the calibration reaches from {low} to {high} (SI units), got {got}; \
          calibrate over the whole range"
     )]
     NotOnCurve {

@@ -176,7 +176,9 @@ impl Kind {
     pub fn parse(self, text: &str) -> Result<f64, QuantityError> {
         let (number, unit) = self.split(text)?;
         let scale = match self.scale(text, unit) {
-            Err(QuantityError::WrongDimension { .. }) if self.is_inverse(number, unit) => {
+            Err(QuantityError::WrongDimension { .. })
+                if CONSTANTS.contains(&self) && self.is_inverse(number, unit) =>
+            {
                 return Err(self.inverted(text, number, unit));
             }
             scale => scale?,
@@ -315,6 +317,14 @@ impl Kind {
         })
     }
 }
+
+/// Kinds that data sheets also give upside down.
+const CONSTANTS: [Kind; 4] = [
+    Kind::TorquePerVolt,
+    Kind::TorquePerRatio,
+    Kind::AngularStiffness,
+    Kind::LinearStiffness,
+];
 
 impl Kind {
     /// Whether a number in that unit is one over a quantity of this kind.

@@ -246,13 +246,13 @@ pub(super) const SYMBOLS: &[Symbol] = &[
     unit(&["V"], &["volt", "volts"], 1.0, VOLTAGE),
     unit(&["nV"], &["nanovolt", "nanovolts"], 1e-9, VOLTAGE),
     unit(
-        &["uV", "uVolt", "uVolts", "uvolt", "uvolts"],
+        &["uV", "uVolt", "uVolts"],
         &["microvolt", "microvolts"],
         1e-6,
         VOLTAGE,
     ),
     unit(
-        &["mV", "mVolt", "mVolts", "mvolt", "mvolts"],
+        &["mV", "mVolt", "mVolts"],
         &["millivolt", "millivolts"],
         1e-3,
         VOLTAGE,
@@ -370,7 +370,7 @@ mod tests {
 
     #[test]
     fn a_wrong_case_or_letter_finds_the_unit_meant() {
-        assert_eq!(nearest("hZ"), Some("Hz"));
+        assert_eq!(nearest("KPA"), Some("kPa"));
         assert_eq!(nearest("lbff"), Some("lbf"));
         assert_eq!(nearest("newtns"), Some("newtons"));
         assert_eq!(nearest("xyzzy"), None);
