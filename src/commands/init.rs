@@ -1,169 +1,15 @@
 //! `init`: a commented stand file for what the user has.
 
+mod questions;
+
 use std::fmt::Write as _;
 use std::io::{BufRead, IsTerminal, Write};
 
-use torqcomp_model::Kind;
-
+use self::questions::{BRIDGE, DRAWING, MECHANICS, Question, TRANSDUCER};
 use super::{Outcome, conclude};
 use crate::cli::init::{Init, InitFrom};
 use crate::failure::Failure;
 use crate::stand;
-
-/// One entry of the file: where it goes, how it is asked for, and what it means.
-struct Question {
-    section: &'static str,
-    key: &'static str,
-    /// The flag without its dashes.
-    flag: &'static str,
-    /// The kind of its quantity; `None` where the unit or a list of words says more.
-    kind: Option<Kind>,
-    example: &'static str,
-    meaning: &'static str,
-    is_needed: bool,
-}
-
-const fn needed(
-    [section, key, flag]: [&'static str; 3],
-    kind: Option<Kind>,
-    example: &'static str,
-    meaning: &'static str,
-) -> Question {
-    Question {
-        section,
-        key,
-        flag,
-        kind,
-        example,
-        meaning,
-        is_needed: true,
-    }
-}
-
-const fn optional(question: Question) -> Question {
-    Question {
-        is_needed: false,
-        ..question
-    }
-}
-
-const MECHANICS: [Question; 2] = [
-    optional(needed(
-        ["mechanics", "natural_frequency", "natural-frequency"],
-        Some(Kind::Frequency),
-        "590 Hz",
-        "at which the stand rings",
-    )),
-    optional(needed(
-        ["mechanics", "damping_ratio", "damping-ratio"],
-        Some(Kind::Ratio),
-        "0.02",
-        "2 % is 0.02",
-    )),
-];
-
-const TRANSDUCER: [Question; 5] = [
-    needed(
-        ["calibration", "sensitivity", "sensitivity"],
-        None,
-        "2 mV/V",
-        "change of the output from no load to rated torque; also in V, mA or Hz",
-    ),
-    needed(
-        ["calibration", "rated_torque", "rated-torque"],
-        Some(Kind::Torque),
-        "50 N m",
-        "torque of that change",
-    ),
-    EXCITATION,
-    GAIN,
-    ZERO,
-];
-
-const BRIDGE: [Question; 5] = [
-    optional(needed(
-        ["calibration", "torque_per_ratio", "torque-per-ratio"],
-        Some(Kind::TorquePerRatio),
-        "25 N m/(mV/V)",
-        "torque per bridge output over excitation",
-    )),
-    optional(needed(
-        ["calibration", "torque_per_volt", "torque-per-volt"],
-        Some(Kind::TorquePerVolt),
-        "12.5 N m/V",
-        "torque per recorded volt",
-    )),
-    EXCITATION,
-    GAIN,
-    ZERO,
-];
-
-const DRAWING: [Question; 12] = [
-    length("width", "20 mm", "across the force"),
-    length("depth", "10 mm", "along the force"),
-    length("length", "200 mm", "from the clamp to the stator"),
-    needed(
-        ["beam", "elastic_modulus", "elastic-modulus"],
-        Some(Kind::Pressure),
-        "200 GPa",
-        "200 GPa for steel, 70 GPa for aluminium",
-    ),
-    length(
-        "radius",
-        "100 mm",
-        "from the shaft to where the beam meets the stator",
-    ),
-    needed(
-        ["beam", "gage_position", "gage-position"],
-        Some(Kind::Length),
-        "50 mm",
-        "distance of the gage from the clamp",
-    ),
-    needed(
-        ["gage", "gage_factor", "gage-factor"],
-        Some(Kind::Ratio),
-        "2.05",
-        "of the gage's data sheet",
-    ),
-    needed(
-        ["gage", "resistance", "gage-resistance"],
-        Some(Kind::Resistance),
-        "350 ohm",
-        "of one gage",
-    ),
-    needed(
-        ["bridge", "layout", "layout"],
-        None,
-        "full",
-        "quarter, half, half-opposite or full",
-    ),
-    EXCITATION,
-    GAIN,
-    ZERO,
-];
-
-const EXCITATION: Question = optional(needed(
-    ["bridge", "excitation", "excitation"],
-    Some(Kind::Voltage),
-    "5 V",
-    "supply of the bridge; needed between volts and mV/V",
-));
-const GAIN: Question = optional(needed(
-    ["recorder", "gain", "gain"],
-    Some(Kind::Gain),
-    "200",
-    "recorded volts per bridge volt; needed between volts and mV/V",
-));
-const ZERO: Question = optional(needed(
-    ["recorder", "zero", "zero"],
-    None,
-    "12 mA",
-    "record at no load, in the unit of the record",
-));
-
-const fn length(key: &'static str, example: &'static str, meaning: &'static str) -> Question {
-    needed(["beam", key, key], Some(Kind::Length), example, meaning)
-}
 
 /// Sections as the file has them, each with the line above it.
 const SECTIONS: [(&str, &str); 6] = [
@@ -352,33 +198,6 @@ fn source(text: &str) -> Result<InitFrom, String> {
         .into_iter()
         .find(|from| word(*from) == text.to_lowercase());
     found.ok_or_else(|| "write transducer, bridge, drawing or unknown".to_owned())
-}
-
-impl Question {
-    fn text(&self) -> String {
-        let skip = if self.is_needed {
-            ""
-        } else {
-            "; Enter to leave it out"
-        };
-        format!(
-            "{} ({}), as {}{skip}",
-            self.key.replace('_', " "),
-            self.meaning,
-            self.example
-        )
-    }
-
-    fn check(&self, answer: &str) -> Result<(), String> {
-        match (answer, self.kind) {
-            ("", _) if self.is_needed => Err(format!("it is needed, as {}", self.example)),
-            ("", _) | (_, None) => Ok(()),
-            (text, Some(kind)) => kind
-                .parse(text)
-                .map(|_| ())
-                .map_err(|error| error.to_string()),
-        }
-    }
 }
 
 impl Init {

@@ -99,6 +99,12 @@ impl TransducerSignal {
         let Some(text) = section.raw(key)? else {
             return Ok(None);
         };
+        if text.trim().parse::<f64>().is_ok() {
+            return Err(section.fail(
+                key,
+                format_args!("\"{text}\" has no unit; expected V, mV/V, mA, Hz or ustrain, as in \"{text} mV/V\""),
+            ));
+        }
         let unit = Unit::of_quantity(&text).map_err(|error| section.fail(key, error))?;
         let Some(signal) = Self::of(&unit) else {
             return Err(section.fail(key, unknown(&text, &unit)));

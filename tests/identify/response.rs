@@ -413,6 +413,24 @@ fn all_constants_follow_from_a_torque_and_the_motion_it_makes() {
         "{written}"
     );
     assert!(!written.contains("\"1 N m/rad\""), "{written}");
+    // The errors of J and K are correlated: below the resonance the inverse is 1 − r², which only the frequency moves,
+    // by 2 r²/(1 − r²) of its relative error.
+    let (frequency, std, _) = parameter(&report, "natural_frequency");
+    let table = [
+        "table",
+        "--stand",
+        "stand.toml",
+        "--from",
+        "42",
+        "--to",
+        "42",
+        "--uncertainty",
+        "--json",
+    ];
+    let stated = folder.json(&table)["rows"][0]["magnitude_relative_std"].as_f64();
+    let square = (42.0 / frequency) * (42.0 / frequency);
+    let expected = 2.0 * square / (1.0 - square) * std.expect("the data tell it") / frequency;
+    assert_close(stated.expect("an uncertainty"), expected, 0.05);
     // A motion against the torque is refused.
     let turned: String = rows
         .lines()
