@@ -388,7 +388,7 @@ fn stand_files() {
     with(
         "torque_per_volt = \"1.23e3 ft lbf/V\"\n",
         "",
-        &["torque_per_volt is missing"],
+        &["write one of torque_per_volt"],
     );
     let folder = Folder::new();
     folder.write("in.csv", good());
