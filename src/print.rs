@@ -11,7 +11,8 @@ use crate::io::digits;
 /// Never: the reports have string keys and no failing parts.
 #[must_use]
 pub fn json(report: &impl Serialize) -> String {
-    let mut text = serde_json::to_string_pretty(report).expect("reports are plain data");
+    let text = serde_json::to_string_pretty(report).expect("reports are plain data");
+    let mut text = written_out(text, |c| format!("\\u{:04x}", u32::from(c)));
     text.push('\n');
     text
 }
@@ -32,7 +33,7 @@ pub(crate) trait Report: Serialize + Sized {
                 version: env!("CARGO_PKG_VERSION"),
                 report: self,
             }),
-            false => self.text(),
+            false => visible(self.text()),
         }
     }
 }
@@ -47,8 +48,46 @@ struct Document<'a, R> {
 
 /// Says something to a person on standard error. Nobody may be there to read it: that is no failure.
 pub fn say(text: &str) {
+    show(&visible(text.to_owned()));
+}
+
+/// Writes how far the work has got over what the line showed before; an empty text clears the line.
+pub fn say_progress(text: &str) {
+    show(&format!("\r{}\x1b[K", visible(text.to_owned())));
+}
+
+fn show(text: &str) {
     use std::io::Write;
     let _ = std::io::stderr().lock().write_all(text.as_bytes());
+}
+
+/// A text whose control characters are written out: names out of a file can neither steer a terminal nor break a page.
+///
+/// ```
+/// use torqcomp::print::visible;
+/// assert_eq!(visible("a\tb\n".to_owned()), "a\tb\n");
+/// assert_eq!(visible("\x1b[2Jtorque".to_owned()), "\\u{1b}[2Jtorque");
+/// assert_eq!(visible("\u{202e}mN".to_owned()), "\\u{202e}mN");
+/// ```
+#[must_use]
+pub fn visible(text: String) -> String {
+    written_out(text, |c| c.escape_unicode().to_string())
+}
+
+fn written_out(text: String, written: impl Fn(char) -> String) -> String {
+    // Controls, what changes the direction of text, and what XML does not allow.
+    let is_hidden = |c: char| {
+        c.is_control() && !matches!(c, '\n' | '\t')
+            || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{fffe}' | '\u{ffff}')
+    };
+    if !text.contains(is_hidden) {
+        return text;
+    }
+    let shown = |c: char| match is_hidden(c) {
+        true => written(c),
+        false => c.to_string(),
+    };
+    text.chars().map(shown).collect()
 }
 
 /// A number for people: six significant digits.

@@ -1,5 +1,6 @@
 //! Tests through the `torqcomp` binary, and every number of the thesis.
 
+mod untrusted;
 mod util;
 
 mod agreement;

@@ -8,6 +8,8 @@ mod panel;
 
 use maud::{Markup, PreEscaped, html};
 
+use crate::print::visible;
+
 pub(crate) use envelope::Envelope;
 pub(crate) use page::Page;
 use panel::{FOOT, HEADING, LEFT, Panel, px};
@@ -181,7 +183,7 @@ pub(crate) fn picture(title: &str, panel_height: f64, charts: &[Chart]) -> Strin
             }
         })
         .collect();
-    html! {
+    let file = html! {
         svg xmlns="http://www.w3.org/2000/svg" viewBox={ "0 0 " (FILE_WIDTH) " " (top) } role="img" aria-label=(title) {
             "\n"
             style { (PreEscaped(STYLE)) } "\n"
@@ -190,8 +192,8 @@ pub(crate) fn picture(title: &str, panel_height: f64, charts: &[Chart]) -> Strin
             @for part in &parts { (part) }
         }
         "\n"
-    }
-    .into_string()
+    };
+    visible(file.into_string())
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::{Chart, STYLE as CHART_STYLE, Series};
+use crate::print::visible;
 
 /// Style of the page.
 const STYLE: &str = "\
@@ -96,7 +97,7 @@ impl Page {
 
     /// The page as a file.
     pub(crate) fn html(&self) -> String {
-        html! {
+        let page = html! {
             (DOCTYPE) "\n"
             html lang="en" {
                 head {
@@ -113,8 +114,8 @@ impl Page {
                 }
             }
             "\n"
-        }
-        .into_string()
+        };
+        visible(page.into_string())
     }
 }
 

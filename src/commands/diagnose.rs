@@ -41,8 +41,10 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
     let is_shown = !args.work.quiet && std::io::stderr().is_terminal();
     let progress = |done: usize, of: usize| {
         if is_shown {
-            let end = if done == of { "\r\x1b[K" } else { "" };
-            print::say(&format!("\r{done} of {of} fits{end}"));
+            match done == of {
+                true => print::say_progress(""),
+                false => print::say_progress(&format!("{done} of {of} fits")),
+            }
         }
     };
     let workers = Workers {

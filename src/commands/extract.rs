@@ -48,9 +48,13 @@ pub fn run(args: &Extract) -> Result<Outcome, Failure> {
 
 /// `time_s`, and the name of the channel with its unit in brackets.
 fn heading(stream: &ChannelStream) -> Vec<u8> {
-    let mut name = stream.name.clone();
+    let mut name = print::visible(stream.name.clone());
     if let Some(unit) = &stream.unit {
         name = format!("{name} [{}]", unit.text);
+    }
+    // A spreadsheet would take it for a formula.
+    if name.starts_with(['=', '+', '-', '@', '\t']) {
+        name.insert(0, '\'');
     }
     if name.contains([',', '"', '\n']) {
         name = format!("\"{}\"", name.replace('"', "\"\""));
