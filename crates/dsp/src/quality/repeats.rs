@@ -85,7 +85,7 @@ fn hold(lengths: &Lengths) -> Option<usize> {
     // Most values are held once: the hold is the most frequent length.
     (2..=LONGEST_HOLD)
         .rev()
-        .find(|k| whole(*k) && 2 * lengths.count(|l| l == *k) > total)
+        .find(|k| 2 * lengths.count(|l| l == *k) > total && whole(*k))
 }
 
 /// Whether more values are held for several samples than the resolution explains.

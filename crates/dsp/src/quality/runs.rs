@@ -57,10 +57,15 @@ pub(super) struct Lengths {
 
 impl Lengths {
     pub(super) fn of(runs: impl Iterator<Item = Run>) -> Self {
-        let mut counts = vec![0; LONGEST + 1];
+        // As long as the longest run: tables of many short columns are gone through as well.
+        let mut counts = Vec::new();
         let mut total = 0;
         for run in runs {
-            counts[run.length.min(LONGEST)] += 1;
+            let length = run.length.min(LONGEST);
+            if length >= counts.len() {
+                counts.resize(length + 1, 0);
+            }
+            counts[length] += 1;
             total += 1;
         }
         Self { counts, total }
@@ -84,7 +89,7 @@ impl Lengths {
     pub(super) fn quantile(&self, part: f64) -> Option<usize> {
         let wanted = (part * self.total as f64).ceil().max(1.0) as usize;
         let mut sum = 0;
-        (0..=LONGEST).find(|length| {
+        (0..self.counts.len()).find(|length| {
             sum += self.counts[*length];
             sum >= wanted
         })
