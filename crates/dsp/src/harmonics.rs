@@ -24,6 +24,8 @@ pub use refine::refine_fundamental;
 
 /// Steps after which a rotating phasor is set anew, so that rounding does not add up.
 const RESET_STEPS: usize = 512;
+/// Phasors that rotate side by side.
+const TURNS: usize = 4;
 /// Bins of the residual's periodogram, on either side of a component, that its uncertainty is taken
 /// from. The nearest one is left out: the fit has emptied it.
 const NEAR_BINS: std::ops::RangeInclusive<usize> = 2..=12;
@@ -344,13 +346,24 @@ fn projections(samples: &[f64], steps: &[f64]) -> (DVector<f64>, DVector<f64>) {
 
 /// Calls `visit(i, e^{jω(i − (N−1)/2)})` for every sample.
 fn rotate(length: usize, step: f64, mut visit: impl FnMut(usize, Complex64)) {
-    let advance = Complex64::from_polar(1.0, step);
     let middle = 0.5 * (length - 1) as f64;
+    // A turn waits for the one before: several go side by side.
+    let ahead: [Complex64; TURNS] =
+        std::array::from_fn(|k| Complex64::from_polar(1.0, step * k as f64));
+    let advance = Complex64::from_polar(1.0, step * TURNS as f64);
     for start in (0..length).step_by(RESET_STEPS) {
-        let mut turn = Complex64::from_polar(1.0, step * (start as f64 - middle));
-        for i in start..(start + RESET_STEPS).min(length) {
+        let first = Complex64::from_polar(1.0, step * (start as f64 - middle));
+        let mut turns = ahead.map(|turn| first * turn);
+        let end = (start + RESET_STEPS).min(length);
+        let whole = end - (end - start) % TURNS;
+        for i in (start..whole).step_by(TURNS) {
+            for (k, turn) in turns.iter_mut().enumerate() {
+                visit(i + k, *turn);
+                *turn *= advance;
+            }
+        }
+        for (i, turn) in (whole..end).zip(turns) {
             visit(i, turn);
-            turn *= advance;
         }
     }
 }

@@ -11,6 +11,10 @@ use crate::Error;
 const LONGEST_SEARCH: usize = 1 << 17;
 /// Steps of the refinement at one length of record.
 const STEPS: usize = 30;
+/// Turns at the ends of a record within which its frequency must be known before a record of twice the length is looked at.
+const KEPT_TURNS: f64 = 1e-3;
+/// The same for the whole record: rounding in the phase at its ends is the floor.
+const LAST_TURNS: f64 = 1e-10;
 
 /// Finds the fundamental near `start_hz`, within `span` of it (0.01 is one per cent).
 ///
@@ -46,7 +50,11 @@ pub fn refine_fundamental(
     let mut frequency_hz = search(&samples[..length], sample_rate_hz, start_hz, span, orders);
     loop {
         let piece = &samples[..length];
-        let refined = settle(piece, sample_rate_hz, frequency_hz, orders)?;
+        let turns = match length == samples.len() {
+            true => LAST_TURNS,
+            false => KEPT_TURNS,
+        };
+        let refined = settle(piece, sample_rate_hz, frequency_hz, orders, turns)?;
         if (refined.frequency_hz / start_hz - 1.0).abs() > span {
             return Err(Error::NotRefined {
                 start_hz,
@@ -91,12 +99,14 @@ fn search(samples: &[f64], rate_hz: f64, start_hz: f64, span: f64, orders: &[f64
         .0
 }
 
-/// Gauss-Newton on the frequency, the amplitudes being fitted anew at each step.
+/// Gauss-Newton on the frequency, the amplitudes being fitted anew at each step, until a step turns the ends of the record
+/// by less than `turns`.
 fn settle(
     samples: &[f64],
     rate_hz: f64,
     mut frequency_hz: f64,
     orders: &[f64],
+    turns: f64,
 ) -> Result<Fundamental, Error> {
     let start_hz = frequency_hz;
     let duration_s = samples.len() as f64 / rate_hz;
@@ -104,8 +114,9 @@ fn settle(
         let fit = SineFit::solve(samples, rate_hz, frequency_hz, orders)?;
         let residual = fit.residual(samples);
         let slope = fit.slope(orders, rate_hz);
+        // The residual has nothing in common with what the amplitudes can take up.
         let pull = slope.iter().zip(&residual).map(|(d, r)| d * r).sum::<f64>();
-        let weight = sum_squares(&slope);
+        let weight = sum_squares(&slope) - fit.taken_up(&slope);
         if weight <= 0.0 {
             break;
         }
@@ -114,8 +125,7 @@ fn settle(
         if !(frequency_hz > 0.0 && frequency_hz.is_finite()) {
             break;
         }
-        // Rounding in the phase at the ends of the record is the floor.
-        if step_hz.abs() < 1e-10 / duration_s {
+        if step_hz.abs() < turns / duration_s {
             let std_hz = fit.std_of_frequency(&residual, rate_hz, frequency_hz, orders, weight);
             return Ok(Fundamental {
                 frequency_hz,
@@ -130,7 +140,7 @@ fn settle(
 }
 
 impl SineFit {
-    /// Derivative of the model by the fundamental, less what the amplitudes can take up.
+    /// Derivative of the model by the fundamental.
     fn slope(&self, orders: &[f64], rate_hz: f64) -> Vec<f64> {
         let middle = 0.5 * (self.length - 1) as f64;
         let mut slope = vec![0.0; self.length];
@@ -141,16 +151,13 @@ impl SineFit {
                 slope[i] -= (i as f64 - middle) * (phasor * turn).im;
             });
         }
-        let (even, odd) = super::projections(&slope, &self.steps);
-        let taken = Self {
-            steps: self.steps.clone(),
-            length: self.length,
-            even: self.even_gram.solve(&even),
-            odd: self.odd_gram.solve(&odd),
-            even_gram: self.even_gram.clone(),
-            odd_gram: self.odd_gram.clone(),
-        };
-        taken.residual(&slope)
+        slope
+    }
+
+    /// Sum of squares of the part of a signal that mean and amplitudes can take up: `bᵀ G⁻¹ b`.
+    fn taken_up(&self, signal: &[f64]) -> f64 {
+        let (even, odd) = super::projections(signal, &self.steps);
+        even.dot(&self.even_gram.solve(&even)) + odd.dot(&self.odd_gram.solve(&odd))
     }
 
     /// `σ²_f = Σ_k w_k S(f_k)(f_s/2) / (Σ w_k)²`, `w_k` being the part of the slope's square that

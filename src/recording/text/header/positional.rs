@@ -1,5 +1,7 @@
 //! Columns named by the rows nearest above the data.
 
+use std::collections::HashSet;
+
 use super::Row;
 use super::field::Field;
 use super::keyed::{is_key_block, is_key_with_values, is_list_of_quantities, repeats_a_key};
@@ -269,9 +271,7 @@ pub(super) fn is_units(cells: &[String]) -> bool {
                 || units::as_written(cell).is_none()
         })
         .count();
-    let repeats = filled
-        .iter()
-        .any(|cell| filled.iter().filter(|c| c == &cell).count() > 1);
+    let repeats = !all_differ(filled.iter().copied());
     known > 0 && (repeats || 2 * like > filled.len()) || bracketed > 0 && bracketed == filled.len()
 }
 
@@ -330,6 +330,11 @@ fn is_of_channels(row: &Row) -> bool {
     row.cells.len() > 1 && row.cells[1..].iter().all(counts)
 }
 
+fn all_differ<'a>(cells: impl IntoIterator<Item = &'a String>) -> bool {
+    let mut seen = HashSet::new();
+    cells.into_iter().all(|cell| seen.insert(cell))
+}
+
 /// A row above the names that tells columns of the same name apart: `CH 1`, `CH 2` above `Voltage`.
 fn upper_names<'a>(names: &Row, fitting: &[&'a Row<'a>], used: &[bool]) -> Option<&'a Row<'a>> {
     let cells = |row: &Row| -> Vec<String> {
@@ -337,12 +342,8 @@ fn upper_names<'a>(names: &Row, fitting: &[&'a Row<'a>], used: &[bool]) -> Optio
             .filter_map(|place| row.cells.get(place).cloned())
             .collect()
     };
-    let is_distinct = |cells: &[String]| {
-        cells
-            .iter()
-            .enumerate()
-            .all(|(place, cell)| !cell.is_empty() && !cells[..place].contains(cell))
-    };
+    let is_distinct =
+        |cells: &[String]| cells.iter().all(|cell| !cell.is_empty()) && all_differ(cells);
     let own = cells(names);
     if own.len() < 2 || is_distinct(&own) {
         return None;
