@@ -183,7 +183,7 @@ pub struct Compensate {
     /// Format of the result [default: mcap if the output file ends in .mcap, else csv]
     #[arg(long, value_enum)]
     pub format: Option<Format>,
-    /// Topic of the result in an MCAP file [default: /torqcomp/torque]
+    /// Topic of the result in an MCAP file [default: /torqcomp/compensated_torque]
     #[arg(long, value_name = "TOPIC")]
     pub output_topic: Option<String>,
     /// Significant digits of the result, 1 to 15, or "shortest" for the fewest that restore every bit
@@ -241,9 +241,9 @@ pub struct Harmonics {
     /// The result.
     #[command(flatten)]
     pub result: OutputArgs,
-    /// Stand file
+    /// Stand file; not needed for a result of compensate
     #[arg(long, value_name = "FILE")]
-    pub stand: PathBuf,
+    pub stand: Option<PathBuf>,
     /// Fundamental frequency
     #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = positive_frequency)]
     pub fundamental: f64,

@@ -36,14 +36,14 @@ fn the_torque_comes_back_in_both_ways_to_run_it() {
         .concat();
         let ran = folder.run(&args);
         assert_eq!(ran.code, 0, "{}", ran.stderr);
-        let torque = column(&ran.stdout, "torque_n_m");
+        let torque = column(&ran.stdout, "compensated_torque_n_m");
         let inside = 400..100_000 - 400;
         let error = largest_difference(&torque[inside.clone()], &acted[inside]);
         assert!(error < 2e-9, "{more:?}: {error:e}");
     }
     // With the default digits the difference is that of the last digit.
     let ran = folder.run(&["compensate", "in.csv", "--stand", "stand.toml", "-q"]);
-    let torque = column(&ran.stdout, "torque_n_m");
+    let torque = column(&ran.stdout, "compensated_torque_n_m");
     assert!(largest_difference(&torque[400..99_600], &acted[400..99_600]) < 2e-9);
 }
 
@@ -70,7 +70,7 @@ fn stream_and_whole_record_agree() {
         .concat();
         let ran = folder.run(&args);
         assert_eq!(ran.code, 0, "{}", ran.stderr);
-        column(&ran.stdout, "torque_n_m")
+        column(&ran.stdout, "compensated_torque_n_m")
     };
     let (stream, whole) = (run(&[]), run(&["--whole-record"]));
     let full_scale = whole.iter().fold(0.0_f64, |m, y| m.max(y.abs()));
@@ -96,10 +96,14 @@ fn units_and_headings() {
             "--with-recorded",
         ])
         .stdout;
-    assert_eq!(table(&si).0, ["time_s", "torque_n_m"]);
+    assert_eq!(table(&si).0, ["time_s", "compensated_torque_n_m"]);
     assert_eq!(
         table(&us).0,
-        ["time_s", "torque_ft_lbf", "recorded_torque_ft_lbf"]
+        [
+            "time_s",
+            "compensated_torque_ft_lbf",
+            "recorded_torque_ft_lbf"
+        ]
     );
     // A constant keeps the static gain, to the first and last sample: 1 ft lbf.
     for row in table(&us).1 {
@@ -140,7 +144,7 @@ fn torque_strain_force_and_volts_are_understood() {
         .concat();
         let ran = folder.run(&args);
         assert_eq!(ran.code, 0, "{heading}: {}", ran.stderr);
-        column(&ran.stdout, "torque_ft_lbf")[250]
+        column(&ran.stdout, "compensated_torque_ft_lbf")[250]
     };
     assert!((constant("bridge_mV", "2", &[]) - 2.46).abs() < 1e-9);
     assert!((constant("Torque [ft lbf]", "3", &[]) - 3.0).abs() < 1e-9);
@@ -179,7 +183,7 @@ fn gage_and_bridge_stand_in_for_a_measured_constant() {
         "-q",
     ]);
     assert_eq!(ran.code, 0, "{}", ran.stderr);
-    let torque = column(&ran.stdout, "torque_ft_lbf")[100];
+    let torque = column(&ran.stdout, "compensated_torque_ft_lbf")[100];
     assert!(
         (torque - 7.0e3 / (22.5 * 157.0) / 12.0).abs() < 1e-6,
         "{torque}"
@@ -209,7 +213,7 @@ fn a_stand_in_other_units_is_compensated_in_them() {
     folder.write("in.csv", format!("time_s,v_out_V\n{rows}"));
     let ran = folder.run(&["compensate", "in.csv", "--stand", "stand.toml", "-q"]);
     assert_eq!(ran.code, 0, "{}", ran.stderr);
-    let applied = column(&ran.stdout, "applied_v");
+    let applied = column(&ran.stdout, "compensated_applied_v");
     for (i, y) in applied.iter().enumerate().skip(500).take(3000) {
         let want = (std::f64::consts::TAU * 300.0 * i as f64 / 20_000.0).cos();
         assert!((y - want).abs() < 1e-8, "{i}");
@@ -249,7 +253,7 @@ fn recorder_low_pass_and_delay_are_divided_out() {
     folder.write("in.csv", record(&shown, rate));
     let ran = folder.run(&["compensate", "in.csv", "--stand", "stand.toml", "-q"]);
     assert_eq!(ran.code, 0, "{}", ran.stderr);
-    let torque = column(&ran.stdout, "torque_n_m");
+    let torque = column(&ran.stdout, "compensated_torque_n_m");
     assert!(largest_difference(&torque[600..19_400], &acted[600..19_400]) < 1e-8);
 }
 
@@ -264,10 +268,10 @@ fn the_zero_of_the_recorder_counts_on_every_way_to_torque() {
     for (stand, heading, expected) in [
         (
             "[calibration]\ntorque_per_volt = \"100 N m/V\"\n",
-            "torque_n_m",
+            "compensated_torque_n_m",
             10.0,
         ),
-        ("static_gain = \"2 V/N\"\n", "force_n", 0.05),
+        ("static_gain = \"2 V/N\"\n", "compensated_force_n", 0.05),
     ] {
         folder.write(
             "stand.toml",
@@ -415,14 +419,14 @@ fn resampling_says_what_it_did() {
     assert_eq!(report["resampled"]["samples_in"], 19_995);
     assert_eq!(report["resampled"]["samples_out"], 20_000);
     assert_eq!(report["warnings"][0]["code"], "resampled-gaps");
-    let torque = column(&folder.read("out.csv"), "torque_n_m");
+    let torque = column(&folder.read("out.csv"), "compensated_torque_n_m");
     assert_eq!(torque.len(), 20_000);
     assert!(largest_difference(&torque[500..8500], &acted[500..8500]) < 1e-4);
     assert_eq!(report["resampled"]["repeated"], 0);
     // Both ways to run it resample alike.
     let whole = [&args[..5], &["-o", "whole.csv", "--whole-record"]].concat();
     assert_eq!(folder.run(&whole).code, 0);
-    let whole = column(&folder.read("whole.csv"), "torque_n_m");
+    let whole = column(&folder.read("whole.csv"), "compensated_torque_n_m");
     assert!(largest_difference(&torque, &whole) < 1e-8);
 }
 
@@ -444,7 +448,7 @@ fn the_example_gives_back_the_torque_that_went_in() {
     ]);
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     let report: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
-    let torque = column(&folder.read("torque.csv"), "torque_ft_lbf");
+    let torque = column(&folder.read("torque.csv"), "compensated_torque_ft_lbf");
     let truth = std::fs::read_to_string(path("torque_applied.csv")).unwrap();
     let truth = column(truth.split_once('\n').unwrap().1, "torque_ft_lbf");
     let error: Vec<f64> = torque.iter().zip(&truth).map(|(a, b)| a - b).collect();

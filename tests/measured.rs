@@ -323,7 +323,10 @@ fn silverbox(folder: &Path) -> Result<(), Failed> {
     let path = file.to_str().unwrap_or_default();
     let (code, out, err) = run(stand, &["compensate", path, "--channel", "v2_out"])?;
     check(code == 0, &err)?;
-    check(out.starts_with("time_s,applied_v\n"), &out[..40])?;
+    check(
+        out.starts_with("time_s,compensated_applied_v\n"),
+        &out[..40],
+    )?;
     let (code, _, err) = run(stand, &["compensate", path])?;
     check(code == 1 && err.contains("\"v1_in\" or \"v2_out\""), &err)
 }

@@ -139,7 +139,7 @@ fn a_reader_that_goes_away_is_no_failure() {
     drop(pipe);
     let ran = child.wait_with_output().expect("the binary ends");
     assert_eq!(ran.status.code(), Some(0));
-    assert!(start.starts_with(b"time_s,torque_n_m\n0,"));
+    assert!(start.starts_with(b"time_s,compensated_torque_n_m\n0,"));
 }
 
 #[cfg(unix)]

@@ -109,7 +109,7 @@ fn round_trip(effect: &Effect, form: &Form) -> (f64, f64, String) {
         .concat(),
     );
     assert_eq!(ran.code, 0, "{} {}: {}", effect.name, form.name, ran.stderr);
-    let back = column(&folder.read("torque.csv"), "torque_n_m");
+    let back = column(&folder.read("torque.csv"), "compensated_torque_n_m");
     let size = rms((0..COUNT).map(torque));
     let error = |range: std::ops::Range<usize>| rms(range.map(|i| back[i] - torque(i))) / size;
     let ends = error(0..COUNT / 20).max(error(COUNT - COUNT / 20..COUNT));
@@ -235,7 +235,7 @@ fn recovered(effect: &'static str, number: usize) -> Option<Recovered> {
         ];
         let ran = folder.run(&args);
         assert_eq!(ran.code, 0, "{effect} {}: {}", variant.name, ran.stderr);
-        let back = column(&ran.stdout, "torque_n_m");
+        let back = column(&ran.stdout, "compensated_torque_n_m");
         let inner = acted.len() / 20..acted.len() * 19 / 20;
         let mean = inner.clone().map(|i| back[i] - acted[i]).sum::<f64>() / inner.len() as f64;
         (rms(inner.map(|i| back[i] - acted[i] - mean)), ran.stderr)

@@ -17,6 +17,7 @@ mod inspect;
 mod measuring_chains;
 mod messages;
 mod noise;
+mod once;
 mod output;
 mod predict;
 mod recordings;

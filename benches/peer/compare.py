@@ -12,7 +12,7 @@ import sys
 import numpy as np
 import polars as pl
 
-COLUMNS = ["time_s", "torque_n_m"]
+COLUMNS = ["time_s", "compensated_torque_n_m"]
 
 
 def read(path):

@@ -68,7 +68,7 @@ def compensate_tuned(volts, rate_hz):
 def main():
     parser = argparse.ArgumentParser(description="Compensate a record with polars and SciPy.")
     parser.add_argument("record", help="CSV with the columns time_s,bridge_V")
-    parser.add_argument("output", help="CSV to write, time_s,torque_n_m")
+    parser.add_argument("output", help="CSV to write, time_s,compensated_torque_n_m")
     parser.add_argument("--tuned", action="store_true", help="skip frequencies above the edge")
     args = parser.parse_args()
 
@@ -80,7 +80,7 @@ def main():
     rate_hz = (len(time_s) - 1) / (time_s[-1] - time_s[0])
     run = compensate_tuned if args.tuned else compensate
     torque = run(frame["bridge_V"].to_numpy(), rate_hz)
-    pl.DataFrame({"time_s": time_s, "torque_n_m": torque}).write_csv(args.output)
+    pl.DataFrame({"time_s": time_s, "compensated_torque_n_m": torque}).write_csv(args.output)
 
 
 if __name__ == "__main__":

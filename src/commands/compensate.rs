@@ -19,8 +19,8 @@ use super::{Outcome, conclude, open_plot, uncertainty, unit_text};
 use crate::cli::{self, OneChannel};
 use crate::failure::Failure;
 use crate::inverse::ChainInverse;
-use crate::io::Input;
 use crate::io::output;
+use crate::io::{COMPENSATED, Input};
 use crate::print::{self, Report};
 use crate::recording::{ChannelStream, StreamSummary};
 use crate::stand::{self, Calibration, Stand};
@@ -84,6 +84,19 @@ pub fn run(args: &cli::Compensate) -> Result<Outcome, Failure> {
     ))
 }
 
+/// Refuses a result of `compensate`: the stand's response must not be divided out twice.
+fn refuse_compensated(stream: &ChannelStream) -> Result<(), Failure> {
+    if !stream.is_compensated {
+        return Ok(());
+    }
+    Err(Failure::failed(format_args!(
+        "{}: \"{}\" is marked as compensated: the stand's response is already divided out of it; compensate the recorded \
+         channel instead, take this one as it is (harmonics needs no --stand for it), or, if it is a recorded signal, \
+         rename it without \"{COMPENSATED}\"",
+        stream.source, stream.name
+    )))
+}
+
 impl Plan {
     fn new(args: &cli::Compensate) -> Result<Self, Failure> {
         let stand = stand::read(&args.stand)?;
@@ -94,6 +107,7 @@ impl Plan {
             reading,
         } = &args.record;
         let stream = ChannelStream::open(&Input::of(input), choice, reading)?;
+        refuse_compensated(&stream)?;
         let chain = stand.calibration(stream.channel(), args.units.into())?;
         let band = match args.band {
             Some(band_hz) => Band::new(stream.rate_hz, band_hz),
@@ -123,6 +137,7 @@ impl Plan {
             dialect: stream.dialect.clone(),
             channel: stream.name.clone(),
             channel_unit: unit_text(stream.unit.as_ref()).to_owned(),
+            taken_as: "recorded",
             stand: self.stand.file.clone(),
             output: output.to_owned(),
             unit: chain.applied.unit.clone(),

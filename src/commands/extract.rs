@@ -6,7 +6,7 @@ use crate::cli::{Extract, OneChannel};
 use crate::failure::Failure;
 use crate::io::output::Output;
 use crate::io::text::Text;
-use crate::io::{Input, Reading};
+use crate::io::{COMPENSATED, Input, Reading, names_compensated};
 use crate::print;
 use crate::recording::{Block, ChannelStream, StreamSummary, UniformRecord};
 
@@ -49,6 +49,9 @@ pub fn run(args: &Extract) -> Result<Outcome, Failure> {
 /// `time_s`, and the name of the channel with its unit in brackets.
 fn heading(stream: &ChannelStream) -> Vec<u8> {
     let mut name = print::visible(stream.name.clone());
+    if stream.is_compensated && !names_compensated(&name) {
+        name = format!("{COMPENSATED}{name}");
+    }
     if let Some(unit) = &stream.unit {
         name = format!("{name} [{}]", unit.text);
     }

@@ -1,15 +1,18 @@
 //! `harmonics`: component torques at a fundamental and its orders.
 
 use std::fmt::Write;
+use std::path::Path;
 
 use num_complex::Complex64;
 use serde::Serialize;
+use torqcomp_dsp::compensate::Inverse;
 use torqcomp_dsp::harmonics::{self, Fundamental, refine_fundamental};
+use torqcomp_model::UnitSystem;
 
 use super::{Outcome, conclude, publish, unit_text};
 use crate::cli::{self, OneChannel};
 use crate::failure::Failure;
-use crate::io::Input;
+use crate::io::{COMPENSATED, Input};
 use crate::print::{Report, columns, rounded, short};
 use crate::quality::excerpt;
 use crate::recording::{ChannelStream, UniformRecord};
@@ -30,7 +33,10 @@ struct HarmonicsReport {
     channel: String,
     /// Its unit in the file.
     channel_unit: String,
-    stand: String,
+    /// `recorded` where the stand's response is divided out, `compensated` where that was done before.
+    taken_as: &'static str,
+    /// `null` for a compensated record.
+    stand: Option<String>,
     /// How the record became torque at rest.
     calibration: String,
     /// Unit of `mean`, `recorded`, `torque`, `std` and `residual_rms`.
@@ -77,22 +83,22 @@ struct ComponentTorque {
 
 /// Runs the verb.
 pub fn run(args: &cli::Harmonics) -> Result<Outcome, Failure> {
-    let stand = stand::read(&args.stand)?;
-    stand.mechanics()?;
+    let stand = args.stand.as_deref().map(stand::read).transpose()?;
     let OneChannel {
         input,
         choice,
         reading,
     } = &args.record;
     let stream = ChannelStream::open(&Input::of(input), choice, reading)?;
-    let chain = stand.calibration(stream.channel(), args.units.into())?;
-    let inputs = [args.record.input.as_ref(), args.stand.as_path()];
+    let way = WayBack::new(&stream, stand, args.units.into())?;
+    let inputs = [Some(args.record.input.as_ref()), args.stand.as_deref()];
+    let inputs: Vec<&Path> = inputs.into_iter().flatten().collect();
     let output = args.result.open(&inputs)?;
     let source = stream.source.clone();
     let (name, unit) = (stream.name.clone(), stream.unit.clone());
-    let record = UniformRecord::read(stream, |values| super::convert(&chain, values))?;
+    let record = UniformRecord::read(stream, |values| super::convert(&way.chain, values))?;
     let channel = (name.as_str(), unit.as_ref());
-    let report = fit(args, &stand, &chain, &record, &source, channel);
+    let report = fit(args, &way, &record, &source, channel);
     let report = report.map_err(|failure| failure.at(&source))?;
     publish(&report, args.json, output)?;
     Ok(conclude(
@@ -102,10 +108,58 @@ pub fn run(args: &cli::Harmonics) -> Result<Outcome, Failure> {
     ))
 }
 
+/// From the record to the torque that acted.
+struct WayBack {
+    chain: Calibration,
+    /// The stand and its inverse response; none for a record that is compensated already.
+    stand: Option<(Stand, Inverse)>,
+}
+
+impl WayBack {
+    fn new(
+        stream: &ChannelStream,
+        stand: Option<Stand>,
+        units: UnitSystem,
+    ) -> Result<Self, Failure> {
+        if stream.is_compensated {
+            let chain = Calibration::of_compensated(stream.channel(), units)?;
+            return Ok(Self { chain, stand: None });
+        }
+        let stand = stand.ok_or_else(|| {
+            Failure::usage(format_args!(
+                "{}: \"{}\" is taken as recorded, with the stand's response in it; give --stand FILE (only a \
+                 channel marked \"{COMPENSATED}\", a result of compensate, needs none)",
+                stream.source, stream.name
+            ))
+        })?;
+        stand.mechanics()?;
+        let chain = stand.calibration(stream.channel(), units)?;
+        let inverse = stand.inverse()?;
+        Ok(Self {
+            chain,
+            stand: Some((stand, inverse)),
+        })
+    }
+
+    /// Applied over recorded torque.
+    fn inverse(&self, frequency_hz: f64) -> Complex64 {
+        match &self.stand {
+            Some((_, inverse)) => inverse(frequency_hz),
+            None => Complex64::ONE,
+        }
+    }
+
+    fn taken_as(&self) -> &'static str {
+        match &self.stand {
+            Some(_) => "recorded",
+            None => "compensated",
+        }
+    }
+}
+
 fn fit(
     args: &cli::Harmonics,
-    stand: &Stand,
-    chain: &Calibration,
+    way: &WayBack,
     record: &UniformRecord,
     source: &str,
     (channel, channel_unit): (&str, Option<&NamedUnit>),
@@ -113,8 +167,15 @@ fn fit(
     let samples = &record.samples;
     let duration_s = samples.len() as f64 / record.rate_hz;
     let mut warnings: Vec<Warning> = record.summary.lost.iter().cloned().collect();
-    let said = [&record.summary.warnings, &stand.warnings, &chain.warnings];
-    warnings.extend(said.into_iter().flatten().cloned());
+    let of_stand = way.stand.iter().flat_map(|(stand, _)| &stand.warnings);
+    let of_chain = way.chain.warnings.iter();
+    let said = record
+        .summary
+        .warnings
+        .iter()
+        .chain(of_stand)
+        .chain(of_chain);
+    warnings.extend(said.cloned());
     let orders = visible_orders(args, record.rate_hz, &mut warnings)?;
     let fundamental = if args.refine {
         let span = 0.01 * args.refine_span;
@@ -131,12 +192,12 @@ fn fit(
     let start_s = record.start_s - reference_s;
     let found = harmonics::fit(samples, record.rate_hz, start_s, fundamental, &orders)?;
 
-    let inverse = stand.inverse()?;
+    let chain = &way.chain;
     let printed = 1.0 / chain.applied.factor;
     let components: Vec<ComponentTorque> = found
         .components
         .iter()
-        .map(|c| component(c, inverse(c.frequency_hz), printed, stand, chain))
+        .map(|c| component(c, printed, way))
         .collect();
     warnings.extend(lost_warning(&components));
     warnings.extend(mains_warning(&components, duration_s));
@@ -156,7 +217,8 @@ fn fit(
         input: source.to_owned(),
         channel: channel.to_owned(),
         channel_unit: unit_text(channel_unit).to_owned(),
-        stand: stand.file.clone(),
+        taken_as: way.taken_as(),
+        stand: way.stand.as_ref().map(|(stand, _)| stand.file.clone()),
         calibration: chain.described.clone(),
         unit: chain.applied.unit.clone(),
         samples: samples.len(),
@@ -165,7 +227,7 @@ fn fit(
         fundamental_hz: fundamental.frequency_hz,
         fundamental_std_hz: fundamental.std_hz,
         phase_reference_s: reference_s,
-        mean: found.mean * inverse(0.0).re * printed,
+        mean: found.mean * way.inverse(0.0).re * printed,
         components,
         residual_rms: found.residual_rms * printed,
         warnings,
@@ -206,17 +268,14 @@ fn visible_orders(
     Ok(seen)
 }
 
-fn component(
-    fitted: &harmonics::Component,
-    inverse: Complex64,
-    printed: f64,
-    stand: &Stand,
-    chain: &Calibration,
-) -> ComponentTorque {
+fn component(fitted: &harmonics::Component, printed: f64, way: &WayBack) -> ComponentTorque {
+    let inverse = way.inverse(fitted.frequency_hz);
     let factor = inverse.norm();
     let recorded = fitted.phasor.norm() * printed;
     let torque = recorded * factor;
-    let of_stand = super::uncertainty(stand, chain, fitted.frequency_hz);
+    let stand = way.stand.as_ref();
+    let of_stand =
+        stand.and_then(|(stand, _)| super::uncertainty(stand, &way.chain, fitted.frequency_hz));
     ComponentTorque {
         order: fitted.order,
         frequency_hz: fitted.frequency_hz,
@@ -283,12 +342,13 @@ impl Report for HarmonicsReport {
             .fundamental_std_hz
             .map_or_else(String::new, |std| format!(" ± {}", rounded(std, 2)));
         let mut text = format!(
-            "{}, {} in {}: {} samples at {} Hz, {} s\n\
+            "{}, {} in {}, taken as {}: {} samples at {} Hz, {} s\n\
              torque = mean + sum of A cos(2 pi f t + phase), A being the peak, t = 0 at {} s\n\
              fundamental {}{std} Hz, mean {} {}, residual {} {} rms\n\n",
             self.input,
             self.channel,
             self.channel_unit,
+            self.taken_as_text(),
             self.samples,
             short(self.rate_hz),
             rounded(self.duration_s, 5),
@@ -319,6 +379,15 @@ impl Report for HarmonicsReport {
         rows.extend(self.components.iter().map(|c| c.cells(with_stand)));
         let _ = write!(text, "{}", columns(&rows));
         text
+    }
+}
+
+impl HarmonicsReport {
+    fn taken_as_text(&self) -> String {
+        match &self.stand {
+            Some(stand) => format!("{} (the response of {stand} is divided out)", self.taken_as),
+            None => format!("{} (no stand is divided out)", self.taken_as),
+        }
     }
 }
 

@@ -2,6 +2,7 @@
 
 pub mod digits;
 mod input;
+mod mark;
 pub mod mcap;
 pub mod number;
 pub mod output;
@@ -10,6 +11,7 @@ mod reading;
 pub mod text;
 
 pub use input::Input;
+pub(crate) use mark::{COMPENSATED, names_compensated};
 pub use parts::remove_when_interrupted;
 pub use reading::{ChannelChoice, Delimiter, DialectOverride, Flags, Reading};
 pub(crate) use reading::{frequency, positive_frequency};

@@ -7,7 +7,7 @@ use super::stamps::StampGrid;
 use super::stream::ChannelStream;
 use super::{Channel, HoleKind, RateFrom, Recording, TimeAxis};
 use crate::failure::Failure;
-use crate::io::{ChannelChoice, Reading};
+use crate::io::{ChannelChoice, Reading, names_compensated};
 use crate::warning::Warning;
 
 /// Samples of a block.
@@ -46,6 +46,7 @@ impl ChannelStream {
         warnings.extend(selection.warnings.iter().cloned());
         Ok(Self {
             dialect: recording.dialect.clone(),
+            is_compensated: names_compensated(&channel.heading),
             name: channel.name.clone(),
             unit: selection.unit.clone(),
             unit_text: channel.unit_text.clone(),

@@ -71,6 +71,7 @@ impl ChannelStream {
         Ok(Self {
             source: name,
             dialect: format!("MCAP, {}", messages::describe(&chosen)),
+            is_compensated: chosen.is_compensated,
             name: channel,
             unit,
             unit_text: chosen.unit.as_ref().map(|found| found.unit.clone()),

@@ -11,7 +11,7 @@ use super::text::{ChannelPlan, TextFile, TextStream};
 use super::validator::{StreamValidator, TextLines};
 use super::{RateFrom, TimeAxis, checkpoints};
 use crate::failure::Failure;
-use crate::io::{ChannelChoice, Input, Reading};
+use crate::io::{ChannelChoice, Input, Reading, names_compensated};
 use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
 
@@ -30,6 +30,8 @@ pub(crate) struct ChannelStream {
     pub(crate) unit: Option<NamedUnit>,
     /// Its unit as the file writes it, known or not.
     pub(crate) unit_text: Option<String>,
+    /// Whether it is a result of `compensate`: the stand's response is no longer in it.
+    pub(crate) is_compensated: bool,
     /// How its samples lie in time.
     pub(crate) time: TimeAxis,
     /// Samples a second.
@@ -143,6 +145,7 @@ impl ChannelStream {
         warnings.extend(selection.warnings);
         Ok(Self {
             dialect: first_rows.dialect.clone(),
+            is_compensated: names_compensated(&selection.channel.heading),
             name: selection.channel.name.clone(),
             unit: selection.unit,
             unit_text: selection.channel.unit_text.clone(),

@@ -89,6 +89,30 @@ pub fn applied_by_unit(text: &str, units: UnitSystem) -> Result<Applied, Failure
     })
 }
 
+impl Calibration {
+    /// Of a channel that is compensated already: it is the applied quantity in its unit.
+    ///
+    /// # Errors
+    /// If the unit is not known.
+    pub fn of_compensated(channel: RecordedChannel, units: UnitSystem) -> Result<Self, Failure> {
+        let named = channel.unit.ok_or_else(|| {
+            let name = channel.name;
+            Failure::failed(format_args!(
+                "the channel \"{name}\" does not say its unit; give it with --unit \"N m\" (or \"ft lbf\", N)"
+            ))
+        })?;
+        Ok(Self {
+            recorded_factor: named.unit.factor(),
+            conversion: Conversion::linear(1.0, 0.0).map_err(Failure::failed)?,
+            zero: 0.0,
+            applied: applied_by_unit(&named.text, units)?,
+            described: "compensated already; used without change".to_owned(),
+            relative_std: None,
+            warnings: Vec::new(),
+        })
+    }
+}
+
 impl Stand {
     /// The calibration of a channel.
     ///

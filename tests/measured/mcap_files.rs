@@ -123,7 +123,7 @@ pub fn copied(folder: &Path) -> Result<(), Failed> {
     ] {
         let before = scan(folder, name)?;
         let added = Added {
-            topic: "/torqcomp/torque".to_owned(),
+            topic: "/torqcomp/compensated_torque".to_owned(),
             name: "torque".to_owned(),
             encoding,
         };
@@ -147,7 +147,12 @@ pub fn copied(folder: &Path) -> Result<(), Failed> {
         let (channels, chunks) = (after.channels.len(), after.chunks[0].chunks);
         check(channels == before.channels.len() + 1, channels)?;
         check(chunks == before.chunks[0].chunks + 1, chunks)?;
-        let (times, values, _) = read(out.path(), "out.mcap", "/torqcomp/torque", "effort[0]")?;
+        let (times, values, _) = read(
+            out.path(),
+            "out.mcap",
+            "/torqcomp/compensated_torque",
+            "effort[0]",
+        )?;
         check(times[0] == start && values[999] == 999.0 * 0.1, values[999])?;
     }
     Ok(())

@@ -17,7 +17,7 @@ from mcap_protobuf.decoder import DecoderFactory as Protobuf
 from mcap_ros1.decoder import DecoderFactory as Ros1
 from mcap_ros2.decoder import DecoderFactory as Ros2
 
-TOPIC = "/torqcomp/torque"
+TOPIC = "/torqcomp/compensated_torque"
 STAND = """schema = "torqcomp.stand/1"
 [mechanics]
 natural_frequency = "60 Hz"
@@ -52,9 +52,9 @@ def everything(reader):
 
 def value(message):
     if isinstance(message, dict):
-        return message["torque_n_m"], message["timestamp"]["sec"] * 10**9 + message["timestamp"]["nsec"]
-    if hasattr(message, "torque_n_m"):
-        return message.torque_n_m, message.timestamp.ToNanoseconds()
+        return message["compensated_torque_n_m"], message["timestamp"]["sec"] * 10**9 + message["timestamp"]["nsec"]
+    if hasattr(message, "compensated_torque_n_m"):
+        return message.compensated_torque_n_m, message.timestamp.ToNanoseconds()
     stamp = message.header.stamp
     if hasattr(stamp, "secs"):
         return message.effort[0], stamp.secs * 10**9 + stamp.nsecs

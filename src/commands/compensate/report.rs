@@ -17,6 +17,8 @@ pub(super) struct CompensateReport {
     pub(super) dialect: String,
     pub(super) channel: String,
     pub(super) channel_unit: String,
+    /// `recorded`: the stand's response is in the channel and is divided out.
+    pub(super) taken_as: &'static str,
     pub(super) stand: String,
     pub(super) output: String,
     /// Topic and field of the result in a file of messages.
@@ -121,7 +123,10 @@ impl Report for CompensateReport {
         line("input", format!("{} ({})", self.input, self.dialect));
         line(
             "channel",
-            format!("{} in {}", self.channel, self.channel_unit),
+            format!(
+                "{} in {}, taken as recorded",
+                self.channel, self.channel_unit
+            ),
         );
         line("calibration", self.calibration.clone());
         line(

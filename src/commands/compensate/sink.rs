@@ -9,15 +9,12 @@ use super::report::CompensateReport;
 use crate::cli::{Compensate, Format};
 use crate::commands::rows::Rows;
 use crate::failure::Failure;
-use crate::io::Input;
 use crate::io::mcap::Writer;
-use crate::io::mcap::writer::Added;
+use crate::io::mcap::writer::{self, Added};
 use crate::io::output::Output;
+use crate::io::{COMPENSATED, Input};
 use crate::recording::MessageOrigin;
 use crate::stand::Calibration;
-
-/// Topic of the result unless another is named.
-const TOPIC: &str = "/torqcomp/torque";
 
 /// An open result, and its picture as far as one is drawn.
 pub(super) struct Sink {
@@ -118,7 +115,11 @@ impl Sink {
 impl Messages {
     fn open(args: &Compensate, plan: &Plan, output: Output) -> Result<Self, Failure> {
         let origin = origin(args, plan)?;
-        let topic = args.output_topic.as_deref().unwrap_or(TOPIC).to_owned();
+        let topic = args
+            .output_topic
+            .as_deref()
+            .unwrap_or(writer::TOPIC)
+            .to_owned();
         let encoding = origin.encoding.ok_or_else(|| {
             Failure::failed("the messages have an encoding that torqcomp does not write")
         })?;
@@ -150,8 +151,8 @@ impl Messages {
 fn heading(chain: &Calibration, with_recorded: bool) -> String {
     let applied = chain.applied.heading();
     match with_recorded {
-        true => format!("time_s,{applied},recorded_{applied}\n"),
-        false => format!("time_s,{applied}\n"),
+        true => format!("time_s,{COMPENSATED}{applied},recorded_{applied}\n"),
+        false => format!("time_s,{COMPENSATED}{applied}\n"),
     }
 }
 

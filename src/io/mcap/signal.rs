@@ -13,7 +13,9 @@ use super::selection::{FieldRequest, FieldText};
 use super::summary::Tally;
 use super::time::{Stamp, TimeChoice, TimeUsed};
 use super::units::{self, UnitFound};
+use super::writer;
 use crate::failure::Failure;
+use crate::io::names_compensated;
 
 /// Messages looked at before the time is chosen.
 const FIRST: usize = 16;
@@ -40,8 +42,19 @@ pub struct SelectedSignal {
     pub field: String,
     /// Unit, if the file states it.
     pub unit: Option<UnitFound>,
+    /// Whether the channel is marked as a result of `compensate`.
+    pub is_compensated: bool,
     /// Which time counts, and why.
     pub time: TimeUsed,
+}
+
+/// Whether a channel says of itself that it is a result of `compensate`, by its metadata or, where a tool has dropped
+/// them, by its topic or field.
+fn is_compensated(channel: &::mcap::records::Channel, field: &str) -> bool {
+    let marked = channel.metadata.get(writer::COMPENSATED_KEY);
+    marked.is_some_and(|value| value == "true")
+        || channel.topic == writer::TOPIC
+        || field.rsplit('.').next().is_some_and(names_compensated)
 }
 
 /// A signal whose topic has been found.
@@ -107,6 +120,7 @@ impl TopicSignal {
             encoding: channel.record.message_encoding.clone(),
             field: route.text.clone(),
             unit: units::find(&route, &channel.record.metadata),
+            is_compensated: is_compensated(&channel.record, &route.text),
             time: TimeUsed {
                 choice: TimeChoice::Log,
                 field: stamp.as_ref().map(|stamp| stamp.text.clone()),

@@ -29,6 +29,12 @@ use torque::TorqueMessage;
 /// Name of the metadata record with the provenance.
 pub const METADATA: &str = "torqcomp";
 
+/// Topic of the added channel unless another is named.
+pub const TOPIC: &str = "/torqcomp/compensated_torque";
+
+/// Key in the metadata of the added channel that marks it: its value is `true`.
+pub const COMPENSATED_KEY: &str = "compensated";
+
 /// The channel that is added.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Added {
@@ -182,7 +188,9 @@ fn declare(
         schema_id,
         topic: topic.to_owned(),
         message_encoding: torque.message_encoding().to_owned(),
-        metadata: BTreeMap::from([("unit".to_owned(), "N m".to_owned())]),
+        metadata: [("unit", "N m"), (COMPENSATED_KEY, "true")]
+            .map(|(key, value)| (key.to_owned(), value.to_owned()))
+            .into(),
     })?;
     chunk.record(op::CHANNEL, &channel);
     index.channels.insert(id, channel);

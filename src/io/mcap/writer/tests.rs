@@ -187,8 +187,8 @@ fn every_encoding_can_be_read_back() {
     for (encoding, field) in [
         (Encoding::Cdr, "effort[0]"),
         (Encoding::Ros1, "effort[0]"),
-        (Encoding::Protobuf, "torque_n_m"),
-        (Encoding::Json, "torque_n_m"),
+        (Encoding::Protobuf, "compensated_torque_n_m"),
+        (Encoding::Json, "compensated_torque_n_m"),
     ] {
         let after = copy(&before, encoding);
         let (times, values) = read(&after, field);

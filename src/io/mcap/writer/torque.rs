@@ -49,7 +49,7 @@ const JSON_DEFINITION: &str = r#"{
       "properties": {"sec": {"type": "integer", "minimum": 0}, "nsec": {"type": "integer", "minimum": 0, "maximum": 999999999}}
     },
     "name": {"type": "string"},
-    "torque_n_m": {"type": "number", "description": "torque in N m"}
+    "compensated_torque_n_m": {"type": "number", "description": "compensated torque in N m"}
   }
 }
 "#;
@@ -108,7 +108,7 @@ impl TorqueMessage {
     pub fn field(&self) -> &'static str {
         match self.encoding {
             Encoding::Cdr | Encoding::Ros1 => "effort[0]",
-            Encoding::Protobuf | Encoding::Json => "torque_n_m",
+            Encoding::Protobuf | Encoding::Json => "compensated_torque_n_m",
         }
     }
 
@@ -125,7 +125,7 @@ impl TorqueMessage {
                 let value = serde_json::json!({
                     "timestamp": {"sec": seconds, "nsec": nanoseconds},
                     "name": self.name,
-                    "torque_n_m": torque_n_m,
+                    "compensated_torque_n_m": torque_n_m,
                 });
                 out.extend_from_slice(value.to_string().as_bytes());
             }
@@ -190,7 +190,7 @@ struct ProtobufTorque {
 }
 
 /// `message Torque { google.protobuf.Timestamp timestamp = 1; string name = 2;
-/// double torque_n_m = 3; }`, with what it needs.
+/// double compensated_torque_n_m = 3; }`, with what it needs.
 fn descriptor() -> Vec<u8> {
     let stamp_file = "google/protobuf/timestamp.proto";
     let stamp_type = Some(".google.protobuf.Timestamp");
@@ -201,7 +201,7 @@ fn descriptor() -> Vec<u8> {
     let torque = vec![
         field("timestamp", 1, Type::Message, stamp_type),
         field("name", 2, Type::String, None),
-        field("torque_n_m", 3, Type::Double, None),
+        field("compensated_torque_n_m", 3, Type::Double, None),
     ];
     let mut files = vec![
         file(stamp_file, "google.protobuf", "Timestamp", stamp),

@@ -1,0 +1,35 @@
+//! The mark of a result of `compensate`: the stand's response is no longer in it, and no verb divides it out again.
+
+/// Beginning of the heading of a result of `compensate`.
+pub(crate) const COMPENSATED: &str = "compensated_";
+
+/// Whether a heading or the name of a field is that of a result of `compensate`, in any case.
+pub(crate) fn names_compensated(name: &str) -> bool {
+    let front = name.trim_start().get(..COMPENSATED.len());
+    front.is_some_and(|front| front.eq_ignore_ascii_case(COMPENSATED))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::names_compensated;
+
+    #[test]
+    fn only_the_beginning_marks_a_result() {
+        for marked in [
+            "compensated_torque_n_m",
+            "Compensated_Torque [N m]",
+            " compensated_x",
+        ] {
+            assert!(names_compensated(marked), "{marked}");
+        }
+        for unmarked in [
+            "torque_n_m",
+            "compensated",
+            "uncompensated_torque",
+            "temperature_compensated_V",
+            "é",
+        ] {
+            assert!(!names_compensated(unmarked), "{unmarked}");
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! The stand's response is divided out once: results of `compensate` are marked, refused by `compensate`, and taken
+//! as they are by `harmonics`.
+
+use crate::util::{Folder, assert_close, record, steady};
+
+/// 0.30 N m at 590 Hz, where the stand of the thesis shows 7 times as much.
+const PARTS: [(f64, f64, f64); 2] = [(0.5, 0.0, 0.0), (0.30, 590.0, 0.4)];
+
+const HARMONICS: [&str; 7] = [
+    "--fundamental",
+    "590",
+    "--orders",
+    "1",
+    "--json",
+    "--channel",
+    "1",
+];
+
+fn folder() -> Folder {
+    let folder = Folder::new();
+    let (shown, _) = steady(&PARTS, 20_000.0, 20_000);
+    folder.write("in.csv", record(&shown, 20_000.0));
+    folder
+}
+
+#[test]
+fn harmonics_of_a_compensated_record_are_the_torque_without_a_stand() {
+    let folder = folder();
+    let torque = folder.run(&["compensate", "in.csv", "--stand", "stand.toml", "-q"]);
+    assert_eq!(torque.code, 0, "{}", torque.stderr);
+    assert!(torque.stdout.starts_with("time_s,compensated_torque_n_m\n"));
+    for stand in [&[][..], &["--stand", "stand.toml"]] {
+        let args = [&["harmonics", "-"], &HARMONICS[..], stand].concat();
+        let ran = folder.pipe(&args, torque.stdout.as_bytes());
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        let report: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
+        let first = &report["components"][0];
+        let number = |key: &str| first[key].as_f64().unwrap();
+        // The ends of the record depend on its continuation: 34 ms of 1 s.
+        assert_close(number("torque"), 0.30, 5e-3);
+        assert_eq!(number("factor"), 1.0);
+        assert_eq!(number("recorded"), number("torque"));
+        assert_eq!(report["taken_as"], "compensated");
+        assert!(report["stand"].is_null() && first["std_stand"].is_null());
+    }
+    // The same with the stand divided out here, and the text says which of both was done.
+    let direct = folder.run(&[
+        "harmonics",
+        "in.csv",
+        "--stand",
+        "stand.toml",
+        "--fundamental",
+        "590",
+        "--orders",
+        "1",
+    ]);
+    let said = "taken as recorded (the response of stand.toml is divided out)";
+    assert!(direct.stdout.contains(said), "{}", direct.stdout);
+    let args = [
+        &["harmonics", "in.csv", "--stand", "stand.toml"],
+        &HARMONICS[..],
+    ]
+    .concat();
+    let report = folder.json(&args);
+    assert_close(
+        report["components"][0]["torque"].as_f64().unwrap(),
+        0.30,
+        1e-9,
+    );
+    assert_eq!(report["taken_as"], "recorded");
+}
+
+#[test]
+fn a_compensated_record_is_not_compensated_again() {
+    let folder = folder();
+    for units in ["si", "us"] {
+        let args = [
+            "compensate",
+            "in.csv",
+            "--stand",
+            "stand.toml",
+            "--units",
+            units,
+            "--force",
+            "-qo",
+            "out.csv",
+        ];
+        assert_eq!(folder.run(&args).code, 0);
+        let again = folder.run(&["compensate", "out.csv", "--stand", "stand.toml"]);
+        again.says(
+            1,
+            &[
+                "out.csv",
+                "\"compensated_torque\" is marked as compensated",
+                "rename it",
+            ],
+        );
+        assert!(again.stdout.is_empty());
+    }
+    // Another column of the same file is another matter.
+    let both = [
+        "compensate",
+        "in.csv",
+        "--stand",
+        "stand.toml",
+        "--with-recorded",
+        "-qo",
+        "both.csv",
+    ];
+    assert_eq!(folder.run(&both).code, 0);
+    let of = |channel| {
+        [
+            "compensate",
+            "both.csv",
+            "--stand",
+            "stand.toml",
+            "--channel",
+            channel,
+        ]
+    };
+    assert_eq!(folder.run(&of("recorded_torque")).code, 0);
+    folder
+        .run(&of("compensated_torque"))
+        .says(1, &["marked as compensated"]);
+}
+
+#[test]
+fn a_recorded_channel_needs_the_stand() {
+    let folder = folder();
+    let ran = folder.run(&["harmonics", "in.csv", "--fundamental", "590"]);
+    ran.says(2, &["\"bridge\" is taken as recorded", "--stand FILE"]);
+}
