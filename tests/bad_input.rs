@@ -372,7 +372,7 @@ fn stand_files() {
     with(
         "\"8.1e4 ft lbf/rad\"",
         "8.1e4",
-        &["line 5", "no unit", "ft lbf/rad"],
+        &["line 5", "no unit", "N m/rad"],
     );
     with(
         "\"8.1e4",

@@ -521,6 +521,26 @@ fn every_std_of_the_stand_file_is_stated() {
         "[[effects]]\nkind = \"gain-error\"\nerror = { value = \"0.1\", std = \"0.011\" }\n";
     let (magnitude, _) = table(&format!("{MECHANICS}{effect}"));
     assert!((magnitude - 0.01).abs() < 1e-4, "{magnitude}");
+    // A width of ± 1 %, a gage factor of ± 1 %, and for volts a supply of ± 0.5 % and a gain of ± 0.2 %.
+    let drawing = DRAWING
+        .replace(
+            "width = \"20 mm\"",
+            "width = { value = \"20 mm\", std = \"0.2 mm\" }",
+        )
+        .replace(
+            "gage_factor = 2",
+            "gage_factor = { value = \"2\", std = \"0.02\" }",
+        )
+        .replace("gain = 1", "gain = { value = \"1\", std = \"0.002\" }");
+    let supply =
+        "[bridge]\nlayout = \"full\"\nexcitation = { value = \"10 V\", std = \"0.05 V\" }\n";
+    folder.write("stand.toml", format!("{drawing}{supply}"));
+    for (heading, want) in [("U [mV/V]", 2e-4), ("U [mV]", 2e-4 + 25e-6 + 4e-6)] {
+        folder.write("in.csv", record(heading, None, |c| c));
+        let part = amplitude(&folder, &[]).1["components"][0].clone();
+        let stated = part["std_stand"].as_f64().unwrap() / part["torque"].as_f64().unwrap();
+        close(stated * stated, want, heading);
+    }
     // A static gain of 2 mV/N ± 1 %.
     let gain = MECHANICS.to_owned() + "static_gain = { value = \"2 mV/N\", std = \"0.02 mV/N\" }\n";
     folder.write("stand.toml", gain);

@@ -110,6 +110,12 @@ pub(super) fn beam(section: &Section) -> Result<BeamDrawing, Failure> {
         ));
     }
     Ok(BeamDrawing {
+        strain_relative_std: strain_relative_std(
+            section,
+            &shape,
+            [&length, &modulus, &radius],
+            gage_position.as_ref(),
+        )?,
         slender_stiffness: slender_stiffness(section, &shape, &length, &modulus, &radius)?,
         full,
         modulus,
@@ -133,6 +139,26 @@ fn slender_stiffness(
         Beam::new(vec![segment], x[1])?.angular_stiffness_n_m_per_rad(x[2])
     };
     derived(section, Kind::AngularStiffness, &inputs, stiffness)
+}
+
+/// Relative standard uncertainty of the torque per strain of a slender beam, whose lengths and modulus are those of the
+/// drawing.
+fn strain_relative_std(
+    section: &Section,
+    shape: &BeamShape,
+    [length, modulus, radius]: [&Estimate; 3],
+    position: Option<&Estimate>,
+) -> Result<Option<f64>, Failure> {
+    let Some(position) = position else {
+        return Ok(None);
+    };
+    let mut inputs = vec![length, modulus, radius, position];
+    inputs.extend(&shape.sizes);
+    let torque = |x: &[f64]| {
+        let segment = Segment::new(x[0], shape.of(&x[4..])?)?;
+        Beam::new(vec![segment], x[1])?.torque_per_strain_n_m(x[2], x[3])
+    };
+    Ok(derived(section, Kind::Torque, &inputs, torque)?.relative_std())
 }
 
 /// An estimate that follows from others.

@@ -7,6 +7,7 @@ use torqcomp_model::{Estimate, Kind, UnitSystem};
 
 use super::section::Section;
 use super::signal::TransducerSignal;
+use super::static_law::together;
 use crate::failure::Failure;
 
 /// A measured calibration: torque over a signal.
@@ -95,6 +96,7 @@ pub(super) fn calibration(section: &Section) -> Result<MeasuredCalibration, Fail
         ));
     }
     let read = match given.first() {
+        None if section.has("zero_frequency") => frequency(section)?,
         Some(&"torque_per_ratio") => {
             constant(section, "torque_per_ratio", TransducerSignal::Ratio)?
         }
@@ -118,17 +120,26 @@ const HOW: &str = "write one of torque_per_volt = \"12.5 N m/V\"; torque_per_rat
 
 /// Refuses the keys that the form does not take; the message lists those of all forms.
 fn finish(section: &Section) -> Result<(), Failure> {
-    let Err(of_another_form) = section.finish() else {
+    if section.finish().is_ok() {
         return Ok(());
-    };
-    for key in ["rated_torque", "zero_frequency", "degree"]
+    }
+    let beside = ["rated_torque", "zero_frequency", "degree"];
+    let taken: Vec<&str> = FORMS
         .into_iter()
-        .chain(FORMS)
-    {
+        .chain(beside)
+        .filter(|key| section.has(key))
+        .collect();
+    for key in beside.into_iter().chain(FORMS) {
         let _ = section.raw(key);
     }
     section.finish()?;
-    Err(of_another_form)
+    Err(section.fail(
+        "",
+        match taken[..] {
+            [one] => format!("{one} alone does not convert a record; {HOW}"),
+            _ => format!("{} do not go together; {HOW}", taken.join(" and ")),
+        },
+    ))
 }
 
 fn constant(
@@ -195,11 +206,7 @@ fn per_change(
             ));
         }
     }
-    let relative = [rated.relative_std(), change.relative_std()];
-    let known = relative.into_iter().flatten();
-    let relative_std = known.fold(None, |sum: Option<f64>, std| {
-        Some(std.hypot(sum.unwrap_or(0.0)))
-    });
+    let relative_std = together(&[rated.relative_std(), change.relative_std()]);
     let value = rated.value() / change.value();
     let unit = Kind::TorquePerVolt;
     let law = match signal {
@@ -224,31 +231,24 @@ struct CalibrationPoint {
 
 /// `points`, joined by straight lines or by a polynomial of `degree`.
 fn points(section: &Section) -> Result<MeasuredCalibration, Failure> {
+    let table = section.sections("points").map_err(|_| {
+        section.fail(
+            "points",
+            "expected points = [{ reading = \"1 mV/V\", torque = \"25 N m\" }, …]",
+        )
+    })?;
     let mut signal = None;
     let mut points = Vec::new();
-    for point in section.sections("points")? {
-        let missing = || {
-            point.fail(
-                "",
-                "expected reading = \"1.0003 mV/V\", torque = \"25 N m\"",
-            )
-        };
-        let (of, reading) = TransducerSignal::read(&point, "reading")?.ok_or_else(missing)?;
-        let torque = point.required("torque", Kind::Torque)?;
-        let std = point.quantity("std", Kind::Torque)?.map(|std| std.value());
-        point.finish()?;
+    for row in &table {
+        let (of, point) = point(row)?;
         if signal.is_some_and(|signal| signal != of) {
-            return Err(point.fail(
+            return Err(row.fail(
                 "reading",
                 "the readings are in different kinds of units; use one",
             ));
         }
         signal = Some(of);
-        let std = std.or(torque.std_uncertainty());
-        let torque = Estimate::new(Kind::Torque, torque.value(), std, "stand file")
-            .map_err(|error| point.fail("std", error))?;
-        let reading = reading.value();
-        points.push(CalibrationPoint { reading, torque });
+        points.push(point);
     }
     let Some(signal) = signal else {
         return Err(section.fail("points", "the table has no points"));
@@ -280,6 +280,21 @@ fn points(section: &Section) -> Result<MeasuredCalibration, Failure> {
         zero: None,
         relative_std,
     })
+}
+
+/// One point, and what its reading is of.
+fn point(row: &Section) -> Result<(TransducerSignal, CalibrationPoint), Failure> {
+    let expected = "expected reading = \"1.0003 mV/V\", torque = \"25 N m\"";
+    let read = TransducerSignal::read(row, "reading")?;
+    let (signal, reading) = read.ok_or_else(|| row.fail("", expected))?;
+    let torque = row.required("torque", Kind::Torque)?;
+    let std = row.quantity("std", Kind::Torque)?.map(|std| std.value());
+    row.finish()?;
+    let std = std.or(torque.std_uncertainty());
+    let torque = Estimate::new(Kind::Torque, torque.value(), std, "stand file")
+        .map_err(|error| row.fail("std", error))?;
+    let reading = reading.value();
+    Ok((signal, CalibrationPoint { reading, torque }))
 }
 
 /// The polynomial through points by least squares, weighted where every point has a `std`, and the relative standard

@@ -11,7 +11,6 @@ use super::{BridgeData, GageData, RecorderData};
 use crate::failure::Failure;
 
 pub(super) fn gage(section: &Section) -> Result<GageData, Failure> {
-    let value = |key, kind| section.required(key, kind).map(|e: Estimate| e.value());
     let optional = |key, kind| section.quantity(key, kind).map(|e| e.map(|e| e.value()));
     // A metal-foil gage is linear, and temperature does not enter its law.
     let room = 298.15;
@@ -19,8 +18,9 @@ pub(super) fn gage(section: &Section) -> Result<GageData, Failure> {
     let temperature_k = optional("temperature", Kind::TemperatureAbsolute)?.unwrap_or(reference);
     let bonding = optional("bonding_temperature", Kind::TemperatureAbsolute)?;
     let drift = optional("resistance_drift", Kind::Ratio)?.unwrap_or(0.0);
+    let factor = section.required("gage_factor", Kind::Ratio)?;
     let gage = Gage::new(
-        value("gage_factor", Kind::Ratio)?,
+        factor.value(),
         optional("quadratic_coefficient", Kind::Ratio)?.unwrap_or(0.0),
         reference,
         section.positive("resistance", Kind::Resistance)?.value(),
@@ -30,6 +30,7 @@ pub(super) fn gage(section: &Section) -> Result<GageData, Failure> {
     section.finish()?;
     Ok(GageData {
         gage,
+        factor_relative_std: factor.relative_std(),
         bonded_resistance_ohm: bonded.map(|e| e.value()),
         bonding_temperature_k: bonding.unwrap_or(temperature_k),
         temperature_k,
@@ -65,27 +66,33 @@ pub(super) fn bridge(section: &Section) -> Result<BridgeData, Failure> {
         }),
         Some(_) => Some(BridgeLayout::Quarter),
     };
-    let supply = supply(section)?;
+    let (supply, supply_relative_std) = supply(section)?;
     let leads = leads(section)?;
     section.finish()?;
     Ok(BridgeData {
         layout,
         supply,
+        supply_relative_std,
         leads,
     })
 }
 
-fn supply(section: &Section) -> Result<Option<Supply>, Failure> {
+/// The supply and its relative standard uncertainty.
+fn supply(section: &Section) -> Result<(Option<Supply>, Option<f64>), Failure> {
     let volts = section.positive_if_any("excitation", Kind::Voltage)?;
     let amperes = section.positive_if_any("excitation_current", Kind::Current)?;
     match (volts, amperes) {
-        (None, None) => Ok(None),
-        (Some(volts), None) => Ok(Some(Supply::ConstantVoltage {
-            volts: volts.value(),
-        })),
-        (None, Some(amperes)) => Ok(Some(Supply::ConstantCurrent {
-            amperes: amperes.value(),
-        })),
+        (None, None) => Ok((None, None)),
+        (Some(volts), None) => {
+            let std = volts.relative_std();
+            let volts = volts.value();
+            Ok((Some(Supply::ConstantVoltage { volts }), std))
+        }
+        (None, Some(amperes)) => {
+            let std = amperes.relative_std();
+            let amperes = amperes.value();
+            Ok((Some(Supply::ConstantCurrent { amperes }), std))
+        }
         (Some(_), Some(_)) => Err(section.fail(
             "excitation_current",
             "give either excitation = \"5 V\" or excitation_current = \"2 mA\"",
@@ -123,6 +130,7 @@ pub(super) fn recorder(section: Option<&Section>) -> Result<RecorderData, Failur
             cutoff_std_hz: None,
             delay_std_s: None,
             has_gain: false,
+            gain_relative_std: None,
             input_resistance_ohm: None,
             zero: None,
         });
@@ -162,6 +170,7 @@ pub(super) fn recorder(section: Option<&Section>) -> Result<RecorderData, Failur
         cutoff_std_hz: cutoff.and_then(|cutoff| cutoff.std_uncertainty()),
         delay_std_s: delay.and_then(|delay| delay.std_uncertainty()),
         has_gain: given.is_some(),
+        gain_relative_std: given.and_then(|gain| gain.relative_std()),
         input_resistance_ohm,
         zero: zero.map(|(signal, zero)| (signal, zero.value())),
     })

@@ -125,6 +125,8 @@ pub struct BeamDrawing {
     pub full: torqcomp_model::Beam,
     /// Elastic modulus.
     pub modulus: Estimate,
+    /// Relative standard uncertainty of the torque per strain at the gage, if known.
+    pub strain_relative_std: Option<f64>,
     /// Radius at which the beam meets the stator.
     pub radius: Estimate,
     /// Distance of the gage from the clamp.
@@ -156,6 +158,8 @@ pub struct Friction {
 pub struct GageData {
     /// The gage before it was bonded.
     pub gage: torqcomp_dsp::gage::Gage,
+    /// Relative standard uncertainty of the gage factor, if known.
+    pub factor_relative_std: Option<f64>,
     /// Resistance after bonding, in Ω.
     pub bonded_resistance_ohm: Option<f64>,
     /// Temperature at which the bonded resistance was measured, in K.
@@ -173,6 +177,8 @@ pub struct BridgeData {
     pub layout: Option<BridgeLayout>,
     /// What drives it, if it is given.
     pub supply: Option<Supply>,
+    /// Relative standard uncertainty of the supply, if known.
+    pub supply_relative_std: Option<f64>,
     /// Its wires.
     pub leads: Leads,
 }
@@ -190,6 +196,8 @@ pub struct RecorderData {
     pub delay_std_s: Option<f64>,
     /// Whether the file gives the gain.
     pub has_gain: bool,
+    /// Relative standard uncertainty of the gain, if known.
+    pub gain_relative_std: Option<f64>,
     /// Input resistance in Ω that loads the bridge.
     pub input_resistance_ohm: Option<f64>,
     /// Record at no load in SI units, if it is given.

@@ -20,6 +20,12 @@ pub(super) struct StaticLaw {
     pub(super) warnings: Vec<Warning>,
 }
 
+/// Relative standard uncertainty of a product whose factors have these.
+pub(super) fn together(stds: &[Option<f64>]) -> Option<f64> {
+    let known = stds.iter().copied().flatten();
+    known.reduce(f64::hypot)
+}
+
 impl StaticLaw {
     pub(super) fn of(conversion: Result<Conversion, ConversionError>) -> Result<Self, Failure> {
         Ok(Self {
@@ -158,7 +164,14 @@ impl Stand {
         let is_other = signal != measured.signal;
         Ok(StaticLaw {
             described: measured.described(units),
-            relative_std: measured.relative_std,
+            relative_std: match is_other {
+                true => together(&[
+                    measured.relative_std,
+                    self.of_supply(),
+                    self.recorder.gain_relative_std,
+                ]),
+                false => measured.relative_std,
+            },
             warnings: is_other
                 .then(|| self.assumed_gain())
                 .flatten()
@@ -181,6 +194,11 @@ impl Stand {
             "{}: a current or a frequency is seldom zero at no load, and the output there is not given; add {example}",
             self.file
         ))
+    }
+
+    /// Relative standard uncertainty of the bridge's supply.
+    fn of_supply(&self) -> Option<f64> {
+        self.bridge.as_ref()?.supply_relative_std
     }
 
     /// A warning if the gain between bridge and record is not given.
@@ -209,6 +227,7 @@ impl Stand {
                 let offset = -torque_per_strain * zero;
                 return Ok(StaticLaw {
                     described: "strain through the beam's drawing".to_owned(),
+                    relative_std: self.of_drawing(signal),
                     ..StaticLaw::of(Conversion::linear(torque_per_strain, offset))?
                 });
             }
@@ -244,12 +263,25 @@ impl Stand {
                 crate::io::digits::text(small, 5),
                 Kind::Torque.unit(units)
             ),
+            relative_std: self.of_drawing(signal),
             warnings: match signal {
                 TransducerSignal::Voltage => self.assumed_gain().into_iter().collect(),
                 _ => Vec::new(),
             },
             ..law
         })
+    }
+
+    /// Relative standard uncertainty of the torque by beam, gage and bridge.
+    fn of_drawing(&self, signal: TransducerSignal) -> Option<f64> {
+        let of_beam = self.beam.as_ref().and_then(|b| b.strain_relative_std);
+        let of_gage = self.gage.as_ref().and_then(|g| g.factor_relative_std);
+        let of_gain = self.recorder.gain_relative_std;
+        match signal {
+            TransducerSignal::Strain => of_beam,
+            TransducerSignal::Voltage => together(&[of_beam, of_gage, self.of_supply(), of_gain]),
+            _ => together(&[of_beam, of_gage]),
+        }
     }
 
     /// The voltage that a recorded ratio refers to: any, if the supply is one of voltage.

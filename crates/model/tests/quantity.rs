@@ -157,13 +157,13 @@ fn bad_text_is_refused_with_what_to_write() {
             Kind::Inertia,
             "0.35",
             "\"0.35\" has no unit; expected mass moment of inertia with its unit, for example \
-             \"5.85e-3 slug ft^2\"",
+             \"0.008 kg m^2\"",
         ),
         (
             Kind::Torque,
             "3 Nm/rad",
             "the unit \"Nm/rad\" has the dimension kg m^2 s^-2 rad^-1; expected torque (kg m^2 \
-             s^-2), for example \"3.5 ft lbf\"",
+             s^-2), for example \"50 N m\"",
         ),
         (
             Kind::Voltage,
@@ -180,7 +180,7 @@ fn bad_text_is_refused_with_what_to_write() {
             Kind::Force,
             "1,000 N",
             "\"1,000 N\" does not start with a number; write the number with a decimal point and \
-             without thousands marks, for example \"15 lbf\"",
+             without thousands marks, for example \"70 N\"",
         ),
         (
             Kind::Force,
@@ -200,7 +200,7 @@ fn bad_text_is_refused_with_what_to_write() {
         (
             Kind::Force,
             "  ",
-            "the text is empty; expected force, for example \"15 lbf\"",
+            "the text is empty; expected force, for example \"70 N\"",
         ),
         (
             Kind::TemperatureAbsolute,

@@ -59,7 +59,7 @@ fn mistakes_name_the_line_and_the_remedy() {
         (
             "\"3.07 ft lbf s/rad\"",
             "3.07",
-            vec!["line 4", "[mechanics] damping", "no unit", "ft lbf s/rad"],
+            vec!["line 4", "[mechanics] damping", "no unit", "N m s/rad"],
         ),
         (
             "\"3.07 ft lbf s/rad\"",

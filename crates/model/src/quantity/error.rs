@@ -143,6 +143,6 @@ pub enum QuantityError {
 fn hint(nearest: Option<&'static str>) -> String {
     match nearest {
         Some(unit) => format!("; did you mean \"{unit}\"?"),
-        None => "; the units known are listed in the documentation of quantities".to_owned(),
+        None => "; docs/stand-file.md lists the units that are known".to_owned(),
     }
 }
