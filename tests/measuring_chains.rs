@@ -225,7 +225,15 @@ fn every_form_of_a_calibration_gives_one_torque_and_its_uncertainty() {
         ("4 to 20 mA", "sensitivity = { value = \"8 mA\", std = \"0.016 mA\" }\nrated_torque = \"50 N m\"\n[recorder]\nzero = \"12 mA\"\n".into(), "I [mA]", 4.0, 12.0, Some(0.002)),
         ("frequency", "zero_frequency = \"60 kHz\"\nfrequency_at_rated = { value = \"90 kHz\", std = \"60 Hz\" }\nrated_torque = \"50 N m\"".into(), "f [Hz]", 15e3, 60e3, Some(0.002)),
         ("frequency in kHz", "zero_frequency = \"10 kHz\"\nfrequency_at_rated = \"15 khz\"\nrated_torque = \"50 N m\"".into(), "f [kHz]", 2.5, 10.0, None),
-        ("points", table.into(), "U [mV/V]", 1.0, 0.0, Some(0.002)),
+                (
+            "lever",
+            "lever_arm = { value = \"0.5 m\", std = \"1 mm\" }".into(),
+            "F [N]",
+            50.0,
+            0.0,
+            Some(0.002),
+        ),
+("points", table.into(), "U [mV/V]", 1.0, 0.0, Some(0.002)),
         ("line through points", format!("degree = 1\n{}", table.replace(", std = \"0.1 N m\"", "")), "U [mV/V]", 1.0, 0.0, Some(0.0)),
         ("cubic through points", format!("degree = 3\n{}", table.replace(", std = \"0.1 N m\"", "")), "U [mV/V]", 1.0, 0.0, None),
     ];

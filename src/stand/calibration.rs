@@ -134,13 +134,6 @@ impl Stand {
                 described: format!("the record is torque in {}", named.text),
                 ..StaticLaw::of(Conversion::linear(1.0, 0.0))?
             },
-            (FORCE, _) => {
-                let radius = self.radius(channel.name, &named.text)?;
-                StaticLaw {
-                    described: format!("force times the radius of {radius} m"),
-                    ..StaticLaw::of(Conversion::linear(radius, 0.0))?
-                }
-            }
             _ => return Err(no_torque(channel.name, named)),
         };
         Ok(Calibration {
@@ -193,18 +186,6 @@ impl Stand {
             relative_std: gain.relative_std,
             warnings: Vec::new(),
         })
-    }
-
-    fn radius(&self, channel: &str, unit: &str) -> Result<f64, Failure> {
-        match &self.beam {
-            Some(beam) => Ok(beam.radius.value()),
-            None => Err(Failure::failed(format_args!(
-                "the channel \"{channel}\" is a force in \"{unit}\", and {} does not say at which \
-                 radius it acts; add [beam] with its radius, or, to compensate the force itself, \
-                 give [mechanics] as natural_frequency and damping_ratio with static_gain = \"1 N/N\"",
-                self.file
-            ))),
-        }
     }
 }
 

@@ -64,18 +64,19 @@ pub(crate) const SECTIONS: &[StandSection] = &[
         ("damping_ratio", Quantity(Kind::Ratio), "`f/(2 √(K J))`, with `natural_frequency`"),
         ("static_gain", RecordQuantity, "recorded over applied quantity at rest, `\"1 V/V\"` or `\"2.5 mV/N\"`, for stands that do not measure torque; with `natural_frequency` only"),
     ]),
-    ("[calibration]", "A measured calibration, in one of five forms; it replaces gage, bridge and recorder gain. The `std` of each quantity enters the stated uncertainty.", &[
+    ("[calibration]", "A measured calibration, in one of six forms; it replaces gage, bridge and recorder gain. The `std` of each quantity enters the stated uncertainty.", &[
         ("torque_per_volt", Quantity(Kind::TorquePerVolt), "torque per volt as recorded"),
         ("torque_per_ratio", Quantity(Kind::TorquePerRatio), "torque per bridge output over excitation"),
         ("sensitivity", RecordQuantity, "change of the output from no load to `rated_torque`, with its sign: `\"2.0012 mV/V\"`, `\"10 V\"`, `\"8 mA\"` or `\"30 kHz\"`"),
         ("rated_torque", Quantity(Kind::Torque), "torque of `sensitivity` or `frequency_at_rated`"),
         ("zero_frequency", Quantity(Kind::Frequency), "output at no load of a transducer with frequency output"),
         ("frequency_at_rated", Quantity(Kind::Frequency), "its output at `rated_torque`"),
+        ("lever_arm", Quantity(Kind::Length), "distance from the shaft at which a recorded force acts"),
         ("points", Section, "a table of points, joined by straight lines, and continued by 20 % of its range"),
         ("degree", Whole, "1, 2 or 3: joins the points by a polynomial of least squares"),
     ]),
     ("[[calibration.points]]", "A point of the calibration, also written `points = [{ reading = \"1 mV/V\", torque = \"25 N m\" }, …]`.", &[
-        ("reading", RecordQuantity, "output in V, mV/V, mA, Hz or ustrain"),
+        ("reading", RecordQuantity, "output in V, mV/V, mA, Hz, ustrain or N"),
         ("torque", Quantity(Kind::Torque), "torque that gave it"),
         ("std", Quantity(Kind::Torque), "its standard uncertainty"),
     ]),
@@ -133,7 +134,7 @@ pub(crate) const SECTIONS: &[StandSection] = &[
     ]),
     ("[recorder]", "The amplifier and the recorder.", &[
         ("gain", Quantity(Kind::Gain), "recorded volts per bridge volt; negative for an inverting amplifier; 1 if it is not given, with a warning where it matters"),
-        ("zero", RecordQuantity, "record at no load, in V, mV/V, mA, Hz or ustrain; subtracted from any record in such a unit"),
+        ("zero", RecordQuantity, "record at no load, in V, mV/V, mA, Hz, ustrain or N; subtracted from any record in such a unit"),
         ("low_pass", Quantity(Kind::Frequency), "cut-off of a Butterworth low-pass"),
         ("low_pass_order", Whole, "1 (default, an RC low-pass) to 16"),
         ("delay", Quantity(Kind::Time), "time by which the record lags"),

@@ -76,12 +76,13 @@ impl MeasuredCalibration {
 }
 
 /// Keys that each begin another form.
-const FORMS: [&str; 5] = [
+const FORMS: [&str; 6] = [
     "torque_per_volt",
     "torque_per_ratio",
     "sensitivity",
     "frequency_at_rated",
     "points",
+    "lever_arm",
 ];
 
 /// Reads the section.
@@ -100,6 +101,7 @@ pub(super) fn calibration(section: &Section) -> Result<MeasuredCalibration, Fail
         Some(&"torque_per_ratio") => {
             constant(section, "torque_per_ratio", TransducerSignal::Ratio)?
         }
+        Some(&"lever_arm") => constant(section, "lever_arm", TransducerSignal::Force)?,
         Some(&"sensitivity") => sensitivity(section)?,
         Some(&"frequency_at_rated") => frequency(section)?,
         Some(&"points") => points(section)?,
@@ -116,7 +118,7 @@ pub(super) fn calibration(section: &Section) -> Result<MeasuredCalibration, Fail
 /// What to write where the section holds none of the forms.
 const HOW: &str = "write one of torque_per_volt = \"12.5 N m/V\"; torque_per_ratio = \"25 N m/(mV/V)\"; sensitivity = \
     \"2.0012 mV/V\" with rated_torque = \"50 N m\"; zero_frequency = \"60 kHz\", frequency_at_rated = \"90 kHz\" and \
-    rated_torque = \"50 N m\"; points = [{ reading = \"1 mV/V\", torque = \"25 N m\" }, …]";
+    rated_torque = \"50 N m\"; lever_arm = \"0.5 m\"; points = [{ reading = \"1 mV/V\", torque = \"25 N m\" }, …]";
 
 /// Refuses the keys that the form does not take; the message lists those of all forms.
 fn finish(section: &Section) -> Result<(), Failure> {
@@ -149,6 +151,7 @@ fn constant(
 ) -> Result<MeasuredCalibration, Failure> {
     let kind = match signal {
         TransducerSignal::Ratio => Kind::TorquePerRatio,
+        TransducerSignal::Force => Kind::Length,
         _ => Kind::TorquePerVolt,
     };
     let constant = section.required(key, kind)?;

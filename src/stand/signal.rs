@@ -1,4 +1,4 @@
-//! What a recorder stores before anything is calibrated: volts, a ratio of voltages, a current, a frequency, a strain.
+//! What a recorder stores before anything is calibrated: volts, a ratio of voltages, a current, a frequency, a strain, a force.
 
 use std::f64::consts::TAU;
 
@@ -20,26 +20,31 @@ pub enum TransducerSignal {
     Frequency,
     /// Strain, m/m.
     Strain,
+    /// N, of a load cell at a lever.
+    Force,
 }
 
 impl TransducerSignal {
     /// All of them.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::Voltage,
         Self::Ratio,
         Self::Current,
         Self::Frequency,
         Self::Strain,
+        Self::Force,
     ];
 
-    /// What a record in that unit is; `None` for torque, force, plain ratios and all else.
+    /// What a record in that unit is; `None` for torque, plain ratios and all else.
     #[must_use]
     pub fn of(unit: &Unit) -> Option<Self> {
         const VOLTAGE: Dimension = Dimension::new([1, 2, -3, -1, 0, 0]);
         const CURRENT: Dimension = Dimension::new([0, 0, 0, 1, 0, 0]);
+        const FORCE: Dimension = Dimension::new([1, 1, -2, 0, 0, 0]);
         match (unit.dimension(), unit.ratio_of()) {
             (VOLTAGE, _) => Some(Self::Voltage),
             (CURRENT, _) => Some(Self::Current),
+            (FORCE, _) => Some(Self::Force),
             (_, Some(RatioOf::Voltages)) => Some(Self::Ratio),
             (_, Some(RatioOf::Lengths)) => Some(Self::Strain),
             _ if unit.is_hertz() => Some(Self::Frequency),
@@ -56,6 +61,7 @@ impl TransducerSignal {
             Self::Current => Kind::Current,
             Self::Frequency => Kind::Frequency,
             Self::Strain => Kind::Strain,
+            Self::Force => Kind::Force,
         }
     }
 
@@ -78,6 +84,7 @@ impl TransducerSignal {
             Self::Current => ("mA", 1e-3),
             Self::Frequency => ("Hz", 1.0),
             Self::Strain => ("ustrain", 1e-6),
+            Self::Force => ("N", 1.0),
         }
     }
 
@@ -102,7 +109,7 @@ impl TransducerSignal {
         if text.trim().parse::<f64>().is_ok() {
             return Err(section.fail(
                 key,
-                format_args!("\"{text}\" has no unit; expected V, mV/V, mA, Hz or ustrain, as in \"{text} mV/V\""),
+                format_args!("\"{text}\" has no unit; expected V, mV/V, mA, Hz, ustrain or N, as in \"{text} mV/V\""),
             ));
         }
         let unit = Unit::of_quantity(&text).map_err(|error| section.fail(key, error))?;
@@ -122,7 +129,7 @@ fn unknown(text: &str, unit: &Unit) -> String {
              \"% strain\")"
         ),
         None => format!(
-            "\"{text}\" is no output of a transducer; expected V, mV/V, mA, Hz or ustrain, as in \"2.0012 mV/V\""
+            "\"{text}\" is no output of a transducer; expected V, mV/V, mA, Hz, ustrain or N, as in \"2.0012 mV/V\""
         ),
     }
 }

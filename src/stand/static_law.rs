@@ -53,13 +53,15 @@ impl Stand {
         if let Some(scale) = self.per_signal(signal, measured.signal)? {
             return self.by_measured(measured, signal, scale, zero, units);
         }
-        if signal == TransducerSignal::Strain && self.beam.is_some() {
+        let is_of_beam = matches!(signal, TransducerSignal::Strain | TransducerSignal::Force);
+        if is_of_beam && self.beam.is_some() {
             let mut law = self.by_drawing(signal, zero.unwrap_or(0.0), units)?;
             law.warnings.push(Warning::new(
                 "calibration-not-used",
                 format!(
-                    "the channel \"{channel}\" is strain, and [calibration] of {} is in {}: strain was taken through \
-                     the beam's drawing; record in {} to use the calibration",
+                    "the channel \"{channel}\" is in {}, and [calibration] of {} is in {}: the record was taken through the \
+                     beam's drawing; record in {} to use the calibration",
+                    named.text,
                     self.file,
                     measured.signal.usual_unit().0,
                     measured.signal.usual_unit().0
@@ -223,13 +225,13 @@ impl Stand {
     ) -> Result<StaticLaw, Failure> {
         let per_bridge_volt = match signal {
             TransducerSignal::Strain => {
-                let torque_per_strain = self.torque_per_strain()?;
-                let offset = -torque_per_strain * zero;
-                return Ok(StaticLaw {
-                    described: "strain through the beam's drawing".to_owned(),
-                    relative_std: self.of_drawing(signal),
-                    ..StaticLaw::of(Conversion::linear(torque_per_strain, offset))?
-                });
+                let described = "strain through the beam's drawing".to_owned();
+                return self.of_slope(signal, self.torque_per_strain()?, zero, described);
+            }
+            TransducerSignal::Force => {
+                let radius = self.radius()?;
+                let described = format!("force times the radius of {radius} m");
+                return self.of_slope(signal, radius, zero, described);
             }
             TransducerSignal::Voltage => self.recorder.recorder.gain(),
             TransducerSignal::Ratio => 1.0 / self.ratio_excitation_v()?,
@@ -272,6 +274,34 @@ impl Stand {
         })
     }
 
+    /// A straight line through the record at no load.
+    fn of_slope(
+        &self,
+        signal: TransducerSignal,
+        slope: f64,
+        zero: f64,
+        described: String,
+    ) -> Result<StaticLaw, Failure> {
+        Ok(StaticLaw {
+            described,
+            relative_std: self.of_drawing(signal),
+            ..StaticLaw::of(Conversion::linear(slope, -slope * zero))?
+        })
+    }
+
+    /// Radius in m at which a recorded force acts.
+    fn radius(&self) -> Result<f64, Failure> {
+        match &self.beam {
+            Some(beam) => Ok(beam.radius.value()),
+            None => Err(Failure::failed(format_args!(
+                "{}: at which radius the recorded force acts is not given; add [calibration] lever_arm = \"0.5 m\", or, to \
+                 compensate the force itself, give [mechanics] as natural_frequency and damping_ratio with static_gain = \
+                 \"1 N/N\"",
+                self.file
+            ))),
+        }
+    }
+
     /// Relative standard uncertainty of the torque by beam, gage and bridge.
     fn of_drawing(&self, signal: TransducerSignal) -> Option<f64> {
         let of_beam = self.beam.as_ref().and_then(|b| b.strain_relative_std);
@@ -279,6 +309,7 @@ impl Stand {
         let of_gain = self.recorder.gain_relative_std;
         match signal {
             TransducerSignal::Strain => of_beam,
+            TransducerSignal::Force => self.beam.as_ref().and_then(|b| b.radius.relative_std()),
             TransducerSignal::Voltage => together(&[of_beam, of_gage, self.of_supply(), of_gain]),
             _ => together(&[of_beam, of_gage]),
         }

@@ -36,7 +36,7 @@ pub fn run(args: &Static) -> Result<Outcome, Failure> {
     if entries.is_empty() && args.findings.result.output.is_some() {
         return Err(Failure::failed(
             "a stand file takes a calibration of torque; give the load as a torque, or as a force or mass with --radius, and \
-             the reading in V, mV/V, mA, Hz or ustrain; or omit -o",
+             the reading in V, mV/V, mA, Hz, ustrain or N; or omit -o",
         ));
     }
     let mut recorded = Recorded::default();
@@ -93,7 +93,9 @@ fn points(
     let (loads, load_unit) = column(recording, &columns.load)?;
     let (readings, unit) = column(recording, &columns.reading)?;
     let is_effort = [TORQUE, FORCE].contains(&unit.unit.dimension());
-    if TransducerSignal::of(&load_unit.unit).is_some() && is_effort {
+    let is_signal =
+        load_unit.unit.dimension() != FORCE && TransducerSignal::of(&load_unit.unit).is_some();
+    if is_signal && is_effort {
         return Err(Failure::usage(format_args!(
             "--load \"{}\" is in {} and --reading \"{}\" in {}; the columns are swapped",
             args.load, load_unit.text, args.reading, unit.text
