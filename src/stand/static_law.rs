@@ -122,8 +122,8 @@ impl Stand {
         match self.bridge.as_ref().and_then(|bridge| bridge.supply) {
             Some(Supply::ConstantVoltage { volts }) => Ok(volts),
             _ => Err(Failure::failed(format_args!(
-                "{}: between volts and a ratio such as mV/V stands the voltage of the bridge's supply, which is not \
-                 given; add [bridge] excitation = \"5 V\"",
+                "{}: converting between volts and mV/V needs the voltage of the bridge's supply, which is not given; add \
+                 [bridge] excitation = \"5 V\"",
                 self.file
             ))),
         }
