@@ -84,7 +84,7 @@ fn columns() {
         two.as_bytes(),
         &["--channel", "load"],
         1,
-        &["force", "radius", "static_gain"],
+        &["force", "radius", "lever_arm"],
     );
     refused(
         good().as_bytes(),

@@ -69,13 +69,20 @@ impl Stand {
             ));
             return Ok(law);
         }
+        let remedy = match signal {
+            TransducerSignal::Force => {
+                "give the radius at which this force acts as [beam] radius, or as lever_arm in place of that calibration"
+                    .to_owned()
+            }
+            _ => format!("give the calibration in {}", signal.usual_unit().0),
+        };
         Err(Failure::failed(format_args!(
-            "the channel \"{channel}\" is in \"{}\", and [calibration] of {} is in {}; choose another channel, say \
-             the unit with --unit, or give the calibration in {}",
+            "the channel \"{channel}\" is a {} in \"{}\", and [calibration] of {} is in {}; choose another channel, say \
+             the unit with --unit, or {remedy}",
+            signal.kind().name(),
             named.text,
             self.file,
-            measured.signal.usual_unit().0,
-            signal.usual_unit().0
+            measured.signal.usual_unit().0
         )))
     }
 
