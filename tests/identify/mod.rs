@@ -6,6 +6,7 @@ mod files;
 mod response;
 mod runup;
 mod static_load;
+mod trials;
 
 use serde_json::Value;
 use torqcomp::identify::{Identification, NamedEstimate};

@@ -154,7 +154,7 @@ fn coverage_of(how: response::Excitation, seed: u64) -> [Coverage; 2] {
     let struck = hits(6);
     for k in 0..240 {
         let (applied, shown) = match how {
-            response::Excitation::Impact => struck.clone(),
+            response::Excitation::Impact | response::Excitation::Transient => struck.clone(),
             response::Excitation::Periodic => periods(500, 7, &mut noise),
             response::Excitation::Random => driven(20_000, &mut noise),
         };

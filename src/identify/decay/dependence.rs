@@ -25,8 +25,12 @@ pub(super) fn damping_law(
         .max_by_key(|s| stretches[*s].values.len())
         .unwrap_or(0);
     let at = 2 + longest * 4;
-    let start = [0, 1, 2, 3].map(|i| fit.fit.values[at + i]);
-    let laws = laws::compare(&stretches[longest], pole, start)?;
+    let start = laws::ViscousFit {
+        pole,
+        linear: [0, 1, 2, 3].map(|i| fit.fit.values[at + i]),
+        relative_density: fit.relative_density(stretches, longest, pole),
+    };
+    let laws = laws::compare(&stretches[longest], &start)?;
     let viscous = laws.iter().find(|l| l.law == Law::Viscous);
     if let (Some(best), Some(viscous)) = (laws.first(), viscous)
         && best.law != Law::Viscous

@@ -135,16 +135,27 @@ pub struct LawFit {
     pub law: Law,
     /// Root mean square of the residual.
     pub rms: f64,
-    /// Bayesian information criterion: less is better.
+    /// Bayesian information criterion, with the samples counted by the power of the noise at the mode: less is better.
     pub criterion: f64,
     /// Whether no part of the law was fitted as zero.
     #[serde(skip)]
     is_complete: bool,
 }
 
-/// Fits a law to a stretch with one mode, starting from the viscous fit.
-fn fit(law: Law, stretch: &Stretch, pole: Pole, start: [f64; 4]) -> Result<LawFit, FitError> {
-    let parameters = parameters(law, stretch, pole, start);
+/// The viscous fit from which the laws start.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ViscousFit {
+    /// Its mode.
+    pub pole: Pole,
+    /// a, b, c and d of the stretch.
+    pub linear: [f64; 4],
+    /// Power of the noise at the mode over that of white noise with its variance.
+    pub relative_density: f64,
+}
+
+/// Fits a law to a stretch with one mode.
+fn fit(law: Law, stretch: &Stretch, viscous: &ViscousFit) -> Result<LawFit, FitError> {
+    let parameters = parameters(law, stretch, viscous.pole, viscous.linear);
     let residuals = |p: &[f64], out: &mut Vec<f64>| {
         let pairs = stretch.times_s.iter().zip(&stretch.values);
         out.extend(pairs.map(|(t, y)| {
@@ -184,7 +195,7 @@ fn fit(law: Law, stretch: &Stretch, pole: Pole, start: [f64; 4]) -> Result<LawFi
         ..Options::default()
     };
     let fit = minimize(&problem, &parameters, &options)?;
-    Ok(summed(law, &fit))
+    Ok(summed(law, &fit, viscous.relative_density))
 }
 
 /// Amplitude, ω, phase, offset, drift, σ, s and β with their starts and bounds.
@@ -218,14 +229,15 @@ fn parameters(law: Law, stretch: &Stretch, pole: Pole, start: [f64; 4]) -> [Para
     ]
 }
 
-fn summed(law: Law, fit: &Fit) -> LawFit {
+fn summed(law: Law, fit: &Fit, relative_density: f64) -> LawFit {
     let n = fit.residuals.len() as f64;
     let fixed = law.parts().iter().filter(|has| !**has).count();
     let free = (fit.values.len() - fixed) as f64;
     LawFit {
         law,
         rms: fit.rms,
-        criterion: n * fit.rms.powi(2).max(f64::MIN_POSITIVE).ln() + free * n.ln(),
+        criterion: n / relative_density * fit.rms.powi(2).max(f64::MIN_POSITIVE).ln()
+            + free * n.ln(),
         is_complete: !fit.at_bound[5..8].iter().any(|b| *b),
     }
 }
@@ -234,14 +246,10 @@ fn summed(law: Law, fit: &Fit) -> LawFit {
 ///
 /// # Errors
 /// [`FitError`] if a law cannot be fitted.
-pub(super) fn compare(
-    stretch: &Stretch,
-    pole: Pole,
-    start: [f64; 4],
-) -> Result<Vec<LawFit>, FitError> {
+pub(super) fn compare(stretch: &Stretch, viscous: &ViscousFit) -> Result<Vec<LawFit>, FitError> {
     let mut all = Vec::new();
     for law in Law::ALL {
-        let fitted = fit(law, stretch, pole, start)?;
+        let fitted = fit(law, stretch, viscous)?;
         if fitted.is_complete {
             all.push(fitted);
         }

@@ -1,13 +1,12 @@
 //! Frequencies and damping from free decays (Appendix C, II).
 
 mod by_hand;
+mod colour;
 mod dependence;
 mod laws;
 mod modes;
 mod present;
 mod stretches;
-
-use torqcomp_dsp::decimate;
 
 use super::{FitQuality, Identification, ModalPole, rms};
 use crate::failure::Failure;
@@ -53,17 +52,13 @@ pub fn identify(
     options: &DecayOptions,
 ) -> Result<(Identification, Vec<Stretch>), Failure> {
     let mut result = Identification::new("decay");
-    let (stretches, is_decimated) = stretches::stretches(records, options, &mut result)?;
+    let stretches = stretches::stretches(records, options, &mut result)?;
     let search = ModeSearch {
         count: options.modes,
         most: MOST_MODES,
         band_hz: options.band_hz.unwrap_or((0.0, f64::INFINITY)),
-        worth: if is_decimated { decimate::NOISE } else { 1.0 },
     };
-    let mut fit = modes::search(&stretches, &search)?;
-    if is_decimated {
-        fit.allow_for(decimate::NOISE);
-    }
+    let fit = modes::search(&stretches, &search)?;
     if fit.poles.is_empty() {
         return Err(Failure::failed(
             "no decaying sine stands out of the noise; check the channel, or cut the record to the decay with \

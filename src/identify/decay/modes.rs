@@ -5,12 +5,16 @@
 //! ```
 //!
 //! Decay rates and frequencies belong to the stand and are common to all stretches; amplitudes, offset
-//! and drift belong to each stretch.
+//! and drift belong to each stretch. Uncertainties allow for the colour of the noise ([`super::colour`]).
+
+use std::ops::Range;
 
 use nalgebra::DMatrix;
 use torqcomp_dsp::peaks;
+use torqcomp_model::Covariance;
 use torqcomp_model::fit::{Fit, FitError, Options, Parameter, Residuals, linear, minimize};
 
+use super::colour::{self, NoiseColour};
 use crate::identify::Pole;
 
 /// A stretch of free ringing.
@@ -34,6 +38,11 @@ impl Stretch {
             values,
         }
     }
+
+    /// Mean time between samples in s.
+    fn step_s(&self) -> f64 {
+        self.times_s.last().copied().unwrap_or(1.0) / (self.times_s.len() - 1) as f64
+    }
 }
 
 /// A fit of a number of modes.
@@ -45,8 +54,8 @@ pub(super) struct ModesFit {
     pub fit: Fit,
     /// Residuals of each stretch, model less data.
     pub residuals: Vec<Vec<f64>>,
-    /// Bayesian information criterion: n ln(S/n) + p ln n.
-    pub criterion: f64,
+    /// Colour of the noise in each stretch.
+    colours: Vec<NoiseColour>,
     /// Frequency in Hz of a line that was rejected as too close to a mode.
     pub close_hz: Option<f64>,
 }
@@ -60,8 +69,6 @@ pub(super) struct ModeSearch {
     pub most: usize,
     /// Lowest and highest frequency in Hz.
     pub band_hz: (f64, f64),
-    /// Effective number of independent samples over their number.
-    pub worth: f64,
 }
 
 /// Relative distance in frequency below which two lines are one mode, unless the number of modes is given: a frequency
@@ -191,44 +198,71 @@ pub(super) fn fit(stretches: &[Stretch], starts: &[Pole]) -> Result<ModesFit, Fi
             ..Options::default()
         },
     )?;
-    Ok(sorted(fit, stretches, starts.len()))
+    with_colour(fit, &problem)
 }
 
 /// Half the usual sampling rate, as an angular frequency.
 fn fastest_rad_per_s(stretches: &[Stretch]) -> f64 {
     stretches
         .iter()
-        .map(|s| (s.times_s.len() - 1) as f64 / s.times_s.last().copied().unwrap_or(1.0))
+        .map(|s| 1.0 / s.step_s())
         .fold(f64::INFINITY, f64::min)
         * std::f64::consts::PI
 }
 
-fn sorted(fit: Fit, stretches: &[Stretch], modes: usize) -> ModesFit {
+/// The fit with its covariance for the colour of the noise.
+fn with_colour(mut fit: Fit, problem: &SineSum) -> Result<ModesFit, FitError> {
+    let stretches = problem.stretches;
     let mut residuals = Vec::new();
     let mut from = 0;
     for stretch in stretches {
         residuals.push(fit.residuals[from..from + stretch.values.len()].to_vec());
         from += stretch.values.len();
     }
-    let n = fit.residuals.len() as f64;
-    let mean = (fit.sum_of_squares / n).max(f64::MIN_POSITIVE);
-    let criterion = n * mean.ln() + fit.values.len() as f64 * n.ln();
-    ModesFit {
-        poles: Pole::all(&fit.values[..2 * modes]),
+    let count = fit.values.len();
+    let free: Vec<usize> = (0..count).filter(|i| fit.std[*i].is_some()).collect();
+    let mut jacobian = DMatrix::zeros(from, count);
+    problem.jacobian(&fit.values, &mut jacobian)?;
+    let groups = of_one_rate(stretches);
+    let learnt = colour::learn(&residuals, &groups, &jacobian.select_columns(&free));
+    let colours = match learnt {
+        Some((colours, covariance)) => {
+            fit.covariance = Covariance::of_some(&free, count, covariance);
+            fit.std = (0..count).map(|i| fit.covariance.std(i)).collect();
+            let each = colours.into_iter().zip(&groups);
+            each.flat_map(|(c, group)| vec![c; group.len()]).collect()
+        }
+        None => vec![NoiseColour::white(fit.rms.powi(2)); stretches.len()],
+    };
+    Ok(ModesFit {
+        poles: Pole::all(&fit.values[..2 * problem.modes]),
         fit,
         residuals,
-        criterion,
+        colours,
         close_hz: None,
-    }
+    })
+}
+
+/// Relative difference of sampling intervals that count as one.
+const SAME_STEP: f64 = 1e-3;
+
+/// Neighbouring stretches with the same sampling rate.
+fn of_one_rate(stretches: &[Stretch]) -> Vec<Range<usize>> {
+    let is_same = |a: &Stretch, b: &Stretch| (a.step_s() / b.step_s() - 1.0).abs() < SAME_STEP;
+    let mut from = 0;
+    let chunks = stretches.chunk_by(is_same);
+    chunks
+        .map(|chunk| {
+            from += chunk.len();
+            from - chunk.len()..from
+        })
+        .collect()
 }
 
 impl ModesFit {
-    /// Enlarges the uncertainties where the residuals show only a part of the noise's power.
-    pub(super) fn allow_for(&mut self, shown: f64) {
-        self.fit.covariance = self.fit.covariance.clone().times(1.0 / shown);
-        for std in self.fit.std.iter_mut().flatten() {
-            *std /= shown.sqrt();
-        }
+    /// Power of the noise at a frequency over that of white noise with its variance, in a stretch.
+    pub(super) fn relative_density(&self, stretches: &[Stretch], s: usize, pole: Pole) -> f64 {
+        self.colours[s].relative_density(pole.omega_rad_per_s * stretches[s].step_s())
     }
 
     /// Initial amplitude of a mode in a stretch.
@@ -281,7 +315,7 @@ pub(super) fn search(stretches: &[Stretch], wanted: &ModeSearch) -> Result<Modes
         let mut starts = best.poles.clone();
         starts.push(pole);
         let next = fit(stretches, &starts)?;
-        let pays = gain(&best, &next, wanted.worth) > 10.0
+        let pays = gain(&best, &next, stretches) > LEAST_GAIN
             && next.fit.sum_of_squares < 0.98 * best.fit.sum_of_squares
             && physical(&next, stretches);
         if wanted.count.is_none() {
@@ -298,11 +332,29 @@ pub(super) fn search(stretches: &[Stretch], wanted: &ModeSearch) -> Result<Modes
     Ok(best)
 }
 
-/// Reduction of the criterion from one fit to another if only a part `worth` of the samples counts.
-fn gain(before: &ModesFit, after: &ModesFit, worth: f64) -> f64 {
-    let n = before.fit.residuals.len() as f64;
+/// Minimum gain for one more mode.
+const LEAST_GAIN: f64 = 20.0;
+
+/// Gain of one more mode, the last of `after`: the reduction of the sum of squares over the power of the noise at the
+/// mode's frequency, less ln n for each parameter (Bayesian information criterion, where that power is known). Noise that
+/// is strongest at the frequency of the first mode counts with its mean power: a stand that rings has a mode.
+fn gain(before: &ModesFit, after: &ModesFit, stretches: &[Stretch]) -> f64 {
+    let Some(pole) = after.poles.last() else {
+        return 0.0;
+    };
+    let squares = |residuals: &[f64]| residuals.iter().map(|r| r * r).sum::<f64>();
+    let of_stretch = |s: usize| {
+        let colour = &after.colours[s];
+        let density = colour.density(pole.omega_rad_per_s * stretches[s].step_s());
+        let density = match before.poles.is_empty() {
+            true => density.min(colour.variance()),
+            false => density,
+        };
+        (squares(&before.residuals[s]) - squares(&after.residuals[s])) / density
+    };
+    let n = after.fit.residuals.len() as f64;
     let more = (after.fit.values.len() - before.fit.values.len()) as f64;
-    worth * n * (before.fit.sum_of_squares / after.fit.sum_of_squares).ln() - more * n.ln()
+    (0..stretches.len()).map(of_stretch).sum::<f64>() - more * n.ln()
 }
 
 /// Frequency in Hz of a mode that is too close to the last one, if there is one.

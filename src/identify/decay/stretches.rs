@@ -20,17 +20,15 @@ const WORTH: f64 = 1e-6;
 /// Fewest samples of a record.
 const LEAST_SAMPLES: usize = 40;
 
-/// Cuts all records into stretches of free ringing and decimates them where nothing is lost; also whether any was
-/// decimated.
+/// Cuts all records into stretches of free ringing and decimates them where nothing is lost.
 pub(super) fn stretches(
     records: &[Ringing],
     options: &DecayOptions,
     result: &mut Identification,
-) -> Result<(Vec<Stretch>, bool), Failure> {
+) -> Result<Vec<Stretch>, Failure> {
     let cut = cut(records, options, result)?;
     let total: usize = cut.iter().map(|(stretch, _)| stretch.values.len()).sum();
     let mut all = Vec::new();
-    let mut is_decimated = is_low_passed(records, options);
     for (stretch, rate_hz) in cut {
         let share = MOST_SAMPLES * stretch.values.len() / total;
         let factor = match (rate_hz, options.band_hz) {
@@ -38,7 +36,6 @@ pub(super) fn stretches(
             _ => 1,
         };
         if factor > 1 {
-            is_decimated = true;
             result.method.push(format!(
                 "decimated to one sample in {factor}: there are no modes above {} Hz",
                 short(decimate::PASS * rate_hz.unwrap_or(0.0) / factor as f64)
@@ -47,7 +44,7 @@ pub(super) fn stretches(
         all.push(decimated(&stretch, factor)?);
     }
     result.method.dedup();
-    Ok((all, is_decimated))
+    Ok(all)
 }
 
 /// All stretches as recorded, with the sampling rate of their record.
@@ -129,15 +126,6 @@ fn prepared(
 /// Decimation factor for a band.
 fn band_factor(rate_hz: f64, highest_hz: f64) -> usize {
     ((decimate::PASS * rate_hz / highest_hz).floor() as usize).max(1)
-}
-
-/// Whether the band leads to decimation of a record.
-fn is_low_passed(records: &[Ringing], options: &DecayOptions) -> bool {
-    let Some((_, highest_hz)) = options.band_hz else {
-        return false;
-    };
-    let mut rates = records.iter().filter_map(|r| r.rate_hz);
-    rates.any(|rate_hz| band_factor(rate_hz, highest_hz) > 1)
 }
 
 /// A stretch with one sample in `factor`.

@@ -64,6 +64,7 @@ pub(super) fn blocks(
         .unwrap_or_else(|| guess(records[0].applied));
     match excitation {
         Excitation::Impact => impacts(records, result),
+        Excitation::Transient => Ok(whole_transients(records, result)),
         Excitation::Random => random(records, options, result),
         Excitation::Periodic => periodic(records, options, result),
     }
@@ -74,6 +75,8 @@ fn guess(applied: &[f64]) -> Excitation {
     let quiet = applied.iter().filter(|v| v.abs() < 0.1 * largest).count();
     if quiet as f64 > AT_REST * applied.len() as f64 {
         Excitation::Impact
+    } else if is_step(applied) {
+        Excitation::Transient
     } else if frf::find_period(applied).is_some() {
         Excitation::Periodic
     } else {
@@ -81,11 +84,107 @@ fn guess(applied: &[f64]) -> Excitation {
     }
 }
 
+/// Part of a record, at either end, over which levels are taken.
+const END: usize = 10;
+/// Spread of a signal within either end, over the difference of their levels, below which it is a step.
+const STEADY: f64 = 0.1;
+
+/// Whether a signal goes from one steady level to another.
+fn is_step(samples: &[f64]) -> bool {
+    let count = (samples.len() / END).max(1);
+    let ends = [&samples[..count], &samples[samples.len() - count..]];
+    let levels = ends.map(mean);
+    let spread = |(end, level): (&[f64], f64)| -> f64 {
+        rms(&end.iter().map(|v| v - level).collect::<Vec<f64>>())
+    };
+    let step = (levels[1] - levels[0]).abs();
+    step > 0.0
+        && ends
+            .into_iter()
+            .zip(levels)
+            .all(|e| spread(e) < STEADY * step)
+}
+
+fn mean(samples: &[f64]) -> f64 {
+    samples.iter().sum::<f64>() / samples.len() as f64
+}
+
+/// A transient of a record.
+struct Transient {
+    record: usize,
+    applied: Vec<f64>,
+    measured: Vec<f64>,
+}
+
 fn impacts(records: &[Driven], result: &mut Identification) -> Result<Set, Failure> {
-    let rate_hz = records[0].rate_hz;
     let good = good_hits(records, result)?;
     let length = good.iter().map(|(_, range)| range.len()).min().unwrap_or(0);
-    let window = window_for(records, &good, length);
+    let of = |(r, range): &(usize, Range<usize>)| {
+        let range = range.start..range.start + length;
+        // The level before the hit is offset.
+        let without = |v: &[f64]| v.iter().map(|x| x - mean(&v[..8])).collect::<Vec<f64>>();
+        Transient {
+            record: *r,
+            applied: without(&records[*r].applied[range.clone()]),
+            measured: without(&records[*r].measured[range]),
+        }
+    };
+    let rings = |(r, range): &(usize, Range<usize>)| {
+        still_rings(&records[*r].measured[range.start..range.start + length])
+    };
+    let window = window_for(good.iter().any(rings), length);
+    let cut: Vec<Transient> = good.iter().map(of).collect();
+    Ok(transients(&cut, records[0].rate_hz, window, result))
+}
+
+/// Every record as one transient, whatever its shape. The spectra are those of the differences from sample to sample over
+/// 1 − e^(−jω), as levels may differ between start and end.
+fn whole_transients(records: &[Driven], result: &mut Identification) -> Set {
+    let length = records.iter().map(|r| r.applied.len()).min().unwrap_or(0);
+    let differences = |v: &[f64]| -> Vec<f64> {
+        let steps = v[..length].windows(2).map(|pair| pair[1] - pair[0]);
+        std::iter::once(0.0).chain(steps).collect()
+    };
+    let of = |(record, driven): (usize, &Driven)| Transient {
+        record,
+        applied: differences(driven.applied),
+        measured: differences(driven.measured),
+    };
+    let rings = |record: &Driven| {
+        let end = &record.measured[length - (length / END).max(1)..length];
+        let about: Vec<f64> = record.measured[..length]
+            .iter()
+            .map(|v| v - mean(end))
+            .collect();
+        still_rings(&about)
+    };
+    let window = window_for(records.iter().any(rings), length);
+    let cut: Vec<Transient> = records.iter().enumerate().map(of).collect();
+    let mut set = transients(&cut, records[0].rate_hz, window, result);
+    for block in &mut set.blocks {
+        for (k, (x, y)) in block
+            .applied
+            .iter_mut()
+            .zip(&mut block.measured)
+            .enumerate()
+        {
+            let turn = std::f64::consts::TAU * k as f64 / length as f64;
+            let factor = match k {
+                0 => Complex64::ZERO,
+                _ => 1.0 / (1.0 - Complex64::cis(-turn)),
+            };
+            (*x, *y) = (*x * factor, *y * factor);
+        }
+    }
+    set.powers = Powers::of(set.blocks.iter(), 0..usize::MAX);
+    result
+        .method
+        .push("each record taken as one transient, whatever its shape".to_owned());
+    set
+}
+
+/// Blocks of transients.
+fn transients(cut: &[Transient], rate_hz: f64, window: Window, result: &mut Identification) -> Set {
     let added_rate = match window {
         Window::Exponential(tau) => {
             result.method.push(format!(
@@ -96,21 +195,13 @@ fn impacts(records: &[Driven], result: &mut Identification) -> Result<Set, Failu
         }
         _ => 0.0,
     };
-    let block = |(r, range): &(usize, Range<usize>)| {
-        let range = range.start..range.start + length;
-        let record = &records[*r];
-        // The level before the hit is offset.
-        let level = |v: &[f64]| v[..8].iter().sum::<f64>() / 8.0;
-        let without = |v: &[f64]| v.iter().map(|x| x - level(v)).collect::<Vec<f64>>();
-        let applied = without(&record.applied[range.clone()]);
-        let measured = without(&record.measured[range]);
-        (*r, frf::transform(&applied, &measured, window))
-    };
-    let cut = good.iter().map(block).collect();
-    Ok(Set {
+    let block = |t: &Transient| (t.record, frf::transform(&t.applied, &t.measured, window));
+    let length = cut.first().map_or(1, |t| t.applied.len());
+    let blocks = cut.iter().map(block).collect();
+    Set {
         added_rate,
-        ..Set::new(cut, rate_hz / length as f64, window)
-    })
+        ..Set::new(blocks, rate_hz / length as f64, window)
+    }
 }
 
 /// Record and samples of each usable hit; the others are reported.
@@ -144,7 +235,8 @@ fn good_hits(
     }
     if good.is_empty() {
         bad.push(
-            "no usable hit; hit once, without overdriving the inputs, or choose another --excitation"
+            "no usable hit; hit once, without overdriving the inputs, or choose another --excitation: transient takes \
+             any record as it is"
                 .to_owned(),
         );
         return Err(Failure::failed(bad.join("; ")));
@@ -157,25 +249,24 @@ fn good_hits(
 
 fn second_stroke(record: &Driven, k: usize, part: f64) -> String {
     format!(
-        "{}, hit {}: second stroke with {} % of the force; the hit is used, as the recorded force includes both, but a \
-         clean one is better",
+        "{}, hit {}: second stroke with {} % of the force; the hit is used, as the recorded force includes both",
         record.name,
         k + 1,
         rounded(100.0 * part, 2)
     )
 }
 
+/// Whether a response still rings at its end.
+fn still_rings(measured: &[f64]) -> bool {
+    let top = measured.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    rms(&measured[measured.len() - measured.len() / 20..]) > RINGING * top
+}
+
 /// An exponential window, if a response still rings at the end.
-fn window_for(records: &[Driven], good: &[(usize, Range<usize>)], length: usize) -> Window {
-    let still_rings = good.iter().any(|(r, range)| {
-        let part = &records[*r].measured[range.start..range.start + length];
-        let top = part.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-        rms(&part[length - length / 20..]) > RINGING * top
-    });
-    if still_rings {
-        Window::Exponential(length as f64 / -WINDOW_END.ln())
-    } else {
-        Window::None
+fn window_for(still_rings: bool, length: usize) -> Window {
+    match still_rings {
+        true => Window::Exponential(length as f64 / -WINDOW_END.ln()),
+        false => Window::None,
     }
 }
 

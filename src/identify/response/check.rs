@@ -128,3 +128,21 @@ pub(super) fn doubts(result: &mut Identification, relative: f64, leads: bool, mo
         );
     }
 }
+
+/// Largest error of the gain by noise in the applied signal from which there is a warning.
+const GAIN_ERROR: f64 = 1e-3;
+
+/// Warns where noise enters before the resonance.
+pub(super) fn noise_before_resonance(result: &mut Identification, gain_error: f64) {
+    if gain_error > GAIN_ERROR {
+        result.warn(
+            "noise-before-resonance",
+            format!(
+                "the residual follows the resonance: something else drives the stand, or the applied signal is recorded \
+                 with noise, which makes the gain up to {} % too small (and J, f and K as much too large); their \
+                 uncertainties allow for it; reduce the noise of --applied or excite more",
+                rounded(100.0 * gain_error, 2)
+            ),
+        );
+    }
+}

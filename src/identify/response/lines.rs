@@ -49,6 +49,26 @@ pub(super) fn band(set: &Set, options: &ResponseOptions) -> Result<Lines, Failur
 /// Most lines that are fitted.
 pub(super) const MOST_LINES: usize = 6000;
 
+/// Lines of the band that is suggested: fewer than are fitted, as its limits are rounded.
+const SUGGESTED: usize = 5800;
+
+/// The band of [`SUGGESTED`] lines in which the measured signal has most power, in Hz.
+pub(super) fn strongest(set: &Set, lines: &Lines) -> (f64, f64) {
+    let power = |k: usize| -> f64 { set.blocks.iter().map(|b| b.measured[k].norm_sqr()).sum() };
+    let powers: Vec<f64> = lines.clone().map(power).collect();
+    let mut sum: f64 = powers[..SUGGESTED].iter().sum();
+    let mut best = (sum, 0);
+    for from in 1..=powers.len() - SUGGESTED {
+        sum += powers[from + SUGGESTED - 1] - powers[from - 1];
+        if sum > best.0 {
+            best = (sum, from);
+        }
+    }
+    let first = lines.start + best.1;
+    let hz = |line: usize| line as f64 * set.step_hz;
+    (hz(first), hz(first + SUGGESTED))
+}
+
 /// H1, each line weighted with the root of its applied power.
 pub(super) fn data(powers: &Powers, set: &Set, lines: &Lines, options: &ResponseOptions) -> Data {
     let frf = powers.response(Estimator::H1);

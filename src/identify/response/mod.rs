@@ -25,6 +25,8 @@ use modal::{Data, Effort, Modal};
 pub enum Excitation {
     /// Hammer hits, one or several per record
     Impact,
+    /// Any other transient, one per record: a step, a drop, a shock table
+    Transient,
     /// Noise
     Random,
     /// A periodic signal
@@ -94,6 +96,7 @@ pub fn identify(records: &[Driven], options: &ResponseOptions) -> Result<Identif
         leads,
         fitted.modal.poles.len(),
     );
+    check::noise_before_resonance(&mut result, fitted.gain_error);
     result.fit = Some(FitQuality {
         rms: present::output_rms(&set, &lines) * fitted.relative,
         unit: String::new(),
@@ -117,6 +120,8 @@ struct FinalFit {
     linear: usize,
     /// Residual over the measured signal.
     relative: f64,
+    /// Largest relative error of the gain by noise in the applied signal.
+    gain_error: f64,
 }
 
 impl FinalFit {
@@ -156,6 +161,7 @@ fn final_fit(
         covariance: scatter::of_poles(set, lines, data, &modal)?,
         linear: searched,
         relative: set.error(&modal.response, lines),
+        gain_error: 0.0,
         modal,
     })
 }

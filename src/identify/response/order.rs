@@ -3,9 +3,10 @@
 use torqcomp_dsp::frf::{self, Estimator, Powers};
 
 use super::blocks::Set;
-use super::lines::{Lines, MOST_LINES, data};
+use super::lines::{self, Lines, MOST_LINES, data};
 use super::{Data, Effort, Modal, ResponseOptions};
 use crate::failure::Failure;
+use crate::print::rounded;
 
 /// Relative distance in frequency below which no second mode is searched for, unless the number of modes is given: the
 /// residual of a slightly nonlinear mode lies beside its line.
@@ -51,9 +52,13 @@ pub(super) fn order(
 ) -> Result<(Modal, Vec<f64>), Failure> {
     let folds = folds(set);
     if lines.len() > MOST_LINES {
+        let (from_hz, to_hz) = lines::strongest(set, lines);
         return Err(Failure::failed(format_args!(
-            "{} lines in the band, more than {MOST_LINES}; narrow it with --band",
-            lines.len()
+            "{} lines in the band, more than {MOST_LINES}; narrow it with --band to where the response is strongest: \
+             --band {}..{}",
+            lines.len(),
+            rounded(from_hz, 4),
+            rounded(to_hz, 4)
         )));
     }
     if let Some(modes) = options.modes {

@@ -1,15 +1,15 @@
 //! Sensitivity and zero from known loads (Appendix C, IV), with the terms of the standards.
 
+mod mixed;
 mod terms;
 
-use nalgebra::DMatrix;
 use serde::Serialize;
-use torqcomp_model::fit::linear::{self, LinearFit};
 
 use super::{FitQuality, Identification, NamedEstimate, rms};
 use crate::chart::{Chart, Series};
 use crate::failure::Failure;
 use crate::print::rounded;
+use mixed::LoadCurve;
 
 /// One reading under a known load.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -107,28 +107,15 @@ pub fn identify(
             "the reading does not change with load; check --reading and the bridge supply",
         ));
     }
-    let design = DMatrix::from_fn(points.len(), degree + 1, |r, c| {
-        (points[r].load / largest).powi(c as i32)
-    });
-    let readings: Vec<f64> = points.iter().map(|p| p.reading).collect();
-    let weights: Option<Vec<f64>> = points.iter().map(|p| p.std.map(|s| 1.0 / s)).collect();
-    let fit = linear::solve(&design, &readings, weights.as_deref(), weights.is_some())?;
+    let fit = mixed::fit(points, degree, (&steps, largest))?;
     let unscale = |(k, v): (usize, &f64)| v / largest.powi(k as i32);
     let curve: Vec<f64> = fit.values.iter().enumerate().map(unscale).collect();
     let mut result = Identification::new("static");
     result.parameters = constants(&fit, largest, units);
-    let quality = quality(&fit, points, weights.as_deref(), units);
+    let quality = quality(&curve, points, units);
     poor(&mut result, quality.relative);
     result.fit = Some(quality);
-    result.method.push(format!(
-        "{} regression of the reading on the load over {} points, loading and unloading together",
-        if weights.is_some() {
-            "weighted"
-        } else {
-            "unweighted"
-        },
-        points.len()
-    ));
+    method(&mut result, &fit, points, &units.reading);
     result.terms = terms::terms(points, &steps, &curve, largest);
     result.steps = calibration_points(points, &steps, &fit, largest);
     draw(&mut result, points, &curve, units);
@@ -167,17 +154,10 @@ fn calibration_points(
 }
 
 /// The unweighted residual, over the swing of the readings.
-fn quality(
-    fit: &LinearFit,
-    points: &[Point],
-    weights: Option<&[f64]>,
-    units: &LoadUnits,
-) -> FitQuality {
-    let mut left = fit.residuals.clone();
-    if let Some(weights) = weights {
-        left.iter_mut().zip(weights).for_each(|(r, w)| *r /= w);
-    }
-    let swing: Vec<f64> = points.iter().map(|p| p.reading - fit.values[0]).collect();
+fn quality(curve: &[f64], points: &[Point], units: &LoadUnits) -> FitQuality {
+    let left = points.iter().map(|p| p.reading - value_of(curve, p.load));
+    let left: Vec<f64> = left.collect();
+    let swing: Vec<f64> = points.iter().map(|p| p.reading - curve[0]).collect();
     FitQuality {
         rms: rms(&left),
         unit: units.reading.clone(),
@@ -185,8 +165,46 @@ fn quality(
     }
 }
 
+/// Reading at a load, by the coefficients of its powers.
+fn value_of(curve: &[f64], load: f64) -> f64 {
+    let power = |(k, c): (usize, &f64)| c * load.powi(k as i32);
+    curve.iter().enumerate().map(power).sum()
+}
+
+/// Says what was fitted, and what the uncertainties allow for.
+fn method(result: &mut Identification, fit: &LoadCurve, points: &[Point], unit: &str) {
+    let is_weighted = points.iter().all(|p| p.std.is_some());
+    result.method.push(format!(
+        "{} regression of the reading on the load over {} points, loading and unloading together{}{}",
+        if is_weighted { "weighted" } else { "unweighted" },
+        points.len(),
+        if fit.has_even_drift { ", with an even drift of the zero" } else { "" },
+        if fit.has_hysteresis { ", with a hysteresis at each load" } else { "" }
+    ));
+    let spreads = &fit.spreads;
+    let allowed = [
+        (
+            spreads.drift,
+            "a drift of the zero by",
+            " from reading to reading",
+        ),
+        (spreads.zero, "a spread of the zero over the series of", ""),
+        (
+            spreads.sensitivity,
+            "a spread over the mountings of",
+            " at the largest load",
+        ),
+    ];
+    for (spread, what, when) in allowed.iter().filter(|a| a.0 > 0.0) {
+        let size = rounded(*spread, 2);
+        result.method.push(format!(
+            "uncertainties allow for {what} {size} {unit}{when} (standard deviation)"
+        ));
+    }
+}
+
 /// Sensitivity, its inverse, zero, and the higher powers of the curve.
-fn constants(fit: &LinearFit, largest: f64, units: &LoadUnits) -> Vec<NamedEstimate> {
+fn constants(fit: &LoadCurve, largest: f64, units: &LoadUnits) -> Vec<NamedEstimate> {
     let (load, reading) = (&units.load, &units.reading);
     let slope = fit.values[1] / largest;
     let slope_std = fit.std[1].map(|s| s / largest);
@@ -223,11 +241,7 @@ fn draw(result: &mut Identification, points: &[Point], curve: &[f64], units: &Lo
     points.sort_by(|a, b| a.load.total_cmp(&b.load));
     let loads: Vec<f64> = points.iter().map(|p| p.load).collect();
     let readings: Vec<f64> = points.iter().map(|p| p.reading).collect();
-    let value = |load: &f64| -> f64 {
-        let power = |(k, c): (usize, &f64)| c * load.powi(k as i32);
-        curve.iter().enumerate().map(power).sum()
-    };
-    let fitted: Vec<f64> = loads.iter().map(value).collect();
+    let fitted: Vec<f64> = loads.iter().map(|load| value_of(curve, *load)).collect();
     let left: Vec<f64> = readings.iter().zip(&fitted).map(|(r, c)| r - c).collect();
     let x = format!("load, {}", units.load);
     let y = format!("reading, {}", units.reading);

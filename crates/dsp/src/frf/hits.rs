@@ -23,8 +23,6 @@ pub enum HitFault {
     ForceClipped,
     /// The measured signal is clipped.
     MeasuredClipped,
-    /// The hammer struck twice.
-    Doubled,
     /// The record ends soon after it.
     CutShort,
 }
@@ -34,7 +32,6 @@ impl fmt::Display for HitFault {
         f.write_str(match self {
             Self::ForceClipped => "its force is clipped",
             Self::MeasuredClipped => "its response is clipped",
-            Self::Doubled => "the hammer struck twice",
             Self::CutShort => "the record ends soon after it",
         })
     }
@@ -42,11 +39,8 @@ impl fmt::Display for HitFault {
 
 /// Smallest force of a hit over the largest one; weaker pulses belong to the hit before.
 const STRONG: f64 = 0.3;
-/// Smallest force of a second stroke, over the first, that is reported.
+/// Smallest force of a second stroke, over the first, that is reported. It is part of the recorded force.
 const SECOND: f64 = 0.05;
-/// Force of a second stroke, over the first, from which the hit is unusable: the spectrum of the force then has deep
-/// notches. A weaker one is part of the recorded force and does little harm.
-const USELESS: f64 = 0.3;
 /// Smallest force of a second stroke, in standard deviations of the force at rest.
 const ABOVE_NOISE: f64 = 8.0;
 /// Distance from its extreme, over it, within which a signal counts as clipped.
@@ -61,7 +55,7 @@ const FLAT: usize = 3;
 /// Samples kept before the force rises.
 const BEFORE: usize = 16;
 
-/// Finds the hits. A second stroke within `apart` samples is a fault of the first hit; later ones are separate hits.
+/// Finds the hits. A second stroke within `apart` samples belongs to the first hit; later ones are separate hits.
 #[must_use]
 pub fn find_hits(force: &[f64], measured: &[f64], apart: usize) -> Vec<Hit> {
     let rest = median(force);
@@ -81,9 +75,6 @@ pub fn find_hits(force: &[f64], measured: &[f64], apart: usize) -> Vec<Hit> {
             let mut faults = faults(force, measured, rest, peaks[k], range.clone());
             let second = (SECOND * size(peaks[k])).max(ABOVE_NOISE * noise);
             let second = second_stroke(&size, peaks[k], range.end, second);
-            if second.is_some_and(|part| part >= USELESS) {
-                faults.push(HitFault::Doubled);
-            }
             if range.len() < longest / 2 {
                 faults.push(HitFault::CutShort);
             }
@@ -242,7 +233,8 @@ mod tests {
         let faults: Vec<&[HitFault]> = hits.iter().map(|h| &h.faults[..]).collect();
         assert_eq!(faults[0], []);
         assert_eq!(faults[1], [HitFault::ForceClipped]);
-        assert_eq!(faults[2], [HitFault::Doubled]);
+        assert_eq!(faults[2], []);
+        assert!(hits[2].second.is_some_and(|part| (part - 0.4).abs() < 0.01));
         assert_eq!(faults[3], []);
         assert!(hits[0].range.start < 500 && hits[0].range.end < 2500);
         let mut flat = measured.clone();
@@ -279,7 +271,7 @@ mod tests {
             let got = hits[0].second;
             assert_eq!(got.is_some(), doubled, "{second} after 10, noise {noise}");
             assert!(got.is_none_or(|part| (part - second / 10.0).abs() < 0.01));
-            assert!(!hits[0].faults.contains(&HitFault::Doubled));
+            assert!(hits[0].faults.is_empty());
         }
     }
 

@@ -97,25 +97,32 @@ impl<'a> Parameters<'a> {
         k: usize,
     ) -> Complex64 {
         let omega = spectra.omega[k];
-        let scale = self.shape.scale();
-        let (front, s) = self.shape.front(omega, state.delay_s, scale);
-        let (linear, own) = (&state.linear, &state.transients[record]);
+        let own = &state.transients[record];
+        let s = Complex64::new(0.0, omega / self.shape.scale());
+        let mut transient = self.resonances(s, own, state);
         let far = 2 * self.modes;
-        let mut response = linear[far] + linear[far + 1] / (s * s);
-        let mut transient = Complex64::ZERO;
         for (l, p) in self.smooth(omega).iter().enumerate() {
             transient += Complex64::new(own[far + 2 * l], own[far + 2 * l + 1]) * p;
         }
-        for (j, pole) in state.poles.iter().enumerate() {
-            let (near, mirrored) = self.shape.fractions(s, *pole, scale);
-            let of = |v: &[f64]| {
-                let residue = Complex64::new(v[2 * j], v[2 * j + 1]);
-                residue * near + residue.conj() * mirrored
-            };
-            response += of(linear);
-            transient += of(own);
-        }
-        spectra.measured[k] - front * response * spectra.applied[k] - transient
+        spectra.measured[k] - self.response(omega, state) * spectra.applied[k] - transient
+    }
+
+    /// H at an angular frequency.
+    pub fn response(&self, omega: f64, state: &ParameterValues) -> Complex64 {
+        let (front, s) = self.shape.front(omega, state.delay_s, self.shape.scale());
+        let far = 2 * self.modes;
+        let outside = state.linear[far] + state.linear[far + 1] / (s * s);
+        front * (self.resonances(s, &state.linear, state) + outside)
+    }
+
+    /// Σ R/(s − p) + R̄/(s − p̄) for residues R.
+    fn resonances(&self, s: Complex64, residues: &[f64], state: &ParameterValues) -> Complex64 {
+        let of = |(j, pole): (usize, &Pole)| {
+            let (near, mirrored) = self.shape.fractions(s, *pole, self.shape.scale());
+            let residue = Complex64::new(residues[2 * j], residues[2 * j + 1]);
+            residue * near + residue.conj() * mirrored
+        };
+        state.poles.iter().enumerate().map(of).sum()
     }
 
     /// Derivatives of the model at a line, then the residual.

@@ -13,10 +13,15 @@
 //! Identification, 2nd ed., 2012, 6.3.2 and 9.)
 //!
 //! Weighted least squares (the maximum-likelihood estimate), by Gauss-Newton steps in all parameters from the fit of the
-//! averaged response. The variance of the noise is that of the residual, smoothed over neighbouring lines; the covariance
-//! is the inverse of the information.
+//! averaged response. The variance of the noise is that of the residual ([`noise`]); the covariance is the inverse of the
+//! information.
+//!
+//! Noise that enters before the resonance may be in the recorded input. That makes H too small, up to the factor
+//! g = (1 + √(1 − 4ρ))/2 for ρ = r/S_u, where S_u is the mean power of the recorded input: the gain's uncertainty allows
+//! for it with the second moment of a factor anywhere between g and 1, (1 − g)²/3.
 
 mod line;
+mod noise;
 mod normal;
 
 use std::ops::Range;
@@ -30,6 +35,7 @@ use super::{Data, Driven, FinalFit, Modal};
 use crate::identify::Pole;
 use crate::parallel::{in_parts, threads};
 use line::{ParameterValues, Parameters};
+use noise::NoiseParts;
 use normal::{Gram, PART, Solved};
 
 /// The lines of a record in the band.
@@ -53,6 +59,8 @@ const SMOOTHED: f64 = 0.04;
 const NEIGHBOURS: (usize, usize) = (20, 400);
 /// Fewest lines for each parameter.
 const LEAST_LINES: usize = 2;
+/// Noise before the resonance that is significant: in standard uncertainties, and over the power of the input.
+const BEFORE: (f64, f64) = (4.0, 1e-6);
 /// Lines for each parameter in the first search.
 const ENOUGH: usize = 500;
 /// Lines within half the width of a mode in the first search.
@@ -84,18 +92,34 @@ impl Whole {
         let state = ParameterValues::start(&layout, start, all.len());
         let some: Vec<Spectra> = all.iter().map(|s| s.thinned(&layout, &state)).collect();
         let (state, _) = descend(&layout, &some, state, LAST_STEP.0)?;
+        let mut before: f64 = 0.0;
         for (record, spectra) in all.iter_mut().enumerate() {
-            spectra.learn_noise(&layout, &state, record);
+            let parts = spectra.learn_noise(&layout, &state, record);
+            before = before.max(spectra.before_resonance(&parts));
         }
         let (state, solved) = descend(&layout, &all, state, LAST_STEP.1)?;
         let delay_s = (state.delay_s, solved.delay_std(&layout));
+        let gain_error = largest_gain_error(before);
+        let mut covariance = solved.covariance;
+        for (i, a) in state.linear.iter().enumerate() {
+            for (j, b) in state.linear.iter().enumerate() {
+                let at = (layout.searched() + i, layout.searched() + j);
+                covariance[at] += a * b * gain_error * gain_error / 3.0;
+            }
+        }
         Some(FinalFit {
             relative: residual_over_measured(&layout, &all, &state),
             modal: shape.modal_of(&state.poles, delay_s, &state.linear),
             linear: layout.searched(),
-            covariance: Covariance::of(solved.covariance),
+            covariance: Covariance::of(covariance),
+            gain_error,
         })
     }
+}
+
+/// 1 − g, the largest relative error of the gain for noise of that power before the resonance, over that of the input.
+fn largest_gain_error(before: f64) -> f64 {
+    0.5 * (1.0 - (1.0 - 4.0 * before).max(0.0).sqrt())
 }
 
 impl Spectra {
@@ -143,20 +167,39 @@ impl Spectra {
         in_parts(self.omega.len(), PART, threads(), part).concat()
     }
 
-    /// Weights from the residual, which is less than the noise by what the fit absorbs.
-    fn learn_noise(&mut self, layout: &Parameters, state: &ParameterValues, record: usize) {
+    /// Weights from the residual, which is less than the noise by what the fit absorbs; and the parts of the noise.
+    fn learn_noise(
+        &mut self,
+        layout: &Parameters,
+        state: &ParameterValues,
+        record: usize,
+    ) -> NoiseParts {
         let count = self.omega.len();
         let taken = layout.columns() as f64 / (2 * count) as f64;
+        let power = self.left(layout, state, record);
+        let response = |omega: &f64| layout.response(*omega, state).norm_sqr();
+        let shape: Vec<f64> = self.omega.iter().map(response).collect();
+        let parts = NoiseParts::of(&power, &shape);
         let mut sums = vec![0.0; count + 1];
-        for (k, left) in self.left(layout, state, record).into_iter().enumerate() {
-            sums[k + 1] = sums[k] + left;
+        for (k, power) in power.iter().enumerate() {
+            sums[k + 1] = sums[k] + power / parts.at(shape[k]).max(f64::MIN_POSITIVE);
         }
         let reach = ((SMOOTHED * count as f64) as usize).clamp(NEIGHBOURS.0, NEIGHBOURS.1);
         for (k, weight) in self.weight.iter_mut().enumerate() {
             let (from, to) = (k.saturating_sub(reach), (k + reach + 1).min(count));
-            let power = (sums[to] - sums[from]) / (to - from) as f64 / (1.0 - taken);
+            let smooth = (sums[to] - sums[from]) / (to - from) as f64 / (1.0 - taken);
+            let power = smooth * parts.at(shape[k]);
             *weight = (2.0 / power.max(f64::MIN_POSITIVE)).sqrt();
         }
+        parts
+    }
+
+    /// Power of the noise before the resonance over that of the applied signal; 0 if it is not significant.
+    fn before_resonance(&self, parts: &NoiseParts) -> f64 {
+        let applied: f64 = self.applied.iter().map(|u| u.norm_sqr()).sum();
+        let part = parts.shaped * self.applied.len() as f64 / applied;
+        let is_significant = parts.shaped > BEFORE.0 * parts.shaped_std && part > BEFORE.1;
+        if is_significant { part } else { 0.0 }
     }
 }
 

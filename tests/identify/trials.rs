@@ -1,0 +1,470 @@
+//! Trials of the stated uncertainties where the noise is not white, the input is noisy, mountings differ, the zero drifts
+//! or the stand has hysteresis. Short by default; `TORQCOMP_TRIALS=400` sets the number of records of each case.
+
+use num_complex::Complex64;
+use torqcomp::identify::static_load::{LoadUnits, Point, series_of};
+use torqcomp::identify::{decay, response, static_load};
+
+use super::{Coverage, Noise, TAU, of, times};
+use crate::util::assert_close;
+
+/// Records of each case.
+fn records(default: usize) -> usize {
+    let number = std::env::var("TORQCOMP_TRIALS").ok();
+    number.and_then(|n| n.parse().ok()).unwrap_or(default)
+}
+
+/// Between 92 and 97 % of the intervals include the true value, give or take three standard deviations of that share over
+/// so many records.
+fn check(covered: &Coverage, what: &str) {
+    let all = covered.all as f64;
+    let share = covered.inside as f64 / all;
+    println!(
+        "{what}: {} of {} ({:.1} %)",
+        covered.inside,
+        covered.all,
+        100.0 * share
+    );
+    let chance = 3.0 * (0.05 * 0.95 / all).sqrt();
+    assert!(
+        (0.92 - chance..=0.97 + chance).contains(&share),
+        "{what}: {} of {}",
+        covered.inside,
+        covered.all
+    );
+}
+
+/// Colours of noise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Colour {
+    White,
+    /// First order: x_i = a x_(i−1) + e_i.
+    FirstOrder(f64),
+    /// Two poles on the real axis, as of a low-pass.
+    LowPassed(f64),
+    /// Eight first-order noises of equal power, time constants of 2 to 2⁸ samples.
+    Pink,
+    /// A pole pair: frequency in cycles a sample, damping per sample.
+    Resonant(f64, f64),
+}
+
+impl Colour {
+    /// So many samples with a standard deviation of about 1.
+    fn samples(self, count: usize, noise: &mut Noise) -> Vec<f64> {
+        let settle = 4000;
+        let mut first_order = |a: f64| -> Vec<f64> {
+            let mut x = 0.0;
+            let step = (1.0 - a * a).sqrt();
+            let mut next = || {
+                x = a * x + step * noise.normal();
+                x
+            };
+            (0..count + settle).map(|_| next()).skip(settle).collect()
+        };
+        let mut samples = match self {
+            Self::White => first_order(0.0),
+            Self::FirstOrder(a) => first_order(a),
+            Self::LowPassed(a) => {
+                let mut y = 0.0;
+                let once = first_order(a);
+                let twice = once.iter().map(|x| {
+                    y = a * y + x;
+                    y
+                });
+                twice.collect()
+            }
+            Self::Pink => (1..=8).fold(vec![0.0; count], |sum, k| {
+                let part = first_order(1.0 - 0.5_f64.powi(k));
+                sum.iter().zip(part).map(|(s, x)| s + x).collect()
+            }),
+            Self::Resonant(frequency, damping) => {
+                let (a, b) = (
+                    2.0 * (-damping).exp() * (TAU * frequency).cos(),
+                    (-2.0 * damping).exp(),
+                );
+                let (mut x, mut before) = (0.0, 0.0);
+                let mut next = || {
+                    (x, before) = (a * x - b * before + noise.normal(), x);
+                    x
+                };
+                (0..count + settle).map(|_| next()).skip(settle).collect()
+            }
+        };
+        let power = samples.iter().map(|v| v * v).sum::<f64>() / count as f64;
+        samples.iter_mut().for_each(|v| *v /= power.sqrt());
+        samples
+    }
+}
+
+/// Decays of the stand of figure 5 (590 Hz) and of a lightly damped one in noise of a colour, 20 to 50 dB below the first
+/// amplitude.
+fn decays(colour: Colour, count: usize) -> ([Coverage; 2], usize) {
+    let mut noise = Noise(41);
+    let mut covered = [Coverage::default(), Coverage::default()];
+    let mut spurious = 0;
+    for k in 0..count {
+        let (sigma, omega, rate_hz, length) = match k % 2 {
+            0 => (4.0_f64.ln() / 5.3e-3, TAU / 1.7e-3, 40_000.0, 1200),
+            _ => (20.0, TAU * 180.0, 5000.0, 1500),
+        };
+        let size = 2.0 * 10_f64.powf(-[20.0, 30.0, 40.0, 50.0][(k / 2) % 4] / 20.0);
+        let t = times(length, rate_hz);
+        let free = |t: &f64| 2.0 * (-sigma * t).exp() * (omega * t).cos() + 0.1;
+        let drawn = colour.samples(length, &mut noise);
+        let values: Vec<f64> = t
+            .iter()
+            .zip(drawn)
+            .map(|(t, e)| free(t) + size * e)
+            .collect();
+        let record = decay::Ringing {
+            name: "simulated",
+            times_s: &t,
+            rate_hz: Some(rate_hz),
+            values: &values,
+        };
+        let (found, _) = decay::identify(&[record], &decay::DecayOptions::default()).unwrap();
+        spurious += found.modes.len() - 1;
+        let natural = omega.hypot(sigma);
+        let name = |what: &str| match found.modes.len() {
+            1 => what.to_owned(),
+            _ => format!("mode_1_{what}"),
+        };
+        covered[0].count(of(&found, &name("natural_frequency")), natural / TAU);
+        covered[1].count(of(&found, &name("damping_ratio")), sigma / natural);
+    }
+    (covered, spurious)
+}
+
+#[test]
+fn intervals_of_decays_cover_the_truth_in_coloured_noise() {
+    let number = records(24);
+    let (mut found, mut all) = (0, 0);
+    for colour in [
+        Colour::White,
+        Colour::FirstOrder(0.9),
+        Colour::FirstOrder(0.99),
+        Colour::LowPassed(0.8),
+        Colour::Pink,
+        Colour::Resonant(0.1, 0.05),
+    ] {
+        let (covered, spurious) = decays(colour, number);
+        println!("{colour:?}: {spurious} modes that are not there in {number} records");
+        (found, all) = (found + spurious, all + number);
+        for (covered, what) in covered.iter().zip(["frequency", "damping"]) {
+            check(covered, &format!("decay, {what}, {colour:?}"));
+        }
+    }
+    assert!(
+        50 * found <= all,
+        "{found} modes that are not there in {all} records"
+    );
+}
+
+/// Samples of noise up to 200 Hz, periodic over a longer time, and the displacement of a mode of 60 Hz driven by it: the
+/// response times the spectrum.
+fn driven(count: usize, ratio: f64, noise: &mut Noise) -> (Vec<f64>, Vec<f64>) {
+    let rate_hz = 1000.0;
+    let natural = TAU * 60.0;
+    let length = (count * 3 / 2).next_power_of_two();
+    let step = rate_hz / length as f64;
+    let plan = torqcomp_fourier::inverse(length);
+    let mut spectrum = vec![Complex64::ZERO; length / 2 + 1];
+    for line in &mut spectrum[1..(200.0 / step) as usize] {
+        *line = Complex64::new(noise.normal(), noise.normal());
+    }
+    let signal = |mut lines: Vec<Complex64>| {
+        let mut out = vec![0.0; length];
+        plan.process(&mut lines, &mut out).expect("lengths match");
+        out.truncate(count);
+        out
+    };
+    let shown = spectrum.iter().enumerate().map(|(k, x)| {
+        let w = TAU * step * k as f64;
+        x * natural * natural / Complex64::new(natural * natural - w * w, 2.0 * ratio * natural * w)
+    });
+    let shown = shown.collect();
+    (signal(spectrum), signal(shown))
+}
+
+fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
+}
+
+/// Where the noise of a response comes from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Disturbance {
+    /// White, in the measured signal.
+    Output,
+    /// Another torque on the stand, so that the noise has the shape of the resonance; and a little white noise.
+    Torque,
+    /// White, in the recorded input.
+    Input,
+}
+
+/// Responses to noise: natural frequency, damping ratio, stiffness.
+fn responses(disturbance: Disturbance, count: usize) -> [Coverage; 3] {
+    let mut noise = Noise(43);
+    let mut covered = [0; 3].map(|_| Coverage::default());
+    let (natural, stiffness) = (TAU * 60.0, 2800.0);
+    for k in 0..count {
+        let ratio = [0.03, 0.01][k % 2];
+        let size = [0.1, 0.03, 0.01][(k / 2) % 3];
+        let samples = 12_000;
+        let (mut applied, mut shown) = driven(samples, ratio, &mut noise);
+        let add = |to: &mut [f64], other: &[f64], factor: f64| {
+            let factor = factor * rms(to) / rms(other);
+            to.iter_mut().zip(other).for_each(|(v, e)| *v += factor * e);
+        };
+        let white: Vec<f64> = (0..samples).map(|_| noise.normal()).collect();
+        match disturbance {
+            Disturbance::Output => add(&mut shown, &white, size),
+            Disturbance::Torque => {
+                let (_, other) = driven(samples, ratio, &mut noise);
+                add(&mut shown, &other, size);
+                add(&mut shown, &white, 1e-3);
+            }
+            Disturbance::Input => {
+                add(&mut applied, &white, size);
+                let more: Vec<f64> = (0..samples).map(|_| noise.normal()).collect();
+                add(&mut shown, &more, 1e-3);
+            }
+        }
+        shown.iter_mut().for_each(|v| *v /= stiffness);
+        let record = response::Driven {
+            name: "simulated",
+            rate_hz: 1000.0,
+            applied: &applied,
+            measured: &shown,
+        };
+        let options = response::ResponseOptions {
+            excitation: Some(response::Excitation::Random),
+            band_hz: Some((20.0, 150.0)),
+            modes: Some(1),
+            ..Default::default()
+        };
+        let found = response::identify(&[record], &options).unwrap();
+        covered[0].count(of(&found, "natural_frequency"), natural / TAU);
+        covered[1].count(of(&found, "damping_ratio"), ratio);
+        let constants = found.modes[0].stand_constants().expect("constants");
+        let found = constants.list.iter().find(|c| c.name == "stiffness");
+        covered[2].count(found.expect("a stiffness"), stiffness);
+    }
+    covered
+}
+
+#[test]
+fn intervals_of_responses_cover_the_truth_whatever_the_noise() {
+    let number = records(60);
+    for disturbance in [Disturbance::Output, Disturbance::Torque, Disturbance::Input] {
+        let covered = responses(disturbance, number);
+        for (covered, what) in covered.iter().zip(["frequency", "damping", "stiffness"]) {
+            check(
+                covered,
+                &format!("response, {what}, noise of {disturbance:?}"),
+            );
+        }
+    }
+}
+
+/// The displacement of a mode of 60 Hz and damping ratio 0.03 under a force, a gain of 1 at rest, by Runge and Kutta's
+/// method in 16 steps a sample; both at 1 kHz.
+fn driven_by(force: impl Fn(f64) -> f64, count: usize) -> (Vec<f64>, Vec<f64>) {
+    let (natural, ratio, steps) = (TAU * 60.0, 0.03, 16);
+    let h = 1e-3 / f64::from(steps);
+    let slope =
+        |t: f64, x: f64, v: f64| natural * natural * (force(t) - x) - 2.0 * ratio * natural * v;
+    let (mut x, mut v) = (0.0, 0.0);
+    let (mut applied, mut shown) = (Vec::new(), Vec::new());
+    for i in 0..count {
+        applied.push(force(i as f64 * 1e-3));
+        shown.push(x);
+        for k in 0..steps {
+            let t = i as f64 * 1e-3 + f64::from(k) * h;
+            let a = slope(t, x, v);
+            let b = slope(t + h / 2.0, x + h / 2.0 * v, v + h / 2.0 * a);
+            let c = slope(
+                t + h / 2.0,
+                x + h / 2.0 * (v + h / 2.0 * a),
+                v + h / 2.0 * b,
+            );
+            let d = slope(t + h, x + h * (v + h / 2.0 * b), v + h * c);
+            x += h * v + h * h / 6.0 * (a + b + c);
+            v += h / 6.0 * (a + 2.0 * b + 2.0 * c + d);
+        }
+    }
+    (applied, shown)
+}
+
+/// A step, a bouncing drop and the trapezoid of a shock table give the mode of the stand, as a hammer does.
+#[test]
+fn transients_are_taken_as_they_are() {
+    let smooth = |t: f64| 0.5 * (1.0 + (t / 0.002).tanh());
+    let bell = |t: f64| (-0.5 * (t / 0.003).powi(2)).exp();
+    let step = |t: f64| 5.0 * smooth(t - 0.2);
+    let drop = |t: f64| bell(t - 0.2) + 0.6 * bell(t - 0.23) + 0.4 * bell(t - 0.27);
+    let trapezoid = |t: f64| smooth(t - 0.2) - smooth(t - 0.212);
+    let forces: [(&str, &dyn Fn(f64) -> f64, Option<response::Excitation>); 3] = [
+        ("step", &step, None),
+        ("drop", &drop, None),
+        (
+            "trapezoid",
+            &trapezoid,
+            Some(response::Excitation::Transient),
+        ),
+    ];
+    let mut noise = Noise(53);
+    for (name, force, excitation) in forces {
+        let (applied, shown) = driven_by(force, 2000);
+        let size = 1e-3 * shown.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        let measured: Vec<Vec<f64>> = (0..4)
+            .map(|_| shown.iter().map(|v| v + size * noise.normal()).collect())
+            .collect();
+        let driven = |measured| response::Driven {
+            name,
+            rate_hz: 1000.0,
+            applied: &applied,
+            measured,
+        };
+        let all: Vec<_> = measured.iter().map(|m| driven(m)).collect();
+        let options = response::ResponseOptions {
+            excitation,
+            band_hz: Some((10.0, 120.0)),
+            ..Default::default()
+        };
+        let found = response::identify(&all, &options).unwrap();
+        assert_eq!(found.modes.len(), 1, "{name}");
+        assert_close(of(&found, "natural_frequency").value(), 60.0, 1e-3);
+        assert_close(of(&found, "damping_ratio").value(), 0.03, 2e-2);
+    }
+}
+
+/// A band with too many lines is answered with one that will do.
+#[test]
+fn a_band_with_few_enough_lines_is_suggested() {
+    let bell = |t: f64| (-0.5 * ((t - 0.2) / 0.0005).powi(2)).exp();
+    let (applied, shown) = driven_by(bell, 40_000);
+    let record = response::Driven {
+        name: "long",
+        rate_hz: 1000.0,
+        applied: &applied,
+        measured: &shown,
+    };
+    let options = |band_hz| response::ResponseOptions {
+        band_hz,
+        modes: Some(1),
+        ..Default::default()
+    };
+    let refused = response::identify(&[record], &options(Some((1.0, 400.0)))).unwrap_err();
+    let message = refused.to_string();
+    let (_, band) = message.split_once("--band ").expect("a band");
+    let (from, to) = band.split_once("..").expect("two numbers");
+    let band = (
+        from.parse().expect("a number"),
+        to.parse().expect("a number"),
+    );
+    assert!(band.0 < 55.0 && band.1 > 65.0, "{message}");
+    let found = response::identify(&[record], &options(Some(band))).unwrap();
+    assert_close(of(&found, "natural_frequency").value(), 60.0, 1e-3);
+}
+
+/// What disturbs a calibration besides white noise of the readings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Calibration {
+    Plain,
+    /// Each mounting has a sensitivity and a zero of its own; so many of them.
+    Mountings(usize),
+    /// The mountings are declared, but all the same.
+    SameMountings,
+    /// The zero walks at random.
+    Walk,
+    /// The zero drifts evenly.
+    EvenDrift,
+    /// Half an ellipse of hysteresis, closed at both ends.
+    Hysteresis,
+    /// A constant hysteresis.
+    Friction,
+    /// Loading only, and a zero that walks at random.
+    WalkUp,
+}
+
+fn calibrations(case: Calibration, count: usize) -> Coverage {
+    let mut noise = Noise(47);
+    let mut covered = Coverage::default();
+    let units = LoadUnits {
+        load: "N m".to_owned(),
+        reading: "V".to_owned(),
+    };
+    for k in 0..count {
+        let size = [0.01, 0.003, 0.001][k % 3];
+        let mountings = match case {
+            Calibration::Mountings(count) => count,
+            _ => 3,
+        };
+        let up: Vec<f64> = (0..=10).map(f64::from).collect();
+        let down: Vec<f64> = up.iter().rev().skip(1).copied().collect();
+        let one = match case {
+            Calibration::WalkUp => [&up[..], &[0.0]].concat(),
+            _ => [&up[..], &down[..]].concat(),
+        };
+        let loads: Vec<f64> = one
+            .iter()
+            .copied()
+            .cycle()
+            .take(one.len() * mountings)
+            .collect();
+        let series = series_of(&loads);
+        let own: Vec<(f64, f64)> = (0..mountings)
+            .map(|_| (5.0 * size * noise.normal(), 0.3 * size * noise.normal()))
+            .collect();
+        let mut drift = 0.0;
+        let is_declared = matches!(case, Calibration::Mountings(_) | Calibration::SameMountings);
+        let point = |(i, load): (usize, &f64)| {
+            let s = series[i];
+            let side = if i % one.len() <= 10 { 1.0 } else { -1.0 };
+            let other = match case {
+                Calibration::Mountings(_) => own[s].0 + own[s].1 * load,
+                Calibration::Walk | Calibration::WalkUp => {
+                    drift += 0.5 * size * noise.normal();
+                    drift
+                }
+                Calibration::EvenDrift => 0.3 * size * i as f64,
+                Calibration::Hysteresis => 0.4 * size * side * load * (10.0 - load) / 2.5,
+                Calibration::Friction if *load > 0.0 && *load < 10.0 => 3.0 * size * side,
+                _ => 0.0,
+            };
+            Point {
+                load: *load,
+                reading: 0.02 + 0.1 * load + other + size * noise.normal(),
+                std: None,
+                series: s,
+                position: if is_declared { s } else { 0 },
+            }
+        };
+        let points: Vec<Point> = loads.iter().enumerate().map(point).collect();
+        let found = static_load::identify(&points, 1, &units).unwrap();
+        covered.count(of(&found, "sensitivity"), 0.1);
+    }
+    covered
+}
+
+#[test]
+fn intervals_of_calibrations_cover_the_truth_whatever_disturbs_them() {
+    use Calibration::{
+        EvenDrift, Friction, Hysteresis, Mountings, Plain, SameMountings, Walk, WalkUp,
+    };
+    let number = records(100);
+    for case in [
+        Plain,
+        Mountings(3),
+        Mountings(4),
+        Mountings(8),
+        SameMountings,
+        Walk,
+        WalkUp,
+        EvenDrift,
+        Hysteresis,
+        Friction,
+    ] {
+        check(&calibrations(case, number), &format!("static, {case:?}"));
+    }
+}
