@@ -40,6 +40,8 @@ pub(super) struct LoadCurve {
     pub values: Vec<f64>,
     /// Their standard uncertainties; `None` without degrees of freedom.
     pub std: Vec<Option<f64>>,
+    /// Readings less coefficients of the curve.
+    pub degrees_of_freedom: usize,
     /// Standard deviations of the random parts, in units of the reading.
     pub spreads: Spreads,
     /// Whether an even drift of the zero is part of the model.
@@ -97,7 +99,8 @@ pub(super) fn fit(
 ) -> Result<LoadCurve, FitError> {
     let mut columns = Vec::new();
     let mut model = Mixed::of(points, degree, largest, &columns);
-    let row = |i: usize, _| i as f64 / points.len() as f64;
+    // From −½ to ½, so that the zero is that of the middle row.
+    let row = |i: usize, _| (i as f64 + 0.5) / points.len() as f64 - 0.5;
     let drift = DVector::from_fn(points.len(), row);
     let mut has_even_drift = model.is_apart(&drift);
     if has_even_drift {
@@ -286,6 +289,7 @@ impl Mixed {
         Ok(LoadCurve {
             values: solved.values.as_slice()[..=degree].to_vec(),
             std: (0..=degree).map(std).collect(),
+            degrees_of_freedom: self.readings.len().saturating_sub(degree + 1),
             spreads: Spreads {
                 drift: spread(ratios[0]),
                 zero: spread(ratios[1]),

@@ -127,7 +127,7 @@ pub fn identify(
 fn calibration_points(
     points: &[Point],
     steps: &[f64],
-    fit: &LinearFit,
+    fit: &LoadCurve,
     largest: f64,
 ) -> Vec<CalibrationStep> {
     let count = fit.degrees_of_freedom.max(1) as f64;
