@@ -356,7 +356,7 @@ fn a_band_with_few_enough_lines_is_suggested() {
     };
     let refused = response::identify(&[record], &options(Some((1.0, 400.0)))).unwrap_err();
     let message = refused.to_string();
-    let (_, band) = message.split_once("--band ").expect("a band");
+    let (_, band) = message.rsplit_once("--band ").expect("a band");
     let (from, to) = band.split_once("..").expect("two numbers");
     let band = (
         from.parse().expect("a number"),

@@ -54,7 +54,7 @@ pub(super) fn order(
     if lines.len() > MOST_LINES {
         let (from_hz, to_hz) = lines::strongest(set, lines);
         return Err(Failure::failed(format_args!(
-            "{} lines in the band, more than {MOST_LINES}; narrow it with --band to where the response is strongest: \
+            "{} lines in the band, more than {MOST_LINES}; narrow it to where the response is strongest: \
              --band {}..{}",
             lines.len(),
             rounded(from_hz, 4),

@@ -64,8 +64,20 @@ pub fn find_hits(force: &[f64], measured: &[f64], apart: usize) -> Vec<Hit> {
     if largest == 0.0 {
         return Vec::new();
     }
-    let peaks = peaks(&size, force.len(), largest, apart);
-    let starts: Vec<usize> = peaks.iter().map(|p| start_of(&size, *p, largest)).collect();
+    let all = peaks(&size, force.len(), largest, apart);
+    let mut peaks: Vec<usize> = Vec::new();
+    let mut starts: Vec<usize> = Vec::new();
+    for peak in all {
+        let start = start_of(&size, peak, largest);
+        // A response that still rings belongs to the hit before.
+        if starts
+            .last()
+            .is_none_or(|last| has_decayed(&measured[*last..start]))
+        {
+            peaks.push(peak);
+            starts.push(start);
+        }
+    }
     let noise = spread(force, rest);
     let lengths = |k: usize| starts.get(k + 1).copied().unwrap_or(force.len()) - starts[k];
     let longest = (0..starts.len()).map(lengths).max().unwrap_or(0);
@@ -111,6 +123,17 @@ fn peaks(size: &dyn Fn(usize) -> f64, count: usize, largest: f64, apart: usize) 
         i = end.max(i + 1);
     }
     peaks
+}
+
+/// Swing at the end of a response over its largest below which the next hit has a response of its own.
+const DECAYED: f64 = 0.1;
+
+/// Whether a response has decayed at its end, the last fifth.
+fn has_decayed(measured: &[f64]) -> bool {
+    let middle = median(measured);
+    let size = |v: &f64| (v - middle).abs();
+    let largest = |part: &[f64]| part.iter().map(size).fold(0.0, f64::max);
+    largest(&measured[measured.len() - measured.len() / 5..]) < DECAYED * largest(measured)
 }
 
 /// Clipped signals of a hit.
@@ -227,9 +250,15 @@ mod tests {
         pulse(4500, 10.0, f64::INFINITY, &mut force);
         pulse(4700, 4.0, f64::INFINITY, &mut force);
         pulse(6500, 9.0, f64::INFINITY, &mut force);
-        let measured: Vec<f64> = (0..8000).map(|i| (f64::from(i) * 0.37).sin()).collect();
+        // Decays that begin with each hit.
+        let ring =
+            |i: i32| (f64::from(i) * 0.37).sin() * (-f64::from((i + 1500) % 2000) / 200.0).exp();
+        let measured: Vec<f64> = (0..8000).map(ring).collect();
         let hits = find_hits(&force, &measured, 1000);
         assert_eq!(hits.len(), 4, "{hits:?}");
+        // Where the response still rings, later hits belong to the first.
+        let endless: Vec<f64> = (0..8000).map(|i| (f64::from(i) * 0.37).sin()).collect();
+        assert_eq!(find_hits(&force, &endless, 1000).len(), 1);
         let faults: Vec<&[HitFault]> = hits.iter().map(|h| &h.faults[..]).collect();
         assert_eq!(faults[0], []);
         assert_eq!(faults[1], [HitFault::ForceClipped]);
