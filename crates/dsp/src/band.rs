@@ -6,7 +6,11 @@
 //! `√(1+(β/π)²)/edge width` seconds (J. F. Kaiser, "Nonrecursive digital filter design using the
 //! I₀-sinh window function", ISCAS 1974).
 
+mod choice;
+
 use crate::Error;
+
+pub use choice::{BandChoice, BandSearch, band_of_stand};
 
 /// Shape of the Kaiser window behind the edge: `e^{-26} ≈ 5·10⁻¹²` is left in the filter's tail.
 const EDGE_BETA: f64 = 26.0;
@@ -71,9 +75,14 @@ impl Band {
         Ok(Self {
             sample_rate_hz,
             top_hz,
-            end_hz: (top_hz * (1.0 + EDGE_FRACTION)).min(nyquist_hz),
+            end_hz: Self::end_of(sample_rate_hz, top_hz),
             edge: Edge::new(),
         })
+    }
+
+    /// Frequency from which on a band up to `top_hz` passes nothing.
+    fn end_of(sample_rate_hz: f64, top_hz: f64) -> f64 {
+        (top_hz * (1.0 + EDGE_FRACTION)).min(0.5 * sample_rate_hz)
     }
 
     /// The wanted band if the rate carries it with its full edge, or else 0.7 of half the rate.

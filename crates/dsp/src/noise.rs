@@ -101,10 +101,7 @@ impl RecordNoise {
         }
         above.sort_by(f64::total_cmp);
         let median = above[above.len() / 2];
-        // Median over mean of a chi-squared quantity with 2 degrees of freedom a block
-        // (E. B. Wilson, M. M. Hilferty, PNAS 17 (1931), 684).
-        let freedom = 2.0 * density.blocks as f64;
-        let floor_density = median / (1.0 - 2.0 / (9.0 * freedom)).powi(3);
+        let floor_density = median / density.median_over_mean();
         if floor_density <= 0.0 {
             return None;
         }

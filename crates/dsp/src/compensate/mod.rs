@@ -145,6 +145,12 @@ impl InverseFilter {
         self.half_length
     }
 
+    /// The inverse response, whatever the band.
+    #[must_use]
+    pub fn inverse(&self) -> &Inverse {
+        &self.inverse
+    }
+
     /// The band that the filter covers.
     #[must_use]
     pub fn band(&self) -> &Band {

@@ -1,0 +1,331 @@
+//! The band that suits a record and a stand.
+//!
+//! What a band `W(f)` leaves wrong is the torque that it cuts off and the noise that the inverse response multiplies
+//! within it:
+//!
+//! ```text
+//! e²(W) = ∫ |H⁻¹|² [ (1 − W)² (P − N) + W² N ] df
+//! ```
+//!
+//! with the record's density `P`, the density `N` of its noise, and so that of the torque `|H⁻¹|² (P − N)`. The band with
+//! the least `e²` is taken from a grid of rounded frequencies, about 2.4 % apart. `P − N` is used with its sign: where
+//! there is only noise it is zero on the average, so that extending the band by many lines never pays by chance, and one
+//! line decides only if it is larger than all the noise up to it.
+//!
+//! `N` is white. It is taken from where the record is weakest: the mean of the three least medians of 16 equal parts
+//! between 2 and 98 % of half the rate.
+
+use super::{Band, Edge, FALLBACK_FRACTION};
+use crate::compensate::Inverse;
+use crate::spectrum::{Density, welch_steep};
+
+/// Frequencies of the grid a decade.
+const PER_DECADE: i32 = 96;
+/// Lines of the density below the lowest band.
+const LOWEST_LINES: f64 = 4.0;
+/// Lines that a mean and its window's main lobe take up.
+const MEAN_LINES: usize = 3;
+/// Parts of the spectrum that noise is looked for in, and how many of them are taken.
+const FLOOR_PARTS: usize = 16;
+const FLOOR_TAKEN: usize = 3;
+/// Part of half the rate in which noise is looked for.
+const FLOOR_RANGE: [f64; 2] = [0.02, 0.98];
+/// Shortest and longest block of the density.
+const BLOCKS: [usize; 2] = [64, 1 << 15];
+/// Blocks that a record is long, at least.
+const RECORD_BLOCKS: usize = 4;
+/// Signal over its standard deviation from noise alone, below which a record holds none.
+const SIGNIFICANT: f64 = 6.0;
+/// Gain for noise up to which a band reaches that is chosen without a record.
+const STAND_GAIN: f64 = 10.0;
+
+/// A band and what it costs, in the units of the record at rest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BandChoice {
+    /// Upper end of the part that is compensated in full, in Hz.
+    pub top_hz: f64,
+    /// Expected noise within the band after compensation, rms.
+    pub noise_rms: f64,
+    /// Expected torque that the band cuts off, rms.
+    pub lost_rms: f64,
+}
+
+impl BandChoice {
+    /// Expected error of the compensated record, rms.
+    #[must_use]
+    pub fn error_rms(&self) -> f64 {
+        self.noise_rms.hypot(self.lost_rms)
+    }
+}
+
+/// A record's spectrum, divided by a stand's response.
+pub struct BandSearch {
+    rate_hz: f64,
+    step_hz: f64,
+    /// `|H⁻¹|²` at each line, as far as it is finite; zero for the mean.
+    power_gain: Vec<f64>,
+    density: Vec<f64>,
+    floor: f64,
+    /// Sums of `|H⁻¹|²` and of `|H⁻¹|² P` over the lines before each.
+    sums: Vec<[f64; 2]>,
+    /// Whether the record holds more than noise.
+    has_signal: bool,
+    edge: Edge,
+}
+
+impl BandSearch {
+    /// Of a record: torque at rest in any unit. `None` if it has too few samples for a spectrum.
+    #[must_use]
+    pub fn of_record(samples: &[f64], rate_hz: f64, inverse: &Inverse) -> Option<Self> {
+        let [shortest, longest] = BLOCKS;
+        let longest_here = samples.len() / RECORD_BLOCKS;
+        if longest_here < shortest {
+            return None;
+        }
+        let block = (longest_here / 2 + 1).next_power_of_two().min(longest);
+        let density = welch_steep(samples, rate_hz, block).ok()?;
+        Self::of_density(&density, rate_hz, inverse)
+    }
+
+    /// Of the density of a record. `None` if it has too few lines or no noise.
+    #[must_use]
+    pub fn of_density(density: &Density, rate_hz: f64, inverse: &Inverse) -> Option<Self> {
+        let floor = white_floor(density)?;
+        let gain = |line: usize| inverse(line as f64 * density.step_hz).norm_sqr();
+        let mut power_gain: Vec<f64> = (0..density.values.len())
+            .map(gain)
+            .take_while(|gain| gain.is_finite())
+            .collect();
+        let mean_lines = power_gain.len().min(MEAN_LINES);
+        power_gain[..mean_lines].fill(0.0);
+        let mut sums = vec![[0.0; 2]];
+        let (mut gains, mut record) = (0.0, 0.0);
+        for (gain, value) in power_gain.iter().zip(&density.values) {
+            gains += gain;
+            record += gain * value;
+            sums.push([gains, record]);
+        }
+        Some(Self {
+            rate_hz,
+            step_hz: density.step_hz,
+            has_signal: has_signal(density, floor),
+            density: density.values.clone(),
+            power_gain,
+            floor,
+            sums,
+            edge: Edge::new(),
+        })
+    }
+
+    /// The band with the least expected error; `None` if the record holds nothing but noise.
+    #[must_use]
+    pub fn best(&self) -> Option<BandChoice> {
+        if !self.has_signal {
+            return None;
+        }
+        let known_hz = self.power_gain.len() as f64 * self.step_hz;
+        let least_hz = LOWEST_LINES * self.step_hz;
+        grid(least_hz, FALLBACK_FRACTION * 0.5 * self.rate_hz)
+            .filter(|top_hz| Band::end_of(self.rate_hz, *top_hz) <= known_hz)
+            .map(|top_hz| (top_hz, self.squares(top_hz)))
+            .min_by(|(_, a), (_, b)| (a[0] + a[1]).total_cmp(&(b[0] + b[1])))
+            .map(|(top_hz, squares)| choice(top_hz, squares))
+    }
+
+    /// What a given band costs.
+    #[must_use]
+    pub fn cost(&self, top_hz: f64) -> BandChoice {
+        choice(top_hz, self.squares(top_hz))
+    }
+
+    /// Mean squares of the noise within a band and of the torque beyond it; the latter scatters about zero where there
+    /// is none.
+    fn squares(&self, top_hz: f64) -> [f64; 2] {
+        let end_hz = Band::end_of(self.rate_hz, top_hz);
+        let lines = self.power_gain.len();
+        let line = |hz: f64| ((hz / self.step_hz) as usize + 1).min(lines);
+        let (top, end) = (line(top_hz), line(end_hz));
+        let [gain, record] = self.sums[lines];
+        let [gain_to_end, record_to_end] = self.sums[end];
+        let mut noise = self.sums[top][0] * self.floor;
+        let mut lost = record - record_to_end - (gain - gain_to_end) * self.floor;
+        for k in top..end {
+            let hz = k as f64 * self.step_hz;
+            let kept = 1.0 - self.edge.at((hz - top_hz) / (end_hz - top_hz));
+            noise += self.power_gain[k] * kept * kept * self.floor;
+            lost += self.power_gain[k] * (1.0 - kept).powi(2) * (self.density[k] - self.floor);
+        }
+        [noise * self.step_hz, lost * self.step_hz]
+    }
+}
+
+/// The band of a stand alone: as far as `|H⁻¹|` stays below 10, at most 0.7 of half the rate.
+///
+/// ```
+/// use std::sync::Arc;
+/// use num_complex::Complex64;
+/// use torqcomp_dsp::band::band_of_stand;
+/// // |1 − (f/100)²| = 10 at 331.7 Hz; the next lower frequency of the grid.
+/// let stand = Arc::new(|f: f64| Complex64::new(1.0 - (f / 100.0).powi(2), 0.0));
+/// assert_eq!(band_of_stand(20_000.0, &(stand as _)), 324.0);
+/// ```
+#[must_use]
+pub fn band_of_stand(rate_hz: f64, inverse: &Inverse) -> f64 {
+    let highest_hz = FALLBACK_FRACTION * 0.5 * rate_hz;
+    let least_hz = 1e-6 * rate_hz;
+    grid(least_hz, highest_hz)
+        .take_while(|top_hz| inverse(*top_hz).norm() <= STAND_GAIN * inverse(0.0).norm())
+        .last()
+        .unwrap_or(highest_hz)
+}
+
+fn choice(top_hz: f64, [noise, lost]: [f64; 2]) -> BandChoice {
+    BandChoice {
+        top_hz,
+        noise_rms: noise.max(0.0).sqrt(),
+        lost_rms: lost.max(0.0).sqrt(),
+    }
+}
+
+/// Frequencies of three significant digits, `10^(k/96)` rounded, within limits.
+fn grid(from_hz: f64, to_hz: f64) -> impl Iterator<Item = f64> {
+    let place = |hz: f64| (f64::from(PER_DECADE) * hz.log10()).round() as i32;
+    let rounded = |k: i32| {
+        let hz = 10_f64.powf(f64::from(k) / f64::from(PER_DECADE));
+        let digits = 2 - hz.log10().floor() as i32;
+        // Dividing by a power of ten gives the double nearest to the decimal number.
+        match digits {
+            0.. => (hz * 10_f64.powi(digits)).round() / 10_f64.powi(digits),
+            _ => (hz / 10_f64.powi(-digits)).round() * 10_f64.powi(-digits),
+        }
+    };
+    (place(from_hz)..=place(to_hz) + 1)
+        .map(rounded)
+        .filter(move |hz| (from_hz..=to_hz * (1.0 + 1e-12)).contains(hz))
+}
+
+/// Density of white noise in a record; `None` if there is none.
+fn white_floor(density: &Density) -> Option<f64> {
+    let lines = density.values.len() as f64;
+    let [from, to] = FLOOR_RANGE.map(|part| (part * lines) as usize);
+    let width = (to - from) / FLOOR_PARTS;
+    if width == 0 {
+        return None;
+    }
+    let mut medians: Vec<f64> = density.values[from..to]
+        .chunks_exact(width)
+        .map(|part| {
+            let mut part = part.to_vec();
+            part.sort_by(f64::total_cmp);
+            part[part.len() / 2]
+        })
+        .collect();
+    medians.sort_by(f64::total_cmp);
+    let least = medians[..FLOOR_TAKEN].iter().sum::<f64>() / FLOOR_TAKEN as f64;
+    let floor = least / density.median_over_mean();
+    (floor > 0.0).then_some(floor)
+}
+
+/// Whether the sum of all lines differs from that of noise, or one of them does.
+fn has_signal(density: &Density, floor: f64) -> bool {
+    let values = &density.values[MEAN_LINES.min(density.values.len())..];
+    let scatter = floor / (density.blocks as f64).sqrt();
+    let excess: f64 = values.iter().map(|value| value - floor).sum();
+    let largest = values.iter().copied().fold(0.0, f64::max);
+    // The largest of n exponential values is about ln n times their mean.
+    let of_noise = (values.len() as f64).ln();
+    excess > SIGNIFICANT * scatter * (values.len() as f64).sqrt()
+        && largest > floor + (SIGNIFICANT + of_noise) * scatter
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use num_complex::Complex64;
+
+    use super::*;
+
+    const RATE: f64 = 10_000.0;
+
+    /// A stand whose inverse grows as `1 + (f/100)²`.
+    fn inverse() -> Inverse {
+        Arc::new(|hz| Complex64::new(1.0 + (hz / 100.0).powi(2), 0.0))
+    }
+
+    /// Density of white noise 1 with a torque's band of 100 up to a frequency, at 5 Hz.
+    fn flat(to_hz: f64, at: impl Fn(f64) -> f64) -> Density {
+        let value = |line: usize| {
+            let hz = 5.0 * line as f64;
+            1.0 + if hz <= to_hz { 100.0 } else { 0.0 } + at(hz)
+        };
+        Density {
+            step_hz: 5.0,
+            values: (0..=1000).map(value).collect(),
+            blocks: 10_000,
+        }
+    }
+
+    fn best(density: &Density) -> Option<BandChoice> {
+        BandSearch::of_density(density, RATE, &inverse())?.best()
+    }
+
+    #[test]
+    fn the_band_ends_where_the_signal_does() {
+        let found = best(&flat(400.0, |_| 0.0)).unwrap();
+        // Within the edge little of the signal is lost, and above it only noise would be gained.
+        assert!((360.0..=410.0).contains(&found.top_hz), "{found:?}");
+        // ∫ (1 + (f/100)²)² df = f + 2f³/3e4 + f⁵/5e8 = 23 747 up to 400 Hz; the edge adds to it.
+        assert!(
+            (23_000_f64.sqrt()..30_000_f64.sqrt()).contains(&found.noise_rms),
+            "{found:?}"
+        );
+    }
+
+    #[test]
+    fn a_chance_line_does_not_decide_and_a_strong_one_does() {
+        // Noise up to 3000 Hz costs about 3000⁵/5e8 = 4.9e8; a line of 5 Hz there brings 5 · 901² = 4.1e6 for each unit.
+        let line = |size: f64| flat(400.0, move |hz| if hz == 3000.0 { size } else { 0.0 });
+        assert!(best(&line(60.0)).unwrap().top_hz < 420.0);
+        assert!(best(&line(600.0)).unwrap().top_hz > 2500.0);
+    }
+
+    #[test]
+    fn noise_alone_is_no_reason_for_a_band() {
+        assert_eq!(best(&flat(-1.0, |_| 0.0)), None);
+        assert!(BandSearch::of_record(&[1.0; 10], RATE, &inverse()).is_none());
+        assert!(BandSearch::of_record(&[1.0; 10_000], RATE, &inverse()).is_none());
+    }
+
+    #[test]
+    fn frequencies_of_the_grid_have_three_digits_and_steps_of_a_few_per_cent() {
+        let all: Vec<f64> = grid(0.5, 7000.0).collect();
+        assert!(
+            all.windows(2)
+                .all(|w| w[1] / w[0] > 1.01 && w[1] / w[0] < 1.04),
+            "{all:?}"
+        );
+        assert!(
+            all.iter().all(|hz| format!("{hz}")
+                .trim_start_matches("0.")
+                .replace('.', "")
+                .trim_end_matches('0')
+                .len()
+                <= 3),
+            "{all:?}"
+        );
+        assert!(all.contains(&1.0) && all.contains(&100.0) && all.contains(&1000.0));
+    }
+
+    #[test]
+    fn an_unknown_inverse_ends_the_band() {
+        let inverse: Inverse = Arc::new(|hz| match hz < 200.0 {
+            true => Complex64::ONE,
+            false => Complex64::new(f64::INFINITY, 0.0),
+        });
+        let search = BandSearch::of_density(&flat(400.0, |_| 0.0), RATE, &inverse).unwrap();
+        let end_hz = 1.2 * search.best().unwrap().top_hz;
+        assert!((190.0..=200.0).contains(&end_hz), "{end_hz}");
+        assert!((150.0..200.0).contains(&band_of_stand(RATE, &inverse)));
+    }
+}
