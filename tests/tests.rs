@@ -26,3 +26,4 @@ mod simulate;
 mod table;
 mod text_tables;
 mod thesis;
+mod times;

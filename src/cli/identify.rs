@@ -89,9 +89,6 @@ pub struct Decay {
     /// Number of modes [default: chosen from the data]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=20))]
     pub modes: Option<u8>,
-    /// Part of the record to use, in seconds on its time axis
-    #[arg(long, value_name = "FROM..TO", value_parser = range, allow_hyphen_values = true)]
-    pub range: Option<(f64, f64)>,
     /// Frequencies of the modes, in Hz
     #[arg(long, value_name = "FROM..TO", value_parser = range)]
     pub band: Option<(f64, f64)>,

@@ -143,6 +143,7 @@ impl Plan {
             unit: chain.applied.unit.clone(),
             calibration: chain.described.clone(),
             rate_hz: stream.rate_hz,
+            filled: stream.filled.clone(),
             rate_from: stream.time.rate_from.sentence(stream.time.is_resampled()),
             method: match self.undo {
                 Some(_) => "refined",

@@ -70,7 +70,7 @@ fn write_as_it_is(
     stream: ChannelStream,
     output: &mut Output,
 ) -> Result<StreamSummary, Failure> {
-    let (grid, rate_hz, start_s) = (stream.time.grid.clone(), stream.rate_hz, stream.start_s);
+    let (grid, rate_hz, start) = (stream.time.grid.clone(), stream.rate_hz, stream.start);
     let (mut blocks, plan, mut validator) = stream.into_parts(0);
     let mut block = Block::default();
     let mut text = Text::default();
@@ -82,7 +82,7 @@ fn write_as_it_is(
             digits: args.digits,
             scale: 1.0,
             rate_hz,
-            times: Times::of(&block, grid.as_ref(), start_s, first),
+            times: Times::of(&block, grid.as_ref(), start, first),
         };
         text.clear();
         rows.write(&mut text, &block.rows.values, &[]);
@@ -98,7 +98,7 @@ fn write_resampled(
     output: &mut Output,
 ) -> Result<StreamSummary, Failure> {
     let record = UniformRecord::read(stream, |_| Ok(()))?;
-    let axis = (record.rate_hz, record.start_s);
+    let axis = (record.rate_hz, record.start);
     rows::write_uniform(output, args.digits, axis, &record.samples)?;
     Ok(record.summary)
 }

@@ -15,6 +15,7 @@ use crate::failure::Failure;
 use crate::io::{COMPENSATED, Input};
 use crate::print::{Report, columns, rounded, short};
 use crate::quality::excerpt;
+use crate::recording::moment::Moment;
 use crate::recording::{ChannelStream, UniformRecord};
 use crate::stand::{self, Calibration, Stand};
 use crate::unit::NamedUnit;
@@ -49,6 +50,11 @@ struct HarmonicsReport {
     fundamental_std_hz: Option<f64>,
     /// Time that phases refer to, on the time axis of the record.
     phase_reference_s: f64,
+    /// The same with all its digits.
+    phase_reference: String,
+    /// Time of the first sample.
+    #[serde(flatten)]
+    start: Moment,
     /// The constant part of the torque.
     mean: f64,
     components: Vec<ComponentTorque>,
@@ -184,12 +190,13 @@ fn fit(
         Fundamental::given(args.fundamental)
     };
     // Far from zero, a phase there would be an extrapolation over many periods.
-    let reference_s = if record.start_s.abs() > FAR_FROM_ZERO * duration_s {
-        record.start_s
+    let is_far = record.start.seconds().abs() > FAR_FROM_ZERO * duration_s;
+    let reference = if is_far {
+        record.start
     } else {
-        0.0
+        Moment::default()
     };
-    let start_s = record.start_s - reference_s;
+    let start_s = if is_far { 0.0 } else { record.start.seconds() };
     let found = harmonics::fit(samples, record.rate_hz, start_s, fundamental, &orders)?;
 
     let chain = &way.chain;
@@ -209,7 +216,7 @@ fn fit(
             unit: &chain.applied.unit,
             scale: printed,
             rate_hz: record.rate_hz,
-            start_s: record.start_s,
+            start: record.start,
             samples: samples.len(),
         },
     ));
@@ -226,7 +233,9 @@ fn fit(
         duration_s,
         fundamental_hz: fundamental.frequency_hz,
         fundamental_std_hz: fundamental.std_hz,
-        phase_reference_s: reference_s,
+        phase_reference_s: reference.seconds(),
+        phase_reference: reference.text(),
+        start: record.start,
         mean: found.mean * way.inverse(0.0).re * printed,
         components,
         residual_rms: found.residual_rms * printed,
@@ -343,7 +352,7 @@ impl Report for HarmonicsReport {
             .map_or_else(String::new, |std| format!(" ± {}", rounded(std, 2)));
         let mut text = format!(
             "{}, {} in {}, taken as {}: {} samples at {} Hz, {} s\n\
-             torque = mean + sum of A cos(2 pi f t + phase), A being the peak, t = 0 at {} s\n\
+             torque = mean + sum of A cos(2 pi f t + phase), A being the peak, t = 0 at {}\n\
              fundamental {}{std} Hz, mean {} {}, residual {} {} rms\n\n",
             self.input,
             self.channel,
@@ -352,7 +361,7 @@ impl Report for HarmonicsReport {
             self.samples,
             short(self.rate_hz),
             rounded(self.duration_s, 5),
-            short(self.phase_reference_s),
+            self.phase_reference,
             rounded(self.fundamental_hz, 9),
             rounded(self.mean, 5),
             self.unit,

@@ -6,6 +6,7 @@ use crate::failure::Failure;
 use crate::io::digits::{self, Decimal, Digits};
 use crate::io::output::Output;
 use crate::io::text::Text;
+use crate::recording::moment::Moment;
 use crate::recording::text::place_of;
 use crate::recording::{Block, StampGrid};
 
@@ -27,10 +28,13 @@ pub(super) enum Times<'a> {
     Copied { text: &'a [u8], spans: &'a [u64] },
     /// Stamps in another unit, times seconds per unit.
     Stamps { times: &'a [f64], seconds: f64 },
-    /// Nanoseconds from an origin, in nanoseconds.
-    Nanoseconds { times: &'a [f64], origin: i64 },
+    /// Stamps that count from an origin.
+    Counted {
+        times: &'a [f64],
+        grid: &'a StampGrid,
+    },
     /// A grid: start, index of the first sample, rate.
-    Grid { start_s: f64, first: usize },
+    Grid { start: Moment, first: usize },
 }
 
 /// Rows that are written at once.
@@ -39,7 +43,7 @@ const ROWS_AT_ONCE: usize = 1 << 14;
 /// The parts of a record that is in memory on a uniform time axis, each with the range of its samples.
 pub(super) fn uniform_parts(
     (digits, scale): (Digits, f64),
-    (rate_hz, start_s): (f64, f64),
+    (rate_hz, start): (f64, Moment),
     samples: usize,
 ) -> impl Iterator<Item = (Rows<'static>, Range<usize>)> {
     (0..samples).step_by(ROWS_AT_ONCE).map(move |first| {
@@ -47,7 +51,7 @@ pub(super) fn uniform_parts(
             digits,
             scale,
             rate_hz,
-            times: Times::Grid { start_s, first },
+            times: Times::Grid { start, first },
         };
         (rows, first..samples.min(first + ROWS_AT_ONCE))
     })
@@ -57,7 +61,7 @@ pub(super) fn uniform_parts(
 pub(super) fn write_uniform(
     output: &mut Output,
     digits: Digits,
-    axis: (f64, f64),
+    axis: (f64, Moment),
     samples: &[f64],
 ) -> Result<(), Failure> {
     let mut text = Text::default();
@@ -73,21 +77,18 @@ impl<'a> Times<'a> {
     /// The times of a block whose first sample is the `first` of the record.
     pub(super) fn of(
         block: &'a Block,
-        grid: Option<&StampGrid>,
-        start_s: f64,
+        grid: Option<&'a StampGrid>,
+        start: Moment,
         first: usize,
     ) -> Self {
         let times = &block.rows.times;
-        match grid.filter(|grid| !grid.resampled) {
-            None => Self::Grid { start_s, first },
+        match grid.filter(|grid| !grid.resampled && !grid.is_coarse()) {
+            None => Self::Grid { start, first },
             Some(grid) if grid.copied => Self::Copied {
                 text: &block.text,
                 spans: &block.rows.time_text,
             },
-            Some(grid) if grid.origin_ns != 0 => Self::Nanoseconds {
-                times,
-                origin: grid.origin_ns,
-            },
+            Some(grid) if grid.origin_ns != 0 => Self::Counted { times, grid },
             Some(grid) => Self::Stamps {
                 times,
                 seconds: grid.seconds_per_unit,
@@ -171,8 +172,11 @@ impl Rows<'_> {
                 out.copy(text, offset, length);
             }
             Times::Stamps { times, seconds } => out.number(times[i] * seconds, digits),
-            Times::Nanoseconds { times, origin } => out.seconds(origin + times[i] as i64),
-            Times::Grid { .. } => out.number(self.time_s(i), digits),
+            Times::Counted { times, grid } => out.seconds(grid.nanoseconds(times[i])),
+            Times::Grid { start, first } => match start.origin_ns {
+                0 => out.number(self.time_s(i), digits),
+                _ => out.seconds(self.on_grid(*start, first + i).nanoseconds()),
+            },
         }
         out.byte(b',');
     }
@@ -186,10 +190,14 @@ impl Rows<'_> {
         out.byte(b'\n');
     }
 
+    fn on_grid(&self, start: Moment, sample: usize) -> Moment {
+        start.later(sample as f64 / self.rate_hz)
+    }
+
     /// Time of the row `i` in ns; a grid begins at `start_ns`.
     pub(super) fn time_ns(&self, i: usize, start_ns: i64) -> i64 {
         match &self.times {
-            Times::Nanoseconds { times, origin } => origin + times[i] as i64,
+            Times::Counted { times, grid } => grid.nanoseconds(times[i]),
             Times::Grid { first, .. } => {
                 start_ns + (1e9 * (first + i) as f64 / self.rate_hz).round() as i64
             }
@@ -205,8 +213,8 @@ impl Rows<'_> {
                 crate::io::number::read(text, offset, b'.').map_or(f64::NAN, |(value, _)| value)
             }
             Times::Stamps { times, seconds } => times[i] * seconds,
-            Times::Nanoseconds { times, origin } => (*origin as f64 + times[i]) * 1e-9,
-            Times::Grid { start_s, first } => start_s + (first + i) as f64 / self.rate_hz,
+            Times::Counted { times, grid } => grid.nanoseconds(times[i]) as f64 * 1e-9,
+            Times::Grid { start, first } => self.on_grid(*start, first + i).seconds(),
         }
     }
 }

@@ -9,6 +9,7 @@ use crate::cli;
 use crate::failure::Failure;
 use crate::io::{ChannelChoice, Flags, Input};
 use crate::print::{Report, short};
+use crate::recording::moment::Moment;
 use crate::recording::{AlignedChannel, AlignedChannels};
 use crate::stand::{self, Calibration, Stand, TransducerSignal};
 use crate::unit::{NamedUnit, RecordedChannel};
@@ -31,7 +32,8 @@ struct SimulateReport {
     input_between_samples: &'static str,
     samples: usize,
     rate_hz: f64,
-    start_s: f64,
+    #[serde(flatten)]
+    start: Moment,
     /// Steps of integration from sample to sample.
     steps_per_sample: usize,
     effects: Vec<&'static str>,
@@ -65,7 +67,7 @@ pub fn run(args: &cli::Simulate) -> Result<Outcome, Failure> {
     let applied: Vec<f64> = chosen.samples.iter().map(|u| u * units.applied).collect();
     let chain = stand.chain()?;
     let between = args.between.into();
-    let input = Excitation::new(applied, read.rate_hz, read.start_s, 1).with_between(between);
+    let input = Excitation::new(applied, read.rate_hz, read.start.after_s, 1).with_between(between);
     let (mut simulated, steps) = refined(&chain, &input)?;
     for value in &mut simulated {
         let torque = *value + stand.diagnosed.offset;
@@ -79,7 +81,7 @@ pub fn run(args: &cli::Simulate) -> Result<Outcome, Failure> {
         *value = recorded / units.measured;
     }
     output.write(b"time_s,measured\n")?;
-    let axis = (read.rate_hz, read.start_s);
+    let axis = (read.rate_hz, read.start);
     rows::write_uniform(&mut output, args.digits, axis, &simulated)?;
     output.finish()?;
     let report = SimulateReport {
@@ -91,7 +93,7 @@ pub fn run(args: &cli::Simulate) -> Result<Outcome, Failure> {
         input_between_samples: between.name(),
         samples: simulated.len(),
         rate_hz: read.rate_hz,
-        start_s: read.start_s,
+        start: read.start,
         steps_per_sample: steps,
         effects: stand.effects.iter().map(|e| e.effect.name).collect(),
         warnings,

@@ -13,5 +13,5 @@ pub mod text;
 pub use input::Input;
 pub(crate) use mark::{COMPENSATED, names_compensated};
 pub use parts::remove_when_interrupted;
-pub use reading::{ChannelChoice, Delimiter, DialectOverride, Flags, Reading};
+pub use reading::{ChannelChoice, Delimiter, DialectOverride, Fill, Flags, Reading, TimeRange};
 pub(crate) use reading::{frequency, positive_frequency};

@@ -14,6 +14,8 @@ const INVERSE_POWERS: [f64; 23] = [
     1e0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13, 1e-14,
     1e-15, 1e-16, 1e-17, 1e-18, 1e-19, 1e-20, 1e-21, 1e-22,
 ];
+/// Digits that fit a `u64` whatever they are.
+const MOST_DIGITS: usize = 19;
 /// Largest integer up to which every integer is an `f64`.
 const EXACT_MANTISSA: u64 = 1 << 53;
 
@@ -32,8 +34,50 @@ pub fn read_nearly(text: &[u8], at: usize, decimal: u8) -> Option<(f64, usize)> 
     read_as::<false>(text, at, decimal)
 }
 
+/// Reads a number at `text[at..]` as its difference to a whole one, rounded once: of 1710250000.123456 to 1710250000 it is
+/// 0.123456, where the number itself has no more than 2.4e-7 in an `f64`. And the position after it.
+pub fn read_after(text: &[u8], at: usize, decimal: u8, origin: i64) -> Option<(f64, usize)> {
+    let (parts, count, place) = parts(text, at, decimal)?;
+    let exact = || {
+        let mantissa = i128::from(parts.mantissa);
+        let number = if parts.negative { -mantissa } else { mantissa };
+        let power = 10_i128.pow(parts.exponent.unsigned_abs());
+        if parts.exponent < 0 {
+            (number - i128::from(origin) * power) as f64 / power as f64
+        } else {
+            (number * power - i128::from(origin)) as f64
+        }
+    };
+    if count > MOST_DIGITS {
+        let short = without_last_digits(&text[at..place], decimal)?;
+        return read_after(&short, 0, decimal, origin).map(|(value, _)| (value, place));
+    }
+    if parts.exponent.unsigned_abs() > 18 {
+        let (value, place) = read(text, at, decimal)?;
+        return Some((value - origin as f64, place));
+    }
+    Some((exact(), place))
+}
+
+/// A number without the decimals behind its nineteenth digit; `None` if it has none to spare.
+#[cold]
+fn without_last_digits(number: &[u8], decimal: u8) -> Option<Vec<u8>> {
+    let point = number.iter().position(|byte| *byte == decimal)?;
+    let before = number[..point]
+        .iter()
+        .filter(|byte| byte.is_ascii_digit())
+        .count();
+    let decimals = number[point + 1..]
+        .iter()
+        .take_while(|byte| byte.is_ascii_digit())
+        .count();
+    let kept = MOST_DIGITS.checked_sub(before)?.min(decimals);
+    Some([&number[..=point + kept], &number[point + 1 + decimals..]].concat())
+}
+
+/// The digits of a number at `text[at..]`, how many they are, and the position after it.
 #[inline(always)]
-fn read_as<const EXACT: bool>(text: &[u8], at: usize, decimal: u8) -> Option<(f64, usize)> {
+fn parts(text: &[u8], at: usize, decimal: u8) -> Option<(Parts, usize, usize)> {
     let mut place = at;
     let negative = text.get(place) == Some(&b'-');
     if negative || text.get(place) == Some(&b'+') {
@@ -60,15 +104,24 @@ fn read_as<const EXACT: bool>(text: &[u8], at: usize, decimal: u8) -> Option<(f6
         exponent = exponent.saturating_add(more);
         place = end;
     }
-    // 19 digits fit a u64 whatever they are.
-    if count > 19 || mantissa > EXACT_MANTISSA || exponent.unsigned_abs() > 22 {
+    Some((
+        Parts {
+            negative,
+            mantissa,
+            exponent,
+        },
+        count,
+        place,
+    ))
+}
+
+#[inline(always)]
+fn read_as<const EXACT: bool>(text: &[u8], at: usize, decimal: u8) -> Option<(f64, usize)> {
+    let (parts, count, place) = parts(text, at, decimal)?;
+    if count > MOST_DIGITS || parts.mantissa > EXACT_MANTISSA || parts.exponent.unsigned_abs() > 22
+    {
         return slow(&text[at..place], decimal).map(|value| (value, place));
     }
-    let parts = Parts {
-        negative,
-        mantissa,
-        exponent,
-    };
     let value = if EXACT {
         parts.exactly()?
     } else {
@@ -243,6 +296,25 @@ pub fn cell(text: &str, decimal: u8) -> Option<f64> {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    #[test]
+    fn large_stamps_keep_every_digit_as_differences() {
+        let origin = 1_710_250_000;
+        for (text, expected) in [
+            ("1710250000.000020", 2e-5),
+            ("1710249999.5", -0.5),
+            ("1710250000", 0.0),
+            ("1.710250000123456789e+09", 0.123_456_789),
+            ("1710250000.123456789012345", 0.123_456_789),
+            ("1710250000.123456789012345e0", 0.123_456_789),
+        ] {
+            let found = read_after(text.as_bytes(), 0, b'.', origin);
+            assert_eq!(found, Some((expected, text.len())), "{text}");
+        }
+        let ns = read_after(b"1710250000000000001", 0, b'.', 1_710_250_000_000_000_000);
+        assert_eq!(ns, Some((1.0, 19)));
+        assert_eq!(read_after(b"x", 0, b'.', origin), None);
+    }
 
     #[test]
     fn usual_cells() {

@@ -1,6 +1,6 @@
 //! How a recording is read, as far as its file leaves that open.
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 
 use super::mcap::TimeChoice;
 use torqcomp_model::Kind;
@@ -35,6 +35,12 @@ pub struct Reading {
     /// Interpolate where the time stamps are not uniform, instead of refusing
     #[arg(long)]
     pub resample: bool,
+    /// Part of the record to use: seconds on its time axis (0.5..2), times of day or dates; either end may be left out
+    #[arg(long, value_name = "FROM..TO", value_parser = time_range, allow_hyphen_values = true)]
+    pub range: Option<TimeRange>,
+    /// What stands in for missing samples: empty cells, and gaps of whole steps between the time stamps [default: refuse]
+    #[arg(long, value_name = "HOW", value_enum)]
+    pub fill: Option<Fill>,
     /// Topic of an MCAP file, as /joint_states; channels are then named by the fields of its messages
     #[arg(long, value_name = "TOPIC")]
     pub topic: Option<String>,
@@ -49,6 +55,26 @@ pub struct Reading {
     pub any_steps: bool,
 }
 
+/// The ends of a range of time as written; what they mean the record's time axis says.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TimeRange {
+    /// Its first time.
+    pub from: Option<String>,
+    /// Its last time.
+    pub to: Option<String>,
+}
+
+/// What stands in for samples that are missing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Fill {
+    /// A straight line between the neighbours
+    Linear,
+    /// The last value before
+    Hold,
+    /// Nothing: such records are refused
+    Refuse,
+}
+
 /// Marks of a table, given by the user instead of found in the file.
 #[derive(Debug, Clone, Default, Args)]
 pub struct DialectOverride {
@@ -58,6 +84,13 @@ pub struct DialectOverride {
     /// Decimal mark: . or ,
     #[arg(long, value_name = "MARK", value_parser = decimal)]
     pub decimal: Option<u8>,
+}
+
+impl Reading {
+    /// Whether a part of the record is read, or something is added to it: both need the whole of it in memory.
+    pub(crate) fn is_partial(&self) -> bool {
+        self.range.is_some() || self.fill.is_some_and(|fill| fill != Fill::Refuse)
+    }
 }
 
 /// Which channel of a recording is read, and its unit if the file does not say or is wrong.
@@ -164,6 +197,19 @@ pub(crate) fn positive_frequency(text: &str) -> Result<f64, String> {
     match frequency(text)? {
         0.0 => Err("expected a frequency greater than zero".to_owned()),
         value => Ok(value),
+    }
+}
+
+fn time_range(text: &str) -> Result<TimeRange, String> {
+    let end = |text: &str| Some(text.trim().to_owned()).filter(|text| !text.is_empty());
+    let (from, to) = text.split_once("..").unwrap_or_default();
+    match (end(from), end(to)) {
+        (None, None) => Err(
+            "expected FROM..TO, in seconds (0.5..2), as times of day (14:30:00..14:31:00) or as dates with times; \
+             either end may be left out"
+                .to_owned(),
+        ),
+        (from, to) => Ok(TimeRange { from, to }),
     }
 }
 

@@ -1,6 +1,7 @@
 //! What is wrong with a record that a verb works on, told from as much of it as may be kept.
 
 use crate::recording::TimeAxis;
+use crate::recording::moment::Moment;
 use crate::warning::Warning;
 
 /// Samples that are kept of a record that goes by as a stream.
@@ -24,7 +25,7 @@ pub struct Of<'a> {
     /// Samples a second.
     pub rate_hz: f64,
     /// Time of the first sample.
-    pub start_s: f64,
+    pub start: Moment,
     /// Samples in all.
     pub samples: usize,
 }
@@ -53,8 +54,9 @@ pub fn of_memory(mut samples: Vec<f64>) -> Vec<f64> {
 /// The warnings of [`super::warnings`] about the first samples of a record; that it has more is said.
 ///
 /// ```
+/// use torqcomp::recording::moment::Moment;
 /// use torqcomp::quality::excerpt::{Of, warnings};
-/// let of = Of { name: "bridge", unit: "V", scale: 1e3, rate_hz: 1000.0, start_s: 0.0, samples: 5000 };
+/// let of = Of { name: "bridge", unit: "V", scale: 1e3, rate_hz: 1000.0, start: Moment::default(), samples: 5000 };
 /// let samples: Vec<f64> = (0..1000).map(|i| (0.1 * f64::from(i)).sin().min(0.7) * 1e-3).collect();
 /// let found = warnings(&samples, of);
 /// assert_eq!(found[0].code, "clipped");
@@ -63,7 +65,10 @@ pub fn of_memory(mut samples: Vec<f64>) -> Vec<f64> {
 #[must_use]
 pub fn warnings(samples: &[f64], of: Of) -> Vec<Warning> {
     let scaled: Vec<f64> = samples.iter().map(|sample| sample * of.scale).collect();
-    let axis = TimeAxis::of_header("rate", of.rate_hz, Some(of.start_s));
+    let axis = TimeAxis {
+        start: Some(of.start),
+        ..TimeAxis::of_header("rate", of.rate_hz, None)
+    };
     let mut found = super::warnings(of.name, of.unit, &scaled, &axis);
     if samples.len() < of.samples {
         let rest = format!(

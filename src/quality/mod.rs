@@ -108,10 +108,13 @@ fn place(axis: &TimeAxis, index: usize) -> String {
     let stamp = axis.stamps_s.as_ref().and_then(|t| t.get(index).copied());
     let counted = || {
         axis.rate_hz
-            .map(|rate| axis.start_s.unwrap_or(0.0) + index as f64 / rate)
+            .map(|rate| axis.start.unwrap_or_default().later(index as f64 / rate))
     };
-    match stamp.filter(|t| t.is_finite()).or_else(counted) {
-        Some(time_s) => format!("{} s", crate::print::rounded(time_s, 7)),
+    let stamp = stamp
+        .filter(|t| t.is_finite())
+        .map(|after_s| axis.moment(after_s));
+    match stamp.or_else(counted) {
+        Some(moment) => moment.short(),
         None => format!("sample {}", index + 1),
     }
 }

@@ -6,7 +6,7 @@ use torqcomp_dsp::quality::rounding::{Rounded, rounded};
 use torqcomp_dsp::quality::steps::{Event, Events, Steps, rounded_steps, steps};
 
 use crate::print::rounded as number;
-use crate::recording::{Channel, TimeAxis};
+use crate::recording::{COARSE_STAMPS, Channel, TimeAxis};
 use crate::warning::Warning;
 
 /// Largest deviation of a step, as a part of it, in an axis that counts as uniform.
@@ -69,15 +69,16 @@ impl TimeFindings {
                 format!("{whose}: {} time stamp(s) are no numbers", steps.non_finite),
             ));
         }
-        found.extend(backwards(whose, steps));
-        found.extend(repeated(whose, steps));
+        found.extend(backwards(whose, axis, steps));
+        found.extend(repeated(whose, axis, steps));
         if axis.rate_hz.is_none() {
             // Without a usual step, every step would be a gap.
             return found;
         }
-        found.extend(jumps(whose, steps));
-        found.extend(gaps(whose, steps));
+        found.extend(jumps(whose, axis, steps));
+        found.extend(gaps(whose, axis, steps));
         found.extend(match &self.rounded {
+            Some(rounded) if rounded.quantum_s <= COARSE_STAMPS * rounded.step_s => None,
             Some(rounded) => Some(rounded_stamps(whose, rounded)),
             None => jitter(whose, steps),
         });
@@ -141,7 +142,7 @@ fn counted(events: &Events) -> Option<(&Event, &Event)> {
     events.listed.first().zip(events.longest.as_ref())
 }
 
-fn backwards(whose: &str, steps: &Steps) -> Option<Warning> {
+fn backwards(whose: &str, axis: &TimeAxis, steps: &Steps) -> Option<Warning> {
     let (first, longest) = counted(&steps.backwards)?;
     let why = if -longest.step_s > SET_BACK * steps.typical_s {
         "the clock was set back, or two recordings were joined; split the file there"
@@ -151,54 +152,54 @@ fn backwards(whose: &str, steps: &Steps) -> Option<Warning> {
     Some(Warning::new(
         "time-backwards",
         format!(
-            "{whose}: time runs backwards {}, first at {} s and at most by {} s: {why}",
+            "{whose}: time runs backwards {}, first at {} and at most by {} s: {why}",
             times(steps.backwards.count),
-            number(first.from_s, 7),
+            axis.moment(first.from_s).short(),
             number(-longest.step_s, 4)
         ),
     ))
 }
 
-fn repeated(whose: &str, steps: &Steps) -> Option<Warning> {
+fn repeated(whose: &str, axis: &TimeAxis, steps: &Steps) -> Option<Warning> {
     let (first, _) = counted(&steps.repeated)?;
     Some(Warning::new(
         "repeated-stamps",
         format!(
-            "{whose}: {} time stamp(s) equal the one before, first {} s: samples stored twice, or a \
-             clock coarser than the samples; --resample leaves them out",
+            "{whose}: {} time stamp(s) equal the one before, first {}: samples stored twice, or a \
+             clock that stood still",
             steps.repeated.count,
-            number(first.from_s, 7)
+            axis.moment(first.from_s).short()
         ),
     ))
 }
 
-fn jumps(whose: &str, steps: &Steps) -> Option<Warning> {
+fn jumps(whose: &str, axis: &TimeAxis, steps: &Steps) -> Option<Warning> {
     let (first, _) = counted(&steps.jumps)?;
     Some(Warning::new(
         "clock-jump",
         format!(
-            "{whose}: the time stamps jump by {} s after {} s, more than all of the rest takes: the \
+            "{whose}: the time stamps jump by {} s after {}, more than all of the rest takes: the \
              clock was set, or two recordings were joined; split the file there",
             number(first.step_s, 4),
-            number(first.from_s, 7)
+            axis.moment(first.from_s).short()
         ),
     ))
 }
 
-fn gaps(whose: &str, steps: &Steps) -> Option<Warning> {
+fn gaps(whose: &str, axis: &TimeAxis, steps: &Steps) -> Option<Warning> {
     let (first, longest) = counted(&steps.gaps)?;
     let samples = steps.stamps as f64;
     Some(Warning::new(
         "time-gaps",
         format!(
             "{whose}: {} gap(s) in the time stamps, about {} sample(s) missing ({} %); the first \
-             after {} s, the longest of {} s after {} s; --resample bridges short ones",
+             after {}, the longest of {} s after {}; --fill linear bridges short ones",
             steps.gaps.count,
             number(steps.missing, 6),
             number(100.0 * steps.missing / (samples + steps.missing), 2),
-            number(first.from_s, 7),
+            axis.moment(first.from_s).short(),
             number(longest.step_s, 4),
-            number(longest.from_s, 7)
+            axis.moment(longest.from_s).short()
         ),
     ))
 }
@@ -222,9 +223,9 @@ fn rounded_stamps(whose: &str, rounded: &Rounded) -> Warning {
         "rounded-time-stamps",
         format!(
             "{whose}: the time stamps are written in multiples of {} s; but for that they are \
-             uniform, {} Hz. Give it with --rate",
+             uniform, and all of them together give {} Hz",
             number(rounded.quantum_s, 3),
-            number(1.0 / rounded.step_s, 7)
+            number(1.0 / rounded.step_s, 9)
         ),
     )
 }

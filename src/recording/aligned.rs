@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use torqcomp_dsp::resample::{Resampled, Resampler};
 
-use super::memory_stream::check_holes;
+use super::memory_stream::check_cells;
+use super::moment::Moment;
 use super::stamps::check_resampled;
 use super::{Recording, Selection, typical_step};
 use crate::failure::Failure;
@@ -50,8 +51,8 @@ pub(crate) struct AlignedChannels {
     pub(crate) source: String,
     /// Samples a second.
     pub(crate) rate_hz: f64,
-    /// Time of the first sample, in seconds.
-    pub(crate) start_s: f64,
+    /// Time of the first sample.
+    pub(crate) start: Moment,
     /// The channels, in the order in which they were asked for.
     pub(crate) channels: Vec<AlignedChannel>,
     /// What should be known of the file and of how its channels were brought together; what was lost comes first.
@@ -87,13 +88,17 @@ impl AlignedChannels {
         reading: &Reading,
     ) -> Result<Self, Failure> {
         let is_text = recording.format != "mcap";
+        for (i, choice) in choices.iter().enumerate() {
+            let place = if is_text { recording.place(choice)? } else { i };
+            recording.fill(place, reading)?;
+        }
         let mut warnings = recording.all_warnings();
         let mut chosen = Vec::new();
         for (i, choice) in choices.iter().enumerate() {
             // Of messages, only what is chosen was read.
             let place = if is_text { recording.place(choice)? } else { i };
             let selection = recording.select_at(place, choice, reading)?;
-            check_holes(selection.channel)?;
+            check_cells(selection.channel, reading)?;
             check_finite(&selection)?;
             let new = |w: &Warning| !warnings.contains(w);
             let more: Vec<Warning> = selection
@@ -112,7 +117,7 @@ impl AlignedChannels {
         let mut aligned = Self {
             source: recording.source.clone(),
             rate_hz: first.rate_hz,
-            start_s: first.start_s,
+            start: first.start,
             channels: Vec::new(),
             warnings,
             is_lossy: recording.lost.is_some(),
@@ -120,6 +125,12 @@ impl AlignedChannels {
         let is_given = reading.rate_hz.is_some() && !reading.resample;
         if is_given || !reading.resample && is_one_axis(&chosen, is_text)? {
             let count = chosen.iter().map(|c| c.channel.samples.len()).min();
+            if !is_given {
+                let rounded = chosen[0]
+                    .channel
+                    .rounded_stamps(&aligned.source, chosen[0].rate_hz);
+                aligned.warnings.extend(rounded);
+            }
             let empty = chosen.iter().map(|c| aligned_channel(c, Vec::new()));
             let empty = places.into_iter().zip(empty).collect();
             aligned.channels = filled(&mut recording, empty, count.unwrap_or(0));
@@ -133,7 +144,11 @@ impl AlignedChannels {
     fn resample(&mut self, chosen: &[Selection]) -> Result<(), Failure> {
         let stamps: Vec<Arc<Vec<f64>>> = chosen
             .iter()
-            .filter_map(|c| c.channel.axis.stamps_s.clone())
+            .filter_map(|c| {
+                c.channel
+                    .axis
+                    .stamps_after(chosen[0].channel.axis.origin_ns)
+            })
             .filter(|stamps| !stamps.is_empty())
             .collect();
         if stamps.len() < chosen.len() {
@@ -176,7 +191,7 @@ impl AlignedChannels {
         self.channels
             .iter_mut()
             .for_each(|t| t.samples.truncate(shortest));
-        self.start_s = start_s;
+        self.start = chosen[0].channel.axis.moment(start_s);
         self.warnings.push(self.resampled(chosen, &worst));
         Ok(())
     }
@@ -184,12 +199,12 @@ impl AlignedChannels {
     fn resampled(&self, chosen: &[Selection], done: &Resampled) -> Warning {
         let several = chosen.len() > 1;
         let mut message = format!(
-            "{} {} interpolated to {} Hz from {} s on, because the time stamps {} (jitter up to {} % of a \
+            "{} {} interpolated to {} Hz from {} on, because the time stamps {} (jitter up to {} % of a \
              step)",
             names(chosen),
             if several { "were" } else { "was" },
             print::short(self.rate_hz),
-            print::short(self.start_s),
+            self.start.short(),
             if several {
                 "are not uniform or not the same"
             } else {
@@ -269,7 +284,7 @@ fn check_finite(selection: &Selection) -> Result<(), Failure> {
 /// If their rates are too different to be brought together, or nothing says how they lie.
 fn is_one_axis(chosen: &[Selection], is_text: bool) -> Result<bool, Failure> {
     let first = &chosen[0];
-    let stamps = |c: &Selection| c.channel.axis.stamps_s.clone();
+    let stamps = |c: &Selection| c.channel.axis.stamps_after(first.channel.axis.origin_ns);
     let mut same = true;
     for other in &chosen[1..] {
         let rates = other.rate_hz / first.rate_hz - 1.0;
@@ -279,7 +294,7 @@ fn is_one_axis(chosen: &[Selection], is_text: bool) -> Result<bool, Failure> {
         same &= match (stamps(first), stamps(other)) {
             (Some(a), Some(b)) => Arc::ptr_eq(&a, &b) || is_same(&a, &b, first.rate_hz),
             (None, None) => {
-                let apart_s = (other.start_s - first.start_s).abs();
+                let apart_s = (other.start.seconds() - first.start.seconds()).abs();
                 if rates.abs() > SAME_RATE || apart_s * first.rate_hz > SAME_STAMP {
                     return Err(differ(chosen));
                 }
@@ -310,10 +325,10 @@ fn names(chosen: &[Selection]) -> String {
 fn differ(chosen: &[Selection]) -> Failure {
     let one = |c: &Selection| {
         format!(
-            "\"{}\" has {} Hz from {} s on",
+            "\"{}\" has {} Hz from {} on",
             c.channel.name,
             print::short(c.rate_hz),
-            print::short(c.start_s)
+            c.start.short()
         )
     };
     let all: Vec<String> = chosen.iter().map(one).collect();

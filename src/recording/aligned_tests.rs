@@ -18,6 +18,7 @@ fn channel(name: &str, axis: TimeAxis, of: impl Fn(f64) -> f64) -> Channel {
         holes: Vec::new(),
         axis,
         segment: None,
+        filled: Vec::new(),
     }
 }
 
@@ -72,7 +73,7 @@ fn the_same_stamps_are_taken_as_they_are() {
     assert_eq!(found.channels[0].samples, record.channels[0].samples);
     assert_eq!(found.channels[1].samples, record.channels[1].samples);
     assert!(found.warnings.is_empty());
-    assert!((found.start_s - 5.0).abs() < 1e-12 && (found.rate_hz - 1000.0).abs() < 1e-6);
+    assert!((found.start.seconds() - 5.0).abs() < 1e-12 && (found.rate_hz - 1000.0).abs() < 1e-6);
 }
 
 #[test]
@@ -90,7 +91,7 @@ fn messages_at_other_moments_are_interpolated_and_that_is_said() {
     assert!(a.len() == b.len() && a.len() > 380);
     // Both channels hold the same wave, so that they must agree where they overlap.
     for (i, (a, b)) in a.iter().zip(b).enumerate() {
-        let truth = wave(found.start_s + i as f64 / found.rate_hz);
+        let truth = wave(found.start.seconds() + i as f64 / found.rate_hz);
         assert!(
             (a - truth).abs() < 2e-6 && (b - truth).abs() < 2e-6,
             "{i}: {a} {b} {truth}"

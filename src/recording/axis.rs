@@ -2,8 +2,10 @@
 
 use std::sync::Arc;
 
-use torqcomp_dsp::quality::rounding::{Rounded, rounded};
+use torqcomp_dsp::quality::rounding::{Rounded, uniform_line};
 
+use super::Hole;
+use super::moment::Moment;
 use super::stamps::StampGrid;
 use crate::io::digits;
 
@@ -11,6 +13,8 @@ use crate::io::digits;
 const USUAL: f64 = 0.25;
 /// Relative difference of the usual step from the mean one that leaves nothing to be asked.
 const SAME: f64 = 1e-3;
+/// A step longer than this many usual ones leaves out a sample.
+const GAP: f64 = 1.5;
 /// Fewest steps unlike the others that speak for rounding: one or two are gaps.
 const FEWEST_UNLIKE: usize = 3;
 /// Largest deviation of a step, as a fraction of it, that counts as uniform.
@@ -25,16 +29,22 @@ pub struct TimeAxis {
     pub rate_hz: Option<f64>,
     /// Where the rate comes from.
     pub rate_from: RateFrom,
-    /// Time of the first sample on the file's own axis, in seconds.
-    pub start_s: Option<f64>,
+    /// Time of the first sample on the file's own axis.
+    pub start: Option<Moment>,
     /// Date and time of the first sample, as written.
     pub start_text: Option<String>,
-    /// Time of each sample in seconds, as read.
+    /// Time of each sample in seconds after the origin, as read.
     pub stamps_s: Option<Arc<Vec<f64>>>,
+    /// Cells among the stamps that hold no number; the stamps are `NaN` there.
+    pub holes: Vec<Hole>,
+    /// Nanoseconds at which the stamps are zero: those since 1970 would cost an `f64` its last digits.
+    pub origin_ns: i64,
     /// Heading of the column of stamps, or what they are.
     pub stamps_in: Option<String>,
     /// Of samples that pass as a stream, the grid that their stamps lie on.
     pub(crate) grid: Option<StampGrid>,
+    /// Nanoseconds since 1970, or since midnight, at which the stamps are zero, where the file gives dates or times of day.
+    pub(crate) clock_ns: Option<i64>,
     /// Rate that the head of the file gives, in Hz, used or not.
     pub header_rate_hz: Option<f64>,
     /// What was taken for granted about the axis and should be confirmed before results rest on it:
@@ -146,40 +156,90 @@ fn equal_step(stamps: &[f64]) -> Option<f64> {
     alike.then(|| (stamps[stamps.len() - 1] - first) / (stamps.len() - 1) as f64)
 }
 
-/// Usual step of stamps, or that of the straight line that they are but for being rounded: 3 and 4 ms
-/// by turns are a step of 3.5 ms.
-pub(super) fn step_of(stamps_s: &[f64]) -> Option<f64> {
+/// The step of the straight line that stamps are but for their rounding (3 and 4 ms by turns are a step of 3.5 ms), or
+/// of their longest part without a gap; else the usual step.
+pub(super) fn step_of(stamps_s: &[f64], origin_s: f64) -> Option<f64> {
+    let line = |part: &[f64]| line_of(part, origin_s);
+    if let Some(line) = line(stamps_s) {
+        return Some(line.step_s);
+    }
     let step = typical_step(stamps_s)?;
     let span = stamps_s.last()? - stamps_s.first()?;
     let mean = span / (stamps_s.len() - 1) as f64;
     if (step / mean - 1.0).abs() <= SAME {
         return Some(step);
     }
-    Some(rounding(stamps_s, step).map_or(step, |line| line.step_s))
+    let parts = stamps_s.chunk_by(|a, b| (0.0..GAP * step).contains(&(b - a)));
+    let longest = parts.max_by_key(|part| part.len())?;
+    let is_most = 4 * longest.len() > stamps_s.len();
+    Some(
+        line(longest)
+            .filter(|_| is_most)
+            .map_or(step, |line| line.step_s),
+    )
 }
 
 /// How stamps about a step apart are rounded, if that is all that is wrong with them.
-pub(super) fn rounding(stamps_s: &[f64], step: f64) -> Option<Rounded> {
+pub(super) fn rounding(stamps_s: &[f64], step: f64, origin_s: f64) -> Option<Rounded> {
     let unlike = |pair: &&[f64]| ((pair[1] - pair[0]) / step - 1.0).abs() > UNIFORM;
     let some = stamps_s.windows(2).filter(unlike).take(FEWEST_UNLIKE);
-    rounded(stamps_s).filter(|_| some.count() == FEWEST_UNLIKE)
+    line_of(stamps_s, origin_s).filter(|_| some.count() == FEWEST_UNLIKE)
+}
+
+/// The line of stamps that deviate from it by their rounding only. `origin_s` is the time at which they are zero: a
+/// clock that counts from there in an `f64` has its last bit.
+fn line_of(stamps_s: &[f64], origin_s: f64) -> Option<Rounded> {
+    let resolution_s = 2.0 * f64::EPSILON * (origin_s.abs() + stamps_s.last()?.abs());
+    uniform_line(stamps_s.iter().copied().enumerate(), resolution_s)
 }
 
 impl TimeAxis {
     /// An axis of stamps in seconds.
     #[must_use]
     pub fn of_stamps(heading: &str, stamps_s: Arc<Vec<f64>>) -> Self {
-        let step = step_of(&stamps_s);
+        Self::of_stamps_after(0, heading, stamps_s)
+    }
+
+    /// An axis of stamps in seconds after an origin in ns.
+    #[must_use]
+    pub fn of_stamps_after(origin_ns: i64, heading: &str, stamps_s: Arc<Vec<f64>>) -> Self {
+        let origin_s = origin_ns as f64 * 1e-9;
+        let step = step_of(&stamps_s, origin_s);
         let rate_hz = step
             .map(|step| without_rounding(1.0 / step))
             .filter(|hz| hz.is_finite() && *hz > 0.0);
         Self {
             rate_hz,
             rate_from: rate_hz.map_or(RateFrom::None, |_| RateFrom::Stamps(heading.to_owned())),
-            start_s: stamps_s.first().copied().filter(|t| t.is_finite()),
+            start: stamps_s
+                .first()
+                .filter(|t| t.is_finite())
+                .map(|after_s| Moment {
+                    origin_ns,
+                    after_s: *after_s,
+                }),
             stamps_s: Some(stamps_s),
+            origin_ns,
             stamps_in: Some(heading.to_owned()),
             ..Self::default()
+        }
+    }
+
+    /// Its stamps in seconds after another origin.
+    pub(crate) fn stamps_after(&self, origin_ns: i64) -> Option<Arc<Vec<f64>>> {
+        let stamps = self.stamps_s.as_ref()?;
+        let later_s = self.origin_ns.wrapping_sub(origin_ns) as f64 * 1e-9;
+        Some(match later_s {
+            0.0 => Arc::clone(stamps),
+            _ => Arc::new(stamps.iter().map(|stamp| stamp + later_s).collect()),
+        })
+    }
+
+    /// A time on it, in seconds after its origin.
+    pub(crate) fn moment(&self, after_s: f64) -> Moment {
+        Moment {
+            origin_ns: self.origin_ns,
+            after_s,
         }
     }
 
@@ -189,7 +249,7 @@ impl TimeAxis {
         Self {
             rate_hz: Some(rate_hz),
             rate_from: RateFrom::Header(words.to_owned()),
-            start_s,
+            start: start_s.map(Moment::of_seconds),
             header_rate_hz: Some(rate_hz),
             ..Self::default()
         }

@@ -1,7 +1,7 @@
 //! Blocks of samples, as the pipeline moves them.
 
 use super::stamps::{IrregularStep, StampGrid};
-use super::text::{ChannelPlan, ChannelRows, Chunks, Piece};
+use super::text::{ChannelPlan, ChannelRows, Chunks, LastLine, Piece, RowPlan, last_line};
 use crate::failure::Failure;
 use crate::warning::Warning;
 
@@ -32,8 +32,8 @@ pub(crate) struct Block {
     pub(crate) text: Vec<u8>,
     /// What they say.
     pub(crate) rows: ChannelRows,
-    /// Whether the last line has no line feed.
-    pub(super) unended: bool,
+    /// What a last line without a line end is, and its text.
+    pub(super) last_line: Option<(LastLine, String)>,
     /// First irregular time stamp within the block.
     pub(super) irregular: Option<IrregularStep>,
 }
@@ -54,6 +54,23 @@ pub(super) struct TextBlocks {
     pub(super) chunks: Chunks,
     /// Mean length of a row, in bytes.
     pub(super) row_bytes: usize,
+    /// How all columns of the table are read.
+    pub(super) table: RowPlan,
+    /// Whether no line stands before the next piece.
+    pub(super) is_first: bool,
+}
+
+impl TextBlocks {
+    /// Judges a last line that has no line end, and takes it away if the file was cut within it.
+    fn look_at_last_line(&self, block: &mut Block) {
+        let judged = LastLine::of(&block.text, self.is_first, &self.table);
+        let last = last_line(&block.text);
+        let text = String::from_utf8_lossy(last).into_owned();
+        if judged == LastLine::Cut {
+            block.text.truncate(block.text.len() - last.len());
+        }
+        block.last_line = Some((judged, text));
+    }
 }
 
 impl BlockSource for TextBlocks {
@@ -64,7 +81,11 @@ impl BlockSource for TextBlocks {
     fn next(&mut self, block: &mut Block) -> Result<bool, Failure> {
         let piece = self.chunks.next(&mut block.text);
         let piece = piece.map_err(|failure| failure.at(&self.source))?;
-        block.unended = piece == Piece::Unended;
+        block.last_line = None;
+        if piece == Piece::Unended {
+            self.look_at_last_line(block);
+        }
+        self.is_first = false;
         Ok(piece != Piece::End)
     }
 

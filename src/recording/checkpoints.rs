@@ -4,6 +4,8 @@
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 
+use torqcomp_dsp::quality::rounding::uniform_line;
+
 use crate::io::Input;
 use crate::recording::text::{ChannelPlan, ChannelRows};
 
@@ -12,22 +14,29 @@ const PIECE: u64 = 1 << 12;
 /// Largest distance of a stamp from the grid, in steps, at which steps can still be counted.
 const COUNTABLE: f64 = 0.25;
 
-/// The step of stamps that begin at `first` and are about `step` apart, from stamps farther and farther on: each is a
-/// whole number of steps away, which the step as known so far is sharp enough to tell. `None` where it is not.
+/// The step of stamps that begin with `first` and are about `step` apart, from stamps farther and farther on: each is a
+/// whole number of steps away, which the step as known so far is sharp enough to tell. All together are then the stamps
+/// of one line, if they deviate from it by their rounding only. `None` where steps cannot be counted.
 ///
 /// A step of 1.01 that is found with 101 stamps is 1.0099 when the stamp after 10 100 steps is known to be 10 200:
 /// 10 200 / 1.01 = 10 099.01.
-pub(super) fn sharpened(step: f64, first: f64, later: &[f64]) -> Option<f64> {
-    let mut step = step;
+pub(super) fn sharpened(step: f64, first: &[f64], later: &[f64], origin: f64) -> Option<f64> {
+    let (mut step, start) = (step, *first.first()?);
+    let mut known: Vec<(usize, f64)> = first.iter().copied().enumerate().collect();
     for stamp in later {
-        let steps = (stamp - first) / step;
+        let steps = (stamp - start) / step;
         let count = steps.round();
         if count < 1.0 || (steps - count).abs() > COUNTABLE {
             return None;
         }
-        step = (stamp - first) / count;
+        step = (stamp - start) / count;
+        if known.last().is_some_and(|(i, _)| *i < count as usize) {
+            known.push((count as usize, *stamp));
+        }
     }
-    Some(step)
+    let resolution = 2.0 * f64::EPSILON * (origin.abs() + known.last()?.1.abs());
+    let line = uniform_line(known.iter().copied(), resolution);
+    Some(line.map_or(step, |line| line.step_s))
 }
 
 /// Stamps of a text at distances that double, and its last one. `from` is the byte behind the head. Empty where the
@@ -89,9 +98,10 @@ mod tests {
     #[test]
     fn steps_are_counted_as_far_as_they_are_known() {
         // 1.01 per step in the head; in truth 10 200 are 10 099 steps.
-        let step = sharpened(1.01, 0.0, &[101.0, 1010.0, 10_200.0]).unwrap();
+        let first = [0.0, 1.01];
+        let step = sharpened(1.01, &first, &[101.0, 1010.0, 10_200.0], 0.0).unwrap();
         assert!((step - 10_200.0 / 10_099.0).abs() < 1e-12, "{step}");
-        assert_eq!(sharpened(1.0, 0.0, &[100.4]), None);
-        assert_eq!(sharpened(1.0, 0.0, &[]), Some(1.0));
+        assert_eq!(sharpened(1.0, &[0.0], &[100.4], 0.0), None);
+        assert_eq!(sharpened(1.0, &[0.0], &[], 0.0), Some(1.0));
     }
 }

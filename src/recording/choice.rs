@@ -1,6 +1,7 @@
 //! Choosing one channel of a recording: the same way for every format and verb.
 
 use super::axis::UNIFORM;
+use super::moment::Moment;
 use super::{Channel, Recording, TimeAxis, typical_step};
 use crate::failure::{Failure, did_you_mean};
 use crate::io::{ChannelChoice, Reading, digits};
@@ -133,8 +134,8 @@ pub(crate) struct Selection<'a> {
     pub(crate) channel: &'a Channel,
     /// Samples a second.
     pub(crate) rate_hz: f64,
-    /// Time of the first sample, in seconds: 0 if the file does not say, or the rate was given.
-    pub(crate) start_s: f64,
+    /// Time of the first sample: 0 if the file does not say, or the rate was given.
+    pub(crate) start: Moment,
     /// Unit of the samples, if it is known.
     pub(crate) unit: Option<NamedUnit>,
     /// Where the command line and the file differ.
@@ -165,9 +166,9 @@ impl Recording {
         let (unit, warning) = unit_of(choice, &channel.heading, channel.unit.as_ref())?;
         let mut warnings: Vec<Warning> = warning.into_iter().collect();
         let axis = &channel.axis;
-        let (rate_hz, start_s) = match (reading.rate_hz, axis.rate_hz) {
-            (Some(rate_hz), _) => (rate_hz, 0.0),
-            (None, Some(rate_hz)) => (rate_hz, axis.start_s.unwrap_or(0.0)),
+        let (rate_hz, start) = match (reading.rate_hz, axis.rate_hz) {
+            (Some(rate_hz), _) => (rate_hz, Moment::default()),
+            (None, Some(rate_hz)) => (rate_hz, axis.start.unwrap_or_default()),
             (None, None) => return Err(without_rate(channel)),
         };
         if let (Some(assumed), None) = (&axis.assumed, reading.rate_hz) {
@@ -186,7 +187,7 @@ impl Recording {
         Ok(Selection {
             channel,
             rate_hz,
-            start_s,
+            start,
             unit,
             warnings,
         })

@@ -5,9 +5,11 @@ use std::sync::Arc;
 use super::block::{Block, BlockSource};
 use super::stamps::StampGrid;
 use super::stream::ChannelStream;
+use super::text::BRIDGE;
 use super::{Channel, HoleKind, RateFrom, Recording, TimeAxis};
 use crate::failure::Failure;
 use crate::io::{ChannelChoice, Reading, names_compensated};
+use crate::print::plural;
 use crate::warning::Warning;
 
 /// Samples of a block.
@@ -19,26 +21,32 @@ impl ChannelStream {
     /// # Errors
     /// If there is no such channel, its rate is unknown, or a cell of it holds no number.
     pub(super) fn of_recording(
-        recording: Recording,
+        mut recording: Recording,
         choice: &ChannelChoice,
         reading: &Reading,
     ) -> Result<Self, Failure> {
         let source = recording.source.clone();
+        let place = recording.place(choice).map_err(|f| f.at(&source))?;
+        recording.fill(place, reading).map_err(|f| f.at(&source))?;
         let selection = recording
-            .select(choice, reading)
+            .select_at(place, choice, reading)
             .map_err(|f| f.at(&source))?;
         let channel = selection.channel;
-        check_holes(channel).map_err(|failure| failure.at(&source))?;
+        check_cells(channel, reading).map_err(|failure| failure.at(&source))?;
         let stamps = used_stamps(channel, reading);
         let time = match &stamps {
             Some(stamps) => {
                 let heading = channel.axis.stamps_in.as_deref().unwrap_or("time");
-                TimeAxis::of_stream(heading, StampGrid::of_seconds(), stamps, &[], reading)?
+                let grid = StampGrid {
+                    origin_ns: channel.axis.origin_ns,
+                    ..StampGrid::of_seconds()
+                };
+                TimeAxis::of_stream(heading, grid, stamps, &[], reading)?
             }
             None if reading.rate_hz.is_some() => TimeAxis::given(selection.rate_hz),
             None => TimeAxis {
                 stamps_s: None,
-                start_s: Some(selection.start_s),
+                start: Some(selection.start),
                 ..channel.axis.clone()
             },
         };
@@ -51,10 +59,11 @@ impl ChannelStream {
             unit: selection.unit.clone(),
             unit_text: channel.unit_text.clone(),
             rate_hz: time.rate_hz.unwrap_or(selection.rate_hz),
-            start_s: time.start_s.unwrap_or(0.0),
+            start: time.start.unwrap_or_default(),
             time,
             origin: None,
             any_steps: reading.any_steps,
+            filled: channel.filled.clone(),
             warnings,
             blocks: Box::new(MemoryBlocks {
                 samples: channel.samples.clone(),
@@ -75,9 +84,30 @@ pub(super) fn used_stamps(channel: &Channel, reading: &Reading) -> Option<Arc<Ve
     channel.axis.stamps_s.clone().filter(|_| wanted)
 }
 
-/// Refuses cells without a number.
+/// Refuses cells without a number, among the samples and among the stamps that they are placed by.
+pub(crate) fn check_cells(channel: &Channel, reading: &Reading) -> Result<(), Failure> {
+    refuse_holes(channel, used_stamps(channel, reading).is_some())
+}
+
+/// Refuses samples without a number, whatever their time.
 pub(crate) fn check_holes(channel: &Channel) -> Result<(), Failure> {
-    let Some(hole) = channel.holes.first() else {
+    refuse_holes(channel, false)
+}
+
+fn refuse_holes(channel: &Channel, by_stamps: bool) -> Result<(), Failure> {
+    let of_time = channel.axis.holes.iter().filter(|_| by_stamps);
+    let of_time = of_time.filter(|hole| hole.index < channel.samples.len());
+    let stamps_in = channel.axis.stamps_in.as_deref().unwrap_or("time");
+    let all = of_time.map(|hole| (hole, stamps_in));
+    let mut all = all.chain(
+        channel
+            .holes
+            .iter()
+            .map(|hole| (hole, channel.name.as_str())),
+    );
+    let count = all.clone().count();
+    let first = all.by_ref().min_by_key(|(hole, _)| hole.index);
+    let Some((hole, name)) = first else {
         return Ok(());
     };
     let what = match hole.what {
@@ -87,15 +117,9 @@ pub(crate) fn check_holes(channel: &Channel) -> Result<(), Failure> {
         HoleKind::Text => "is a text, expected a number",
     };
     Err(Failure::failed(format_args!(
-        "line {}: the value of \"{}\" {what} ({} such cell(s) in all); correct or remove the line{}",
+        "line {}: the value of \"{name}\" {what} ({} in all); {BRIDGE}",
         hole.line,
-        channel.name,
-        channel.holes.len(),
-        if channel.axis.stamps_s.is_some() {
-            ", and use --resample to bridge the gap"
-        } else {
-            ""
-        }
+        plural(count, "such cell"),
     )))
 }
 

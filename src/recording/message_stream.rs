@@ -76,10 +76,11 @@ impl ChannelStream {
             unit,
             unit_text: chosen.unit.as_ref().map(|found| found.unit.clone()),
             rate_hz: time.rate_hz.unwrap_or(f64::NAN),
-            start_s: time.start_s.unwrap_or(0.0),
+            start: time.start.unwrap_or_default(),
             time,
             warnings: warning.into_iter().collect(),
             any_steps: reading.any_steps,
+            filled: Vec::new(),
             origin: Some(MessageOrigin {
                 encoding: Encoding::of(&chosen.encoding),
                 log_offset_ns,

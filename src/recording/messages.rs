@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::moment::Moment;
 use super::{Channel, Recording, TimeAxis};
 use crate::failure::Failure;
 use crate::io::mcap::{
@@ -51,8 +52,11 @@ pub(super) fn read(
         recording.warnings.extend(warnings);
         let seconds = |time_ns: &i64| time_ns.wrapping_sub(origin_ns.unwrap_or(0)) as f64 * 1e-9;
         let stamps_s = times_ns.iter().map(seconds).collect();
-        let mut axis = TimeAxis::of_stamps(&clock(&selected.time), Arc::new(stamps_s));
-        axis.start_text = origin_ns.map(|ns| format!("{ns} ns"));
+        let heading = clock(&selected.time);
+        let mut axis =
+            TimeAxis::of_stamps_after(origin_ns.unwrap_or(0), &heading, Arc::new(stamps_s));
+        axis.clock_ns = origin_ns;
+        axis.start_text = axis.start.and_then(Moment::date);
         recording.channels.push(Channel {
             heading: choice.channel.clone().unwrap_or_else(|| name(&selected)),
             name: name(&selected),
@@ -62,7 +66,11 @@ pub(super) fn read(
             holes: Vec::new(),
             axis,
             segment: None,
+            filled: Vec::new(),
         });
+    }
+    if let Some(range) = &reading.range {
+        recording.keep(range).map_err(|f| f.at(&input.name()))?;
     }
     Ok(recording)
 }

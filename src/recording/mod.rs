@@ -8,10 +8,13 @@ mod axis;
 mod block;
 mod checkpoints;
 mod choice;
+mod fill;
 mod memory_stream;
 mod message_stream;
 mod messages;
+pub mod moment;
 mod part;
+mod range;
 mod stamps;
 mod stream;
 pub mod text;
@@ -30,10 +33,11 @@ pub(crate) use axis::without_rounding;
 pub use axis::{RateFrom, TimeAxis, typical_step};
 pub(crate) use block::Block;
 pub(crate) use choice::{Selection, unit_of};
-pub(crate) use memory_stream::check_holes;
+pub use fill::FilledSpan;
+pub(crate) use memory_stream::{check_cells, check_holes};
 pub(crate) use message_stream::MessageOrigin;
 pub(crate) use messages::times as message_times;
-pub(crate) use stamps::{StampGrid, is_uniform};
+pub(crate) use stamps::{COARSE_STAMPS, StampGrid, is_uniform};
 pub(crate) use stream::ChannelStream;
 pub(crate) use uniform::UniformRecord;
 pub(crate) use validator::{StreamSummary, StreamValidator};
@@ -107,6 +111,8 @@ pub struct Channel {
     pub axis: TimeAxis,
     /// The segment it belongs to, from 0, if there are several.
     pub segment: Option<usize>,
+    /// Stretches of samples that were filled in.
+    pub filled: Vec<FilledSpan>,
 }
 
 /// A cell among the samples that holds no number.
@@ -172,6 +178,9 @@ impl Recording {
         let (bytes, left_out) = part::first(input, most)?;
         let mut recording = text::read(&name, bytes, reading).map_err(|f| f.at(&name))?;
         recording.warnings.extend(left_out);
+        if let Some(range) = &reading.range {
+            recording.keep(range).map_err(|f| f.at(&name))?;
+        }
         Ok(recording)
     }
 

@@ -3,9 +3,13 @@
 use super::Channel;
 use super::axis::{RateFrom, TimeAxis, UNIFORM, rounding, step_of, without_rounding};
 use super::checkpoints::sharpened;
+use super::moment::Moment;
 use crate::failure::Failure;
 use crate::io::{Reading, digits};
+use crate::warning::Warning;
 
+/// Rounding of stamps, over their step, from which on it is said.
+pub(crate) const COARSE_STAMPS: f64 = 0.25;
 /// Rates, over the recorded one, that stamps may be brought to.
 const RESAMPLED_RATES: (f64, f64) = (0.9, 1.4);
 
@@ -51,8 +55,10 @@ impl TimeAxis {
         later: &[f64],
         reading: &Reading,
     ) -> Result<Self, Failure> {
-        let typical = step_of(first).ok_or_else(|| Failure::failed(no_step(heading, first)))?;
-        let typical = sharpened(typical, first[0], later).unwrap_or(typical);
+        let origin = grid.origin_ns as f64 * 1e-9 / grid.seconds_per_unit;
+        let typical =
+            step_of(first, origin).ok_or_else(|| Failure::failed(no_step(heading, first)))?;
+        let typical = sharpened(typical, first, later, origin).unwrap_or(typical);
         grid.resampled = reading.resample;
         grid.step = match reading.rate_hz {
             None => typical,
@@ -62,11 +68,12 @@ impl TimeAxis {
             }
         };
         grid.allow_rounding(first);
-        let start_s = first[0] * grid.seconds_per_unit + grid.origin_ns as f64 * 1e-9;
+        let start = grid.moment(first[0]);
         Ok(Self {
             rate_hz: Some(without_rounding(1.0 / (grid.step * grid.seconds_per_unit))),
             rate_from: RateFrom::Stamps(heading.to_owned()),
-            start_s: Some(start_s),
+            start: Some(start),
+            origin_ns: grid.origin_ns,
             stamps_in: Some(heading.to_owned()),
             grid: Some(grid),
             ..Self::default()
@@ -78,7 +85,7 @@ impl TimeAxis {
         Self {
             rate_hz: Some(rate_hz),
             rate_from: RateFrom::Given,
-            start_s: Some(0.0),
+            start: Some(Moment::default()),
             ..Self::default()
         }
     }
@@ -104,21 +111,47 @@ impl StampGrid {
     }
 
     /// Uniform stamps in seconds at a rate.
-    fn at_rate(rate_hz: f64, stamps_s: &[f64]) -> Self {
+    fn at_rate(rate_hz: f64, origin_ns: i64, stamps_s: &[f64]) -> Self {
         let mut grid = Self {
             step: 1.0 / rate_hz,
+            origin_ns,
             ..Self::of_seconds()
         };
         grid.allow_rounding(stamps_s);
         grid
     }
 
-    /// Lets stamps deviate by their rounding, if that is all that is wrong with them and no two samples share one.
+    /// Lets stamps deviate by their rounding, if that is all that is wrong with them.
     fn allow_rounding(&mut self, stamps: &[f64]) {
         if self.first_irregular(None, stamps).is_some() {
-            let rounded = rounding(stamps, self.step).map(|line| line.quantum_s);
-            self.quantum = rounded.filter(|q| *q <= self.step).unwrap_or(0.0);
+            let origin = self.origin_ns as f64 * 1e-9 / self.seconds_per_unit;
+            let rounded = rounding(stamps, self.step, origin).map(|line| line.quantum_s);
+            self.quantum = rounded.unwrap_or(0.0);
         }
+    }
+
+    /// Whether stamps are so coarse that several samples may share one: their times are then those of the grid.
+    pub(crate) fn is_coarse(&self) -> bool {
+        self.quantum > self.step
+    }
+
+    /// A warning if stamps are rounded so coarsely that single steps mean little; `span` is the time that they cover, in
+    /// their unit.
+    pub(super) fn rounded_warning(&self, source: &str, span: f64) -> Option<Warning> {
+        let of_seconds = self.seconds_per_unit;
+        let rate_hz = 1.0 / (self.step * of_seconds);
+        (!self.resampled && self.quantum > COARSE_STAMPS * self.step).then(|| {
+            Warning::new(
+                "rounded-time-stamps",
+                format!(
+                    "{source}: the time stamps are rounded to {} s; but for that they are uniform, and all of them \
+                     together give {} Hz (to within {} Hz)",
+                    digits::text(self.quantum * of_seconds, 3),
+                    digits::text(rate_hz, 9),
+                    digits::text(rate_hz * self.quantum / span, 2),
+                ),
+            )
+        })
     }
 
     /// First stamp that does not follow the one before it by the uniform step. `last` is the stamp
@@ -135,7 +168,7 @@ impl StampGrid {
             (0.0, f64::INFINITY)
         } else {
             (
-                self.step * (1.0 - UNIFORM) - rounding,
+                (self.step * (1.0 - UNIFORM) - rounding).max(0.0),
                 self.step * (1.0 + UNIFORM) + rounding,
             )
         };
@@ -157,46 +190,81 @@ impl StampGrid {
         })
     }
 
+    /// The time of a stamp.
+    fn moment(&self, stamp: f64) -> Moment {
+        Moment {
+            origin_ns: self.origin_ns,
+            after_s: stamp * self.seconds_per_unit,
+        }
+    }
+
+    /// The time of a stamp in nanoseconds.
+    pub(crate) fn nanoseconds(&self, stamp: f64) -> i64 {
+        let after_ns = stamp * (self.seconds_per_unit * 1e9);
+        self.origin_ns.saturating_add(after_ns.round() as i64)
+    }
+
+    /// A stamp as the file has it, with its unit.
+    fn time_text(&self, stamp: f64) -> String {
+        match self.origin_ns {
+            0 => format!("{} {}", digits::text(stamp, 12), self.unit),
+            _ => self.moment(stamp).text(),
+        }
+    }
+
     /// Says what is wrong at a break and what to do.
     pub(super) fn explain(&self, found: &IrregularStep) -> String {
         let Self { unit, step, .. } = self;
-        let (before, after) = (
-            digits::text(found.before, 12),
-            digits::text(found.after, 12),
-        );
+        let time = |stamp| self.time_text(stamp);
+        let (before, after) = (time(found.before), time(found.after));
         if found.after < found.before {
             return format!(
-                "time runs backwards, from {before} {unit} to {after} {unit}: the clock was set \
+                "time runs backwards, from {before} to {after}: the clock was set \
                  back or two recordings were joined; split the file there"
             );
         }
-        let what = if found.after == found.before {
-            format!("the time stamp {after} {unit} repeats the one before it")
-        } else {
-            let length = (found.after - found.before) / step;
-            format!(
-                "the time stamps are not uniform: the step from {before} {unit} to {after} {unit} \
-                 is {} times the usual one of {} {unit}",
-                digits::text(length, 4),
-                digits::text(*step, 6)
-            )
+        if found.after == found.before {
+            return format!(
+                "the time stamp {after} repeats the one before it: a sample is stored twice, or the clock stood still; \
+                 remove the sample, or give the rate with --rate HZ if the stamps are wrong"
+            );
+        }
+        let length = (found.after - found.before) / step;
+        let is_gap = length > 1.5 && (length - length.round()).abs() < 0.1;
+        let remedy = match is_gap {
+            true => "use --fill linear to bridge the gap, or --range to leave it out",
+            false => "use --resample to interpolate",
         };
-        format!("{what}; use --resample to interpolate, or --rate HZ if the stamps are wrong")
+        format!(
+            "the time stamps are not uniform: the step from {before} to {after} \
+             is {} times the usual one of {} {unit}; {remedy}, or --rate HZ if the stamps are wrong",
+            digits::text(length, 4),
+            digits::text(*step, 6)
+        )
     }
 }
 
 /// Whether stamps in seconds are uniform.
 pub(crate) fn is_uniform(stamps_s: &[f64], rate_hz: f64) -> bool {
-    let grid = StampGrid::at_rate(rate_hz, stamps_s);
+    let grid = StampGrid::at_rate(rate_hz, 0, stamps_s);
     grid.first_irregular(None, stamps_s).is_none()
 }
 
 impl Channel {
+    /// A warning if the stamps that it is placed by are rounded coarsely.
+    pub(super) fn rounded_stamps(&self, source: &str, rate_hz: f64) -> Option<Warning> {
+        let by_stamps = matches!(self.axis.rate_from, RateFrom::Stamps(_));
+        let stamps_s = self.axis.stamps_s.as_ref().filter(|_| by_stamps)?;
+        let span_s = stamps_s.last()? - stamps_s.first()?;
+        let grid = StampGrid::at_rate(rate_hz, self.axis.origin_ns, stamps_s);
+        grid.rounded_warning(source, span_s)
+    }
+
     /// The first of its stamps that is not uniform, if it is placed by stamps.
     pub(super) fn irregular(&self, rate_hz: f64) -> Option<Failure> {
         let by_stamps = matches!(self.axis.rate_from, RateFrom::Stamps(_));
         let stamps_s = self.axis.stamps_s.as_ref().filter(|_| by_stamps)?;
-        let grid = StampGrid::at_rate(rate_hz, stamps_s);
+        let grid = StampGrid::at_rate(rate_hz, self.axis.origin_ns, stamps_s);
         let found = grid.first_irregular(None, stamps_s)?;
         Some(Failure::failed(format_args!(
             "sample {} of \"{}\": {}",
@@ -307,7 +375,7 @@ mod tests {
         assert!(explain(1.0, 1.0).contains("repeats"));
         let gap = explain(1.0, 2.5);
         assert!(
-            gap.contains("3 times") && gap.contains("--resample"),
+            gap.contains("3 times") && gap.contains("--fill linear"),
             "{gap}"
         );
     }

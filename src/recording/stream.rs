@@ -6,10 +6,11 @@ use std::sync::Arc;
 use super::block::{BlockSource, TextBlocks};
 use super::memory_stream::used_stamps;
 use super::message_stream::MessageOrigin;
+use super::moment::Moment;
 use super::stamps::{StampGrid, is_uniform};
 use super::text::{ChannelPlan, TextFile, TextStream};
 use super::validator::{StreamValidator, TextLines};
-use super::{RateFrom, TimeAxis, checkpoints};
+use super::{FilledSpan, RateFrom, Recording, TimeAxis, checkpoints};
 use crate::failure::Failure;
 use crate::io::{ChannelChoice, Input, Reading, names_compensated};
 use crate::unit::{NamedUnit, RecordedChannel};
@@ -37,9 +38,11 @@ pub(crate) struct ChannelStream {
     /// Samples a second.
     pub(crate) rate_hz: f64,
     /// Time of the first sample: its stamp, or where the file or the user says it starts.
-    pub(crate) start_s: f64,
+    pub(crate) start: Moment,
     /// Of messages, what a copy of their file needs to know.
     pub(crate) origin: Option<MessageOrigin>,
+    /// Stretches of samples that were filled in.
+    pub(crate) filled: Vec<FilledSpan>,
     /// Whether irregular stamps are only said.
     pub(super) any_steps: bool,
     /// What is known to be odd before reading.
@@ -69,6 +72,10 @@ impl ChannelStream {
         reading: &Reading,
     ) -> Result<Self, Failure> {
         let name = input.name();
+        if reading.is_partial() {
+            let recording = Recording::read(input, std::slice::from_ref(choice), reading)?;
+            return Self::of_recording(recording, choice, reading);
+        }
         let mut bytes = input.open()?;
         let unreadable = |error| Failure::failed(format_args!("{name}: cannot be read: {error}"));
         let mut head = Vec::new();
@@ -121,6 +128,7 @@ impl ChannelStream {
                     unit: stamps.unit.to_owned(),
                     seconds_per_unit: stamps.seconds_per_unit,
                     copied: stamps.copied,
+                    origin_ns: stamps.origin_ns,
                     ..StampGrid::of_seconds()
                 };
                 let found =
@@ -137,7 +145,7 @@ impl ChannelStream {
             None if reading.rate_hz.is_some() => TimeAxis::given(selection.rate_hz),
             None => TimeAxis {
                 stamps_s: None,
-                start_s: Some(selection.start_s),
+                start: Some(selection.start),
                 ..axis.clone()
             },
         };
@@ -150,15 +158,18 @@ impl ChannelStream {
             unit: selection.unit,
             unit_text: selection.channel.unit_text.clone(),
             rate_hz: time.rate_hz.unwrap_or(selection.rate_hz),
-            start_s: time.start_s.unwrap_or(0.0),
+            start: time.start.unwrap_or_default(),
             time,
             origin: None,
             any_steps: reading.any_steps,
+            filled: Vec::new(),
             warnings,
             blocks: Box::new(TextBlocks {
                 source: first_rows.source.clone(),
                 chunks,
                 row_bytes,
+                table: layout.plan.clone(),
+                is_first: layout.line == 1,
             }),
             text: Some(TextLines::new(plan, layout)),
             source: first_rows.source,

@@ -3,6 +3,7 @@
 use torqcomp_dsp::resample::{Resampled, Resampler};
 
 use super::block::Block;
+use super::moment::Moment;
 use super::stream::ChannelStream;
 use super::validator::StreamSummary;
 use crate::failure::Failure;
@@ -12,7 +13,7 @@ use crate::failure::Failure;
 pub(crate) struct UniformRecord {
     pub(crate) samples: Vec<f64>,
     /// Time of the first one.
-    pub(crate) start_s: f64,
+    pub(crate) start: Moment,
     /// Samples a second.
     pub(crate) rate_hz: f64,
     /// What the file held.
@@ -31,7 +32,7 @@ impl UniformRecord {
         stream: ChannelStream,
         convert: impl Fn(&mut [f64]) -> Result<(), (usize, String)>,
     ) -> Result<Self, Failure> {
-        let (rate_hz, start_s) = (stream.rate_hz, stream.start_s);
+        let (rate_hz, start) = (stream.rate_hz, stream.start);
         let grid = stream.time.grid.clone();
         let resampled_grid = grid.as_ref().filter(|grid| grid.resampled);
         let (mut blocks, plan, mut validator) = stream.into_parts(0);
@@ -61,7 +62,7 @@ impl UniformRecord {
         }
         Ok(Self {
             samples,
-            start_s,
+            start,
             rate_hz,
             summary: validator.finish(blocks.as_mut())?,
             resampled,

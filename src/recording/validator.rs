@@ -3,7 +3,7 @@
 use super::TimeAxis;
 use super::block::{Block, BlockSource};
 use super::stamps::IrregularStep;
-use super::text::{ChannelPlan, Layout, LineNotes, Problem, is_end_of_data, truncated};
+use super::text::{ChannelPlan, Layout, LineNotes, Problem, is_end_of_data};
 use crate::failure::Failure;
 use crate::warning::Warning;
 
@@ -102,13 +102,10 @@ impl StreamValidator {
         self.pass_midnights(block);
         if let Some(found) = self.irregular_step(block) {
             let line = self.line_of_row(block, found.row);
-            let is_last = found.row + 1 == block.rows.times.len();
             if self.any_steps {
                 self.say_irregular(line, &found);
-            } else if !(block.unended && is_last && block.rows.problem.is_none()) {
-                return Err(self.at(line, self.explain(&found)));
             } else {
-                self.drop_cut_stamp(block, line);
+                return Err(self.at(line, self.explain(&found)));
             }
         }
         if self.text.is_some() {
@@ -140,14 +137,6 @@ impl StreamValidator {
         }
     }
 
-    /// The file was cut within its last stamp.
-    fn drop_cut_stamp(&mut self, block: &mut Block, line: usize) {
-        block.rows.times.pop();
-        block.rows.time_text.pop();
-        block.rows.values.pop();
-        self.lose_last_line(line, &last_line(&block.text));
-    }
-
     /// Says once that the stamps are irregular.
     fn say_irregular(&mut self, line: usize, found: &IrregularStep) {
         if !self.warnings.iter().any(|w| w.code == IRREGULAR) {
@@ -173,13 +162,15 @@ impl StreamValidator {
             self.empty_line = self.empty_line.or(Some(self.lines + line + 1));
         }
         if let Some(problem) = rows.problem {
-            return self.bad_row(block, problem);
+            return Err(self.bad_row(block, problem));
         }
         if rows.ends {
             return self.end(block);
         }
-        if block.unended {
-            self.look_at_unended_line(block);
+        if let Some((judged, text)) = &block.last_line {
+            let lines = memchr::memchr_iter(b'\n', &block.text).count();
+            let place = format!("{}, line {}", self.source, self.lines + lines + 1);
+            self.lost = judged.warning(&place, text);
         }
         Ok(())
     }
@@ -219,6 +210,8 @@ impl StreamValidator {
         if let Some(grid) = self.time.grid.as_ref().filter(|grid| !grid.resampled)
             && let Some((first, last)) = self.first_stamp.zip(self.last_stamp)
         {
+            let rounded = grid.rounded_warning(&self.source, last - first);
+            self.warnings.extend(rounded);
             let (steps, rounding) = ((last - first) / grid.step, grid.quantum / grid.step);
             self.look_at_drift(steps, rounding);
         }
@@ -267,43 +260,16 @@ impl StreamValidator {
             .or(block.irregular)
     }
 
-    fn lose_last_line(&mut self, line: usize, text: &str) {
-        let place = format!("{}, line {line}", self.source);
-        self.lost = Some(truncated(&place, text));
-    }
-
-    /// A row that cannot be read is an error, unless the file was cut there.
-    fn bad_row(&mut self, block: &Block, problem: Problem) -> Result<(), Failure> {
+    /// A row that cannot be read.
+    fn bad_row(&self, block: &Block, problem: Problem) -> Failure {
         let line = self.lines + problem.line + 1;
         let text = nth_line(&block.text, problem.line);
-        let is_last = memchr::memchr_iter(b'\n', &block.text).count() == problem.line;
-        if block.unended && is_last {
-            self.lines += 1;
-            self.lose_last_line(line, &text);
-            return Ok(());
-        }
-        Err(self.at(line, self.describe(problem.cell, &text)))
+        self.at(line, self.describe(problem.cell, &text))
     }
 
     fn describe(&self, cell: usize, line: &str) -> String {
         let text = self.text.as_ref();
         text.map_or_else(String::new, |text| text.plan.describe(line, cell))
-    }
-
-    /// A last line without a line feed may have been cut within its last number.
-    fn look_at_unended_line(&mut self, block: &Block) {
-        let line = last_line(&block.text);
-        let plan = self.text.as_ref().map(|text| &text.plan);
-        if let Some(value) = plan.and_then(|plan| plan.short_last_value(&line)) {
-            self.warnings.push(Warning::new(
-                "unended-last-line",
-                format!(
-                    "{}: the last line has no line end and its value \"{value}\" is shorter than usual; \
-                     if the file was cut there, do not trust the last sample",
-                    self.source
-                ),
-            ));
-        }
     }
 
     /// Says so if the mean rate is not that which was told before all was read: `steps` are those between the first
@@ -332,9 +298,4 @@ impl StreamValidator {
 fn nth_line(text: &[u8], line: usize) -> String {
     let line = text.split(|byte| *byte == b'\n').nth(line);
     String::from_utf8_lossy(line.unwrap_or_default()).into_owned()
-}
-
-/// What stands behind the last line feed.
-fn last_line(text: &[u8]) -> String {
-    nth_line(text, memchr::memchr_iter(b'\n', text).count())
 }

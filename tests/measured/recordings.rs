@@ -69,7 +69,11 @@ pub fn all(folder: &Path) -> Result<(), Failed> {
             )?;
             check(channel.samples.len() == line.samples, &what)?;
             let rate = close(channel.axis.rate_hz, line.rate_hz, RATE);
-            let start = close(channel.axis.start_s, line.start_s, 1e-12);
+            let start = close(
+                channel.axis.start.map(|start| start.seconds()),
+                line.start_s,
+                1e-12,
+            );
             check(rate && start, &what)?;
             let sum: f64 = channel.samples.iter().sum();
             let size: f64 = channel.samples.iter().map(|value| value.abs()).sum();

@@ -36,7 +36,7 @@ pub(super) fn run(
     let record = UniformRecord::read(stream, |values| convert(&chain, values))?;
     let scale = 1.0 / chain.applied.factor;
     report.scale = scale;
-    report.start_s = record.start_s;
+    report.start = record.start;
     report.noise.record =
         density(&record, scale).and_then(|density| RecordNoise::of(&filter, &density));
     let torque = match &undo {
@@ -68,7 +68,7 @@ fn deliver(
     scale: f64,
 ) -> Result<(), Failure> {
     let mut text = Text::default();
-    let axis = (record.rate_hz, record.start_s);
+    let axis = (record.rate_hz, record.start);
     for (rows, range) in uniform_parts((args.digits, scale), axis, torque.len()) {
         let (torque, recorded) = (&torque[range.clone()], &record.samples[range]);
         text.clear();

@@ -52,7 +52,7 @@ pub(super) fn torque(
         noise.compensated_rms = report.scale * spread;
     }
     let scales = Scales {
-        start_s: record.start_s,
+        start_s: record.start.seconds(),
         rate_hz: record.rate_hz,
         reach_s: reach(undo.filter().taps()) as f64 / record.rate_hz,
         printed: report.scale / stand.gain(),

@@ -8,6 +8,8 @@ use torqcomp_dsp::resample::Resampled;
 
 use super::statistics::Statistics;
 use crate::print::{Report, plural, rounded, short};
+use crate::recording::FilledSpan;
+use crate::recording::moment::Moment;
 use crate::warning::Warning;
 
 /// Report of a compensation.
@@ -30,7 +32,10 @@ pub(super) struct CompensateReport {
     pub(super) rate_hz: f64,
     pub(super) rate_from: String,
     /// First time of the result.
-    pub(super) start_s: f64,
+    #[serde(flatten)]
+    pub(super) start: Moment,
+    /// Stretches of samples that `--fill` filled in.
+    pub(super) filled: Vec<FilledSpan>,
     /// `stream`, `whole-record`, or `refined` for a stand with effects that no filter describes.
     pub(super) method: &'static str,
     /// Effects of the stand that were taken out, the last link of the chain first.
@@ -132,11 +137,11 @@ impl Report for CompensateReport {
         line(
             "time",
             format!(
-                "{} samples at {} Hz ({}), from {} s",
+                "{} samples at {} Hz ({}), from {}",
                 self.samples,
                 rounded(self.rate_hz, 9),
                 self.rate_from,
-                short(self.start_s)
+                self.start.text()
             ),
         );
         if let Some(resampled) = &self.resampled {

@@ -18,6 +18,7 @@ use crate::failure::Failure;
 use crate::io::text::Text;
 use crate::pipeline::{self, Stages};
 use crate::quality::excerpt;
+use crate::recording::moment::Moment;
 use crate::recording::{Block, StampGrid, StreamValidator};
 
 /// Jobs under way beside those that the threads hold.
@@ -47,7 +48,7 @@ struct Steps<'a> {
     noise_block: usize,
     grid: Option<&'a StampGrid>,
     rate_hz: f64,
-    start_s: f64,
+    start: Moment,
     scale: f64,
     /// Whether the result is text.
     is_text: bool,
@@ -88,7 +89,7 @@ pub(super) fn run(
         noise_block,
         grid,
         rate_hz,
-        start_s: stream.start_s,
+        start: stream.start,
         scale: 1.0 / chain.applied.factor,
         is_text: sink.is_text(),
         args,
@@ -116,7 +117,7 @@ pub(super) fn run(
     pipeline::run(threads + SPARE_JOBS, convolvers(convolver, threads), stages)?;
 
     report.scale = steps.scale;
-    report.start_s = steps.start_s;
+    report.start = steps.start;
     report.samples = joiner.samples;
     report.resampled = joiner.resampled;
     report.result = gathered.sums.statistics(steps.scale);
@@ -290,8 +291,8 @@ impl Steps<'_> {
         &window[self.half_length..window.len() - self.half_length]
     }
 
-    fn rows<'a>(&self, block: &'a Block, first: usize) -> Rows<'a> {
-        let times = Times::of(block, self.grid, self.start_s, first);
+    fn rows<'a>(&'a self, block: &'a Block, first: usize) -> Rows<'a> {
+        let times = Times::of(block, self.grid, self.start, first);
         Rows {
             digits: self.args.digits,
             scale: self.scale,

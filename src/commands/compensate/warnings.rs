@@ -54,7 +54,7 @@ fn of_quality(report: &CompensateReport, seen: &Seen) -> Vec<Warning> {
         unit: &report.unit,
         scale: report.scale,
         rate_hz: report.rate_hz,
-        start_s: report.start_s,
+        start: report.start,
         samples: report.samples,
     };
     let samples = match report.method {
@@ -65,13 +65,15 @@ fn of_quality(report: &CompensateReport, seen: &Seen) -> Vec<Warning> {
 }
 
 fn empty_plot(report: &CompensateReport) -> Warning {
-    let end_s = report.start_s + (report.samples - 1) as f64 / report.rate_hz;
+    let end = report
+        .start
+        .later((report.samples - 1) as f64 / report.rate_hz);
     Warning::new(
         "empty-plot",
         format!(
-            "no sample lies within --plot-range; the record runs from {} to {} s",
-            short(report.start_s),
-            short(end_s)
+            "no sample lies within --plot-range; the record runs from {} to {}",
+            report.start.text(),
+            end.text()
         ),
     )
 }

@@ -145,7 +145,7 @@ fn pair(args: &Diagnose, file: &str) -> Result<Pair, Failure> {
         applied: applied.samples,
         measured: measured.samples,
         rate_hz: read.rate_hz,
-        start_s: read.start_s,
+        start_s: read.start.after_s,
         applied_unit: applied.unit,
         measured_unit: measured.unit,
         warnings: read.warnings,

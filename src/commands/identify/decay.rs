@@ -8,7 +8,7 @@ use crate::failure::Failure;
 use crate::identify::Identification;
 use crate::identify::decay::{DecayOptions, Ringing, identify};
 use crate::io::{Input, Reading};
-use crate::recording::{AlignedChannels, Recording, is_uniform};
+use crate::recording::{AlignedChannels, Recording, check_cells, is_uniform};
 use crate::stand::update::Entry;
 
 /// A recording of decays.
@@ -39,7 +39,6 @@ pub fn run(args: &Decay) -> Result<Outcome, Failure> {
         .collect();
     let options = DecayOptions {
         modes: args.modes.map(usize::from),
-        range_s: args.range,
         band_hz: args.band,
     };
     let (mut result, _) = identify(&records, &options)?;
@@ -56,7 +55,7 @@ fn load(args: &Decay, input: &str, recorded: &mut Recorded) -> Result<Loaded, Fa
         rate_hz, resample, ..
     } = args.reading;
     let choices = std::slice::from_ref(&args.choice);
-    let recording = Recording::read(&Input::of(input), choices, &args.reading)?;
+    let mut recording = Recording::read(&Input::of(input), choices, &args.reading)?;
     if resample {
         let aligned = AlignedChannels::of(recording, choices, &args.reading);
         return Ok(resampled(
@@ -65,15 +64,20 @@ fn load(args: &Decay, input: &str, recorded: &mut Recorded) -> Result<Loaded, Fa
             recorded,
         ));
     }
+    let filled = recording
+        .place(&args.choice)
+        .and_then(|place| recording.fill(place, &args.reading));
+    filled.map_err(|failure| failure.at(input))?;
     let selection = recording
         .select(&args.choice, &args.reading)
         .map_err(|failure| failure.at(input))?;
+    check_cells(selection.channel, &args.reading).map_err(|failure| failure.at(input))?;
     let samples = &selection.channel.samples;
     let count = samples.len();
     let stamps = match (&selection.channel.axis.stamps_s, rate_hz) {
         (Some(stamps), None) => stamps.to_vec(),
         _ => {
-            let (start, rate) = (selection.start_s, selection.rate_hz);
+            let (start, rate) = (selection.start.after_s, selection.rate_hz);
             (0..count).map(|i| start + i as f64 / rate).collect()
         }
     };
@@ -105,7 +109,7 @@ fn load(args: &Decay, input: &str, recorded: &mut Recorded) -> Result<Loaded, Fa
 /// A recording that was interpolated to a uniform step.
 fn resampled(input: &str, mut aligned: AlignedChannels, recorded: &mut Recorded) -> Loaded {
     let channel = aligned.channels.swap_remove(0);
-    let (start_s, rate_hz) = (aligned.start_s, aligned.rate_hz);
+    let (start_s, rate_hz) = (aligned.start.after_s, aligned.rate_hz);
     let time_s = |i: usize| start_s + i as f64 / rate_hz;
     recorded.add(input, channel.samples.len(), Some(rate_hz));
     recorded.warn(aligned.warnings, aligned.is_lossy);

@@ -3,11 +3,13 @@
 use std::sync::Arc;
 
 use torqcomp_dsp::quality::clipping::Clipping;
+use torqcomp_dsp::quality::steps::Event;
 
 use super::content::Content;
 use super::report::{ChannelWarning, Detail, InspectedChannel, InspectedFile};
 use crate::parallel::{parallel, threads};
 use crate::quality::{self, Findings, TimeFindings, copies, labels, unit_of};
+use crate::recording::moment::Moment;
 use crate::recording::{Channel, Recording, TimeAxis};
 use crate::warning::Warning;
 
@@ -221,14 +223,18 @@ fn describe(channel: &Channel, found: &Findings, time: Option<&TimeFindings>) ->
         rate_hz: axis.rate_hz,
         rate_from: axis.rate_from.describe(),
         header_rate_hz: axis.header_rate_hz,
-        start: axis.start_s,
+        start: axis.start.map(Moment::seconds),
+        start_ns: axis
+            .start
+            .filter(|start| start.origin_ns != 0)
+            .map(Moment::nanoseconds),
         start_unit: "s",
         start_time: axis.start_text.clone(),
         duration_s: duration_s(channel),
         assumed: axis.assumed.clone(),
         ..InspectedChannel::default()
     };
-    with_samples(with_steps(of_axis, time), found)
+    with_samples(with_steps(of_axis, axis.origin_ns, time), found)
 }
 
 fn duration_s(channel: &Channel) -> Option<f64> {
@@ -242,8 +248,21 @@ fn duration_s(channel: &Channel) -> Option<f64> {
     axis.rate_hz.map(|rate_hz| steps as f64 / rate_hz)
 }
 
+/// An irregular step on the file's own axis.
+fn absolute(event: Event, origin_s: f64) -> Event {
+    Event {
+        from_s: event.from_s + origin_s,
+        ..event
+    }
+}
+
 /// Adds what the stamps show.
-fn with_steps(channel: InspectedChannel, time: Option<&TimeFindings>) -> InspectedChannel {
+fn with_steps(
+    channel: InspectedChannel,
+    origin_ns: i64,
+    time: Option<&TimeFindings>,
+) -> InspectedChannel {
+    let origin_s = origin_ns as f64 * 1e-9;
     let Some((time, steps)) = time.and_then(|time| time.steps.as_ref().map(|s| (time, s))) else {
         return channel;
     };
@@ -253,7 +272,12 @@ fn with_steps(channel: InspectedChannel, time: Option<&TimeFindings>) -> Inspect
         stamps_rounded_to_s: time.rounded.map(|rounded| rounded.quantum_s),
         gaps: Some(steps.gaps.count),
         missing_samples: Some(steps.missing),
-        gap_list: steps.gaps.listed.clone(),
+        gap_list: steps
+            .gaps
+            .listed
+            .iter()
+            .map(|gap| absolute(*gap, origin_s))
+            .collect(),
         repeated_stamps: Some(steps.repeated.count),
         backwards: Some(steps.backwards.count),
         clock_jumps: Some(steps.jumps.count),

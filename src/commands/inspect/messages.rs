@@ -9,7 +9,8 @@ use crate::failure::Failure;
 use crate::io::mcap::inventory::{ChannelReport, LeafReport};
 use crate::io::mcap::{self, FieldChoice, Inventory, SelectedSignal};
 use crate::io::{Input, Reading};
-use crate::recording::{Channel, RateFrom, Recording, TimeAxis, message_times, typical_step};
+use crate::recording::moment::{Moment, date_and_time};
+use crate::recording::{Channel, Recording, TimeAxis, message_times};
 use crate::unit::NamedUnit;
 use crate::warning::Warning;
 
@@ -179,6 +180,7 @@ fn channel(
         holes: Vec::new(),
         axis,
         segment: None,
+        filled: Vec::new(),
     };
     (channel, whole)
 }
@@ -186,14 +188,11 @@ fn channel(
 /// An axis of stamps that are counted from the first: seconds since 1970 would cost them their last
 /// digits.
 fn axis(stamps: Stamps, words: String) -> TimeAxis {
-    let step = typical_step(&stamps.from_first_s);
+    let origin_ns = stamps.first_ns.unwrap_or(0);
+    let axis = TimeAxis::of_stamps_after(origin_ns, &words, Arc::new(stamps.from_first_s));
     TimeAxis {
-        rate_hz: step.map(|step| 1.0 / step),
-        rate_from: step.map_or(RateFrom::None, |_| RateFrom::Stamps(words)),
-        start_s: stamps.first_ns.map(|t| t as f64 * 1e-9),
-        start_text: stamps.first_ns.and_then(date_and_time),
-        stamps_s: Some(Arc::new(stamps.from_first_s)),
-        ..TimeAxis::default()
+        start_text: axis.start.and_then(Moment::date),
+        ..axis
     }
 }
 
@@ -299,36 +298,6 @@ fn details(inventory: &Inventory) -> Vec<(String, String)> {
     details
 }
 
-/// Date and time in UTC of nanoseconds since 1970, if they can be meant: from 2000 on.
-///
-/// The date by counting years from March of the year 0, so that leap days come last: an era of 400
-/// years has 146 097 days (ISO 8601, proleptic Gregorian calendar).
-fn date_and_time(ns: i64) -> Option<String> {
-    const YEAR_2000_NS: i64 = 946_684_800_000_000_000;
-    if ns < YEAR_2000_NS {
-        return None;
-    }
-    let (seconds, rest) = (ns / 1_000_000_000, ns % 1_000_000_000);
-    let (days, of_day) = (seconds / 86_400 + 719_468, seconds % 86_400);
-    let (era, of_era) = (days / 146_097, days % 146_097);
-    let year = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;
-    let of_year = of_era - (365 * year + year / 4 - year / 100);
-    let month = (5 * of_year + 2) / 153;
-    let day = of_year - (153 * month + 2) / 5 + 1;
-    let (month, later) = if month < 10 {
-        (month + 3, 0)
-    } else {
-        (month - 9, 1)
-    };
-    Some(format!(
-        "{:04}-{month:02}-{day:02}T{:02}:{:02}:{:02}.{rest:09}Z",
-        400 * era + year + later,
-        of_day / 3600,
-        of_day / 60 % 60,
-        of_day % 60
-    ))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -364,17 +333,6 @@ mod tests {
         assert!((longest.mean.unwrap() - 49.5).abs() < 1e-12);
         assert!((longest.duration_s - 4.999).abs() < 1e-9);
         assert_eq!(content.recording.warnings[0].code, "first-samples-only");
-    }
-
-    #[test]
-    fn dates_are_those_of_the_calendar() {
-        let at = |seconds: i64| date_and_time(seconds * 1_000_000_000).unwrap();
-        assert_eq!(at(946_684_800), "2000-01-01T00:00:00.000000000Z");
-        assert_eq!(at(951_782_400), "2000-02-29T00:00:00.000000000Z");
-        assert_eq!(at(1_000_000_000), "2001-09-09T01:46:40.000000000Z");
-        assert_eq!(at(1_709_210_096), "2024-02-29T12:34:56.000000000Z");
-        assert_eq!(at(4_102_444_799), "2099-12-31T23:59:59.000000000Z");
-        assert_eq!(date_and_time(12), None);
     }
 
     #[test]

@@ -45,7 +45,8 @@ fn chart(channel: &Channel, found: &InspectedChannel, name: String) -> Chart {
         false => name,
     };
     let (axis, last) = (&channel.axis, drawn.saturating_sub(1));
-    let uniform = |i: usize, rate_hz: f64| axis.start_s.unwrap_or(0.0) + i as f64 / rate_hz;
+    let uniform =
+        |i: usize, rate_hz: f64| axis.start.unwrap_or_default().after_s + i as f64 / rate_hz;
     let (ends, x_label) = match (&axis.stamps_s, axis.rate_hz) {
         (Some(stamps), _) => (range(stamps), "time, s"),
         (None, Some(rate_hz)) => (

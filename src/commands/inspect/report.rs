@@ -87,6 +87,8 @@ pub(super) struct InspectedChannel {
     pub(super) header_rate_hz: Option<f64>,
     /// Time of the first sample on the file's own axis, in `start_unit`.
     pub(super) start: Option<f64>,
+    /// The same in ns, if it counts from 1970.
+    pub(super) start_ns: Option<i64>,
     /// Unit of `start`: always s.
     pub(super) start_unit: &'static str,
     /// Date and time of the first sample, as written.

@@ -33,8 +33,6 @@ pub struct Ringing<'a> {
 pub struct DecayOptions {
     /// Number of modes; chosen from the data if not given.
     pub modes: Option<usize>,
-    /// Part of the time axis to use, in seconds.
-    pub range_s: Option<(f64, f64)>,
     /// Lowest and highest frequency of the modes, in Hz. Higher frequencies are filtered out.
     pub band_hz: Option<(f64, f64)>,
 }

@@ -79,7 +79,7 @@ fn cut(
     Ok(cut)
 }
 
-/// Times and samples of the range, low-passed and decimated if a band is given.
+/// Times and samples, low-passed and decimated if a band is given.
 fn prepared(
     record: &Ringing,
     options: &DecayOptions,
@@ -92,19 +92,14 @@ fn prepared(
             i + 1
         )));
     }
-    let (from, to) = options
-        .range_s
-        .unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
-    let first = record.times_s.partition_point(|t| *t < from);
-    let last = record.times_s.partition_point(|t| *t <= to);
-    if last < first + LEAST_SAMPLES {
+    let (times, values) = (record.times_s, record.values);
+    if values.len() < LEAST_SAMPLES {
         return Err(Failure::failed(format_args!(
             "{}: {} samples are too few for a decay; at least {LEAST_SAMPLES} are needed",
             record.name,
-            last.saturating_sub(first)
+            values.len()
         )));
     }
-    let (times, values) = (&record.times_s[first..last], &record.values[first..last]);
     let (Some((_, highest)), Some(rate_hz)) = (options.band_hz, record.rate_hz) else {
         return Ok((times.to_vec(), values.to_vec()));
     };

@@ -371,13 +371,6 @@ impl Scan {
                 say("mcap-unreadable", format!("{}: {why}", channel.topic));
             }
         }
-        let unknown = self.seen.iter();
-        let unknown = unknown.filter(|(id, _)| self.channels.get(**id).is_none());
-        let unknown: u64 = unknown.map(|(_, seen)| seen.messages).sum();
-        if unknown > 0 {
-            let message = format!("{unknown} messages are of channels that are not declared");
-            say("mcap-unknown-channel", message);
-        }
         if self.broken > 0 {
             let message = format!("{} message records are cut short", self.broken);
             say("mcap-skipped", message);

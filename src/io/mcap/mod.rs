@@ -14,6 +14,8 @@
 //! cut off is used up to its last whole message. Memory is that of one chunk (1 GiB at most), of
 //! the samples held back to be sorted, and of the schemas.
 
+#[cfg(test)]
+mod attack_tests;
 mod blocks;
 pub mod cdr;
 mod channels;

@@ -34,6 +34,8 @@ pub(super) struct Tally {
     pub without_time: u64,
     samples: u64,
     without_item: Skipped,
+    /// Messages without the item, though the list or the field is one that any of them may have.
+    unset: u64,
     unreadable: Skipped,
     last_ns: Option<i64>,
 }
@@ -63,6 +65,7 @@ impl Skipped {
 impl Tally {
     /// Counts a message that gives no value.
     pub fn skip(&mut self, damage: Damage, log_time_ns: u64) {
+        self.unset += u64::from(!matches!(damage, Damage::NoName { .. }));
         let skipped = match damage {
             Damage::NoItem { .. } | Damage::NoName { .. } | Damage::Absent => {
                 &mut self.without_item
@@ -120,7 +123,9 @@ impl SignalSummary {
         let clock = signal.clock.warnings().into_iter();
         warnings.extend(clock.map(|said| Warning::new("mcap-clock", format!("{topic}: {said}"))));
         warnings.extend(conflict(conflicts));
-        let skipped = tally.unreadable.count + tally.without_time + broken;
+        // A number that no message has is none of the file.
+        let unset = if tally.samples > 0 { tally.unset } else { 0 };
+        let skipped = tally.unreadable.count + tally.without_time + broken + unset;
         Self {
             is_lossy: records.losses().count > 0
                 || sorter.too_late > 0

@@ -2,7 +2,9 @@
 
 use std::io::{self, Read};
 
+use super::last_line::{LastLine, last_line};
 use crate::failure::Failure;
+use crate::warning::Warning;
 
 /// Longest line that is accepted.
 const LONGEST_LINE: usize = 1 << 24;
@@ -16,6 +18,8 @@ pub struct Chunks {
     carry: Vec<u8>,
     size: usize,
     at_end: bool,
+    /// Number and text of a last line without a line end, where all was taken.
+    unended: Option<(usize, String)>,
 }
 
 /// What a piece is.
@@ -38,6 +42,7 @@ impl Chunks {
             carry: Vec::new(),
             size: PIECE,
             at_end: false,
+            unended: None,
         }
     }
 
@@ -69,7 +74,20 @@ impl Chunks {
     /// Those of the input.
     pub fn take_all(&mut self) -> Result<Vec<u8>, Failure> {
         self.peek(usize::MAX)?;
-        Ok(std::mem::take(&mut self.carry))
+        let text = std::mem::take(&mut self.carry);
+        let last = last_line(&text);
+        if last.len() < text.len() && !last.trim_ascii().is_empty() {
+            let number = memchr::memchr_iter(b'\n', &text).count() + 1;
+            let line = String::from_utf8_lossy(last).into_owned();
+            self.unended = Some((number, line));
+        }
+        Ok(text)
+    }
+
+    /// A warning of a last line without a line end, where all was taken and the other lines have one.
+    pub fn unended_line(&self) -> Option<Warning> {
+        let (number, line) = self.unended.as_ref()?;
+        LastLine::Suspect.warning(&format!("line {number}"), line)
     }
 
     /// Leaves out bytes that were looked at.

@@ -93,7 +93,7 @@ impl Clock {
     }
 
     /// Nanoseconds since 1970, or since midnight without a date.
-    fn total(self) -> i64 {
+    pub(crate) fn total(self) -> i64 {
         i64::from(self.day.unwrap_or(0)) * DAY + self.nanoseconds.unwrap_or(0)
     }
 }

@@ -18,6 +18,7 @@ mod head;
 mod header;
 mod heading;
 mod keys;
+mod last_line;
 mod listing;
 mod makers;
 mod row_template;
@@ -43,11 +44,12 @@ use decode::Decoding;
 use head::Head;
 pub use head::is_end as is_end_of_data;
 use keys::Entry;
+pub use last_line::{LastLine, last_line};
 use makers::Maker;
-pub use rows::{LineNotes, place_of};
-pub use stream::{ChannelPlan, ChannelRows, Problem, TextStream};
+pub use rows::{LineNotes, RowPlan, place_of};
+pub use stream::{BRIDGE, ChannelPlan, ChannelRows, Problem, TextStream};
+pub use table::Layout;
 use table::{FIRST_ROWS, Hints, Part};
-pub use table::{Layout, truncated};
 
 /// Bytes that the encoding is told from.
 const FOR_ENCODING: u64 = 1 << 16;
@@ -158,7 +160,11 @@ impl TextFile {
                 let hints = self.maker.map_or(Hints::default(), |maker| maker.hints);
                 general(&mut self.chunks, layout, hints, &self.reading)?
             }
-            (None, Some(read)) => read(&mut self.chunks, &self.reading)?,
+            (None, Some(read)) => {
+                let mut read = read(&mut self.chunks, &self.reading)?;
+                read.lost = read.lost.or_else(|| self.chunks.unended_line());
+                read
+            }
             (None, None) => return Err(no_channel()),
         };
         if read.channels.is_empty() {
@@ -260,9 +266,10 @@ fn in_lines(text: &[u8], decimal: u8) -> Option<Vec<u8>> {
     });
     let is_one_line = !line.contains(&b'\n') && cells.count() >= ONE_LINE;
     (numbers && is_one_line).then(|| {
-        line.iter()
-            .map(|byte| if *byte == mark { b'\n' } else { *byte })
-            .collect()
+        let bytes = line
+            .iter()
+            .map(|byte| if *byte == mark { b'\n' } else { *byte });
+        bytes.chain([b'\n']).collect()
     })
 }
 

@@ -12,6 +12,7 @@ use super::cell::Cell;
 use super::clock::Clock;
 use super::row_template::RowTemplate;
 use crate::failure::Failure;
+use crate::io::number;
 use crate::recording::text::dialect::{Dialect, decode_line, is_comment, is_skipped};
 use crate::recording::{Hole, HoleKind};
 use cut::line_of;
@@ -23,8 +24,8 @@ pub enum ColumnKind {
     Numbers,
     /// Dates and times of day, taken as seconds after this one.
     Clock(Clock),
-    /// Integers too long for an `f64`, taken as differences to this one.
-    Ticks(i64),
+    /// Numbers with more digits than an `f64` has, taken as differences to this whole one.
+    Offset(i64),
     /// Texts, or nothing that is wanted.
     Nothing,
 }
@@ -232,7 +233,7 @@ impl Rows {
         }
         self.note_break(number);
         for (place, (cell, text)) in read.iter().zip(&cells).enumerate().take(plan.kinds.len()) {
-            self.put(place, *cell, text, plan.kinds[place]);
+            self.put(place, *cell, text, plan);
         }
         if plan.keeps_stamp_text {
             // The same text elsewhere in the line does as well, as long as it is not quoted.
@@ -254,15 +255,17 @@ impl Rows {
         }
     }
 
-    fn put(&mut self, place: usize, cell: Cell, text: &str, kind: ColumnKind) {
-        let value = match (kind, cell) {
+    fn put(&mut self, place: usize, cell: Cell, text: &str, plan: &RowPlan) {
+        let decimal = plan.dialect.decimal;
+        let value = match (plan.kinds[place], cell) {
             (ColumnKind::Nothing, _) | (_, Cell::Empty) => return,
             (ColumnKind::Numbers, Cell::Number(value) | Cell::Grouped(value)) => Ok(value),
             (ColumnKind::Clock(first), Cell::Clock(clock)) => Ok(clock.seconds_after(first)),
-            (ColumnKind::Ticks(first), Cell::Number(_)) => match text.parse() {
-                Ok(ticks) => Ok(ticks_after(first, ticks)),
-                Err(_) => Err(HoleKind::Text),
-            },
+            (ColumnKind::Offset(origin), Cell::Number(value) | Cell::Grouped(value)) => {
+                let after = number::read_after(text.as_bytes(), 0, decimal, origin);
+                let after = after.filter(|(_, end)| *end == text.len());
+                Ok(after.map_or(value - origin as f64, |(after, _)| after))
+            }
             (_, Cell::NonFinite) => Err(HoleKind::NonFinite),
             _ => Err(HoleKind::Text),
         };
@@ -310,9 +313,19 @@ impl Rows {
     /// Fills columns up to the last row in which any of them has a value.
     pub fn fill_together(&mut self, places: &[usize]) {
         let lengths = places.iter().map(|place| self.columns[*place].values.len());
-        let count = std::mem::replace(&mut self.count, lengths.max().unwrap_or(0));
-        places.iter().for_each(|place| self.fill(*place));
-        self.count = count;
+        let longest = lengths.max().unwrap_or(0);
+        places
+            .iter()
+            .for_each(|place| self.fill_up_to(*place, longest));
+    }
+
+    /// Fills a column that has fewer values than so many rows.
+    pub fn fill_up_to(&mut self, place: usize, rows: usize) {
+        if self.columns[place].values.len() < rows {
+            let count = std::mem::replace(&mut self.count, rows);
+            self.fill(place);
+            self.count = count;
+        }
     }
 }
 
@@ -374,16 +387,13 @@ pub(super) fn cleaned(line: &[u8]) -> (String, usize) {
     (text, zeros)
 }
 
-/// The difference of integers.
-fn ticks_after(first: i64, ticks: i64) -> f64 {
-    ticks.wrapping_sub(first) as f64
-}
-
 /// Whether cells make a row: a number or a date where one is wanted, and no more texts than those.
 fn is_row(cells: &[Cell], plan: &RowPlan) -> bool {
     let wanted = || cells.iter().zip(&plan.kinds);
     let is_good = |(cell, kind): &(&Cell, &ColumnKind)| match kind {
-        ColumnKind::Numbers | ColumnKind::Ticks(_) => cell.is_number() || **cell == Cell::NonFinite,
+        ColumnKind::Numbers | ColumnKind::Offset(_) => {
+            cell.is_number() || **cell == Cell::NonFinite
+        }
         ColumnKind::Clock(_) => matches!(cell, Cell::Clock(_)),
         ColumnKind::Nothing => false,
     };

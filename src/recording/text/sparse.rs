@@ -72,7 +72,7 @@ fn of_stamps(axis: &TimeAxis, stamps: &[f64], filled: &[usize]) -> Option<TimeAx
     Some(TimeAxis {
         start_text: axis.start_text.clone(),
         assumed: axis.assumed.clone(),
-        ..TimeAxis::of_stamps(&heading, Arc::new(own?))
+        ..TimeAxis::of_stamps_after(axis.origin_ns, &heading, Arc::new(own?))
     })
 }
 
@@ -80,7 +80,7 @@ fn of_rate(axis: &TimeAxis, first: usize, every: usize) -> Option<TimeAxis> {
     let rows_hz = axis.rate_hz?;
     Some(TimeAxis {
         rate_hz: Some(crate::recording::without_rounding(rows_hz / every as f64)),
-        start_s: axis.start_s.map(|start_s| start_s + first as f64 / rows_hz),
+        start: axis.start.map(|start| start.later(first as f64 / rows_hz)),
         stamps_s: None,
         ..axis.clone()
     })
@@ -90,6 +90,7 @@ fn of_rate(axis: &TimeAxis, first: usize, every: usize) -> Option<TimeAxis> {
 mod tests {
     use super::*;
     use crate::recording::Hole;
+    use crate::recording::moment::Moment;
 
     /// A value in each row that the function takes.
     fn column(rows: usize, has: impl Fn(usize) -> bool) -> Column {
@@ -112,7 +113,10 @@ mod tests {
         thin(&mut slow, &mut axis);
         assert_eq!(slow.values[..3], [1.0, 5.0, 9.0]);
         assert!(slow.holes.is_empty());
-        assert_eq!((axis.rate_hz, axis.start_s), (Some(25.0), Some(5.01)));
+        assert_eq!(
+            (axis.rate_hz, axis.start.map(Moment::seconds)),
+            (Some(25.0), Some(5.01))
+        );
     }
 
     #[test]

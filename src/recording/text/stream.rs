@@ -4,9 +4,13 @@ use super::axes::Role;
 use super::cell::is_non_finite;
 use super::chunks::Chunks;
 use super::clock::unwrap_midnights;
+use super::last_line::shortened;
 use super::rows::{ColumnKind, LineNotes, RowPlan, Rows};
-use super::table::{Layout, shortened};
+use super::table::Layout;
 use crate::io::number;
+
+/// What to do where a number is missing.
+pub const BRIDGE: &str = "bridge it with --fill linear or --fill hold, or correct the line";
 
 /// A channel that is read piece by piece: the pieces in order, each of which can be read on its own.
 pub struct TextStream {
@@ -32,6 +36,8 @@ pub struct StampColumn {
     pub unit: &'static str,
     /// Seconds per unit.
     pub seconds_per_unit: f64,
+    /// Nanoseconds at which they are zero.
+    pub origin_ns: i64,
     /// Whether their text is a number of seconds as the output writes it.
     pub copied: bool,
     /// Those of the first rows, in their unit.
@@ -47,8 +53,6 @@ pub struct ChannelPlan {
     /// Whether stamps are times of day, which begin anew at midnight.
     pub is_time_of_day: bool,
     headings: Vec<String>,
-    /// Fewest characters of a value in the first rows.
-    shortest_value: usize,
 }
 
 /// Rows of one channel, of a piece of a file.
@@ -107,11 +111,15 @@ impl TextStream {
             }
             StampColumn {
                 copied: rule.seconds_per_unit == 1.0
-                    && layout.plan.kinds[rule.place] == ColumnKind::Numbers
+                    && matches!(
+                        layout.plan.kinds[rule.place],
+                        ColumnKind::Numbers | ColumnKind::Offset(_)
+                    )
                     && layout.plan.dialect.decimal == b'.',
                 heading: rule.heading,
                 unit: rule.unit,
                 seconds_per_unit: rule.seconds_per_unit,
+                origin_ns: rule.origin_ns,
                 first,
             }
         });
@@ -152,7 +160,6 @@ impl ChannelPlan {
                 .iter()
                 .map(|field| field.heading.clone())
                 .collect(),
-            shortest_value: layout.shortest_value(value),
         }
     }
 
@@ -176,8 +183,7 @@ impl ChannelPlan {
             ),
             Some("") => self.describe_empty(column, name),
             Some(text) if is_non_finite(text) => format!(
-                "column {column} (\"{name}\") reads \"{text}\", which is not a finite number; \
-                 remove the line, and use --resample to bridge the gap"
+                "column {column} (\"{name}\") reads \"{text}\", which is not a finite number; {BRIDGE}"
             ),
             Some(text) => format!(
                 "column {column} (\"{name}\") reads \"{}\", expected a number{}; correct or remove \
@@ -189,18 +195,7 @@ impl ChannelPlan {
     }
 
     fn describe_empty(&self, column: usize, name: &str) -> String {
-        format!(
-            "column {column} (\"{name}\") is empty; fill in the value or remove the line, and use \
-             --resample to bridge the gap"
-        )
-    }
-
-    /// The value in a last line without a line end, if it is shorter than usual: it may be cut.
-    pub fn short_last_value(&self, line: &str) -> Option<String> {
-        let cells = self.rows.dialect.cells(line);
-        let is_last = cells.len() == self.value + 1;
-        let value = cells.into_iter().nth(self.value).unwrap_or_default();
-        (is_last && !value.is_empty() && value.len() < self.shortest_value).then_some(value)
+        format!("column {column} (\"{name}\") is empty; {BRIDGE}")
     }
 
     /// Line, from 0, that a row of a piece stands on.

@@ -11,14 +11,14 @@ use super::chunks::{Chunks, Piece};
 use super::clock::Clock;
 use super::head::{self, Head, Table};
 use super::header::{self, Field, Header};
+use super::last_line::{LastLine, last_line};
 use super::rows::{Column, ColumnKind, RowPlan, Rows, cleaned};
 use super::{listing, sparse, summary};
 use crate::failure::Failure;
 use crate::io::Reading;
 use crate::recording::text::dialect::{decode_line, is_skipped};
-use crate::recording::{Channel, HoleKind, TimeAxis};
+use crate::recording::{Channel, TimeAxis};
 use crate::warning::Warning;
-pub use warnings::{shortened, truncated};
 
 /// Rows that tell what a column holds.
 const SAMPLE: usize = 400;
@@ -51,8 +51,6 @@ pub struct Layout {
     pub first_rows: Rows,
     /// Bytes of the first rows.
     pub first_bytes: usize,
-    /// Fewest characters of a value in each column.
-    pub shortest: Vec<usize>,
     /// Zero bytes in the lines above it.
     zeros_above: usize,
     /// Rows of each block, if the head says that there are several.
@@ -120,7 +118,6 @@ impl Layout {
             line: head.number(first),
             first_rows: Rows::default(),
             first_bytes: 0,
-            shortest: shortest_values(&head.lines[first..], &table),
             zeros_above: 0,
             block_rows: None,
             held_whole: None,
@@ -167,6 +164,7 @@ impl Layout {
         if !rules.all(StampRule::is_of_one_cell) {
             self.held_whole = Some("its time stands in two columns, or is the sum of steps");
         }
+        self.keep_offsets_of_time(&mut rows);
         let is_time = |role: &Role| *role == Role::Time;
         self.plan.stamps = self.axes.roles.iter().position(is_time);
         if !blocks::restarts(&rows, &self.plan.kinds, &self.axes.roles).is_empty() {
@@ -180,6 +178,25 @@ impl Layout {
         }
         self.first_rows = rows;
         Ok(())
+    }
+
+    /// Takes the large numbers of channels as they are.
+    fn keep_offsets_of_time(&mut self, rows: &mut Rows) {
+        let places = self
+            .plan
+            .kinds
+            .iter_mut()
+            .zip(&self.axes.roles)
+            .zip(&mut rows.columns);
+        for ((kind, _), column) in places.filter(|((_, role), _)| **role != Role::Time) {
+            if let ColumnKind::Offset(origin) = *kind {
+                *kind = ColumnKind::Numbers;
+                column
+                    .values
+                    .iter_mut()
+                    .for_each(|value| *value += origin as f64);
+            }
+        }
     }
 
     fn find_axes(
@@ -219,15 +236,15 @@ impl Layout {
         let (mut piece, mut lost, mut begins_anew) = (Vec::new(), None, false);
         loop {
             let kind = chunks.next(&mut piece)?;
+            if kind == Piece::Unended {
+                lost = self.look_at_last_line(&mut piece, &rows);
+            }
             let end = rows.read(&piece, &self.plan)?;
             if end < piece.len() {
                 let next = decode_line(piece[end..].split(|b| *b == b'\n').next().unwrap_or(&[]));
                 begins_anew = self.plan.end.begins_anew(next.trim_end_matches('\r'));
                 chunks.put_back(&piece[end..]);
                 break;
-            }
-            if kind == Piece::Unended {
-                lost = self.drop_cut_row(&piece, &mut rows);
             }
             if kind != Piece::Lines {
                 break;
@@ -275,6 +292,7 @@ impl Layout {
 
     /// The channels of rows.
     pub fn channels(&self, mut rows: Rows) -> Vec<Channel> {
+        self.fill_stamps(&mut rows);
         let mut channels: Vec<Channel> = Vec::new();
         let mut last: Option<(usize, TimeAxis)> = None;
         for (place, role) in self.axes.roles.iter().enumerate() {
@@ -298,9 +316,14 @@ impl Layout {
         channels
     }
 
-    /// Fewest characters of a value of a column in the first rows.
-    pub fn shortest_value(&self, place: usize) -> usize {
-        self.shortest.get(place).copied().unwrap_or(0)
+    /// Fills columns of stamps that end before their channels do.
+    fn fill_stamps(&self, rows: &mut Rows) {
+        for (place, role) in self.axes.roles.iter().enumerate() {
+            let Role::Channel(rule) = *role else { continue };
+            if let Some(stamps) = &self.axes.rules[rule].stamps {
+                rows.fill_up_to(stamps.place, rows.columns[place].values.len());
+            }
+        }
     }
 
     /// Whether stamps are made of a column.
@@ -315,31 +338,15 @@ impl Layout {
         rules.next().is_some()
     }
 
-    /// Takes the last row away if the file ends within it: without a line end, and with fewer cells than
-    /// the rows before, a cell that cannot be read, or a stamp that falls.
-    fn drop_cut_row(&self, text: &[u8], rows: &mut Rows) -> Option<Warning> {
-        let mut lines = text
-            .rsplit(|byte| *byte == b'\n')
-            .map(|line| cleaned(line).0);
-        let last = lines.next()?;
-        let cells = |line: &str| self.plan.dialect.cells(line).len();
-        let usual = lines.next().map_or(self.plan.width, |line| cells(&line));
-        let is_unreadable = |column: &Column| {
-            let hole = column.holes.last();
-            hole.is_some_and(|hole| hole.index + 1 == rows.count && hole.what == HoleKind::Text)
-        };
-        let falls = |place: usize| match rows.columns[place].values.as_slice() {
-            [.., before, last] => last < before && place + 1 == self.plan.width,
-            _ => false,
-        };
-        let is_cut = cells(&last) < usual
-            || rows.columns.iter().any(is_unreadable)
-            || self.plan.stamps.is_some_and(falls);
-        if rows.count < 2 || is_skipped(&last) || !is_cut {
-            return None;
+    /// Judges a last line that has no line end, and takes it away if the file was cut within it.
+    fn look_at_last_line(&self, piece: &mut Vec<u8>, rows: &Rows) -> Option<Warning> {
+        let judged = LastLine::of(piece, rows.line == 1, &self.plan);
+        let line = rows.line + memchr::memchr_iter(b'\n', piece).count();
+        let text = cleaned(last_line(piece)).0;
+        if judged == LastLine::Cut {
+            piece.truncate(piece.len() - last_line(piece).len());
         }
-        rows.truncate(rows.count - 1);
-        Some(truncated(&format!("line {}", rows.line - 1), &last))
+        judged.warning(&format!("line {line}"), &text)
     }
 }
 
@@ -360,8 +367,13 @@ pub fn channel(field: &Field, mut column: Column, mut axis: TimeAxis) -> Channel
         holes: column.holes,
         axis,
         segment: None,
+        filled: Vec::new(),
     }
 }
+
+/// Numbers from which on stamps are taken as differences: seconds since 1973, and less than an `i64` holds.
+const LARGE: f64 = 1e8;
+const LARGEST: f64 = 9e18;
 
 /// How often a column holds what in the first rows.
 #[derive(Clone, Default)]
@@ -371,23 +383,21 @@ struct Counts {
     /// Dates and times, and the first of them.
     clocks: usize,
     first_clock: Option<(Clock, String)>,
-    /// Long integers, and the first of them.
-    ticks: usize,
-    first_ticks: i64,
+    /// Numbers so large that the last digits of a time are lost in an `f64`, and the whole part of the first.
+    large: usize,
+    origin: Option<i64>,
 }
 
 impl Counts {
     fn add(&mut self, text: &str, decimal: u8) {
-        match Cell::read(text, decimal) {
+        let cell = Cell::read(text, decimal);
+        match cell {
             Cell::Number(_) | Cell::Grouped(_) | Cell::NonFinite => {
                 self.numbers += 1;
-                if let Some(ticks) = text.parse().ok().filter(|_| text.len() > 12) {
-                    self.first_ticks = if self.ticks == 0 {
-                        ticks
-                    } else {
-                        self.first_ticks
-                    };
-                    self.ticks += 1;
+                let Cell::Number(value) = cell else { return };
+                if (LARGE..LARGEST).contains(&value) {
+                    self.origin.get_or_insert(value.trunc() as i64);
+                    self.large += 1;
                 }
             }
             Cell::Clock(clock) => {
@@ -412,8 +422,10 @@ impl Counts {
             Some((first, text)) if self.clocks > self.numbers => {
                 (Some(ColumnKind::Clock(first)), Some(text))
             }
-            _ if self.ticks == self.numbers => (Some(ColumnKind::Ticks(self.first_ticks)), None),
-            _ => (Some(ColumnKind::Numbers), None),
+            _ => match self.origin.filter(|_| self.large == self.numbers) {
+                Some(origin) => (Some(ColumnKind::Offset(origin)), None),
+                None => (Some(ColumnKind::Numbers), None),
+            },
         }
     }
 }
@@ -436,22 +448,6 @@ fn column_kinds(
         }
     }
     counts.into_iter().map(Counts::kind).collect()
-}
-
-/// Fewest characters of a value in each column.
-fn shortest_values(rows: &[head::Line], table: &Table) -> Vec<usize> {
-    let mut shortest = vec![usize::MAX; table.width];
-    for line in rows
-        .iter()
-        .filter(|line| !is_skipped(&line.text))
-        .take(SAMPLE)
-    {
-        let cells = table.dialect.cells(&line.text);
-        for (least, cell) in shortest.iter_mut().zip(&cells) {
-            *least = (*least).min(cell.len().max(1));
-        }
-    }
-    shortest
 }
 
 /// The first row: a row with something wrong in it may stand between the headings and the first good

@@ -11,12 +11,16 @@ pub struct Rounded {
     pub steps_s: [f64; 2],
     /// What the stamps are multiples of.
     pub quantum_s: f64,
+    /// Largest distance of a stamp from the line.
+    pub farthest_s: f64,
 }
 
 /// Fewest stamps that a line is laid through.
 const FEWEST: usize = 8;
 /// Least quantum, as a part of the step, that is worth saying: below it, steps stay within 1 %.
 const COARSE: f64 = 0.01;
+/// Largest distance of a stamp from the line, in quanta, at which the stamps are the line.
+const EXACT: f64 = 0.05;
 /// Largest distance of a stamp from the line, in quanta: half, and as much as the line can be off.
 const HALF: f64 = 0.6;
 
@@ -48,78 +52,136 @@ const HALF: f64 = 0.6;
 /// ```
 #[must_use]
 pub fn rounded(stamps_s: &[f64]) -> Option<Rounded> {
-    let count = stamps_s.len();
-    let falls = stamps_s.windows(2).any(|pair| pair[1] < pair[0]);
-    if count < FEWEST || falls || stamps_s.iter().any(|t| !t.is_finite()) {
-        return None;
-    }
-    let mean_i = 0.5 * (count - 1) as f64;
-    let mean_t = stamps_s.iter().sum::<f64>() / count as f64;
-    let deviations = stamps_s.iter().enumerate();
-    let (sum_it, sum_ii) = deviations.fold((0.0, 0.0), |(it, ii), (i, t)| {
-        let i = i as f64 - mean_i;
-        (it + i * (t - mean_t), ii + i * i)
-    });
-    let step_s = sum_it / sum_ii;
-    let quantum_s = quantum(stamps_s).filter(|q| *q > COARSE * step_s)?;
-    let line = |i: usize| mean_t + step_s * (i as f64 - mean_i);
-    let farthest = stamps_s.iter().enumerate();
-    let farthest = farthest.fold(0.0, |most: f64, (i, t)| most.max((t - line(i)).abs()));
+    let line = uniform_line(stamps_s.iter().copied().enumerate(), 0.0)?;
     // An axis that needs no excuse is not given one.
-    if farthest <= 0.5 * COARSE * step_s || farthest > HALF * quantum_s {
+    let needs_it =
+        line.quantum_s > COARSE * line.step_s && line.farthest_s > 0.5 * COARSE * line.step_s;
+    needs_it.then_some(line)
+}
+
+/// The straight line through stamps (each with its index, both rising or repeated), if these deviate from a line by no
+/// more than their rounding: `|tᵢ − (a + b i)| ≤ 0.6 q`, `q` being the power of ten that all stamps are multiples of, or
+/// that the last and longest of them are, or `resolution_s`, the last bit of a clock.
+///
+/// The step of stamps that lie on the line exactly is theirs; else it is taken as [`rounded`] does.
+///
+/// ```
+/// use torqcomp_dsp::quality::rounding::uniform_line;
+/// // 51.2 kHz for a second, written in microseconds: 1/51200 s = 19.53125 µs.
+/// let stamp = |i: usize| (i, (i as f64 * 19.53125).round() * 1e-6);
+/// let line = uniform_line((0..51_200).map(stamp), 0.0).unwrap();
+/// assert!((line.step_s * 51_200.0 - 1.0).abs() < 1e-12);
+/// // Known at a few places only, it is the same.
+/// let line = uniform_line((0..100).chain([1000, 51_199]).map(stamp), 0.0).unwrap();
+/// assert!((line.step_s * 51_200.0 - 1.0).abs() < 1e-12);
+/// ```
+#[must_use]
+pub fn uniform_line(
+    stamps: impl Iterator<Item = (usize, f64)> + Clone,
+    resolution_s: f64,
+) -> Option<Rounded> {
+    let (count, last) = stamps
+        .clone()
+        .fold((0, f64::NAN), |(n, _), (_, t)| (n + 1, t));
+    let first = stamps.clone().next()?;
+    let rises = |pair: [(usize, f64); 2]| pair[1].0 > pair[0].0 && pair[1].1 >= pair[0].1;
+    let follow = stamps.clone().zip(stamps.clone().skip(1));
+    let good = follow.clone().all(|(a, b)| rises([a, b])) && last.is_finite() && last > first.1;
+    if count < FEWEST || !good {
         return None;
     }
-    let steps_s = explaining(stamps_s, quantum_s).unwrap_or([step_s; 2]);
-    let step_s = if steps_s[0] < steps_s[1] {
-        simplest(steps_s)
-    } else {
-        step_s
-    };
-    Some(Rounded {
+    let n = count as f64;
+    let (sum_i, sum_t) = stamps.clone().fold((0.0, 0.0), |(si, st), (i, t)| {
+        (si + i as f64, st + (t - first.1))
+    });
+    let (mean_i, mean_t) = (sum_i / n, sum_t / n);
+    let (sum_it, sum_ii) = stamps.clone().fold((0.0, 0.0), |(it, ii), (i, t)| {
+        let i = i as f64 - mean_i;
+        (it + i * (t - first.1 - mean_t), ii + i * i)
+    });
+    let slope_s = sum_it / sum_ii;
+    let off = |(i, t): (usize, f64)| (t - first.1 - mean_t - slope_s * (i as f64 - mean_i)).abs();
+    let farthest_s = stamps
+        .clone()
+        .fold(0.0, |most: f64, point| most.max(off(point)));
+    let longest = stamps
+        .clone()
+        .skip(count.saturating_sub(FEWEST))
+        .map(|(_, t)| t);
+    let quantum_s = [
+        quantum(stamps.clone().map(|(_, t)| t)),
+        quantum(longest),
+        Some(resolution_s),
+    ]
+    .into_iter()
+    .flatten()
+    .find(|q| farthest_s <= HALF * q)?;
+    let on_line = |step_s: f64| Rounded {
         step_s,
-        steps_s,
+        steps_s: [step_s; 2],
         quantum_s,
+        farthest_s,
+    };
+    if farthest_s <= EXACT * quantum_s {
+        let last_i = stamps.last().map_or(0, |(i, _)| i);
+        return Some(on_line((last - first.1) / (last_i - first.0) as f64));
+    }
+    let in_quanta = stamps.map(|(i, t)| ((i - first.0) as f64, whole((t - first.1) / quantum_s)));
+    Some(match explaining(&in_quanta.collect::<Vec<_>>()) {
+        Some(quanta) => {
+            let steps_s = quanta.map(|step| step * quantum_s);
+            Rounded {
+                step_s: simplest(steps_s),
+                steps_s,
+                ..on_line(slope_s)
+            }
+        }
+        None => on_line(slope_s),
     })
 }
 
-/// Least and largest step of the lines that stay within a quantum above each stamp, if there are any
-/// and all of them rise.
-fn explaining(stamps_s: &[f64], quantum_s: f64) -> Option<[f64; 2]> {
-    let first = *stamps_s.first()?;
-    let multiples: Vec<f64> = stamps_s
-        .iter()
-        .map(|t| ((t - first) / quantum_s).round())
-        .collect();
-    // In quanta; the first and the last stamp allow no more than these.
-    let (steps, last) = ((multiples.len() - 1) as f64, *multiples.last()?);
-    let low = bound(&multiples, (last - 1.0) / steps)?;
-    let high = bound(&multiples, (last + 1.0) / steps)?;
-    (low > 0.0 && low < high).then_some([low * quantum_s, high * quantum_s])
+/// A multiple without the rounding of a quotient.
+fn whole(multiple: f64) -> f64 {
+    let whole = multiple.round();
+    if (multiple - whole).abs() < 1e-3 {
+        whole
+    } else {
+        multiple
+    }
+}
+
+/// Least and largest step of the lines that stay within one above each stamp (index and stamp, counted from the first),
+/// if there are any and all of them rise.
+fn explaining(points: &[(f64, f64)]) -> Option<[f64; 2]> {
+    // The first and the last stamp allow no more than these.
+    let &(steps, last) = points.last()?;
+    let low = bound(points, (last - 1.0) / steps)?;
+    let high = bound(points, (last + 1.0) / steps)?;
+    (low > 0.0 && low < high).then_some([low, high])
 }
 
 /// The bound of the feasible slopes that is met from a slope outside or on it. For the slope `b` the worst
 /// pair is the stamp that lies highest over `b i` and the upper end of the one that lies lowest; from `b`
 /// on to the slope that brings these two together, until no pair is apart. The function is convex and
 /// made of straight pieces, so that this ends after few steps.
-fn bound(multiples: &[f64], mut slope: f64) -> Option<f64> {
+fn bound(points: &[(f64, f64)], mut slope: f64) -> Option<f64> {
     for _ in 0..100 {
         let (mut highest, mut lowest) = ((f64::NEG_INFINITY, 0), (f64::INFINITY, 0));
-        for (i, multiple) in multiples.iter().enumerate() {
-            let over = multiple - slope * i as f64;
+        for (place, (i, stamp)) in points.iter().enumerate() {
+            let over = stamp - slope * i;
             if over > highest.0 {
-                highest = (over, i);
+                highest = (over, place);
             }
             if over < lowest.0 {
-                lowest = (over, i);
+                lowest = (over, place);
             }
         }
         let apart = highest.0 - lowest.0 - 1.0;
-        if apart <= 1e-9 {
+        if apart <= 1e-6 {
             return Some(slope);
         }
-        let (above, below) = (highest.1, lowest.1);
-        let places = above as f64 - below as f64;
-        slope = (multiples[above] - multiples[below] - 1.0) / places;
+        let (above, below) = (points[highest.1], points[lowest.1]);
+        slope = (above.1 - below.1 - 1.0) / (above.0 - below.0);
         if !slope.is_finite() {
             return None;
         }
@@ -141,10 +203,10 @@ fn simplest([low_s, high_s]: [f64; 2]) -> f64 {
         .unwrap_or(middle)
 }
 
-/// The largest power of ten that all stamps are multiples of, from 1 s to 1 ns.
-fn quantum(stamps_s: &[f64]) -> Option<f64> {
-    (0..10).map(|power| 10_f64.powi(-power)).find(|q| {
-        stamps_s.iter().all(|t| {
+/// The largest power of ten that all stamps are multiples of, from 1 s to 1 as; none if even these are too large.
+fn quantum(stamps_s: impl Iterator<Item = f64> + Clone) -> Option<f64> {
+    (0..19).map(|power| 10_f64.powi(-power)).find(|q| {
+        stamps_s.clone().all(|t| {
             let multiple = t / q;
             // Stamps in other units than seconds bring the rounding of a product.
             (multiple - multiple.round()).abs() < 1e-6 + 4.0 * f64::EPSILON * multiple.abs()

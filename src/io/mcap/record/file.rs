@@ -10,11 +10,17 @@ use super::input::CountedInput;
 use super::{RECORD_HEAD, record_head};
 use crate::failure::Failure;
 use crate::io::Input;
+use crate::print::plural;
 
 /// Longest record that is taken into memory; attachments may be longer, they are passed over.
 const LONGEST: u64 = chunk::LARGEST;
 /// Bytes of an attachment that are looked at: its names.
 const ATTACHMENT_FRONT: u64 = 1 << 16;
+/// Bytes of an end record.
+const FOOTER: usize = RECORD_HEAD + 20;
+/// Opcodes that no version of the format has given a meaning, up to those that anybody may use.
+const FIRST_RESERVED: u8 = 0x10;
+const FIRST_PRIVATE: u8 = 0x80;
 /// Losses that are kept one by one.
 const LOSSES_KEPT: usize = 20;
 /// Where a file ends that ends within an attachment.
@@ -43,6 +49,46 @@ pub(crate) enum Loss {
         /// Byte at which the chunk begins.
         at: u64,
     },
+    /// A record of a kind that does not exist, or not there.
+    Unknown {
+        /// Byte at which it, or the chunk that it is in, begins.
+        at: u64,
+        op: u8,
+        /// Whether it is in a chunk.
+        is_nested: bool,
+    },
+    /// A schema, a channel or an entry of the summary that cannot be read.
+    Unreadable {
+        /// Byte at which it, or the chunk that it is in, begins.
+        at: u64,
+        op: u8,
+    },
+    /// An index of messages that follows no chunk.
+    LoneIndex {
+        /// Byte at which it begins.
+        at: u64,
+    },
+    /// An end record that does not end the file.
+    EarlyEnd {
+        /// Byte at which it begins.
+        at: u64,
+    },
+    /// A checksum of a part of the file does not fit.
+    Checksum { told: u32, found: u32 },
+    /// Messages of channels that were not declared before them.
+    Undeclared { messages: u64 },
+    /// Chunks that the index at the end of the file gives, but that are not there.
+    MissingChunks {
+        /// Byte at which the first of them should begin.
+        at: u64,
+        chunks: u64,
+    },
+    /// Another count than the statistics at the end of the file give.
+    Count {
+        what: &'static str,
+        told: u64,
+        found: u64,
+    },
     /// A record that is too long to be one.
     TooLong {
         /// Byte at which it begins.
@@ -59,7 +105,14 @@ impl Loss {
         match self {
             Self::Truncated { .. } => "mcap-truncated",
             Self::Chunk { .. } | Self::Overrun { .. } => "mcap-damaged-chunk",
-            Self::TooLong { .. } => "mcap-damaged-record",
+            Self::TooLong { .. }
+            | Self::Unknown { .. }
+            | Self::Unreadable { .. }
+            | Self::LoneIndex { .. }
+            | Self::EarlyEnd { .. } => "mcap-damaged-record",
+            Self::Checksum { .. } => "mcap-checksum",
+            Self::Undeclared { .. } => "mcap-unknown-channel",
+            Self::MissingChunks { .. } | Self::Count { .. } => "mcap-count",
         }
     }
 }
@@ -85,6 +138,48 @@ impl fmt::Display for Loss {
                 f,
                 "a record in the chunk at byte {at} runs past the end of the chunk; the rest of \
                  the chunk was left out"
+            ),
+            Self::Unknown { at, op, is_nested } => write!(
+                f,
+                "a record {} byte {at} has the opcode 0x{op:02x}, which {}: what it held is lost",
+                if *is_nested { "in the chunk at" } else { "at" },
+                if *is_nested {
+                    "no record in a chunk has"
+                } else {
+                    "is not defined"
+                }
+            ),
+            Self::Unreadable { at, op } => write!(
+                f,
+                "a record at byte {at} (opcode 0x{op:02x}) cannot be read: what it declares is lost"
+            ),
+            Self::LoneIndex { at } => write!(
+                f,
+                "the index of messages at byte {at} follows no chunk: the chunk before it is lost"
+            ),
+            Self::EarlyEnd { at } => write!(
+                f,
+                "the end record at byte {at} does not end the file: it was passed over"
+            ),
+            Self::Checksum { told, found } => write!(
+                f,
+                "the CRC of the data section is {found:08x} instead of {told:08x}: some bytes of the file are \
+                 damaged"
+            ),
+            Self::Undeclared { messages } => write!(
+                f,
+                "{} of channels that are not declared before them: they were left out",
+                plural(*messages as usize, "message")
+            ),
+            Self::MissingChunks { at, chunks } => write!(
+                f,
+                "{} of the file's index {} not there, the first at byte {at}",
+                plural(*chunks as usize, "chunk"),
+                if *chunks == 1 { "is" } else { "are" }
+            ),
+            Self::Count { what, told, found } => write!(
+                f,
+                "the file says that it has {told} {what}, {found} were found"
             ),
             Self::TooLong { at, op, length } => write!(
                 f,
@@ -134,6 +229,8 @@ pub(crate) struct FileReader {
     /// Whether the end record was found.
     pub is_closed: bool,
     pub losses: Losses,
+    /// CRC of all bytes before the current record.
+    crc: crc32fast::Hasher,
 }
 
 impl FileReader {
@@ -158,6 +255,7 @@ impl FileReader {
             is_ended: false,
             is_closed: false,
             losses: Losses::default(),
+            crc: crc32fast::Hasher::new(),
         };
         file.held = file.want(MAGIC.len())?;
         if file.bytes() != MAGIC {
@@ -223,11 +321,18 @@ impl FileReader {
             op::ATTACHMENT => return Ok(self.truncated(offset, IN_ATTACHMENT)),
             op::CHUNK if !is_whole => drop(self.truncated(offset, "within a chunk")),
             _ if !is_whole => return Ok(self.truncated(offset, "within a record")),
-            op::FOOTER => {
+            op::FOOTER if self.is_at_end(whole)? => {
                 self.is_closed = true;
                 self.is_ended = true;
                 return Ok(None);
             }
+            op::FOOTER => self.losses.add(Loss::EarlyEnd { at: offset }),
+            op::DATA_END => self.check_data(),
+            0 | FIRST_RESERVED..FIRST_PRIVATE => self.losses.add(Loss::Unknown {
+                at: offset,
+                op,
+                is_nested: false,
+            }),
             _ => {}
         }
         Ok(Some(FileRecord {
@@ -235,6 +340,30 @@ impl FileReader {
             offset,
             is_whole,
         }))
+    }
+
+    /// Whether an end record of so many bytes is the last of the file.
+    fn is_at_end(&mut self, whole: usize) -> Result<bool, Failure> {
+        let end = whole + MAGIC.len();
+        let there = self.want(end + 1)?;
+        let behind = &self.input.window()[whole.min(there)..there];
+        // A file that is cut within its last bytes lost nothing.
+        Ok(whole == FOOTER && MAGIC.starts_with(behind))
+    }
+
+    /// Compares the CRC of all that came before the record of the data's end with the one that it gives.
+    fn check_data(&mut self) {
+        let Some(told) = self
+            .body()
+            .first_chunk()
+            .map(|told| u32::from_le_bytes(*told))
+        else {
+            return;
+        };
+        let found = self.crc.clone().finalize();
+        if told != 0 && told != found {
+            self.losses.add(Loss::Checksum { told, found });
+        }
     }
 
     /// Passes over the current record; false if the file ends in it.
@@ -255,11 +384,13 @@ impl FileReader {
     ) -> Result<bool, Failure> {
         let at = self.input.offset();
         write(self.bytes())?;
+        self.crc.update(&self.input.window()[..self.held]);
         self.input.used(std::mem::take(&mut self.held));
         while self.behind > 0 {
             let step = self.behind.min(ATTACHMENT_FRONT) as usize;
             let there = self.want(step)?;
             write(&self.input.window()[..there])?;
+            self.crc.update(&self.input.window()[..there]);
             self.input.used(there);
             self.behind -= there as u64;
             if there < step {

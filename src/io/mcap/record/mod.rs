@@ -1,5 +1,6 @@
 //! The records of an MCAP file, <https://mcap.dev/spec>.
 
+mod census;
 pub mod chunk;
 mod fields;
 pub mod file;

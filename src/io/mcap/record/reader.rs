@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use mcap::records::op;
 
+use super::census::Census;
 use super::chunk::{Unpacked, chunk_front, unpack, unpack_part};
 use super::file::{FileReader, FileRecord, Loss, Losses};
 use super::input::CountedInput;
@@ -31,8 +32,11 @@ pub(crate) struct RecordReader {
     in_place: Option<Range<usize>>,
     /// How far they have been delivered.
     at: usize,
-    chunk_offset: u64,
+    /// Where the current record, or the chunk that it is in, begins in the file.
+    record_offset: u64,
     chunk_counts: BTreeMap<String, ChunkCount>,
+    census: Census,
+    is_counted: bool,
 }
 
 /// Where the body of a record is held.
@@ -64,8 +68,10 @@ impl RecordReader {
             buffer: Vec::new(),
             in_place: None,
             at: 0,
-            chunk_offset: 0,
+            record_offset: 0,
             chunk_counts: BTreeMap::new(),
+            census: Census::default(),
+            is_counted: false,
         }
     }
 
@@ -94,8 +100,21 @@ impl RecordReader {
     /// If the file cannot be read. Damage to its content is no error: see [`Self::losses`].
     pub fn next(&mut self) -> Result<Option<(u8, &[u8])>, Failure> {
         let Some((op, holder)) = self.advance()? else {
+            if !std::mem::replace(&mut self.is_counted, true) {
+                self.census.finish(&mut self.file.losses);
+            }
             return Ok(None);
         };
+        let (mut losses, at) = (std::mem::take(&mut self.file.losses), self.record_offset);
+        let body = match &holder {
+            Holder::File => self.file.body(),
+            Holder::Records(range) => match &self.in_place {
+                Some(place) => &self.file.body()[place.clone()][range.clone()],
+                None => &self.buffer[range.clone()],
+            },
+        };
+        self.census.note(op, body, at, &mut losses);
+        self.file.losses = losses;
         Ok(Some(match holder {
             Holder::File => (op, self.file.body()),
             Holder::Records(range) => (op, &self.records()[range]),
@@ -116,11 +135,19 @@ impl RecordReader {
                 let start = self.at + RECORD_HEAD;
                 let end = start + body.len();
                 self.at = end;
+                if !matches!(op, op::SCHEMA | op::CHANNEL | op::MESSAGE) {
+                    self.file.losses.add(Loss::Unknown {
+                        at: self.record_offset,
+                        op,
+                        is_nested: true,
+                    });
+                    continue;
+                }
                 return Ok(Some((op, Holder::Records(start..end))));
             }
             // The rest of a chunk that was cut off has been reported already.
             if !rest.is_empty() && !self.file.is_ended {
-                let at = self.chunk_offset;
+                let at = self.record_offset;
                 self.file.losses.add(Loss::Overrun { at });
             }
             (self.at, self.in_place) = (0, None);
@@ -128,6 +155,8 @@ impl RecordReader {
             let Some(record) = self.file.next()? else {
                 return Ok(None);
             };
+            self.record_offset = record.offset;
+            self.census.note_outer(record.op, record.offset);
             match record.op {
                 op::CHUNK => self.unpack(record),
                 op::ATTACHMENT => {
@@ -154,7 +183,6 @@ impl RecordReader {
             count.packed = count.packed.saturating_add(header.compressed_size);
             count.unpacked = count.unpacked.saturating_add(header.uncompressed_size);
         }
-        self.chunk_offset = record.offset;
         if !record.is_whole {
             if let Some((header, packed)) = front {
                 // Whatever comes out whole is used; that the chunk is cut off is said anyway.

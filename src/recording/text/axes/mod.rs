@@ -14,6 +14,7 @@ use super::keys::{self, Entry};
 use super::rows::{Column, ColumnKind};
 use crate::failure::Failure;
 use crate::io::Reading;
+use crate::recording::moment::Moment;
 use crate::recording::{RateFrom, TimeAxis};
 use crate::warning::Warning;
 use groups::{Group, groups};
@@ -92,16 +93,27 @@ impl AxisRule {
     /// The axis of columns.
     pub fn axis(&self, columns: &[Column]) -> TimeAxis {
         let mut axis = match &self.stamps {
-            Some(rule) => TimeAxis::of_stamps(&rule.heading, Arc::new(rule.stamps(columns))),
+            Some(rule) => TimeAxis::of_stamps_after(
+                rule.origin_ns,
+                &rule.heading,
+                Arc::new(rule.stamps(columns)),
+            ),
             None => match &self.header {
                 Some((words, hz)) => TimeAxis::of_header(words, *hz, self.header_start_s),
                 None => TimeAxis::default(),
             },
         };
+        if let Some(rule) = &self.stamps {
+            axis.holes.clone_from(&columns[rule.place].holes);
+            axis.clock_ns = rule.clock_ns;
+        }
         axis.header_rate_hz = self.header.as_ref().map(|(_, hz)| *hz);
         self.prefer_header(&mut axis);
         axis.assumed = self.assumed().map(str::to_owned);
         axis.start_text.clone_from(&self.start_text);
+        if axis.start_text.is_none() {
+            axis.start_text = axis.start.and_then(Moment::date);
+        }
         if let Some(rate_hz) = self.given_hz {
             axis.rate_hz = Some(rate_hz);
             axis.rate_from = RateFrom::Given;

@@ -3,7 +3,7 @@
 use super::groups::Group;
 use super::{SAME, Sources, is_counting};
 use crate::failure::Failure;
-use crate::recording::text::clock::unwrap_midnights;
+use crate::recording::text::clock::{Clock, unwrap_midnights};
 use crate::recording::text::rows::{Column, ColumnKind};
 use crate::recording::text::units;
 use crate::recording::typical_step;
@@ -21,6 +21,10 @@ pub struct StampRule {
     pub seconds_per_unit: f64,
     /// Unit of its values, for messages.
     pub unit: &'static str,
+    /// Nanoseconds at which its values are zero.
+    pub origin_ns: i64,
+    /// Nanoseconds since 1970, or since midnight, at which its values are zero, if they are dates or times of day.
+    pub clock_ns: Option<i64>,
     /// Whether they are times of day, which begin anew at midnight.
     pub is_time_of_day: bool,
     /// The column with the milliseconds of each stamp, if they stand in one of their own.
@@ -68,6 +72,8 @@ impl StampRule {
             place,
             seconds_per_unit: 1.0,
             unit: "s",
+            origin_ns: 0,
+            clock_ns: None,
             is_time_of_day: false,
             milliseconds: None,
             is_sum: false,
@@ -93,7 +99,7 @@ impl Sources<'_> {
         for place in &group.times {
             let rule = match self.kinds[*place] {
                 ColumnKind::Clock(first) if first.nanoseconds.is_none() => None,
-                ColumnKind::Clock(first) => Some(self.clock_rule(*place, first.day, group)),
+                ColumnKind::Clock(first) => Some(self.clock_rule(*place, first, group)),
                 _ => self.number_rule(*place, header_hz)?,
             };
             found.extend(rule);
@@ -142,7 +148,7 @@ impl Sources<'_> {
         })
     }
 
-    fn clock_rule(&self, place: usize, day: Option<i32>, group: &Group) -> StampRule {
+    fn clock_rule(&self, place: usize, first: Clock, group: &Group) -> StampRule {
         // Seconds in one column, milliseconds in the next.
         let milliseconds = group
             .times
@@ -162,9 +168,10 @@ impl Sources<'_> {
             .filter(|p| matches!(self.kinds[**p], ColumnKind::Clock(first) if first.nanoseconds.is_none()))
             .find_map(|p| self.clock_texts[*p].as_ref());
         StampRule {
-            is_time_of_day: day.is_none(),
+            is_time_of_day: first.day.is_none(),
+            clock_ns: Some(first.total()),
             milliseconds,
-            start_text: Some(match date.filter(|_| day.is_none()) {
+            start_text: Some(match date.filter(|_| first.day.is_none()) {
                 Some(date) => format!("{date} {text}"),
                 None => text,
             }),
@@ -181,13 +188,15 @@ impl Sources<'_> {
         let Some((seconds_per_unit, assumed)) = self.seconds_per_unit(place, header_hz)? else {
             return Ok(None);
         };
+        let origin_ns = match self.kinds[place] {
+            ColumnKind::Offset(origin) => origin_ns(origin, seconds_per_unit),
+            _ => 0,
+        };
         Ok(Some(StampRule {
             seconds_per_unit,
             unit: name_of_unit(seconds_per_unit),
-            start_text: match self.kinds[place] {
-                ColumnKind::Ticks(first) => Some(first.to_string()),
-                _ => None,
-            },
+            origin_ns,
+            clock_ns: Some(origin_ns).filter(|ns| *ns != 0),
             assumed,
             ..StampRule::of_seconds(&field.heading, place)
         }))
@@ -237,7 +246,7 @@ impl Sources<'_> {
     fn seconds_by_size(&self, place: usize) -> (f64, Option<String>) {
         let (field, values) = (&self.fields[place], &self.columns[place].values);
         let first = match self.kinds[place] {
-            ColumnKind::Ticks(first) => first as f64,
+            ColumnKind::Offset(origin) => origin as f64,
             _ => values.first().copied().unwrap_or(0.0).abs(),
         };
         if let Some(seconds) = epoch_unit(first) {
@@ -259,6 +268,21 @@ impl Sources<'_> {
         let assumed = format!("\"{}\" gives no unit: seconds were assumed", field.heading);
         (1.0, Some(assumed))
     }
+}
+
+/// Nanoseconds of a time in units of so many seconds, counted from 1970 where it counts 100 ns since 1601, and from the
+/// first where it is beyond all dates.
+fn origin_ns(origin: i64, seconds_per_unit: f64) -> i64 {
+    const FROM_1601_TO_1970: i128 = 11_644_473_600_000_000_000;
+    let ns = i128::from(origin) * (seconds_per_unit * 1e9).round() as i128;
+    let is_since_1601 =
+        epoch_unit(origin as f64) == Some(seconds_per_unit) && seconds_per_unit == 1e-7;
+    let ns = if is_since_1601 {
+        ns - FROM_1601_TO_1970
+    } else {
+        ns
+    };
+    i64::try_from(ns).unwrap_or(0)
 }
 
 /// What a unit of time is called in messages.

@@ -8,6 +8,7 @@ use super::{Maker, Rule};
 use crate::failure::Failure;
 use crate::io::Reading;
 use crate::io::number;
+use crate::recording::moment::Moment;
 use crate::recording::text::chunks::Chunks;
 use crate::recording::text::dialect::{Delimiter, Dialect};
 use crate::recording::text::header::Field;
@@ -78,7 +79,10 @@ fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
         };
         let channels =
             segment_channels(&mut lines, &file, &header, &names, reading, &mut recording)?;
-        segment.start_s = channels.first().and_then(|channel| channel.axis.start_s);
+        segment.start_s = channels
+            .first()
+            .and_then(|channel| channel.axis.start)
+            .map(Moment::seconds);
         recording.channels.extend(channels);
         recording.segments.push(segment);
     }

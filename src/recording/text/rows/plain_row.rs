@@ -1,6 +1,6 @@
 //! A row of plain numbers, read without looking twice.
 
-use super::{ColumnKind, RowPlan, Rows, line_end, span, ticks_after};
+use super::{ColumnKind, RowPlan, Rows, line_end, span};
 use crate::io::number;
 use crate::recording::text::clock::Clock;
 use crate::recording::text::dialect::Delimiter;
@@ -64,10 +64,11 @@ impl RowPlan {
     #[inline]
     fn cell(&self, text: &[u8], at: usize, kind: ColumnKind, is_copied: bool) -> Option<PlainCell> {
         let decimal = self.dialect.decimal;
-        if kind == ColumnKind::Numbers {
-            let number = match is_copied {
-                true => number::read_nearly(text, at, decimal),
-                false => number::read(text, at, decimal),
+        if matches!(kind, ColumnKind::Numbers | ColumnKind::Offset(_)) {
+            let number = match kind {
+                ColumnKind::Offset(origin) => number::read_after(text, at, decimal, origin),
+                _ if is_copied => number::read_nearly(text, at, decimal),
+                _ => number::read(text, at, decimal),
             };
             return match number {
                 Some((value, end)) => Some((Some(value), end)),
@@ -82,8 +83,7 @@ impl RowPlan {
         let cell = std::str::from_utf8(cell).ok()?.trim();
         let value = match kind {
             ColumnKind::Clock(first) => Clock::parse(cell)?.seconds_after(first),
-            ColumnKind::Ticks(first) => ticks_after(first, cell.parse().ok()?),
-            ColumnKind::Numbers | ColumnKind::Nothing => return None,
+            ColumnKind::Numbers | ColumnKind::Offset(_) | ColumnKind::Nothing => return None,
         };
         Some((Some(value), end))
     }

@@ -71,25 +71,3 @@ fn of_lines(notes: &LineNotes, zeros: usize) -> Vec<Warning> {
     }
     warnings
 }
-
-/// What was lost if a file ends within a line, `line 7`.
-pub fn truncated(line: &str, text: &str) -> Warning {
-    Warning::new(
-        "truncated-last-line",
-        format!(
-            "{line}: the file ends in the middle of this line (\"{}\"); it was left out, \
-             everything before it was used",
-            shortened(text)
-        ),
-    )
-}
-
-/// A text of at most 60 characters.
-pub fn shortened(text: &str) -> String {
-    let text = text.trim();
-    if text.chars().count() <= 60 {
-        text.to_owned()
-    } else {
-        text.chars().take(57).chain("...".chars()).collect()
-    }
-}

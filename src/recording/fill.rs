@@ -1,0 +1,149 @@
+//! Samples that are missing, filled in when that is asked for.
+
+use std::sync::Arc;
+
+use serde::Serialize;
+
+use super::Recording;
+use super::memory_stream::used_stamps;
+use crate::failure::Failure;
+use crate::io::{Fill, Reading};
+use crate::print::plural;
+use crate::warning::Warning;
+
+/// Stretches whose times a warning gives.
+const SAID: usize = 5;
+/// Most samples that are filled in at one place.
+const LONGEST: f64 = 10_000.0;
+
+/// A stretch of samples that were filled in.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct FilledSpan {
+    /// Time of the sample before it, in s.
+    pub from_s: f64,
+    /// Time of the sample behind it, in s.
+    pub to_s: f64,
+    /// Samples that were filled in.
+    pub samples: usize,
+}
+
+impl Recording {
+    /// Fills in what is missing of a channel, by its place, if that is asked for.
+    ///
+    /// # Errors
+    /// If a gap is too long to be filled.
+    pub(crate) fn fill(&mut self, place: usize, reading: &Reading) -> Result<(), Failure> {
+        let fill = match reading.fill {
+            None | Some(Fill::Refuse) => return Ok(()),
+            Some(fill) => fill,
+        };
+        let channel = &mut self.channels[place];
+        let Some(rate_hz) = reading.rate_hz.or(channel.axis.rate_hz) else {
+            return Ok(());
+        };
+        let is_stamped = used_stamps(channel, reading).is_some();
+        let whole = std::mem::take(&mut channel.samples);
+        let stamps = channel.axis.stamps_s.clone().filter(|_| is_stamped);
+        let time_s = |place: usize| match &stamps {
+            Some(stamps) => stamps[place],
+            None => channel.axis.start.unwrap_or_default().after_s + place as f64 / rate_hz,
+        };
+        let good = (0..whole.len())
+            .filter(|place| whole[*place].is_finite() && time_s(*place).is_finite());
+        let mut filled = Filled::default();
+        for place in good {
+            filled.push(time_s(place), whole[place], fill, rate_hz)?;
+        }
+        let origin_s = channel.axis.origin_ns as f64 * 1e-9;
+        channel.samples = filled.samples;
+        channel.axis.stamps_s = Some(Arc::new(filled.stamps_s)).filter(|_| is_stamped);
+        channel.axis.start = filled.first_s.map(|first_s| channel.axis.moment(first_s));
+        (channel.holes, channel.axis.holes) = (Vec::new(), Vec::new());
+        let warning = said(&channel.name, fill, &filled.spans, |after_s| {
+            channel.axis.moment(after_s).short()
+        });
+        let absolute = |span: FilledSpan| FilledSpan {
+            from_s: span.from_s + origin_s,
+            to_s: span.to_s + origin_s,
+            ..span
+        };
+        channel.filled = filled.spans.into_iter().map(absolute).collect();
+        self.warnings.extend(warning);
+        Ok(())
+    }
+}
+
+/// A record without gaps, under construction.
+#[derive(Default)]
+struct Filled {
+    samples: Vec<f64>,
+    stamps_s: Vec<f64>,
+    first_s: Option<f64>,
+    spans: Vec<FilledSpan>,
+}
+
+impl Filled {
+    fn push(&mut self, time_s: f64, value: f64, fill: Fill, rate_hz: f64) -> Result<(), Failure> {
+        self.first_s.get_or_insert(time_s);
+        if let (Some(&before_s), Some(&before)) = (self.stamps_s.last(), self.samples.last()) {
+            let steps = ((time_s - before_s) * rate_hz).round();
+            if steps > LONGEST {
+                return Err(Failure::failed(format_args!(
+                    "{steps} samples are missing at one place, more than --fill bridges ({LONGEST}); cut the record \
+                     there with --range"
+                )));
+            }
+            for step in 1..steps.max(1.0) as usize {
+                let part = step as f64 / steps;
+                self.stamps_s.push(before_s + part * (time_s - before_s));
+                self.samples.push(match fill {
+                    Fill::Hold => before,
+                    _ => before + part * (value - before),
+                });
+            }
+            if steps > 1.0 {
+                self.spans.push(FilledSpan {
+                    from_s: before_s,
+                    to_s: time_s,
+                    samples: steps as usize - 1,
+                });
+            }
+        }
+        self.stamps_s.push(time_s);
+        self.samples.push(value);
+        Ok(())
+    }
+}
+
+/// What is said of the stretches that were filled in.
+fn said(
+    name: &str,
+    fill: Fill,
+    spans: &[FilledSpan],
+    time: impl Fn(f64) -> String,
+) -> Option<Warning> {
+    let count: usize = spans.iter().map(|span| span.samples).sum();
+    let how = match fill {
+        Fill::Hold => "the last value before them",
+        _ => "straight lines",
+    };
+    let shown = spans.iter().take(SAID);
+    let shown: Vec<String> = shown
+        .map(|span| format!("{} to {}", time(span.from_s), time(span.to_s)))
+        .collect();
+    let more = match spans.len().saturating_sub(SAID) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    (count > 0).then(|| {
+        Warning::new(
+            "filled",
+            format!(
+                "\"{name}\": {} at {} filled in with {how}: {}{more}; do not trust the result there",
+                plural(count, "missing sample"),
+                plural(spans.len(), "place"),
+                shown.join(", ")
+            ),
+        )
+    })
+}
