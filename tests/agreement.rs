@@ -73,7 +73,7 @@ const REASONS: [(&str, &[&str]); 5] = [
         "hole",
         &[
             "has no number there",
-            "is empty; fill in",
+            "bridge it with --fill",
             "expected a number",
             "not a finite number",
         ],
@@ -208,23 +208,36 @@ fn every_verb(name: &str) -> Vec<(&'static str, Taken)> {
     taken.push(("simulate", reported("simulate", &args, &options)));
     let args = ["decay", name, "--channel", &path, "--json"];
     taken.push(("identify", reported("identify", &args, &options)));
-    if report["channels"]
-        .as_array()
-        .is_some_and(|channels| channels.len() > 1)
-        && signal.is_none()
-    {
+    if let Some(measured) = second_channel(&report).filter(|_| signal.is_none()) {
         let args = [
             "--train",
             name,
             "--applied",
             "1",
             "--measured",
-            "2",
+            &measured,
             "--json",
         ];
         taken.push(("diagnose", reported("diagnose", &args, &options)));
     }
     taken
+}
+
+/// Number of a channel that was recorded with the first one, and has a number everywhere.
+fn second_channel(report: &Value) -> Option<String> {
+    let channels = report["channels"].as_array()?;
+    let first = channels.first()?;
+    let is_like = |channel: &&Value| {
+        ["segment", "samples", "rate_hz", "start"]
+            .iter()
+            .all(|key| channel[*key] == first[*key])
+            && channel["non_finite"].as_u64() == Some(0)
+    };
+    let place = channels
+        .iter()
+        .skip(1)
+        .position(|channel| is_like(&channel))?;
+    Some((place + 2).to_string())
 }
 
 fn verb(verb: &str, args: &[&str], options: &[String]) -> Ran {

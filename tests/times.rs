@@ -188,3 +188,298 @@ fn high_orders_keep_their_size_whatever_the_clock() {
     let second = text.stdout.lines().nth(2).unwrap();
     assert!(second.starts_with("1710250000.000039,"), "{second}");
 }
+
+/// A straight line of 400 samples at 10 kHz, 1 V/s, as rows of time and value.
+fn straight(row: impl Fn(usize, String, String) -> Option<String>) -> String {
+    let rows = (0..400).filter_map(|i| {
+        let time = format!("{:.4}", i as f64 * 1e-4);
+        row(i, time.clone(), time)
+    });
+    format!("time [s],bridge [V]\n{}", rows.collect::<String>())
+}
+
+const READERS: [&[&str]; 5] = [
+    &["extract", "record.csv"],
+    &[
+        "compensate",
+        "record.csv",
+        "--stand",
+        "stand.toml",
+        "-o",
+        "out.csv",
+        "--force",
+    ],
+    &[
+        "harmonics",
+        "record.csv",
+        "--stand",
+        "stand.toml",
+        "--fundamental",
+        "80",
+        "--orders",
+        "1",
+    ],
+    &[
+        "simulate",
+        "record.csv",
+        "--unit",
+        "N m",
+        "--stand",
+        "stand.toml",
+        "-o",
+        "out.csv",
+        "--force",
+    ],
+    &["identify", "decay", "record.csv"],
+];
+
+/// An empty cell of the time, in the middle, at the start, and from some row to the end, and one of the value: every verb
+/// refuses it at the same line with the same remedy, and none prints a number that is none.
+#[test]
+fn blank_cells_are_refused_in_every_verb() {
+    let folder = Folder::new();
+    let cases: [(&str, &dyn Fn(usize) -> bool, bool); 4] = [
+        ("line 302", &|i| i == 300, true),
+        ("line 2", &|i| i == 0, true),
+        ("line 302", &|i| i >= 300, true),
+        ("line 302", &|i| i == 300, false),
+    ];
+    for (line, is_blank, is_time) in cases {
+        let record = straight(|i, time, value| {
+            Some(match (is_blank(i), is_time) {
+                (false, _) => format!("{time},{value}\n"),
+                (true, true) => format!(",{value}\n"),
+                (true, false) => format!("{time},\n"),
+            })
+        });
+        folder.write("record.csv", record);
+        for args in READERS {
+            let ran = folder.run(args);
+            let what = format!("{args:?}: {}", ran.stderr);
+            assert_eq!(ran.code, 1, "{what}");
+            assert!(
+                ran.stderr.contains(line) && ran.stderr.contains("--fill linear"),
+                "{what}"
+            );
+            assert!(
+                !ran.stderr.contains("NaN") && !ran.stdout.contains("NaN"),
+                "{what}"
+            );
+        }
+    }
+}
+
+/// A text cut anywhere within its last two rows: what is left is whole, or code 3 says that it is not.
+#[test]
+fn a_cut_text_is_never_taken_for_a_whole_one() {
+    let folder = Folder::new();
+    let whole = straight(|_, time, value| Some(format!("{time},{value}\n")));
+    for length in whole.len() - 26..=whole.len() {
+        let part = &whole[..length];
+        folder.write("record.csv", part);
+        let rows = part.lines().count() - 1;
+        for args in [
+            &["inspect", "record.csv"][..],
+            READERS[0],
+            READERS[1],
+            READERS[3],
+        ] {
+            let ran = folder.run(args);
+            let expected = if part.ends_with('\n') { 0 } else { 3 };
+            assert_eq!(
+                ran.code,
+                expected,
+                "{args:?}, {rows} rows, {:?}: {}",
+                &part[length - 12..],
+                ran.stderr
+            );
+            let code = ["truncated-last-line", "unended-last-line"];
+            assert!(
+                expected == 0
+                    || code
+                        .iter()
+                        .any(|code| (ran.stderr.clone() + &ran.stdout).contains(code))
+            );
+        }
+    }
+}
+
+/// 20 kHz with stamps in whole milliseconds, twenty samples a stamp: the rate is that of all of them, nothing is left out,
+/// and the times are those of the samples.
+#[test]
+fn stamps_that_samples_share_give_the_rate() {
+    let folder = Folder::new();
+    let rows = (0..20_000_u32).map(|i| {
+        let volts = 0.1 * (std::f64::consts::TAU * 50.0 * f64::from(i) / 20_000.0).cos();
+        format!("{},{volts:.9}\n", i / 20)
+    });
+    folder.write(
+        "record.csv",
+        format!("time [ms],bridge [V]\n{}", rows.collect::<String>()),
+    );
+    let args = [
+        "harmonics",
+        "record.csv",
+        "--stand",
+        "stand.toml",
+        "--fundamental",
+        "50",
+        "--orders",
+        "1",
+        "--json",
+    ];
+    let ran = folder.run(&args);
+    let report = json(&ran);
+    assert!((report["rate_hz"].as_f64().unwrap() / 20_000.0 - 1.0).abs() < 1e-9);
+    let recorded = report["components"][0]["recorded"].as_f64().unwrap();
+    // 1230 ft lbf/V are 1667.657 N m/V.
+    assert!((recorded / 166.765_7 - 1.0).abs() < 1e-6, "{recorded}");
+    assert!(
+        ran.stderr.contains("rounded-time-stamps") && !ran.stderr.contains("--resample"),
+        "{}",
+        ran.stderr
+    );
+    let extracted = folder.run(&["extract", "record.csv"]);
+    assert_eq!(extracted.stdout.lines().count(), 20_001);
+    assert!(
+        extracted
+            .stdout
+            .lines()
+            .nth(3)
+            .unwrap()
+            .starts_with("0.0001,"),
+        "{}",
+        extracted.stdout.lines().nth(3).unwrap()
+    );
+}
+
+/// A part of a record by seconds, by seconds since 1970, by seconds after its start, and by time of day.
+#[test]
+fn a_range_is_taken_by_any_clock() {
+    let folder = Folder::new();
+    folder.write(
+        "zero.csv",
+        straight(|_, time, value| Some(format!("{time},{value}\n"))),
+    );
+    folder.write(
+        "epoch.csv",
+        record((10_000, 1), 400, "s", |ns| seconds(ns, 6)),
+    );
+    let clock = (0..400).map(|i| format!("2024-03-12 13:26:{:02}.{:04},{i}\n", 40 + i / 10_000, i));
+    folder.write(
+        "clock.csv",
+        format!("time,bridge [V]\n{}", clock.collect::<String>()),
+    );
+    for (name, range, first, rows) in [
+        ("zero.csv", "0.01..0.0199", "0.0100", 100),
+        ("zero.csv", "..0.0099", "0.0000", 100),
+        ("zero.csv", "0.03..", "0.0300", 100),
+        (
+            "epoch.csv",
+            "1710250000.01..1710250000.0199",
+            "1710250000.01",
+            100,
+        ),
+        ("epoch.csv", "0.01..0.0199", "1710250000.01", 100),
+        (
+            "epoch.csv",
+            "13:26:40.01..13:26:40.0199",
+            "1710250000.01",
+            100,
+        ),
+        (
+            "epoch.csv",
+            "2024-03-12T13:26:40.01..2024-03-12T13:26:40.0199",
+            "1710250000.01",
+            100,
+        ),
+        ("clock.csv", "13:26:40.01..13:26:40.0199", "0.01", 100),
+    ] {
+        let ran = folder.run(&["extract", name, "--range", range]);
+        assert_eq!(ran.code, 0, "{name} {range}: {}", ran.stderr);
+        let lines: Vec<&str> = ran.stdout.lines().collect();
+        assert_eq!(lines.len(), rows + 1, "{name} {range}");
+        let found: f64 = lines[1].split(',').next().unwrap().parse().unwrap();
+        assert_eq!(
+            found,
+            first.parse::<f64>().unwrap(),
+            "{name} {range}: {}",
+            lines[1]
+        );
+    }
+    folder
+        .run(&["extract", "zero.csv", "--range", "5..6"])
+        .says(1, &["no sample", "0.0399"]);
+    folder
+        .run(&["extract", "zero.csv", "--range", "x..6"])
+        .says(2, &["--range"]);
+}
+
+/// Rows left out of a straight line, and empty cells in it, come back on the line.
+#[test]
+fn missing_samples_are_filled_when_that_is_asked_for() {
+    let folder = Folder::new();
+    let record = straight(|i, time, value| match i {
+        100..110 => None,
+        200 => Some(format!("{time},\n")),
+        300 => Some(format!(",{value}\n")),
+        _ => Some(format!("{time},{value}\n")),
+    });
+    folder.write("record.csv", record);
+    folder.run(&["extract", "record.csv"]).says(1, &["line"]);
+    let ran = folder.run(&["extract", "record.csv", "--fill", "linear"]);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    let rows: Vec<&str> = ran.stdout.lines().skip(1).collect();
+    assert_eq!(rows.len(), 400);
+    for row in rows {
+        let (time, value) = row.split_once(',').unwrap();
+        let (time, value): (f64, f64) = (time.parse().unwrap(), value.parse().unwrap());
+        assert!((time - value).abs() < 1e-12, "{row}");
+    }
+    for said in [
+        "[filled]",
+        "12 missing samples at 3 places",
+        "0.0099 s to 0.011 s",
+    ] {
+        assert!(ran.stderr.contains(said), "{}", ran.stderr);
+    }
+    let ran = folder.run(&["extract", "record.csv", "--fill", "hold"]);
+    let held = ran.stdout.lines().nth(1 + 105).unwrap();
+    assert!(held.ends_with(",0.0099"), "{held}");
+    let args = [
+        "compensate",
+        "record.csv",
+        "--stand",
+        "stand.toml",
+        "-o",
+        "out.csv",
+        "--json",
+        "--fill",
+        "linear",
+    ];
+    let report = json(&folder.run(&args));
+    assert_eq!(report["filled"][0]["samples"], 10);
+    assert!((report["filled"][0]["from_s"].as_f64().unwrap() - 0.0099).abs() < 1e-12);
+}
+
+/// Two samples are a record: no verb breaks at them.
+#[test]
+fn a_record_of_two_samples_is_simulated_or_refused() {
+    let folder = Folder::new();
+    folder.write(
+        "record.csv",
+        "time [s],bridge [V]\n0.0000,0.1\n0.0001,0.2\n",
+    );
+    for args in READERS {
+        for between in ["band-limited", "straight-lines", "held"] {
+            let more = if args[0] == "simulate" {
+                vec!["--between", between]
+            } else {
+                Vec::new()
+            };
+            let ran = folder.run(&[args, &more[..]].concat());
+            assert!(matches!(ran.code, 0 | 1), "{args:?}: {}", ran.stderr);
+            assert!(!ran.stderr.contains("panicked"), "{}", ran.stderr);
+        }
+    }
+}

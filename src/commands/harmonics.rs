@@ -1,5 +1,7 @@
 //! `harmonics`: component torques at a fundamental and its orders.
 
+mod speed;
+
 use std::fmt::Write;
 use std::path::Path;
 
@@ -206,6 +208,7 @@ fn fit(
         .iter()
         .map(|c| component(c, printed, way))
         .collect();
+    warnings.extend(speed::warning(record, fundamental.frequency_hz, &orders));
     warnings.extend(lost_warning(&components));
     warnings.extend(mains_warning(&components, duration_s));
     let seen = &samples[..samples.len().min(excerpt::OF_MEMORY)];

@@ -96,7 +96,7 @@ impl Reading {
 /// Which channel of a recording is read, and its unit if the file does not say or is wrong.
 #[derive(Debug, Clone, Args)]
 pub struct ChannelChoice {
-    /// Channel to read: its number as inspect gives it, its heading, or its name without the unit
+    /// Channel to read: its number as inspect gives it, its heading, its name, or a part of it that no other has
     #[arg(long, value_name = "NAME")]
     pub channel: Option<String>,
     /// Field of the messages of --topic.

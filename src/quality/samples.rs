@@ -122,7 +122,9 @@ impl Findings {
                 .filter(|r| r.unexplained == Some(true))
                 .map(|r| repeated(name, &r, axis)),
         );
-        found.extend(self.mains.as_ref().map(|m| hum(name, unit, m)));
+        // Lines that may as well be orders of a shaft are listed, but are nothing to warn of.
+        let hum_of = self.mains.as_ref().filter(|mains| mains.shaft_hz.is_none());
+        found.extend(hum_of.map(|mains| hum(name, unit, mains)));
         found
     }
 }
@@ -231,18 +233,12 @@ fn hum(name: &str, unit: &str, found: &Mains) -> Warning {
             )
         })
         .collect();
-    let doubt = match found.shaft_hz {
-        Some(shaft_hz) => format!(
-            "; there is a line at {} Hz too, a simple fraction of it, so all may be orders of a shaft",
-            rounded(shaft_hz, 4)
-        ),
-        None => "; a machine that turns in step with the mains makes such lines as well".to_owned(),
-    };
     Warning::new(
         "mains-lines",
         format!(
             "\"{name}\" has lines at multiples of {} Hz, as mains hum makes them: {} (peak; others \
-             closer than {} Hz are not told apart){doubt}",
+             closer than {} Hz are not told apart); a machine that turns in step with the mains makes such lines \
+             as well",
             short(found.nominal_hz),
             lines.join(", "),
             rounded(found.resolution_hz, 2)

@@ -278,7 +278,7 @@ fn check_finite(selection: &Selection) -> Result<(), Failure> {
 }
 
 /// Whether all channels have their samples at the same moments, a uniform step apart. Stamps of a text that are
-/// the same for all channels must be uniform.
+/// the same for all channels must be uniform, and so must those of a single channel of messages.
 ///
 /// # Errors
 /// If their rates are too different to be brought together, or nothing says how they lie.
@@ -304,7 +304,7 @@ fn is_one_axis(chosen: &[Selection], is_text: bool) -> Result<bool, Failure> {
         };
     }
     let irregular = first.channel.irregular(first.rate_hz);
-    match irregular.filter(|_| same && is_text) {
+    match irregular.filter(|_| same && (is_text || chosen.len() == 1)) {
         Some(why) => Err(why),
         None => Ok(same && first.channel.irregular(first.rate_hz).is_none()),
     }

@@ -181,16 +181,27 @@ pub(super) fn step_of(stamps_s: &[f64], origin_s: f64) -> Option<f64> {
 
 /// How stamps about a step apart are rounded, if that is all that is wrong with them.
 pub(super) fn rounding(stamps_s: &[f64], step: f64, origin_s: f64) -> Option<Rounded> {
+    line_of(stamps_s, origin_s).filter(|_| has_unlike_steps(stamps_s, step))
+}
+
+/// Whether some steps, more than gaps would be, differ from the usual one.
+fn has_unlike_steps(stamps_s: &[f64], step: f64) -> bool {
     let unlike = |pair: &&[f64]| ((pair[1] - pair[0]) / step - 1.0).abs() > UNIFORM;
     let some = stamps_s.windows(2).filter(unlike).take(FEWEST_UNLIKE);
-    line_of(stamps_s, origin_s).filter(|_| some.count() == FEWEST_UNLIKE)
+    some.count() == FEWEST_UNLIKE
 }
 
 /// The line of stamps that deviate from it by their rounding only. `origin_s` is the time at which they are zero: a
 /// clock that counts from there in an `f64` has its last bit.
 fn line_of(stamps_s: &[f64], origin_s: f64) -> Option<Rounded> {
     let resolution_s = 2.0 * f64::EPSILON * (origin_s.abs() + stamps_s.last()?.abs());
-    uniform_line(stamps_s.iter().copied().enumerate(), resolution_s)
+    let line = uniform_line(stamps_s.iter().copied().enumerate(), resolution_s)?;
+    // A single gap hides in a rounding to more than half a step.
+    let may_hide_gap =
+        line.quantum_s > 0.5 * line.step_s && line.farthest_s > 0.05 * line.quantum_s;
+    let is_rounding =
+        !may_hide_gap || typical_step(stamps_s).is_none_or(|step| has_unlike_steps(stamps_s, step));
+    is_rounding.then_some(line)
 }
 
 impl TimeAxis {

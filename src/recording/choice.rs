@@ -19,7 +19,7 @@ pub(crate) struct Label<'a> {
 }
 
 /// The place of the channel that is wanted: by its heading, its name without the unit, either of them in any case, or
-/// its number from 1; the only channel if none is named. `flag` is the flag that names it.
+/// its number from 1, or a part of the heading in any case that no other has; the only channel if none is named. `flag` is the flag that names it.
 pub(crate) fn choose(
     channels: &[Label],
     wanted: Option<&str>,
@@ -59,12 +59,34 @@ pub(crate) fn choose(
     {
         return Ok(number - 1);
     }
+    if let Some(place) = by_part(channels, wanted)? {
+        return Ok(place);
+    }
     let known = channels.iter().map(|c| c.name);
     Err(Failure::failed(format_args!(
         "there is no channel \"{wanted}\"{}; the channels are {}",
         did_you_mean(wanted, known),
         names(channels)
     )))
+}
+
+/// The place of the only channel whose heading has a part, in any case.
+fn by_part(channels: &[Label], wanted: &str) -> Result<Option<usize>, Failure> {
+    let part = wanted.to_lowercase();
+    let has_part = |place: &usize| channels[*place].heading.to_lowercase().contains(&part);
+    match *(0..channels.len()).filter(has_part).collect::<Vec<_>>() {
+        [] => Ok(None),
+        [one] => Ok(Some(one)),
+        ref several => Err(Failure::failed(format_args!(
+            "\"{wanted}\" is a part of the names of {} channels: {}; give more of it",
+            several.len(),
+            list(
+                several
+                    .iter()
+                    .map(|place| format!("\"{}\"", channels[*place].name))
+            )
+        ))),
+    }
 }
 
 /// The channels as they can be chosen: by name, or by number where a name is used twice.

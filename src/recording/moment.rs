@@ -31,10 +31,11 @@ impl Moment {
     /// The time in seconds, as far as an `f64` has it.
     #[must_use]
     pub fn seconds(self) -> f64 {
-        match self.origin_ns {
-            0 => self.after_s,
-            origin_ns => origin_ns as f64 * 1e-9 + self.after_s,
+        if self.origin_ns == 0 {
+            return self.after_s;
         }
+        let ns = self.nanoseconds();
+        ns.div_euclid(SECOND) as f64 + ns.rem_euclid(SECOND) as f64 * 1e-9
     }
 
     /// The time in nanoseconds.

@@ -8,7 +8,7 @@ use super::memory_stream::used_stamps;
 use super::message_stream::MessageOrigin;
 use super::moment::Moment;
 use super::stamps::{StampGrid, is_uniform};
-use super::text::{ChannelPlan, TextFile, TextStream};
+use super::text::{ChannelPlan, StampColumn, TextFile, TextStream};
 use super::validator::{StreamValidator, TextLines};
 use super::{FilledSpan, RateFrom, Recording, TimeAxis, checkpoints};
 use crate::failure::Failure;
@@ -106,6 +106,14 @@ impl ChannelStream {
         let first_rows = file.recording.clone();
         let place = first_rows.place(choice)?;
         let selection = first_rows.select_at(place, choice, reading)?;
+        // Which sample has a stamp farther on cannot be counted where several share one.
+        let is_coarse = selection
+            .channel
+            .rounded_stamps("", selection.rate_hz)
+            .is_some();
+        if is_coarse && reading.rate_hz.is_none() {
+            return Self::of_recording(file.read()?, choice, reading);
+        }
         let axis = &selection.channel.axis;
         // A rate in the head is better than that of rounded stamps, but only stamps show a gap.
         let are_uniform = |stamps_s: &Arc<Vec<f64>>| is_uniform(stamps_s, selection.rate_hz);
@@ -124,23 +132,7 @@ impl ChannelStream {
             Some(stamps) => {
                 let later = behind_first_rows
                     .map_or_else(Vec::new, |from| checkpoints::of_text(input, from, &plan));
-                let grid = StampGrid {
-                    unit: stamps.unit.to_owned(),
-                    seconds_per_unit: stamps.seconds_per_unit,
-                    copied: stamps.copied,
-                    origin_ns: stamps.origin_ns,
-                    ..StampGrid::of_seconds()
-                };
-                let found =
-                    TimeAxis::of_stream(&stamps.heading, grid, &stamps.first, &later, reading)?;
-                match &axis.rate_from {
-                    RateFrom::Header(_) if !reading.resample => TimeAxis {
-                        rate_hz: axis.rate_hz,
-                        rate_from: axis.rate_from.clone(),
-                        ..found
-                    },
-                    _ => found,
-                }
+                axis_of_stamps(axis, &stamps, &later, reading)?
             }
             None if reading.rate_hz.is_some() => TimeAxis::given(selection.rate_hz),
             None => TimeAxis {
@@ -194,4 +186,29 @@ impl ChannelStream {
         );
         (self.blocks, plan, validator)
     }
+}
+
+/// The axis of a column of stamps of which more will be read; a rate in the head is better than that of rounded stamps.
+fn axis_of_stamps(
+    of_first_rows: &TimeAxis,
+    stamps: &StampColumn,
+    later: &[f64],
+    reading: &Reading,
+) -> Result<TimeAxis, Failure> {
+    let grid = StampGrid {
+        unit: stamps.unit.to_owned(),
+        seconds_per_unit: stamps.seconds_per_unit,
+        copied: stamps.copied,
+        origin_ns: stamps.origin_ns,
+        ..StampGrid::of_seconds()
+    };
+    let found = TimeAxis::of_stream(&stamps.heading, grid, &stamps.first, later, reading)?;
+    Ok(match &of_first_rows.rate_from {
+        RateFrom::Header(_) if !reading.resample => TimeAxis {
+            rate_hz: of_first_rows.rate_hz,
+            rate_from: of_first_rows.rate_from.clone(),
+            ..found
+        },
+        _ => found,
+    })
 }

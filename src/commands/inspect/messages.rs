@@ -68,6 +68,7 @@ fn read_most(place: &Input, reading: &Reading, most: u64) -> Result<Content, Fai
             kept[number].add(times_ns, values);
         })?;
     }
+    let mut is_lossy = inventory.is_lossy;
     let mut results = results.into_iter().zip(kept);
     for (topic, number, is_read) in numbers {
         let read = is_read.then(|| results.next()).flatten();
@@ -76,7 +77,11 @@ fn read_most(place: &Input, reading: &Reading, most: u64) -> Result<Content, Fai
             content.recording.channels.push(channel);
             content.wholes.push(whole);
             let warnings = &mut content.recording.warnings;
-            add_warnings(warnings, summary.warnings, &inventory.warnings);
+            // A list that no message fills has no number in this file.
+            let mut said = summary.warnings;
+            said.retain(|warning| summary.samples > 0 || warning.code != "mcap-without-item");
+            is_lossy |= summary.is_lossy;
+            add_warnings(warnings, said, &inventory.warnings);
         } else {
             // Lists that are empty at first, and the like: the warnings name what is damaged.
             content.listed.push(entry(topic, number));
@@ -85,7 +90,13 @@ fn read_most(place: &Input, reading: &Reading, most: u64) -> Result<Content, Fai
     let said = &mut content.recording.warnings;
     said.extend((left_out > 0).then(|| not_read(left_out)));
     said.extend(whole::warning(&content.wholes));
-    content.inventory = Some(inventory);
+    content.inventory = Some(Inventory {
+        is_lossy,
+        ..inventory
+    });
+    if let Some(range) = &reading.range {
+        content.recording.keep(range)?;
+    }
     Ok(content)
 }
 

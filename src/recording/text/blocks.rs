@@ -86,8 +86,10 @@ fn is_of_block(entry: &Entry) -> bool {
 
 /// The rows at which time begins anew after lines that are no rows, such as empty ones or `# run 2`.
 pub fn restarts(rows: &Rows, kinds: &[ColumnKind], roles: &[Role]) -> Vec<usize> {
-    let is_time =
-        |place: &usize| roles[*place] == Role::Time && kinds[*place] == ColumnKind::Numbers;
+    let is_time = |place: &usize| {
+        roles[*place] == Role::Time
+            && matches!(kinds[*place], ColumnKind::Numbers | ColumnKind::Offset(_))
+    };
     let Some(place) = (0..roles.len()).find(is_time) else {
         return Vec::new();
     };

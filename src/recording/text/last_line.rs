@@ -45,7 +45,10 @@ impl LastLine {
             (Some(cell), Some(usual)) => cell.len() < usual.len() && place + 1 == plan.width,
             _ => false,
         };
+        let is_empty = |cells: &Vec<String>| cells.last().is_some_and(String::is_empty);
+        let ends_before_cell = is_empty(&cells) && !before.as_ref().is_some_and(is_empty);
         let is_cut = cells.len() < usual
+            || ends_before_cell
             || cells.iter().enumerate().any(is_unreadable)
             || plan.stamps.is_some_and(is_short);
         if is_cut { Self::Cut } else { Self::Suspect }

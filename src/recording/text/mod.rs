@@ -47,7 +47,7 @@ use keys::Entry;
 pub use last_line::{LastLine, last_line};
 use makers::Maker;
 pub use rows::{LineNotes, RowPlan, place_of};
-pub use stream::{BRIDGE, ChannelPlan, ChannelRows, Problem, TextStream};
+pub use stream::{BRIDGE, ChannelPlan, ChannelRows, Problem, StampColumn, TextStream};
 pub use table::Layout;
 use table::{FIRST_ROWS, Hints, Part};
 

@@ -1,5 +1,6 @@
 //! One table of numbers with the lines above it: found by the first bytes of a text, then read.
 
+mod counts;
 mod warnings;
 
 use std::sync::Arc;
@@ -8,7 +9,6 @@ use super::axes::{AxisPlan, Role, Sources, StampRule};
 use super::blocks::{self, TableEnd};
 use super::cell::Cell;
 use super::chunks::{Chunks, Piece};
-use super::clock::Clock;
 use super::head::{self, Head, Table};
 use super::header::{self, Field, Header};
 use super::last_line::{LastLine, last_line};
@@ -19,6 +19,7 @@ use crate::io::Reading;
 use crate::recording::text::dialect::{decode_line, is_skipped};
 use crate::recording::{Channel, TimeAxis};
 use crate::warning::Warning;
+use counts::Counts;
 
 /// Rows that tell what a column holds.
 const SAMPLE: usize = 400;
@@ -368,65 +369,6 @@ pub fn channel(field: &Field, mut column: Column, mut axis: TimeAxis) -> Channel
         axis,
         segment: None,
         filled: Vec::new(),
-    }
-}
-
-/// Numbers from which on stamps are taken as differences: seconds since 1973, and less than an `i64` holds.
-const LARGE: f64 = 1e8;
-const LARGEST: f64 = 9e18;
-
-/// How often a column holds what in the first rows.
-#[derive(Clone, Default)]
-struct Counts {
-    numbers: usize,
-    texts: usize,
-    /// Dates and times, and the first of them.
-    clocks: usize,
-    first_clock: Option<(Clock, String)>,
-    /// Numbers so large that the last digits of a time are lost in an `f64`, and the whole part of the first.
-    large: usize,
-    origin: Option<i64>,
-}
-
-impl Counts {
-    fn add(&mut self, text: &str, decimal: u8) {
-        let cell = Cell::read(text, decimal);
-        match cell {
-            Cell::Number(_) | Cell::Grouped(_) | Cell::NonFinite => {
-                self.numbers += 1;
-                let Cell::Number(value) = cell else { return };
-                if (LARGE..LARGEST).contains(&value) {
-                    self.origin.get_or_insert(value.trunc() as i64);
-                    self.large += 1;
-                }
-            }
-            Cell::Clock(clock) => {
-                self.clocks += 1;
-                self.first_clock
-                    .get_or_insert_with(|| (clock, text.to_owned()));
-            }
-            Cell::Text => self.texts += 1,
-            Cell::Empty => {}
-        }
-    }
-
-    /// What the column holds; `None` if nothing. And its first date or time, as written.
-    fn kind(self) -> (Option<ColumnKind>, Option<String>) {
-        if self.numbers + self.clocks + self.texts == 0 {
-            return (None, None);
-        }
-        if self.texts > self.numbers + self.clocks {
-            return (Some(ColumnKind::Nothing), None);
-        }
-        match self.first_clock {
-            Some((first, text)) if self.clocks > self.numbers => {
-                (Some(ColumnKind::Clock(first)), Some(text))
-            }
-            _ => match self.origin.filter(|_| self.large == self.numbers) {
-                Some(origin) => (Some(ColumnKind::Offset(origin)), None),
-                None => (Some(ColumnKind::Numbers), None),
-            },
-        }
     }
 }
 

@@ -25,6 +25,8 @@ const BESIDE: usize = 14;
 const PROMINENCE: f64 = 6.0;
 /// Amplitude of the strongest line, over the rms of the record without its mean, that is worth saying.
 const SMALLEST: f64 = 1e-3;
+/// Amplitude, over the rms of the record with its mean, that the rounding of a transform can make.
+const ROUNDING: f64 = 1e-9;
 /// Largest denominator of the fractions of a mains frequency at which a shaft that makes a line there
 /// is expected to make others.
 const LARGEST_DENOMINATOR: usize = 6;
@@ -88,7 +90,7 @@ pub struct MainsLine {
 /// ```
 #[must_use]
 pub fn mains(samples: &[f64], rate_hz: f64) -> Option<Mains> {
-    let (density, variance) = spectrum(samples, rate_hz)?;
+    let (density, variance, square) = spectrum(samples, rate_hz)?;
     let mut best: Option<(f64, Mains)> = None;
     for nominal_hz in NOMINAL_HZ {
         let lines: Vec<MainsLine> = (1..=ORDERS)
@@ -96,7 +98,8 @@ pub fn mains(samples: &[f64], rate_hz: f64) -> Option<Mains> {
             .collect();
         let strongest = lines.iter().map(|l| l.amplitude).fold(0.0, f64::max);
         let told = lines.iter().any(|l| l.order == 1) || lines.len() > 1;
-        if !told || strongest < SMALLEST * variance.sqrt() {
+        let least = (SMALLEST * variance.sqrt()).max(ROUNDING * square.sqrt());
+        if !told || strongest < least {
             continue;
         }
         // Multiples of 300 Hz belong to both: the fundamental decides, then the number of lines.
@@ -125,8 +128,8 @@ fn shaft(density: &Density, nominal_hz: f64) -> Option<f64> {
         .map(|bin| bin as f64 * density.step_hz)
 }
 
-/// Density and variance of the record, from blocks spread over it.
-fn spectrum(samples: &[f64], rate_hz: f64) -> Option<(Density, f64)> {
+/// Density, variance and mean square of the record, from blocks spread over it.
+fn spectrum(samples: &[f64], rate_hz: f64) -> Option<(Density, f64, f64)> {
     let usable = rate_hz.is_finite() && 0.45 * rate_hz > NOMINAL_HZ[0];
     if !usable || (samples.len() as f64) < SHORTEST_S * rate_hz {
         return None;
@@ -149,7 +152,8 @@ fn spectrum(samples: &[f64], rate_hz: f64) -> Option<(Density, f64)> {
     }
     let mean = sum / count;
     let density = power.density(rate_hz)?;
-    Some((density, (square / count - mean * mean).max(0.0)))
+    let square = square / count;
+    Some((density, (square - mean * mean).max(0.0), square))
 }
 
 /// The line at a multiple of a mains frequency, if there is one.

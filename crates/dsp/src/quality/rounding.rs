@@ -90,20 +90,7 @@ pub fn uniform_line(
     if count < FEWEST || !good {
         return None;
     }
-    let n = count as f64;
-    let (sum_i, sum_t) = stamps.clone().fold((0.0, 0.0), |(si, st), (i, t)| {
-        (si + i as f64, st + (t - first.1))
-    });
-    let (mean_i, mean_t) = (sum_i / n, sum_t / n);
-    let (sum_it, sum_ii) = stamps.clone().fold((0.0, 0.0), |(it, ii), (i, t)| {
-        let i = i as f64 - mean_i;
-        (it + i * (t - first.1 - mean_t), ii + i * i)
-    });
-    let slope_s = sum_it / sum_ii;
-    let off = |(i, t): (usize, f64)| (t - first.1 - mean_t - slope_s * (i as f64 - mean_i)).abs();
-    let farthest_s = stamps
-        .clone()
-        .fold(0.0, |most: f64, point| most.max(off(point)));
+    let (slope_s, farthest_s) = fitted(stamps.clone(), count as f64, first.1);
     let longest = stamps
         .clone()
         .skip(count.saturating_sub(FEWEST))
@@ -138,6 +125,27 @@ pub fn uniform_line(
         }
         None => on_line(slope_s),
     })
+}
+
+/// Slope of the straight line through stamps by least squares, and the largest distance of a stamp from it.
+fn fitted(
+    stamps: impl Iterator<Item = (usize, f64)> + Clone,
+    count: f64,
+    first_s: f64,
+) -> (f64, f64) {
+    let sums = |(si, st), (i, t): (usize, f64)| (si + i as f64, st + (t - first_s));
+    let (sum_i, sum_t) = stamps.clone().fold((0.0, 0.0), sums);
+    let (mean_i, mean_t) = (sum_i / count, sum_t / count);
+    let (sum_it, sum_ii) = stamps.clone().fold((0.0, 0.0), |(it, ii), (i, t)| {
+        let i = i as f64 - mean_i;
+        (it + i * (t - first_s - mean_t), ii + i * i)
+    });
+    let slope_s = sum_it / sum_ii;
+    let off = |(i, t): (usize, f64)| (t - first_s - mean_t - slope_s * (i as f64 - mean_i)).abs();
+    (
+        slope_s,
+        stamps.fold(0.0, |most: f64, point| most.max(off(point))),
+    )
 }
 
 /// A multiple without the rounding of a quotient.

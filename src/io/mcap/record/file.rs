@@ -10,7 +10,6 @@ use super::input::CountedInput;
 use super::{RECORD_HEAD, record_head};
 use crate::failure::Failure;
 use crate::io::Input;
-use crate::print::plural;
 
 /// Longest record that is taken into memory; attachments may be longer, they are passed over.
 const LONGEST: u64 = chunk::LARGEST;
@@ -139,15 +138,32 @@ impl fmt::Display for Loss {
                 "a record in the chunk at byte {at} runs past the end of the chunk; the rest of \
                  the chunk was left out"
             ),
-            Self::Unknown { at, op, is_nested } => write!(
+            Self::TooLong { at, op, length } => write!(
                 f,
-                "a record {} byte {at} has the opcode 0x{op:02x}, which {}: what it held is lost",
-                if *is_nested { "in the chunk at" } else { "at" },
-                if *is_nested {
-                    "no record in a chunk has"
-                } else {
-                    "is not defined"
-                }
+                "the record at byte {at} (opcode 0x{op:02x}) says it is {length} bytes long, more \
+                 than any record; nothing behind it could be read"
+            ),
+            other => other.describe_record(f),
+        }
+    }
+}
+
+impl Loss {
+    /// What is said of single records, and of what the file says of itself.
+    fn describe_record(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unknown {
+                at,
+                op,
+                is_nested: false,
+            } => write!(
+                f,
+                "the record at byte {at} has the opcode 0x{op:02x}, which is not defined: what it held is lost"
+            ),
+            Self::Unknown { at, op, .. } => write!(
+                f,
+                "a record in the chunk at byte {at} has the opcode 0x{op:02x}, which none in a chunk may have: what \
+                 it held is lost"
             ),
             Self::Unreadable { at, op } => write!(
                 f,
@@ -163,29 +179,20 @@ impl fmt::Display for Loss {
             ),
             Self::Checksum { told, found } => write!(
                 f,
-                "the CRC of the data section is {found:08x} instead of {told:08x}: some bytes of the file are \
-                 damaged"
+                "the CRC of the data section is {found:08x} instead of {told:08x}: bytes of the file are damaged"
             ),
             Self::Undeclared { messages } => write!(
                 f,
-                "{} of channels that are not declared before them: they were left out",
-                plural(*messages as usize, "message")
+                "messages of channels that are not declared before them, left out: {messages}"
             ),
             Self::MissingChunks { at, chunks } => write!(
                 f,
-                "{} of the file's index {} not there, the first at byte {at}",
-                plural(*chunks as usize, "chunk"),
-                if *chunks == 1 { "is" } else { "are" }
+                "chunks that the file's index gives and that are not there: {chunks}, the first at byte {at}"
             ),
-            Self::Count { what, told, found } => write!(
-                f,
-                "the file says that it has {told} {what}, {found} were found"
-            ),
-            Self::TooLong { at, op, length } => write!(
-                f,
-                "the record at byte {at} (opcode 0x{op:02x}) says it is {length} bytes long, more \
-                 than any record; nothing behind it could be read"
-            ),
+            Self::Count { what, told, found } => {
+                write!(f, "the file counts {told} {what}, {found} were found")
+            }
+            _ => Ok(()),
         }
     }
 }
@@ -361,7 +368,8 @@ impl FileReader {
             return;
         };
         let found = self.crc.clone().finalize();
-        if told != 0 && told != found {
+        // What is damaged may be known already.
+        if told != 0 && told != found && self.losses.count == 0 {
             self.losses.add(Loss::Checksum { told, found });
         }
     }

@@ -159,9 +159,11 @@ impl Sources<'_> {
         let mut roles = vec![Role::Nothing; count];
         steps.iter().for_each(|place| roles[*place] = Role::Time);
         let named = self.time_places(&used)?;
-        let (index, rest): (Vec<usize>, Vec<usize>) = used
-            .iter()
-            .partition(|place| !named.times.contains(place) && self.is_index(**place, &used));
+        let (index, rest): (Vec<usize>, Vec<usize>) = used.iter().partition(|place| {
+            let counts = self.is_index(**place, &used)
+                || !named.times.is_empty() && self.is_row_label(**place, &used);
+            counts && !named.times.contains(place)
+        });
         index.iter().for_each(|place| roles[*place] = Role::Index);
         let (mut rules, mut warnings) = (Vec::new(), Vec::new());
         warnings.extend(self.falling_time(&rest, &named.times));

@@ -218,6 +218,18 @@ impl Sources<'_> {
         matches!(self.kinds[place], ColumnKind::Clock(_))
     }
 
+    /// Whether a first column without a heading, beside others with one, holds whole numbers that rise: the rows' labels of
+    /// a data frame, some of whose rows were left out.
+    pub(super) fn is_row_label(&self, place: usize, used: &[usize]) -> bool {
+        let values = &self.columns[place].values;
+        let name = &self.fields[place].name;
+        used.first() == Some(&place)
+            && (self.is_unnamed(place) || name.starts_with("Unnamed: "))
+            && used.iter().any(|other| !self.is_unnamed(*other))
+            && values.windows(2).all(|pair| pair[1] > pair[0])
+            && values.iter().all(|value| value.fract() == 0.0)
+    }
+
     /// Whether a column only counts the samples.
     pub(super) fn is_index(&self, place: usize, used: &[usize]) -> bool {
         let field = &self.fields[place];
