@@ -19,7 +19,7 @@ use crate::io::{ChannelChoice, Reading, frequency, positive_frequency};
 pub use diagnose::Diagnose;
 pub use simulate::Simulate;
 pub use values::Orders;
-use values::{digits, orders, percent, range};
+use values::{digits, orders, percent, range, warning_code};
 
 /// True torque from the records of a reaction-torque stand.
 ///
@@ -162,6 +162,25 @@ impl Work {
     }
 }
 
+/// Which warnings end a verb with code 3.
+#[derive(Debug, Clone, Default, Args)]
+pub struct Strictness {
+    /// Exit with code 3 if there are warnings
+    #[arg(long)]
+    pub strict: bool,
+    /// Warning that --strict lets pass, by its code; may be given several times
+    #[arg(long, value_name = "CODE", value_parser = warning_code)]
+    pub allow: Vec<String>,
+}
+
+impl Strictness {
+    /// Whether warnings with these codes are too many.
+    #[must_use]
+    pub fn refuses<'a>(&self, mut codes: impl Iterator<Item = &'a str>) -> bool {
+        self.strict && codes.any(|code| self.allow.iter().all(|allowed| allowed != code))
+    }
+}
+
 /// Arguments of `compensate`.
 #[derive(Debug, Args)]
 pub struct Compensate {
@@ -204,9 +223,9 @@ pub struct Compensate {
     /// Print a report as JSON to standard output (the samples then need -o FILE)
     #[arg(long)]
     pub json: bool,
-    /// Exit with code 3 if there are warnings
-    #[arg(long)]
-    pub strict: bool,
+    /// What makes a warning a failure.
+    #[command(flatten)]
+    pub strictness: Strictness,
     /// How it works.
     #[command(flatten)]
     pub work: Work,
@@ -224,9 +243,9 @@ pub struct Extract {
     /// Significant digits, 1 to 15, or "shortest" for the fewest that restore every bit
     #[arg(long, value_name = "N", default_value = "shortest", value_parser = digits)]
     pub digits: Digits,
-    /// Exit with code 3 if there are warnings
-    #[arg(long)]
-    pub strict: bool,
+    /// What makes a warning a failure.
+    #[command(flatten)]
+    pub strictness: Strictness,
     /// Print only warnings to standard error
     #[arg(short, long)]
     pub quiet: bool,
@@ -262,9 +281,9 @@ pub struct Harmonics {
     /// Print JSON instead of a table
     #[arg(long)]
     pub json: bool,
-    /// Exit with code 3 if there are warnings
-    #[arg(long)]
-    pub strict: bool,
+    /// What makes a warning a failure.
+    #[command(flatten)]
+    pub strictness: Strictness,
 }
 
 /// Arguments of `table`.
@@ -328,9 +347,9 @@ pub struct Inspect {
     /// Print JSON instead of a table
     #[arg(long)]
     pub json: bool,
-    /// Exit with code 3 if there are warnings
-    #[arg(long)]
-    pub strict: bool,
+    /// What makes a warning a failure.
+    #[command(flatten)]
+    pub strictness: Strictness,
 }
 
 #[cfg(test)]

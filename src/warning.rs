@@ -24,7 +24,6 @@ impl Warning {
 
 /// Every code, what it means, and what to do, by where it comes from. `docs/warnings.md` is written from this list.
 #[rustfmt::skip]
-#[cfg(test)]
 pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
     ("Compensate and harmonics", &[
         ["band-lost-in-noise", "part of the band does not rise above the record's noise, which the compensation multiplies there", "choose a lower --band"],

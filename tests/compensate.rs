@@ -402,7 +402,7 @@ fn resampling_says_what_it_did() {
     folder.write("in.csv", format!("time_s,bridge_V\n{rows}"));
     folder
         .run(&["compensate", "in.csv", "--stand", "stand.toml"])
-        .says(1, &["line 9002", "--resample"]);
+        .says(1, &["line 9002", "--fill linear"]);
     let args = [
         "compensate",
         "in.csv",

@@ -519,3 +519,39 @@ fn an_impossible_output_of_identify_is_refused_before_the_work() {
         .run(&args)
         .says(1, &["the folder none does not exist"]);
 }
+
+/// `--strict` fails for a warning unless its code is allowed; a code that no warning has is wrong usage.
+#[test]
+fn strict_lets_allowed_warnings_pass() {
+    let folder = Folder::new();
+    let rows = (0..400).map(|i| {
+        format!(
+            "{:.4},{:.6}\n",
+            f64::from(i) * 1e-4,
+            (f64::from(i) * 0.05).cos()
+        )
+    });
+    folder.write(
+        "record.csv",
+        format!("time_s,torque\n{}", rows.collect::<String>()),
+    );
+    let args = [
+        "simulate",
+        "record.csv",
+        "--stand",
+        "stand.toml",
+        "-o",
+        "out.csv",
+        "--force",
+        "--strict",
+    ];
+    folder.run(&args).says(3, &["[unit-assumed]"]);
+    let allowed = [&args[..], &["--allow", "unit-assumed"]].concat();
+    folder.run(&allowed).says(0, &["[unit-assumed]"]);
+    let other = [&args[..], &["--allow", "clipped"]].concat();
+    folder.run(&other).says(3, &["[unit-assumed]"]);
+    let wrong = [&args[..], &["--allow", "unit-asumed"]].concat();
+    folder
+        .run(&wrong)
+        .says(2, &["did you mean \"unit-assumed\""]);
+}

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{OutputArgs, Work};
+use super::{OutputArgs, Strictness, Work};
 use crate::io::Reading;
 
 /// Arguments of `diagnose`.
@@ -45,9 +45,9 @@ pub struct Diagnose {
     /// Print JSON instead of text
     #[arg(long)]
     pub json: bool,
-    /// Exit with code 3 if there are warnings
-    #[arg(long)]
-    pub strict: bool,
+    /// What makes a warning a failure.
+    #[command(flatten)]
+    pub strictness: Strictness,
     /// How it works.
     #[command(flatten)]
     pub work: Work,

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use super::{OutputArgs, Units, range};
+use super::{OutputArgs, Strictness, Units, range};
 use crate::identify::Motion;
 use crate::identify::response::Excitation;
 use crate::io::{ChannelChoice, Reading};
@@ -61,9 +61,9 @@ pub struct Findings {
     /// Write an HTML page with the fit, the residual and the constants
     #[arg(long, value_name = "FILE")]
     pub html: Option<String>,
-    /// Exit with code 3 if there are warnings
-    #[arg(long)]
-    pub strict: bool,
+    /// What makes a warning a failure.
+    #[command(flatten)]
+    pub strictness: Strictness,
 }
 
 /// A constant known from elsewhere; by default, that of the stand file.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use torqcomp_model::simulate;
 
-use super::{OutputArgs, digits};
+use super::{OutputArgs, Strictness, digits};
 use crate::io::Reading;
 use crate::io::digits::Digits;
 
@@ -40,9 +40,9 @@ pub struct Simulate {
     /// Print a JSON report to standard output; the record then needs -o
     #[arg(long)]
     pub json: bool,
-    /// Exit with code 3 if there are warnings
-    #[arg(long)]
-    pub strict: bool,
+    /// What makes a warning a failure.
+    #[command(flatten)]
+    pub strictness: Strictness,
     /// Print only warnings to standard error
     #[arg(short, long)]
     pub quiet: bool,

@@ -1,6 +1,8 @@
 //! Values as people write them on the command line.
 
+use crate::failure::did_you_mean;
 use crate::io::digits::Digits;
+use crate::warning::CODES;
 
 /// Orders of a fundamental, rising.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,6 +33,20 @@ pub fn range(text: &str) -> Result<(f64, f64), String> {
     match ends {
         Some((from, to)) if from < to => Ok((from, to)),
         _ => Err("expected two times in seconds, such as 0.1..0.15".to_owned()),
+    }
+}
+
+/// A code that some warning has.
+pub fn warning_code(text: &str) -> Result<String, String> {
+    let mut codes = CODES
+        .iter()
+        .flat_map(|(_, rows)| rows.iter().map(|row| row[0]));
+    match codes.clone().any(|code| code == text) {
+        true => Ok(text.to_owned()),
+        false => Err(format!(
+            "no warning has this code{}",
+            did_you_mean(text, &mut codes)
+        )),
     }
 }
 

@@ -80,7 +80,7 @@ pub fn run(args: &cli::Compensate) -> Result<Outcome, Failure> {
     Ok(conclude(
         &report.warnings,
         seen.summary.lost.is_some(),
-        args.strict,
+        &args.strictness,
     ))
 }
 

@@ -61,5 +61,5 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
     }
     output::print(&diagnosis.document(args.json))?;
     output::finish_all(refined.into_iter().chain(html))?;
-    Ok(conclude(&diagnosis.warnings, is_lossy, args.strict))
+    Ok(conclude(&diagnosis.warnings, is_lossy, &args.strictness))
 }

@@ -43,7 +43,11 @@ pub fn run(args: &Extract) -> Result<Outcome, Failure> {
     }
     let mut warnings: Vec<_> = summary.lost.iter().cloned().collect();
     warnings.extend(summary.warnings);
-    Ok(conclude(&warnings, summary.lost.is_some(), args.strict))
+    Ok(conclude(
+        &warnings,
+        summary.lost.is_some(),
+        &args.strictness,
+    ))
 }
 
 /// `time_s`, and the name of the channel with its unit in brackets.

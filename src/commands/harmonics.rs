@@ -112,7 +112,7 @@ pub fn run(args: &cli::Harmonics) -> Result<Outcome, Failure> {
     Ok(conclude(
         &report.warnings,
         record.summary.lost.is_some(),
-        args.strict,
+        &args.strictness,
     ))
 }
 

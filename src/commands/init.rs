@@ -7,6 +7,7 @@ use std::io::{BufRead, IsTerminal, Write};
 
 use self::questions::{BRIDGE, DRAWING, MECHANICS, Question, TRANSDUCER};
 use super::{Outcome, conclude};
+use crate::cli::Strictness;
 use crate::cli::init::{Init, InitFrom};
 use crate::failure::Failure;
 use crate::stand;
@@ -44,7 +45,7 @@ pub fn run(args: &Init) -> Result<Outcome, Failure> {
     let mut output = args.result.open(&[])?;
     output.write(text.as_bytes())?;
     output.finish()?;
-    Ok(conclude(&stand.warnings, false, false))
+    Ok(conclude(&stand.warnings, false, &Strictness::default()))
 }
 
 /// A person at a terminal.

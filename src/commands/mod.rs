@@ -17,7 +17,7 @@ use std::path::Path;
 use torqcomp_dsp::conversion::ConversionError;
 use torqcomp_model::InverseUncertainty;
 
-use crate::cli::{Cli, OutputArgs, Verb};
+use crate::cli::{Cli, OutputArgs, Strictness, Verb};
 use crate::failure::Failure;
 use crate::io::output::{self, Output};
 use crate::print::{self, Report};
@@ -71,14 +71,14 @@ fn report_beside(report: &impl Report, as_json: bool, quiet: bool) -> Result<(),
 }
 
 /// Says the warnings, what was lost among them, and how the command ended.
-fn conclude(warnings: &[Warning], lost: bool, strict: bool) -> Outcome {
+fn conclude(warnings: &[Warning], lost: bool, strictness: &Strictness) -> Outcome {
     for warning in warnings {
         print::say(&format!(
             "torqcomp: warning [{}]: {}\n",
             warning.code, warning.message
         ));
     }
-    match lost || (strict && !warnings.is_empty()) {
+    match lost || strictness.refuses(warnings.iter().map(|w| w.code)) {
         true => Outcome::WithLoss,
         false => Outcome::Done,
     }

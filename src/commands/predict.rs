@@ -9,7 +9,7 @@ use torqcomp_model::{Estimate, Kind, SecondOrder, UnitSystem};
 
 use self::report::{PredictReport, PredictedConstant, Refinement, residual_percent};
 use super::{Outcome, conclude, publish};
-use crate::cli::Predict;
+use crate::cli::{Predict, Strictness};
 use crate::failure::Failure;
 use crate::print::rounded;
 use crate::stand::{self, BeamDrawing, BridgeData, Given, Stand};
@@ -39,7 +39,7 @@ pub fn run(args: &Predict) -> Result<Outcome, Failure> {
         constants,
     };
     publish(&report, args.json, output)?;
-    Ok(conclude(&stand.warnings, false, false))
+    Ok(conclude(&stand.warnings, false, &Strictness::default()))
 }
 
 /// Constants that follow from the drawing, in SI units, and the measured ones.

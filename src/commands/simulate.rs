@@ -99,7 +99,7 @@ pub fn run(args: &cli::Simulate) -> Result<Outcome, Failure> {
         warnings,
     };
     report_beside(&report, args.json, args.quiet || args.json)?;
-    Ok(conclude(&report.warnings, read.is_lossy, args.strict))
+    Ok(conclude(&report.warnings, read.is_lossy, &args.strictness))
 }
 
 impl Report for SimulateReport {

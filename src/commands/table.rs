@@ -5,7 +5,7 @@ use serde::Serialize;
 use torqcomp_dsp::compensate::Inverse;
 
 use super::{Outcome, conclude, publish};
-use crate::cli;
+use crate::cli::{self, Strictness};
 use crate::failure::Failure;
 use crate::print::{Report, rounded};
 use crate::stand::{self, Mechanics, Stand};
@@ -66,7 +66,7 @@ pub fn run(args: &cli::Table) -> Result<Outcome, Failure> {
         with_uncertainty: args.uncertainty,
     };
     publish(&report, args.json, output)?;
-    Ok(conclude(&stand.warnings, false, false))
+    Ok(conclude(&stand.warnings, false, &Strictness::default()))
 }
 
 /// A row, of the refined stand if there is one.

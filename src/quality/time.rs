@@ -6,7 +6,7 @@ use torqcomp_dsp::quality::rounding::{Rounded, rounded};
 use torqcomp_dsp::quality::steps::{Event, Events, Steps, rounded_steps, steps};
 
 use crate::print::rounded as number;
-use crate::recording::{COARSE_STAMPS, Channel, TimeAxis};
+use crate::recording::{COARSE_STAMPS, Channel, TimeAxis, contradicted};
 use crate::warning::Warning;
 
 /// Largest deviation of a step, as a part of it, in an axis that counts as uniform.
@@ -123,18 +123,6 @@ fn missing(whose: &str, axis: &TimeAxis) -> Option<Warning> {
              unless one is given with --rate HZ, or the column of stamps with --time-column"
         ),
     ))
-}
-
-fn contradicted(whose: &str, found: &Contradiction) -> Warning {
-    Warning::new(
-        "rate-contradicts-stamps",
-        format!(
-            "{whose}: the head of the file says {} Hz, the time stamps come at {} Hz; find out which \
-             is right, and give it with --rate if it is not the stamps",
-            number(found.stated_hz, 6),
-            number(found.stamped_hz, 6)
-        ),
-    )
 }
 
 /// `3 of …, the first at …`; nothing if there are none.

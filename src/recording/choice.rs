@@ -1,8 +1,10 @@
 //! Choosing one channel of a recording: the same way for every format and verb.
 
+use torqcomp_dsp::quality::rate::{Contradiction, contradiction};
+
 use super::axis::UNIFORM;
 use super::moment::Moment;
-use super::{Channel, Recording, TimeAxis, typical_step};
+use super::{Channel, RateFrom, Recording, TimeAxis, typical_step};
 use crate::failure::{Failure, did_you_mean};
 use crate::io::{ChannelChoice, Reading, digits};
 use crate::print::list;
@@ -18,8 +20,9 @@ pub(crate) struct Label<'a> {
     pub(crate) segment: Option<usize>,
 }
 
-/// The place of the channel that is wanted: by its heading, its name without the unit, either of them in any case, or
-/// its number from 1, or a part of the heading in any case that no other has; the only channel if none is named. `flag` is the flag that names it.
+/// The place of the channel that is wanted: by its heading, its name without the unit, either of them in any case, its
+/// number from 1, or a part of the heading in any case that no other has; the only channel if none is named. `flag` is
+/// the flag that names it.
 pub(crate) fn choose(
     channels: &[Label],
     wanted: Option<&str>,
@@ -150,6 +153,19 @@ pub(crate) fn overridden(reading: &Reading, stamps_in: &str, stamps_s: &[f64]) -
     ))
 }
 
+/// What is said where the head of a file and its stamps give two rates; `whose` names the channels.
+pub(crate) fn contradicted(whose: &str, found: &Contradiction) -> Warning {
+    Warning::new(
+        "rate-contradicts-stamps",
+        format!(
+            "{whose}: the head of the file says {} Hz, the time stamps come at {} Hz; find out which \
+             is right, and give it with --rate if it is not the stamps",
+            digits::text(found.stated_hz, 6),
+            digits::text(found.stamped_hz, 6)
+        ),
+    )
+}
+
 /// A channel that was chosen, with what the user said of it taken in.
 #[derive(Debug, Clone)]
 pub(crate) struct Selection<'a> {
@@ -206,6 +222,15 @@ impl Recording {
         let stamps = axis.stamps_s.as_ref();
         let name = axis.stamps_in.as_deref().unwrap_or("time");
         warnings.extend(stamps.and_then(|stamps_s| overridden(reading, name, stamps_s)));
+        let is_of_stamps =
+            matches!(axis.rate_from, RateFrom::Stamps(_)) && reading.rate_hz.is_none();
+        let rates = axis
+            .header_rate_hz
+            .zip(axis.rate_hz)
+            .filter(|_| is_of_stamps);
+        let count = stamps.map_or(0, |stamps_s| stamps_s.len());
+        let found = rates.and_then(|(stated, stamped)| contradiction(stated, stamped, count));
+        warnings.extend(found.map(|found| contradicted(&format!("\"{}\"", channel.name), &found)));
         Ok(Selection {
             channel,
             rate_hz,

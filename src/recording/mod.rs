@@ -32,7 +32,7 @@ pub(crate) use aligned::{AlignedChannel, AlignedChannels};
 pub(crate) use axis::without_rounding;
 pub use axis::{RateFrom, TimeAxis, typical_step};
 pub(crate) use block::Block;
-pub(crate) use choice::{Selection, unit_of};
+pub(crate) use choice::{Selection, contradicted, unit_of};
 pub use fill::FilledSpan;
 pub(crate) use memory_stream::{check_cells, check_holes};
 pub(crate) use message_stream::MessageOrigin;

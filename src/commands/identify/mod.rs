@@ -128,7 +128,7 @@ fn deliver(
     Ok(conclude(
         &result.warnings,
         recorded.is_lossy,
-        findings.strict,
+        &findings.strictness,
     ))
 }
 

@@ -105,7 +105,9 @@ fn finish(
         }
         return Err((*last).clone());
     }
-    let warned = args.strict && report.all_warnings().next().is_some();
+    let warned = args
+        .strictness
+        .refuses(report.all_warnings().map(|w| w.code));
     Ok(if report.is_lossy() || warned {
         Outcome::WithLoss
     } else {
