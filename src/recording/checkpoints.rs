@@ -22,7 +22,11 @@ const COUNTABLE: f64 = 0.25;
 /// 10 200 / 1.01 = 10 099.01.
 pub(super) fn sharpened(step: f64, first: &[f64], later: &[f64], origin: f64) -> Option<f64> {
     let (mut step, start) = (step, *first.first()?);
-    let mut known: Vec<(usize, f64)> = first.iter().copied().enumerate().collect();
+    if later.is_empty() {
+        return Some(step);
+    }
+    let place = |stamp: f64| ((stamp - start) / step).round().max(0.0) as usize;
+    let mut known: Vec<(usize, f64)> = first.iter().map(|stamp| (place(*stamp), *stamp)).collect();
     for stamp in later {
         let steps = (stamp - start) / step;
         let count = steps.round();
