@@ -70,7 +70,7 @@ pub(super) fn read(
         });
     }
     if let Some(range) = &reading.range {
-        recording.keep(range).map_err(|f| f.at(&input.name()))?;
+        recording.keep(range).map_err(|f| f.at(input.name()))?;
     }
     Ok(recording)
 }
