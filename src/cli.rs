@@ -18,8 +18,8 @@ use crate::io::{ChannelChoice, Reading, frequency, positive_frequency};
 
 pub use diagnose::Diagnose;
 pub use simulate::Simulate;
-pub use values::Orders;
-use values::{digits, orders, percent, range, warning_code};
+pub use values::{BandOption, Orders};
+use values::{band, digits, orders, percent, range, warning_code};
 
 /// True torque from the records of a reaction-torque stand.
 ///
@@ -193,9 +193,10 @@ pub struct Compensate {
     /// Stand file
     #[arg(long, value_name = "FILE")]
     pub stand: PathBuf,
-    /// Compensate up to this frequency [default: 2400 Hz, or less at low sampling rates]
-    #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = positive_frequency)]
-    pub band: Option<f64>,
+    /// Compensate up to this frequency, or "rated" for 2400 Hz [default: chosen for the least expected error from the
+    /// record's spectrum, its noise and the stand]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = band)]
+    pub band: Option<BandOption>,
     /// Units of the result
     #[arg(long, value_enum, default_value = "si")]
     pub units: Units,

@@ -2,6 +2,7 @@
 
 use crate::failure::did_you_mean;
 use crate::io::digits::Digits;
+use crate::io::positive_frequency;
 use crate::warning::CODES;
 
 /// Orders of a fundamental, rising.
@@ -10,6 +11,25 @@ pub struct Orders(pub Vec<f64>);
 
 /// Most orders that are fitted at once.
 const MOST_ORDERS: usize = 500;
+
+/// The band of a compensation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum BandOption {
+    /// Up to this frequency.
+    Hz(f64),
+    /// That of the thesis.
+    Rated,
+}
+
+pub fn band(text: &str) -> Result<BandOption, String> {
+    match text.trim() {
+        "rated" => Ok(BandOption::Rated),
+        text => match positive_frequency(text) {
+            Ok(hz) => Ok(BandOption::Hz(hz)),
+            Err(why) => Err(format!("{why}; or rated for 2400 Hz")),
+        },
+    }
+}
 
 pub fn percent(text: &str) -> Result<f64, String> {
     match text.trim().trim_end_matches('%').trim().parse::<f64>() {

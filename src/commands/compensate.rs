@@ -1,5 +1,6 @@
 //! `compensate`: a recorded signal in, the applied torque out.
 
+mod band;
 mod memory;
 mod plot;
 mod refined;
@@ -9,10 +10,10 @@ mod statistics;
 mod stream;
 mod warnings;
 
-use torqcomp_dsp::band::Band;
 use torqcomp_dsp::compensate::InverseFilter;
 use torqcomp_dsp::noise::NoiseGain;
 
+use self::band::{BandReport, Wanted};
 use self::report::{CompensateReport, NoiseAt, NoiseReport};
 use self::sink::Sink;
 use super::{Outcome, conclude, open_plot, uncertainty, unit_text};
@@ -25,8 +26,6 @@ use crate::print::{self, Report};
 use crate::recording::{ChannelStream, StreamSummary};
 use crate::stand::{self, Calibration, Stand};
 
-/// The band unless another is asked for, as far as the rate allows: that of the thesis.
-const DEFAULT_BAND_HZ: f64 = 2400.0;
 /// Frequencies at which the report gives the gain, as fractions of the band.
 const GAIN_POINTS: usize = 9;
 
@@ -36,6 +35,8 @@ struct Plan {
     stand: Stand,
     chain: Calibration,
     filter: InverseFilter,
+    /// Its band, and where it comes from.
+    band: BandReport,
     /// The inverse of effects that no filter describes, if there are any.
     undo: Option<ChainInverse>,
 }
@@ -106,16 +107,22 @@ impl Plan {
             choice,
             reading,
         } = &args.record;
-        let stream = ChannelStream::open(&Input::of(input), choice, reading)?;
+        let mut stream = ChannelStream::open(&Input::of(input), choice, reading)?;
         refuse_compensated(&stream)?;
         let chain = stand.calibration(stream.channel(), args.units.into())?;
-        let band = match args.band {
-            Some(band_hz) => Band::new(stream.rate_hz, band_hz),
-            None => Band::fitting(stream.rate_hz, DEFAULT_BAND_HZ),
-        }
-        .map_err(|error| Failure::failed(error).at(&stream.source))?;
-        let (filter, undo) = if stand.chain()?.is_a_response() {
-            (InverseFilter::design(stand.inverse()?, band)?, None)
+        let is_a_response = stand.chain()?.is_a_response();
+        let inverse = match is_a_response {
+            true => stand.inverse()?,
+            false => ChainInverse::linear(&stand)?,
+        };
+        let wanted = Wanted {
+            option: args.band,
+            chain: &chain,
+            inverse: &inverse,
+        };
+        let (band, chosen) = wanted.choose(&mut stream)?;
+        let (filter, undo) = if is_a_response {
+            (InverseFilter::design(inverse, band)?, None)
         } else {
             let undo = ChainInverse::new(&stand, band)?;
             (undo.filter().clone(), Some(undo))
@@ -125,6 +132,7 @@ impl Plan {
             stand,
             chain,
             filter,
+            band: chosen,
             undo,
         })
     }
@@ -151,6 +159,7 @@ impl Plan {
                 None => "stream",
             },
             effects: refined::effects(&self.stand, self.undo.as_ref()),
+            band: self.band.clone(),
             band_hz: band.top_hz(),
             band_end_hz: band.end_hz(),
             edge_s: self.filter.half_length() as f64 / band.sample_rate_hz(),

@@ -79,15 +79,18 @@ impl ChainInverse {
     pub(crate) fn new(stand: &Stand, band: Band) -> Result<Self, Failure> {
         let chain = Arc::new(stand.chain()?);
         refuse_bent_coupling(stand, &chain)?;
-        let linear = chain.clone();
-        let inverse: Inverse = Arc::new(move |hz| {
-            let regular = |link: &Link| link.dies_out(&linear.mode);
-            linear.mode.inverse(TAU * hz) / linear.response_of(hz, regular)
-        });
         Ok(Self {
-            filter: InverseFilter::design(inverse, band)?,
+            filter: InverseFilter::design(regular_inverse(chain.clone()), band)?,
             chain,
         })
+    }
+
+    /// The inverse of the linear part of a stand, from which its band can be chosen.
+    ///
+    /// # Errors
+    /// If the stand has no mechanics.
+    pub(crate) fn linear(stand: &Stand) -> Result<Inverse, Failure> {
+        Ok(regular_inverse(Arc::new(stand.chain()?)))
     }
 
     /// The linear part of the way back, without factors whose inverse has no end in time.
@@ -152,6 +155,14 @@ impl ChainInverse {
     fn band(&self) -> &Band {
         self.filter.band()
     }
+}
+
+/// The linear part of the way back, without factors whose inverse has no end in time.
+fn regular_inverse(chain: Arc<Chain>) -> Inverse {
+    Arc::new(move |hz| {
+        let regular = |link: &Link| link.dies_out(&chain.mode);
+        chain.mode.inverse(TAU * hz) / chain.response_of(hz, regular)
+    })
 }
 
 /// Refuses a coupling past a curve: what reaches the record past the stand is bent with the rest of it.

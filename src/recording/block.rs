@@ -48,6 +48,20 @@ impl Block {
     }
 }
 
+impl Block {
+    /// Moves the content of the next block behind that of this one; rows of a text are then read again.
+    pub(super) fn append(&mut self, next: &mut Self) {
+        self.text.append(&mut next.text);
+        self.rows.values.append(&mut next.rows.values);
+        self.rows.times.append(&mut next.rows.times);
+        self.unended = next.unended;
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.text.is_empty() && self.rows.values.is_empty()
+    }
+}
+
 /// The rows of a text.
 pub(super) struct TextBlocks {
     pub(super) source: String,

@@ -9,6 +9,7 @@ mod block;
 mod checkpoints;
 mod choice;
 mod fill;
+mod first_samples;
 mod memory_stream;
 mod message_stream;
 mod messages;

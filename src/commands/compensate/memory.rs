@@ -32,13 +32,16 @@ pub(super) fn run(
         chain,
         filter,
         undo,
+        ..
     } = plan;
     let record = UniformRecord::read(stream, |values| convert(&chain, values))?;
     let scale = 1.0 / chain.applied.factor;
     report.scale = scale;
     report.start = record.start;
-    report.noise.record =
-        density(&record, scale).and_then(|density| RecordNoise::of(&filter, &density));
+    if let Some(density) = density(&record, scale) {
+        report.noise.record = RecordNoise::of(&filter, &density);
+        report.band.judge(&density, &filter);
+    }
     let torque = match &undo {
         None => whole_record(&filter, &record.samples)?,
         Some(undo) => refined::torque(undo, &stand, &record, report)?,

@@ -6,6 +6,7 @@ use serde::Serialize;
 use torqcomp_dsp::noise::RecordNoise;
 use torqcomp_dsp::resample::Resampled;
 
+use super::band::BandReport;
 use super::statistics::Statistics;
 use crate::print::{Report, plural, rounded, short};
 use crate::recording::FilledSpan;
@@ -45,6 +46,7 @@ pub(super) struct CompensateReport {
     /// Times at which the torque cannot be recovered from the record.
     pub(super) lost: Vec<LostSpan>,
     pub(super) lines: Vec<RemovedLine>,
+    pub(super) band: BandReport,
     /// End of the part that is compensated in full.
     pub(super) band_hz: f64,
     /// Frequency from which on nothing is passed.
@@ -150,10 +152,11 @@ impl Report for CompensateReport {
         line(
             "band",
             format!(
-                "compensated up to {} Hz, zero from {} Hz; the first and last {} ms depend on \
-                 extrapolation beyond the record",
+                "compensated up to {} Hz, zero from {} Hz, {}; the first and last {} ms depend on extrapolation beyond \
+                 the record",
                 short(self.band_hz),
                 short(self.band_end_hz),
+                self.band.text(),
                 rounded(1e3 * self.edge_s, 3)
             ),
         );

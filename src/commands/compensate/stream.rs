@@ -121,10 +121,11 @@ pub(super) fn run(
     report.samples = joiner.samples;
     report.resampled = joiner.resampled;
     report.result = gathered.sums.statistics(steps.scale);
-    report.noise.record = gathered
-        .density(rate_hz)
-        .and_then(|density| RecordNoise::of(&filter, &density))
-        .map(|noise| noise.scaled(steps.scale));
+    if let Some(density) = gathered.density(rate_hz) {
+        let density = density.scaled(steps.scale * steps.scale);
+        report.noise.record = RecordNoise::of(&filter, &density);
+        report.band.judge(&density, &filter);
+    }
     Ok(Seen {
         summary: validator.finish(blocks.as_mut())?,
         excerpt: gathered.first,

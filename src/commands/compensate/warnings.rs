@@ -25,6 +25,7 @@ pub(super) fn add(report: &mut CompensateReport, seen: &Seen, traces: Option<&Tr
         Some(noise) => more.extend(of_noise(noise, report)),
         None => more.extend(of_unknown_noise(report)),
     }
+    more.extend(report.band.warning());
     more.extend(of_quality(report, seen));
     if traces.is_some_and(Traces::is_empty) {
         more.push(empty_plot(report));
@@ -36,12 +37,12 @@ pub(super) fn add(report: &mut CompensateReport, seen: &Seen, traces: Option<&Tr
 
 fn of_unknown_noise(report: &CompensateReport) -> Option<Warning> {
     let gain = report.noise.largest_gain;
-    (gain > LARGE_GAIN).then(|| {
+    (gain > LARGE_GAIN && report.band.is_given()).then(|| {
         Warning::new(
             "noise-unknown",
             format!(
-                "the record is amplified up to {} times and its noise is unknown; choose a lower \
-                 --band if the result looks noisy",
+                "the record is amplified up to {} times and its noise is unknown; choose a lower --band if the result looks \
+                 noisy",
                 rounded(gain, 3)
             ),
         )
@@ -109,18 +110,11 @@ fn of_noise(noise: &RecordNoise, report: &CompensateReport) -> Vec<Warning> {
             ),
         ));
     }
-    if let Some(from_hz) = noise.lost_from_hz(band_hz) {
-        let remedy = if from_hz > 0.0 {
-            format!("--band {} excludes it", rounded(from_hz, 4))
-        } else {
-            "the whole band is affected: check the channel".to_owned()
-        };
+    if noise.lost_from_hz(band_hz) == Some(0.0) {
         warnings.push(Warning::new(
             "band-lost-in-noise",
             format!(
-                "from {} to {} Hz the record is no larger than its noise, which the compensation \
-                 amplifies; {remedy}",
-                rounded(from_hz, 4),
+                "up to {} Hz the record is no larger than its noise, which the compensation amplifies; check the channel",
                 short(band_hz)
             ),
         ));
@@ -129,9 +123,13 @@ fn of_noise(noise: &RecordNoise, report: &CompensateReport) -> Vec<Warning> {
         warnings.push(Warning::new(
             "mostly-noise",
             format!(
-                "noise makes up {} of {} {unit} rms of the result; choose a lower --band",
+                "noise makes up {} of {} {unit} rms of the result; {}",
                 rounded(noise.compensated_rms, 3),
-                rounded(rms, 3)
+                rounded(rms, 3),
+                match report.band.is_given() {
+                    true => "choose a lower --band",
+                    false => "record with less noise",
+                }
             ),
         ));
     }

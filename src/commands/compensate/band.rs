@@ -1,0 +1,152 @@
+//! The band of a compensation: as given, or chosen from the record and the stand.
+
+use serde::Serialize;
+use torqcomp_dsp::band::{Band, BandSearch, band_of_stand};
+use torqcomp_dsp::compensate::{Inverse, InverseFilter};
+use torqcomp_dsp::spectrum::Density;
+
+use crate::cli::BandOption;
+use crate::commands::convert;
+use crate::failure::Failure;
+use crate::print::{rounded, short};
+use crate::recording::ChannelStream;
+use crate::stand::Calibration;
+use crate::warning::Warning;
+
+/// The band of `--band rated`, as far as the rate allows: that of the thesis.
+const RATED_BAND_HZ: f64 = 2400.0;
+/// Samples that a band is chosen from, at least, if there are so many.
+const FIRST_SAMPLES: usize = 1 << 17;
+/// Expected error over that of the best band, from which it is worth a warning.
+const UNSUITED: f64 = 1.5;
+
+/// The band of a compensation and where it comes from.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub(super) struct BandReport {
+    /// End of the part that is compensated in full.
+    pub(super) top_hz: f64,
+    /// Frequency from which on nothing is passed.
+    pub(super) end_hz: f64,
+    /// `record`, `first-seconds` of it, `stand` alone, `option` or `rated`.
+    pub(super) chosen_from: &'static str,
+    /// Length of the part of the record that it was chosen from; `null` if it was not.
+    pub(super) seconds: Option<f64>,
+    /// Torque that the band cuts off, rms, as far as the record rises above its noise there; `null` if unknown.
+    pub(super) lost_rms: Option<f64>,
+    /// The band with the least expected error over the whole record; `null` if unknown.
+    pub(super) best_hz: Option<f64>,
+    /// Expected error in this band over that in the best one; `null` if unknown.
+    pub(super) error_over_best: Option<f64>,
+}
+
+/// What a band is chosen by.
+pub(super) struct Wanted<'a> {
+    pub(super) option: Option<BandOption>,
+    pub(super) chain: &'a Calibration,
+    pub(super) inverse: &'a Inverse,
+}
+
+impl Wanted<'_> {
+    /// The band for a stream, whose first samples are looked at if no band is given.
+    pub(super) fn choose(&self, stream: &mut ChannelStream) -> Result<(Band, BandReport), Failure> {
+        let rate_hz = stream.rate_hz;
+        let (band, chosen_from, seconds) = match self.option {
+            Some(BandOption::Hz(top_hz)) => (Band::new(rate_hz, top_hz), "option", None),
+            Some(BandOption::Rated) => (Band::fitting(rate_hz, RATED_BAND_HZ), "rated", None),
+            None => {
+                let mut first = stream.first_samples(FIRST_SAMPLES)?;
+                // A sample that cannot be converted is refused where it is compensated.
+                if let Err((index, _)) = convert(self.chain, &mut first.values) {
+                    first.values.truncate(index);
+                }
+                let search = BandSearch::of_record(&first.values, rate_hz, self.inverse);
+                let seconds = first.values.len() as f64 / rate_hz;
+                let from = if first.is_all {
+                    "record"
+                } else {
+                    "first-seconds"
+                };
+                match search.and_then(|search| search.best()) {
+                    Some(best) => (Band::new(rate_hz, best.top_hz), from, Some(seconds)),
+                    None => {
+                        let top_hz = band_of_stand(rate_hz, self.inverse);
+                        (Band::new(rate_hz, top_hz), "stand", Some(seconds))
+                    }
+                }
+            }
+        };
+        let band = band.map_err(|error| Failure::failed(error).at(&stream.source))?;
+        let report = BandReport {
+            top_hz: band.top_hz(),
+            end_hz: band.end_hz(),
+            chosen_from,
+            seconds,
+            ..BandReport::default()
+        };
+        Ok((band, report))
+    }
+}
+
+impl BandReport {
+    /// Compares the band with the best one for the density of the whole record, in printed units.
+    pub(super) fn judge(&mut self, density: &Density, filter: &InverseFilter) {
+        let rate_hz = filter.band().sample_rate_hz();
+        let Some(search) = BandSearch::of_density(density, rate_hz, filter.inverse()) else {
+            return;
+        };
+        let cost = search.cost(self.top_hz);
+        self.lost_rms = Some(cost.lost_rms);
+        if let Some(best) = search.best() {
+            self.best_hz = Some(best.top_hz);
+            self.error_over_best = Some((cost.error_rms() / best.error_rms()).max(1.0));
+        }
+    }
+
+    /// Where the band comes from, for people.
+    pub(super) fn text(&self) -> String {
+        let length = |seconds: Option<f64>| rounded(seconds.unwrap_or(0.0), 3);
+        match self.chosen_from {
+            "option" => "as given".to_owned(),
+            "rated" => "the rated band".to_owned(),
+            "stand" => format!(
+                "chosen from the stand alone, up to a gain of 10, because the first {} s do not rise above their noise",
+                length(self.seconds)
+            ),
+            "record" => {
+                "chosen for the least expected error from the record and its noise".to_owned()
+            }
+            _ => format!(
+                "chosen for the least expected error from the first {} s and their noise",
+                length(self.seconds)
+            ),
+        }
+    }
+
+    /// Whether it was asked for by `--band`.
+    pub(super) fn is_given(&self) -> bool {
+        matches!(self.chosen_from, "option" | "rated")
+    }
+
+    /// A warning if another band suits the whole record better.
+    pub(super) fn warning(&self) -> Option<Warning> {
+        let ratio = self.error_over_best.filter(|ratio| *ratio > UNSUITED)?;
+        let best_hz = self.best_hz?;
+        let remedy = match self.is_given() {
+            true => format!("--band {}, or no --band, makes it least", short(best_hz)),
+            false => format!("--band {} makes it least", short(best_hz)),
+        };
+        Some(Warning::new(
+            "band-unsuited",
+            format!(
+                "the expected error of the whole record in a band of {} Hz is {} times the least possible: {}; {remedy}",
+                short(self.top_hz),
+                rounded(ratio, 2),
+                if best_hz < self.top_hz {
+                    "above that it is mostly amplified noise"
+                } else {
+                    "torque above it is cut off"
+                },
+            ),
+        ))
+    }
+}
