@@ -1,6 +1,7 @@
 //! The command line.
 
 pub mod diagnose;
+mod help;
 pub mod identify;
 pub mod init;
 pub mod simulate;
@@ -17,6 +18,7 @@ use crate::io::output::{Output, Policy};
 use crate::io::{ChannelChoice, Reading, frequency, positive_frequency};
 
 pub use diagnose::Diagnose;
+pub use help::parse;
 pub use simulate::Simulate;
 pub use values::{BandOption, Orders};
 use values::{band, digits, orders, percent, range, warning_code};

@@ -21,8 +21,6 @@ pub mod warning;
 
 use std::process::ExitCode;
 
-use clap::Parser;
-
 use commands::Outcome;
 
 /// Runs the command line of this process.
@@ -33,7 +31,7 @@ pub fn run() -> ExitCode {
         print::say(&format!("torqcomp: {message}: {error}\n"));
     }
     // clap itself exits with code 2 for wrong usage, and with 0 for help.
-    match commands::run(cli::Cli::parse()) {
+    match commands::run(cli::parse()) {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::WithLoss) => ExitCode::from(3),
         Err(failure) => {

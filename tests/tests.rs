@@ -5,6 +5,7 @@ mod util;
 
 mod agreement;
 mod bad_input;
+mod band;
 #[allow(dead_code)] // the example writes and scores what the tests only look into
 mod blind;
 mod blind_generator;

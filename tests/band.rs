@@ -1,0 +1,157 @@
+//! The band of `compensate`: chosen from the record and the stand, the same when asked again, or as given.
+
+use crate::noise::Noise;
+use crate::util::{Folder, column, record, steady};
+
+const RATE: f64 = 20_000.0;
+/// The torque ends at 300 Hz, half the natural frequency.
+const PARTS: [(f64, f64, f64); 4] = [
+    (0.8, 0.0, 0.0),
+    (1.0, 60.0, 0.3),
+    (0.5, 120.0, 2.0),
+    (0.3, 300.0, -1.0),
+];
+
+/// A record with uniform noise of 0.01 N m rms, silent but for noise up to a sample.
+fn noisy(count: usize, silent: usize) -> (String, Vec<f64>) {
+    let (shown, acted) = steady(&PARTS, RATE, count);
+    let mut noise = Noise(11);
+    let mut noisy = |(i, x): (usize, &f64)| {
+        let torque = if i < silent { 0.0 } else { *x };
+        torque + 0.01 * 12_f64.sqrt() * (noise.uniform() - 0.5)
+    };
+    let recorded: Vec<f64> = shown.iter().enumerate().map(&mut noisy).collect();
+    (record(&recorded, RATE), acted)
+}
+
+fn rms_error(torque: &[f64], acted: &[f64]) -> f64 {
+    let inside = acted.len() / 5..acted.len() * 4 / 5;
+    let count = inside.len() as f64;
+    let square: f64 = inside.map(|i| (torque[i] - acted[i]).powi(2)).sum();
+    (square / count).sqrt()
+}
+
+#[test]
+fn the_band_follows_the_torque_and_is_the_same_when_asked_again() {
+    let folder = Folder::new();
+    let (text, acted) = noisy(40_000, 0);
+    folder.write("in.csv", &text);
+    let args = [
+        "compensate",
+        "in.csv",
+        "--stand",
+        "stand.toml",
+        "--json",
+        "-o",
+        "out.csv",
+        "--force",
+    ];
+    let ran = folder.run(&args);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    let report: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
+    let band = &report["band"];
+    let top_hz = band["top_hz"].as_f64().unwrap();
+    // The last line is at 300 Hz, and the inverse multiplies noise only from 830 Hz (590 √2) on.
+    assert!((300.0..900.0).contains(&top_hz), "{band}");
+    assert_eq!(band["chosen_from"], "record");
+    assert_eq!(band["seconds"], 2.0);
+    assert_eq!(report["band_hz"], band["top_hz"]);
+    assert!(
+        ran.stderr
+            .contains("chosen for the least expected error from the record"),
+        "{}",
+        ran.stderr
+    );
+    assert!(!ran.stderr.contains("warning"), "{}", ran.stderr);
+    let chosen = folder.read("out.csv");
+
+    // The same band as an option, from a pipe and as a whole gives the same samples.
+    let given = top_hz.to_string();
+    let again = folder.run(&[
+        "compensate",
+        "in.csv",
+        "--stand",
+        "stand.toml",
+        "-q",
+        "--band",
+        &given,
+    ]);
+    assert_eq!(again.stdout, chosen);
+    let piped = folder.pipe(
+        &["compensate", "-", "--stand", "stand.toml", "-q"],
+        text.as_bytes(),
+    );
+    assert_eq!(piped.stdout, chosen);
+    let whole = folder.json(&[&args[..], &["--whole-record"]].concat());
+    assert_eq!(whole["band"]["top_hz"], band["top_hz"]);
+
+    // The band of the thesis lets in noise, multiplied by up to 15, and says so.
+    let rated = folder.run(&[
+        "compensate",
+        "in.csv",
+        "--stand",
+        "stand.toml",
+        "--band",
+        "rated",
+    ]);
+    rated.says(
+        0,
+        &[
+            "up to 2400 Hz",
+            "the rated band",
+            "band-unsuited",
+            &format!("--band {given}"),
+        ],
+    );
+    let error = |text: &str| rms_error(&column(text, "compensated_torque_n_m"), &acted);
+    assert!(error(&chosen) < 0.01, "{}", error(&chosen));
+    assert!(error(&rated.stdout) > 5.0 * error(&chosen));
+}
+
+#[test]
+fn a_record_without_signal_takes_the_band_of_the_stand() {
+    let folder = Folder::new();
+    let (text, _) = noisy(20_000, 20_000);
+    folder.write("in.csv", &text);
+    for file in ["in.csv", "short.csv"] {
+        folder.write(
+            "short.csv",
+            text.lines().take(100).collect::<Vec<_>>().join("\n") + "\n",
+        );
+        let args = [
+            "compensate",
+            file,
+            "--stand",
+            "stand.toml",
+            "--json",
+            "-o",
+            "out.csv",
+            "--force",
+        ];
+        let report = folder.json(&args);
+        assert_eq!(report["band"]["chosen_from"], "stand");
+        // |1 − (f/592)²| = 10 at 1963 Hz.
+        let top_hz = report["band"]["top_hz"].as_f64().unwrap();
+        assert!((1900.0..=1963.0).contains(&top_hz), "{top_hz}");
+    }
+}
+
+#[test]
+fn a_quiet_start_of_a_long_record_is_said() {
+    let folder = Folder::new();
+    // 131,072 samples and a little more are looked at.
+    let (text, _) = noisy(300_000, 200_000);
+    let ran = folder.pipe(
+        &["compensate", "-", "--stand", "stand.toml", "-o", "out.csv"],
+        text.as_bytes(),
+    );
+    ran.says(
+        0,
+        &[
+            "chosen from the stand alone",
+            "s do not rise above their noise",
+            "band-unsuited",
+            "mostly amplified noise",
+        ],
+    );
+}
