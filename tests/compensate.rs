@@ -453,11 +453,11 @@ fn the_example_gives_back_the_torque_that_went_in() {
     let truth = column(truth.split_once('\n').unwrap().1, "torque_ft_lbf");
     let error: Vec<f64> = torque.iter().zip(&truth).map(|(a, b)| a - b).collect();
     let rms = (error[400..5600].iter().map(|e| e * e).sum::<f64>() / 5200.0).sqrt();
-    // What is left is the recorder's noise, as large as the report says it is.
+    // What is left is the recorder's noise and the torque above the band, as large as the report says.
     let stated = report["noise"]["record"]["compensated_rms"]
         .as_f64()
         .unwrap();
-    assert!((rms / stated - 1.0).abs() < 0.1, "{rms} stated {stated}");
+    assert!((rms / stated - 1.0).abs() < 0.15, "{rms} stated {stated}");
     // As recorded, the stand's ringing is forty times that.
     let recorded = folder.run(&[
         "compensate",
