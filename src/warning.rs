@@ -26,8 +26,7 @@ impl Warning {
 #[rustfmt::skip]
 pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
     ("Compensate and harmonics", &[
-        ["band-lost-in-noise", "nothing in the band rises above the record's noise", "check the channel"],
-        ["band-unsuited", "the expected error in this band is more than 1.5 times that in another one", "give the --band that the message names"],
+        ["band-lost-in-noise", "part of the band does not rise above the record's noise, which the compensation multiplies there", "choose a lower --band"],
         ["components-lost-in-noise", "components do not exceed twice their own uncertainty", "average over a longer record, or take them as zero"],
         ["direction-unknown", "the speed is not significantly different from zero over part of the record, where a friction depends on its sign", "take the torque there as known to the size of the friction only"],
         ["empty-plot", "no sample lies within --plot-range", "choose a range within the record"],

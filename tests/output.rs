@@ -238,9 +238,9 @@ fn strict_turns_a_warning_into_3() {
         &["-o", "out.csv", "--force", "--band", "rated"],
     ]
     .concat();
-    folder.run(&args).says(0, &["band-unsuited", "--band"]);
+    folder.run(&args).says(0, &["band-lost-in-noise", "--band"]);
     let strict = [&args[..], &["--strict"]].concat();
-    folder.run(&strict).says(3, &["band-unsuited"]);
+    folder.run(&strict).says(3, &["band-lost-in-noise"]);
     // The same record with the band that is chosen for it has nothing to warn of.
     let chosen = [&COMPENSATE[..], &["-o", "out.csv", "--force", "--strict"]].concat();
     assert_eq!(folder.run(&chosen).code, 0);

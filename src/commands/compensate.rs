@@ -29,7 +29,14 @@ use crate::stand::{self, Calibration, Stand};
 /// Frequencies at which the report gives the gain, as fractions of the band.
 const GAIN_POINTS: usize = 9;
 
-/// All that is settled before the first sample is read.
+/// What is read before anything is written.
+struct Opened {
+    stand: Stand,
+    stream: ChannelStream,
+    chain: Calibration,
+}
+
+/// All that is settled before the first sample is compensated.
 struct Plan {
     stream: ChannelStream,
     stand: Stand,
@@ -55,10 +62,11 @@ pub fn run(args: &cli::Compensate) -> Result<Outcome, Failure> {
             "--json and the samples both go to standard output; give the samples a file with -o",
         ));
     }
-    let plan = Plan::new(args)?;
+    let opened = Opened::new(args)?;
     let inputs = [args.record.input.as_ref(), args.stand.as_path()];
     let output = args.result.open(&inputs)?;
     let mut plot = open_plot(args.plot.as_deref(), &args.result, &inputs)?;
+    let plan = Plan::new(args, opened)?;
     let mut report = plan.describe(args, output.name());
     let mut sink = Sink::open(args, &plan, output)?;
     report.output_signal = sink.signal();
@@ -98,7 +106,7 @@ fn refuse_compensated(stream: &ChannelStream) -> Result<(), Failure> {
     )))
 }
 
-impl Plan {
+impl Opened {
     fn new(args: &cli::Compensate) -> Result<Self, Failure> {
         let stand = stand::read(&args.stand)?;
         stand.mechanics()?;
@@ -107,9 +115,24 @@ impl Plan {
             choice,
             reading,
         } = &args.record;
-        let mut stream = ChannelStream::open(&Input::of(input), choice, reading)?;
+        let stream = ChannelStream::open(&Input::of(input), choice, reading)?;
         refuse_compensated(&stream)?;
         let chain = stand.calibration(stream.channel(), args.units.into())?;
+        Ok(Self {
+            stand,
+            stream,
+            chain,
+        })
+    }
+}
+
+impl Plan {
+    fn new(args: &cli::Compensate, opened: Opened) -> Result<Self, Failure> {
+        let Opened {
+            stand,
+            mut stream,
+            chain,
+        } = opened;
         let is_a_response = stand.chain()?.is_a_response();
         let inverse = match is_a_response {
             true => stand.inverse()?,

@@ -2,23 +2,19 @@
 
 use serde::Serialize;
 use torqcomp_dsp::band::{Band, BandSearch, band_of_stand};
-use torqcomp_dsp::compensate::{Inverse, InverseFilter};
-use torqcomp_dsp::spectrum::Density;
+use torqcomp_dsp::compensate::Inverse;
 
 use crate::cli::BandOption;
 use crate::commands::convert;
 use crate::failure::Failure;
-use crate::print::{rounded, short};
+use crate::print::rounded;
 use crate::recording::ChannelStream;
 use crate::stand::Calibration;
-use crate::warning::Warning;
 
 /// The band of `--band rated`, as far as the rate allows: that of the thesis.
 const RATED_BAND_HZ: f64 = 2400.0;
 /// Samples that a band is chosen from, at least, if there are so many.
 const FIRST_SAMPLES: usize = 1 << 17;
-/// Expected error over that of the best band, from which it is worth a warning.
-const UNSUITED: f64 = 1.5;
 
 /// The band of a compensation and where it comes from.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
@@ -31,12 +27,6 @@ pub(super) struct BandReport {
     pub(super) chosen_from: &'static str,
     /// Length of the part of the record that it was chosen from; `null` if it was not.
     pub(super) seconds: Option<f64>,
-    /// Torque that the band cuts off, rms, as far as the record rises above its noise there; `null` if unknown.
-    pub(super) lost_rms: Option<f64>,
-    /// The band with the least expected error over the whole record; `null` if unknown.
-    pub(super) best_hz: Option<f64>,
-    /// Expected error in this band over that in the best one; `null` if unknown.
-    pub(super) error_over_best: Option<f64>,
 }
 
 /// What a band is chosen by.
@@ -81,27 +71,12 @@ impl Wanted<'_> {
             end_hz: band.end_hz(),
             chosen_from,
             seconds,
-            ..BandReport::default()
         };
         Ok((band, report))
     }
 }
 
 impl BandReport {
-    /// Compares the band with the best one for the density of the whole record, in printed units.
-    pub(super) fn judge(&mut self, density: &Density, filter: &InverseFilter) {
-        let rate_hz = filter.band().sample_rate_hz();
-        let Some(search) = BandSearch::of_density(density, rate_hz, filter.inverse()) else {
-            return;
-        };
-        let cost = search.cost(self.top_hz);
-        self.lost_rms = Some(cost.lost_rms);
-        if let Some(best) = search.best() {
-            self.best_hz = Some(best.top_hz);
-            self.error_over_best = Some((cost.error_rms() / best.error_rms()).max(1.0));
-        }
-    }
-
     /// Where the band comes from, for people.
     pub(super) fn text(&self) -> String {
         let length = |seconds: Option<f64>| rounded(seconds.unwrap_or(0.0), 3);
@@ -125,28 +100,5 @@ impl BandReport {
     /// Whether it was asked for by `--band`.
     pub(super) fn is_given(&self) -> bool {
         matches!(self.chosen_from, "option" | "rated")
-    }
-
-    /// A warning if another band suits the whole record better.
-    pub(super) fn warning(&self) -> Option<Warning> {
-        let ratio = self.error_over_best.filter(|ratio| *ratio > UNSUITED)?;
-        let best_hz = self.best_hz?;
-        let remedy = match self.is_given() {
-            true => format!("--band {}, or no --band, makes it least", short(best_hz)),
-            false => format!("--band {} makes it least", short(best_hz)),
-        };
-        Some(Warning::new(
-            "band-unsuited",
-            format!(
-                "the expected error of the whole record in a band of {} Hz is {} times the least possible: {}; {remedy}",
-                short(self.top_hz),
-                rounded(ratio, 2),
-                if best_hz < self.top_hz {
-                    "above that it is mostly amplified noise"
-                } else {
-                    "torque above it is cut off"
-                },
-            ),
-        ))
     }
 }

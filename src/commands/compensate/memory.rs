@@ -40,7 +40,6 @@ pub(super) fn run(
     report.start = record.start;
     if let Some(density) = density(&record, scale) {
         report.noise.record = RecordNoise::of(&filter, &density);
-        report.band.judge(&density, &filter);
     }
     let torque = match &undo {
         None => whole_record(&filter, &record.samples)?,

@@ -124,7 +124,6 @@ pub(super) fn run(
     if let Some(density) = gathered.density(rate_hz) {
         let density = density.scaled(steps.scale * steps.scale);
         report.noise.record = RecordNoise::of(&filter, &density);
-        report.band.judge(&density, &filter);
     }
     Ok(Seen {
         summary: validator.finish(blocks.as_mut())?,

@@ -25,7 +25,6 @@ pub(super) fn add(report: &mut CompensateReport, seen: &Seen, traces: Option<&Tr
         Some(noise) => more.extend(of_noise(noise, report)),
         None => more.extend(of_unknown_noise(report)),
     }
-    more.extend(report.band.warning());
     more.extend(of_quality(report, seen));
     if traces.is_some_and(Traces::is_empty) {
         more.push(empty_plot(report));
@@ -110,11 +109,18 @@ fn of_noise(noise: &RecordNoise, report: &CompensateReport) -> Vec<Warning> {
             ),
         ));
     }
-    if noise.lost_from_hz(band_hz) == Some(0.0) {
+    if let Some(from_hz) = noise.lost_from_hz(band_hz) {
+        let remedy = if from_hz > 0.0 {
+            format!("--band {} excludes it", rounded(from_hz, 4))
+        } else {
+            "the whole band is affected: check the channel".to_owned()
+        };
         warnings.push(Warning::new(
             "band-lost-in-noise",
             format!(
-                "up to {} Hz the record is no larger than its noise, which the compensation amplifies; check the channel",
+                "from {} to {} Hz the record is no larger than its noise, which the compensation \
+                 amplifies; {remedy}",
+                rounded(from_hz, 4),
                 short(band_hz)
             ),
         ));
