@@ -54,7 +54,7 @@ impl Block {
         self.text.append(&mut next.text);
         self.rows.values.append(&mut next.rows.values);
         self.rows.times.append(&mut next.rows.times);
-        self.unended = next.unended;
+        self.last_line = next.last_line.take();
     }
 
     pub(super) fn is_empty(&self) -> bool {

@@ -104,7 +104,7 @@ pub(super) fn fit(
     let drift = DVector::from_fn(points.len(), row);
     let mut has_even_drift = model.is_apart(&drift);
     if has_even_drift {
-        let next = Mixed::of(points, degree, largest, &[drift.clone()]);
+        let next = Mixed::of(points, degree, largest, std::slice::from_ref(&drift));
         has_even_drift = next.is_better(&model, model.best_ratios());
         if has_even_drift {
             (columns, model) = (vec![drift], next);
