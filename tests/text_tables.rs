@@ -36,7 +36,7 @@ fn same(name: &str, content: impl AsRef<[u8]>, more: &[&str]) {
     .concat();
     let other = folder.run(&args);
     assert_eq!(other.code, 0, "{name}: {}", other.stderr);
-    for heading in ["time_s", "torque_n_m"] {
+    for heading in ["time_s", "compensated_torque_n_m"] {
         let (a, b) = (
             column(&plain.stdout, heading),
             column(&other.stdout, heading),

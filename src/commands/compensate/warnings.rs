@@ -109,7 +109,9 @@ fn of_noise(noise: &RecordNoise, report: &CompensateReport) -> Vec<Warning> {
             ),
         ));
     }
-    if let Some(from_hz) = noise.lost_from_hz(band_hz) {
+    // A chosen band ends where the expected error is least, which may be above where the noise is as large as the signal.
+    let lost_from_hz = noise.lost_from_hz(band_hz);
+    if let Some(from_hz) = lost_from_hz.filter(|hz| report.band.is_given() || *hz == 0.0) {
         let remedy = if from_hz > 0.0 {
             format!("--band {} excludes it", rounded(from_hz, 4))
         } else {

@@ -142,7 +142,8 @@ impl NoiseColour {
 
     /// The autoregression of the order with the least criterion, by Levinson's recursion.
     fn from_autocovariances(covariances: &[f64], count: usize) -> Self {
-        let most = MOST_ORDERS.min(count / SAMPLES_PER_ORDER);
+        let known = covariances.len() - 1;
+        let most = MOST_ORDERS.min(count / SAMPLES_PER_ORDER).min(known);
         let mut innovation = covariances[0];
         let mut coefficients: Vec<f64> = Vec::new();
         let mut best = Self::white(innovation);

@@ -197,18 +197,28 @@ fn bound(points: &[(f64, f64)], mut slope: f64) -> Option<f64> {
     None
 }
 
-/// Of the steps in the middle half of a range the one that takes the fewest digits, itself or as a rate.
+/// Digits that a step near the ends of a range must take less than one in its middle half to be taken.
+const DIGITS_LESS: usize = 2;
+
+/// Of the steps in the middle half of a range the one that takes the fewest digits, itself or as a rate; of all steps, if
+/// that takes clearly fewer.
 fn simplest([low_s, high_s]: [f64; 2]) -> f64 {
     let quarter = 0.25 * (high_s - low_s);
-    let (low, high) = (low_s + quarter, high_s - quarter);
-    let middle = 0.5 * (low + high);
+    let middle = 0.5 * (low_s + high_s);
     let digits =
         |value: f64, count: usize| -> f64 { format!("{value:.count$e}").parse().unwrap_or(value) };
-    let fits = |step: &f64| (low..=high).contains(step);
-    (0..16)
-        .flat_map(|count| [1.0 / digits(1.0 / middle, count), digits(middle, count)])
-        .find(fits)
-        .unwrap_or(middle)
+    let within = |margin: f64| {
+        let fits = |step: &f64| (low_s + margin..=high_s - margin).contains(step);
+        (0..16).find_map(|count| {
+            let ways = [1.0 / digits(1.0 / middle, count), digits(middle, count)];
+            ways.into_iter().find(fits).map(|step| (count, step))
+        })
+    };
+    match (within(quarter), within(0.0)) {
+        (Some((inner, _)), Some((all, step))) if all + DIGITS_LESS <= inner => step,
+        (Some((_, step)), _) => step,
+        _ => middle,
+    }
 }
 
 /// The largest power of ten that all stamps are multiples of, from 1 s to 1 as; none if even these are too large.
