@@ -254,7 +254,15 @@ fn torque_transducer_compensated(folder: &Path) -> Result<(), Failed> {
         }
         let (code, out, err) = run(
             STAND,
-            &["compensate", name, "--unit", "N m", "--with-recorded"],
+            &[
+                "compensate",
+                name,
+                "--unit",
+                "N m",
+                "--with-recorded",
+                "--band",
+                "rated",
+            ],
         )?;
         check(code == 0, &err)?;
         check(err.contains("compensated up to 350 Hz"), &err)?;

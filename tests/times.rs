@@ -238,7 +238,8 @@ const READERS: [&[&str]; 5] = [
 #[test]
 fn blank_cells_are_refused_in_every_verb() {
     let folder = Folder::new();
-    let cases: [(&str, &dyn Fn(usize) -> bool, bool); 4] = [
+    type Case<'a> = (&'a str, &'a dyn Fn(usize) -> bool, bool);
+    let cases: [Case; 4] = [
         ("line 302", &|i| i == 300, true),
         ("line 2", &|i| i == 0, true),
         ("line 302", &|i| i >= 300, true),

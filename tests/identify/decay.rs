@@ -54,7 +54,6 @@ fn intervals_of_decays_cover_the_truth() {
             let options = decay::DecayOptions {
                 band_hz,
                 modes: band_hz.map(|_| 1),
-                ..Default::default()
             };
             let (found, _) = decay::identify(&[record], &options).unwrap();
             assert_eq!(found.modes.len(), 1, "at {decibel} dB");

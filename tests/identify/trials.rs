@@ -303,7 +303,12 @@ fn transients_are_taken_as_they_are() {
     let step = |t: f64| 5.0 * smooth(t - 0.2);
     let drop = |t: f64| bell(t - 0.2) + 0.6 * bell(t - 0.23) + 0.4 * bell(t - 0.27);
     let trapezoid = |t: f64| smooth(t - 0.2) - smooth(t - 0.212);
-    let forces: [(&str, &dyn Fn(f64) -> f64, Option<response::Excitation>); 3] = [
+    type Force<'a> = (
+        &'a str,
+        &'a dyn Fn(f64) -> f64,
+        Option<response::Excitation>,
+    );
+    let forces: [Force; 3] = [
         ("step", &step, None),
         ("drop", &drop, None),
         (

@@ -365,6 +365,10 @@ fn close(poles: &[Pole]) -> Option<f64> {
     Some(found.frequency_hz())
 }
 
+/// Standard uncertainties by which the decay rate of the first mode and of any other one must differ from zero. A stand
+/// that rings has a mode, even if the record is too short to say much of its damping.
+const DECAYS: [f64; 2] = [1.0, 2.0];
+
 /// Whether every mode decays significantly, swings more than once, and differs from the others.
 fn physical(found: &ModesFit, stretches: &[Stretch]) -> bool {
     let length = stretches
@@ -374,7 +378,11 @@ fn physical(found: &ModesFit, stretches: &[Stretch]) -> bool {
     let one = |(k, pole): (usize, &Pole)| {
         let rate_std = found.fit.std[2 * k];
         let turns = pole.frequency_hz() * length;
-        let known = rate_std.is_some_and(|std| pole.rate_per_s > 2.0 * std);
+        let least = match k {
+            0 => DECAYS[0],
+            _ => DECAYS[1],
+        };
+        let known = rate_std.is_some_and(|std| pole.rate_per_s > least * std);
         let rings = pole.omega_rad_per_s > pole.rate_per_s && turns > 1.5;
         let apart = found.poles[..k].iter().all(|other| {
             let near = (other.omega_rad_per_s - pole.omega_rad_per_s).abs();

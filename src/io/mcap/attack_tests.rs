@@ -51,8 +51,11 @@ fn files() -> Vec<(&'static str, Vec<u8>)> {
     ]
 }
 
-/// What is read of the topic, or nothing if it is refused; and whether anything is said to be lost.
-fn read(bytes: &[u8]) -> Option<((Vec<i64>, Vec<f64>), bool)> {
+/// Times and values, and whether anything is said to be lost.
+type Found = ((Vec<i64>, Vec<f64>), bool);
+
+/// What is read of the topic, or nothing if it is refused.
+fn read(bytes: &[u8]) -> Option<Found> {
     let mut reader = open(bytes, ("/torque", "data"), &TimeOptions::default()).ok()?;
     let read = drain(&mut reader);
     Some((read, reader.finish().is_lossy))

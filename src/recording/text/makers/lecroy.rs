@@ -46,6 +46,10 @@ fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
             "samples-missing",
             format!("the head announces {said} samples, but there are {there}"),
         ));
+    } else {
+        // These files end without a line end, and all that was announced is there.
+        let ended = |lost: &mut Warning| lost.code == "unended-last-line";
+        recording.lost.take_if(ended);
     }
     let is_listed = |channel: &Channel| channel.segment.is_none_or(|place| place < list.len());
     recording.channels.retain(is_listed);
