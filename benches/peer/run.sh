@@ -122,7 +122,7 @@ trap 'rm -f "${output[@]}" "$table"' EXIT
 
 peer_command=("$python" "$here/peer.py" "${peer_flags[@]}" "$record" "${output[peer]}")
 torqcomp_command=("$torqcomp" compensate "$record" --stand "$here/stand.toml"
-    -o "${output[torqcomp]}" --quiet "${torqcomp_flags[@]}")
+    -o "${output[torqcomp]}" --band rated --quiet "${torqcomp_flags[@]}")
 
 measure() {
     local name=$1

@@ -198,6 +198,16 @@ static FOUR_DIGITS: [u32; 10_000] = {
     table
 };
 
+/// So many bytes of a text from a place on, to be set at once: a copy between slices is a call of memmove where it is not
+/// inlined.
+///
+/// # Panics
+/// If the text is shorter than that.
+#[inline(always)]
+pub(super) fn chunk_at<const N: usize>(text: &mut [u8], at: usize) -> &mut [u8; N] {
+    text[at..].first_chunk_mut().expect("room for a piece")
+}
+
 /// `0.00ddd`, `dd.ddd` or `dddd`. Bytes after the length told are left over.
 ///
 /// Written without a branch: whether a number is below one or above cannot be foreseen.
@@ -216,8 +226,8 @@ fn put_plain(
     let before = if below_one { ASCII_ZEROS } else { digits };
     let point = start + if below_one { 1 } else { whole };
     let after = point + 1 + zeros;
-    text[start..start + 16].copy_from_slice(&before.to_le_bytes());
-    text[after..after + 16].copy_from_slice(&(digits >> (8 * whole)).to_le_bytes());
+    *chunk_at(text, start) = before.to_le_bytes();
+    *chunk_at(text, after) = (digits >> (8 * whole)).to_le_bytes();
     text[point] = b'.';
     if significant <= whole {
         return start + whole;

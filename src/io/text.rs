@@ -7,6 +7,12 @@ const SHORT: usize = 32;
 /// Room that is kept free at the end.
 const ROOM: usize = digits::ROOM;
 
+/// What is copied for a short piece, unless the source ends before.
+#[inline(always)]
+fn short_piece(source: &[u8], offset: usize) -> Option<&[u8; SHORT]> {
+    source.get(offset..)?.first_chunk()
+}
+
 /// A growing text. Pieces are copied with a fixed length, which is quicker than the right one; what
 /// that puts after their end is overwritten by the next piece.
 #[derive(Debug, Default)]
@@ -84,10 +90,7 @@ impl Text {
     /// If the source is shorter than that.
     #[inline(always)]
     pub fn row(&mut self, source: &[u8], offset: usize, length: usize, decimal: &Decimal) {
-        let Some(piece) = source
-            .get(offset..offset + SHORT)
-            .filter(|_| length < SHORT)
-        else {
+        let Some(piece) = short_piece(source, offset).filter(|_| length < SHORT) else {
             self.long_row(source, offset, length, decimal);
             return;
         };
@@ -95,7 +98,7 @@ impl Text {
             self.grow();
         }
         let row = &mut self.bytes[self.length..self.length + SHORT + ROOM];
-        row[..SHORT].copy_from_slice(piece);
+        *digits::chunk_at(row, 0) = *piece;
         row[length] = b',';
         let number = &mut row[length + 1..length + 1 + ROOM];
         let end = length + 1 + decimal.put(number.try_into().expect("a slice of that length"));
@@ -117,8 +120,8 @@ impl Text {
     /// If the source is shorter than that.
     #[inline]
     pub fn copy(&mut self, source: &[u8], offset: usize, length: usize) {
-        match source.get(offset..offset + SHORT) {
-            Some(piece) if length <= SHORT => self.room()[..SHORT].copy_from_slice(piece),
+        match short_piece(source, offset) {
+            Some(piece) if length <= SHORT => *digits::chunk_at(self.room(), 0) = *piece,
             _ => self.copy_long(&source[offset..offset + length]),
         }
         self.length += length;
