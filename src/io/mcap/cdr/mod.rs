@@ -163,9 +163,9 @@ impl CdrLayout {
 
 /// Byte order, whether it is XCDR2, and the message behind.
 fn encapsulation(message: &[u8]) -> Result<(bool, bool, &[u8]), Damage> {
-    let (head, data) = message
-        .split_at_checked(ENCAPSULATION)
-        .ok_or(Damage::Short)?;
+    let Some((head, data)) = message.split_at_checked(ENCAPSULATION) else {
+        return Err(Damage::Short);
+    };
     match head[1] {
         0x00 => Ok((true, false, data)),
         0x01 => Ok((false, false, data)),

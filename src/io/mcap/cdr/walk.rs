@@ -6,6 +6,15 @@ use crate::io::mcap::route::Hop;
 use crate::io::mcap::schema::Number;
 use crate::io::mcap::tree::item_place;
 
+/// The bytes of a number and where they start, behind padding from `at` on. An option, since an error that may own a text
+/// would have to be dropped at every number.
+#[inline(always)]
+fn number_at<const N: usize>(data: &[u8], at: usize, align: usize) -> Option<(usize, [u8; N])> {
+    let start = at.checked_next_multiple_of(align)?;
+    let bytes = data.get(start..)?.first_chunk()?;
+    Some((start, *bytes))
+}
+
 /// A place in a message.
 pub struct CdrWalk<'a> {
     /// The message behind its encapsulation; padding counts from its start.
@@ -112,9 +121,9 @@ impl<'a> CdrWalk<'a> {
         let align = 4.min(usize::from(self.plan.rules.largest_align));
         let mut at = self.at;
         for _ in 0..count {
-            let start = at.checked_next_multiple_of(align).ok_or(Damage::Short)?;
-            let bytes = data.get(start..).and_then(|rest| rest.first_chunk());
-            let bytes: [u8; 4] = *bytes.ok_or(Damage::Short)?;
+            let Some((start, bytes)) = number_at(data, at, align) else {
+                return Err(Damage::Short);
+            };
             let length = match is_big {
                 true => u32::from_be_bytes(bytes),
                 false => u32::from_le_bytes(bytes),
@@ -174,8 +183,9 @@ impl<'a> CdrWalk<'a> {
     fn compare(&mut self) -> Result<(), Damage> {
         let length = self.count()?;
         let end = self.at.checked_add(length);
-        let text = end.and_then(|end| self.data.get(self.at..end));
-        let text = text.ok_or(Damage::Short)?;
+        let Some(text) = end.and_then(|end| self.data.get(self.at..end)) else {
+            return Err(Damage::Short);
+        };
         // CDR writes the zero at the end of a text, ROS 1 does not.
         let text = text.strip_suffix(&[0]).unwrap_or(text);
         self.names.compare(text);
@@ -197,13 +207,11 @@ impl<'a> CdrWalk<'a> {
     #[inline]
     fn take<const N: usize>(&mut self) -> Result<[u8; N], Damage> {
         let align = N.min(usize::from(self.plan.rules.largest_align));
-        let start = self
-            .at
-            .checked_next_multiple_of(align)
-            .ok_or(Damage::Short)?;
-        let bytes = self.data.get(start..).and_then(|rest| rest.first_chunk());
-        self.at = start.saturating_add(N);
-        bytes.copied().ok_or(Damage::Short)
+        let Some((start, bytes)) = number_at(self.data, self.at, align) else {
+            return Err(Damage::Short);
+        };
+        self.at = start + N;
+        Ok(bytes)
     }
 
     fn read(&mut self, number: Number, sinks: Sinks) -> Result<(), Damage> {
