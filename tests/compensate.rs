@@ -1,7 +1,7 @@
 //! `compensate` gives back the torque that acted.
 
 use crate::noise::Noise;
-use crate::util::{Folder, column, hertel_response, record, steady, table};
+use crate::util::{Folder, column, hertel_response, record, sampled, steady, table};
 
 const PARTS: [(f64, f64, f64); 5] = [
     (0.8, 0.0, 0.0),
@@ -124,11 +124,8 @@ fn torque_strain_force_and_volts_are_understood() {
         crate::util::HERTEL
     );
     folder.write("stand.toml", &stand);
-    let constant = |heading: &str, value: &str, more: &[&str]| -> f64 {
-        let rows: String = (0..500)
-            .map(|i| format!("{},{value}\n", f64::from(i) * 1e-4))
-            .collect();
-        folder.write("in.csv", format!("time_s,{heading}\n{rows}"));
+    let constant = |heading: &str, value: f64, more: &[&str]| -> f64 {
+        folder.write("in.csv", sampled(heading, 1e4, 500, |_| value));
         let args = [
             &[
                 "compensate",
@@ -146,13 +143,13 @@ fn torque_strain_force_and_volts_are_understood() {
         assert_eq!(ran.code, 0, "{heading}: {}", ran.stderr);
         column(&ran.stdout, "compensated_torque_ft_lbf")[250]
     };
-    assert!((constant("bridge_mV", "2", &[]) - 2.46).abs() < 1e-9);
-    assert!((constant("Torque [ft lbf]", "3", &[]) - 3.0).abs() < 1e-9);
+    assert!((constant("bridge_mV", 2.0, &[]) - 2.46).abs() < 1e-9);
+    assert!((constant("Torque [ft lbf]", 3.0, &[]) - 3.0).abs() < 1e-9);
     // 2.8 in times 12 lbf are 2.8 ft lbf.
-    assert!((constant("Load (lbf)", "12", &[]) - 2.8).abs() < 1e-9);
+    assert!((constant("Load (lbf)", 12.0, &[]) - 2.8).abs() < 1e-9);
     // (27a): 3.50e6 times 12 microstrain are 42 in lbf, or 3.5 ft lbf.
-    assert!((constant("gage (ustrain)", "12", &[]) - 3.5).abs() < 1e-9);
-    assert!((constant("something", "2", &["--unit", "mV"]) - 2.46).abs() < 1e-9);
+    assert!((constant("gage (ustrain)", 12.0, &[]) - 3.5).abs() < 1e-9);
+    assert!((constant("something", 2.0, &["--unit", "mV"]) - 2.46).abs() < 1e-9);
 }
 
 #[test]
@@ -169,10 +166,7 @@ fn gage_and_bridge_stand_in_for_a_measured_constant() {
            radius = \"2.8 in\"\ngage_position = \"1 in\"\n[gage]\ngage_factor = 157\nresistance = \"5784 ohm\"\n\
            [bridge]\nlayout = \"half\"\nexcitation = \"22.5 V\"\n";
     folder.write("stand.toml", stand);
-    let rows: String = (0..500)
-        .map(|i| format!("{},1\n", f64::from(i) * 1e-4))
-        .collect();
-    folder.write("in.csv", format!("time_s,bridge_mV\n{rows}"));
+    folder.write("in.csv", sampled("bridge_mV", 1e4, 500, |_| 1.0));
     let ran = folder.run(&[
         "compensate",
         "in.csv",
@@ -197,20 +191,12 @@ fn a_stand_in_other_units_is_compensated_in_them() {
         "stand.toml",
         "schema = \"torqcomp.stand/1\"\n[mechanics]\nnatural_frequency = \"590 Hz\"\ndamping_ratio = 0.07\nstatic_gain = \"2 V/V\"\n",
     );
-    let rows: String = (0..4000)
-        .map(|i| {
-            // 300 Hz of 1 V in: 2 V out times the response.
-            let u: f64 = 300.0 / 590.0;
-            let (re, im) = (1.0 - u * u, 2.0 * 0.07 * u);
-            let turn = std::f64::consts::TAU * 300.0 * f64::from(i) / 20_000.0 - im.atan2(re);
-            format!(
-                "{},{}\n",
-                f64::from(i) / 20_000.0,
-                2.0 / re.hypot(im) * turn.cos()
-            )
-        })
-        .collect();
-    folder.write("in.csv", format!("time_s,v_out_V\n{rows}"));
+    // 300 Hz of 1 V in: 2 V out times the response.
+    let u: f64 = 300.0 / 590.0;
+    let (re, im) = (1.0 - u * u, 2.0 * 0.07 * u);
+    let turn = |i| std::f64::consts::TAU * 300.0 * i as f64 / 20_000.0 - im.atan2(re);
+    let shown = |i| 2.0 / re.hypot(im) * turn(i).cos();
+    folder.write("in.csv", sampled("v_out_V", 20_000.0, 4000, shown));
     let ran = folder.run(&["compensate", "in.csv", "--stand", "stand.toml", "-q"]);
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     let applied = column(&ran.stdout, "compensated_applied_v");
@@ -260,10 +246,7 @@ fn recorder_low_pass_and_delay_are_divided_out() {
 #[test]
 fn the_zero_of_the_recorder_counts_on_every_way_to_torque() {
     let folder = Folder::new();
-    let rows: String = (0..500)
-        .map(|i| format!("{},2.6\n", f64::from(i) * 1e-4))
-        .collect();
-    folder.write("in.csv", format!("time_s,bridge_V\n{rows}"));
+    folder.write("in.csv", sampled("bridge_V", 1e4, 500, |_| 2.6));
     let modal = "schema = \"torqcomp.stand/1\"\n[mechanics]\nnatural_frequency = \"590 Hz\"\ndamping_ratio = 0.07\n";
     for (stand, heading, expected) in [
         (
@@ -358,10 +341,7 @@ fn a_signal_above_the_band_and_an_unknown_noise_are_said() {
 #[test]
 fn values_that_no_recorder_measures_are_refused() {
     let folder = Folder::new();
-    let rows: String = (0..500)
-        .map(|i| format!("{},1e305\n", f64::from(i) * 1e-4))
-        .collect();
-    folder.write("in.csv", format!("time_s,bridge_V\n{rows}"));
+    folder.write("in.csv", sampled("bridge_V", 1e4, 500, |_| 1e305));
     for more in [&[][..], &["--whole-record"]] {
         let args = [
             &[

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::util::Folder;
+use crate::util::{Folder, sampled};
 
 /// Samples per second, and of a record: 20 periods of 10 Hz.
 const RATE_HZ: f64 = 1000.0;
@@ -46,30 +46,26 @@ fn bridge(layout: &str, d: f64) -> f64 {
 
 /// A record of one channel: `signal` of a cosine at 10 Hz.
 fn record(heading: &str, unit_row: Option<&str>, signal: impl Fn(f64) -> f64) -> String {
-    let mut text = format!("time_s,{heading}\n");
-    text.extend(unit_row.map(|unit| format!("s,{unit}\n")));
-    for i in 0..SAMPLES {
-        let t = i as f64 / RATE_HZ;
-        text += &format!("{t:.3},{:.12e}\n", signal((TAU * TONE_HZ * t).cos()));
+    let cosine = |i| signal((TAU * TONE_HZ * i as f64 / RATE_HZ).cos());
+    let text = sampled(heading, RATE_HZ, SAMPLES, cosine);
+    match unit_row {
+        Some(unit) => text.replacen('\n', &format!("\ns,{unit}\n"), 1),
+        None => text,
     }
-    text
 }
+
+const HARMONICS: [&str; 6] = [
+    "harmonics",
+    "in.csv",
+    "--stand",
+    "stand.toml",
+    "--fundamental",
+    "10",
+];
 
 /// Recorded amplitude of the 10 Hz in N m, before the stand is divided out, and the whole report.
 fn amplitude(folder: &Folder, more: &[&str]) -> (f64, serde_json::Value) {
-    let mut args = vec![
-        "harmonics",
-        "in.csv",
-        "--stand",
-        "stand.toml",
-        "--fundamental",
-        "10",
-        "--orders",
-        "1",
-        "--json",
-    ];
-    args.extend(more);
-    let report = folder.json(&args);
+    let report = folder.json(&[&HARMONICS[..], &["--orders", "1", "--json"], more].concat());
     (
         report["components"][0]["recorded"].as_f64().unwrap(),
         report,
@@ -77,16 +73,7 @@ fn amplitude(folder: &Folder, more: &[&str]) -> (f64, serde_json::Value) {
 }
 
 fn refusal(folder: &Folder, more: &[&str]) -> String {
-    let mut args = vec![
-        "harmonics",
-        "in.csv",
-        "--stand",
-        "stand.toml",
-        "--fundamental",
-        "10",
-    ];
-    args.extend(more);
-    let ran = folder.run(&args);
+    let ran = folder.run(&[&HARMONICS[..], more].concat());
     assert!(ran.code != 0, "{}", ran.stdout);
     ran.stderr
 }

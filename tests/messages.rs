@@ -7,7 +7,7 @@ use std::io::Cursor;
 use mcap::records::MessageHeader;
 use mcap::{WriteOptions, Writer};
 
-use crate::util::{Folder, column, table};
+use crate::util::{Folder, column, sampled, table};
 
 /// Time of the first message.
 const BEGIN_NS: u64 = 1_700_000_000_000_000_000;
@@ -62,16 +62,8 @@ fn stamp(i: usize) -> u64 {
 fn folder() -> (Folder, Vec<f64>) {
     let folder = Folder::new();
     folder.write("modal.toml", STAND);
-    let rows: String = (0..SAMPLES)
-        .map(|i| {
-            format!(
-                "{:.3},{:e}\n",
-                i as f64 / RATE_HZ,
-                applied(i as f64 / RATE_HZ)
-            )
-        })
-        .collect();
-    folder.write("in.csv", format!("time_s,applied_V\n{rows}"));
+    let wave = |i| applied(i as f64 / RATE_HZ);
+    folder.write("in.csv", sampled("applied_V", RATE_HZ, SAMPLES, wave));
     let ran = folder.run(&[
         "simulate",
         "in.csv",

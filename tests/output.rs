@@ -4,7 +4,7 @@ use std::io::Read;
 use std::process::Stdio;
 
 use crate::noise::Noise;
-use crate::util::{Folder, command, record, steady};
+use crate::util::{Folder, command, record, sampled, steady};
 
 fn folder() -> Folder {
     let folder = Folder::new();
@@ -540,17 +540,8 @@ fn an_impossible_output_of_identify_is_refused_before_the_work() {
 #[test]
 fn strict_lets_allowed_warnings_pass() {
     let folder = Folder::new();
-    let rows = (0..400).map(|i| {
-        format!(
-            "{:.4},{:.6}\n",
-            f64::from(i) * 1e-4,
-            (f64::from(i) * 0.05).cos()
-        )
-    });
-    folder.write(
-        "record.csv",
-        format!("time_s,torque\n{}", rows.collect::<String>()),
-    );
+    let wave = |i| (i as f64 * 0.05).cos();
+    folder.write("record.csv", sampled("torque", 1e4, 400, wave));
     let args = [
         "simulate",
         "record.csv",

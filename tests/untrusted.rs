@@ -1,6 +1,6 @@
 //! Names out of files, which anybody may have written.
 
-use crate::util::{Folder, HERTEL};
+use crate::util::{Folder, sampled};
 
 /// Sets the title of a terminal window, moves its cursor, and ends a tag.
 const NAMES: [&str; 4] = [
@@ -12,11 +12,8 @@ const NAMES: [&str; 4] = [
 
 fn folder(name: &str) -> Folder {
     let folder = Folder::new();
-    let rows: String = (0..3000)
-        .map(|i| format!("{},{}\n", f64::from(i) * 1e-4, (f64::from(i) * 0.05).sin()))
-        .collect();
-    folder.write("in.csv", format!("time_s,{name} [V]\n{rows}"));
-    folder.write("stand.toml", HERTEL);
+    let wave = |i| (i as f64 * 0.05).sin();
+    folder.write("in.csv", sampled(&format!("{name} [V]"), 1e4, 3000, wave));
     folder
 }
 

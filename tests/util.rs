@@ -181,14 +181,17 @@ pub fn steady(parts: &[(f64, f64, f64)], rate_hz: f64, count: usize) -> (Vec<f64
         .unzip()
 }
 
-/// A recorder's file `time_s,bridge_V` of a torque in N m, to 17 digits.
+/// A recorder's file of a column beside `time_s`, to 17 digits: `value` of the number of the sample.
+pub fn sampled(heading: &str, rate_hz: f64, count: usize, value: impl Fn(usize) -> f64) -> String {
+    let row = |i| format!("{},{:e}\n", i as f64 / rate_hz, value(i));
+    let rows: String = (0..count).map(row).collect();
+    format!("time_s,{heading}\n{rows}")
+}
+
+/// A recorder's file `time_s,bridge_V` of a torque in N m.
 pub fn record(torque_n_m: &[f64], rate_hz: f64) -> String {
-    let mut text = "time_s,bridge_V\n".to_owned();
-    for (i, torque) in torque_n_m.iter().enumerate() {
-        let volts = torque / (1.23e3 * 1.355_817_948_331_400_4);
-        text.push_str(&format!("{},{volts:e}\n", i as f64 / rate_hz));
-    }
-    text
+    let volts = |i: usize| torque_n_m[i] / (1.23e3 * 1.355_817_948_331_400_4);
+    sampled("bridge_V", rate_hz, torque_n_m.len(), volts)
 }
 
 /// Fails with got, want and difference unless both agree to a relative tolerance.

@@ -1,10 +1,10 @@
 //! Trials of the stated uncertainties where the noise is not white, the input is noisy, mountings differ, the zero drifts
 //! or the stand has hysteresis. Short by default; `TORQCOMP_TRIALS=400` sets the number of records of each case.
 
-use num_complex::Complex64;
 use torqcomp::identify::static_load::{LoadUnits, Point, series_of};
 use torqcomp::identify::{decay, response, static_load};
 
+use super::response::{driven, driven_by};
 use super::{Coverage, Noise, TAU, of, times};
 use crate::util::assert_close;
 
@@ -160,32 +160,6 @@ fn intervals_of_decays_cover_the_truth_in_coloured_noise() {
     );
 }
 
-/// Samples of noise up to 200 Hz, periodic over a longer time, and the displacement of a mode of 60 Hz driven by it: the
-/// response times the spectrum.
-fn driven(count: usize, ratio: f64, noise: &mut Noise) -> (Vec<f64>, Vec<f64>) {
-    let rate_hz = 1000.0;
-    let natural = TAU * 60.0;
-    let length = (count * 3 / 2).next_power_of_two();
-    let step = rate_hz / length as f64;
-    let plan = torqcomp_fourier::inverse(length);
-    let mut spectrum = vec![Complex64::ZERO; length / 2 + 1];
-    for line in &mut spectrum[1..(200.0 / step) as usize] {
-        *line = Complex64::new(noise.normal(), noise.normal());
-    }
-    let signal = |mut lines: Vec<Complex64>| {
-        let mut out = vec![0.0; length];
-        plan.process(&mut lines, &mut out).expect("lengths match");
-        out.truncate(count);
-        out
-    };
-    let shown = spectrum.iter().enumerate().map(|(k, x)| {
-        let w = TAU * step * k as f64;
-        x * natural * natural / Complex64::new(natural * natural - w * w, 2.0 * ratio * natural * w)
-    });
-    let shown = shown.collect();
-    (signal(spectrum), signal(shown))
-}
-
 fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
 }
@@ -210,7 +184,7 @@ fn responses(disturbance: Disturbance, count: usize) -> [Coverage; 3] {
         let ratio = [0.03, 0.01][k % 2];
         let size = [0.1, 0.03, 0.01][(k / 2) % 3];
         let samples = 12_000;
-        let (mut applied, mut shown) = driven(samples, ratio, &mut noise);
+        let (mut applied, mut shown) = driven(samples, (200.0, ratio), &mut noise);
         let add = |to: &mut [f64], other: &[f64], factor: f64| {
             let factor = factor * rms(to) / rms(other);
             to.iter_mut().zip(other).for_each(|(v, e)| *v += factor * e);
@@ -219,7 +193,7 @@ fn responses(disturbance: Disturbance, count: usize) -> [Coverage; 3] {
         match disturbance {
             Disturbance::Output => add(&mut shown, &white, size),
             Disturbance::Torque => {
-                let (_, other) = driven(samples, ratio, &mut noise);
+                let (_, other) = driven(samples, (200.0, ratio), &mut noise);
                 add(&mut shown, &other, size);
                 add(&mut shown, &white, 1e-3);
             }
@@ -266,36 +240,6 @@ fn intervals_of_responses_cover_the_truth_whatever_the_noise() {
     }
 }
 
-/// The displacement of a mode of 60 Hz and damping ratio 0.03 under a force, a gain of 1 at rest, by Runge and Kutta's
-/// method in 16 steps a sample; both at 1 kHz.
-fn driven_by(force: impl Fn(f64) -> f64, count: usize) -> (Vec<f64>, Vec<f64>) {
-    let (natural, ratio, steps) = (TAU * 60.0, 0.03, 16);
-    let h = 1e-3 / f64::from(steps);
-    let slope =
-        |t: f64, x: f64, v: f64| natural * natural * (force(t) - x) - 2.0 * ratio * natural * v;
-    let (mut x, mut v) = (0.0, 0.0);
-    let (mut applied, mut shown) = (Vec::new(), Vec::new());
-    for i in 0..count {
-        applied.push(force(i as f64 * 1e-3));
-        shown.push(x);
-        for k in 0..steps {
-            let t = i as f64 * 1e-3 + f64::from(k) * h;
-            let a = slope(t, x, v);
-            let b = slope(t + h / 2.0, x + h / 2.0 * v, v + h / 2.0 * a);
-            let c = slope(
-                t + h / 2.0,
-                x + h / 2.0 * (v + h / 2.0 * a),
-                v + h / 2.0 * b,
-            );
-            let d = slope(t + h, x + h * (v + h / 2.0 * b), v + h * c);
-            x += h * v + h * h / 6.0 * (a + b + c);
-            v += h / 6.0 * (a + 2.0 * b + 2.0 * c + d);
-        }
-    }
-    (applied, shown)
-}
-
-/// A step, a bouncing drop and the trapezoid of a shock table give the mode of the stand, as a hammer does.
 #[test]
 fn transients_are_taken_as_they_are() {
     let smooth = |t: f64| 0.5 * (1.0 + (t / 0.002).tanh());

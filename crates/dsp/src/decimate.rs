@@ -14,13 +14,6 @@ const BETA: f64 = 7.9;
 /// Frequency, over the new rate, up to which the response is 1 within 2·10⁻⁴.
 pub const PASS: f64 = 0.2;
 
-/// Power of white noise after decimation, over that of white noise of the same density at the new rate: twice the corner
-/// over the new rate.
-///
-/// White noise is not white afterwards: it has no power between the corner and half the rate, so the residual of a fit
-/// shows less noise than there is at the frequencies of the signal.
-pub const NOISE: f64 = 2.0 * CORNER;
-
 /// A record at a lower rate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Decimated {

@@ -132,12 +132,6 @@ impl BandSearch {
             .map(|(top_hz, squares)| choice(top_hz, squares))
     }
 
-    /// What a given band costs.
-    #[must_use]
-    pub fn cost(&self, top_hz: f64) -> BandChoice {
-        choice(top_hz, self.squares(top_hz))
-    }
-
     /// Mean squares of the noise within a band and of the torque beyond it; the latter scatters about zero where there
     /// is none.
     fn squares(&self, top_hz: f64) -> [f64; 2] {
