@@ -5,11 +5,11 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 
 use crate::blind::draw::Draw;
-use crate::blind::excitation::{Excitation, Line, RATE_HZ};
+use crate::blind::excitation::{Excitation, Input, Line, RATE_HZ};
 use crate::blind::integrate::run;
 use crate::blind::plain_fit::{PlainConstants, answer, rms};
 use crate::blind::plant::{Built, Constants, Plain, Scene};
-use crate::blind::{catalogue, friction, linear, record};
+use crate::blind::{catalogue, friction, linear, record, several, sizing};
 
 fn sines(lines: &[(f64, f64, f64)]) -> Excitation {
     Excitation::Multisine {
@@ -100,6 +100,65 @@ fn delay_and_low_pass_are_those_of_their_responses() {
     let low = |f: f64| response(f) / Complex64::new(1.0, f / 400.0);
     let off = largest_difference(&passed, |time_s| steady(time_s, low));
     assert!(off < 1e-7, "low-pass {off:e}");
+}
+
+/// The definition of a name in the catalogue.
+fn variant(effect: &str, name: &str) -> &'static catalogue::Variant {
+    let mut all = catalogue::CATALOGUE.iter();
+    all.find(|v| v.effect == effect && v.name == name)
+        .expect("the catalogue has it")
+}
+
+/// Effects of these sizes in one stand: what is recorded of a multisine.
+fn together(effects: &[(&str, &str, f64)], input: &Input) -> (Built, Vec<f64>) {
+    let variants: Vec<_> = effects
+        .iter()
+        .map(|(e, name, _)| variant(e, name))
+        .collect();
+    let parts = variants.iter().zip(effects).enumerate();
+    let parts = parts
+        .map(|(k, (v, (_, _, size)))| (v.build)(&scene(), *size, &mut Draw::new(k as u64, "")));
+    let built = several::joined(Constants::hertel(), &variants, parts.collect::<Vec<_>>());
+    let signal = sizing::noise_free(&built, input, 0, 1);
+    (built, signal)
+}
+
+#[test]
+fn linear_effects_together_are_the_product_of_their_responses() {
+    let input = sines(&LINES).input();
+    let effects = [
+        ("second-mode", "modal", 0.1),
+        ("gain-error", "gain", 0.05),
+        ("recorder-lowpass", "first order", 1.5),
+        ("time-delay", "delay", 3.7),
+    ];
+    let (built, signal) = together(&effects, &input);
+    let p = |key: &str| {
+        let mut all = built.parameters.iter();
+        all.find(|(name, _)| *name == key).expect("a parameter").1
+    };
+    let (second, ratio, share) = (p("frequency_hz"), p("damping_ratio"), p("share"));
+    let closed_form = |f: f64| {
+        let r = f / second;
+        let mode = Complex64::new(1.0 - r * r, 2.0 * ratio * r).inv();
+        let sum = (1.0 - share) * response(f) + share * mode;
+        let delay = Complex64::from_polar(1.0, -TAU * f * 3.7 / RATE_HZ);
+        p("gain") * sum * delay / Complex64::new(1.0, f / 400.0)
+    };
+    let off = largest_difference(&signal, |time_s| steady(time_s, closed_form));
+    assert!(off < 1e-4, "{off:e}");
+}
+
+#[test]
+fn torques_together_add_up() {
+    let input = sines(&LINES).input();
+    let cubic = |size: f64| ("cubic-stiffness", "hardening", size);
+    let (_, both) = together(&[cubic(0.05), cubic(0.1)], &input);
+    let (_, one) = together(&[cubic(0.15)], &input);
+    let (_, less) = together(&[cubic(0.1)], &input);
+    let apart =
+        |other: &[f64]| largest_difference(&both, |t| other[(t * RATE_HZ).round() as usize]);
+    assert!(apart(&one) < 1e-9 && apart(&less) > 1e-3);
 }
 
 #[test]

@@ -232,3 +232,102 @@ fn laws_beside_the_list_are_suspected_and_not_added() {
         );
     }
 }
+
+/// Two effects of the generator in one stand are both found, and no third; the ladder of errors falls from step to step.
+#[test]
+fn two_effects_are_found_together() {
+    let case = make(1, "two", 2).expect("the catalogue has it");
+    let folder = folder(&case);
+    let report = folder.json(&diagnose(&["-o", "refined.toml", "--json"]));
+    let names = |list: &serde_json::Value| -> Vec<String> {
+        let names = list.as_array().expect("a list").iter();
+        let mut names: Vec<String> = names.map(|n| n.as_str().unwrap_or("").to_owned()).collect();
+        names.sort();
+        names
+    };
+    assert_eq!(names(&report["effects"]), names(&case.truth["effects"]));
+    assert_eq!(report["verdict"], "explained");
+    let ladder = report["ladder"].as_array().expect("a list");
+    let errors = ladder
+        .iter()
+        .map(|step| step["holdout_rms"].as_f64().expect("a number"));
+    let errors: Vec<f64> = errors.collect();
+    assert_eq!(errors.len(), 3);
+    assert!(errors[0] > errors[1] && errors[1] > errors[2], "{errors:?}");
+    assert!(errors[2] < 1.1 * noise_rms(&case), "{errors:?}");
+    for share in report["shares"].as_array().expect("a list") {
+        assert!(share["share"].as_f64().expect("a number") > 0.02, "{share}");
+    }
+    let correlation = report["correlations"][0]["correlation"].as_f64();
+    assert!(correlation.expect("a number").abs() < 1.0);
+
+    // The refined stand lacks nothing; without its last effect it lacks that one, and keeps the other.
+    let refined = folder.read("refined.toml");
+    let again = |stand: &str| {
+        folder.write("stand.toml", stand);
+        let report = folder.json(&diagnose(&["-o", "again.toml", "--json", "--force"]));
+        (report, folder.read("again.toml"))
+    };
+    let (complete, kept) = again(&refined);
+    assert_eq!(complete["verdict"], "nothing-missing", "{complete}");
+    assert_eq!(complete["declared_effects"], report["effects"]);
+    assert_eq!(kept.matches("[[effects]]").count(), 2);
+    let last = refined.rfind("[[effects]]").expect("an effect");
+    let rest = refined[last..]
+        .find("\n[diagnosed]")
+        .expect("the last section");
+    let less = refined[..last].to_owned() + &refined[last + rest..];
+    let (more, both) = again(&less);
+    assert_eq!(more["effects"][0], report["effects"][1], "{more}");
+    assert_eq!(more["declared_effects"][0], report["effects"][0]);
+    assert_eq!(both.matches("[[effects]]").count(), 2);
+}
+
+/// A record in volts with a constant of 2 N m in it: the stand file says so after the first diagnosis, and after a second.
+#[test]
+fn a_declared_constant_is_taken_off_once() {
+    let case = make(7, "none", 1).expect("the catalogue has it");
+    let folder = folder(&case);
+    for (name, record) in [("train.csv", &case.train), ("holdout.csv", &case.holdout)] {
+        let mut table = String::from("time_s,applied_n_m,measured_V\n");
+        let rows = record.applied_n_m.iter().zip(&record.measured_n_m);
+        for (i, (applied, measured)) in rows.take(KEPT).enumerate() {
+            // 1.23e3 ft lbf per volt.
+            let volts = (measured + 2.0) / (1.23e3 * 1.355_817_948_331_400_4);
+            table += &format!("{:.5},{applied:.8},{volts:.12}\n", i as f64 / 20_000.0);
+        }
+        folder.write(name, table);
+    }
+    let offset = |stand: &str| {
+        let found = folder.run(&[
+            "diagnose",
+            "--stand",
+            stand,
+            "--train",
+            "train.csv",
+            "--holdout",
+            "holdout.csv",
+            "--applied",
+            "applied_n_m",
+            "--measured",
+            "measured_V",
+            "-o",
+            "refined.toml",
+            "--force",
+        ]);
+        assert_eq!(found.code, 0, "{}", found.stderr);
+        let refined = folder.read("refined.toml");
+        let line = refined.lines().find(|l| l.starts_with("offset = "));
+        let text = line.and_then(|l| l.split('"').nth(1)).expect("an offset");
+        text.trim_end_matches(" N m")
+            .parse::<f64>()
+            .expect("a number")
+    };
+    let first = offset("stand.toml");
+    folder.write("once.toml", folder.read("refined.toml"));
+    let second = offset("once.toml");
+    assert!(
+        (first - 2.0).abs() < 0.05 && (second - first).abs() < 0.01,
+        "{first} {second}"
+    );
+}

@@ -53,6 +53,15 @@ impl Case {
         self.truth["effect"].as_str().unwrap_or_default()
     }
 
+    /// The effects that are in the record, in alphabetical order.
+    pub fn effects(&self) -> Vec<&str> {
+        let list = self.truth["effects"].as_array();
+        let names = list.into_iter().flatten().filter_map(Value::as_str);
+        let mut names: Vec<&str> = names.collect();
+        names.sort_unstable();
+        names
+    }
+
     pub fn variant(&self) -> &str {
         self.truth["variant"].as_str().unwrap_or_default()
     }
@@ -189,7 +198,11 @@ impl Answer {
         match self.case.effect() {
             "none" => self.verdict() == "nothing-missing",
             "unlisted" => ["unexplained", "partly-explained"].contains(&self.verdict()),
-            name => self.effects() == [name],
+            _ => {
+                let mut named = self.effects();
+                named.sort_unstable();
+                named == self.case.effects()
+            }
         }
     }
 
@@ -197,6 +210,11 @@ impl Answer {
     pub fn column(&self) -> String {
         match self.effects().as_slice() {
             [] => self.verdict().to_owned(),
+            _ if self.case.effects().len() > 1 => {
+                let right = self.case.effects();
+                let hits = self.effects().iter().filter(|e| right.contains(e)).count();
+                format!("{hits} right, {} wrong", self.effects().len() - hits)
+            }
             [one] => (*one).to_owned(),
             several if several.contains(&self.case.effect()) => "right one and more".to_owned(),
             _ => "several wrong".to_owned(),

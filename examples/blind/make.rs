@@ -3,7 +3,7 @@
 use std::io;
 use std::path::PathBuf;
 
-use crate::blind::{catalogue, record, write};
+use crate::blind::{catalogue, record, several, write};
 use crate::parallel::each;
 
 /// What to make.
@@ -20,7 +20,7 @@ pub struct Make {
     /// Another seed gives other records.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Only these effects.
+    /// Only these effects; "two" and "three" are records with so many of them at once.
     #[arg(long)]
     only: Vec<String>,
     /// Threads.
@@ -30,8 +30,10 @@ pub struct Make {
 
 /// Makes the records, number by number, so that a set that is cut short still has every effect in it.
 pub fn make(arguments: &Make) -> io::Result<()> {
+    let several = several::SEVERAL.iter().map(|(name, _)| *name);
     let wanted: Vec<&str> = catalogue::effects()
         .into_iter()
+        .chain(several)
         .filter(|name| arguments.only.is_empty() || arguments.only.iter().any(|only| only == name))
         .collect();
     let numbers = arguments.first..arguments.first + arguments.per_effect;

@@ -67,10 +67,9 @@ pub fn markdown(answers: &[Answer], failures: bool) -> String {
         text.push_str("\n## What went wrong\n\n");
         for answer in answers.iter().filter(|answer| !answer.is_right()) {
             let _ = writeln!(text, "- {}", line(answer));
-            for name in std::iter::once(answer.case.effect()).chain(answer.effects()) {
-                if !["none", "unlisted"].contains(&name) {
-                    let _ = writeln!(text, "  - {}", answer.candidate(name));
-                }
+            let named = answer.effects().into_iter();
+            for name in named.chain(answer.case.effects()) {
+                let _ = writeln!(text, "  - {}", answer.candidate(name));
             }
         }
         text.push_str("\n## Right name, error above 1.2 of the noise\n\n");
@@ -84,7 +83,7 @@ pub fn markdown(answers: &[Answer], failures: bool) -> String {
 fn listed(answers: &[Answer]) -> impl Iterator<Item = &Answer> {
     answers
         .iter()
-        .filter(|answer| !["none", "unlisted"].contains(&answer.case.effect()))
+        .filter(|answer| answer.case.effects() == [answer.case.effect()])
 }
 
 fn count<'a>(answers: impl Iterator<Item = &'a Answer>, hit: impl Fn(&Answer) -> bool) -> String {
@@ -125,6 +124,18 @@ fn marks(text: &mut String, answers: &[Answer]) {
         "| listed: the name among those accepted | | {} |",
         count(listed(answers), named)
     );
+    for (name, wanted) in [("two", "92 %"), ("three", "80 %")] {
+        let _ = writeln!(
+            text,
+            "| {name} at once: their names and no other | {wanted} | {} |",
+            count(of(name), right)
+        );
+        let _ = writeln!(
+            text,
+            "| {name} at once: other names with the verdict `explained` | none | {} |",
+            count(of(name), |a| a.verdict() == "explained" && !a.is_right())
+        );
+    }
     let _ = writeln!(
         text,
         "| none: `nothing-missing` | 95 % | {} |",

@@ -54,7 +54,7 @@ pub fn residual(
             }
         ));
     }
-    if !found.settled && !found.after.fitted.structure.effects.is_empty() {
+    if !found.settled && !found.after.effect_names().is_empty() {
         parts.push(
             "the effect found switches so fast that the step size of the integration adds to the error; a second effect was not \
              searched for"

@@ -5,11 +5,14 @@
 
 mod blocks;
 mod columns;
+mod declared;
 mod describe;
 mod fit;
 mod guard_models;
 mod intersample;
+mod ladder;
 mod noise_floor;
+mod pairs;
 mod plain;
 mod plot_series;
 mod reason;
@@ -20,6 +23,7 @@ mod residual_tests;
 mod result;
 mod score;
 mod search;
+mod several;
 mod spectra;
 mod starts;
 mod stationarity;
@@ -32,13 +36,15 @@ use torqcomp_model::simulate::Between;
 
 use crate::failure::Failure;
 use crate::warning::Warning;
+use declared::DeclaredStand;
 use fit::FittedModel;
+use ladder::Ladder;
 use noise_floor::NoiseFloor;
-use score::BaseModel;
 use spectra::lines_of;
 use structure::FitContext;
-use verdict::{PlainExcess, noise_rms, remains};
+use verdict::{noise_rms, remains};
 
+pub use declared::DeclaredForm;
 pub use fit::RecordResidual;
 pub use guard_models::GuardModel;
 pub use noise_floor::NoiseFloorSource;
@@ -51,7 +57,7 @@ pub use result::{Diagnosis, SourceFiles};
 pub use score::{EffectParameter, ScoredModel};
 pub use search::{CandidateFit, Workers};
 pub use spectra::SpectralLine;
-pub use structure::PlainStand;
+pub use structure::{EffectForm, PlainStand};
 pub use units::ChannelUnits;
 pub use verdict::Verdict;
 
@@ -61,6 +67,8 @@ pub struct Case {
     pub records: Records,
     /// The plain stand that the stand file declares.
     pub declared: Option<PlainStand>,
+    /// The effects that it declares.
+    pub declared_effects: Vec<DeclaredForm>,
     /// Whether the gain is part of the declaration, not of the fit.
     pub gain_is_declared: bool,
     /// The recorder as declared.
@@ -78,8 +86,12 @@ struct SearchState {
     before: ScoredModel,
     /// The same with the accepted effects.
     after: ScoredModel,
-    /// The candidates, the accepted one first; one list for each effect that was looked for.
+    /// The candidates; one list for each effect that was looked for.
     rounds: Vec<Vec<CandidateFit>>,
+    /// The models with effects on the way.
+    path: Vec<ScoredModel>,
+    /// What each of the effects explains.
+    ladder: Ladder,
     /// A guard model that explains more than each candidate of the last round.
     suspected: Option<GuardModel>,
     noise_floor: Option<NoiseFloor>,
@@ -91,8 +103,6 @@ struct SearchState {
     settled: bool,
 }
 
-/// Most effects that are added.
-const MOST_EFFECTS: usize = 2;
 /// Power over the spectrum around it from which on a line of the residual is reported, and most such lines.
 const PROMINENT: f64 = 30.0;
 const MOST_LINES: usize = 5;
@@ -137,8 +147,11 @@ pub fn run(mut case: Case, workers: Workers) -> Result<Diagnosis, Failure> {
     let context = plain::find_plain(&unscaled, case.declared, &case.records.train)?;
     refuse::check(&case, &context)?;
     case.records.prepare_for(&context.plain);
-    let look =
-        |records: &Records| SearchState::with(records.clone(), &context, case.declared, workers);
+    let declared = case.declared.map(|plain| DeclaredStand {
+        plain,
+        effects: &case.declared_effects,
+    });
+    let look = |records: &Records| SearchState::with(records.clone(), &context, declared, workers);
     let mut found = look(&case.records)?;
     if let Some(between) = found.other_course(workers.threads) {
         found = look(&case.records.with_between(between))?;
@@ -151,17 +164,17 @@ impl SearchState {
     fn with(
         mut records: Records,
         context: &FitContext,
-        declared: Option<PlainStand>,
+        declared: Option<DeclaredStand>,
         workers: Workers,
     ) -> Result<Self, Failure> {
-        let mut plain = plain::refine_plain(context.clone(), &records.train)?;
+        let mut plain = plain::refine_plain(context.clone(), declared, &records.train)?;
         plain::set_starts(&plain, &mut records.train);
         plain::set_starts(&plain, &mut records.holdout);
         plain.initial = records.train.iter().map(|r| r.initial).collect();
         let declared = declared.and_then(|declared| {
-            let values = plain.structure.context.plain_values(&declared);
             let declared = FittedModel {
-                values,
+                values: declared.values(&plain.structure.context),
+                amplitudes: declared.amplitudes(),
                 ..plain.clone()
             };
             ScoredModel::of(declared, &records)
@@ -173,55 +186,21 @@ impl SearchState {
         let mut found = Self {
             records,
             declared,
-            noise_floor: NoiseFloor::of(&before.holdout),
+            noise_floor: NoiseFloor::of(&before.holdout, &before.fitted.mode()),
             after: before.clone(),
             before,
             rounds: Vec::new(),
+            path: Vec::new(),
+            ladder: Ladder::default(),
             suspected: None,
             tests_before: tests.clone(),
             tests,
             settled: true,
         };
         let coarse = found.records.substeps();
-        while found.rounds.len() < MOST_EFFECTS && found.add_effect(coarse, workers) {}
+        found.build(coarse, workers);
         found.lower_noise_floor();
         Ok(found)
-    }
-
-    /// Looks for one more effect and adds it; whether another one could be named beside it. `coarse` is the number of
-    /// steps of integration for the plain stand.
-    fn add_effect(&mut self, coarse: usize, workers: Workers) -> bool {
-        let records = &mut self.records;
-        let floor = self.noise_floor;
-        let excess = PlainExcess {
-            before: &self.before,
-            noise_floor: floor,
-        };
-        let base = BaseModel::of(self.after.clone(), records);
-        let mut tried = search::try_all(&base, records, workers);
-        let accepted = tried.first().filter(|t| t.status() == Status::Accepted);
-        let next = accepted.and_then(|t| t.model.clone());
-        if next.is_some() || remains(&self.after, &self.tests, floor) {
-            let noise_rms = noise_rms(floor);
-            self.suspected = GuardModel::best(&base, next.as_ref(), noise_rms, records, workers);
-        }
-        let next = next.filter(|next| {
-            let too_small = excess.too_small_second(&self.after, next);
-            if let Some(guard) = &self.suspected {
-                search::reject_all(&mut tried, |candidate| guard.instead_of(candidate));
-            } else if let Some(reason) = &too_small {
-                search::reject_all(&mut tried, |_| reason.clone());
-            }
-            self.suspected.is_none() && too_small.is_none()
-        });
-        self.rounds.push(tried);
-        let Some(next) = next else {
-            return false;
-        };
-        (self.after, self.settled) = next.refine_step(records, coarse);
-        self.tests = tests(&self.after);
-        // No second effect beside a law for which the integration does not converge.
-        self.settled && remains(&self.after, &self.tests, floor) && excess.has_room(&self.after)
     }
 
     /// Measures the noise again, without what the model explains and what does not repeat with the input.
@@ -230,7 +209,9 @@ impl SearchState {
             let old = self.noise_floor;
             old.is_some_and(|old| old.from == NoiseFloorSource::Periods && new.rms < old.rms)
         };
-        if let Some(new) = NoiseFloor::of_residuals(&self.after.holdout).filter(is_lower) {
+        let mode = self.before.fitted.mode();
+        let new = NoiseFloor::of_residuals(&self.after.holdout, &mode);
+        if let Some(new) = new.filter(is_lower) {
             self.noise_floor = Some(new);
         }
     }
@@ -238,18 +219,14 @@ impl SearchState {
     /// A course of the input between its samples that explains what is missing better than what was found.
     fn other_course(&self, threads: usize) -> Option<Between> {
         let floor = self.noise_floor;
-        let has_effects = !self.after.fitted.structure.effects.is_empty();
+        let has_effects = !self.after.effect_names().is_empty();
         if !has_effects && !remains(&self.before, &self.tests_before, floor) {
             return None;
         }
-        let accepted = self.rounds.iter().filter_map(|tried| {
-            let first = tried.first().filter(|t| t.status() == Status::Accepted)?;
-            first.model.as_ref()
-        });
         let mut models = vec![&self.before];
         // If nothing is left, only a course in place of all effects could say more.
         if remains(&self.after, &self.tests, floor) {
-            models.extend(accepted);
+            models.extend(&self.path);
         }
         let noise_rms = noise_rms(floor);
         intersample::better_course(&models, &self.after, noise_rms, &self.records, threads)

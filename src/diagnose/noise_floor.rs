@@ -1,9 +1,11 @@
 //! The noise floor, estimated without any model of the stand.
 
 use serde::Serialize;
+use torqcomp_model::Mode;
 
 use super::fit::RecordResidual;
-use super::record::{StandRecord, dot};
+use super::record::{DECAYED, StandRecord, dot};
+use super::residual_tests::without_mean;
 use super::spectra::spectra;
 
 /// The noise of the held-out records.
@@ -24,8 +26,12 @@ pub enum NoiseFloorSource {
 
 /// Part of the input's power that may differ from period to period.
 const SAME: f64 = 1e-5;
-/// Time in which the motion settles, in s.
-const SETTLED_S: f64 = 0.05;
+/// Samples of the piece of the input whose repetition is looked for, if it varies enough.
+const PIECE: usize = 256;
+/// Mean square of that piece about its mean, over that of the input: less repeats at any lag, as constant stretches do.
+const VARIES: f64 = 0.25;
+/// Shortest period, in samples.
+const SHORTEST: usize = 64;
 /// Largest part of the power out of band that the signal may have.
 const SIGNAL: f64 = 0.2;
 
@@ -35,10 +41,10 @@ type MeanSquare = (f64, usize);
 impl NoiseFloor {
     /// The noise of records: from the differences of periods where every input repeats, otherwise from the top of the
     /// spectrum, where the plain stand's modelled record says that there is no signal.
-    pub fn of(residuals: &[RecordResidual]) -> Option<Self> {
+    pub fn of(residuals: &[RecordResidual], mode: &Mode) -> Option<Self> {
         let periods = residuals.iter().map(|r| {
             let record = &r.record;
-            of_periods(record, record.measured_in_range())
+            of_periods(record, record.measured_in_range(), mode)
         });
         Self::pooled(periods, NoiseFloorSource::Periods).or_else(|| {
             let found = residuals.iter().filter_map(out_of_band);
@@ -48,8 +54,9 @@ impl NoiseFloor {
 
     /// The noise in the residuals of a model, from differences of periods: disturbances that do not repeat with the input,
     /// such as mains pickup, are not in it if the model has them.
-    pub fn of_residuals(residuals: &[RecordResidual]) -> Option<Self> {
-        let found = residuals.iter().map(|r| of_periods(&r.record, &r.samples));
+    pub fn of_residuals(residuals: &[RecordResidual], mode: &Mode) -> Option<Self> {
+        let found = residuals.iter();
+        let found = found.map(|r| of_periods(&r.record, &r.samples, mode));
         Self::pooled(found, NoiseFloorSource::Periods)
     }
 
@@ -68,11 +75,12 @@ impl NoiseFloor {
 
 /// Noise from differences of periods, over the samples before which the input has repeated for long enough that the
 /// motion has settled.
-fn of_periods(record: &StandRecord, y: &[f64]) -> Option<MeanSquare> {
+fn of_periods(record: &StandRecord, y: &[f64], mode: &Mode) -> Option<MeanSquare> {
     let u = record.applied_in_range();
     let period = period(u)?;
     let small = SAME * dot(u, u) / u.len() as f64;
-    let settled = (SETTLED_S * record.rate_hz()) as usize;
+    let time_constant_s = 1.0 / (mode.damping_ratio * mode.omega_rad_s);
+    let settled = (DECAYED * time_constant_s * record.rate_hz()) as usize;
     let (mut run, mut sum, mut count) = (0, 0.0, 0);
     for i in period..u.len() {
         let repeats = (u[i] - u[i - period]).powi(2) < 100.0 * small;
@@ -93,12 +101,24 @@ fn period(u: &[f64]) -> Option<usize> {
     }
     // A piece from the middle is searched for in the second half.
     let from = u.len() / 2;
-    let piece = &u[from..(from + 256).min(u.len())];
+    let piece = varying_piece(u, from)?;
     let near = |lag: &usize| {
         let there = u[from + lag..].iter().zip(piece);
         there.map(|(a, b)| (a - b).powi(2)).sum::<f64>() < SAME * energy * piece.len() as f64
     };
-    (64..(u.len() - from).saturating_sub(piece.len())).find(near)
+    (SHORTEST..(u.len() - from).saturating_sub(piece.len())).find(near)
+}
+
+/// The samples from one on, as many as it takes until they vary like the whole input.
+fn varying_piece(u: &[f64], from: usize) -> Option<&[f64]> {
+    let variance = |u: &[f64]| {
+        let varying = without_mean(u);
+        dot(&varying, &varying) / u.len() as f64
+    };
+    let least = VARIES * variance(u);
+    let lengths = std::iter::successors(Some(PIECE), |length| Some(2 * length));
+    let mut pieces = lengths.map_while(|length| u.get(from..from + length));
+    pieces.find(|piece| variance(piece) >= least)
 }
 
 /// White noise with the level that the top of the spectrum has.
@@ -119,4 +139,65 @@ fn out_of_band(residual: &RecordResidual) -> Option<MeanSquare> {
     let kept = &quiet[..(quiet.len() * 9).div_ceil(10)];
     let level = kept.iter().sum::<f64>() / kept.len() as f64;
     Some((level * (lines - 1) as f64, y.len()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RATE_HZ: f64 = 1000.0;
+    const NOISE: f64 = 1e-3;
+
+    /// A stand at 2 Hz: its time constant is 1.6 s.
+    fn mode() -> Mode {
+        Mode {
+            omega_rad_s: std::f64::consts::TAU * 2.0,
+            damping_ratio: 0.05,
+        }
+    }
+
+    /// The stand's answer to steps of ±1 at these times: `1 − e^(−ζωt) (cos ω_d t + ζω/ω_d sin ω_d t)` for each.
+    fn steps(times_s: &[f64], count: usize) -> RecordResidual {
+        let mode = mode();
+        let decay = mode.damping_ratio * mode.omega_rad_s;
+        let swing = mode.omega_rad_s * (1.0 - mode.damping_ratio.powi(2)).sqrt();
+        let answer = |t: f64| {
+            let (sine, cosine) = (swing * t).sin_cos();
+            1.0 - (-decay * t).exp() * (cosine + decay / swing * sine)
+        };
+        let sum = |i: usize, of: &dyn Fn(f64) -> f64| -> f64 {
+            let time_s = i as f64 / RATE_HZ;
+            let past = times_s.iter().enumerate().filter(|(_, at)| **at <= time_s);
+            past.map(|(k, at)| [1.0, -1.0][k % 2] * of(time_s - at))
+                .sum()
+        };
+        let applied = (0..count).map(|i| sum(i, &|_| 1.0)).collect();
+        let clean: Vec<f64> = (0..count).map(|i| sum(i, &answer)).collect();
+        // Numbers from −√3 to √3 have the standard deviation 1; multiples of the golden section fill any range evenly, and
+        // their squares lose the order of that.
+        let noise = |i: usize| 12_f64.sqrt() * ((0.618_034 * (i * i) as f64).fract() - 0.5);
+        let noisy = clean.iter().enumerate().map(|(i, y)| y + NOISE * noise(i));
+        let mut residual = RecordResidual::made(applied, noisy.collect(), Vec::new());
+        residual.modelled = clean;
+        residual
+    }
+
+    #[test]
+    fn the_floor_after_a_step_is_the_noise() {
+        // The plateaus are constant, the stand swings on them for 20 s.
+        for times_s in [&[5.0][..], &[5.0, 20.0], &[1.0, 9.0, 17.0, 25.0]] {
+            let floor = NoiseFloor::of(&[steps(times_s, 32_000)], &mode()).expect("a floor");
+            let ratio = floor.rms / NOISE;
+            assert!((0.9..1.1).contains(&ratio), "{times_s:?}: {ratio}");
+        }
+    }
+
+    #[test]
+    fn steps_that_repeat_give_the_noise_once_the_stand_has_settled() {
+        // From the second period on the input has repeated; 12 time constants, 19.1 s, later the motion has, too.
+        let times_s: Vec<f64> = (0..40).map(|k| 1.5 * f64::from(k)).collect();
+        let floor = NoiseFloor::of(&[steps(&times_s, 64_000)], &mode()).expect("a floor");
+        assert_eq!(floor.from, NoiseFloorSource::Periods);
+        assert!((0.9..1.1).contains(&(floor.rms / NOISE)), "{}", floor.rms);
+    }
 }

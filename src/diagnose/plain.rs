@@ -5,6 +5,7 @@ use std::sync::Arc;
 use torqcomp_model::Chain;
 use torqcomp_model::simulate::MotionState;
 
+use super::declared::DeclaredStand;
 use super::fit::{FitEffort, FittedModel, fit};
 use super::record::{StandRecord, dot};
 use super::residual_tests::without_mean;
@@ -45,14 +46,38 @@ pub fn find_plain(
     Ok(context.at(best.stand()))
 }
 
-/// The plain stand of a context, fitted again with the samples and steps that the records have now.
+/// The plain stand of a context, fitted again with the samples and steps that the records have now; with the effects of the
+/// stand file, from their declared values on.
 ///
 /// # Errors
 /// If it cannot be fitted.
-pub fn refine_plain(context: FitContext, train: &[StandRecord]) -> Result<FittedModel, Failure> {
-    let values = context.plain_values(&context.plain);
-    let structure = Structure::plain(Arc::new(context));
-    fit(structure, &values, train, REFINEMENT).map_err(Failure::failed)
+pub fn refine_plain(
+    context: FitContext,
+    declared: Option<DeclaredStand>,
+    train: &[StandRecord],
+) -> Result<FittedModel, Failure> {
+    let declared = declared.filter(|declared| !declared.effects.is_empty());
+    let context = Arc::new(context);
+    let Some(declared) = declared else {
+        let values = context.plain_values(&context.plain);
+        let structure = Structure::plain(context);
+        return fit(structure, &values, train, REFINEMENT).map_err(Failure::failed);
+    };
+    // The declared constants belong to the effects; those of a plain stand without effects may be nearer.
+    let fitted = DeclaredStand {
+        plain: context.plain,
+        ..declared
+    };
+    let fits = [declared, fitted].map(|stand| {
+        let values = stand.values(&context);
+        fit(stand.structure(context.clone()), &values, train, REFINEMENT)
+    });
+    let [declared, fitted] = fits;
+    match (declared, fitted) {
+        (Ok(declared), Ok(fitted)) if fitted.train_sum < declared.train_sum => Ok(fitted),
+        (Ok(declared), _) => Ok(declared),
+        (Err(_), fitted) => fitted.map_err(Failure::failed),
+    }
 }
 
 /// Sum of squares for each start on a coarse grid, in ascending order.

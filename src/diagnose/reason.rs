@@ -51,7 +51,7 @@ pub enum Reason {
     /// Its hold-out error over that of the best.
     Worse {
         ratio: f64,
-        best: &'static str,
+        best: String,
     },
     MoreParameters {
         best: &'static str,
@@ -66,9 +66,14 @@ pub enum Reason {
         law: &'static str,
         equation: &'static str,
     },
-    /// A second effect that explains less than this part of the initial excess error.
+    /// A further effect that explains less than this part of the initial excess error and less than this part of the rest.
     SmallSecond {
         least: f64,
+        rest: f64,
+    },
+    /// It was added and taken out again: without it, these leave no more.
+    Needless {
+        others: String,
     },
     /// It explains only this part of the excess error.
     SmallPart {
@@ -132,9 +137,14 @@ impl Reason {
                  list of effects",
                 rounded(*ratio, 3)
             ),
-            Self::SmallSecond { least } => format!(
-                "explains less than {:.0} % of what the plain stand leaves above the noise: too little for a second effect",
-                100.0 * least
+            Self::SmallSecond { least, rest } => format!(
+                "explains less than {:.0} % of what the plain stand leaves above the noise, and less than {:.0} % of what is \
+                 left now: too little for a further effect",
+                100.0 * least,
+                100.0 * rest
+            ),
+            Self::Needless { others } => format!(
+                "not needed: the hold-out error of {others} without it is not significantly larger"
             ),
             Self::SmallPart { explained } => format!(
                 "improves the fit, but explains only {:.0} % of the error above the noise: the main cause is something else",

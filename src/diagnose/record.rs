@@ -75,7 +75,7 @@ pub struct Nuisance {
 }
 
 /// Time constants after which the free motion from a record's start is gone.
-const DECAYED: f64 = 12.0;
+pub const DECAYED: f64 = 12.0;
 /// Time constants up to which the range determines that motion: beyond, noise would be amplified by more than `e³` on its
 /// way back to the start.
 const START_SEEN: f64 = 3.0;

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::describe;
 use super::guard_models::GuardModel;
+use super::ladder::Ladder;
 use super::noise_floor::NoiseFloorSource;
 use super::reason::Status;
 use super::record::StandRecord;
@@ -32,9 +33,14 @@ pub struct Diagnosis {
     pub verdict: Verdict,
     /// Names of the effects that were added.
     pub effects: Vec<&'static str>,
+    /// Names of those that the stand file declares; they are fitted anew in all models but the declared one.
+    pub declared_effects: Vec<&'static str>,
     /// `band-limited`, `straight-lines` or `held`.
     pub input_between_samples: &'static str,
     pub error: ErrorTable,
+    /// The held-out error with ever more effects, and what each of them explains.
+    #[serde(flatten)]
+    pub explained: Ladder,
     pub constants: Vec<StandConstant>,
     /// The effects that were tried: accepted ones first, then by hold-out error.
     pub candidates: Vec<CandidateFit>,
@@ -118,6 +124,7 @@ impl Diagnosis {
         let lines = found.lines();
         let unit = case.units.per_printed;
         let verdict = found.conclude();
+        found.settle_candidates();
         let effects = found.after.effect_names();
         let error = ErrorTable::of(&found);
         let levels = ExcitationLevels::of(&found, &error.before);
@@ -137,8 +144,14 @@ impl Diagnosis {
             sources: case.sources,
             verdict,
             effects,
+            declared_effects: case
+                .declared_effects
+                .iter()
+                .map(|e| e.effect.effect.name)
+                .collect(),
             input_between_samples: found.records.between().name(),
             error,
+            explained: std::mem::take(&mut found.ladder),
             constants: constants(case.declared, &found),
             next_experiment: describe::next_experiment(&found, suspected.as_ref(), verdict),
             warnings: [case.warnings, describe::warnings(&found.before, verdict)].concat(),
@@ -157,11 +170,8 @@ impl Diagnosis {
 }
 
 impl SearchState {
-    /// All candidates in the order in which they are reported; the accepted ones as they are in the last model, not as they
-    /// were when they were chosen.
+    /// All candidates in the order in which they are reported.
     fn candidates(&mut self) -> Vec<CandidateFit> {
-        let mut parameters = self.after.parameters().into_iter();
-        let mut with = Vec::new();
         let mut all = Vec::new();
         for mut round in std::mem::take(&mut self.rounds) {
             round.sort_by(|a, b| {
@@ -169,16 +179,6 @@ impl SearchState {
                 let by_error = a.holdout_error().total_cmp(&b.holdout_error());
                 first(a).cmp(&first(b)).then(by_error)
             });
-            round.iter_mut().for_each(|c| c.with.clone_from(&with));
-            if let Some(accepted) = round.first_mut().filter(|c| c.status() == Status::Accepted) {
-                accepted.parameters = parameters.next().unwrap_or_default();
-                with.push(accepted.effect.name);
-                if parameters.len() == 0 {
-                    let errors = self.after.errors();
-                    accepted.train_rms = Some(errors.train_rms);
-                    accepted.holdout_rms = Some(errors.holdout_rms);
-                }
-            }
             all.extend(round);
         }
         all
@@ -194,7 +194,7 @@ impl ErrorTable {
             rms: model.errors(),
             holdout_relative: model.holdout_rms() / size,
         };
-        let has_effects = !after.fitted.structure.effects.is_empty();
+        let has_effects = !after.effect_names().is_empty();
         Self {
             unit: units.printed(),
             declared: found.declared.as_ref().map(errors),

@@ -171,8 +171,9 @@ impl ScoredModel {
         train + holdout + self.parameter_count() as f64 * (n + m).ln()
     }
 
+    /// Names of the effects that were added to those of the stand file.
     pub fn effect_names(&self) -> Vec<&'static str> {
-        let effects = self.fitted.structure.effects.iter();
+        let effects = self.fitted.structure.added().iter();
         effects.map(|e| e.effect.name).collect()
     }
 
@@ -276,6 +277,18 @@ impl BaseModel {
             slopes,
             nuisance,
         }
+    }
+
+    /// Something of each training record, by its number, without what the base's own parameters and what belongs to the
+    /// record can change of it; one record after the other.
+    pub fn cleared(&self, of: impl Fn(usize) -> Vec<f64>) -> Vec<f64> {
+        let clear = |(k, slopes): (usize, &Columns)| {
+            let mut samples = of(k);
+            slopes.clear(&mut samples);
+            samples
+        };
+        let records = self.slopes.iter().enumerate();
+        records.flat_map(clear).collect()
     }
 }
 

@@ -93,25 +93,44 @@ const FOR_SECOND_EFFECT: SearchEffort = SearchEffort {
     full: 4,
 };
 
-/// Adds every effect to a base model in turn; if one of them is accepted, it is the first of the result.
-pub fn try_all(base: &BaseModel, records: &Records, workers: Workers) -> Vec<CandidateFit> {
-    let present = base.scored.effect_names();
+/// Every effect added to a base model in turn.
+pub struct Round {
+    /// One for each effect, in its best form; if one of them is accepted, it is the first.
+    pub tried: Vec<CandidateFit>,
+    /// The fits of all forms that reduce the training error.
+    pub fits: Vec<ScoredModel>,
+}
+
+impl Round {
+    /// The model with the accepted effect.
+    pub fn accepted(&self) -> Option<&ScoredModel> {
+        let first = self.tried.first()?;
+        let is_accepted = first.status() == Status::Accepted;
+        first.model.as_ref().filter(|_| is_accepted)
+    }
+}
+
+/// Adds every effect to a base model in turn.
+pub fn try_all(base: &BaseModel, records: &Records, workers: Workers) -> Round {
+    let present: Vec<&str> = base.scored.fitted.structure.names().collect();
     let gain_is_free = base.scored.fitted.structure.context.gain_is_free;
     let effects = EFFECTS.iter().copied().filter(|effect| {
         !(present.contains(&effect.name) || gain_is_free && effect.name == "gain-error")
     });
     let forms = EffectForm::all(effects.clone());
     let lines = residual_lines(base, records);
-    let mut fits = fit_all(base, &forms, &lines, records, workers).into_iter();
+    let fits = fit_all(base, &forms, &lines, records, workers);
+    let mut rest = fits.iter();
     let mut tried: Vec<CandidateFit> = effects
         .map(|effect| {
-            let models = fits.by_ref().take(effect.forms.len()).flatten();
+            let models = rest.by_ref().take(effect.forms.len()).flatten();
             let best = models.min_by(|a, b| a.criterion().total_cmp(&b.criterion()));
-            CandidateFit::new(effect, &base.scored, best)
+            CandidateFit::new(effect, &base.scored, best.cloned())
         })
         .collect();
     decide(&mut tried);
-    tried
+    let fits = fits.into_iter().flatten().collect();
+    Round { tried, fits }
 }
 
 impl CandidateFit {
@@ -125,7 +144,7 @@ impl CandidateFit {
         Self {
             effect,
             form: last.map(|e| e.form.name),
-            with: Vec::new(),
+            with: base.effect_names(),
             train_rms: errors.map(|e| e.train_rms),
             holdout_rms: errors.map(|e| e.holdout_rms),
             p_value: comparison.and_then(|c| c.p_value()),
@@ -254,6 +273,17 @@ fn residual_lines(base: &BaseModel, records: &Records) -> Vec<SpectralLine> {
 
 /// Why an effect is not accepted, considered alone.
 pub fn refusal(model: &ScoredModel, before: &ScoredModel) -> Option<Reason> {
+    if let Some(reason) = no_gain(model, before) {
+        return Some(reason);
+    }
+    if let Some(name) = model.insignificant_parameter() {
+        return Some(Reason::ZeroParameter { name });
+    }
+    (model.criterion() >= before.criterion()).then_some(Reason::CriterionNotLower)
+}
+
+/// Why a model is not better on the held-out records than one with less in it.
+pub fn no_gain(model: &ScoredModel, before: &ScoredModel) -> Option<Reason> {
     let comparison = model.against(before);
     let (gain, variance) = (comparison.gain(), model.holdout_rms().powi(2));
     let total = before.holdout_rms().powi(2) * before.holdout_samples().len() as f64;
@@ -268,10 +298,7 @@ pub fn refusal(model: &ScoredModel, before: &ScoredModel) -> Option<Reason> {
         let share = gain / total;
         return Some(Reason::SmallShare { share });
     }
-    if let Some(name) = model.insignificant_parameter() {
-        return Some(Reason::ZeroParameter { name });
-    }
-    (model.criterion() >= before.criterion()).then_some(Reason::CriterionNotLower)
+    None
 }
 
 /// Accepts the best of the candidates that nothing speaks against, and compares the others with it.
@@ -331,6 +358,7 @@ fn behind(other: &CandidateFit, chosen: &CandidateFit, is_tied: bool) -> Option<
     let best = chosen.effect.name;
     let reason = if !is_tied {
         let ratio = model.holdout_rms() / accepted.holdout_rms();
+        let best = best.to_owned();
         Reason::Worse { ratio, best }
     } else if model.parameter_count() > accepted.parameter_count() {
         Reason::MoreParameters { best }

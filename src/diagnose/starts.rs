@@ -1,5 +1,7 @@
 //! Where the fit of an effect starts: near the size that the residual suggests.
 
+use torqcomp_model::effects::RecordScales;
+
 use super::fit::raw_residual;
 use super::record::{StandRecord, dot};
 use super::score::BaseModel;
@@ -37,27 +39,22 @@ pub fn best_starts(
         return Vec::new();
     };
     let plain = &base.scored.fitted.values;
+    let of_base = base.scored.fitted.structure.model(plain).0;
+    let present = of_base.added_stiffness();
     let evaluated = |own: &[f64]| {
         let values = [plain.as_slice(), &own[..effect.moved()]].concat();
-        evaluate(
-            base,
-            structure,
-            with_shared_stiffness(structure, values),
-            training,
-        )
+        let values = with_shared_stiffness(structure, present, values);
+        evaluate(base, structure, values, training)
     };
-    let mut starts: Vec<(Vec<f64>, Start)> = own_values(effect, lines)
+    let scales = &structure.context.scales;
+    let mut starts: Vec<(Vec<f64>, Start)> = own_values(effect, lines, scales)
         .into_iter()
         .filter_map(|own| evaluated(&own).map(|start| (own, start)))
         .collect();
     starts.sort_by(|(_, a), (_, b)| b.reduction.total_cmp(&a.reduction));
-    let parameters = effect.form.parameters;
-    let size = parameters
-        .iter()
-        .position(|p| p.lower <= 0.0 && p.upper >= 0.0);
     let mut found: Vec<Start> = starts.iter().map(|(_, start)| start.clone()).collect();
-    if let Some(size) = size.filter(|_| !effect.is_line()) {
-        let bounds = &parameters[size];
+    if let Some(size) = effect.size() {
+        let bounds = &effect.form.parameters[size];
         found.extend(starts.iter().take(SIZED).filter_map(|(own, start)| {
             let mut own = own.clone();
             let factor = start.factor.abs().clamp(FACTORS[0], FACTORS[1]);
@@ -75,20 +72,22 @@ pub fn best_starts(
 }
 
 /// Start values of an effect's own parameters; for a line also the frequencies that stand out of the residual.
-fn own_values(effect: &EffectForm, lines: &[SpectralLine]) -> Vec<Vec<f64>> {
+fn own_values(effect: &EffectForm, lines: &[SpectralLine], scales: &RecordScales) -> Vec<Vec<f64>> {
     let mut all: Vec<Vec<f64>> = effect.form.starts.iter().map(|s| s.to_vec()).collect();
     if effect.is_line() {
         let frequency = &effect.form.parameters[0];
         let bounds = frequency.lower..=frequency.upper;
-        let near = lines.iter().map(|line| line.frequency_hz);
-        all.extend(near.filter(|hz| bounds.contains(hz)).map(|hz| vec![hz]));
+        let size = frequency.size(scales);
+        let near = lines.iter().map(|line| line.frequency_hz / size);
+        all.extend(near.filter(|f| bounds.contains(f)).map(|f| vec![f]));
     }
     all
 }
 
-/// Reduces the stiffness of the plain stand by that of the effect, so that the whole is as stiff as before.
-fn with_shared_stiffness(structure: &Structure, mut values: Vec<f64>) -> Vec<f64> {
-    let factor = 1.0 + structure.model(&values).0.added_stiffness();
+/// Reduces the stiffness of the plain stand by that of the effect, so that the whole is as stiff as before; `present` is the
+/// added stiffness of the effects that are there already.
+fn with_shared_stiffness(structure: &Structure, present: f64, mut values: Vec<f64>) -> Vec<f64> {
+    let factor = (1.0 + structure.model(&values).0.added_stiffness()) / (1.0 + present);
     values[0] /= factor.sqrt();
     if structure.context.gain_is_free {
         values[2] *= factor;

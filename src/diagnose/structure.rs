@@ -98,6 +98,13 @@ impl EffectForm {
         }
     }
 
+    /// The parameter that says how much of it there is: the first that may be zero.
+    pub fn size(&self) -> Option<usize> {
+        let parameters = self.form.parameters.iter().take(self.moved());
+        let mut sizes = parameters.map(|p| p.lower <= 0.0 && p.upper >= 0.0);
+        sizes.position(|is_size| is_size && !self.is_line())
+    }
+
     /// Whether it adds lines: its parameters are a frequency, then amplitudes.
     pub fn is_line(&self) -> bool {
         let first = self.form.parameters.first();
@@ -110,7 +117,10 @@ impl EffectForm {
 #[derive(Clone)]
 pub struct Structure {
     pub context: Arc<FitContext>,
+    /// Those that the stand file declares come first.
     pub effects: Vec<EffectForm>,
+    /// Number of effects that the stand file declares.
+    pub declared: usize,
 }
 
 /// Bounds of the natural frequency, of the damping ratio and of the gain, as parameters of a fit.
@@ -122,7 +132,18 @@ impl Structure {
         Self {
             context,
             effects: Vec::new(),
+            declared: 0,
         }
+    }
+
+    /// The effects that were added to those of the stand file.
+    pub fn added(&self) -> &[EffectForm] {
+        &self.effects[self.declared..]
+    }
+
+    /// Names of all effects.
+    pub fn names(&self) -> impl Iterator<Item = &'static str> {
+        self.effects.iter().map(|e| e.effect.name)
     }
 
     /// The same with one more effect.

@@ -1,6 +1,7 @@
 //! Verdict: whether something is missing, and which effects stand.
 
 use super::SearchState;
+use super::ladder::Ladder;
 use super::noise_floor::{NoiseFloor, NoiseFloorSource};
 use super::reason::{Reason, Status};
 use super::residual_tests::ResidualTests;
@@ -42,8 +43,10 @@ const NAMED: f64 = 0.5;
 const CLEARLY_ABOVE: f64 = 1.05;
 /// Error over the noise floor above which a remaining dependence on the input counts.
 const ABOVE: f64 = 1.005;
-/// Minimum part of the initial excess error power that a second effect must explain to be named.
+/// Minimum part of the initial excess error power that a further effect must explain to be named.
 const SECOND: f64 = 0.02;
+/// Part of what is left above the noise from which on one is named that explains less than that.
+const MOST_OF_REST: f64 = 0.5;
 
 /// What the plain stand leaves, and the noise in it.
 #[derive(Clone, Copy)]
@@ -64,17 +67,20 @@ impl PlainExcess<'_> {
         self.share(self.before, after)
     }
 
-    /// Why a second effect is not named although it passes: what no model describes exactly resembles many effects a
-    /// little.
-    pub fn too_small_second(&self, after: &ScoredModel, next: &ScoredModel) -> Option<Reason> {
-        let is_second = !after.fitted.structure.effects.is_empty();
-        (is_second && self.share(after, next) < SECOND)
-            .then_some(Reason::SmallSecond { least: SECOND })
+    /// Whether a further effect is not named although it passes, as it explains little of the whole and of what is left: what
+    /// no model describes exactly resembles many effects a little.
+    pub fn is_too_small(&self, after: &ScoredModel, next: &ScoredModel) -> bool {
+        let left = after.excess_power(noise_rms(self.noise_floor));
+        let gain = after.holdout_rms().powi(2) - next.holdout_rms().powi(2);
+        self.share(after, next) < SECOND && gain < MOST_OF_REST * left
     }
 
-    /// Whether another effect could be named beside those found: not if little is explained, nor if next to nothing is left.
-    pub fn has_room(&self, after: &ScoredModel) -> bool {
-        (NAMED..1.0 - SECOND).contains(&self.explained(after))
+    /// The reason for that.
+    pub fn too_small() -> Reason {
+        Reason::SmallSecond {
+            least: SECOND,
+            rest: MOST_OF_REST,
+        }
     }
 }
 
@@ -121,18 +127,14 @@ impl SearchState {
     pub fn conclude(&mut self) -> Verdict {
         let is_suspected = self.suspected.is_some();
         let is_left = !self.settled || is_suspected || self.leaves(&self.after, &self.tests);
-        if self.after.fitted.structure.effects.is_empty() {
+        if self.after.effect_names().is_empty() {
             let is_missing = is_suspected || self.leaves(&self.before, &self.tests_before);
             return match is_missing {
                 true => Verdict::Unexplained,
                 false => Verdict::NothingMissing,
             };
         }
-        let excess = PlainExcess {
-            before: &self.before,
-            noise_floor: self.noise_floor,
-        };
-        let explained = excess.explained(&self.after);
+        let explained = self.excess().explained(&self.after);
         let is_known = self.noise_floor.is_some_and(|floor| {
             floor.from == NoiseFloorSource::Periods
                 && self.before.holdout_rms() > CLEARLY_ABOVE * floor.rms
@@ -151,6 +153,7 @@ impl SearchState {
         }
         self.after = self.before.clone();
         self.tests = self.tests_before.clone();
+        self.ladder = Ladder::default();
         Verdict::Unexplained
     }
 }

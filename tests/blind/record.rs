@@ -5,8 +5,9 @@ use serde_json::Value;
 use super::catalogue::{Variant, variant_of};
 use super::draw::Draw;
 use super::plain_fit::{PlainConstants, left_by, rms};
-use super::setting::setting;
-use super::sizing::{noise_free, scene, sized};
+use super::setting::{Setting, setting};
+use super::several;
+use super::sizing::{Fitted, noise_free, scene};
 use super::truth::truth;
 
 /// A record: what was applied and what was measured.
@@ -40,23 +41,29 @@ fn seed_of(master: u64, effect: &str, number: usize, attempt: u64) -> u64 {
 /// Where the held-out record would hardly show the effect (a clip that its level never reaches), the case
 /// is drawn again with both records at one level.
 pub fn make(master: u64, effect: &str, number: usize) -> Option<Case> {
-    let variant = variant_of(effect, number)?;
-    let mut case = attempt(master, variant, number, 0);
+    let mut case = attempt(master, effect, number, 0)?;
     for again in 1..4 {
         if case.1 {
             break;
         }
-        case = attempt(master, variant, number, again);
+        case = attempt(master, effect, number, again)?;
     }
     Some(case.0)
 }
 
-/// A case, and whether its held-out record shows the effect, too.
-fn attempt(master: u64, variant: &'static Variant, number: usize, again: u64) -> (Case, bool) {
-    let seed = seed_of(master, variant.effect, number, again);
+/// A case, and whether its held-out record shows each effect, too.
+fn attempt(master: u64, effect: &str, number: usize, again: u64) -> Option<(Case, bool)> {
+    let seed = seed_of(master, effect, number, again);
+    let variants: Vec<&'static Variant> = match variant_of(effect, number) {
+        Some(variant) => vec![variant],
+        None => several::drawn(effect, seed)?,
+    };
     let setting = setting(seed, number, again > 0);
     let scene = scene(&setting);
-    let sized = sized(&setting, &scene, variant, seed);
+    let parts = several::parts(&setting, &scene, &variants, seed);
+    let shows = effect == "none"
+        || several::are_comparable(&parts) && parts.iter().all(|part| shows(&setting, part, seed));
+    let sized = several::together(&setting, &variants, parts, seed);
     let held = noise_free(&sized.built, &setting.inputs[1], 1, seed);
     let held_left = left_by(sized.plain, &setting.inputs[1], &held);
     let mut noise_rms = [setting.noise.share * rms(&sized.signal); 2];
@@ -69,11 +76,9 @@ fn attempt(master: u64, variant: &'static Variant, number: usize, again: u64) ->
         let mut draw = Draw::new(seed, ["noise of train", "noise of holdout"][index]);
         noise_rms[index] = setting.noise.add(record, noise_rms[index], &mut draw);
     }
-    let shows = variant.effect == "none"
-        || held_strength > 0.4 * sized.strength.max(0.5)
-        || held_strength > 3.0;
     let truth = truth(
-        variant,
+        effect,
+        &variants,
         number,
         seed,
         &setting,
@@ -92,5 +97,17 @@ fn attempt(master: u64, variant: &'static Variant, number: usize, again: u64) ->
         plain: sized.plain,
         truth,
     };
-    (case, shows && held_strength.is_finite())
+    Some((case, shows && held_strength.is_finite()))
+}
+
+/// Whether the held-out input shows an effect, alone, about as well as the training input does.
+fn shows(setting: &Setting, part: &Fitted, seed: u64) -> bool {
+    let held = noise_free(&part.built, &setting.inputs[1], 1, seed);
+    let left = left_by(part.plain, &setting.inputs[1], &held);
+    let size = match setting.noise.absolute {
+        true => rms(&part.signal),
+        false => rms(&held),
+    };
+    let strength = left / (setting.noise.share * size);
+    strength > 0.4 * part.strength.max(0.5) || strength > 3.0
 }

@@ -77,8 +77,14 @@ fn try_size(
     }
 }
 
-/// The size at which the effect has about the strength wanted, within what is physical.
-pub fn sized(setting: &Setting, scene: &Scene, variant: &Variant, seed: u64) -> Fitted {
+/// The size at which the effect has about the strength aimed at, within what is physical.
+pub fn sized(
+    setting: &Setting,
+    scene: &Scene,
+    variant: &Variant,
+    target: f64,
+    seed: u64,
+) -> Fitted {
     let (least, first, most) = variant.sizes;
     let mut size = first.max(least);
     let (mut too_small, mut too_large) = (least * 0.999, most * 1.001);
@@ -94,7 +100,7 @@ pub fn sized(setting: &Setting, scene: &Scene, variant: &Variant, seed: u64) -> 
             (size, start, last) = (size * 0.4, truth, None);
             continue;
         }
-        let off = (setting.target / tried.strength).ln();
+        let off = (target / tried.strength).ln();
         let at_limit = (size >= most && off > 0.0) || (size <= least && off < 0.0);
         if variant.effect == "none" || off.abs() < 0.3 || at_limit || tries == 8 {
             return tried;

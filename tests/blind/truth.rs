@@ -11,7 +11,8 @@ use super::sizing::Fitted;
 /// Effect, size, strength, noise, constants and records; `held_left` is what the plain fit leaves of the
 /// held-out signal.
 pub fn truth(
-    variant: &Variant,
+    effect: &str,
+    variants: &[&Variant],
     number: usize,
     seed: u64,
     setting: &Setting,
@@ -24,10 +25,15 @@ pub fn truth(
         .iter()
         .map(|(name, value)| ((*name).to_owned(), json!(value)))
         .collect();
+    let names = variants.iter().map(|v| v.effect);
+    let names: Vec<&str> = names
+        .filter(|name| !["none", "unlisted"].contains(name))
+        .collect();
     let per_hz = std::f64::consts::TAU;
     json!({
-        "effect": variant.effect,
-        "variant": variant.name,
+        "effect": effect,
+        "variant": described(variants),
+        "effects": names,
         "number": number,
         "seed": seed,
         "size": sized.size,
@@ -64,4 +70,15 @@ pub fn truth(
             "top_hz": setting.excitations.iter().map(Excitation::top_hz).fold(0.0, f64::max),
         },
     })
+}
+
+/// The definitions that a case was made with.
+fn described(variants: &[&Variant]) -> String {
+    match variants {
+        [one] => one.name.to_owned(),
+        several => {
+            let each = several.iter().map(|v| format!("{} ({})", v.effect, v.name));
+            each.collect::<Vec<_>>().join(" + ")
+        }
+    }
 }

@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use super::text::{cells, constant_rows, error_rows, error_sentences, suspected};
+use super::text::{
+    cells, constant_rows, error_rows, error_sentences, ladder_rows, share_rows, suspected,
+};
 use crate::chart::{Chart, Page, Series};
 use crate::diagnose::{
     CandidateFit, Diagnosis, MotionAxis, RecordResidual, Status, Verdict, autocorrelation, binned,
@@ -83,6 +85,10 @@ impl Draft<'_> {
         self.page.table(&error_rows(self.diagnosis));
         for sentence in error_sentences(self.diagnosis) {
             self.page.text(&sentence);
+        }
+        if self.diagnosis.effects.len() > 1 {
+            self.page.table(&ladder_rows(self.diagnosis));
+            self.page.table(&share_rows(self.diagnosis));
         }
     }
 

@@ -9,13 +9,14 @@ use torqcomp_model::{Dimension, UnitSystem};
 use crate::cli::Diagnose;
 use crate::commands::convert;
 use crate::diagnose::{
-    Case, ChannelUnits, InitialState, PlainStand, Records, SourceFiles, StandRecord,
+    Case, ChannelUnits, DeclaredForm, EffectForm, InitialState, PlainStand, Records, SourceFiles,
+    StandRecord,
 };
 use crate::failure::Failure;
 use crate::io::{ChannelChoice, Input};
 use crate::print::short;
 use crate::recording::AlignedChannels;
-use crate::stand::{Given, Stand, TransducerSignal, si_unit};
+use crate::stand::{Calibration, DeclaredEffect, Given, Stand, TransducerSignal, si_unit};
 use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
 
@@ -99,6 +100,7 @@ pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<(Case, bool), Fail
         },
         records,
         declared,
+        declared_effects: declared_effects(stand),
         gain_is_declared: gain.is_some() && static_gain(stand).is_none(),
         recorder: stand.and_then(recorder),
         units,
@@ -113,6 +115,19 @@ fn recorder(stand: &Stand) -> Option<Fixed> {
     let is_ideal = recorder.is_ideal();
     let response: Fixed = Arc::new(move |hz| recorder.response(hz));
     (!is_ideal).then_some(response)
+}
+
+/// The effects of the stand file.
+fn declared_effects(stand: Option<&Stand>) -> Vec<DeclaredForm> {
+    let effects = stand.map_or(&[][..], |stand| &stand.effects);
+    let form = |declared: &DeclaredEffect| DeclaredForm {
+        effect: EffectForm {
+            effect: declared.effect,
+            form: declared.form,
+        },
+        values: declared.values.clone(),
+    };
+    effects.iter().map(form).collect()
 }
 
 fn pair(args: &Diagnose, file: &str) -> Result<Pair, Failure> {
@@ -269,7 +284,12 @@ fn record(
     let measured: Vec<f64> = match calibrated {
         None => pair.measured.iter().map(|y| y * measured_factor).collect(),
         Some(stand) => {
-            let chain = stand.calibration(pair.measured_channel(), UnitSystem::Si)?;
+            let calibration = stand.calibration(pair.measured_channel(), UnitSystem::Si)?;
+            // The constant of the records is estimated anew, as in records of torque.
+            let chain = Calibration {
+                zero: 0.0,
+                ..calibration
+            };
             let mut values = pair.measured;
             convert(&chain, &mut values).map_err(|(row, why)| {
                 Failure::failed(format_args!("{}: sample {}: {why}", pair.source, row + 1))

@@ -13,11 +13,16 @@ impl Report for Diagnosis {
             true => "none".to_owned(),
             false => self.effects.join(", "),
         };
+        let declared = match self.declared_effects.as_slice() {
+            [] => String::new(),
+            some => format!("declared effects, fitted anew: {}\n", some.join(", ")),
+        };
         let mut text = format!(
-            "verdict: {}\neffects: {effects}\n\n{}{}\n\n{}\n",
+            "verdict: {}\neffects: {effects}\n{declared}\n{}{}\n\n{}{}\n",
             self.verdict.name(),
             columns(&error_rows(self)),
             error_sentences(self).join("\n"),
+            several(self),
             columns(&constant_rows(self))
         );
         text.extend(self.candidates.iter().map(candidate));
@@ -45,6 +50,48 @@ pub fn suspected(guard: &GuardModel) -> String {
         rounded(guard.errors.holdout_rms, 4),
         unit_or_as_recorded(&guard.unit)
     )
+}
+
+/// The error with ever more effects and what each explains, where there are several.
+fn several(diagnosis: &Diagnosis) -> String {
+    if diagnosis.effects.len() < 2 {
+        return String::new();
+    }
+    let mut text = columns(&ladder_rows(diagnosis)) + "\n" + &columns(&share_rows(diagnosis));
+    for pair in &diagnosis.explained.correlations {
+        let [one, other] = pair.effects;
+        text += &format!(
+            "Correlation of what {one} and {other} explain alone: {}.\n",
+            rounded(pair.correlation, 2)
+        );
+    }
+    text + "\n"
+}
+
+/// The held-out error with ever more effects, with a head.
+pub fn ladder_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
+    let head = format!("rms error, {}", unit_or_as_recorded(&diagnosis.error.unit));
+    let mut rows = vec![cells([&head, "training", "held out"])];
+    rows.extend(diagnosis.explained.ladder.iter().map(|step| {
+        let effects = match step.effects.as_slice() {
+            [] => "with none".to_owned(),
+            some => format!("with {}", some.join(" + ")),
+        };
+        let [train, holdout] = [step.errors.train_rms, step.errors.holdout_rms];
+        cells([&effects, &rounded(train, 4), &rounded(holdout, 4)])
+    }));
+    rows
+}
+
+/// What each effect explains, with a head.
+pub fn share_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
+    let mut rows = vec![cells(["effect", "share of the explained power"])];
+    let shares = diagnosis.explained.shares.iter();
+    rows.extend(shares.map(|s| {
+        let share = format!("{} %", rounded(100.0 * s.share, 2));
+        cells([s.effect, &share])
+    }));
+    rows
 }
 
 /// A number with its standard uncertainty, for people.

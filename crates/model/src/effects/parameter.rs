@@ -151,6 +151,25 @@ impl EffectParameter {
         }
     }
 
+    /// What a fit moves, from the value in its unit.
+    ///
+    /// ```
+    /// use torqcomp_model::effects::{EffectParameter, RecordScales};
+    /// let scales = RecordScales { rms: 2.0, peak: 5.0, natural_hz: 10.0, duration_s: 1.0 };
+    /// // A corner at 40 Hz is moved as its reciprocal: 10 Hz / 40 Hz.
+    /// assert_eq!(EffectParameter::corner("corner", 0.0, 1.0).moved(40.0, &scales), 0.25);
+    /// assert_eq!(EffectParameter::frequency("line", 0.0, 9.0).moved(40.0, &scales), 4.0);
+    /// ```
+    #[must_use]
+    pub fn moved(&self, value: f64, scales: &RecordScales) -> f64 {
+        let size = self.size(scales);
+        if self.reciprocal {
+            size / value
+        } else {
+            value / size
+        }
+    }
+
     /// The standard uncertainty, in its unit, of what a fit moves.
     #[must_use]
     pub fn std(&self, moved: f64, std: f64, scales: &RecordScales) -> f64 {

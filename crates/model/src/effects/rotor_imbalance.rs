@@ -39,5 +39,6 @@ pub(super) static EFFECT: Effect = Effect {
     ],
 };
 
+/// From three turns in a record on, up to any number.
 const RATE: EffectParameter =
-    EffectParameter::frequency("frequency", 0.1, 5000.0).by(ParameterScale::Absolute);
+    EffectParameter::frequency("frequency", 3.0, 1e9).by(ParameterScale::Record);

@@ -1,0 +1,51 @@
+//! The stand as its file declares it, with its effects.
+
+use std::sync::Arc;
+
+use super::structure::{EffectForm, FitContext, PlainStand, Structure};
+
+/// An effect of the stand file.
+#[derive(Clone)]
+pub struct DeclaredForm {
+    pub effect: EffectForm,
+    /// Its parameters, in units of the record, s and Hz.
+    pub values: Vec<f64>,
+}
+
+/// A stand file's plain stand and its effects.
+#[derive(Clone, Copy)]
+pub struct DeclaredStand<'a> {
+    pub plain: PlainStand,
+    pub effects: &'a [DeclaredForm],
+}
+
+impl DeclaredStand<'_> {
+    /// The plain stand with the effects of the file.
+    pub fn structure(&self, context: Arc<FitContext>) -> Structure {
+        let effects: Vec<EffectForm> = self.effects.iter().map(|e| e.effect).collect();
+        Structure {
+            context,
+            declared: effects.len(),
+            effects,
+        }
+    }
+
+    /// Values of all parameters that a fit of that structure moves.
+    pub fn values(&self, context: &FitContext) -> Vec<f64> {
+        let mut values = context.plain_values(&self.plain);
+        for declared in self.effects {
+            let effect = &declared.effect;
+            let parameters = effect.form.parameters.iter().take(effect.moved());
+            let own = parameters.zip(&declared.values);
+            values.extend(own.map(|(p, value)| p.moved(*value, &context.scales)));
+        }
+        values
+    }
+
+    /// Amplitudes of all lines.
+    pub fn amplitudes(&self) -> Vec<f64> {
+        let lines = self.effects.iter().filter(|e| e.effect.is_line());
+        let own = lines.flat_map(|e| &e.values[e.effect.moved()..]);
+        own.copied().collect()
+    }
+}

@@ -1,0 +1,190 @@
+//! Effects taken out again: which ones a model needs, what each explains, and the errors with none, with one, with two.
+
+use serde::Serialize;
+
+use super::fit::{FitEffort, FittedModel, fit};
+use super::record::dot;
+use super::records::Records;
+use super::score::{RmsErrors, ScoredModel};
+use crate::parallel::parallel;
+
+/// A fit of a model from which effects were taken out.
+const REPEATED: FitEffort = FitEffort::full(6);
+
+/// A number of effects, and the error that they leave.
+#[derive(Debug, Clone, Serialize)]
+pub struct LadderStep {
+    pub effects: Vec<&'static str>,
+    #[serde(flatten)]
+    pub errors: RmsErrors,
+    /// Probability of the gain over the step before by chance.
+    pub p_value: Option<f64>,
+}
+
+/// What one of several effects explains.
+#[derive(Debug, Clone, Serialize)]
+pub struct EffectShare {
+    pub effect: &'static str,
+    /// Power that is left without it and not with it, over that which all effects explain; on the held-out records.
+    pub share: f64,
+}
+
+/// How alike two effects change the held-out records.
+#[derive(Debug, Clone, Serialize)]
+pub struct EffectCorrelation {
+    pub effects: [&'static str; 2],
+    /// Of what each of them alone explains.
+    pub correlation: f64,
+}
+
+/// What several effects explain, each and together.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Ladder {
+    pub ladder: Vec<LadderStep>,
+    pub shares: Vec<EffectShare>,
+    pub correlations: Vec<EffectCorrelation>,
+}
+
+impl FittedModel {
+    /// The model with some of the effects that were added to it, fitted again.
+    fn with_only(&self, keep: impl Fn(usize) -> bool, records: &Records) -> Option<Self> {
+        let mut structure = self.structure.clone();
+        let mut next = structure.context.plain_count();
+        let mut values = self.values[..next].to_vec();
+        structure.effects.clear();
+        for (k, effect) in self.structure.effects.iter().enumerate() {
+            let own = next..next + effect.moved();
+            next = own.end;
+            if k.checked_sub(self.structure.declared).is_none_or(&keep) {
+                values.extend(&self.values[own]);
+                structure.effects.push(*effect);
+            }
+        }
+        let train = self.with_initial_states(&records.train);
+        fit(structure, &values, &train, REPEATED).ok()
+    }
+}
+
+impl ScoredModel {
+    /// The model without each of the effects that were added to it, in turn; `None` where that cannot be fitted.
+    pub fn without_each(&self, records: &Records, threads: usize) -> Vec<Option<Self>> {
+        parallel(self.fitted.structure.added().len(), threads, |k| {
+            let less = self.fitted.with_only(|other| other != k, records)?;
+            Self::of(less, records)
+        })
+    }
+
+    /// The model with each of the effects that were added to it, alone.
+    fn each_alone(&self, records: &Records, threads: usize) -> Vec<Option<Self>> {
+        parallel(self.fitted.structure.added().len(), threads, |k| {
+            let alone = self.fitted.with_only(|other| other == k, records)?;
+            Self::of(alone, records)
+        })
+    }
+
+    fn holdout_sum(&self) -> f64 {
+        let samples = self.holdout_samples();
+        dot(&samples, &samples)
+    }
+}
+
+impl Ladder {
+    /// What the effects of a model explain; `without` is the model without each of them.
+    pub fn of(
+        after: &ScoredModel,
+        before: &ScoredModel,
+        without: Vec<Option<ScoredModel>>,
+        records: &Records,
+        threads: usize,
+    ) -> Self {
+        let names = after.effect_names();
+        if names.is_empty() {
+            return Self::default();
+        }
+        let explained = before.holdout_sum() - after.holdout_sum();
+        let share = |(k, effect): (usize, &&'static str)| {
+            let without = match names.len() {
+                1 => Some(before),
+                _ => without.get(k)?.as_ref(),
+            };
+            Some(EffectShare {
+                effect,
+                share: (without?.holdout_sum() - after.holdout_sum()) / explained,
+            })
+        };
+        Self {
+            shares: names.iter().enumerate().filter_map(share).collect(),
+            correlations: correlations(after, before, records, threads),
+            ladder: steps(after, before, without, records, threads),
+        }
+    }
+}
+
+/// The models from none of the effects to all: from the last one on, the effect goes whose absence the training records show
+/// least.
+fn steps(
+    after: &ScoredModel,
+    before: &ScoredModel,
+    mut without: Vec<Option<ScoredModel>>,
+    records: &Records,
+    threads: usize,
+) -> Vec<LadderStep> {
+    let mut models = vec![after.clone()];
+    while let Some(less) = without
+        .into_iter()
+        .flatten()
+        .min_by(|a, b| a.fitted.train_sum.total_cmp(&b.fitted.train_sum))
+    {
+        without = match less.effect_names().len() {
+            0 | 1 => Vec::new(),
+            _ => less.without_each(records, threads),
+        };
+        models.push(less);
+    }
+    if models.last().is_some_and(|m| !m.effect_names().is_empty()) {
+        models.push(before.clone());
+    }
+    models.reverse();
+    let step = |k: usize| LadderStep {
+        effects: models[k].effect_names(),
+        errors: models[k].errors(),
+        p_value: match k {
+            0 => None,
+            _ => models[k].against(&models[k - 1]).p_value(),
+        },
+    };
+    (0..models.len()).map(step).collect()
+}
+
+fn correlations(
+    after: &ScoredModel,
+    before: &ScoredModel,
+    records: &Records,
+    threads: usize,
+) -> Vec<EffectCorrelation> {
+    let names = after.effect_names();
+    if names.len() < 2 {
+        return Vec::new();
+    }
+    let residual = before.holdout_samples();
+    let alone = after.each_alone(records, threads).into_iter();
+    let changes: Vec<Option<Vec<f64>>> = alone
+        .map(|model| {
+            let left = model?.holdout_samples();
+            Some(residual.iter().zip(left).map(|(b, a)| b - a).collect())
+        })
+        .collect();
+    let mut found = Vec::new();
+    for (k, one) in changes.iter().enumerate() {
+        for (j, other) in changes.iter().enumerate().skip(k + 1) {
+            let (Some(one), Some(other)) = (one, other) else {
+                continue;
+            };
+            found.push(EffectCorrelation {
+                effects: [names[k], names[j]],
+                correlation: dot(one, other) / (dot(one, one) * dot(other, other)).sqrt(),
+            });
+        }
+    }
+    found
+}

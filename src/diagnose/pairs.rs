@@ -1,0 +1,162 @@
+//! Pairs of effects fitted together: what two effects leave shows neither of them clearly while the other is missing.
+
+use super::fit::{FitEffort, FittedModel, fit};
+use super::record::dot;
+use super::records::Records;
+use super::score::{BaseModel, ScoredModel};
+use super::search::Workers;
+use super::structure::EffectForm;
+use crate::parallel::parallel;
+
+/// Pairs that get a first, a second and a full fit.
+const FITTED: [usize; 3] = [8, 3, 2];
+const EFFORTS: [FitEffort; 3] = [
+    FitEffort::brief(3),
+    FitEffort::brief(5),
+    FitEffort::full(15),
+];
+/// Smallest and largest factor on the size of an effect in a pair, over its size alone.
+const FACTORS: [f64; 2] = [0.1, 2.0];
+
+/// What an effect, fitted alone, changes of the training residuals.
+struct Change {
+    effect: EffectForm,
+    /// Parameters of the plain stand less those of the base, and the effect's own.
+    plain: Vec<f64>,
+    own: Vec<f64>,
+    /// Over all training records, without what the base's own parameters can change.
+    samples: Vec<f64>,
+}
+
+/// Two changes, and the sizes with which both together leave least.
+struct Pair {
+    members: [usize; 2],
+    factors: [f64; 2],
+    /// Reduction of the training sum of squares, to first order.
+    reduction: f64,
+}
+
+/// The pair of effects with the smallest criterion on the training records, of those that reduce the training error most to
+/// first order. `alone` are fits of single effects beside the same base.
+pub fn best_pair(
+    base: &BaseModel,
+    alone: &[ScoredModel],
+    records: &Records,
+    workers: Workers,
+) -> Option<ScoredModel> {
+    let changes: Vec<Change> = alone.iter().map(|model| Change::of(base, model)).collect();
+    let residual = base.cleared(|k| base.scored.train[k].samples.clone());
+    let mut pairs = pairs(&changes, &residual);
+    pairs.truncate(FITTED[0]);
+    let training = base.scored.fitted.with_initial_states(&records.train);
+    let mut fits: Vec<FittedModel> = parallel(pairs.len(), workers.threads, |k| {
+        let (structure, start) = pairs[k].start(base, &changes);
+        fit(structure, &start, &training, EFFORTS[0]).ok()
+    })
+    .into_iter()
+    .flatten()
+    .collect();
+    for (count, effort) in FITTED.into_iter().zip(EFFORTS).skip(1) {
+        fits.sort_by(|a, b| a.train_sum.total_cmp(&b.train_sum));
+        fits.truncate(count);
+        let again = parallel(fits.len(), workers.threads, |k| {
+            fits[k].refit(&records.train, effort).ok()
+        });
+        for (old, new) in fits.iter_mut().zip(again) {
+            if let Some(new) = new.filter(|new| new.train_sum < old.train_sum) {
+                *old = new;
+            }
+        }
+    }
+    let scored = fits
+        .into_iter()
+        .filter_map(|fit| ScoredModel::of(fit, records));
+    scored.min_by(|a, b| a.criterion().total_cmp(&b.criterion()))
+}
+
+impl Change {
+    fn of(base: &BaseModel, model: &ScoredModel) -> Self {
+        let before = &base.scored;
+        let count = before.fitted.structure.context.plain_count();
+        let values = &model.fitted.values;
+        let plain = values[..count].iter().zip(&before.fitted.values);
+        Self {
+            effect: model.fitted.structure.effects[before.fitted.structure.effects.len()],
+            plain: plain.map(|(with, without)| with - without).collect(),
+            own: values[before.fitted.values.len()..].to_vec(),
+            samples: base.cleared(|k| {
+                let pairs = before.train[k].samples.iter().zip(&model.train[k].samples);
+                pairs.map(|(before, after)| before - after).collect()
+            }),
+        }
+    }
+}
+
+impl Pair {
+    /// Structure and start values: each effect in its size of the pair, the plain stand moved by both.
+    fn start(
+        &self,
+        base: &BaseModel,
+        changes: &[Change],
+    ) -> (super::structure::Structure, Vec<f64>) {
+        let fitted = &base.scored.fitted;
+        let (mut structure, mut values) = (fitted.structure.clone(), fitted.values.clone());
+        for (member, factor) in self.members.iter().zip(self.factors) {
+            let change = &changes[*member];
+            let factor = factor.clamp(FACTORS[0], FACTORS[1]);
+            for (value, moved) in values.iter_mut().zip(&change.plain) {
+                *value += factor * moved;
+            }
+            let mut own = change.own.clone();
+            if let Some(size) = change.effect.size() {
+                own[size] *= factor;
+            }
+            values.extend(own);
+            structure = structure.with(change.effect);
+        }
+        (structure, values)
+    }
+}
+
+/// All pairs of different effects, each in its best forms, by what they reduce the training sum of squares.
+fn pairs(changes: &[Change], residual: &[f64]) -> Vec<Pair> {
+    let along: Vec<f64> = changes.iter().map(|c| dot(&c.samples, residual)).collect();
+    let mut found: Vec<Pair> = Vec::new();
+    for (k, one) in changes.iter().enumerate() {
+        let own = dot(&one.samples, &one.samples);
+        for (j, other) in changes.iter().enumerate().skip(k + 1) {
+            if one.effect.effect.name == other.effect.effect.name {
+                continue;
+            }
+            let (square, mixed) = (
+                dot(&other.samples, &other.samples),
+                dot(&one.samples, &other.samples),
+            );
+            let determinant = own * square - mixed * mixed;
+            if determinant <= NEARLY_THE_SAME * own * square {
+                continue;
+            }
+            let factors = [
+                (square * along[k] - mixed * along[j]) / determinant,
+                (own * along[j] - mixed * along[k]) / determinant,
+            ];
+            found.push(Pair {
+                members: [k, j],
+                factors,
+                reduction: factors[0] * along[k] + factors[1] * along[j],
+            });
+        }
+    }
+    found.sort_by(|a, b| b.reduction.total_cmp(&a.reduction));
+    let names = |pair: &Pair| pair.members.map(|k| changes[k].effect.effect.name);
+    let mut seen = Vec::new();
+    found.retain(|pair| {
+        let is_new = !seen.contains(&names(pair));
+        seen.push(names(pair));
+        is_new
+    });
+    found
+}
+
+/// One less the squared correlation of two changes below which they count as one.
+const NEARLY_THE_SAME: f64 = 1e-4;

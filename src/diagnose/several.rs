@@ -1,0 +1,237 @@
+//! The way from the plain stand to one with effects: singles, pairs, one after the other; what is not needed goes again, and
+//! laws beside the list may speak against what is left.
+
+use super::SearchState;
+use super::guard_models::GuardModel;
+use super::ladder::Ladder;
+use super::pairs::best_pair;
+use super::reason::{Reason, Status};
+use super::residual_tests::ResidualTests;
+use super::score::{BaseModel, ScoredModel};
+use super::search::{self, Workers, no_gain, refusal, reject_all};
+use super::verdict::{PlainExcess, noise_rms, remains};
+
+/// Most effects that are added.
+const MOST_EFFECTS: usize = 5;
+
+impl SearchState {
+    /// Adds effects to the plain stand. `coarse` is the number of steps of integration for that.
+    pub(super) fn build(&mut self, coarse: usize, workers: Workers) {
+        let base = BaseModel::of(self.before.clone(), &self.records);
+        self.add_first(&base, coarse, workers);
+        while self.has_room() && self.add_another(coarse, workers) {}
+        let without = self.eliminate(workers.threads);
+        let without = self.ask_guards(&base, without, workers);
+        self.ladder = Ladder::of(
+            &self.after,
+            &self.before,
+            without,
+            &self.records,
+            workers.threads,
+        );
+    }
+
+    /// Adds the best effect, or the best pair where that explains more.
+    fn add_first(&mut self, base: &BaseModel, coarse: usize, workers: Workers) {
+        let records = &self.records;
+        let round = search::try_all(base, records, workers);
+        let mut next = round.accepted().cloned();
+        let tests = next.as_ref().map(super::tests);
+        let best = next.as_ref().zip(tests.as_ref());
+        let (model, tests) = best.unwrap_or((&self.before, &self.tests_before));
+        if self.is_worthwhile(model, tests) {
+            let pair = best_pair(base, &round.fits, records, workers);
+            let pair = pair.filter(|pair| refusal(pair, model).is_none());
+            next = pair.or(next);
+        }
+        self.rounds.push(round.tried);
+        if let Some(next) = next {
+            self.take(&next, coarse);
+        }
+    }
+
+    /// Adds one more effect; whether there was one.
+    fn add_another(&mut self, coarse: usize, workers: Workers) -> bool {
+        let base = BaseModel::of(self.after.clone(), &self.records);
+        let round = search::try_all(&base, &self.records, workers);
+        let accepted = round.accepted();
+        let next = accepted.filter(|next| !self.excess().is_too_small(&self.after, next));
+        let next = next.cloned();
+        let mut tried = round.tried;
+        if next.is_none() {
+            reject_all(&mut tried, |_| PlainExcess::too_small());
+        }
+        self.rounds.push(tried);
+        if let Some(next) = &next {
+            self.take(next, coarse);
+        }
+        next.is_some()
+    }
+
+    /// Makes a model the one with the effects found so far.
+    fn take(&mut self, next: &ScoredModel, coarse: usize) {
+        (self.after, self.settled) = next.clone().refine_step(&mut self.records, coarse);
+        self.tests = super::tests(&self.after);
+        self.path.push(self.after.clone());
+    }
+
+    /// Whether another effect is looked for: not beside a law for which the integration does not converge.
+    fn has_room(&self) -> bool {
+        let count = self.after.effect_names().len();
+        let is_open = (1..MOST_EFFECTS).contains(&count) && self.settled;
+        is_open && self.is_worthwhile(&self.after, &self.tests)
+    }
+
+    /// Whether a model leaves enough for another effect: something above the noise, or a residual that is not noise alone.
+    fn is_worthwhile(&self, model: &ScoredModel, tests: &ResidualTests) -> bool {
+        let is_noise = tests.white && tests.independent_of_input;
+        !is_noise || remains(model, tests, self.noise_floor)
+    }
+
+    /// Takes out again what is not needed; the model without each of the effects that are left.
+    fn eliminate(&mut self, threads: usize) -> Vec<Option<ScoredModel>> {
+        while self.after.effect_names().len() > 1 {
+            let mut without = self.after.without_each(&self.records, threads);
+            let Some(k) = self.needless(&without) else {
+                return without;
+            };
+            let names = self.after.effect_names();
+            let Some(less) = without.swap_remove(k) else {
+                break;
+            };
+            let others = less.effect_names().join(" + ");
+            for tried in self.rounds.iter_mut().flatten() {
+                if tried.effect.name == names[k] && tried.status() == Status::Accepted {
+                    tried.reason = Reason::Needless {
+                        others: others.clone(),
+                    };
+                }
+            }
+            self.tests = super::tests(&less);
+            self.after = less;
+        }
+        Vec::new()
+    }
+
+    /// The effect that is missed least, if its absence does not show.
+    fn needless(&self, without: &[Option<ScoredModel>]) -> Option<usize> {
+        let (after, excess) = (&self.after, self.excess());
+        let is_needless = |less: &ScoredModel| {
+            no_gain(after, less).is_some()
+                || after.criterion() >= less.criterion()
+                || excess.is_too_small(less, after)
+        };
+        let all = without.iter().enumerate();
+        let models = all.filter_map(|(k, less)| Some((k, less.as_ref()?)));
+        let needless = models.filter(|(_, less)| is_needless(less));
+        let least = needless.min_by(|(_, a), (_, b)| a.criterion().total_cmp(&b.criterion()));
+        least.map(|(k, _)| k)
+    }
+
+    /// Asks laws beside the list whether they explain more: than all effects, than the last of several, and beside all.
+    /// The model without each of the effects that are left.
+    fn ask_guards(
+        &mut self,
+        base: &BaseModel,
+        mut without: Vec<Option<ScoredModel>>,
+        workers: Workers,
+    ) -> Vec<Option<ScoredModel>> {
+        let noise_rms = noise_rms(self.noise_floor);
+        let count = self.after.effect_names().len();
+        let is_left = remains(&self.after, &self.tests, self.noise_floor);
+        let records = &self.records;
+        let ask = |base: &BaseModel, against: Option<&ScoredModel>| {
+            GuardModel::best(base, against, noise_rms, records, workers)
+        };
+        let instead = match count {
+            0 if !is_left => None,
+            0 => ask(base, None),
+            _ => ask(base, Some(&self.after)),
+        };
+        if let Some(guard) = instead {
+            self.withdraw(guard, self.before.clone());
+            return Vec::new();
+        }
+        if count > 1 && is_left {
+            for k in 0..without.len() {
+                let Some(less) = &without[k] else { continue };
+                let beside = BaseModel::of(less.clone(), records);
+                if let Some(guard) = ask(&beside, Some(&self.after)) {
+                    let less = less.clone();
+                    self.withdraw(guard, less);
+                    without = match count {
+                        2 => Vec::new(),
+                        _ => self.after.without_each(&self.records, workers.threads),
+                    };
+                    return without;
+                }
+            }
+        }
+        if count > 0 && is_left {
+            self.suspected = ask(&BaseModel::of(self.after.clone(), records), None);
+        }
+        without
+    }
+
+    /// Goes back to a model with fewer effects, as a law beside the list explains more than the others.
+    fn withdraw(&mut self, guard: GuardModel, less: ScoredModel) {
+        let kept = less.effect_names();
+        for round in &mut self.rounds {
+            let is_named = |name: &str| kept.contains(&name);
+            for candidate in round.iter_mut().filter(|c| !is_named(c.effect.name)) {
+                reject_all(std::slice::from_mut(candidate), |c| guard.instead_of(c));
+            }
+        }
+        self.tests = super::tests(&less);
+        self.after = less;
+        self.suspected = Some(guard);
+    }
+
+    /// What the plain stand leaves, and the noise in it.
+    pub(super) fn excess(&self) -> PlainExcess<'_> {
+        PlainExcess {
+            before: &self.before,
+            noise_floor: self.noise_floor,
+        }
+    }
+
+    /// Brings the candidates in line with the effects that were added in the end.
+    pub(super) fn settle_candidates(&mut self) {
+        let names = self.after.effect_names();
+        let left = self.after.holdout_rms();
+        let all = names.join(" + ");
+        for candidate in self.rounds.iter_mut().flatten() {
+            let is_stale = match &candidate.reason {
+                Reason::Best => !names.is_empty(),
+                Reason::Tied { best, .. } | Reason::MoreParameters { best } => {
+                    !names.is_empty() && !names.contains(best)
+                }
+                _ => false,
+            };
+            if let Some(model) = candidate.model.as_ref().filter(|_| is_stale) {
+                candidate.reason = Reason::Worse {
+                    ratio: model.holdout_rms() / left,
+                    best: all.clone(),
+                };
+            }
+        }
+        let declared = self.after.fitted.structure.declared;
+        let parameters = self.after.parameters().split_off(declared);
+        let (added, errors) = (self.after.fitted.structure.added(), self.after.errors());
+        for (k, (effect, own)) in added.iter().zip(parameters).enumerate() {
+            let entries = self.rounds.iter_mut().flatten();
+            let named = entries.filter(|c| c.effect.name == effect.effect.name);
+            let Some(entry) = named.filter(|c| c.model.is_some()).last() else {
+                continue;
+            };
+            entry.reason = Reason::Best;
+            entry.form = Some(effect.form.name);
+            entry.with = names[..k].to_vec();
+            entry.parameters = own;
+            if k + 1 == names.len() {
+                entry.train_rms = Some(errors.train_rms);
+                entry.holdout_rms = Some(errors.holdout_rms);
+            }
+        }
+    }
+}
