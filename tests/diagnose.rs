@@ -331,3 +331,39 @@ fn a_declared_constant_is_taken_off_once() {
         "{first} {second}"
     );
 }
+
+/// The same records on stands of another speed and size get the same answer: no constant of the search is in seconds, hertz or
+/// newton metres.
+#[test]
+fn answers_do_not_depend_on_the_scale_of_time_and_torque() {
+    let case = make(7, "rotor-imbalance", 1).expect("the catalogue has it");
+    let rate = case.truth["parameters"]["frequency_hz"].as_f64();
+    let rate_hz = rate.expect("the truth says it");
+    for (stretch, size) in [(1.0, 1.0), (1.0 / 1200.0, 1.0), (30.0, 1e-4), (0.1, 1.0)] {
+        let folder = Folder::new();
+        let natural_hz = 592.0 / stretch;
+        folder.write(
+            "stand.toml",
+            format!(
+                "schema = \"torqcomp.stand/1\"\n[mechanics]\nnatural_frequency = \"{natural_hz} Hz\"\ndamping_ratio = 0.07\n"
+            ),
+        );
+        for (name, record) in [("train.csv", &case.train), ("holdout.csv", &case.holdout)] {
+            let mut table = String::from("time_s,applied_n_m,measured_n_m\n");
+            let rows = record.applied_n_m.iter().zip(&record.measured_n_m);
+            for (i, (applied, measured)) in rows.take(KEPT).enumerate() {
+                let time_s = i as f64 * stretch / 20_000.0;
+                let [applied, measured] = [applied, measured].map(|torque| torque * size);
+                table += &format!("{time_s:.12e},{applied:.12e},{measured:.12e}\n");
+            }
+            folder.write(name, table);
+        }
+        let report = folder.json(&diagnose(&["--json"]));
+        let names = serde_json::json!(["rotor-imbalance"]);
+        assert_eq!(report["effects"], names, "{stretch} {size}");
+        assert_eq!(report["verdict"], "explained", "{stretch} {size}");
+        let found_hz = report["candidates"][0]["parameters"][0]["value"].as_f64();
+        let ratio = found_hz.expect("a number") * stretch / rate_hz;
+        assert!((ratio - 1.0).abs() < 0.01, "{stretch} {size}: {ratio}");
+    }
+}

@@ -8,8 +8,10 @@ use super::search::Workers;
 use super::structure::EffectForm;
 use crate::parallel::parallel;
 
+/// Forms of a pair of effects that are fitted.
+const FORMS: usize = 2;
 /// Pairs that get a first, a second and a full fit.
-const FITTED: [usize; 3] = [8, 3, 2];
+const FITTED: [usize; 3] = [10, 5, 3];
 const EFFORTS: [FitEffort; 3] = [
     FitEffort::brief(3),
     FitEffort::brief(5),
@@ -32,18 +34,18 @@ struct Change {
 struct Pair {
     members: [usize; 2],
     factors: [f64; 2],
-    /// Reduction of the training sum of squares, to first order.
-    reduction: f64,
+    /// Bayesian information criterion on the training records, less a constant, to first order.
+    criterion: f64,
 }
 
-/// The pair of effects with the smallest criterion on the training records, of those that reduce the training error most to
-/// first order. `alone` are fits of single effects beside the same base.
-pub fn best_pair(
+/// Pairs of effects, the one with the smallest criterion first, of those for which it is smallest to first order.
+/// `alone` are fits of single effects beside the same base.
+pub fn best_pairs(
     base: &BaseModel,
     alone: &[ScoredModel],
     records: &Records,
     workers: Workers,
-) -> Option<ScoredModel> {
+) -> Vec<ScoredModel> {
     let changes: Vec<Change> = alone.iter().map(|model| Change::of(base, model)).collect();
     let residual = base.cleared(|k| base.scored.train[k].samples.clone());
     let mut pairs = pairs(&changes, &residual);
@@ -68,10 +70,12 @@ pub fn best_pair(
             }
         }
     }
-    let scored = fits
-        .into_iter()
-        .filter_map(|fit| ScoredModel::of(fit, records));
-    scored.min_by(|a, b| a.criterion().total_cmp(&b.criterion()))
+    let fits = fits.into_iter();
+    let mut scored: Vec<ScoredModel> = fits
+        .filter_map(|fit| ScoredModel::of(fit, records))
+        .collect();
+    scored.sort_by(|a, b| a.pooled_criterion().total_cmp(&b.pooled_criterion()));
+    scored
 }
 
 impl Change {
@@ -118,8 +122,9 @@ impl Pair {
     }
 }
 
-/// All pairs of different effects, each in its best forms, by what they reduce the training sum of squares.
+/// All pairs of different effects, each in its best forms, the one with the smallest criterion first.
 fn pairs(changes: &[Change], residual: &[f64]) -> Vec<Pair> {
+    let (count, whole) = (residual.len() as f64, dot(residual, residual));
     let along: Vec<f64> = changes.iter().map(|c| dot(&c.samples, residual)).collect();
     let mut found: Vec<Pair> = Vec::new();
     for (k, one) in changes.iter().enumerate() {
@@ -140,20 +145,24 @@ fn pairs(changes: &[Change], residual: &[f64]) -> Vec<Pair> {
                 (square * along[k] - mixed * along[j]) / determinant,
                 (own * along[j] - mixed * along[k]) / determinant,
             ];
+            let reduction = factors[0] * along[k] + factors[1] * along[j];
+            let left = (1.0 - reduction / whole).max(f64::EPSILON);
+            let parameters = (one.own.len() + other.own.len()) as f64;
             found.push(Pair {
                 members: [k, j],
                 factors,
-                reduction: factors[0] * along[k] + factors[1] * along[j],
+                criterion: count * left.ln() + parameters * count.ln(),
             });
         }
     }
-    found.sort_by(|a, b| b.reduction.total_cmp(&a.reduction));
+    found.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
     let names = |pair: &Pair| pair.members.map(|k| changes[k].effect.effect.name);
     let mut seen = Vec::new();
     found.retain(|pair| {
-        let is_new = !seen.contains(&names(pair));
+        let before = seen.iter().filter(|names_of| **names_of == names(pair));
+        let is_kept = before.count() < FORMS;
         seen.push(names(pair));
-        is_new
+        is_kept
     });
     found
 }

@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use serde::{Serialize, Serializer};
 use torqcomp_model::effects::{EFFECTS, Effect};
 
+use super::blocks::{Comparison, family_p_values};
 use super::fit::{FitEffort, FittedModel, fit};
 use super::reason::{Reason, Status};
 use super::records::Records;
@@ -15,7 +16,7 @@ use super::structure::EffectForm;
 use crate::parallel::parallel;
 
 /// An effect that was tried, in its best form.
-#[derive(Serialize)]
+#[derive(Clone, Serialize)]
 pub struct CandidateFit {
     #[serde(serialize_with = "name_of")]
     pub effect: &'static Effect,
@@ -24,7 +25,7 @@ pub struct CandidateFit {
     pub with: Vec<&'static str>,
     pub train_rms: Option<f64>,
     pub holdout_rms: Option<f64>,
-    /// Probability of its gain by chance.
+    /// Probability of its gain by chance, for the number of effects tried beside it.
     pub p_value: Option<f64>,
     pub parameters: Vec<EffectParameter>,
     #[serde(flatten)]
@@ -128,9 +129,20 @@ pub fn try_all(base: &BaseModel, records: &Records, workers: Workers) -> Round {
             CandidateFit::new(effect, &base.scored, best.cloned())
         })
         .collect();
+    set_p_values(&mut tried, &base.scored);
     decide(&mut tried);
     let fits = fits.into_iter().flatten().collect();
     Round { tried, fits }
+}
+
+/// Sets the probability of each gain, for the number of effects that were tried.
+fn set_p_values(tried: &mut [CandidateFit], base: &ScoredModel) {
+    let models = tried.iter().filter_map(|c| c.model.as_ref());
+    let comparisons: Vec<Comparison> = models.map(|model| model.against(base)).collect();
+    let fitted = tried.iter_mut().filter(|c| c.model.is_some());
+    for (candidate, p) in fitted.zip(family_p_values(&comparisons)) {
+        candidate.p_value = p;
+    }
 }
 
 impl CandidateFit {
@@ -139,7 +151,6 @@ impl CandidateFit {
             .as_ref()
             .and_then(|m| m.fitted.structure.effects.last());
         let errors = model.as_ref().map(ScoredModel::errors);
-        let comparison = model.as_ref().map(|m| m.against(base));
         let refusal = model.as_ref().map(|m| refusal(m, base));
         Self {
             effect,
@@ -147,7 +158,7 @@ impl CandidateFit {
             with: base.effect_names(),
             train_rms: errors.map(|e| e.train_rms),
             holdout_rms: errors.map(|e| e.holdout_rms),
-            p_value: comparison.and_then(|c| c.p_value()),
+            p_value: None,
             parameters: model
                 .as_ref()
                 .map_or_else(Vec::new, ScoredModel::last_parameters),

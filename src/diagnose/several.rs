@@ -4,50 +4,106 @@
 use super::SearchState;
 use super::guard_models::GuardModel;
 use super::ladder::Ladder;
-use super::pairs::best_pair;
+use super::pairs::best_pairs;
 use super::reason::{Reason, Status};
 use super::residual_tests::ResidualTests;
 use super::score::{BaseModel, ScoredModel};
-use super::search::{self, Workers, no_gain, refusal, reject_all};
+use super::search::{self, CandidateFit, Round, Workers, no_gain, refusal, reject_all};
 use super::verdict::{PlainExcess, noise_rms, remains};
 
 /// Most effects that are added.
 const MOST_EFFECTS: usize = 5;
 
+/// Ways to several effects that are followed: the second if the first leaves more than noise, or if it begins with less.
+const WAYS: usize = 2;
+
+/// Where a way to several effects led.
+struct Way {
+    after: ScoredModel,
+    tests: ResidualTests,
+    settled: bool,
+    rounds: Vec<Vec<CandidateFit>>,
+    path: Vec<ScoredModel>,
+    /// The model without each of its effects.
+    without: Vec<Option<ScoredModel>>,
+}
+
 impl SearchState {
     /// Adds effects to the plain stand. `coarse` is the number of steps of integration for that.
     pub(super) fn build(&mut self, coarse: usize, workers: Workers) {
         let base = BaseModel::of(self.before.clone(), &self.records);
-        self.add_first(&base, coarse, workers);
-        while self.has_room() && self.add_another(coarse, workers) {}
-        let without = self.eliminate(workers.threads);
+        let round = search::try_all(&base, &self.records, workers);
+        let starts = self.starts(&base, &round, workers);
+        self.rounds.push(round.tried);
+        let mut best: Option<Way> = None;
+        for start in starts.iter().take(WAYS) {
+            let beats = |best: &Way| {
+                let is_open = remains(&best.after, &best.tests, self.noise_floor);
+                is_open || start.pooled_criterion() < best.after.pooled_criterion()
+            };
+            if !best.as_ref().is_none_or(beats) {
+                continue;
+            }
+            let way = self.follow(start, coarse, workers);
+            let criterion = way.after.pooled_criterion();
+            if best
+                .as_ref()
+                .is_none_or(|best| criterion < best.after.pooled_criterion())
+            {
+                best = Some(way);
+            }
+        }
+        let without = best.map_or_else(Vec::new, |way| self.arrive(way));
         let without = self.ask_guards(&base, without, workers);
-        self.ladder = Ladder::of(
-            &self.after,
-            &self.before,
-            without,
-            &self.records,
-            workers.threads,
-        );
+        let threads = workers.threads;
+        self.ladder = Ladder::of(&self.after, &self.before, without, &self.records, threads);
     }
 
-    /// Adds the best effect, or the best pair where that explains more.
-    fn add_first(&mut self, base: &BaseModel, coarse: usize, workers: Workers) {
-        let records = &self.records;
-        let round = search::try_all(base, records, workers);
-        let mut next = round.accepted().cloned();
-        let tests = next.as_ref().map(super::tests);
-        let best = next.as_ref().zip(tests.as_ref());
+    /// Where ways begin: with the best effect; with the best pair, if that explains more and has other effects.
+    fn starts(&self, base: &BaseModel, round: &Round, workers: Workers) -> Vec<ScoredModel> {
+        let single = round.accepted();
+        let tests = single.map(super::tests);
+        let best = single.zip(tests.as_ref());
         let (model, tests) = best.unwrap_or((&self.before, &self.tests_before));
-        if self.is_worthwhile(model, tests) {
-            let pair = best_pair(base, &round.fits, records, workers);
-            let pair = pair.filter(|pair| refusal(pair, model).is_none());
-            next = pair.or(next);
+        if !self.is_worthwhile(model, tests) {
+            return single.cloned().into_iter().collect();
         }
-        self.rounds.push(round.tried);
-        if let Some(next) = next {
-            self.take(&next, coarse);
+        let mut starts = best_pairs(base, &round.fits, &self.records, workers);
+        starts.retain(|pair| refusal(pair, model).is_none());
+        if let Some(single) = single {
+            // Beside the best effect all others are compared, ties included.
+            let names = starts.first().map(ScoredModel::effect_names);
+            let is_part = names.is_none_or(|names| names.contains(&single.effect_names()[0]));
+            starts.insert(usize::from(!is_part), single.clone());
         }
+        starts
+    }
+
+    /// Follows one way from its start: further effects, then without those that are not needed.
+    fn follow(&mut self, start: &ScoredModel, coarse: usize, workers: Workers) -> Way {
+        let rounds = self.rounds.clone();
+        self.path.clear();
+        self.take(start, coarse);
+        while self.has_room() && self.add_another(coarse, workers) {}
+        let without = self.eliminate(workers.threads);
+        Way {
+            after: self.after.clone(),
+            tests: self.tests.clone(),
+            settled: self.settled,
+            rounds: std::mem::replace(&mut self.rounds, rounds),
+            path: std::mem::take(&mut self.path),
+            without,
+        }
+    }
+
+    /// Takes over where a way led; the model without each of its effects.
+    fn arrive(&mut self, way: Way) -> Vec<Option<ScoredModel>> {
+        self.after = way.after;
+        self.tests = way.tests;
+        self.settled = way.settled;
+        self.rounds = way.rounds;
+        self.path = way.path;
+        way.without
     }
 
     /// Adds one more effect; whether there was one.
