@@ -1,5 +1,7 @@
 //! Numbers, columns and documents as they are printed.
 
+use std::fmt;
+
 use serde::Serialize;
 use unicode_width::UnicodeWidthStr;
 
@@ -164,12 +166,12 @@ pub fn value_and_std(value: f64, std: f64) -> [String; 2] {
 /// assert_eq!(plural(2, "stretch"), "2 stretches");
 /// ```
 #[must_use]
-pub fn plural(count: usize, noun: &str) -> String {
-    match (count, noun.ends_with("ch")) {
-        (1, _) => format!("1 {noun}"),
-        (_, true) => format!("{count} {noun}es"),
-        (_, false) => format!("{count} {noun}s"),
+pub fn plural<N: fmt::Display + PartialEq + From<u8>>(count: N, noun: &str) -> String {
+    if count == N::from(1) {
+        return format!("1 {noun}");
     }
+    let ending = if noun.ends_with("ch") { "es" } else { "s" };
+    format!("{count} {noun}{ending}")
 }
 
 /// `a, b or c`.

@@ -165,6 +165,23 @@ impl WayBack {
     }
 }
 
+/// What was lost comes first, then what is known of the record, its stand and its channel.
+fn of_inputs(way: &WayBack, record: &UniformRecord) -> Vec<Warning> {
+    let of_stand = way.stand.iter().flat_map(|(stand, _)| &stand.warnings);
+    let lost = record.summary.lost.iter();
+    let said = lost.chain(&record.summary.warnings).chain(of_stand);
+    said.chain(&way.chain.warnings).cloned().collect()
+}
+
+/// The moment at which the phases hold, and the time of the first sample after it in s. Far from zero, a phase there would
+/// be an extrapolation over many periods.
+fn phase_reference(start: Moment, duration_s: f64) -> (Moment, f64) {
+    match start.seconds().abs() > FAR_FROM_ZERO * duration_s {
+        true => (start, 0.0),
+        false => (Moment::default(), start.seconds()),
+    }
+}
+
 fn fit(
     args: &cli::Harmonics,
     way: &WayBack,
@@ -174,16 +191,7 @@ fn fit(
 ) -> Result<HarmonicsReport, Failure> {
     let samples = &record.samples;
     let duration_s = samples.len() as f64 / record.rate_hz;
-    let mut warnings: Vec<Warning> = record.summary.lost.iter().cloned().collect();
-    let of_stand = way.stand.iter().flat_map(|(stand, _)| &stand.warnings);
-    let of_chain = way.chain.warnings.iter();
-    let said = record
-        .summary
-        .warnings
-        .iter()
-        .chain(of_stand)
-        .chain(of_chain);
-    warnings.extend(said.cloned());
+    let mut warnings = of_inputs(way, record);
     let orders = visible_orders(args, record.rate_hz, &mut warnings)?;
     let fundamental = if args.refine {
         let span = 0.01 * args.refine_span;
@@ -191,14 +199,7 @@ fn fit(
     } else {
         Fundamental::given(args.fundamental)
     };
-    // Far from zero, a phase there would be an extrapolation over many periods.
-    let is_far = record.start.seconds().abs() > FAR_FROM_ZERO * duration_s;
-    let reference = if is_far {
-        record.start
-    } else {
-        Moment::default()
-    };
-    let start_s = if is_far { 0.0 } else { record.start.seconds() };
+    let (reference, start_s) = phase_reference(record.start, duration_s);
     let found = harmonics::fit(samples, record.rate_hz, start_s, fundamental, &orders)?;
 
     let chain = &way.chain;

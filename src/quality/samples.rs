@@ -9,7 +9,7 @@ use torqcomp_dsp::quality::stuck::{constant, standstills};
 use torqcomp_dsp::quality::{Run, is_straight, range};
 
 use super::{place, with_unit};
-use crate::print::{rounded, short};
+use crate::print::{plural, rounded, short};
 use crate::recording::{Hole, HoleKind, TimeAxis};
 use crate::warning::Warning;
 
@@ -161,9 +161,9 @@ fn non_finite_cells(name: &str, found: &NonFinite, axis: &TimeAxis, holes: &[Hol
     Warning::new(
         "non-finite",
         format!(
-            "\"{name}\": {} sample(s) are missing or no finite numbers{counts}, the first at \
-             {}{line}, at most {} in a row; remove or repair them before processing",
-            found.count,
+            "\"{name}\": {} without a finite number{counts}, the first at {}{line}, at most {} in a row; \
+             remove or repair them before processing",
+            plural(found.count, "sample"),
             place(axis, found.first),
             found.longest
         ),
@@ -174,12 +174,12 @@ fn clipped(name: &str, unit: &str, end: &str, rail: &Rail, axis: &TimeAxis) -> W
     Warning::new(
         "clipped",
         format!(
-            "\"{name}\" is cut off at its {end} value of {}: {} samples have exactly that, {} run(s) \
-             of up to {} begin or end in full motion, the first at {}; use a larger range of the \
+            "\"{name}\" is cut off at its {end} value of {}: {} are exactly there, in {} of up to {} \
+             samples that the signal enters or leaves in full motion, the first at {}; use a larger range of the \
              recorder, unless the signal itself is limited there",
             with_unit(rail.value, unit, 6),
-            rail.samples,
-            rail.runs,
+            plural(rail.samples, "sample"),
+            plural(rail.runs, "run"),
             rail.longest,
             place(axis, rail.first)
         ),
@@ -192,9 +192,9 @@ fn stuck(name: &str, unit: &str, runs: &[Run], axis: &TimeAxis) -> Option<Warnin
     Some(Warning::new(
         "stuck-channel",
         format!(
-            "\"{name}\" stands still {} time(s), for {samples} samples in all; the longest is at {} \
-             from {} on, {} samples: at rest, or a cable, a transmitter or the recorder dropped out",
-            runs.len(),
+            "\"{name}\" stands still in {}, {samples} samples in all; the longest is at {} from {} on, {} samples: \
+             at rest, or a cable, a transmitter or the recorder dropped out",
+            plural(runs.len(), "stretch"),
             with_unit(longest.value, unit, 6),
             place(axis, longest.start),
             longest.length

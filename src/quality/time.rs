@@ -5,6 +5,7 @@ use torqcomp_dsp::quality::rate::{Contradiction, contradiction};
 use torqcomp_dsp::quality::rounding::{Rounded, rounded};
 use torqcomp_dsp::quality::steps::{Event, Events, Steps, rounded_steps, steps};
 
+use crate::print::plural;
 use crate::print::rounded as number;
 use crate::recording::{COARSE_STAMPS, Channel, TimeAxis, contradicted};
 use crate::warning::Warning;
@@ -66,7 +67,10 @@ impl TimeFindings {
         if steps.non_finite > 0 {
             found.push(Warning::new(
                 "non-finite-stamps",
-                format!("{whose}: {} time stamp(s) are no numbers", steps.non_finite),
+                format!(
+                    "{whose}: {} without a number",
+                    plural(steps.non_finite, "time stamp")
+                ),
             ));
         }
         found.extend(backwards(whose, axis, steps));
@@ -153,9 +157,8 @@ fn repeated(whose: &str, axis: &TimeAxis, steps: &Steps) -> Option<Warning> {
     Some(Warning::new(
         "repeated-stamps",
         format!(
-            "{whose}: {} time stamp(s) equal the one before, first {}: samples stored twice, or a \
-             clock that stood still",
-            steps.repeated.count,
+            "{whose}: {} the same as the one before, first {}: samples stored twice, or a clock that stood still",
+            plural(steps.repeated.count, "time stamp"),
             axis.moment(first.from_s).short()
         ),
     ))
@@ -180,9 +183,9 @@ fn gaps(whose: &str, axis: &TimeAxis, steps: &Steps) -> Option<Warning> {
     Some(Warning::new(
         "time-gaps",
         format!(
-            "{whose}: {} gap(s) in the time stamps, about {} sample(s) missing ({} %); the first \
-             after {}, the longest of {} s after {}; --fill linear bridges short ones",
-            steps.gaps.count,
+            "{whose}: {} in the time stamps, samples missing: about {} ({} %); the first after {}, the longest of {} s \
+             after {}; --fill linear bridges short ones",
+            plural(steps.gaps.count, "gap"),
             number(steps.missing, 6),
             number(100.0 * steps.missing / (samples + steps.missing), 2),
             axis.moment(first.from_s).short(),

@@ -214,14 +214,16 @@ impl AlignedChannels {
         );
         if done.gaps > 0 {
             message += &format!(
-                "; {} gap(s), the longest of {} s, were bridged by straight lines: do not trust what is \
-                 found from them",
-                done.gaps,
+                "; bridged by straight lines: {}, the longest of {} s; do not trust results from there",
+                print::plural(done.gaps, "gap"),
                 print::rounded(done.longest_step_s, 4)
             );
         }
         if done.repeated > 0 {
-            message += &format!("; {} repeated stamp(s) were left out", done.repeated);
+            message += &format!(
+                "; left out: {}",
+                print::plural(done.repeated, "repeated stamp")
+            );
         }
         Warning::new("resampled", message)
     }

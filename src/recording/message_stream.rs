@@ -54,20 +54,9 @@ impl ChannelStream {
             times_ns,
             values,
         };
-        let time = match reading.rate_hz.filter(|_| !reading.resample) {
-            Some(rate_hz) => TimeAxis::given(rate_hz),
-            None => {
-                let grid = StampGrid {
-                    unit: "ns".to_owned(),
-                    seconds_per_unit: 1e-9,
-                    origin_ns,
-                    ..StampGrid::of_seconds()
-                };
-                let heading = messages::clock(&chosen.time);
-                TimeAxis::of_stream(&heading, grid, &blocks.relative()?, &later, reading)
-                    .map_err(|f| f.at(&name))?
-            }
-        };
+        let heading = messages::clock(&chosen.time);
+        let time = blocks.axis(&heading, &later, reading);
+        let time = time.map_err(|failure| failure.at(&name))?;
         Ok(Self {
             source: name,
             dialect: format!("MCAP, {}", messages::describe(&chosen)),
@@ -129,6 +118,20 @@ struct MessageBlocks {
 }
 
 impl MessageBlocks {
+    /// The time axis of the first messages and of stamps `later`, of a clock named by `heading`.
+    fn axis(&self, heading: &str, later: &[f64], reading: &Reading) -> Result<TimeAxis, Failure> {
+        if let Some(rate_hz) = reading.rate_hz.filter(|_| !reading.resample) {
+            return Ok(TimeAxis::given(rate_hz));
+        }
+        let grid = StampGrid {
+            unit: "ns".to_owned(),
+            seconds_per_unit: 1e-9,
+            origin_ns: self.origin_ns,
+            ..StampGrid::of_seconds()
+        };
+        TimeAxis::of_stream(heading, grid, &self.relative()?, later, reading)
+    }
+
     fn relative(&self) -> Result<Vec<f64>, Failure> {
         let one = |time_ns: &i64| match time_ns.checked_sub(self.origin_ns) {
             Some(ns) if ns.abs() < EXACT_NS => Ok(ns as f64),

@@ -6,6 +6,7 @@ use super::checkpoints::sharpened;
 use super::moment::Moment;
 use crate::failure::Failure;
 use crate::io::{Reading, digits};
+use crate::print::plural;
 use crate::warning::Warning;
 
 /// Rounding of stamps, over their step, from which on it is said.
@@ -305,9 +306,8 @@ pub(super) fn check_resampled(rate_hz: f64, recorded_hz: f64) -> Result<(), Fail
 fn no_step(heading: &str, times: &[f64]) -> String {
     if times.len() < 2 {
         return format!(
-            "the time column \"{heading}\" has {} stamp(s), so the sampling rate is unknown; give \
-             it with --rate HZ",
-            times.len()
+            "the time column \"{heading}\" has {}, so the sampling rate is unknown; give it with --rate HZ",
+            plural(times.len(), "stamp")
         );
     }
     format!(

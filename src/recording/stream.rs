@@ -1,9 +1,9 @@
 //! One channel of a recording, open for reading block by block, whatever the format of the file.
 
 use std::io::{Cursor, Read};
-use std::sync::Arc;
 
 use super::block::{BlockSource, TextBlocks};
+use super::choice::Selection;
 use super::memory_stream::used_stamps;
 use super::message_stream::MessageOrigin;
 use super::moment::Moment;
@@ -115,11 +115,6 @@ impl ChannelStream {
             return Self::of_recording(file.read()?, choice, reading);
         }
         let axis = &selection.channel.axis;
-        // A rate in the head is better than that of rounded stamps, but only stamps show a gap.
-        let are_uniform = |stamps_s: &Arc<Vec<f64>>| is_uniform(stamps_s, selection.rate_hz);
-        let is_checked =
-            reading.rate_hz.is_none() && axis.stamps_s.as_ref().is_some_and(are_uniform);
-        let has_stamps = is_checked || used_stamps(selection.channel, reading).is_some();
         let TextStream {
             chunks,
             plan,
@@ -127,7 +122,7 @@ impl ChannelStream {
             stamps,
             row_bytes,
             behind_first_rows,
-        } = file.stream(place, has_stamps);
+        } = file.stream(place, are_stamps_read(&selection, reading));
         let time = match stamps {
             Some(stamps) => {
                 let later = behind_first_rows
@@ -186,6 +181,15 @@ impl ChannelStream {
         );
         (self.blocks, plan, validator)
     }
+}
+
+/// Whether the stamps of a text are read beside its samples: a rate in the head is better than that of rounded stamps, but
+/// only stamps show a gap.
+fn are_stamps_read(selection: &Selection, reading: &Reading) -> bool {
+    let stamps_s = selection.channel.axis.stamps_s.as_ref();
+    let are_checked = reading.rate_hz.is_none()
+        && stamps_s.is_some_and(|stamps_s| is_uniform(stamps_s, selection.rate_hz));
+    are_checked || used_stamps(selection.channel, reading).is_some()
 }
 
 /// The axis of a column of stamps of which more will be read; a rate in the head is better than that of rounded stamps.

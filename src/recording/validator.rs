@@ -5,6 +5,7 @@ use super::block::{Block, BlockSource};
 use super::stamps::IrregularStep;
 use super::text::{ChannelPlan, Layout, LineNotes, Problem, is_end_of_data};
 use crate::failure::Failure;
+use crate::print::plural;
 use crate::warning::Warning;
 
 /// Code of the warning that stamps are irregular.
@@ -197,8 +198,9 @@ impl StreamValidator {
         if self.samples < 2 {
             let why = lost.map_or(String::new(), |lost| format!(": {}", lost.message));
             return Err(Failure::failed(format_args!(
-                "{}: {} row(s) of numbers; a record has at least two{why}",
-                self.source, self.samples
+                "{}: {} of numbers; a record has at least two{why}",
+                self.source,
+                plural(self.samples, "row")
             )));
         }
         self.lost = self.lost.or(lost);

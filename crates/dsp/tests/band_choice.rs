@@ -3,16 +3,16 @@
 #[path = "../benches/band_cases/mod.rs"]
 mod band_cases;
 
-use band_cases::{Excitation, all, run, summary};
+use band_cases::{TorqueCourse, all, run, summary};
 
 #[test]
 fn the_chosen_band_is_nearly_as_good_as_an_oracle() {
     let cases = all(20_261);
     assert_eq!(cases.len(), 192);
     for kind in [
-        Excitation::Steps,
-        Excitation::Multisine,
-        Excitation::Impulses,
+        TorqueCourse::Steps,
+        TorqueCourse::Multisine,
+        TorqueCourse::Impulses,
     ] {
         assert_eq!(
             cases.iter().filter(|case| case.excitation == kind).count(),

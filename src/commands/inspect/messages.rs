@@ -9,6 +9,7 @@ use crate::failure::Failure;
 use crate::io::mcap::inventory::{ChannelReport, LeafReport};
 use crate::io::mcap::{self, FieldChoice, Inventory, SelectedSignal};
 use crate::io::{Input, Reading};
+use crate::print::plural;
 use crate::recording::moment::{Moment, date_and_time};
 use crate::recording::{Channel, Recording, TimeAxis, message_times};
 use crate::unit::NamedUnit;
@@ -43,24 +44,12 @@ fn read_most(place: &Input, reading: &Reading, most: u64) -> Result<Content, Fai
         listed: Vec::new(),
         inventory: None,
     };
-    let mut budget = Budget::of(place, &inventory, most);
-    let mut left_out = 0;
-    let (mut choices, mut kept, mut numbers) = (Vec::new(), Vec::new(), Vec::new());
-    for topic in &inventory.channels {
-        let of_topic = numbers.len();
-        for number in topic.leaves.iter().filter(|leaf| !leaf.is_stamp) {
-            let share = budget.share(topic.messages);
-            left_out += usize::from(share.is_none() && topic.messages > 0);
-            numbers.push((topic, Some(number), share.is_some()));
-            if let Some(most) = share {
-                choices.push(choice(topic, number));
-                kept.push(Kept::new(most));
-            }
-        }
-        if numbers.len() == of_topic {
-            numbers.push((topic, None, false));
-        }
-    }
+    let Numbers {
+        listed: numbers,
+        choices,
+        mut kept,
+        left_out,
+    } = Numbers::of(&inventory, Budget::of(place, &inventory, most));
     let mut results = Vec::new();
     if !choices.is_empty() {
         let options = message_times(reading);
@@ -100,6 +89,44 @@ fn read_most(place: &Input, reading: &Reading, most: u64) -> Result<Content, Fai
     Ok(content)
 }
 
+/// The numbers of a file, and which of them are read.
+struct Numbers<'a> {
+    /// Each with its topic and whether it is read; a topic without numbers is there once.
+    listed: Vec<(&'a ChannelReport, Option<&'a LeafReport>, bool)>,
+    /// Those that are read, and what is kept of them.
+    choices: Vec<FieldChoice>,
+    kept: Vec<Kept>,
+    /// Those with messages for which there is no room.
+    left_out: usize,
+}
+
+impl<'a> Numbers<'a> {
+    fn of(inventory: &'a Inventory, mut budget: Budget) -> Self {
+        let mut all = Self {
+            listed: Vec::new(),
+            choices: Vec::new(),
+            kept: Vec::new(),
+            left_out: 0,
+        };
+        for topic in &inventory.channels {
+            let before = all.listed.len();
+            for number in topic.leaves.iter().filter(|leaf| !leaf.is_stamp) {
+                let share = budget.share(topic.messages);
+                all.left_out += usize::from(share.is_none() && topic.messages > 0);
+                all.listed.push((topic, Some(number), share.is_some()));
+                if let Some(most) = share {
+                    all.choices.push(choice(topic, number));
+                    all.kept.push(Kept::new(most));
+                }
+            }
+            if all.listed.len() == before {
+                all.listed.push((topic, None, false));
+            }
+        }
+        all
+    }
+}
+
 /// Leaves out all other topics.
 fn keep_topic(inventory: &mut Inventory, wanted: &str) -> Result<(), Failure> {
     inventory.channels.retain(|channel| channel.topic == wanted);
@@ -124,8 +151,8 @@ fn not_read(left_out: usize) -> Warning {
     Warning::new(
         "samples-not-read",
         format!(
-            "the samples of {left_out} number(s) were not looked at: together they are too many, or the \
-             file can be read once only"
+            "samples not examined: those of {}; there are too many of them, or the input can be read only once",
+            plural(left_out, "number")
         ),
     )
 }
@@ -264,8 +291,8 @@ fn dialect(inventory: &Inventory) -> String {
         .chunks
         .iter()
         .map(|chunk| match chunk.compression.as_str() {
-            "" => format!("{} uncompressed chunk(s)", chunk.chunks),
-            name => format!("{} {name} chunk(s)", chunk.chunks),
+            "" => plural(chunk.chunks, "uncompressed chunk"),
+            name => plural(chunk.chunks, &format!("{name} chunk")),
         })
         .collect();
     let chunks = match chunks.as_slice() {
@@ -283,8 +310,9 @@ fn details(inventory: &Inventory) -> Vec<(String, String)> {
     for topic in &inventory.channels {
         let schema = topic.schema.as_deref().unwrap_or("no schema");
         let value = format!(
-            "{schema}, {}, {} message(s)",
-            topic.message_encoding, topic.messages
+            "{schema}, {}, {}",
+            topic.message_encoding,
+            plural(topic.messages, "message")
         );
         details.push((topic.topic.clone(), value));
         let mut told: Vec<&[String]> = Vec::new();

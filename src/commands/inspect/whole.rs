@@ -1,6 +1,7 @@
 //! Channels too long to be kept: their first samples, and what all of them come to.
 
 use super::report::InspectedChannel;
+use crate::print::plural;
 use crate::warning::Warning;
 
 /// What all samples of a channel come to of which only the first were kept.
@@ -132,10 +133,9 @@ pub fn warning(wholes: &[Option<Whole>]) -> Option<Warning> {
     Some(Warning::new(
         "first-samples-only",
         format!(
-            "{} channel(s) are too long to be kept in memory: samples, duration, range, mean, rms and \
-             missing numbers are those of all samples, everything else was looked for in the first \
-             ones ({} of {} in the longest)",
-            long.len(),
+            "{} too long to be kept in memory: samples, duration, range, mean, rms and missing numbers are those of \
+             all samples, all other checks cover the first ones ({} of {} in the longest)",
+            plural(long.len(), "channel"),
             longest.kept,
             longest.samples
         ),

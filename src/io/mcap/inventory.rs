@@ -243,7 +243,7 @@ fn choose_topic(file: &str, mut topics: Vec<TopicNumbers>) -> Result<FieldReques
 struct Scan {
     header: Option<Header>,
     channels: Channels,
-    seen: BTreeMap<u16, Seen>,
+    seen: BTreeMap<u16, ChannelCount>,
     attachments: Vec<AttachmentReport>,
     metadata: Vec<MetadataReport>,
     /// Message records that are cut short.
@@ -251,7 +251,7 @@ struct Scan {
 }
 
 /// What was seen of a channel's messages.
-struct Seen {
+struct ChannelCount {
     messages: u64,
     log_ns: (u64, u64),
     publish_ns: (u64, u64),
@@ -302,7 +302,7 @@ impl Scan {
                 seen.greatest_log_ns = seen.greatest_log_ns.max(log);
             }
             None => {
-                let seen = Seen {
+                let seen = ChannelCount {
                     messages: 1,
                     log_ns: (log, log),
                     publish_ns: (publish, publish),
@@ -380,7 +380,7 @@ impl Scan {
     }
 }
 
-fn report(channel: &TopicChannel, seen: Option<&Seen>) -> ChannelReport {
+fn report(channel: &TopicChannel, seen: Option<&ChannelCount>) -> ChannelReport {
     let record = &channel.record;
     let schema = channel.schema.as_ref();
     let first = seen.map(|seen| seen.first.as_slice());
@@ -478,7 +478,7 @@ fn called(mut parts: Vec<PathPart>, name: &str) -> Option<Vec<PathPart>> {
     Some(parts)
 }
 
-fn rate_hz(seen: &Seen) -> Option<f64> {
+fn rate_hz(seen: &ChannelCount) -> Option<f64> {
     let span_ns = seen.greatest_log_ns - seen.least_log_ns;
     (seen.messages > 1 && span_ns > 0).then(|| (seen.messages - 1) as f64 * 1e9 / span_ns as f64)
 }

@@ -7,7 +7,12 @@ use crate::failure::Failure;
 use crate::warning::Warning;
 
 /// Longest line that is accepted.
-const LONGEST_LINE: usize = 1 << 24;
+pub const LONGEST_LINE: usize = 1 << 24;
+
+/// The refusal of a line beyond [`LONGEST_LINE`].
+pub fn too_long_a_line() -> Failure {
+    Failure::failed("a line is longer than 16 MiB: this is no table of numbers")
+}
 /// Bytes of a piece: large enough to be quick, small enough to stay in cache.
 const PIECE: usize = 1 << 17;
 
@@ -137,9 +142,7 @@ impl Chunks {
                 });
             }
             if piece.len() > LONGEST_LINE {
-                return Err(Failure::failed(
-                    "a line is longer than 16 MiB: this is no table of numbers",
-                ));
+                return Err(too_long_a_line());
             }
             self.size = self.size.max(2 * piece.len());
             let more = self.carry.len().min(self.size - piece.len());

@@ -40,13 +40,8 @@ impl Decoding {
     /// If it is another format that is often handed over in place of text, or binary.
     pub fn of(head: &[u8]) -> Result<Self, Failure> {
         let (mut oddities, mut warnings) = (Vec::new(), Vec::new());
-        let encoding = match utf16(head) {
-            Some(wide) => Some(wide),
-            None => {
-                refuse_other_formats(head)?;
-                encoding::told(head)
-            }
-        };
+        refuse_binary(head)?;
+        let encoding = utf16(head).or_else(|| encoding::told(head));
         let mut text = head.to_vec();
         if let Some(encoding) = encoding {
             oddities.push(encoding::name(encoding));
@@ -190,6 +185,17 @@ fn utf16(head: &[u8]) -> Option<&'static Encoding> {
     }
 }
 
+/// Refuses what is no text, by its first bytes.
+///
+/// # Errors
+/// If it is another format that is often handed over in place of text, or binary.
+pub fn refuse_binary(head: &[u8]) -> Result<(), Failure> {
+    match utf16(head) {
+        Some(_) => Ok(()),
+        None => refuse_other_formats(head),
+    }
+}
+
 /// Names the formats that are often handed over in place of text.
 fn refuse_other_formats(head: &[u8]) -> Result<(), Failure> {
     let known: [(&[u8], &str); 3] = [
@@ -215,9 +221,14 @@ fn refuse_other_formats(head: &[u8]) -> Result<(), Failure> {
     }
 }
 
-/// Whether there are more zero bytes than a fault in a text would leave.
+/// Whether there are more zero bytes than a fault in a text would leave, or more of the other characters that no text has.
+/// Of random bytes, a tenth is such.
 fn is_binary(head: &[u8]) -> bool {
-    head.iter().filter(|byte| **byte == 0).count() > head.len() / 100
+    let is_of_text = |byte: u8| matches!(byte, 0 | b'\t'..=b'\r' | 0x1a | 0x1b | b' '..);
+    let most = head.len() / 100;
+    let zeros = head.iter().filter(|byte| **byte == 0).count();
+    let others = head.iter().filter(|byte| !is_of_text(**byte)).count();
+    zeros > most || others > most
 }
 
 #[cfg(test)]

@@ -37,10 +37,11 @@ use crate::failure::Failure;
 use crate::io::Reading;
 use crate::recording::text::dialect::decode_line;
 
-pub use chunks::{Chunks, Piece};
+pub use chunks::{Chunks, LONGEST_LINE, Piece, too_long_a_line};
 pub use clock::Clock;
 pub use clock::days_between;
 use decode::Decoding;
+pub use decode::refuse_binary;
 use head::Head;
 pub use head::is_end as is_end_of_data;
 use keys::Entry;
@@ -49,7 +50,7 @@ use makers::Maker;
 pub use rows::{LineNotes, RowPlan, place_of};
 pub use stream::{BRIDGE, ChannelPlan, ChannelRows, Problem, StampColumn, TextStream};
 pub use table::Layout;
-use table::{FIRST_ROWS, Hints, Part};
+use table::{FIRST_ROWS, Hints, ReadTable};
 
 /// Bytes that the encoding is told from.
 const FOR_ENCODING: u64 = 1 << 16;
@@ -274,7 +275,7 @@ fn in_lines(text: &[u8], decimal: u8) -> Option<Vec<u8>> {
 }
 
 /// Puts tables together as the segments of a recording.
-fn recording_of(parts: Vec<Part>, dialect: String) -> Recording {
+fn recording_of(parts: Vec<ReadTable>, dialect: String) -> Recording {
     let blocks: usize = parts.iter().map(|part| part.blocks.len()).sum();
     let mut recording = Recording::empty("csv", String::new());
     recording.dialect = dialect;

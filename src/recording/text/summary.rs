@@ -2,6 +2,7 @@
 
 use super::axes::Role;
 use super::rows::{Column, Rows};
+use crate::print::plural;
 use crate::recording::HoleKind;
 use crate::warning::Warning;
 
@@ -74,8 +75,9 @@ pub fn leave_out(rows: &mut Rows, roles: &[Role]) -> Option<Warning> {
     Some(Warning::new(
         "lines-skipped",
         format!(
-            "{behind} row(s) behind the last time stamp have none, as sums and mean values below the \
-             samples; they were left out; the first is line {line}"
+            "{} left out below the last time stamp, from line {line} on: no time stamp, like sums and means below \
+             a table",
+            plural(behind, "row")
         ),
     ))
 }

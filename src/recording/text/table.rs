@@ -62,7 +62,7 @@ pub struct Layout {
 
 /// A table as read.
 #[derive(Debug)]
-pub struct Part {
+pub struct ReadTable {
     /// Its channels, for each block of rows in which time begins anew.
     pub blocks: Vec<Vec<Channel>>,
     /// Its head.
@@ -230,7 +230,7 @@ impl Layout {
     ///
     /// # Errors
     /// Those of the input, and rows of too different lengths.
-    pub fn read(self, chunks: &mut Chunks) -> Result<Part, Failure> {
+    pub fn read(self, chunks: &mut Chunks) -> Result<ReadTable, Failure> {
         chunks.skip(self.offset);
         let mut rows = Rows::default();
         rows.begin(self.line, self.plan.kinds.len());
@@ -251,7 +251,7 @@ impl Layout {
                 break;
             }
         }
-        Ok(Part {
+        Ok(ReadTable {
             lost,
             next_line: rows.line,
             begins_anew,
@@ -260,7 +260,7 @@ impl Layout {
     }
 
     /// Channels of rows as read, and what should be known of them.
-    fn part_of(self, mut rows: Rows) -> Part {
+    fn part_of(self, mut rows: Rows) -> ReadTable {
         let mut skipped: Vec<Warning> = summary::leave_out_count(&mut rows, true)
             .into_iter()
             .collect();
@@ -281,7 +281,7 @@ impl Layout {
             .chain(further.into_iter().rev())
             .map(|rows| self.channels(rows))
             .collect();
-        Part {
+        ReadTable {
             blocks,
             header: self.header,
             warnings,

@@ -28,7 +28,7 @@ pub const NOISES: [f64; 3] = [0.001, 0.01, 0.05];
 
 /// What acts on the stand.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Excitation {
+pub enum TorqueCourse {
     /// Four sudden steps, back to zero.
     Steps,
     /// All lines up to a frequency, in random phases.
@@ -45,13 +45,13 @@ pub struct Case {
     pub rate_hz: f64,
     /// Over the rms of the record.
     pub noise: f64,
-    pub excitation: Excitation,
+    pub excitation: TorqueCourse,
     pub seed: u64,
 }
 
 /// The 192 cases: each stand, damping and noise with two of the three excitations in turn.
 pub fn all(seed: u64) -> Vec<Case> {
-    use Excitation::*;
+    use TorqueCourse::*;
     let mut cases = Vec::new();
     for (i, (natural_hz, rate_hz)) in STANDS.into_iter().enumerate() {
         for (j, damping_ratio) in DAMPINGS.into_iter().enumerate() {
@@ -86,12 +86,15 @@ pub struct Simulated {
 }
 
 /// A part of a torque that begins at a time in s.
-struct Part {
+struct Pulse {
     at_s: f64,
     size: f64,
     /// Length of a half-sine pulse; 0 for a step.
     width_s: f64,
 }
+
+/// Power density of the torque over the frequency in Hz.
+type Density = Box<dyn Fn(f64) -> f64>;
 
 impl Case {
     /// Torque over record at a frequency.
@@ -108,57 +111,11 @@ impl Case {
     pub fn simulate(&self) -> Simulated {
         let mut random = Random(self.seed ^ 0x9e37_79b9_7f4a_7c15);
         let count = self.count();
-        let duration_s = count as f64 / self.rate_hz;
         let mut torque = vec![0.0; count];
         let mut recorded = vec![0.0; count];
-        let density: Box<dyn Fn(f64) -> f64> = match self.excitation {
-            Excitation::Multisine => {
-                let top_hz =
-                    (self.natural_hz * (0.5 + 2.5 * random.uniform())).min(0.35 * self.rate_hz);
-                let step_hz = 1.0 / duration_s;
-                let lines = (top_hz / step_hz) as usize;
-                let mut of_torque = vec![(0.0, 0.0); count];
-                let mut of_record = vec![(0.0, 0.0); count];
-                for k in 1..=lines {
-                    let phase = TAU * random.uniform();
-                    let x = (0.5 * phase.cos(), 0.5 * phase.sin());
-                    let y = divide(x, self.inverse(k as f64 * step_hz));
-                    (of_torque[k], of_torque[count - k]) = (x, (x.0, -x.1));
-                    (of_record[k], of_record[count - k]) = (y, (y.0, -y.1));
-                }
-                transform(&mut of_torque, 1.0);
-                transform(&mut of_record, 1.0);
-                for i in 0..count {
-                    torque[i] = of_torque[i].0;
-                    recorded[i] = of_record[i].0;
-                }
-                Box::new(move |hz| {
-                    if hz > 0.5 * step_hz && hz < top_hz + 0.5 * step_hz {
-                        0.5 / step_hz
-                    } else {
-                        0.0
-                    }
-                })
-            }
-            _ => {
-                let parts = self.parts(&mut random, duration_s);
-                for i in 0..count {
-                    let t = i as f64 / self.rate_hz;
-                    for part in &parts {
-                        if t >= part.at_s {
-                            let (x, y) = self.answer(part, t - part.at_s);
-                            torque[i] += x;
-                            recorded[i] += y;
-                        }
-                    }
-                }
-                Box::new(move |hz| {
-                    parts
-                        .iter()
-                        .map(|part| 2.0 * part.energy(hz) / duration_s)
-                        .sum()
-                })
-            }
+        let density = match self.excitation {
+            TorqueCourse::Multisine => self.multisine(&mut random, &mut torque, &mut recorded),
+            _ => self.pulses(&mut random, &mut torque, &mut recorded),
         };
         let mean = recorded.iter().sum::<f64>() / count as f64;
         let rms = (recorded.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / count as f64).sqrt();
@@ -174,19 +131,73 @@ impl Case {
         }
     }
 
-    fn parts(&self, random: &mut Random, duration_s: f64) -> Vec<Part> {
-        let mut part = |width_s: f64| Part {
+    /// Lines of one size up to a frequency that chance sets; the density of the torque is that of its lines.
+    fn multisine(&self, random: &mut Random, torque: &mut [f64], recorded: &mut [f64]) -> Density {
+        let count = torque.len();
+        let duration_s = count as f64 / self.rate_hz;
+        let top_hz = (self.natural_hz * (0.5 + 2.5 * random.uniform())).min(0.35 * self.rate_hz);
+        let step_hz = 1.0 / duration_s;
+        let lines = (top_hz / step_hz) as usize;
+        let mut of_torque = vec![(0.0, 0.0); count];
+        let mut of_record = vec![(0.0, 0.0); count];
+        for k in 1..=lines {
+            let phase = TAU * random.uniform();
+            let x = (0.5 * phase.cos(), 0.5 * phase.sin());
+            let y = divide(x, self.inverse(k as f64 * step_hz));
+            (of_torque[k], of_torque[count - k]) = (x, (x.0, -x.1));
+            (of_record[k], of_record[count - k]) = (y, (y.0, -y.1));
+        }
+        transform(&mut of_torque, 1.0);
+        transform(&mut of_record, 1.0);
+        for i in 0..count {
+            torque[i] = of_torque[i].0;
+            recorded[i] = of_record[i].0;
+        }
+        Box::new(move |hz| {
+            if hz > 0.5 * step_hz && hz < top_hz + 0.5 * step_hz {
+                0.5 / step_hz
+            } else {
+                0.0
+            }
+        })
+    }
+
+    /// Steps or impulses.
+    fn pulses(&self, random: &mut Random, torque: &mut [f64], recorded: &mut [f64]) -> Density {
+        let count = torque.len();
+        let duration_s = count as f64 / self.rate_hz;
+        let parts = self.parts(random, duration_s);
+        for i in 0..count {
+            let t = i as f64 / self.rate_hz;
+            for part in &parts {
+                if t >= part.at_s {
+                    let (x, y) = self.answer(part, t - part.at_s);
+                    torque[i] += x;
+                    recorded[i] += y;
+                }
+            }
+        }
+        Box::new(move |hz| {
+            parts
+                .iter()
+                .map(|part| 2.0 * part.energy(hz) / duration_s)
+                .sum()
+        })
+    }
+
+    fn parts(&self, random: &mut Random, duration_s: f64) -> Vec<Pulse> {
+        let mut part = |width_s: f64| Pulse {
             at_s: duration_s * (0.15 + 0.45 * random.uniform()),
             size: (0.5 + random.uniform()) * if random.uniform() < 0.5 { -1.0 } else { 1.0 },
             width_s,
         };
-        if self.excitation == Excitation::Steps {
-            let mut steps: Vec<Part> = (0..4).map(|_| part(0.0)).collect();
+        if self.excitation == TorqueCourse::Steps {
+            let mut steps: Vec<Pulse> = (0..4).map(|_| part(0.0)).collect();
             // Back to zero at the end.
             steps[3].size = -steps[..3].iter().map(|s| s.size).sum::<f64>();
             return steps;
         }
-        let mut pulses: Vec<Part> = (0..3).map(|_| part(0.0)).collect();
+        let mut pulses: Vec<Pulse> = (0..3).map(|_| part(0.0)).collect();
         for pulse in &mut pulses {
             pulse.width_s =
                 ((0.2 + 0.8 * random.uniform()) / self.natural_hz).max(4.0 / self.rate_hz);
@@ -195,7 +206,7 @@ impl Case {
     }
 
     /// Torque and record of a part, a time after its beginning.
-    fn answer(&self, part: &Part, t: f64) -> (f64, f64) {
+    fn answer(&self, part: &Pulse, t: f64) -> (f64, f64) {
         if part.width_s == 0.0 {
             let (z, w) = (self.damping_ratio, TAU * self.natural_hz);
             let root = (1.0 - z * z).sqrt();
@@ -260,7 +271,7 @@ impl Case {
     }
 }
 
-impl Part {
+impl Pulse {
     /// `|X(f)|²`: `(a/ω)²` of a step, `(2aw/π cos(πfw)/(1 − (2fw)²))²` of a half-sine pulse.
     fn energy(&self, hz: f64) -> f64 {
         if self.width_s == 0.0 {

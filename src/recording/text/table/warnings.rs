@@ -1,6 +1,7 @@
 //! What should be known of how a table was read.
 
 use super::Layout;
+use crate::print::plural;
 use crate::recording::text::keys::{Topic, quantity};
 use crate::recording::text::rows::LineNotes;
 use crate::warning::Warning;
@@ -48,7 +49,7 @@ fn of_lines(notes: &LineNotes, zeros: usize) -> Vec<Warning> {
     if zeros > 0 {
         warnings.push(Warning::new(
             "zero-bytes",
-            format!("{zeros} zero byte(s) stand in the text; they were left out"),
+            format!("{} in the text left out", plural(zeros, "zero byte")),
         ));
     }
     // A last word such as EOF is no fault.
@@ -57,9 +58,8 @@ fn of_lines(notes: &LineNotes, zeros: usize) -> Vec<Warning> {
         warnings.push(Warning::new(
             "lines-skipped",
             format!(
-                "{} line(s) among the rows are no rows and were left out; the first is line \
-                 {line}: \"{text}\"",
-                notes.odd_count
+                "{} among the rows left out, not rows of numbers; the first is line {line}: \"{text}\"",
+                plural(notes.odd_count, "line")
             ),
         ));
     }
