@@ -48,6 +48,7 @@ pub fn best_pairs(
 ) -> Vec<ScoredModel> {
     let changes: Vec<Change> = alone.iter().map(|model| Change::of(base, model)).collect();
     let residual = base.cleared(|k| base.scored.train[k].samples.clone());
+    let samples = residual.len() as f64;
     let mut pairs = pairs(&changes, &residual);
     pairs.truncate(FITTED[0]);
     let training = base.scored.fitted.with_initial_states(&records.train);
@@ -59,7 +60,10 @@ pub fn best_pairs(
     .flatten()
     .collect();
     for (count, effort) in FITTED.into_iter().zip(EFFORTS).skip(1) {
-        fits.sort_by(|a, b| a.train_sum.total_cmp(&b.train_sum));
+        let criterion = |fit: &FittedModel| {
+            samples * fit.train_sum.ln() + fit.values.len() as f64 * samples.ln()
+        };
+        fits.sort_by(|a, b| criterion(a).total_cmp(&criterion(b)));
         fits.truncate(count);
         let again = parallel(fits.len(), workers.threads, |k| {
             fits[k].refit(&records.train, effort).ok()

@@ -59,7 +59,8 @@ impl SearchState {
         self.ladder = Ladder::of(&self.after, &self.before, without, &self.records, threads);
     }
 
-    /// Where ways begin: with the best effect; with the best pair, if that explains more and has other effects.
+    /// Where ways begin: with the best effect, with the best pair if that explains more; that first if the best effect is in no
+    /// such pair.
     fn starts(&self, base: &BaseModel, round: &Round, workers: Workers) -> Vec<ScoredModel> {
         let single = round.accepted();
         let tests = single.map(super::tests);
@@ -72,9 +73,10 @@ impl SearchState {
         starts.retain(|pair| refusal(pair, model).is_none());
         if let Some(single) = single {
             // Beside the best effect all others are compared, ties included.
-            let names = starts.first().map(ScoredModel::effect_names);
-            let is_part = names.is_none_or(|names| names.contains(&single.effect_names()[0]));
-            starts.insert(usize::from(!is_part), single.clone());
+            let name = single.effect_names()[0];
+            let is_part = |pair: &ScoredModel| pair.effect_names().contains(&name);
+            let place = usize::from(!starts.is_empty() && !starts.iter().any(is_part));
+            starts.insert(place, single.clone());
         }
         starts
     }
