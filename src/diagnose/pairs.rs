@@ -31,7 +31,7 @@ struct Change {
 }
 
 /// Two changes, and the sizes with which both together leave least.
-struct Pair {
+struct EffectPair {
     members: [usize; 2],
     factors: [f64; 2],
     /// Bayesian information criterion on the training records, less a constant, to first order.
@@ -100,7 +100,7 @@ impl Change {
     }
 }
 
-impl Pair {
+impl EffectPair {
     /// Structure and start values: each effect in its size of the pair, the plain stand moved by both.
     fn start(
         &self,
@@ -127,10 +127,10 @@ impl Pair {
 }
 
 /// All pairs of different effects, each in its best forms, the one with the smallest criterion first.
-fn pairs(changes: &[Change], residual: &[f64]) -> Vec<Pair> {
+fn pairs(changes: &[Change], residual: &[f64]) -> Vec<EffectPair> {
     let (count, whole) = (residual.len() as f64, dot(residual, residual));
     let along: Vec<f64> = changes.iter().map(|c| dot(&c.samples, residual)).collect();
-    let mut found: Vec<Pair> = Vec::new();
+    let mut found: Vec<EffectPair> = Vec::new();
     for (k, one) in changes.iter().enumerate() {
         let own = dot(&one.samples, &one.samples);
         for (j, other) in changes.iter().enumerate().skip(k + 1) {
@@ -152,7 +152,7 @@ fn pairs(changes: &[Change], residual: &[f64]) -> Vec<Pair> {
             let reduction = factors[0] * along[k] + factors[1] * along[j];
             let left = (1.0 - reduction / whole).max(f64::EPSILON);
             let parameters = (one.own.len() + other.own.len()) as f64;
-            found.push(Pair {
+            found.push(EffectPair {
                 members: [k, j],
                 factors,
                 criterion: count * left.ln() + parameters * count.ln(),
@@ -160,7 +160,7 @@ fn pairs(changes: &[Change], residual: &[f64]) -> Vec<Pair> {
         }
     }
     found.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
-    let names = |pair: &Pair| pair.members.map(|k| changes[k].effect.effect.name);
+    let names = |pair: &EffectPair| pair.members.map(|k| changes[k].effect.effect.name);
     let mut seen = Vec::new();
     found.retain(|pair| {
         let before = seen.iter().filter(|names_of| **names_of == names(pair));

@@ -132,11 +132,7 @@ impl Reason {
                 ratio,
                 law,
                 equation,
-            } => format!(
-                "improves the fit, but its hold-out error is {} times that of {law} ({equation}), a law that is not in the \
-                 list of effects",
-                rounded(*ratio, 3)
-            ),
+            } => beside_the_list(*ratio, law, equation),
             Self::SmallSecond { least, rest } => format!(
                 "explains less than {:.0} % of what the plain stand leaves above the noise, and less than {:.0} % of what is \
                  left now: too little for a further effect",
@@ -153,6 +149,15 @@ impl Reason {
             Self::NoneAccepted => "no effect is accepted".to_owned(),
         }
     }
+}
+
+/// An effect behind a law that is not in the list.
+fn beside_the_list(ratio: f64, law: &str, equation: &str) -> String {
+    format!(
+        "improves the fit, but its hold-out error is {} times that of {law} ({equation}), a law that is not in the list of \
+         effects",
+        rounded(ratio, 3)
+    )
 }
 
 /// A relative change in percent, with its sign.
