@@ -130,3 +130,41 @@ fn a_recorded_channel_needs_the_stand() {
     let ran = folder.run(&["harmonics", "in.csv", "--fundamental", "590"]);
     ran.says(2, &["\"bridge\" is taken as recorded", "--stand FILE"]);
 }
+
+/// No stand is identified or diagnosed from a torque in which its response is no longer.
+#[test]
+fn a_compensated_record_is_no_answer_of_a_stand() {
+    let folder = Folder::new();
+    let row = |i: usize| {
+        let wave = (i as f64 * 0.05).sin();
+        format!("{},{wave},{wave}\n", i as f64 * 5e-5)
+    };
+    let rows: String = (0..20_000).map(row).collect();
+    folder.write(
+        "in.csv",
+        format!("time_s,applied_n_m,compensated_torque_n_m\n{rows}"),
+    );
+    let pair = ["--applied", "applied", "--measured", "compensated_torque"];
+    let runs: [&[&str]; 4] = [
+        &["identify", "decay", "in.csv", "--channel", "compensated"],
+        &[&["identify", "response", "in.csv"], &pair[..]].concat(),
+        &[
+            &["diagnose", "--stand", "stand.toml", "--train", "in.csv"],
+            &pair[..],
+        ]
+        .concat(),
+        &[
+            "compensate",
+            "in.csv",
+            "--stand",
+            "stand.toml",
+            "--channel",
+            "compensated",
+        ],
+    ];
+    for args in runs {
+        folder
+            .run(args)
+            .says(1, &["marked as compensated", "take the recorded channel"]);
+    }
+}

@@ -21,7 +21,7 @@ use crate::cli::{self, OneChannel};
 use crate::failure::Failure;
 use crate::inverse::ChainInverse;
 use crate::io::output;
-use crate::io::{COMPENSATED, Input};
+use crate::io::{Input, already_compensated};
 use crate::print::{self, Report};
 use crate::recording::{ChannelStream, StreamSummary};
 use crate::stand::{self, Calibration, Stand};
@@ -93,19 +93,6 @@ pub fn run(args: &cli::Compensate) -> Result<Outcome, Failure> {
     ))
 }
 
-/// Refuses a result of `compensate`: the stand's response must not be divided out twice.
-fn refuse_compensated(stream: &ChannelStream) -> Result<(), Failure> {
-    if !stream.is_compensated {
-        return Ok(());
-    }
-    Err(Failure::failed(format_args!(
-        "{}: \"{}\" is marked as compensated: the stand's response is already divided out of it; compensate the recorded \
-         channel instead, take this one as it is (harmonics needs no --stand for it), or, if it is a recorded signal, \
-         rename it without \"{COMPENSATED}\"",
-        stream.source, stream.name
-    )))
-}
-
 impl Opened {
     fn new(args: &cli::Compensate) -> Result<Self, Failure> {
         let stand = stand::read(&args.stand)?;
@@ -116,7 +103,9 @@ impl Opened {
             reading,
         } = &args.record;
         let stream = ChannelStream::open(&Input::of(input), choice, reading)?;
-        refuse_compensated(&stream)?;
+        if stream.is_compensated {
+            return Err(already_compensated(&stream.source, &stream.name));
+        }
         let chain = stand.calibration(stream.channel(), args.units.into())?;
         Ok(Self {
             stand,

@@ -11,7 +11,7 @@ mod reading;
 pub mod text;
 
 pub use input::Input;
-pub(crate) use mark::{COMPENSATED, names_compensated};
+pub(crate) use mark::{COMPENSATED, already_compensated, names_compensated};
 pub use parts::remove_when_interrupted;
 pub use reading::{ChannelChoice, Delimiter, DialectOverride, Fill, Flags, Reading, TimeRange};
 pub(crate) use reading::{frequency, positive_frequency};

@@ -9,7 +9,7 @@ use super::moment::Moment;
 use super::stamps::check_resampled;
 use super::{Recording, Selection, typical_step};
 use crate::failure::Failure;
-use crate::io::{ChannelChoice, Input, Reading};
+use crate::io::{ChannelChoice, Input, Reading, already_compensated};
 use crate::print;
 use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
@@ -31,9 +31,22 @@ pub(crate) struct AlignedChannel {
     pub(crate) unit: Option<NamedUnit>,
     /// That unit as the file writes it, known or not.
     pub(crate) unit_text: Option<String>,
+    /// Whether it is marked as a result of `compensate`.
+    is_compensated: bool,
 }
 
 impl AlignedChannel {
+    /// Refuses a result of `compensate` where the answer of a stand is wanted.
+    ///
+    /// # Errors
+    /// If it is marked as one.
+    pub(crate) fn must_be_as_recorded(&self, source: &str) -> Result<(), Failure> {
+        match self.is_compensated {
+            true => Err(already_compensated(source, &self.name)),
+            false => Ok(()),
+        }
+    }
+
     /// The channel as a stand takes it.
     pub(crate) fn channel(&self) -> RecordedChannel<'_> {
         RecordedChannel {
@@ -243,6 +256,7 @@ fn aligned_channel(selection: &Selection, samples: Vec<f64>) -> AlignedChannel {
         samples,
         unit: selection.unit.clone(),
         unit_text: selection.channel.unit_text.clone(),
+        is_compensated: selection.channel.is_compensated,
     }
 }
 

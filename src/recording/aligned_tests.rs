@@ -19,6 +19,7 @@ fn channel(name: &str, axis: TimeAxis, of: impl Fn(f64) -> f64) -> Channel {
         axis,
         segment: None,
         filled: Vec::new(),
+        is_compensated: false,
     }
 }
 

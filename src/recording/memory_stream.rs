@@ -8,7 +8,7 @@ use super::stream::ChannelStream;
 use super::text::BRIDGE;
 use super::{Channel, HoleKind, RateFrom, Recording, TimeAxis};
 use crate::failure::Failure;
-use crate::io::{ChannelChoice, Reading, names_compensated};
+use crate::io::{ChannelChoice, Reading};
 use crate::print::plural;
 use crate::warning::Warning;
 
@@ -54,7 +54,7 @@ impl ChannelStream {
         warnings.extend(selection.warnings.iter().cloned());
         Ok(Self {
             dialect: recording.dialect.clone(),
-            is_compensated: names_compensated(&channel.heading),
+            is_compensated: channel.is_compensated,
             name: channel.name.clone(),
             unit: selection.unit.clone(),
             unit_text: channel.unit_text.clone(),

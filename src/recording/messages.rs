@@ -67,6 +67,7 @@ pub(super) fn read(
             axis,
             segment: None,
             filled: Vec::new(),
+            is_compensated: selected.is_compensated,
         });
     }
     if let Some(range) = &reading.range {

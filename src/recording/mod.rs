@@ -114,6 +114,8 @@ pub struct Channel {
     pub segment: Option<usize>,
     /// Stretches of samples that were filled in.
     pub filled: Vec<FilledSpan>,
+    /// Whether it is marked as a result of `compensate`.
+    pub is_compensated: bool,
 }
 
 /// A cell among the samples that holds no number.

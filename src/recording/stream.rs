@@ -12,7 +12,7 @@ use super::text::{ChannelPlan, StampColumn, TextFile, TextStream};
 use super::validator::{StreamValidator, TextLines};
 use super::{FilledSpan, RateFrom, Recording, TimeAxis, checkpoints};
 use crate::failure::Failure;
-use crate::io::{ChannelChoice, Input, Reading, names_compensated};
+use crate::io::{ChannelChoice, Input, Reading};
 use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
 
@@ -140,7 +140,7 @@ impl ChannelStream {
         warnings.extend(selection.warnings);
         Ok(Self {
             dialect: first_rows.dialect.clone(),
-            is_compensated: names_compensated(&selection.channel.heading),
+            is_compensated: selection.channel.is_compensated,
             name: selection.channel.name.clone(),
             unit: selection.unit,
             unit_text: selection.channel.unit_text.clone(),

@@ -148,6 +148,7 @@ fn pair(args: &Diagnose, file: &str) -> Result<Pair, Failure> {
             read.source
         )));
     };
+    measured.must_be_as_recorded(&read.source)?;
     let count = applied.samples.len();
     if count < FEWEST {
         return Err(Failure::failed(format_args!(

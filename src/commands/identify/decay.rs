@@ -7,7 +7,7 @@ use crate::commands::Outcome;
 use crate::failure::Failure;
 use crate::identify::Identification;
 use crate::identify::decay::{DecayOptions, Ringing, identify};
-use crate::io::{Input, Reading};
+use crate::io::{Input, Reading, already_compensated};
 use crate::recording::{AlignedChannels, Recording, check_cells, is_uniform};
 use crate::stand::update::Entry;
 
@@ -56,6 +56,11 @@ fn load(args: &Decay, input: &str, recorded: &mut Recorded) -> Result<Loaded, Fa
     } = args.reading;
     let choices = std::slice::from_ref(&args.choice);
     let mut recording = Recording::read(&Input::of(input), choices, &args.reading)?;
+    let place = recording.place(&args.choice).map_err(|f| f.at(input))?;
+    let chosen = &recording.channels[place];
+    if chosen.is_compensated {
+        return Err(already_compensated(input, &chosen.name));
+    }
     if resample {
         let aligned = AlignedChannels::of(recording, choices, &args.reading);
         return Ok(resampled(
@@ -64,9 +69,7 @@ fn load(args: &Decay, input: &str, recorded: &mut Recorded) -> Result<Loaded, Fa
             recorded,
         ));
     }
-    let filled = recording
-        .place(&args.choice)
-        .and_then(|place| recording.fill(place, &args.reading));
+    let filled = recording.fill(place, &args.reading);
     filled.map_err(|failure| failure.at(input))?;
     let selection = recording
         .select(&args.choice, &args.reading)

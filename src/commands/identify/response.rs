@@ -21,6 +21,7 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
     let mut loaded = Vec::new();
     for input in &args.inputs {
         let read = AlignedChannels::read(&Input::of(input), &choices, &args.reading)?;
+        read.channels[1].must_be_as_recorded(&read.source)?;
         recorded.add(input, read.channels[0].samples.len(), Some(read.rate_hz));
         recorded.warn(read.warnings.clone(), read.is_lossy);
         loaded.push(read);

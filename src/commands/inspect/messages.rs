@@ -219,6 +219,7 @@ fn channel(
         axis,
         segment: None,
         filled: Vec::new(),
+        is_compensated: selected.is_compensated,
     };
     (channel, whole)
 }

@@ -15,7 +15,7 @@ use super::last_line::{LastLine, last_line};
 use super::rows::{Column, ColumnKind, RowPlan, Rows, cleaned};
 use super::{listing, sparse, summary};
 use crate::failure::Failure;
-use crate::io::Reading;
+use crate::io::{Reading, names_compensated};
 use crate::recording::text::dialect::{decode_line, is_skipped};
 use crate::recording::{Channel, TimeAxis};
 use crate::warning::Warning;
@@ -369,6 +369,7 @@ pub fn channel(field: &Field, mut column: Column, mut axis: TimeAxis) -> Channel
         axis,
         segment: None,
         filled: Vec::new(),
+        is_compensated: names_compensated(&field.heading),
     }
 }
 
