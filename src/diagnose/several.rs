@@ -4,6 +4,7 @@
 use super::SearchState;
 use super::guard_models::GuardModel;
 use super::ladder::Ladder;
+use super::noise_floor::NoiseFloorSource;
 use super::pairs::best_pairs;
 use super::reason::{Reason, Status};
 use super::residual_tests::ResidualTests;
@@ -16,6 +17,9 @@ const MOST_EFFECTS: usize = 5;
 
 /// Ways to several effects that are followed: the second if the first leaves more than noise, or if it begins with less.
 const WAYS: usize = 2;
+
+/// Error over the differences of the periods up to which nothing but noise is left.
+const ALL_NOISE: f64 = 1.005;
 
 /// Where a way to several effects led.
 struct Way {
@@ -140,10 +144,15 @@ impl SearchState {
         is_open && self.is_worthwhile(&self.after, &self.tests)
     }
 
-    /// Whether a model leaves enough for another effect: something above the noise, or a residual that is not noise alone.
+    /// Whether a model leaves enough for another effect: something above the noise, or a residual that is not noise alone
+    /// and larger than the differences of the periods.
     fn is_worthwhile(&self, model: &ScoredModel, tests: &ResidualTests) -> bool {
         let is_noise = tests.white && tests.independent_of_input;
-        !is_noise || remains(model, tests, self.noise_floor)
+        let floor = self.noise_floor;
+        let of_periods = floor.filter(|floor| floor.from == NoiseFloorSource::Periods);
+        let is_at_floor =
+            of_periods.is_some_and(|floor| model.holdout_rms() <= ALL_NOISE * floor.rms);
+        remains(model, tests, floor) || !is_noise && !is_at_floor
     }
 
     /// Takes out again what is not needed; the model without each of the effects that are left.
