@@ -17,6 +17,7 @@ mod identify;
 mod inspect;
 mod measuring_chains;
 mod messages;
+mod mutations;
 mod noise;
 mod once;
 mod output;

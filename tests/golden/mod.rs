@@ -148,6 +148,23 @@ fn run(verb: &str, case: &Path, expected: &str) -> String {
     text
 }
 
+/// Words of the commands of all cases, behind the name of the program; `OUT/` stands for a folder.
+pub fn commands() -> Vec<Vec<String>> {
+    let folders = files(&Path::new(PROJECT).join("tests/golden/cases"));
+    let cases = folders.iter().flat_map(|folder| files(folder));
+    let text = |case: PathBuf| fs::read_to_string(case).expect("a text");
+    let lines = |text: String| -> Vec<String> {
+        let commands = text
+            .lines()
+            .filter_map(|line| line.strip_prefix("$ torqcomp "));
+        commands.map(str::to_owned).collect()
+    };
+    cases
+        .flat_map(|case| lines(text(case)))
+        .map(|line| words(&line))
+        .collect()
+}
+
 /// Runs a command line.
 fn execute(command: &str) -> std::process::Output {
     let mut words = words(command);

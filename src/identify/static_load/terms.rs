@@ -200,9 +200,10 @@ fn ends(values: &[f64]) -> (f64, f64) {
         })
 }
 
-/// The largest of the known values.
+/// The largest of the known values; one over a mean of zero is not known.
 fn worst(values: impl Iterator<Item = Option<f64>>) -> Option<f64> {
     values
         .flatten()
+        .filter(|value| value.is_finite())
         .fold(None, |m: Option<f64>, v| Some(m.map_or(v, |m| m.max(v))))
 }

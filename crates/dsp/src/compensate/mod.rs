@@ -103,7 +103,8 @@ impl InverseFilter {
         }
         let edge_width = band.end_hz() - band.top_hz();
         // Some hundred points over the edge are where the response can start to die out.
-        let start = (64.0 * band.sample_rate_hz() / edge_width).max(1024.0) as usize;
+        let longest = 2.0 * LONGEST_DESIGN as f64;
+        let start = (64.0 * band.sample_rate_hz() / edge_width).clamp(1024.0, longest) as usize;
         let mut length = start.next_power_of_two();
         while length <= LONGEST_DESIGN {
             let grid = response_on_grid(&inverse, &band, length)?;

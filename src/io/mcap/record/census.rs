@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use mcap::records::{Record, op};
 
 use super::file::{Loss, Losses};
-use super::parse;
+use super::{indexed_chunk, parse};
 
 /// Counts of what passed, and what the file says of it.
 #[derive(Debug, Default)]
@@ -48,11 +48,9 @@ impl Census {
             },
             op::SCHEMA if parse(op, body).is_none() => losses.add(Loss::Unreadable { at, op }),
             op::ATTACHMENT => self.attachments += 1,
-            op::CHUNK_INDEX => match mcap::parse_record(op, body) {
-                Ok(Record::ChunkIndex(index)) => {
-                    self.indexed.insert(index.chunk_start_offset);
-                }
-                _ => losses.add(Loss::Unreadable { at, op }),
+            op::CHUNK_INDEX => match indexed_chunk(body) {
+                Some(start) => drop(self.indexed.insert(start)),
+                None => losses.add(Loss::Unreadable { at, op }),
             },
             op::STATISTICS => match mcap::parse_record(op, body) {
                 Ok(Record::Statistics(found)) => {

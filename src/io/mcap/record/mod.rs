@@ -14,11 +14,9 @@ use mcap::records::{AttachmentHeader, Record, op};
 use fields::RecordFields;
 
 /// Reads a header, schema, channel or metadata record. Where a text in it is not UTF-8, it is read with
-/// replacement characters; of pairs with the same key, the last one counts. `mcap` refuses both.
+/// replacement characters; of pairs with the same key, the last one counts. `mcap` refuses both, and reserves memory for
+/// any length of a text that is claimed, up to 4 GiB.
 pub(crate) fn parse(op: u8, body: &[u8]) -> Option<Record<'static>> {
-    if let Ok(record) = mcap::parse_record(op, body) {
-        return Some(record.into_owned());
-    }
     let mended = mended(op, body)?;
     mcap::parse_record(op, &mended).ok().map(Record::into_owned)
 }
@@ -53,6 +51,20 @@ fn mended(op: u8, body: &[u8]) -> Option<Vec<u8>> {
     }
     mended.extend_from_slice(fields.rest);
     Some(mended)
+}
+
+/// Where the chunk of a chunk index begins, if all of the index is there.
+fn indexed_chunk(body: &[u8]) -> Option<u64> {
+    let mut fields = RecordFields { rest: body };
+    // First and last time; then the place and length of the chunk, those of its indexes, compression, sizes.
+    fields.take(16)?;
+    let start = fields.u64()?;
+    fields.take(8)?;
+    fields.bytes()?;
+    fields.take(8)?;
+    fields.bytes()?;
+    fields.take(16)?;
+    Some(start)
 }
 
 fn push(record: &mut Vec<u8>, bytes: &[u8]) {
