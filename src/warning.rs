@@ -77,6 +77,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["not-viscous", "another law of damping fits the envelope better than viscous damping", "look for the cause with diagnose"],
         ["one-direction", "the body moves in one direction only: dry friction and offset are one number", "run it both ways"],
         ["one-series", "the loads were applied once, so that the repeatability is unknown", "repeat the series"],
+        ["one-weight", "one load beside no load shows no curve", "apply other loads as well"],
         ["poor-fit", "the model leaves much of the data unexplained", "check the columns; choose another range, band or degree"],
         ["second-stroke", "the hammer struck twice; the recorded force includes both strokes", "repeat the hit if the coherence is low"],
         ["speed-unknown", "the speed is known but for a constant, so that the offset includes friction", "record position or speed"],

@@ -653,8 +653,11 @@ fn init_writes_a_stand_file_that_converts() {
     // Without mechanics it says how to get them.
     let ran = folder.run(&["init", "--from", "unknown"]);
     assert!(
-        ran.code == 0 && ran.stdout.contains("identify decay"),
+        ran.code == 0 && ran.stdout.contains("identify decay tap.csv -o FILE"),
         "{}",
         ran.stdout
     );
+    folder.run(&["init", "--from", "unknown", "-o", "fan.toml"]);
+    let named = "identify decay tap.csv -o fan.toml";
+    assert!(folder.read("fan.toml").contains(named));
 }

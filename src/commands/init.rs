@@ -137,6 +137,8 @@ fn compose<R: BufRead, W: Write>(
 /// What the file says, section by section; what is missing stands there as a comment.
 fn page(args: &Init, from: InitFrom, answers: &[(&Question, String)]) -> String {
     let name = args.name.as_deref().unwrap_or("my stand");
+    let file = args.result.output.as_deref().filter(|file| *file != "-");
+    let file = file.unwrap_or("FILE");
     let mut text = format!(
         "schema = \"torqcomp.stand/1\"\nname = {}\n\n# Every number has its unit; a known uncertainty is written as\n\
          #     {{ value = \"50 N m\", std = \"0.1 N m\", source = \"certificate\" }}\n",
@@ -145,11 +147,12 @@ fn page(args: &Init, from: InitFrom, answers: &[(&Question, String)]) -> String 
     for (section, about) in SECTIONS {
         let of_section: Vec<_> = answers.iter().filter(|a| a.0.section == section).collect();
         if of_section.is_empty() {
-            text += match (section, from) {
+            let how = match (section, from) {
                 ("mechanics", _) => NO_MECHANICS,
                 ("calibration", InitFrom::Bridge | InitFrom::Unknown) => NO_CALIBRATION,
                 _ => "",
             };
+            text += &how.replace("FILE", file);
             continue;
         }
         let _ = write!(text, "\n# {about}\n[{section}]\n");
@@ -161,12 +164,15 @@ fn page(args: &Init, from: InitFrom, answers: &[(&Question, String)]) -> String 
     text
 }
 
-const NO_MECHANICS: &str = "\n# [mechanics] is still missing: the response that is divided out. Record how the stand rings after a tap, and run\n\
-    #     torqcomp identify decay hit.csv -o FILE\n# with the name of this file, or add\n\
+/// How `[mechanics]` is found; FILE is the name of the file.
+const NO_MECHANICS: &str = "\n# [mechanics] is the response that is divided out. Record how the stand rings after a tap, and run\n\
+    #     torqcomp identify decay tap.csv -o FILE\n# or write it by hand:\n\
     # [mechanics]\n# natural_frequency = \"590 Hz\"\n# damping_ratio = 0.02\n";
-const NO_CALIBRATION: &str = "\n# A record in N m needs no [calibration]. For one in V, mV/V, mA or Hz load the stand with known weights, and run\n\
+/// How `[calibration]` is found.
+const NO_CALIBRATION: &str = "\n# [calibration] leads from the record to torque. A record in N m needs none. For one in V, mV/V, mA or Hz load the\n\
+    # stand with known weights, and run\n\
     #     torqcomp identify static loads.csv --load LOAD --reading READING --radius \"0.5 m\" -o FILE\n\
-    # with the name of this file, or add one of\n# [calibration]\n# torque_per_volt = \"12.5 N m/V\"\n\
+    # or write one of these by hand:\n# [calibration]\n# torque_per_volt = \"12.5 N m/V\"\n\
     # torque_per_ratio = \"25 N m/(mV/V)\"\n";
 
 fn of(from: InitFrom) -> &'static [Question] {

@@ -117,6 +117,8 @@ fn missing(whose: &str, axis: &TimeAxis) -> Option<Warning> {
         return None;
     }
     let why = match &axis.stamps_s {
+        // A list that no message fills has nothing that a rate could be of.
+        Some(stamps) if stamps.is_empty() => return None,
         Some(_) => "the time stamps have no usual step",
         None => "the file has neither time stamps nor a rate",
     };
@@ -249,6 +251,11 @@ mod tests {
         assert!(codes(&stamped(good.clone())).is_empty());
         assert!(codes(&TimeAxis::of_header("Delta_X", 1000.0, None)).is_empty());
         assert_eq!(codes(&TimeAxis::default()), ["missing-rate"]);
+        let empty = TimeAxis {
+            stamps_s: Some(Vec::new().into()),
+            ..TimeAxis::default()
+        };
+        assert!(codes(&empty).is_empty());
 
         let mut gap = good.clone();
         gap.iter_mut().skip(400).for_each(|t| *t += 0.005);

@@ -210,7 +210,7 @@ impl Ran {
 }
 
 /// Words of a command line; quotes keep spaces.
-fn words(command: &str) -> Vec<String> {
+pub fn words(command: &str) -> Vec<String> {
     let (mut words, mut word, mut quote) = (Vec::new(), None::<String>, None);
     for c in command.chars() {
         match (quote, c) {

@@ -50,7 +50,7 @@ pub(super) fn from_ratios(
     };
     result.parameters.extend(found.list);
     let Some((known, is_given)) = known(anchors, findings, ratios)? else {
-        result.warn("not-anchored", not_scaled(ratios));
+        result.warn("not-anchored", ONLY_RATIOS);
         let names = ["natural_frequency", "damping_ratio"];
         let modal = mode.modal_constants().of_mode((0, 1), &names);
         return Ok(entries(&modal.list, source));
@@ -92,18 +92,10 @@ pub(super) fn from_ratios(
     Ok(all)
 }
 
-fn not_scaled(ratios: Ratios) -> &'static str {
-    match ratios {
-        Ratios::OverInertia => {
-            "a decay gives only ratios, such as stiffness over inertia; for all three constants give --inertia or \
-             --stiffness, or a stand file that declares one"
-        }
-        Ratios::OverStiffness => {
-            "torque in and torque out give only damping and inertia over stiffness; for all three constants give \
-             --stiffness or --inertia, or a stand file that declares one"
-        }
-    }
-}
+/// Said where no constant is known that the ratios could be scaled with.
+const ONLY_RATIOS: &str = "natural frequency and damping ratio, which compensate needs, are found; for inertia, damping and \
+                           stiffness, of which this test gives only ratios, give --inertia or --stiffness, or a stand \
+                           file that declares one";
 
 /// The known constant, and whether it comes from the command line.
 fn known(

@@ -1,5 +1,7 @@
 //! `identify response`.
 
+use torqcomp_model::Estimate;
+
 use super::constants::{Ratios, from_ratios, from_residue};
 use super::{ONE_MODE, Recorded, TORQUE, deliver};
 use crate::cli::identify::Response;
@@ -53,8 +55,27 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
     if let (Some(fit), Some(unit)) = (&mut result.fit, unit) {
         fit.unit.clone_from(&unit.text);
     }
+    name_gain(&mut result, &loaded[0]);
     let entries = entries(args, rad_per_n_m(args, &loaded, motion)?, &mut result)?;
     deliver(result, recorded, &args.findings, &entries)
+}
+
+/// Gives the static gain its unit: that of the measured channel over that of the applied one.
+fn name_gain(result: &mut Identification, record: &AlignedChannels) {
+    let unit = |k: usize| record.channels[k].unit.as_ref().map(|unit| &unit.text);
+    let gain = result
+        .parameters
+        .iter_mut()
+        .find(|p| p.name == "static_gain");
+    if let (Some(gain), Some(applied), Some(measured)) = (gain, unit(0), unit(1))
+        && applied != measured
+    {
+        let unit = match applied.contains([' ', '/']) {
+            true => format!("{measured}/({applied})"),
+            false => format!("{measured}/{applied}"),
+        };
+        gain.estimate = Estimate::of(unit, gain.value(), gain.std());
+    }
 }
 
 /// Rad (or rad/s, rad/s²) per N m of one unit measured per unit applied; `None` unless the one is a motion and the other

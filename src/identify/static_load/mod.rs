@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::{FitQuality, Identification, NamedEstimate, rms};
 use crate::chart::{Chart, Series};
 use crate::failure::Failure;
-use crate::print::rounded;
+use crate::print::{plural, rounded};
 use mixed::LoadCurve;
 
 /// One reading under a known load.
@@ -83,6 +83,9 @@ pub fn series_of(loads: &[f64]) -> Vec<usize> {
     numbers
 }
 
+/// Fewest rows of one load and no load.
+const ONE_WEIGHT: usize = 5;
+
 /// Evaluates the points with a curve of that degree, 1 or 3.
 ///
 /// # Errors
@@ -94,11 +97,17 @@ pub fn identify(
 ) -> Result<Identification, Failure> {
     let largest = points.iter().fold(0.0_f64, |m, p| m.max(p.load.abs()));
     let steps = steps(points, largest);
-    if steps.len() < degree + 2 {
+    let is_one_weight = degree == 1 && steps.len() == 2 && points.len() >= ONE_WEIGHT;
+    if steps.len() < degree + 2 && !is_one_weight {
+        let or = match degree {
+            1 => format!(", or one load on and off ({ONE_WEIGHT} rows or more)"),
+            _ => String::new(),
+        };
         return Err(Failure::failed(format_args!(
-            "{} different loads are too few for a curve of degree {degree} and its error; apply at least {}, the empty \
-             stand included",
-            steps.len(),
+            "{} in {} are too few for a curve of degree {degree} and its error; apply at least {}, the empty stand \
+             included{or}",
+            plural(steps.len(), "different load"),
+            plural(points.len(), "row"),
             degree + 2
         )));
     }
@@ -120,6 +129,13 @@ pub fn identify(
     result.steps = calibration_points(points, &steps, &fit, largest);
     draw(&mut result, points, &curve, units);
     warnings(&mut result, points, degree);
+    if is_one_weight {
+        result.warn(
+            "one-weight",
+            "with one load beside no load, a curved characteristic would not show; apply other loads as well, or stay near \
+             this one",
+        );
+    }
     Ok(result)
 }
 
@@ -396,5 +412,36 @@ mod tests {
             assert!((got - want).abs() < 1e-9, "{got} {want}");
         }
         assert!(identify(&points(&rows[..3], &[]), 3, &units).is_err());
+    }
+
+    #[test]
+    fn one_load_on_and_off_gives_the_slope_of_the_means() {
+        let units = LoadUnits {
+            load: "N m".to_owned(),
+            reading: "V".to_owned(),
+        };
+        let rows = [
+            (0.0, 0.11),
+            (4.0, 2.08),
+            (0.0, 0.09),
+            (4.0, 2.12),
+            (0.0, 0.10),
+        ];
+        let found = identify(&points(&rows, &[]), 1, &units).unwrap();
+        // Means of 0.10 V and 2.10 V.
+        assert!((found.get("torque_per_volt").unwrap().value() - 2.0).abs() < 1e-3);
+        assert!(
+            found
+                .get("torque_per_volt")
+                .unwrap()
+                .std()
+                .is_some_and(|std| std > 0.005)
+        );
+        assert!(found.warnings.iter().any(|w| w.code == "one-weight"));
+        let refused = identify(&points(&rows[..4], &[]), 1, &units).unwrap_err();
+        assert!(
+            refused.to_string().contains("on and off (5 rows or more)"),
+            "{refused}"
+        );
     }
 }

@@ -65,6 +65,7 @@ mod tests {
     fn headings_as_recorders_write_them() {
         for (heading, name, unit) in [
             ("bridge_V", "bridge", Some("V")),
+            ("mass_kg", "mass", Some("kg")),
             ("Torque [N m]", "Torque", Some("N m")),
             ("Force (N)", "Force", Some("N")),
             ("Time(s)", "Time", Some("s")),

@@ -1,14 +1,13 @@
 //! MCAP files of every encoding, written by the crate `mcap`: one signal of 1 kHz, and what is usual beside it.
 
-use std::collections::BTreeMap;
 use std::f64::consts::TAU;
-use std::io::Cursor;
 
-use mcap::records::MessageHeader;
-use mcap::{Compression, WriteOptions, Writer};
+use mcap::Compression;
 use prost::Message as _;
 use prost_types::field_descriptor_proto::{Label, Type};
 use prost_types::{DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet};
+
+use crate::mcap_file::{Cdr, McapFile};
 
 /// Time of the first message: 14 November 2023.
 const BEGIN_NS: u64 = 1_700_000_000_000_000_000;
@@ -41,90 +40,6 @@ fn time_ns(i: usize) -> u64 {
     BEGIN_NS + i as u64 * 1_000_000
 }
 
-struct File(Writer<Cursor<Vec<u8>>>);
-
-impl File {
-    fn new(compression: Option<Compression>) -> Self {
-        let options = WriteOptions::new()
-            .compression(compression)
-            .compression_threads(0)
-            .chunk_size(Some(16_384))
-            .profile("")
-            .library("golden");
-        Self(
-            options
-                .create(Cursor::new(Vec::new()))
-                .expect("a file in memory"),
-        )
-    }
-
-    fn channel(&mut self, topic: &str, encoding: &str, schema: Option<(&str, &str, &[u8])>) -> u16 {
-        let schema = schema.map_or(0, |(name, language, text)| {
-            self.0.add_schema(name, language, text).expect("a schema")
-        });
-        self.0
-            .add_channel(schema, topic, encoding, &BTreeMap::new())
-            .expect("a channel")
-    }
-
-    /// A message, logged 40 µs after it was published.
-    fn message(&mut self, channel_id: u16, sequence: usize, data: &[u8]) {
-        let header = MessageHeader {
-            channel_id,
-            sequence: sequence as u32,
-            log_time: time_ns(sequence) + 40_000,
-            publish_time: time_ns(sequence),
-        };
-        self.0
-            .write_to_known_channel(&header, data)
-            .expect("a message");
-    }
-
-    fn finish(mut self) -> Vec<u8> {
-        self.0.finish().expect("a whole file");
-        self.0.into_inner().into_inner()
-    }
-}
-
-/// CDR, little endian: values aligned to their size, counted from behind the head.
-struct Cdr(Vec<u8>);
-
-impl Cdr {
-    fn new() -> Self {
-        Self(vec![0, 1, 0, 0])
-    }
-
-    fn align(&mut self, size: usize) {
-        while !(self.0.len() - 4).is_multiple_of(size) {
-            self.0.push(0);
-        }
-    }
-
-    fn u32(&mut self, value: u32) {
-        self.align(4);
-        self.0.extend(value.to_le_bytes());
-    }
-
-    fn text(&mut self, text: &str) {
-        self.u32(text.len() as u32 + 1);
-        self.0.extend(text.bytes());
-        self.0.push(0);
-    }
-
-    fn numbers(&mut self, values: &[f64]) {
-        self.u32(values.len() as u32);
-        for value in values {
-            self.align(8);
-            self.0.extend(value.to_le_bytes());
-        }
-    }
-
-    fn stamp(&mut self, i: usize) {
-        self.u32((time_ns(i) / 1_000_000_000) as u32);
-        self.u32((time_ns(i) % 1_000_000_000) as u32);
-    }
-}
-
 const JOINT_STATE: &str = "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n\
     ================================================================================\nMSG: std_msgs/Header\n\
     builtin_interfaces/Time stamp\nstring frame_id\n\
@@ -133,7 +48,7 @@ const JOINT_STATE: &str = "std_msgs/Header header\nstring[] name\nfloat64[] posi
 
 /// Joint states and a slower temperature.
 fn ros2(compression: Option<Compression>) -> Vec<u8> {
-    let mut file = File::new(compression);
+    let mut file = McapFile::new(compression, "", "golden");
     let schema = (
         "sensor_msgs/msg/JointState",
         "ros2msg",
@@ -148,7 +63,7 @@ fn ros2(compression: Option<Compression>) -> Vec<u8> {
     let slow = file.channel("/temperature", "cdr", Some(schema));
     for i in 0..COUNT {
         let mut cdr = Cdr::new();
-        cdr.stamp(i);
+        cdr.stamp(time_ns(i));
         cdr.text("stand");
         cdr.u32(2);
         cdr.text("motor");
@@ -156,12 +71,11 @@ fn ros2(compression: Option<Compression>) -> Vec<u8> {
         cdr.numbers(&[i as f64 * 0.01, 0.0]);
         cdr.numbers(&[10.0, -10.0]);
         cdr.numbers(&[2e3 * volts(i), -1.5]);
-        file.message(joints, i, &cdr.0);
+        file.message(joints, i, time_ns(i), &cdr.0);
         if i % 100 == 0 {
             let mut cdr = Cdr::new();
-            cdr.align(8);
-            cdr.0.extend((20.0 + i as f64 * 1e-3).to_le_bytes());
-            file.message(slow, i, &cdr.0);
+            cdr.f64(20.0 + i as f64 * 1e-3);
+            file.message(slow, i, time_ns(i), &cdr.0);
         }
     }
     file.finish()
@@ -169,7 +83,7 @@ fn ros2(compression: Option<Compression>) -> Vec<u8> {
 
 /// Objects without a schema.
 fn json() -> Vec<u8> {
-    let mut file = File::new(None);
+    let mut file = McapFile::new(None, "", "golden");
     let stand = file.channel("/stand", "json", None);
     for i in 0..COUNT {
         let text = format!(
@@ -177,7 +91,7 @@ fn json() -> Vec<u8> {
             volts(i),
             1100 + i % 7
         );
-        file.message(stand, i, text.as_bytes());
+        file.message(stand, i, time_ns(i), text.as_bytes());
     }
     file.finish()
 }
@@ -256,7 +170,7 @@ fn protobuf() -> Vec<u8> {
             part("stand.proto", "example", &[known], own),
         ],
     };
-    let mut file = File::new(Some(Compression::Lz4));
+    let mut file = McapFile::new(Some(Compression::Lz4), "", "golden");
     let schema = ("example.Stand", "protobuf", set.encode_to_vec());
     let stand = file.channel("/stand", "protobuf", Some((schema.0, schema.1, &schema.2)));
     for i in 0..COUNT {
@@ -271,14 +185,14 @@ fn protobuf() -> Vec<u8> {
             }),
             count: i as i32 - 600,
         };
-        file.message(stand, i, &message.encode_to_vec());
+        file.message(stand, i, time_ns(i), &message.encode_to_vec());
     }
     file.finish()
 }
 
 /// A hundred samples a message, with their spacing.
 fn blocks() -> Vec<u8> {
-    let mut file = File::new(Some(Compression::Zstd));
+    let mut file = McapFile::new(Some(Compression::Zstd), "", "golden");
     let text = b"float64 dt\nfloat64[] data".as_slice();
     let bridge = file.channel(
         "/bridge",
@@ -290,7 +204,7 @@ fn blocks() -> Vec<u8> {
         cdr.0.extend(1e-3_f64.to_le_bytes());
         let samples: Vec<f64> = (0..100).map(|k| volts(block * 100 + k)).collect();
         cdr.numbers(&samples);
-        file.message(bridge, block * 100, &cdr.0);
+        file.message(bridge, block * 100, time_ns(block * 100), &cdr.0);
     }
     file.finish()
 }

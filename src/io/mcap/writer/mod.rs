@@ -183,12 +183,14 @@ fn declare(
     let Some(id) = (1..=u16::MAX).find(unused) else {
         return Ok(None);
     };
+    // Of this field alone: a joint state has positions and velocities too.
+    let unit_key = format!("unit.{}", torque.field().trim_end_matches("[0]"));
     let channel = body(&Channel {
         id,
         schema_id,
         topic: topic.to_owned(),
         message_encoding: torque.message_encoding().to_owned(),
-        metadata: [("unit", "N m"), (COMPENSATED_KEY, "true")]
+        metadata: [(unit_key.as_str(), "N m"), (COMPENSATED_KEY, "true")]
             .map(|(key, value)| (key.to_owned(), value.to_owned()))
             .into(),
     })?;
