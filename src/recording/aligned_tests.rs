@@ -12,7 +12,6 @@ fn channel(name: &str, axis: TimeAxis, of: impl Fn(f64) -> f64) -> Channel {
     Channel {
         name: name.to_owned(),
         heading: name.to_owned(),
-        is_compensated: false,
         unit: None,
         unit_text: None,
         samples: times.into_iter().map(of).collect(),

@@ -60,7 +60,6 @@ pub(super) fn read(
         recording.channels.push(Channel {
             heading: choice.channel.clone().unwrap_or_else(|| name(&selected)),
             name: name(&selected),
-            is_compensated: selected.is_compensated,
             unit: unit(&selected),
             unit_text: selected.unit.as_ref().map(|found| found.unit.clone()),
             samples,

@@ -100,8 +100,6 @@ pub struct Channel {
     pub name: String,
     /// Its heading as written, or `column N`.
     pub heading: String,
-    /// Whether it is marked as a result of `compensate`.
-    pub is_compensated: bool,
     /// Its unit, if it is known to torqcomp.
     pub unit: Option<NamedUnit>,
     /// Its unit as written, known or not.

@@ -212,7 +212,6 @@ fn channel(
     let channel = Channel {
         name: name(topic, Some(number)),
         heading: number.path.clone(),
-        is_compensated: selected.is_compensated,
         unit: unit.as_deref().and_then(NamedUnit::parse),
         unit_text: unit,
         samples,

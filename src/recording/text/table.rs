@@ -362,7 +362,6 @@ pub fn channel(field: &Field, mut column: Column, mut axis: TimeAxis) -> Channel
     Channel {
         name: field.name.clone(),
         heading: field.heading.clone(),
-        is_compensated: names_compensated(&field.heading),
         unit: field.unit.clone(),
         unit_text: field.unit_text.clone(),
         samples: column.values,
