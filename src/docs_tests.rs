@@ -67,9 +67,11 @@ fn section(page: &mut String, effect: &Effect) {
     };
     write!(
         page,
-        "\n## {}\n\nSource: {}. Valid {}. Mistaken for {}. To tell them apart: {}.\n\n\
+        "\n## {}\n\n{} {}\n\nSource: {}. Valid {}. Mistaken for {}. To tell them apart: {}.\n\n\
          | form | equation | where | parameters, unit, bounds | compensate |\n|---|---|---|---|---|\n",
         effect.name,
+        effect.meaning,
+        effect.remedy,
         effect.source,
         effect.validity,
         named(effect.mistaken_for),

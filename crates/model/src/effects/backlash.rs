@@ -24,6 +24,9 @@ const SOFT_GAPS: &[&[f64]] = &[&[0.01, 0.4], &[0.05, 0.4], &[0.3, 0.4]];
 pub(super) static EFFECT: Effect = Effect {
     name: "backlash",
     equation: "n = -clamp(x, -g, g)",
+    meaning: "The beam is not touched while the stator moves within a gap, so the record misses what happens \
+              there.",
+    remedy: "Tighten or preload the joint between stator and beam, or keep it closed with a steady torque.",
     source: "M. Nordin, P.-O. Gutman, Automatica 38 (2002), 1633",
     validity: "for stiff flanks without impact losses",
     mistaken_for: &["coulomb-friction", "bouc-wen-hysteresis", "cubic-stiffness"],

@@ -33,6 +33,9 @@ const STARTS: &[&[f64]] = &[
 pub(super) static EFFECT: Effect = Effect {
     name: "bouc-wen-hysteresis",
     equation: "n = k z, z' = x' - b |x'| z - c x' |z|",
+    meaning: "A joint or clamp slips a little each time the motion turns, and its torque depends on where the \
+              motion came from.",
+    remedy: "Clean and tighten clamps and bolts, or weld or glue the joint that slips.",
     source: "Y. K. Wen, J. Eng. Mech. Div. 102 (1976), 249",
     validity: "without drift of the loops",
     mistaken_for: &["coulomb-friction", "backlash", "structural-damping"],

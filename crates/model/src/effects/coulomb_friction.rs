@@ -15,6 +15,9 @@ use super::{Action, Effect, EffectParameter, Form, Memory, Stage, Torque};
 pub(super) static EFFECT: Effect = Effect {
     name: "coulomb-friction",
     equation: "n = F sgn(x'), or F tanh(x'/v)",
+    meaning: "Dry friction takes a torque of constant size against the motion, so small motions are damped more \
+              than large ones.",
+    remedy: "Find the contact that rubs (bearing, seal, cable, dirt in a gap), and free or lubricate it.",
     source: "C. A. Coulomb, Theorie des machines simples (1781)",
     validity: "where sliding is full",
     mistaken_for: &[

@@ -15,6 +15,10 @@ const STARTS: &[&[f64]] = &[&[0.01], &[-0.005]];
 pub(super) static EFFECT: Effect = Effect {
     name: "cubic-stiffness",
     equation: "n = c x^3",
+    meaning: "The stiffness changes with the square of the displacement, so the natural frequency changes with \
+              the level.",
+    remedy: "Stay at levels where the term is small, and check the clamping of the beam for edges that come into \
+              contact.",
     source: "G. Duffing, Erzwungene Schwingungen bei veraenderlicher Eigenfrequenz (1918)",
     validity: "while the next odd power is small",
     mistaken_for: &["gage-nonlinearity", "quadratic-stiffness", "backlash"],

@@ -13,6 +13,9 @@ const CUBE: EffectParameter = EffectParameter::motion("cube", -2, 0, -0.05, 1.0)
 pub(super) static EFFECT: Effect = Effect {
     name: "gage-nonlinearity",
     equation: "y = x + a x^2 + b x^3",
+    meaning: "The output of gage or bridge is not proportional to the strain.",
+    remedy: "Calibrate with known static loads over the whole range, and use less strain, a full bridge or metal \
+              gages.",
     source: "T. P. Hertel's thesis, Appendix B",
     validity: "while the curve rises",
     mistaken_for: &["quadratic-stiffness", "cubic-stiffness", "saturation"],

@@ -31,6 +31,8 @@ macro_rules! form {
 pub(super) static EFFECT: Effect = Effect {
     name: "mains-pickup",
     equation: "y = x + sum of a_k sin(2 pi k f t + phase), f = 50 or 60 Hz",
+    meaning: "The mains add a line at their frequency, and often at its multiples, to the record.",
+    remedy: "Shield the gage's cable, keep it away from power cables, and ground the stand at one point only.",
     source: "the definition",
     validity: "for a steady grid",
     mistaken_for: &["rotor-imbalance"],

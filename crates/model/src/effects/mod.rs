@@ -96,6 +96,10 @@ pub struct Effect {
     pub name: &'static str,
     /// The equation of its first form.
     pub equation: &'static str,
+    /// What happens, in a sentence for the user of the stand.
+    pub meaning: &'static str,
+    /// What to do about it at the stand, in a sentence.
+    pub remedy: &'static str,
     /// Where the equation comes from.
     pub source: &'static str,
     /// Where it holds.

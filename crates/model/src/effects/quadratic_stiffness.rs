@@ -10,6 +10,9 @@ use super::{Action, Effect, EffectParameter, Form, Memory, Stage, Torque};
 pub(super) static EFFECT: Effect = Effect {
     name: "quadratic-stiffness",
     equation: "n = c x^2, or c x |x|",
+    meaning: "The stiffness changes in proportion to the displacement, towards one side as of a bent or preloaded \
+              beam, or towards both.",
+    remedy: "Straighten the beam and take off its preload, or stay at levels where the term is small.",
     source: "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (1979), 2.3",
     validity: "while the stiffness stays positive",
     mistaken_for: &["gage-nonlinearity", "cubic-stiffness"],

@@ -20,6 +20,8 @@ const FAR_LIMIT: EffectParameter =
 pub(super) static EFFECT: Effect = Effect {
     name: "saturation",
     equation: "y = clamp(x, -L, L), or L tanh(x/L)",
+    meaning: "The recorder or amplifier reaches the end of its range and cuts the signal off.",
+    remedy: "Record again with a lower gain or a wider range: what is cut off cannot be recovered.",
     source: "the definition",
     validity: "for a range that is the same to both sides",
     mistaken_for: &["gage-nonlinearity", "cubic-stiffness"],

@@ -39,6 +39,10 @@ macro_rules! starts {
 pub(super) static EFFECT: Effect = Effect {
     name: "second-mode",
     equation: "H = H1 + a H2",
+    meaning: "Another resonance of the stand lies in or near the band, so one inertia and one spring do not \
+              describe the response.",
+    remedy: "Stiffen the part that moves in it, or identify the stand with excitation up to well above that \
+              resonance.",
     source: "D. J. Ewins, Modal Testing (2000), 2",
     validity: "for modes apart by more than their widths",
     mistaken_for: &["recorder-lowpass", "time-delay", "gain-error"],

@@ -20,6 +20,8 @@ const HALF_WAVES: usize = 8;
 pub(super) static EFFECT: Effect = Effect {
     name: "thermal-drift",
     equation: "y = x + d t, or x + D (1 - e^(-t/tau)), or (1 + g t) x",
+    meaning: "Zero or sensitivity changes while gage, bridge or amplifier warm up.",
+    remedy: "Let everything warm up before the record, use a full bridge, and record the zero before and after.",
     source: "T. P. Hertel's thesis, Appendix B",
     validity: "over one warm-up",
     mistaken_for: &["capacitive-coupling"],

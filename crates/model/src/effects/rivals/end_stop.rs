@@ -19,6 +19,8 @@ const TO_ONE_SIDE: &[&[f64]] = &[&[0.1, 0.05], &[0.3, 0.5], &[1.0, 0.8]];
 pub(super) static EFFECT: Effect = Effect {
     name: "end-stop",
     equation: "n = k (x - clamp(x, -g, g))",
+    meaning: "Beyond some displacement something else carries too, such as a stop that the beam touches.",
+    remedy: "Find what the beam touches and move it away, or stay below that displacement.",
     source: "S. W. Shaw, P. J. Holmes, J. Sound Vib. 90 (1983), 129",
     validity: "without impact losses",
     mistaken_for: &["cubic-stiffness", "saturation", "bouc-wen-hysteresis"],

@@ -12,6 +12,9 @@ const STARTS: &[&[f64]] = &[&[1e-3], &[-3e-4]];
 pub(super) static EFFECT: Effect = Effect {
     name: "quintic-stiffness",
     equation: "n = c x^5",
+    meaning: "The restoring torque grows with the fifth power of the displacement, so large motions meet a much \
+              stiffer stand.",
+    remedy: "Stay at lower levels, and look for parts that come into contact at large displacements.",
     source: "I. Kovacic, M. J. Brennan (eds.), The Duffing Equation (2011), 1",
     validity: "where the cubic part is small",
     mistaken_for: &["cubic-stiffness", "bouc-wen-hysteresis"],
