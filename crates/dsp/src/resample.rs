@@ -14,6 +14,8 @@ const LONGEST_STEP: f64 = 1.5;
 const LONGEST_GAP: f64 = 10_000.0;
 /// Grid samples for each recorded one, and in any case, beyond which nothing is bridged any more.
 const MOST_PER_SAMPLE: usize = 10;
+/// Gaps whose times are noted.
+const MOST_NOTED: usize = 10_000;
 /// Distance of a stamp from the grid, in grid steps, that is nothing but rounding.
 const COINCIDENT: f64 = 1e-6;
 
@@ -34,6 +36,20 @@ pub struct Resampled {
     pub longest_step_s: f64,
     /// Largest distance of a stamp from the uniform step, as a fraction of the step, gaps aside.
     pub largest_jitter: f64,
+    /// The gaps, the first 10 000 of them.
+    #[serde(skip)]
+    pub bridged_gaps: Vec<BridgedGap>,
+}
+
+/// A gap that was bridged.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BridgedGap {
+    /// Time of the sample before it, in s after the grid's first.
+    pub from_s: f64,
+    /// Time of the sample behind it.
+    pub to_s: f64,
+    /// Grid samples within it.
+    pub samples: usize,
 }
 
 /// Interpolates stamped samples on the grid `t₀ + k Δt`, `t₀` being the first stamp.
@@ -183,11 +199,26 @@ impl Resampler {
         self.done.longest_step_s = self.done.longest_step_s.max(step_s);
         if step_s > LONGEST_STEP * self.step_s {
             self.done.gaps += 1;
+            self.note_gap(last - self.start_s, time_s - self.start_s);
         } else {
             let jitter = (step_s / self.step_s - 1.0).abs();
             self.done.largest_jitter = self.done.largest_jitter.max(jitter);
         }
         Ok(())
+    }
+
+    /// Notes a gap between two times after the grid's first.
+    fn note_gap(&mut self, from_s: f64, to_s: f64) {
+        let first = (from_s / self.step_s + COINCIDENT).floor() + 1.0;
+        let end = (to_s / self.step_s - COINCIDENT).ceil();
+        let samples = (end - first.max(0.0)).max(0.0) as usize;
+        if samples > 0 && self.done.bridged_gaps.len() < MOST_NOTED {
+            self.done.bridged_gaps.push(BridgedGap {
+                from_s,
+                to_s,
+                samples,
+            });
+        }
     }
 
     fn emit(&mut self, out: &mut Vec<f64>) {
@@ -306,6 +337,21 @@ mod tests {
         assert_eq!((done.gaps, done.repeated, done.bridged), (1, 1, 3));
         assert_eq!((done.samples_in, done.samples_out), (8, 10));
         assert_eq!(done.longest_step_s, 4.0);
+        let gap = |from_s, to_s, samples| BridgedGap {
+            from_s,
+            to_s,
+            samples,
+        };
+        assert_eq!(done.bridged_gaps, [gap(3.0, 7.0, 3)]);
+        // Counted from the first stamp, and between stamps beside the grid.
+        let stamps = [10.0, 11.1, 13.9, 15.0, 18.0];
+        let (_, done) = resample(&stamps, |t| t, 1.0);
+        let [first, second] = done.bridged_gaps[..] else {
+            panic!("{done:?}");
+        };
+        assert!((first.from_s - 1.1).abs() < 1e-12 && (first.to_s - 3.9).abs() < 1e-12);
+        assert_eq!((first.samples, second), (2, gap(5.0, 8.0, 2)));
+        assert_eq!(done.bridged, 4);
     }
 
     #[test]

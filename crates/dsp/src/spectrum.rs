@@ -96,6 +96,72 @@ impl PowerSum {
     }
 }
 
+/// Welch's density of a record that comes in pieces, in bounded memory: the same as [`welch`] of the whole, to rounding.
+#[derive(Debug, Clone)]
+pub struct StreamedPower {
+    sum: PowerSum,
+    /// Samples of blocks that are not complete.
+    pending: Vec<f64>,
+}
+
+/// Blocks that a [`StreamedPower`] transforms at once.
+const BLOCKS_AT_ONCE: usize = 16;
+
+impl StreamedPower {
+    /// No samples yet, for blocks of that even length.
+    #[must_use]
+    pub fn new(block_length: usize) -> Self {
+        Self {
+            sum: PowerSum::new(block_length),
+            pending: Vec::new(),
+        }
+    }
+
+    /// Takes the next samples.
+    ///
+    /// ```
+    /// use torqcomp_dsp::spectrum::{StreamedPower, welch};
+    /// let x: Vec<f64> = (0..5000).map(|i| (0.3 * i as f64).cos() + 0.001 * i as f64).collect();
+    /// let mut streamed = StreamedPower::new(64);
+    /// x.chunks(77).for_each(|piece| streamed.push(piece));
+    /// let (whole, streamed) = (welch(&x, 1000.0, 64)?, streamed.density(1000.0).unwrap());
+    /// assert_eq!(whole.blocks, streamed.blocks);
+    /// assert!(whole.values.iter().zip(&streamed.values).all(|(a, b)| (a - b).abs() < 1e-12));
+    /// # Ok::<(), torqcomp_dsp::Error>(())
+    /// ```
+    pub fn push(&mut self, samples: &[f64]) {
+        self.pending.extend_from_slice(samples);
+        if self.pending.len() >= BLOCKS_AT_ONCE * self.sum.block_length {
+            self.transform();
+        }
+    }
+
+    fn transform(&mut self) {
+        let (length, half) = (self.sum.block_length, self.sum.block_length / 2);
+        if self.pending.len() < length {
+            return;
+        }
+        self.sum.add_samples(&self.pending);
+        let blocks = (self.pending.len() - length) / half + 1;
+        // What the next block begins with.
+        self.pending.drain(..blocks * half);
+    }
+
+    /// The density of all samples; of a record shorter than two blocks from blocks of at most half of it, and `None` if there
+    /// are fewer than 8 samples.
+    #[must_use]
+    pub fn density(&self, sample_rate_hz: f64) -> Option<Density> {
+        let mut whole = self.clone();
+        let half = whole.pending.len() / 2;
+        if whole.sum.blocks == 0 && half < whole.sum.block_length {
+            let block_length = 1 << half.checked_ilog2().filter(|power| *power >= 2)?;
+            return welch(&whole.pending, sample_rate_hz, block_length).ok();
+        }
+        whole.transform();
+        whole.sum.density(sample_rate_hz)
+    }
+}
+
 /// One-sided power spectral density, unit²/Hz, at equally spaced frequencies from zero.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Density {
