@@ -21,7 +21,7 @@ pub use diagnose::Diagnose;
 pub use help::parse;
 pub use simulate::Simulate;
 pub use values::{BandOption, Orders};
-use values::{band, digits, orders, percent, range, warning_code};
+use values::{band, digits, orders, percent, range, svg_file, warning_code};
 
 /// True torque from the records of a reaction-torque stand.
 ///
@@ -125,11 +125,16 @@ impl OutputArgs {
         Output::open(place, self.policy(), inputs)
     }
 
-    /// Opens another output of the same run.
-    pub(crate) fn open_beside(&self, place: &Path, inputs: &[&Path]) -> Result<Output, Failure> {
+    /// Opens another output of the same run, if one is asked for.
+    pub(crate) fn open_beside(
+        &self,
+        place: Option<&Path>,
+        taken: &[&Path],
+    ) -> Result<Option<Output>, Failure> {
         let first = self.output.as_deref().map(Path::new);
-        let taken: Vec<&Path> = inputs.iter().copied().chain(first).collect();
-        Output::open(Some(place), self.policy(), &taken)
+        let taken: Vec<&Path> = taken.iter().copied().chain(first).collect();
+        let open = |place| Output::open(Some(place), self.policy(), &taken);
+        place.map(open).transpose()
     }
 
     pub(crate) fn policy(&self) -> Policy {
@@ -218,12 +223,15 @@ pub struct Compensate {
     #[arg(long)]
     pub whole_record: bool,
     /// Plot the recorded and the compensated torque to an SVG file
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = svg_file)]
     pub plot: Option<PathBuf>,
     /// Time range to plot, in seconds
     #[arg(long, value_name = "FROM..TO", value_parser = range, requires = "plot")]
     pub plot_range: Option<(f64, f64)>,
-    /// Print a report as JSON to standard output (the samples then need -o FILE)
+    /// Write an HTML report with charts, band, noise and uncertainty
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
+    /// Print a report as JSON (the samples then need -o FILE)
     #[arg(long)]
     pub json: bool,
     /// What makes a warning a failure.
@@ -345,7 +353,7 @@ pub struct Inspect {
     #[command(flatten)]
     pub reading: Reading,
     /// Plot the channels to an SVG file
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = svg_file)]
     pub plot: Option<PathBuf>,
     /// Print JSON instead of a table
     #[arg(long)]

@@ -13,6 +13,7 @@ pub mod io;
 mod parallel;
 mod pipeline;
 pub mod print;
+mod provenance;
 pub mod quality;
 pub mod recording;
 pub mod stand;

@@ -78,7 +78,13 @@ fn an_effect_is_named_added_and_simulated() {
         .map(|i| (rows[i][1] - case.holdout.measured_n_m[i]).powi(2));
     let left = (squares.sum::<f64>() / settled.len() as f64).sqrt();
     assert!(left < 1.2 * noise_rms(&case), "{left}");
-    page_is_complete(&folder.read("page.html"));
+    let page = folder.read("page.html");
+    page_is_complete(&page);
+    // White noise of that rms at 20 kHz has the one-sided density rms²/10 kHz.
+    let (_, floor) = crate::reports::highest(&page, ">Spectrum<", 2);
+    let rms = report["error"]["noise_floor_rms"].as_f64().expect("known");
+    let difference = floor - (rms / 1e4_f64.sqrt()).log10();
+    assert!(difference.abs() < 0.01, "{floor} {rms}");
 }
 
 fn page_is_complete(page: &str) {
@@ -92,7 +98,10 @@ fn page_is_complete(page: &str) {
         "Over displacement",
         "Candidates",
         "coulomb-friction",
-        "Next experiment",
+        "n = c x^3; the gage shows x. The stiffness changes with the square",
+        "Stay at levels where the term is small",
+        "more candidates</summary>",
+        "noise floor",
     ];
     for part in parts {
         assert!(page.contains(part), "{part}");

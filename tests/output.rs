@@ -42,7 +42,7 @@ fn an_input_is_never_replaced() {
         assert_ne!(folder.run(&args).code, 0);
         assert_eq!(folder.read("stand.toml"), crate::util::HERTEL);
     }
-    let both = [&COMPENSATE[..], &["-o", "a.csv", "--plot", "./a.csv"]].concat();
+    let both = [&COMPENSATE[..], &["-o", "a.svg", "--plot", "./a.svg"]].concat();
     folder.run(&both).says(2, &["write to another file"]);
 }
 
@@ -271,9 +271,12 @@ fn a_plot_is_an_svg_file() {
 fn one_file_cannot_be_two_outputs_or_input_and_output() {
     let folder = folder();
     std::fs::create_dir(folder.path("sub")).unwrap();
-    let spelled = ["-o", "a.csv", "--plot", "sub/../a.csv"];
+    let spelled = ["-o", "a.svg", "--plot", "sub/../a.svg"];
     let both = [&COMPENSATE[..], &spelled].concat();
-    folder.run(&both).says(2, &["a.csv as well"]);
+    folder.run(&both).says(2, &["a.svg as well"]);
+    let besides = ["-o", "a.csv", "--plot", "a.svg", "--html", "./a.svg"];
+    let both = [&COMPENSATE[..], &besides].concat();
+    folder.run(&both).says(2, &["a.svg as well"]);
     let diagnose = [
         "diagnose",
         "--train",

@@ -25,6 +25,7 @@ mod output;
 mod predict;
 mod recordings;
 mod refined;
+mod reports;
 mod simulate;
 mod table;
 mod text_tables;

@@ -43,6 +43,11 @@ impl Axis {
         })
     }
 
+    /// Its ends and whether it is logarithmic, for the script of a page.
+    pub(super) fn ends(&self) -> String {
+        format!("{} {} {}", self.low, self.high, u8::from(self.log))
+    }
+
     pub(super) fn contains(&self, value: f64) -> bool {
         value.is_finite() && (!self.log || value.log10() >= self.low)
     }

@@ -25,7 +25,7 @@ const TITLE: f64 = 30.0;
 const PAGE_WIDTH: f64 = 720.0;
 const PAGE_PANEL: f64 = 224.0;
 /// Colours of series.
-const COLOURS: usize = 4;
+const COLOURS: usize = 5;
 /// Columns that a dense line may leave empty; more are a gap.
 const BRIDGED: f64 = 3.0;
 
@@ -37,9 +37,10 @@ text{font:12px system-ui,sans-serif;fill:#222}.name{font-weight:600}\
 .rail{stroke:#c0392b;stroke-dasharray:6 4}\
 .line{fill:none;stroke:currentColor;stroke-width:1.4;stroke-linejoin:round}\
 .dot{fill:currentColor}.band{fill:currentColor;opacity:.2}\
-.s0{color:#b8690a}.s1{color:#1f5fa8}.s2{color:#2b7d3d}.s3{color:#8a3f99}\
+.filled{fill:#c0392b;opacity:.45}.smeared{fill:#c0392b;opacity:.15}.inside{fill:#1f5fa8;opacity:.1}\
+.s0{color:#b8690a}.s1{color:#1f5fa8}.s2{color:#2b7d3d}.s3{color:#8a3f99}.s4{color:#555}\
 @media screen and (prefers-color-scheme:dark){text{fill:#ddd}.paper{fill:#1b1b1b}.grid{stroke:#444}\
-.rail{stroke:#ff7b6b}.s0{color:#eda94c}.s1{color:#74b3f5}.s2{color:#7ccb8c}.s3{color:#d294df}}";
+.rail{stroke:#ff7b6b}.s0{color:#eda94c}.s1{color:#74b3f5}.s2{color:#7ccb8c}.s3{color:#d294df}.s4{color:#aaa}}";
 
 /// A chart.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -56,8 +57,50 @@ pub(crate) struct Chart {
     pub(crate) band: Vec<(f64, f64, f64)>,
     /// Heights marked by dashed lines.
     pub(crate) rails: Vec<f64>,
+    /// Stretches along x that are marked.
+    pub(crate) spans: Vec<MarkedSpan>,
     /// Colour of the first series: what is the same on several charts has the same colour on all of them.
     pub(crate) first_colour: usize,
+}
+
+/// A stretch along x that means something.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct MarkedSpan {
+    pub(crate) from: f64,
+    pub(crate) to: f64,
+    pub(crate) kind: SpanKind,
+}
+
+/// What a stretch along x means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum SpanKind {
+    /// Samples that were filled in.
+    Filled,
+    /// Results that depend on such samples.
+    Smeared,
+    /// Frequencies that are compensated.
+    Band,
+}
+
+impl SpanKind {
+    /// All kinds, those that lie below others first.
+    const ALL: [Self; 3] = [Self::Band, Self::Smeared, Self::Filled];
+
+    fn class(self) -> &'static str {
+        match self {
+            Self::Filled => "filled",
+            Self::Smeared => "smeared",
+            Self::Band => "inside",
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Filled => "filled in",
+            Self::Smeared => "affected by filling",
+            Self::Band => "compensated band",
+        }
+    }
 }
 
 /// A series of a chart.
@@ -124,6 +167,12 @@ impl Chart {
         }
     }
 
+    /// The kinds of spans that it has.
+    fn span_kinds(&self) -> impl Iterator<Item = SpanKind> {
+        let has = |kind: &SpanKind| self.spans.iter().any(|s| s.kind == *kind);
+        SpanKind::ALL.into_iter().filter(has)
+    }
+
     fn colour(&self, series: usize) -> usize {
         (self.first_colour + series) % COLOURS
     }
@@ -146,7 +195,7 @@ impl Chart {
         let height = HEADING + PAGE_PANEL + FOOT;
         html! {
             svg xmlns="http://www.w3.org/2000/svg" viewBox={ "0 0 " (PAGE_WIDTH) " " (height) }
-                role="img" aria-label=(self.title) {
+                role="img" aria-label=(self.title) data-axes=[panel.as_ref().map(Panel::axes)] {
                 "\n"
                 text x="8" y=(px(HEADING - 9.0)) { (self.y_label) @if panel.is_none() { " (no numbers)" } }
                 "\n"

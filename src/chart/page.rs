@@ -7,23 +7,9 @@ use super::{Chart, STYLE as CHART_STYLE, Series};
 use crate::print::visible;
 
 /// Style of the page.
-const STYLE: &str = "\
-:root{--ink:#1c1c1c;--faint:#dcdcdc;--paper:#fff;--mark:#8a4b00}\
-@media screen and (prefers-color-scheme:dark){:root{--ink:#e4e4e4;--faint:#3d3d3d;--paper:#171717;--mark:#f0b66a}}\
-@media print{section,figure,table{break-inside:avoid}}\
-*{box-sizing:border-box}body{margin:0 auto;padding:1.2rem;max-width:60rem;background:var(--paper);\
-color:var(--ink);font:15px/1.5 system-ui,sans-serif;overflow-wrap:anywhere}h1{font-size:1.5rem;margin:0 0 .3rem;break-after:avoid}\
-h2{font-size:1.1rem;margin:1.8rem 0 .5rem;break-after:avoid}p{margin:.4rem 0}.wide{overflow-x:auto}\
-table{border-collapse:collapse;font-variant-numeric:tabular-nums}\
-th,td{padding:.25rem .8rem .25rem 0;text-align:right;border-bottom:1px solid var(--faint);white-space:nowrap}\
-th:first-child,td:first-child{text-align:left}\
-th.prose,td.prose{text-align:left;white-space:normal;min-width:15rem}.warn{border-left:3px solid var(--mark);padding-left:.7rem}\
-code{font-size:.9em}figure{margin:1rem 0}figcaption{font-weight:600;font-size:.95rem}\
-svg{width:100%;height:auto;display:block}.s1.line{stroke-dasharray:7 3}.s2.line{stroke-dasharray:2 3}\
-svg.swatch{display:inline;width:28px;height:8px}.key span{margin-right:1.2rem;white-space:nowrap;font-size:.85em}\
-@media(max-width:480px){body{padding:.7rem;font-size:14px}svg text{font-size:16px!important}\
-th,td{padding-right:.45rem;font-size:13px;overflow-wrap:normal}\
-td:first-child,th:first-child{white-space:normal}th.prose,td.prose{min-width:9rem}}";
+const STYLE: &str = include_str!("page.css");
+/// Zoom and values under the cursor; without it the charts stay as they are.
+const SCRIPT: &str = include_str!("zoom.js");
 
 /// Letters of the longest cell above which a column holds sentences.
 const PROSE: usize = 36;
@@ -58,23 +44,56 @@ impl Page {
             .push(html! { p.warn { code { (code) } " " (message) } });
     }
 
-    /// A table; the first row is its head. A column of sentences is set as text, one of numbers to the right.
+    /// Names with their values.
+    pub(crate) fn facts(&mut self, facts: &[[String; 2]]) {
+        self.body.push(html! {
+            dl {
+                @for [name, value] in facts { dt { (name) } dd { (value) } "\n" }
+            }
+        });
+    }
+
+    /// A text with its lines as they are.
+    pub(crate) fn preformatted(&mut self, text: &str) {
+        self.body.push(html! { pre { (text) } });
+    }
+
+    /// Parts that a reader unfolds; paper shows them.
+    pub(crate) fn folded(&mut self, summary: &str, build: impl FnOnce(&mut Self)) {
+        let mut inside = Self::default();
+        build(&mut inside);
+        self.body.push(html! {
+            details {
+                summary { (summary) } "\n"
+                @for part in &inside.body { (part) "\n" }
+            }
+        });
+    }
+
+    /// A table; the first row is its head. A column of sentences is set as text, one of numbers to the right; on a narrow
+    /// screen a table with sentences has its cells one below the other.
     pub(crate) fn table(&mut self, rows: &[Vec<String>]) {
-        let width = rows.iter().map(Vec::len).max().unwrap_or(0);
+        let Some((head, rows)) = rows.split_first() else {
+            return;
+        };
         let is_prose = |k: usize| {
             let mut cells = rows.iter().filter_map(|row| row.get(k));
             cells.any(|cell| cell.chars().count() > PROSE)
         };
-        let class: Vec<Option<&str>> = (0..width).map(|k| is_prose(k).then_some("prose")).collect();
+        let class: Vec<Option<&str>> = (0..head.len())
+            .map(|k| is_prose(k).then_some("prose"))
+            .collect();
+        let has_prose = class.iter().any(Option::is_some);
         self.body.push(html! {
             div.wide {
-                table {
+                table class=[has_prose.then_some("cards")] {
                     "\n"
-                    @for (i, row) in rows.iter().enumerate() {
+                    thead { tr { @for (cell, class) in head.iter().zip(&class) { th class=[class] { (cell) } } } }
+                    "\n"
+                    @for row in rows {
                         tr {
-                            @for (cell, class) in row.iter().zip(&class) {
-                                @if i == 0 { th class=[class] { (cell) } }
-                                @else { td class=[class] { (cell) } }
+                            @for ((cell, class), name) in row.iter().zip(&class).zip(head) {
+                                td class=[class] data-name=[has_prose.then_some(name)] { (cell) }
                             }
                         }
                         "\n"
@@ -111,6 +130,7 @@ impl Page {
                 body {
                     "\n"
                     @for part in &self.body { (part) "\n" }
+                    script { (PreEscaped(SCRIPT)) }
                 }
             }
             "\n"
@@ -134,6 +154,12 @@ fn key(chart: &Chart) -> Markup {
                 svg.swatch viewBox="0 0 28 8" aria-hidden="true" { (mark(series, k)) } " " (series.name)
             }
         }
+        @for kind in chart.span_kinds() {
+            span {
+                svg.swatch viewBox="0 0 28 8" aria-hidden="true" { rect.(kind.class()) width="28" height="8" {} }
+                " " (kind.name())
+            }
+        }
     }
 }
 
@@ -149,13 +175,15 @@ mod tests {
         page.chart(&Chart::default());
         let html = page.html();
         assert!(html.starts_with("<!DOCTYPE html>") && html.contains("a &lt; b"));
-        assert!(!html.contains("<script") && html.contains("&lt;script&gt;"));
+        assert!(html.contains("&lt;script&gt;"));
+        assert_eq!(html.matches("<script").count(), 1, "our own");
+        assert_eq!(html.matches("</script").count(), 1, "nothing ends it early");
         let addresses = html.matches("http").count();
         assert_eq!(
             addresses,
             html.matches("http://www.w3.org/2000/svg").count()
         );
-        for external in ["src=", "href=", "url(", "@import"] {
+        for external in ["src=", "href=", "url(", "@import", "fetch(", "eval("] {
             assert!(!html.contains(external), "{external}");
         }
     }

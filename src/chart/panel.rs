@@ -6,7 +6,7 @@ use maud::{Markup, html};
 
 use super::axis::Axis;
 use super::envelope::{COLUMNS, thinned};
-use super::{Chart, Point, Series};
+use super::{Chart, MarkedSpan, Point, Series, SpanKind};
 use crate::print::rounded;
 
 /// Margins of a panel, in user units.
@@ -18,6 +18,8 @@ pub(super) const FOOT: f64 = 44.0;
 const LOW: f64 = 200.0;
 /// Significant digits of a mark.
 const DIGITS: u32 = 9;
+/// Distance between spans that is not drawn, and width of the shortest.
+const CLOSE: f64 = 0.5;
 /// Width of an entry of the legend.
 const ENTRY: f64 = 150.0;
 
@@ -71,6 +73,7 @@ impl<'a> Panel<'a> {
                 }
                 "\n"
             }
+            (self.spans())
             @for rail in &self.chart.rails {
                 @let y = px(self.up(*rail));
                 line.rail x1=(left) y1=(y) x2=(right) y2=(y) {} "\n"
@@ -100,6 +103,52 @@ impl<'a> Panel<'a> {
                 line.grid x1=(left) y1=(px(y)) x2=(right) y2=(px(y)) {}
                 text x=(px(LEFT - 7.0)) y=(px(y + 4.0)) text-anchor="end" { (rounded(mark, DIGITS)) }
                 "\n"
+            }
+        }
+    }
+
+    /// Both axes for the script of a page: the frame in user units, and the values at its ends, as logarithms where so
+    /// drawn.
+    pub(super) fn axes(&self) -> String {
+        let frame = [LEFT, self.right, HEADING, self.bottom].map(px).join(" ");
+        format!("{frame} {} {}", self.x.ends(), self.y.ends())
+    }
+
+    fn spans(&self) -> Markup {
+        let places = |kind: SpanKind| {
+            let is_drawn = move |s: &&MarkedSpan| {
+                s.kind == kind && self.x.part(s.from) <= 1.0 && self.x.part(s.to) >= 0.0
+            };
+            let place = |s: &MarkedSpan| {
+                let part = |x: f64| self.x.part(x).clamp(0.0, 1.0);
+                let [from, to] = [s.from, s.to].map(|x| LEFT + part(x) * (self.right - LEFT));
+                (from, to)
+            };
+            let mut all: Vec<Point> = self
+                .chart
+                .spans
+                .iter()
+                .filter(is_drawn)
+                .map(place)
+                .collect();
+            all.sort_by(|a, b| a.0.total_cmp(&b.0));
+            // What overlaps or nearly does is one.
+            all.dedup_by(|later, first| {
+                let joins = later.0 <= first.1 + CLOSE;
+                if joins {
+                    first.1 = first.1.max(later.1);
+                }
+                joins
+            });
+            all
+        };
+        html! {
+            @for kind in SpanKind::ALL {
+                @for (from, to) in places(kind) {
+                    // A short one is seen too.
+                    rect.(kind.class()) x=(px(from)) y=(px(HEADING)) width=(px((to - from).max(CLOSE))) height=(px(self.bottom - HEADING)) {}
+                    "\n"
+                }
             }
         }
     }
@@ -147,18 +196,25 @@ impl<'a> Panel<'a> {
         html! { path.line.(class) d=(line) {} "\n" }
     }
 
-    /// Names of several series beside a piece of each, above the panel to the right.
+    /// Names of several series and of spans beside a piece of each, above the panel to the right.
     pub(super) fn legend(&self) -> Markup {
-        let count = self.chart.series.len();
-        if count < 2 {
-            return Markup::default();
-        }
-        let entry = |k: usize| self.right - ENTRY * (count - k) as f64;
+        let (series, kinds) = (&self.chart.series, self.chart.span_kinds());
+        let kinds: Vec<SpanKind> = kinds.collect();
+        let count = match series.len() {
+            0 | 1 => 0,
+            several => several,
+        };
+        let entry = |k: usize| self.right - ENTRY * (count + kinds.len() - k) as f64;
         html! {
-            @for (k, series) in self.chart.series.iter().enumerate() {
+            @for (k, series) in series.iter().take(count).enumerate() {
                 line.line.{ "s" (self.chart.colour(k)) }
                     x1=(px(entry(k))) y1=(px(HEADING - 11.0)) x2=(px(entry(k) + 26.0)) y2=(px(HEADING - 11.0)) {}
                 text x=(px(entry(k) + 34.0)) y=(px(HEADING - 7.0)) { (series.name) }
+                "\n"
+            }
+            @for (k, kind) in kinds.iter().enumerate() {
+                rect.(kind.class()) x=(px(entry(count + k))) y=(px(HEADING - 16.0)) width="26" height="10" {}
+                text x=(px(entry(count + k) + 34.0)) y=(px(HEADING - 7.0)) { (kind.name()) }
                 "\n"
             }
         }

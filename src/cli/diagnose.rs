@@ -39,6 +39,9 @@ pub struct Diagnose {
     /// Write an HTML report with charts of records, models and residuals
     #[arg(long, value_name = "FILE")]
     pub html: Option<String>,
+    /// List all candidates in the text, not the best five
+    #[arg(long)]
+    pub all: bool,
     /// The refined stand file.
     #[command(flatten)]
     pub result: OutputArgs,

@@ -4,8 +4,8 @@ use clap::{Arg, Command, CommandFactory, FromArgMatches};
 
 use super::Cli;
 
-/// Headings of the help, with the options below each; those of one verb alone stay under "Options".
-const GROUPS: [(&str, &[&str]); 5] = [
+/// Headings of the help, with the options below each.
+const GROUPS: [(&str, &[&str]); 6] = [
     (
         "Input",
         &[
@@ -15,24 +15,88 @@ const GROUPS: [(&str, &[&str]); 5] = [
             "decimal",
             "delimiter",
             "field",
+            "fill",
+            "holdout",
+            "load",
+            "load-unit",
             "measured",
+            "measured-as",
             "measured-unit",
             "motion",
             "motion-unit",
+            "position",
             "range",
             "rate",
+            "reading",
+            "reading-unit",
             "resample",
+            "series",
             "signal",
             "spacing",
+            "std",
             "time",
             "time-column",
             "time-unit",
             "topic",
+            "torque",
+            "torque-factor",
+            "torque-unit",
+            "train",
             "unit",
         ],
     ),
-    ("Stand", &["stand", "inertia", "stiffness"]),
+    (
+        "Stand",
+        &[
+            "damping-ratio",
+            "depth",
+            "elastic-modulus",
+            "excitation",
+            "gage-factor",
+            "gage-position",
+            "gage-resistance",
+            "gain",
+            "inertia",
+            "layout",
+            "length",
+            "name",
+            "natural-frequency",
+            "radius",
+            "rated-torque",
+            "sensitivity",
+            "stand",
+            "stiffness",
+            "torque-per-ratio",
+            "torque-per-volt",
+            "width",
+            "zero",
+        ],
+    ),
     ("Band", &["band"]),
+    (
+        "Method",
+        &[
+            "between",
+            "by-direction",
+            "degree",
+            "delay",
+            "from",
+            "fundamental",
+            "gravity",
+            "modes",
+            "orders",
+            "period",
+            "refine",
+            "refine-span",
+            "segment",
+            "step",
+            "threads",
+            "to",
+            "uncertainty",
+            "whole-record",
+            "window",
+        ],
+    ),
     (
         "Output",
         &[
@@ -49,6 +113,7 @@ const GROUPS: [(&str, &[&str]); 5] = [
     (
         "Report",
         &[
+            "all",
             "allow",
             "html",
             "json",
@@ -62,11 +127,19 @@ const GROUPS: [(&str, &[&str]); 5] = [
 
 /// Options that the short help leaves out.
 const RARE: &[&str] = &[
+    "allow",
+    "applied-unit",
     "decimal",
+    "delay",
     "delimiter",
     "digits",
+    "measured-as",
+    "measured-unit",
     "no-sync",
     "output-topic",
+    "period",
+    "plot-range",
+    "segment",
     "signal",
     "spacing",
     "threads",
@@ -74,7 +147,11 @@ const RARE: &[&str] = &[
     "time-column",
     "time-unit",
     "whole-record",
+    "with-recorded",
 ];
+
+/// Longest line of an example, without what marks that it goes on.
+const EXAMPLE_WIDTH: usize = 74;
 
 /// Two examples for each verb, the words of a verb and its test joined by a space.
 const EXAMPLES: &[(&str, [&str; 2])] = &[
@@ -188,13 +265,33 @@ fn grouped(path: &str, command: Command) -> Command {
     let examples = EXAMPLES.iter().find(|(verb, _)| *verb == path);
     let command = command.mut_args(in_group);
     let command = match examples {
-        Some((_, lines)) => command.after_help(format!("Examples:\n  {}", lines.join("\n  "))),
+        Some((_, lines)) => {
+            let lines = lines.map(folded);
+            command.after_help(format!("Examples:\n  {}", lines.join("\n  ")))
+        }
         None => command,
     };
     command.mut_subcommands(|verb| {
         let path = format!("{path} {}", verb.get_name());
         grouped(path.trim_start(), verb)
     })
+}
+
+/// An example on lines of at most 78 letters, cut before options as a shell reads it.
+fn folded(example: &str) -> String {
+    let mut lines = vec![String::new()];
+    for piece in example.split(" -") {
+        let last = lines.len() - 1;
+        let line = &mut lines[last];
+        match line.is_empty() {
+            true => line.push_str(piece),
+            false if line.len() + piece.len() <= EXAMPLE_WIDTH => {
+                line.push_str(&format!(" -{piece}"));
+            }
+            false => lines.push(format!("    -{piece}")),
+        }
+    }
+    lines.join(" \\\n  ")
 }
 
 fn in_group(arg: Arg) -> Arg {
@@ -212,6 +309,38 @@ fn in_group(arg: Arg) -> Arg {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn check_groups(command: &Command) {
+        let options = command.get_arguments().filter_map(Arg::get_long);
+        for option in options.filter(|name| !["help", "version"].contains(name)) {
+            let groups = GROUPS.iter().filter(|(_, names)| names.contains(&option));
+            assert_eq!(groups.count(), 1, "--{option} of {}", command.get_name());
+        }
+        command.get_subcommands().for_each(check_groups);
+    }
+
+    #[test]
+    fn every_option_is_in_one_group() {
+        check_groups(&command());
+    }
+
+    #[test]
+    fn long_examples_go_on_as_a_shell_reads_them() {
+        assert_eq!(
+            folded("torqcomp inspect run.csv"),
+            "torqcomp inspect run.csv"
+        );
+        for (_, lines) in EXAMPLES {
+            for line in lines {
+                let shown = folded(line);
+                assert!(shown.lines().all(|line| line.len() <= 80), "{shown}");
+                let joined = shown.replace("\\\n", "");
+                let words = |text: &str| text.split_whitespace().map(str::to_owned).collect();
+                let (shown, given): (Vec<String>, Vec<String>) = (words(&joined), words(line));
+                assert_eq!(shown, given);
+            }
+        }
+    }
 
     #[test]
     fn every_verb_has_examples_that_it_takes_and_its_short_help_fits_a_screen() {

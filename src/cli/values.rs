@@ -1,5 +1,7 @@
 //! Values as people write them on the command line.
 
+use std::path::{Path, PathBuf};
+
 use crate::failure::did_you_mean;
 use crate::io::digits::Digits;
 use crate::io::positive_frequency;
@@ -53,6 +55,21 @@ pub fn range(text: &str) -> Result<(f64, f64), String> {
     match ends {
         Some((from, to)) if from < to => Ok((from, to)),
         _ => Err("expected two times in seconds, such as 0.1..0.15".to_owned()),
+    }
+}
+
+/// A file for charts, which are written as SVG.
+pub fn svg_file(text: &str) -> Result<PathBuf, String> {
+    let path = Path::new(text);
+    if text == "-" {
+        return Err("charts need the name of a file, such as chart.svg".to_owned());
+    }
+    match path.extension() {
+        Some(end) if !end.eq_ignore_ascii_case("svg") => Err(format!(
+            "charts are written as SVG only; name it {}, and convert that if need be",
+            path.with_extension("svg").display()
+        )),
+        _ => Ok(path.to_owned()),
     }
 }
 
@@ -111,6 +128,9 @@ mod tests {
         assert_eq!(range("0.1..0.2"), Ok((0.1, 0.2)));
         assert!(range("0.2..0.1").is_err());
         assert_eq!(digits("9"), Ok(Digits::Significant(9)));
+        assert_eq!(svg_file("a/x.svg"), Ok(PathBuf::from("a/x.svg")));
+        assert!(svg_file("x.tar.png").unwrap_err().contains("x.tar.svg"));
+        assert!(svg_file("-").is_err());
         assert!(digits("0").is_err() && digits("16").is_err());
     }
 }

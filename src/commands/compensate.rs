@@ -2,6 +2,7 @@
 
 mod band;
 mod memory;
+mod page;
 mod plot;
 mod refined;
 mod report;
@@ -10,13 +11,15 @@ mod statistics;
 mod stream;
 mod warnings;
 
+use std::path::Path;
+
 use torqcomp_dsp::compensate::InverseFilter;
 use torqcomp_dsp::noise::NoiseGain;
 
 use self::band::{BandReport, Wanted};
 use self::report::{CompensateReport, NoiseAt, NoiseReport};
 use self::sink::Sink;
-use super::{Outcome, conclude, open_plot, uncertainty, unit_text};
+use super::{Outcome, conclude, uncertainty, unit_text};
 use crate::cli::{self, OneChannel};
 use crate::failure::Failure;
 use crate::inverse::ChainInverse;
@@ -65,7 +68,9 @@ pub fn run(args: &cli::Compensate) -> Result<Outcome, Failure> {
     let opened = Opened::new(args)?;
     let inputs = [args.record.input.as_ref(), args.stand.as_path()];
     let output = args.result.open(&inputs)?;
-    let mut plot = open_plot(args.plot.as_deref(), &args.result, &inputs)?;
+    let mut plot = args.result.open_beside(args.plot.as_deref(), &inputs)?;
+    let taken: Vec<&Path> = inputs.into_iter().chain(args.plot.as_deref()).collect();
+    let mut html = args.result.open_beside(args.html.as_deref(), &taken)?;
     let plan = Plan::new(args, opened)?;
     let mut report = plan.describe(args, output.name());
     let mut sink = Sink::open(args, &plan, output)?;
@@ -74,15 +79,20 @@ pub fn run(args: &cli::Compensate) -> Result<Outcome, Failure> {
         "stream" => stream::run(args, plan, &mut sink, &mut report)?,
         _ => memory::run(args, plan, &mut sink, &mut report)?,
     };
+    report.note_bridged();
     warnings::add(&mut report, &seen, sink.traces());
     // Do everything that can fail before renaming the first output.
     if let (Some(plot), Some(traces)) = (&mut plot, sink.traces()) {
-        plot.write(traces.svg(&report.unit).as_bytes())?;
+        plot.write(traces.svg(&report).as_bytes())?;
+    }
+    if let (Some(html), Some(page)) = (&mut html, sink.page()) {
+        html.write(page.html(&report).as_bytes())?;
     }
     if args.json {
         output::print(&report.document(true))?;
     }
-    output::finish_all(plot.into_iter().chain([sink.finish(args, &report)?]))?;
+    let beside = plot.into_iter().chain(html);
+    output::finish_all(beside.chain([sink.finish(args, &report)?]))?;
     if !args.work.quiet {
         print::say(&report.text());
     }
@@ -170,6 +180,7 @@ impl Plan {
                 None if args.whole_record => "whole-record",
                 None => "stream",
             },
+            reach_s: refined::reach(self.filter.taps()) as f64 / band.sample_rate_hz(),
             effects: refined::effects(&self.stand, self.undo.as_ref()),
             band: self.band.clone(),
             band_hz: band.top_hz(),

@@ -14,6 +14,7 @@ use crate::diagnose::{self, Workers};
 use crate::failure::Failure;
 use crate::io::output;
 use crate::print::{self, Report};
+use crate::provenance::Provenance;
 use crate::stand::{self, Stand};
 
 /// Runs the verb.
@@ -34,9 +35,9 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
         .map(|_| result.open(&files))
         .transpose()?;
     let html = args.html.as_deref().map(Path::new);
-    let mut html = html
-        .map(|page| result.open_beside(page, &files))
-        .transpose()?;
+    let mut html = result.open_beside(html, &files)?;
+    let provenance = html.as_ref().map(|_| provenance(args, stand.as_ref()));
+    let provenance = provenance.transpose()?;
     let (case, is_lossy) = read::read(args, stand.as_ref().map(|(stand, _)| stand))?;
     let is_shown = !args.work.quiet && std::io::stderr().is_terminal();
     let progress = |done: usize, of: usize| {
@@ -51,15 +52,23 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
         threads: args.work.thread_count(),
         progress: &progress,
     };
-    let diagnosis = diagnose::run(case, workers)?;
+    let mut diagnosis = diagnose::run(case, workers)?;
+    diagnosis.shows_all = args.all;
     if let Some(refined) = &mut refined {
         let declared = stand.as_ref().map(|(stand, text)| (stand, text.as_str()));
         refined.write(refined::stand_file(&diagnosis, declared)?.as_bytes())?;
     }
-    if let Some(html) = &mut html {
-        html.write(page::page(&diagnosis).as_bytes())?;
+    if let (Some(html), Some(provenance)) = (&mut html, provenance) {
+        html.write(page::page(&diagnosis, &provenance).as_bytes())?;
     }
     output::print(&diagnosis.document(args.json))?;
     output::finish_all(refined.into_iter().chain(html))?;
     Ok(conclude(&diagnosis.warnings, is_lossy, &args.strictness))
+}
+
+/// Where the page comes from.
+fn provenance(args: &Diagnose, stand: Option<&(Stand, String)>) -> Result<Provenance, Failure> {
+    let inputs = [args.train.as_slice(), &args.holdout].concat();
+    let stand = stand.map(|(stand, text)| (stand.file.as_str(), text.as_str()));
+    Provenance::of(&inputs, stand)
 }

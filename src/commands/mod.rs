@@ -12,12 +12,10 @@ mod rows;
 mod simulate;
 mod table;
 
-use std::path::Path;
-
 use torqcomp_dsp::conversion::ConversionError;
 use torqcomp_model::InverseUncertainty;
 
-use crate::cli::{Cli, OutputArgs, Strictness, Verb};
+use crate::cli::{Cli, Strictness, Verb};
 use crate::failure::Failure;
 use crate::io::output::{self, Output};
 use crate::print::{self, Report};
@@ -82,21 +80,6 @@ fn conclude(warnings: &[Warning], lost: bool, strictness: &Strictness) -> Outcom
         true => Outcome::WithLoss,
         false => Outcome::Done,
     }
-}
-
-/// Opens the file for a picture.
-fn open_plot(
-    path: Option<&Path>,
-    result: &OutputArgs,
-    inputs: &[&Path],
-) -> Result<Option<Output>, Failure> {
-    let Some(path) = path else {
-        return Ok(None);
-    };
-    if path == Path::new("-") {
-        return Err(Failure::usage("--plot needs the name of a file"));
-    }
-    result.open_beside(path, inputs).map(Some)
 }
 
 /// A unit as written in the file; empty if there is none.

@@ -49,6 +49,9 @@ pub struct Diagnosis {
     pub residual: ResidualReport,
     pub next_experiment: Option<String>,
     pub warnings: Vec<Warning>,
+    /// Whether the text lists all candidates.
+    #[serde(skip)]
+    pub shows_all: bool,
     /// The plain stand, fitted.
     #[serde(skip)]
     pub before: ScoredModel,
@@ -158,6 +161,7 @@ impl Diagnosis {
             candidates: found.candidates(),
             suspected,
             residual,
+            shows_all: false,
             before: found.before,
             after: found.after,
         }

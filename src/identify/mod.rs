@@ -244,6 +244,17 @@ impl Identification {
         self.parameters.extend(constants.list);
     }
 
+    /// Adds a unit to the axes of charts that have this label.
+    pub(crate) fn label_charts(&mut self, label: &str, unit: &str) {
+        let unit = match unit {
+            "" => "unit not given",
+            unit => unit,
+        };
+        for chart in self.charts.iter_mut().filter(|c| c.y_label == label) {
+            chart.y_label = format!("{label}, {unit}");
+        }
+    }
+
     /// Converts all parameters from SI units.
     pub(crate) fn convert(&mut self, units: UnitSystem) {
         let compared = self.comparisons.iter_mut().flat_map(|c| &mut c.parameters);

@@ -5,6 +5,7 @@ use std::fmt::Write;
 use super::{Correlation, FitQuality, Identification, NamedEstimate};
 use crate::chart::Page;
 use crate::print::{Report, columns, rounded, short, value_and_std};
+use crate::provenance::Provenance;
 
 /// A table under its heading, and a sentence below it.
 struct ResultTable {
@@ -49,8 +50,9 @@ impl Report for Identification {
 
 impl Identification {
     /// The result as an HTML page that needs no other file.
-    pub(crate) fn page(&self) -> String {
+    pub(crate) fn page(&self, provenance: &Provenance) -> String {
         let mut page = Page::new(&self.title());
+        provenance.add_to(&mut page);
         page.text(&self.recording());
         page.heading("Constants");
         page.table(&constant_rows(&self.parameters));
@@ -88,7 +90,6 @@ impl Identification {
         for line in &self.method {
             page.text(line);
         }
-        page.text(concat!("torqcomp ", env!("CARGO_PKG_VERSION")));
         page.html()
     }
 

@@ -114,16 +114,18 @@ fn seconds(ns: i64) -> String {
 }
 
 /// Date and time in UTC of nanoseconds since 1970, if they can be meant: from 2000 on.
-///
-/// The date by counting years from March of the year 0, so that leap days come last: an era of 400
-/// years has 146 097 days (ISO 8601, proleptic Gregorian calendar).
 #[must_use]
 pub fn date_and_time(ns: i64) -> Option<String> {
     const YEAR_2000_NS: i64 = 946_684_800_000_000_000;
-    if ns < YEAR_2000_NS {
-        return None;
-    }
-    let (seconds, rest) = (ns / 1_000_000_000, ns % 1_000_000_000);
+    let (seconds, rest) = (ns / SECOND, ns % SECOND);
+    (ns >= YEAR_2000_NS).then(|| format!("{}.{rest:09}Z", utc(seconds.unsigned_abs())))
+}
+
+/// Date and time in UTC of seconds since 1970.
+///
+/// The date by counting years from March of the year 0, so that leap days come last: an era of 400
+/// years has 146 097 days (ISO 8601, proleptic Gregorian calendar).
+pub(crate) fn utc(seconds: u64) -> String {
     let (days, of_day) = (seconds / 86_400 + 719_468, seconds % 86_400);
     let (era, of_era) = (days / 146_097, days % 146_097);
     let year = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;
@@ -135,13 +137,13 @@ pub fn date_and_time(ns: i64) -> Option<String> {
     } else {
         (month - 9, 1)
     };
-    Some(format!(
-        "{:04}-{month:02}-{day:02}T{:02}:{:02}:{:02}.{rest:09}Z",
+    format!(
+        "{:04}-{month:02}-{day:02}T{:02}:{:02}:{:02}",
         400 * era + year + later,
         of_day / 3600,
         of_day / 60 % 60,
         of_day % 60
-    ))
+    )
 }
 
 #[cfg(test)]
@@ -157,6 +159,7 @@ mod tests {
         assert_eq!(at(1_709_210_096), "2024-02-29T12:34:56.000000000Z");
         assert_eq!(at(4_102_444_799), "2099-12-31T23:59:59.000000000Z");
         assert_eq!(date_and_time(12), None);
+        assert_eq!(utc(0), "1970-01-01T00:00:00");
     }
 
     #[test]

@@ -12,8 +12,15 @@ const TOLERANCE: f64 = 1e-6;
 /// Magnitude below which a number is what rounding leaves of zero.
 const ZERO: f64 = 1e-11;
 
-/// A text with its decimal numbers rounded and the middle of its long tables replaced by sums.
+/// A text with its decimal numbers rounded, the middle of its long tables replaced by sums, and of a page neither the
+/// hashes of its inputs, whose last digits differ between machines, nor style and script, which are files of their own.
 pub fn readable(content: &str) -> String {
+    let content = &without(
+        "<script>",
+        "</script>",
+        &without("<style>", "</style>", content),
+    );
+    let content = &without_sums(content);
     let lines: Vec<&str> = content.split_inclusive('\n').collect();
     let mut text = String::new();
     let mut at = 0;
@@ -26,6 +33,29 @@ pub fn readable(content: &str) -> String {
         };
         table(&mut text, &lines[at..at + count]);
         at += count;
+    }
+    text
+}
+
+/// A page without what stands between two marks.
+fn without(from: &str, to: &str, content: &str) -> String {
+    let is_page = content.starts_with("<!DOCTYPE");
+    match (content.split_once(from), content.split_once(to)) {
+        (Some((before, _)), Some((_, after))) if is_page => format!("{before}{from}…{to}{after}"),
+        _ => content.to_owned(),
+    }
+}
+
+/// A text without hexadecimal SHA-256 sums.
+fn without_sums(content: &str) -> String {
+    const MARK: &str = "SHA-256 ";
+    let mut parts = content.split(MARK);
+    let mut text = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let digits = part.bytes().take_while(u8::is_ascii_hexdigit).count();
+        text.push_str(MARK);
+        text.push_str(if digits == 64 { "(sum)" } else { "" });
+        text.push_str(if digits == 64 { &part[64..] } else { part });
     }
     text
 }

@@ -102,7 +102,7 @@ fn spread(
 }
 
 /// Taps on either side of the middle, beyond which less than a small part of the weight is left.
-fn reach(taps: &[f64]) -> usize {
+pub(super) fn reach(taps: &[f64]) -> usize {
     let half = taps.len() / 2;
     let all: f64 = taps.iter().map(|tap| tap.abs()).sum();
     let mut left = 0.0;

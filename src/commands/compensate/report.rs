@@ -13,6 +13,9 @@ use crate::recording::FilledSpan;
 use crate::recording::moment::Moment;
 use crate::warning::Warning;
 
+/// Stretches whose times the text gives.
+const LISTED: usize = 20;
+
 /// Report of a compensation.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub(super) struct CompensateReport {
@@ -35,8 +38,10 @@ pub(super) struct CompensateReport {
     /// First time of the result.
     #[serde(flatten)]
     pub(super) start: Moment,
-    /// Stretches of samples that `--fill` filled in.
+    /// Stretches of samples that `--fill` or `--resample` filled in.
     pub(super) filled: Vec<FilledSpan>,
+    /// Time on both sides of a sample in which the result depends on it: 99 % of the filter's weight.
+    pub(super) reach_s: f64,
     /// `stream`, `whole-record`, or `refined` for a stand with effects that no filter describes.
     pub(super) method: &'static str,
     /// Effects of the stand that were taken out, the last link of the chain first.
@@ -123,66 +128,130 @@ impl Report for CompensateReport {
 
     fn text(&self) -> String {
         let mut text = String::new();
-        let mut line = |label: &str, value: String| {
+        for [label, value] in self.facts() {
             // Writing to a String cannot fail.
             let _ = writeln!(text, "{label:<12} {value}");
-        };
-        line("input", format!("{} ({})", self.input, self.dialect));
-        line(
-            "channel",
-            format!(
-                "{} in {}, taken as recorded",
-                self.channel, self.channel_unit
-            ),
-        );
-        line("calibration", self.calibration.clone());
-        line(
-            "time",
-            format!(
-                "{} samples at {} Hz ({}), from {}",
-                self.samples,
-                rounded(self.rate_hz, 9),
-                self.rate_from,
-                self.start.text()
-            ),
-        );
-        if let Some(resampled) = &self.resampled {
-            line("resampled", resampled_text(resampled));
         }
-        line(
-            "band",
-            format!(
-                "compensated up to {} Hz, zero from {} Hz, {}; the first and last {} ms depend on extrapolation beyond \
-                 the record",
-                short(self.band_hz),
-                short(self.band_end_hz),
-                self.band.text(),
-                rounded(1e3 * self.edge_s, 3)
-            ),
-        );
-        if !self.effects.is_empty() {
-            line("effects", self.effects_text());
-        }
-        line("gain", self.noise.gain_text());
-        line("noise", self.noise.record_text(&self.unit));
-        let result = &self.result;
-        line(
-            "result",
-            format!(
-                "mean {}, rms about the mean {}, range {} to {} {}",
-                rounded(result.mean, 4),
-                rounded(result.rms, 4),
-                rounded(result.smallest, 4),
-                rounded(result.largest, 4),
-                self.unit
-            ),
-        );
-        line("output", self.output.clone());
         text
     }
 }
 
 impl CompensateReport {
+    /// What was done and what came of it: names with their values.
+    pub(super) fn facts(&self) -> Vec<[String; 2]> {
+        let fact = |label: &str, value: String| [label.to_owned(), value];
+        let mut facts = vec![
+            fact("input", format!("{} ({})", self.input, self.dialect)),
+            fact(
+                "channel",
+                format!(
+                    "{} in {}, taken as recorded",
+                    self.channel, self.channel_unit
+                ),
+            ),
+            fact("calibration", self.calibration.clone()),
+            fact(
+                "time",
+                format!(
+                    "{} samples at {} Hz ({}), from {}",
+                    self.samples,
+                    rounded(self.rate_hz, 9),
+                    self.rate_from,
+                    self.start.text()
+                ),
+            ),
+        ];
+        let resampled = self.resampled.iter();
+        facts.extend(resampled.map(|resampled| fact("resampled", resampled_text(resampled))));
+        if !self.filled.is_empty() {
+            facts.push(fact("filled in", self.filled_text()));
+        }
+        facts.push(fact("band", self.band_text()));
+        if !self.effects.is_empty() {
+            facts.push(fact("effects", self.effects_text()));
+        }
+        facts.extend([
+            fact("gain", self.noise.gain_text()),
+            fact("noise", self.noise.record_text(&self.unit)),
+            fact("result", self.result_text()),
+            fact("output", self.output.clone()),
+        ]);
+        facts
+    }
+
+    /// Adds the gaps that were bridged in resampling to what was filled in.
+    pub(super) fn note_bridged(&mut self) {
+        let start_s = self.start.seconds();
+        let gaps = self
+            .resampled
+            .iter()
+            .flat_map(|resampled| &resampled.bridged_gaps);
+        self.filled.extend(gaps.map(|gap| FilledSpan {
+            from_s: start_s + gap.from_s,
+            to_s: start_s + gap.to_s,
+            samples: gap.samples,
+        }));
+    }
+
+    fn band_text(&self) -> String {
+        format!(
+            "compensated up to {} Hz, zero from {} Hz, {}; the first and last {} ms depend on extrapolation beyond the record",
+            short(self.band_hz),
+            short(self.band_end_hz),
+            self.band.text(),
+            rounded(1e3 * self.edge_s, 3)
+        )
+    }
+
+    /// Mean, rms and range of the result.
+    pub(super) fn result_text(&self) -> String {
+        let result = &self.result;
+        format!(
+            "mean {}, rms about the mean {}, range {} to {} {}",
+            rounded(result.mean, 4),
+            rounded(result.rms, 4),
+            rounded(result.smallest, 4),
+            rounded(result.largest, 4),
+            self.unit
+        )
+    }
+
+    /// How much was filled in, and how far that reaches.
+    pub(super) fn filled_summary(&self) -> String {
+        let samples = self.filled.iter().map(|span| span.samples).sum();
+        format!(
+            "{} at {}, which affects the result within {} ms of them",
+            plural(samples, "sample"),
+            plural(self.filled.len(), "place"),
+            rounded(1e3 * self.reach_s, 3)
+        )
+    }
+
+    /// A time of the record for people.
+    pub(super) fn time_text(&self, time_s: f64) -> String {
+        match self.start.origin_ns {
+            0 => format!("{} s", rounded(time_s, 12)),
+            // Seconds since 1970 are good to 0.24 µs in an f64.
+            _ => {
+                let after_s = ((time_s - self.start.seconds()) * 1e6).round() * 1e-6;
+                self.start.later(after_s).short()
+            }
+        }
+    }
+
+    fn filled_text(&self) -> String {
+        let each = self.filled.iter().take(LISTED).map(|span| {
+            let [from, to] = [span.from_s, span.to_s].map(|s| self.time_text(s));
+            format!("{from} to {to} ({})", span.samples)
+        });
+        let each: Vec<String> = each.collect();
+        let more = match self.filled.len().saturating_sub(LISTED) {
+            0 => String::new(),
+            more => format!(" and {more} more, which --json lists"),
+        };
+        format!("{}: {}{more}", self.filled_summary(), each.join(", "))
+    }
+
     fn effects_text(&self) -> String {
         let each = |e: &UndoneEffect| format!("{} ({}) {}", e.effect, e.form, e.done);
         let list: Vec<String> = self.effects.iter().map(each).collect();
@@ -223,7 +292,26 @@ impl NoiseReport {
         points.join(", ")
     }
 
-    fn record_text(&self, unit: &str) -> String {
+    /// What the uncertainties of the stand make of the result.
+    pub(super) fn uncertainty_text(&self) -> String {
+        let known = |g: &NoiseAt| {
+            let std = rounded(100.0 * g.relative_std?, 2);
+            Some(format!("{std} % at {} Hz", short(g.frequency_hz)))
+        };
+        let ends = [self.gain.first(), self.gain.last()];
+        let ends: Option<Vec<String>> = ends.into_iter().map(|g| g.and_then(known)).collect();
+        match ends {
+            Some(ends) => format!(
+                "{} (standard uncertainty of stand and calibration)",
+                ends.join(", ")
+            ),
+            None => {
+                "unknown: the stand file gives no std for its constants, or has effects".to_owned()
+            }
+        }
+    }
+
+    pub(super) fn record_text(&self, unit: &str) -> String {
         match &self.record {
             None => format!(
                 "white noise is multiplied by {}; the noise of this record is unknown (too few \

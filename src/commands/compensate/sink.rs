@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::Plan;
+use super::page::PageData;
 use super::plot::Traces;
 use super::report::CompensateReport;
 use crate::cli::{Compensate, Format};
@@ -16,10 +17,11 @@ use crate::io::{COMPENSATED, Input};
 use crate::recording::MessageOrigin;
 use crate::stand::Calibration;
 
-/// An open result, and its picture as far as one is drawn.
+/// An open result, with its picture and its page as far as they are wanted.
 pub(super) struct Sink {
     target: Target,
     traces: Option<Traces>,
+    page: Option<PageData>,
 }
 
 enum Target {
@@ -57,6 +59,8 @@ impl Sink {
         mut output: Output,
     ) -> Result<Self, Failure> {
         let traces = args.plot.as_ref().map(|_| Traces::new(args.plot_range));
+        let page = args.html.as_ref().map(|_| PageData::new(args, plan));
+        let page = page.transpose()?;
         let target = match format(args) {
             Format::Csv => {
                 output.write(heading(&plan.chain, args.with_recorded).as_bytes())?;
@@ -64,7 +68,11 @@ impl Sink {
             }
             Format::Mcap => Target::Messages(Box::new(Messages::open(args, plan, output)?)),
         };
-        Ok(Self { target, traces })
+        Ok(Self {
+            target,
+            traces,
+            page,
+        })
     }
 
     /// Whether rows are wanted as text.
@@ -76,12 +84,16 @@ impl Sink {
         self.traces.as_ref()
     }
 
+    pub(super) fn page(&self) -> Option<&PageData> {
+        self.page.as_ref()
+    }
+
     pub(super) fn take(&mut self, part: &Part) -> Result<(), Failure> {
         if let Some(traces) = &mut self.traces {
-            let scale = part.rows.scale;
-            for (i, (torque, recorded)) in part.torque.iter().zip(part.recorded).enumerate() {
-                traces.add(part.rows.time_s(i), recorded * scale, torque * scale);
-            }
+            traces.take(part);
+        }
+        if let Some(page) = &mut self.page {
+            page.take(part);
         }
         match &mut self.target {
             Target::Text(output) => output.write(part.text),

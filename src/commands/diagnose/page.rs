@@ -3,14 +3,15 @@
 use std::path::Path;
 
 use super::text::{
-    cells, constant_rows, error_rows, error_sentences, ladder_rows, share_rows, suspected,
+    answer, candidates, cells, constant_rows, error_rows, error_sentences, ladder_rows, share_rows,
 };
 use crate::chart::{Chart, Page, Series};
 use crate::diagnose::{
-    CandidateFit, Diagnosis, MotionAxis, RecordResidual, Status, Verdict, autocorrelation, binned,
-    density, response,
+    CandidateFit, Diagnosis, MotionAxis, RecordResidual, Status, autocorrelation, binned, density,
+    response,
 };
-use crate::print::{rounded, short, unit_or_as_recorded};
+use crate::print::{plural, rounded, short, unit_or_as_recorded};
+use crate::provenance::Provenance;
 use crate::stand::si_unit;
 
 /// Periods of the stand in the picture over time.
@@ -21,7 +22,7 @@ const PICTURED: [usize; 2] = [50, 4000];
 const LAGS: usize = 60;
 
 /// A page for a browser, complete in itself.
-pub fn page(diagnosis: &Diagnosis) -> String {
+pub fn page(diagnosis: &Diagnosis, provenance: &Provenance) -> String {
     let stand = diagnosis.sources.stand.as_deref();
     let stand = stand.map_or_else(|| "a plain stand".to_owned(), file_name);
     let units = &diagnosis.context().units;
@@ -32,6 +33,7 @@ pub fn page(diagnosis: &Diagnosis) -> String {
         applied_unit: si_unit(&units.applied),
         per_printed: units.per_printed,
     };
+    provenance.add_to(&mut page.page);
     page.conclusion();
     page.errors();
     page.records();
@@ -41,8 +43,6 @@ pub fn page(diagnosis: &Diagnosis) -> String {
     page.residuals();
     page.candidates();
     page.remaining();
-    page.page
-        .text(concat!("torqcomp ", env!("CARGO_PKG_VERSION")));
     page.page.html()
 }
 
@@ -60,21 +60,9 @@ struct Draft<'a> {
 
 impl Draft<'_> {
     fn conclusion(&mut self) {
-        let added = self.diagnosis.effects.join(" and ");
-        self.page.text(&match self.diagnosis.verdict {
-            Verdict::Explained => {
-                format!("Explained: with {added}, the error on the held-out records is at the noise.")
-            }
-            Verdict::PartlyExplained => format!(
-                "Partly explained: {added} reduces the error on the held-out records, but structure above the noise remains."
-            ),
-            Verdict::NothingMissing => {
-                "Nothing missing: the plain stand explains the held-out records down to the noise.".to_owned()
-            }
-            Verdict::Unexplained => {
-                "Unexplained: something is missing, and no effect in the list explains it.".to_owned()
-            }
-        });
+        for sentence in answer(self.diagnosis) {
+            self.page.text(&sentence);
+        }
         for warning in &self.diagnosis.warnings {
             self.page.warning(warning.code, &warning.message);
         }
@@ -196,11 +184,12 @@ impl Draft<'_> {
             self.page.chart(&chart);
         }
         let label = format!("{}/√Hz", self.unit);
-        let spectrum =
+        let mut spectrum =
             self.of_residuals("Spectrum", ["frequency, Hz", &label], |name, residuals| {
                 let (x, y) = density(residuals);
                 self.line(name, &x, &y)
             });
+        spectrum.series.extend(self.noise_floor());
         self.page.chart(&logarithmic(spectrum));
         let chart = self.autocorrelation();
         self.page.chart(&chart);
@@ -228,9 +217,20 @@ impl Draft<'_> {
         }
     }
 
+    /// Density of white noise that has the power of the noise floor.
+    fn noise_floor(&self) -> Option<Series> {
+        let rms = self.diagnosis.error.noise_floor_rms?;
+        let holdout = &self.diagnosis.before.holdout;
+        let rate_hz = holdout.first()?.record.rate_hz();
+        let (x, _) = density(holdout);
+        let level = rms * (2.0 / rate_hz).sqrt();
+        let ends = [*x.first()?, *x.last()?];
+        Some(Series::line("noise floor", &ends, &[level; 2]))
+    }
+
     fn autocorrelation(&self) -> Chart {
         let title = "Autocorrelation; within the band: white at 99 %";
-        let labels = ["lag, samples", "of the mean square"];
+        let labels = ["lag, samples", "share of the mean square"];
         let (shares, bound) = autocorrelation(&self.diagnosis.before.holdout, LAGS);
         let lags: Vec<f64> = (0..shares.len()).map(|lag| lag as f64).collect();
         Chart {
@@ -269,11 +269,13 @@ impl Draft<'_> {
     fn candidates(&mut self) {
         self.page
             .heading("Candidates, the accepted first, then by hold-out error");
-        let mut rows = vec![cells([
-            "effect", "status", "held out", "training", "p", "reason",
-        ])];
-        rows.extend(self.diagnosis.candidates.iter().map(candidate_row));
-        self.page.table(&rows);
+        let (first, others) = candidates(self.diagnosis);
+        self.page.table(&self.candidate_rows(&first));
+        if !others.is_empty() {
+            let summary = plural(others.len(), "more candidate");
+            let rows = self.candidate_rows(&others);
+            self.page.folded(&summary, |page| page.table(&rows));
+        }
         let shown = self.diagnosis.candidates.iter();
         let shown = shown.filter(|c| c.status() != Status::Rejected);
         let mut rows = vec![cells(["effect", "parameter", "value", "std", "unit"])];
@@ -294,11 +296,30 @@ impl Draft<'_> {
         }
     }
 
+    fn candidate_rows(&self, candidates: &[&CandidateFit]) -> Vec<Vec<String>> {
+        let number = |value: Option<f64>, digits: u32| {
+            value.map_or_else(|| "–".to_owned(), |v| rounded(v, digits))
+        };
+        let [held_out, training] =
+            ["held out", "training"].map(|part| format!("{part}, {}", self.unit));
+        let mut rows = vec![cells([
+            "effect", "status", &held_out, &training, "p", "reason",
+        ])];
+        rows.extend(candidates.iter().map(|candidate| {
+            cells([
+                &candidate.names().join(" + "),
+                candidate.status().name(),
+                &number(candidate.holdout_rms, 4),
+                &number(candidate.train_rms, 4),
+                &number(candidate.p_value, 2),
+                &candidate.reason.text(),
+            ])
+        }));
+        rows
+    }
+
     fn remaining(&mut self) {
         self.page.heading("What remains");
-        if let Some(guard) = &self.diagnosis.suspected {
-            self.page.text(&format!("Suspected: {}.", suspected(guard)));
-        }
         let residual = &self.diagnosis.residual;
         self.page
             .text(&format!("Hold-out residual: {}.", residual.described));
@@ -320,10 +341,6 @@ impl Draft<'_> {
             ])
         }));
         self.page.table(&rows);
-        self.page.heading("Next experiment");
-        let next = self.diagnosis.next_experiment.as_deref();
-        self.page
-            .text(next.unwrap_or("No further record is needed to distinguish candidates."));
     }
 }
 
@@ -345,18 +362,4 @@ fn rms_about_mean(values: &[f64]) -> f64 {
     let count = values.len().max(1) as f64;
     let mean = values.iter().sum::<f64>() / count;
     (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / count).sqrt()
-}
-
-fn candidate_row(candidate: &CandidateFit) -> Vec<String> {
-    let number = |value: Option<f64>, digits: u32| {
-        value.map_or_else(|| "–".to_owned(), |v| rounded(v, digits))
-    };
-    cells([
-        &candidate.names().join(" + "),
-        candidate.status().name(),
-        &number(candidate.holdout_rms, 4),
-        &number(candidate.train_rms, 4),
-        &number(candidate.p_value, 2),
-        &candidate.reason.text(),
-    ])
 }

@@ -1,9 +1,13 @@
 //! A diagnosis as text.
 
 use torqcomp_model::Estimate;
+use torqcomp_model::effects::Effect;
 
-use crate::diagnose::{CandidateFit, Diagnosis, GuardModel, NoiseFloorSource, Status};
-use crate::print::{Report, columns, rounded, unit_or_as_recorded, with_std};
+use crate::diagnose::{CandidateFit, Diagnosis, GuardModel, NoiseFloorSource, Status, Verdict};
+use crate::print::{Report, columns, plural, rounded, unit_or_as_recorded, with_std};
+
+/// Candidates that are listed unless all are asked for.
+const FIRST: usize = 5;
 
 impl Report for Diagnosis {
     const SCHEMA: &'static str = "torqcomp.diagnose/1";
@@ -18,23 +22,80 @@ impl Report for Diagnosis {
             some => format!("declared effects, fitted anew: {}\n", some.join(", ")),
         };
         let mut text = format!(
-            "verdict: {}\neffects: {effects}\n{declared}\n{}{}\n\n{}{}\n",
+            "verdict: {}\neffects: {effects}\n{declared}{}\n\n{}{}\n\n{}{}\n",
             self.verdict.name(),
+            answer(self).join("\n"),
             columns(&error_rows(self)),
             error_sentences(self).join("\n"),
             several(self),
             columns(&constant_rows(self))
         );
-        text.extend(self.candidates.iter().map(candidate));
-        if let Some(guard) = &self.suspected {
-            text += &format!("\nsuspected: {}\n", suspected(guard));
+        let (first, others) = candidates(self);
+        text.extend(first.into_iter().map(candidate));
+        match self.shows_all {
+            true => text.extend(others.into_iter().map(candidate)),
+            false if others.is_empty() => {}
+            false => {
+                let more = plural(others.len(), "more candidate");
+                text += &format!("{more}; --all lists them\n");
+            }
         }
         text += &format!("\nresidual: {}\n", self.residual.described);
-        if let Some(next) = &self.next_experiment {
-            text += &format!("next experiment: {next}\n");
-        }
         text
     }
+}
+
+/// What was found and what to do about it: the verdict, each effect with its equation, the next record.
+pub fn answer(diagnosis: &Diagnosis) -> Vec<String> {
+    let names = diagnosis.effects.join(" and ");
+    let verdict = match diagnosis.verdict {
+        Verdict::Explained => {
+            format!("Explained: with {names}, the error on the held-out records is at the noise.")
+        }
+        Verdict::PartlyExplained => format!(
+            "Partly explained: {names} reduces the error on the held-out records, but structure above the noise remains."
+        ),
+        Verdict::NothingMissing => {
+            "Nothing missing: the plain stand explains the held-out records down to the noise."
+                .to_owned()
+        }
+        Verdict::Unexplained => {
+            "Unexplained: something is missing, and no effect in the list explains it.".to_owned()
+        }
+    };
+    let effects = diagnosis.after.fitted.structure.effects.iter();
+    let added = effects.filter(|own| diagnosis.effects.contains(&own.effect.name));
+    let added = added.map(|own| explained(own.effect, own.form.law));
+    let guard = diagnosis.suspected.iter().flat_map(|guard| {
+        let suspected = format!("Suspected: {}.", suspected(guard));
+        [suspected, explained(guard.effect, guard.equation)]
+    });
+    let next = diagnosis.next_experiment.iter().map(|next| {
+        let end = if next.ends_with('?') { "" } else { "." };
+        format!("Next experiment: {next}{end}")
+    });
+    let all = std::iter::once(verdict).chain(added).chain(guard);
+    all.chain(next).collect()
+}
+
+/// An effect in two sentences with its equation.
+fn explained(effect: &Effect, law: &str) -> String {
+    format!(
+        "{}, {law}. {} {}",
+        effect.name, effect.meaning, effect.remedy
+    )
+}
+
+/// The candidates that are listed first, the accepted ones among them, and the others.
+pub fn candidates(diagnosis: &Diagnosis) -> (Vec<&CandidateFit>, Vec<&CandidateFit>) {
+    let (mut all, others): (Vec<_>, Vec<_>) = diagnosis
+        .candidates
+        .iter()
+        .partition(|c| c.status() == Status::Accepted);
+    let first = FIRST.max(all.len());
+    all.extend(others);
+    let others = all.split_off(first.min(all.len()));
+    (all, others)
 }
 
 /// A guard model in words.

@@ -45,6 +45,7 @@ pub fn run(args: &Decay) -> Result<Outcome, Failure> {
     if let Some(fit) = &mut result.fit {
         fit.unit.clone_from(&loaded[0].unit);
     }
+    result.label_charts("signal", &loaded[0].unit);
     let entries = entries(args, &mut result)?;
     deliver(result, recorded, &args.findings, &entries)
 }

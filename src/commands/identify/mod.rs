@@ -16,6 +16,7 @@ use crate::failure::Failure;
 use crate::identify::{Identification, NamedEstimate};
 use crate::io::output::{self, Output, Policy};
 use crate::print::Report;
+use crate::provenance::Provenance;
 use crate::stand::update::Entry;
 use crate::stand::{self, update};
 use crate::unit::{NamedUnit, RecordedChannel};
@@ -118,7 +119,12 @@ fn deliver(
         stand.write(stand_file(findings, entries)?.as_bytes())?;
     }
     if let Some(page) = &mut targets.page {
-        page.write(result.page().as_bytes())?;
+        let stand = stand_text(findings)?;
+        let stand = stand
+            .as_ref()
+            .map(|(name, text)| (name.as_str(), text.as_str()));
+        let provenance = Provenance::of(&result.inputs, stand)?;
+        page.write(result.page(&provenance).as_bytes())?;
     }
     // Standard output has the stand file.
     if findings.json || findings.result.output.is_none() || !findings.result.is_stdout() {
@@ -155,10 +161,9 @@ impl Targets {
         let place = result.output.as_deref().map(Path::new);
         let stand = place.map(|_| Output::open(place, policy, &inputs));
         let page = findings.html.as_deref().map(Path::new);
-        let page = page.map(|page| result.open_beside(page, &inputs));
         Ok(Self {
             stand: stand.transpose()?,
-            page: page.transpose()?,
+            page: result.open_beside(page, &inputs)?,
         })
     }
 }

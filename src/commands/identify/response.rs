@@ -7,7 +7,7 @@ use super::{ONE_MODE, Recorded, TORQUE, deliver};
 use crate::cli::identify::Response;
 use crate::commands::Outcome;
 use crate::failure::Failure;
-use crate::identify::response::{Driven, ResponseOptions, identify};
+use crate::identify::response::{Driven, RATIO, ResponseOptions, identify};
 use crate::identify::{Identification, Motion};
 use crate::io::{ChannelChoice, Input};
 use crate::recording::AlignedChannels;
@@ -56,6 +56,11 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
         fit.unit.clone_from(&unit.text);
     }
     name_gain(&mut result, &loaded[0]);
+    let units = [1, 0].map(|k| loaded[0].channels[k].unit.as_ref());
+    if let [Some(measured), Some(applied)] = units {
+        let unit = format!("({})/({})", measured.text, applied.text);
+        result.label_charts(RATIO, &unit);
+    }
     let entries = entries(args, rad_per_n_m(args, &loaded, motion)?, &mut result)?;
     deliver(result, recorded, &args.findings, &entries)
 }

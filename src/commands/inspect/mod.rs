@@ -13,7 +13,7 @@ use std::path::Path;
 
 use self::content::Content;
 use self::report::{ChannelWarning, InspectReport, Inspected};
-use super::{Outcome, open_plot};
+use super::Outcome;
 use crate::cli::Inspect;
 use crate::failure::Failure;
 use crate::io::Input;
@@ -27,7 +27,7 @@ pub fn run(args: &Inspect) -> Result<Outcome, Failure> {
     check(args)?;
     let inputs: Vec<&Path> = args.files.iter().map(Path::new).collect();
     let output = args.result.open(&inputs)?;
-    let plot = open_plot(args.plot.as_deref(), &args.result, &inputs)?;
+    let plot = args.result.open_beside(args.plot.as_deref(), &inputs)?;
 
     let read: Vec<Result<Content, Failure>> = args
         .files

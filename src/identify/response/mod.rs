@@ -19,6 +19,7 @@ use crate::failure::Failure;
 use blocks::Set;
 use lines::Lines;
 use modal::{Data, Effort, Modal};
+pub(crate) use present::RATIO;
 
 /// How a stand was excited.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

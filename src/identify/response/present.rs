@@ -168,6 +168,9 @@ pub(super) fn levels(result: &mut Identification, set: &Set, lines: &Lines) {
     }
 }
 
+/// Label of the magnitude, whose unit is that of the channels.
+pub(crate) const RATIO: &str = "measured per applied";
+
 /// Magnitude with its bounds, phase and coherence, the model, and the error against the number of modes if that was chosen.
 pub(super) fn draw(result: &mut Identification, set: &Set, lines: &Lines, fitted: &Modal) {
     let h1 = set.powers.response(Estimator::H1);
@@ -179,14 +182,14 @@ pub(super) fn draw(result: &mut Identification, set: &Set, lines: &Lines, fitted
         Series::line("model", &hz, &sizes(&fitted.response)),
     ];
     let frequency = "frequency, Hz";
-    let mut magnitude = Chart::new("Response", frequency, "measured over applied", both);
+    let mut magnitude = Chart::new("Response", frequency, RATIO, both);
     magnitude.y_log = true;
     magnitude.band = bounds(&h1, lines, set.step_hz);
     let coherence = vec![Series::line("coherence", &hz, &h1.coherence[lines.clone()])];
     result.charts.extend([
         magnitude,
         phase(&hz, part, &fitted.response),
-        Chart::new("Coherence", frequency, "", coherence),
+        Chart::new("Coherence", frequency, "coherence, no unit", coherence),
     ]);
     let errors = &result.held_out_errors;
     if errors.iter().filter(|e| e.is_finite()).count() < 2 {
@@ -195,7 +198,12 @@ pub(super) fn draw(result: &mut Identification, set: &Set, lines: &Lines, fitted
     let counts: Vec<f64> = (0..errors.len()).map(|n| n as f64).collect();
     let percent: Vec<f64> = errors.iter().map(|e| 100.0 * e).collect();
     let error = vec![Series::dots("hold-out error", &counts, &percent)];
-    let chart = Chart::new("Error and number of modes", "modes", "per cent", error);
+    let chart = Chart::new(
+        "Error and number of modes",
+        "number of modes",
+        "hold-out error, %",
+        error,
+    );
     result.charts.push(chart);
 }
 
@@ -212,7 +220,7 @@ fn phase(hz: &[f64], h1: &[Complex64], model: &[Complex64]) -> Chart {
         Series::line("H1", hz, &measured),
         Series::line("model", hz, &turns),
     ];
-    Chart::new("Phase", "frequency, Hz", "degrees", both)
+    Chart::new("Phase", "frequency, Hz", "phase, degrees", both)
 }
 
 /// The magnitude ± twice its standard uncertainty: x, low, high.
