@@ -7,13 +7,17 @@ pub(super) const COLUMNS: usize = 900;
 /// Most bins of an envelope, an even number.
 const MOST_BINS: usize = 4096;
 
-/// The first, lowest, highest and last point of each run of points in the same column.
+/// The first, lowest, highest and last point of each run of points in the same column, in their order.
 pub(super) fn thinned(
     points: impl Iterator<Item = Point>,
     column: impl Fn(f64) -> i64,
 ) -> Vec<Point> {
     let mut out: Vec<Point> = Vec::new();
     let mut open: Option<(i64, [Point; 4])> = None;
+    let in_order = |(_, [first, low, high, last]): (i64, [Point; 4])| match low.0 <= high.0 {
+        true => [first, low, high, last],
+        false => [first, high, low, last],
+    };
     for point in points {
         let here = column(point.0);
         match &mut open {
@@ -27,12 +31,12 @@ pub(super) fn thinned(
                 *last = point;
             }
             _ => {
-                out.extend(open.into_iter().flat_map(|(_, points)| points));
+                out.extend(open.into_iter().flat_map(in_order));
                 open = Some((here, [point; 4]));
             }
         }
     }
-    out.extend(open.into_iter().flat_map(|(_, points)| points));
+    out.extend(open.into_iter().flat_map(in_order));
     out
 }
 
@@ -44,19 +48,20 @@ pub(crate) struct Envelope {
     in_last: usize,
 }
 
+/// The lowest and the highest of some points.
 #[derive(Debug, Clone, Copy)]
 struct Bin {
-    x: f64,
-    low: f64,
-    high: f64,
+    low: Point,
+    high: Point,
 }
 
 impl Bin {
     fn join(self, later: Self) -> Self {
+        let is_lower = later.low.1 < self.low.1 || self.low.1.is_nan();
+        let is_higher = later.high.1 > self.high.1 || self.high.1.is_nan();
         Self {
-            x: self.x,
-            low: self.low.min(later.low),
-            high: self.high.max(later.high),
+            low: if is_lower { later.low } else { self.low },
+            high: if is_higher { later.high } else { self.high },
         }
     }
 }
@@ -71,7 +76,10 @@ impl Envelope {
     }
 
     pub(crate) fn add(&mut self, x: f64, y: f64) {
-        let bin = Bin { x, low: y, high: y };
+        let bin = Bin {
+            low: (x, y),
+            high: (x, y),
+        };
         match self.bins.last_mut() {
             Some(last) if self.in_last < self.samples_per_bin => {
                 *last = last.join(bin);
@@ -95,11 +103,15 @@ impl Envelope {
         self.bins.is_empty()
     }
 
-    /// The lowest and highest value of each bin, as a line.
+    /// The lowest and highest point of each bin in their order, as a line: all points of a short series.
     pub(crate) fn points(&self) -> Vec<Point> {
         let ends = |bin: &Bin| {
-            let high = (bin.high > bin.low).then_some((bin.x, bin.high));
-            std::iter::once((bin.x, bin.low)).chain(high)
+            let (first, last) = match bin.low.0 <= bin.high.0 {
+                true => (bin.low, bin.high),
+                false => (bin.high, bin.low),
+            };
+            let last = (last.0 > first.0).then_some(last);
+            std::iter::once(first).chain(last)
         };
         self.bins.iter().flat_map(ends).collect()
     }
@@ -118,10 +130,20 @@ mod tests {
         }
         let bins = &envelope.bins;
         assert!(bins.len() <= MOST_BINS);
-        assert!(bins.iter().any(|bin| bin.high == 9.0));
-        let widths: Vec<f64> = bins.windows(2).map(|w| w[1].x - w[0].x).collect();
+        assert!(bins.iter().any(|bin| bin.high == (54_321.0, 9.0)));
+        let widths = bins.windows(2).map(|w| w[1].low.0 - w[0].low.0);
+        let widths: Vec<f64> = widths.collect();
         assert!(widths[0] > 0.0);
         assert!(widths.iter().all(|w| *w == widths[0]), "bins of one width");
+    }
+
+    #[test]
+    fn a_short_series_is_kept_as_it_is() {
+        let wave = |i: u32| (f64::from(i), f64::from(i * 31 % 97));
+        let mut envelope = Envelope::new();
+        (0..8000).map(wave).for_each(|(x, y)| envelope.add(x, y));
+        assert_eq!(envelope.samples_per_bin, 2);
+        assert_eq!(envelope.points(), (0..8000).map(wave).collect::<Vec<_>>());
     }
 
     #[test]
@@ -129,7 +151,7 @@ mod tests {
         let heights = [0.0, f64::NAN, 5.0, -1.0, 2.0, 7.0];
         let points = heights.iter().enumerate().map(|(i, y)| (i as f64, *y));
         let kept = thinned(points, |x| (x / 5.0) as i64);
-        let want = [(0.0, 0.0), (3.0, -1.0), (2.0, 5.0), (4.0, 2.0)];
+        let want = [(0.0, 0.0), (2.0, 5.0), (3.0, -1.0), (4.0, 2.0)];
         assert_eq!(kept[..4], want);
         assert_eq!(kept[4..], [(5.0, 7.0); 4]);
     }

@@ -12,7 +12,7 @@ use crate::print::visible;
 
 pub(crate) use envelope::Envelope;
 pub(crate) use page::Page;
-use panel::{FOOT, HEADING, LEFT, Panel, px};
+use panel::{FOOT, HEADING, LEFT, Panel, Resolution, px};
 
 /// x and y.
 pub(crate) type Point = (f64, f64);
@@ -191,7 +191,7 @@ impl Chart {
 
     /// The chart for a page, which writes title and legend beside it.
     fn svg(&self) -> Markup {
-        let panel = Panel::new(self, PAGE_WIDTH, PAGE_PANEL);
+        let panel = Panel::new(self, (PAGE_WIDTH, PAGE_PANEL), Resolution::PAGE);
         let height = HEADING + PAGE_PANEL + FOOT;
         html! {
             svg xmlns="http://www.w3.org/2000/svg" viewBox={ "0 0 " (PAGE_WIDTH) " " (height) }
@@ -208,7 +208,7 @@ impl Chart {
 /// A file with the charts one above the other, their panels of the same height. Charts that follow each other with the
 /// same range of x share its labels.
 pub(crate) fn picture(title: &str, panel_height: f64, charts: &[Chart]) -> String {
-    let panel = |chart| Panel::new(chart, FILE_WIDTH, panel_height);
+    let panel = |chart| Panel::new(chart, (FILE_WIDTH, panel_height), Resolution::FILE);
     let panels: Vec<Option<Panel>> = charts.iter().map(panel).collect();
     let labelled = |i: usize| match (&panels[i], panels.get(i + 1)) {
         (Some(this), Some(Some(next))) => !this.shares_x_with(next),
@@ -274,7 +274,7 @@ mod tests {
         y[54_321] = 9.0;
         let chart = Chart::new("a <b>", "t, s", "V", vec![Series::line("data", &x, &y)]);
         let svg = chart.svg().into_string();
-        assert!(svg.contains("a &lt;b&gt;") && svg.len() < 80_000 && !svg.contains("NaN"));
+        assert!(svg.contains("a &lt;b&gt;") && svg.len() < 160_000 && !svg.contains("NaN"));
         // The highest point lies 5 % of the range below the top of the frame.
         let top = heights(&svg).into_iter().fold(f64::INFINITY, f64::min);
         let want = HEADING + 0.05 / 1.1 * PAGE_PANEL;

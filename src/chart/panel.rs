@@ -23,9 +23,32 @@ const CLOSE: f64 = 0.5;
 /// Width of an entry of the legend.
 const ENTRY: f64 = 150.0;
 
+/// How fine a picture is.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Resolution {
+    /// Columns that a long series is reduced to.
+    columns: usize,
+    /// Steps of a position in a user unit.
+    steps: f64,
+}
+
+impl Resolution {
+    /// Of what is seen as a whole.
+    pub(super) const FILE: Self = Self {
+        columns: COLUMNS,
+        steps: 10.0,
+    };
+    /// Of what a reader can zoom into.
+    pub(super) const PAGE: Self = Self {
+        columns: 2048,
+        steps: 100.0,
+    };
+}
+
 /// A chart and where it lies in the picture.
 pub(super) struct Panel<'a> {
     chart: &'a Chart,
+    resolution: Resolution,
     x: Axis,
     y: Axis,
     bottom: f64,
@@ -34,12 +57,17 @@ pub(super) struct Panel<'a> {
 
 impl<'a> Panel<'a> {
     /// `None` if no point can be drawn.
-    pub(super) fn new(chart: &'a Chart, width: f64, height: f64) -> Option<Self> {
+    pub(super) fn new(
+        chart: &'a Chart,
+        (width, height): (f64, f64),
+        resolution: Resolution,
+    ) -> Option<Self> {
         let points = || chart.series.iter().flat_map(|s| s.points.iter().copied());
         let bands = chart.band.iter().flat_map(|(_, low, high)| [*low, *high]);
         let heights = points().map(|p| p.1).chain(bands);
         Some(Self {
             chart,
+            resolution,
             x: Axis::over(points().map(|p| p.0), chart.x_log, 0.0)?,
             y: Axis::over(heights, chart.y_log, 0.05)?,
             bottom: HEADING + height,
@@ -165,7 +193,7 @@ impl<'a> Panel<'a> {
             .map(|(x, y)| (self.across(x), self.up(y)));
         html! {
             @if inside.len() > 1 {
-                path.band.{ "s" (self.chart.colour(0)) } d=(path(outline, f64::INFINITY)) {} "\n"
+                path.band.{ "s" (self.chart.colour(0)) } d=(path(outline, f64::INFINITY, self.resolution.steps)) {} "\n"
             }
         }
     }
@@ -175,7 +203,8 @@ impl<'a> Panel<'a> {
         let place = |p: &Point| (self.across(p.0), self.up(p.1));
         let places = series.points.iter().filter(inside).map(place);
         let class = format!("s{colour}");
-        if series.dots && series.points.len() <= COLUMNS {
+        let Resolution { columns, steps } = self.resolution;
+        if series.dots && series.points.len() <= columns {
             return html! {
                 @for (x, y) in places.filter(|p| p.1.is_finite()) {
                     circle.dot.(class) cx=(px(x)) cy=(px(y)) r="3.5" {}
@@ -184,14 +213,12 @@ impl<'a> Panel<'a> {
             };
         }
         let bridged = series.bridged * (self.across(1.0) - self.across(0.0));
-        let line = if series.points.len() <= 4 * COLUMNS {
-            path(places, bridged)
+        let line = if series.points.len() <= 4 * columns {
+            path(places, bridged, steps)
         } else {
-            let per_column = (self.right - LEFT) / COLUMNS as f64;
-            path(
-                thinned(places, |x| (x / per_column) as i64).into_iter(),
-                bridged,
-            )
+            let per_column = (self.right - LEFT) / columns as f64;
+            let places = thinned(places, |x| (x / per_column) as i64);
+            path(places.into_iter(), bridged, steps)
         };
         html! { path.line.(class) d=(line) {} "\n" }
     }
@@ -226,8 +253,9 @@ pub(super) fn px(value: f64) -> String {
     format!("{value:.1}")
 }
 
-/// A line through the places; the pen is lifted where one is not finite and over distances above `bridged`.
-fn path(places: impl Iterator<Item = Point>, bridged: f64) -> String {
+/// A line through the places, rounded to `steps` in a unit; the pen is lifted where one is not finite and over distances
+/// above `bridged`.
+fn path(places: impl Iterator<Item = Point>, bridged: f64, steps: f64) -> String {
     let mut text = String::new();
     let mut last: Option<Point> = None;
     for (x, y) in places {
@@ -235,7 +263,7 @@ fn path(places: impl Iterator<Item = Point>, bridged: f64) -> String {
             last = None;
             continue;
         }
-        let place = ((10.0 * x).round() / 10.0, (10.0 * y).round() / 10.0);
+        let place = ((steps * x).round() / steps, (steps * y).round() / steps);
         if last == Some(place) {
             continue;
         }
