@@ -218,7 +218,7 @@ impl CompensateReport {
 
     /// How much was filled in, and how far that reaches.
     pub(super) fn filled_summary(&self) -> String {
-        let samples = self.filled.iter().map(|span| span.samples).sum();
+        let samples: usize = self.filled.iter().map(|span| span.samples).sum();
         format!(
             "{} at {}, which affects the result within {} ms of them",
             plural(samples, "sample"),
