@@ -112,13 +112,19 @@ impl Torque for Gap {
     }
 }
 
+/// A follower brought within the gap around `x`. A motion that diverges while constants are tried has no value at last:
+/// `clamp` would panic there.
+fn within(follower: f64, x: f64, gap: f64) -> f64 {
+    follower.max(x - gap).min(x + gap)
+}
+
 struct Joint {
     gap: f64,
 }
 
 impl Torque for Joint {
     fn value(&self, memory: &mut Memory, x: f64, _: f64) -> f64 {
-        memory[0] = memory[0].clamp(x - self.gap, x + self.gap);
+        memory[0] = within(memory[0], x, self.gap);
         memory[0] - x
     }
 
@@ -136,7 +142,7 @@ impl Distortion for Play {
     fn forward(&self, _: SampleClock, samples: &mut [f64]) {
         let mut follower = samples.first().copied().unwrap_or(0.0);
         for sample in samples {
-            follower = follower.clamp(*sample - self.gap, *sample + self.gap);
+            follower = within(follower, *sample, self.gap);
             *sample = follower;
         }
     }
@@ -284,6 +290,15 @@ fn cubic(x: &mut [f64], from: usize, to: usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_motion_that_diverged_is_no_panic() {
+        let joint = Joint { gap: 0.2 };
+        assert!(joint.value(&mut [0.0, 0.0], f64::NAN, 0.0).is_nan());
+        assert_eq!(within(1.0, 0.5, 0.2), 0.7);
+        assert_eq!(within(-1.0, 0.5, 0.2), 0.3);
+        assert_eq!(within(0.6, 0.5, 0.2), 0.6);
+    }
 
     #[test]
     fn a_sine_comes_back_through_play() {
