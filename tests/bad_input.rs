@@ -340,6 +340,10 @@ fn bands_that_the_rate_does_not_carry() {
         &["greater than zero"],
     );
     refused(good().as_bytes(), &["--band", "2.4 V"], 2, &["--band"]);
+    for option in ["--band", "--rate"] {
+        let args = [option, "4.9e-324"];
+        refused(good().as_bytes(), &args, 2, &["between 1e-12 and 1e15 Hz"]);
+    }
 }
 
 #[test]

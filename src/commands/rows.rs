@@ -105,7 +105,7 @@ impl Rows<'_> {
             return digits::DEFAULT_DIGITS;
         };
         let steps = (self.time_s(last).abs() * rate_hz).max(1.0);
-        match steps.log10() as u32 + 5 {
+        match (steps.log10() as u32).saturating_add(5) {
             ..=12 => digits::DEFAULT_DIGITS,
             count @ 13..=15 => Digits::Significant(count),
             _ => Digits::Shortest,

@@ -193,10 +193,12 @@ pub(crate) fn frequency(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A frequency above zero that a clock could have: the times of its samples are numbers.
 pub(crate) fn positive_frequency(text: &str) -> Result<f64, String> {
     match frequency(text)? {
         0.0 => Err("expected a frequency greater than zero".to_owned()),
-        value => Ok(value),
+        value if (1e-12..=1e15).contains(&value) => Ok(value),
+        _ => Err("expected a frequency between 1e-12 and 1e15 Hz".to_owned()),
     }
 }
 
