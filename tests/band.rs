@@ -24,6 +24,19 @@ fn noisy(count: usize, silent: usize) -> (String, Vec<f64>) {
     (record(&recorded, RATE), acted)
 }
 
+fn compensate(file: &str) -> [&str; 8] {
+    [
+        "compensate",
+        file,
+        "--stand",
+        "stand.toml",
+        "--json",
+        "-o",
+        "out.csv",
+        "--force",
+    ]
+}
+
 fn rms_error(torque: &[f64], acted: &[f64]) -> f64 {
     let inside = acted.len() / 5..acted.len() * 4 / 5;
     let count = inside.len() as f64;
@@ -36,16 +49,7 @@ fn the_band_follows_the_torque_and_is_the_same_when_asked_again() {
     let folder = Folder::new();
     let (text, acted) = noisy(40_000, 0);
     folder.write("in.csv", &text);
-    let args = [
-        "compensate",
-        "in.csv",
-        "--stand",
-        "stand.toml",
-        "--json",
-        "-o",
-        "out.csv",
-        "--force",
-    ];
+    let args = compensate("in.csv");
     let ran = folder.run(&args);
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     let report: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
@@ -118,17 +122,7 @@ fn a_record_without_signal_takes_the_band_of_the_stand() {
             "short.csv",
             text.lines().take(100).collect::<Vec<_>>().join("\n") + "\n",
         );
-        let args = [
-            "compensate",
-            file,
-            "--stand",
-            "stand.toml",
-            "--json",
-            "-o",
-            "out.csv",
-            "--force",
-        ];
-        let report = folder.json(&args);
+        let report = folder.json(&compensate(file));
         assert_eq!(report["band"]["chosen_from"], "stand");
         // |1 − (f/592)²| = 10 at 1963 Hz.
         let top_hz = report["band"]["top_hz"].as_f64().unwrap();

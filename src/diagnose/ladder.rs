@@ -114,7 +114,7 @@ impl Ladder {
         };
         Self {
             shares: names.iter().enumerate().filter_map(share).collect(),
-            correlations: correlations(after, before, records, threads),
+            correlations: correlations(after, before, &without, records, threads),
             ladder: steps(after, before, without, records, threads),
         }
     }
@@ -156,9 +156,11 @@ fn steps(
     (0..models.len()).map(step).collect()
 }
 
+/// Between the changes of each effect alone. Of two, each alone is the model without the other.
 fn correlations(
     after: &ScoredModel,
     before: &ScoredModel,
+    without: &[Option<ScoredModel>],
     records: &Records,
     threads: usize,
 ) -> Vec<EffectCorrelation> {
@@ -167,13 +169,17 @@ fn correlations(
         return Vec::new();
     }
     let residual = before.holdout_samples();
-    let alone = after.each_alone(records, threads).into_iter();
-    let changes: Vec<Option<Vec<f64>>> = alone
-        .map(|model| {
-            let left = model?.holdout_samples();
-            Some(residual.iter().zip(left).map(|(b, a)| b - a).collect())
-        })
-        .collect();
+    let change = |model: &Option<ScoredModel>| {
+        let left = model.as_ref()?.holdout_samples();
+        Some(residual.iter().zip(left).map(|(b, a)| b - a).collect())
+    };
+    let changes: Vec<Option<Vec<f64>>> = match without {
+        [without_first, without_second] => [without_second, without_first].map(change).to_vec(),
+        _ => {
+            let alone = after.each_alone(records, threads);
+            alone.iter().map(change).collect()
+        }
+    };
     let mut found = Vec::new();
     for (k, one) in changes.iter().enumerate() {
         for (j, other) in changes.iter().enumerate().skip(k + 1) {

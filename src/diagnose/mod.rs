@@ -28,6 +28,8 @@ mod spectra;
 mod starts;
 mod stationarity;
 mod structure;
+#[cfg(test)]
+mod test_noise;
 mod units;
 mod verdict;
 

@@ -5,7 +5,7 @@ use super::record::dot;
 use super::records::Records;
 use super::score::{BaseModel, ScoredModel};
 use super::search::Workers;
-use super::structure::EffectForm;
+use super::structure::{EffectForm, Structure};
 use crate::parallel::parallel;
 
 /// Forms of a pair of effects that are fitted.
@@ -102,11 +102,7 @@ impl Change {
 
 impl EffectPair {
     /// Structure and start values: each effect in its size of the pair, the plain stand moved by both.
-    fn start(
-        &self,
-        base: &BaseModel,
-        changes: &[Change],
-    ) -> (super::structure::Structure, Vec<f64>) {
+    fn start(&self, base: &BaseModel, changes: &[Change]) -> (Structure, Vec<f64>) {
         let fitted = &base.scored.fitted;
         let (mut structure, mut values) = (fitted.structure.clone(), fitted.values.clone());
         for (member, factor) in self.members.iter().zip(self.factors) {

@@ -271,17 +271,7 @@ fn pooled_share(
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Reproducible pseudo-random numbers in [−0.5, 0.5] (linear congruential).
-    fn noise(seed: u64) -> impl FnMut() -> f64 {
-        let mut state = seed;
-        move || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-        }
-    }
+    use crate::diagnose::test_noise::noise;
 
     /// Of 400 sets of records whose residual is noise, 1 % are found to depend on the input: 4, and hardly ever more than 11.
     #[test]

@@ -236,6 +236,7 @@ fn segments(slopes: &[Vec<f64>; 3], length: usize) -> Vec<Columns> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::test_noise::noise;
 
     const RATE_HZ: f64 = 1000.0;
     const COUNT: usize = 12_000;
@@ -244,17 +245,6 @@ mod tests {
         Mode {
             omega_rad_s: TAU * 60.0,
             damping_ratio: 0.05,
-        }
-    }
-
-    /// Reproducible pseudo-random numbers in [−0.5, 0.5] (linear congruential).
-    fn noise(seed: u64) -> impl FnMut() -> f64 {
-        let mut state = seed;
-        move || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
         }
     }
 

@@ -23,10 +23,26 @@ pub(super) struct BandReport {
     pub(super) top_hz: f64,
     /// Frequency from which on nothing is passed.
     pub(super) end_hz: f64,
-    /// `record`, `first-seconds` of it, `stand` alone, `option` or `rated`.
-    pub(super) chosen_from: &'static str,
+    pub(super) chosen_from: BandSource,
     /// Length of the part of the record that it was chosen from; `null` if it was not.
     pub(super) seconds: Option<f64>,
+}
+
+/// Where a band comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum BandSource {
+    /// The whole record.
+    #[default]
+    Record,
+    /// The first seconds of a longer one.
+    FirstSeconds,
+    /// The stand alone, since the record does not rise above its noise.
+    Stand,
+    /// `--band HZ`.
+    Option,
+    /// `--band rated`.
+    Rated,
 }
 
 /// What a band is chosen by.
@@ -41,8 +57,12 @@ impl Wanted<'_> {
     pub(super) fn choose(&self, stream: &mut ChannelStream) -> Result<(Band, BandReport), Failure> {
         let rate_hz = stream.rate_hz;
         let (band, chosen_from, seconds) = match self.option {
-            Some(BandOption::Hz(top_hz)) => (Band::new(rate_hz, top_hz), "option", None),
-            Some(BandOption::Rated) => (Band::fitting(rate_hz, RATED_BAND_HZ), "rated", None),
+            Some(BandOption::Hz(top_hz)) => (Band::new(rate_hz, top_hz), BandSource::Option, None),
+            Some(BandOption::Rated) => (
+                Band::fitting(rate_hz, RATED_BAND_HZ),
+                BandSource::Rated,
+                None,
+            ),
             None => {
                 let mut first = stream.first_samples(FIRST_SAMPLES)?;
                 // A sample that cannot be converted is refused where it is compensated.
@@ -51,16 +71,15 @@ impl Wanted<'_> {
                 }
                 let search = BandSearch::of_record(&first.values, rate_hz, self.inverse);
                 let seconds = first.values.len() as f64 / rate_hz;
-                let from = if first.is_all {
-                    "record"
-                } else {
-                    "first-seconds"
+                let from = match first.is_all {
+                    true => BandSource::Record,
+                    false => BandSource::FirstSeconds,
                 };
                 match search.and_then(|search| search.best()) {
                     Some(best) => (Band::new(rate_hz, best.top_hz), from, Some(seconds)),
                     None => {
                         let top_hz = band_of_stand(rate_hz, self.inverse);
-                        (Band::new(rate_hz, top_hz), "stand", Some(seconds))
+                        (Band::new(rate_hz, top_hz), BandSource::Stand, Some(seconds))
                     }
                 }
             }
@@ -81,16 +100,16 @@ impl BandReport {
     pub(super) fn text(&self) -> String {
         let length = |seconds: Option<f64>| rounded(seconds.unwrap_or(0.0), 3);
         match self.chosen_from {
-            "option" => "as given".to_owned(),
-            "rated" => "the rated band".to_owned(),
-            "stand" => format!(
+            BandSource::Option => "as given".to_owned(),
+            BandSource::Rated => "the rated band".to_owned(),
+            BandSource::Stand => format!(
                 "chosen from the stand alone, up to a gain of 10, because the first {} s do not rise above their noise",
                 length(self.seconds)
             ),
-            "record" => {
+            BandSource::Record => {
                 "chosen for the least expected error from the record and its noise".to_owned()
             }
-            _ => format!(
+            BandSource::FirstSeconds => format!(
                 "chosen for the least expected error from the first {} s and their noise",
                 length(self.seconds)
             ),
@@ -99,6 +118,6 @@ impl BandReport {
 
     /// Whether it was asked for by `--band`.
     pub(super) fn is_given(&self) -> bool {
-        matches!(self.chosen_from, "option" | "rated")
+        matches!(self.chosen_from, BandSource::Option | BandSource::Rated)
     }
 }
