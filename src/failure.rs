@@ -31,8 +31,7 @@ impl Failure {
         match error.kind() {
             io::ErrorKind::BrokenPipe => Self::ClosedPipe,
             io::ErrorKind::StorageFull => Self::failed(format_args!(
-                "{place}: no space left on the disk; nothing was left behind. Free some space or \
-                 write elsewhere with -o"
+                "{place}: no space left on the disk; free some space or write elsewhere with -o"
             )),
             _ => Self::failed(format_args!("{place}: cannot be written: {error}")),
         }

@@ -1,6 +1,5 @@
 //! Where a page comes from: date, command line, version, the files read with their SHA-256, and the stand file.
 
-use std::fs::File;
 use std::io;
 use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -10,6 +9,7 @@ use sha2::{Digest, Sha256};
 use crate::chart::Page;
 use crate::failure::Failure;
 use crate::io::Input;
+use crate::io::storage::Stored;
 use crate::recording::moment::utc;
 
 /// The last second of the year 9999.
@@ -113,7 +113,7 @@ fn hash(input: &Input) -> Result<String, Failure> {
 }
 
 fn sum_of(path: &Path) -> io::Result<String> {
-    let mut file = File::open(path)?;
+    let mut file = Stored::open(path)?;
     let mut piece = vec![0; 1 << 16];
     let mut sum = Sha256::new();
     loop {

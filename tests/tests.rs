@@ -11,6 +11,8 @@ mod blind;
 mod blind_generator;
 mod compensate;
 mod diagnose;
+#[cfg(debug_assertions)] // optimised builds have no faults on purpose
+mod faults;
 mod golden;
 mod harmonics;
 mod identify;

@@ -1,8 +1,9 @@
 //! Where a recording is read from.
 
-use std::io::{BufRead, Read};
-use std::path::PathBuf;
+use std::io::{self, BufRead, ErrorKind, Read};
+use std::path::{Path, PathBuf};
 
+use super::storage::Stored;
 use crate::failure::Failure;
 
 /// Where bytes come from.
@@ -46,11 +47,20 @@ impl Input {
             return Ok(stdin.fill_buf().unwrap_or_default().starts_with(START));
         }
         let mut first = Vec::new();
-        let read = self
-            .open()?
-            .take(START.len() as u64)
-            .read_to_end(&mut first);
-        Ok(read.is_ok() && first == START)
+        let mut start = self.open()?.take(START.len() as u64);
+        start
+            .read_to_end(&mut first)
+            .map_err(|error| self.unreadable(&error))?;
+        Ok(first == START)
+    }
+
+    /// The failure to read it.
+    pub fn unreadable(&self, error: &io::Error) -> Failure {
+        let path = match self {
+            Self::Stdin => Path::new("standard input"),
+            Self::File(path) => path,
+        };
+        Failure::reading(path, error)
     }
 
     /// Opens it for reading.
@@ -59,14 +69,13 @@ impl Input {
     /// If it cannot be opened.
     pub fn open(&self) -> Result<Box<dyn Read + Send>, Failure> {
         match self {
-            Self::Stdin => Ok(Box::new(std::io::stdin())),
+            Self::Stdin => Ok(Box::new(Stored::stdin())),
             Self::File(path) => {
-                let file = std::fs::File::open(path).map_err(|e| Failure::reading(path, &e))?;
-                if file.metadata().is_ok_and(|m| m.is_dir()) {
-                    let error = std::io::ErrorKind::IsADirectory.into();
-                    return Err(Failure::reading(path, &error));
+                let file = Stored::open(path).map_err(|e| self.unreadable(&e))?;
+                match file.metadata().is_ok_and(|m| m.is_dir()) {
+                    true => Err(self.unreadable(&ErrorKind::IsADirectory.into())),
+                    false => Ok(Box::new(file)),
                 }
-                Ok(Box::new(file))
             }
         }
     }

@@ -1,6 +1,7 @@
 //! Files in and out.
 
 pub mod digits;
+mod fault;
 mod input;
 mod mark;
 pub mod mcap;
@@ -8,6 +9,7 @@ pub mod number;
 pub mod output;
 mod parts;
 mod reading;
+pub(crate) mod storage;
 pub mod text;
 
 pub use input::Input;

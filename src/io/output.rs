@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
 
-use super::parts;
+use super::{parts, storage};
 use crate::failure::Failure;
 
 /// Most links that lead to one file.
@@ -76,7 +76,7 @@ impl Output {
                 )));
             }
             Ok(meta) if !meta.is_file() => {
-                let file = File::options().write(true).open(path);
+                let file = storage::open_for_writing(path);
                 Kind::Device(file.map_err(|e| Failure::writing(&name, &e))?)
             }
             _ if exists && !policy.replace => {
@@ -104,12 +104,8 @@ impl Output {
     /// # Errors
     /// [`Failure::ClosedPipe`] if nobody reads any more, or a failure that names the output.
     pub fn write(&mut self, bytes: &[u8]) -> Result<(), Failure> {
-        let result = match &mut self.kind {
-            Kind::Stdout(out) => out.write_all(bytes),
-            Kind::Device(file) => file.write_all(bytes),
-            Kind::File { part, .. } => part.as_file_mut().write_all(bytes),
-        };
-        result.map_err(|error| Failure::writing(&self.name, &error))
+        let written = self.write_all(bytes);
+        written.map_err(|error| Failure::writing(&self.name, &error))
     }
 
     /// Completes the output: a file gets its name now.
@@ -125,7 +121,7 @@ impl Output {
         match &mut self.kind {
             Kind::Stdout(out) => out.flush(),
             Kind::Device(file) => file.flush(),
-            Kind::File { part, policy, .. } if policy.sync => part.as_file().sync_all(),
+            Kind::File { part, policy, .. } if policy.sync => storage::sync(part.as_file()),
             Kind::File { .. } => Ok(()),
         }
     }
@@ -140,9 +136,9 @@ impl Output {
 impl Write for Output {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         match &mut self.kind {
-            Kind::Stdout(out) => out.write(bytes),
-            Kind::Device(file) => file.write(bytes),
-            Kind::File { part, .. } => part.as_file_mut().write(bytes),
+            Kind::Stdout(out) => storage::write(out, bytes),
+            Kind::Device(file) => storage::write(file, bytes),
+            Kind::File { part, .. } => storage::write(part.as_file_mut(), bytes),
         }
     }
 
@@ -182,8 +178,7 @@ pub fn finish_all(outputs: impl IntoIterator<Item = Output>) -> Result<(), Failu
             }
         }
     }
-    done.iter().for_each(Renamed::settle);
-    Ok(())
+    done.iter().try_for_each(Renamed::settle)
 }
 
 /// A file that has taken its name.
@@ -203,11 +198,7 @@ impl Renamed {
             true => second_name(&path),
             false => None,
         };
-        let renamed = match policy.replace {
-            true => part.persist(&path),
-            false => part.persist_noclobber(&path),
-        };
-        renamed.map_err(|e| e.error)?;
+        storage::rename(part.into_temp_path(), &path, policy.replace)?;
         Ok(Self {
             path,
             is_new,
@@ -220,28 +211,33 @@ impl Renamed {
     fn undo(self) {
         // The failure that led here is the one to tell.
         let _ = match self.replaced {
-            Some(old) => old.persist(&self.path).map_err(|e| e.error),
+            Some(old) => storage::rename(old, &self.path, true),
             None if self.is_new => std::fs::remove_file(&self.path),
             // Without a copy of the old file, the new one is all there is.
             None => Ok(()),
         };
     }
 
-    /// Has the new name on the disk, too. Where folders cannot be synced, the system does so in its time.
-    fn settle(&self) {
-        if self.sync
-            && let Ok(folder) = File::open(folder_of(&self.path))
-        {
-            let _ = folder.sync_all();
-        }
+    /// Has the new name on the disk, too. Where folders cannot be opened or synced, the system does so in its time.
+    fn settle(&self) -> Result<(), Failure> {
+        let synced = match self.sync {
+            true => storage::sync_folder(folder_of(&self.path)),
+            false => Ok(()),
+        };
+        synced.map_err(|error| {
+            Failure::failed(format_args!(
+                "{}: written and in its place, but its folder cannot be synced: {error}; after a power cut the old \
+                 content may be back",
+                self.path.display()
+            ))
+        })
     }
 }
 
 /// A second name for a file that exists, removed when it is dropped; `None` where file systems have no such thing.
 fn second_name(path: &Path) -> Option<tempfile::TempPath> {
     let part = parts::create_in(folder_of(path)).ok()?.into_temp_path();
-    std::fs::remove_file(&part).ok()?;
-    std::fs::hard_link(path, &part).ok()?;
+    storage::link(path, &part).ok()?;
     Some(part)
 }
 

@@ -7,6 +7,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use tempfile::NamedTempFile;
 
+use super::storage;
+
 /// Files to be removed if the run is interrupted.
 static OPEN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 /// How the names of all of them begin and end.
@@ -78,7 +80,7 @@ pub fn create_in(folder: &Path) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(&prefix).suffix(SUFFIX);
     set_permissions(&mut builder);
-    let part = builder.tempfile_in(folder)?;
+    let part = storage::create(&builder, folder)?;
     open().push(part.path().to_owned());
     Ok(part)
 }

@@ -2,11 +2,12 @@
 //! rows alone, so that it does not depend on whether a verb streams.
 
 use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
+use std::io::{self, Read, Seek, SeekFrom};
 
 use torqcomp_dsp::quality::rounding::uniform_line;
 
 use crate::io::Input;
+use crate::io::storage::Stored;
 use crate::recording::text::{ChannelPlan, ChannelRows};
 
 /// Bytes that are read at the first checkpoint behind the head, and at each.
@@ -45,54 +46,60 @@ pub(super) fn sharpened(step: f64, first: &[f64], later: &[f64], origin: f64) ->
 
 /// Stamps of a text at distances that double, and its last one. `from` is the byte behind the head. Empty where the
 /// place cannot be sought, and where a row cannot be read as it stands.
-pub(super) fn of_text(input: &Input, from: u64, plan: &ChannelPlan) -> Vec<f64> {
+///
+/// # Errors
+/// If the file cannot be read.
+pub(super) fn of_text(input: &Input, from: u64, plan: &ChannelPlan) -> io::Result<Vec<f64>> {
     let Input::File(path) = input else {
-        return Vec::new();
+        return Ok(Vec::new());
     };
-    let open = || -> std::io::Result<(File, u64)> {
-        let file = File::open(path)?;
-        let meta = file.metadata()?;
-        Ok((file, if meta.is_file() { meta.len() } else { 0 }))
-    };
-    let Ok((mut file, length)) = open() else {
-        return Vec::new();
-    };
+    // To open a pipe a second time would wait for a second writer.
+    let meta = std::fs::metadata(path)?;
+    if !meta.is_file() {
+        return Ok(Vec::new());
+    }
+    let (mut file, length) = (Stored::open(path)?, meta.len());
     let mut stamps = Vec::new();
     let mut at = from.max(PIECE);
     while at + 2 * PIECE < length {
-        match stamp_behind(&mut file, at, plan, false) {
+        match stamp_behind(&mut file, at, plan, false)? {
             Some(stamp) => stamps.push(stamp),
-            None => return Vec::new(),
+            None => return Ok(Vec::new()),
         }
         at *= 2;
     }
     if length > from {
-        stamps.extend(stamp_behind(
-            &mut file,
-            length.saturating_sub(PIECE).max(from),
-            plan,
-            true,
-        ));
+        let at = length.saturating_sub(PIECE).max(from);
+        stamps.extend(stamp_behind(&mut file, at, plan, true)?);
     }
-    stamps
+    Ok(stamps)
 }
 
 /// The stamp of the first whole line behind a byte, or of the last one.
-fn stamp_behind(file: &mut File, at: u64, plan: &ChannelPlan, last: bool) -> Option<f64> {
-    file.seek(SeekFrom::Start(at)).ok()?;
+fn stamp_behind(
+    file: &mut Stored<File>,
+    at: u64,
+    plan: &ChannelPlan,
+    last: bool,
+) -> io::Result<Option<f64>> {
+    file.seek(SeekFrom::Start(at))?;
     let mut bytes = Vec::new();
-    file.take(PIECE).read_to_end(&mut bytes).ok()?;
+    file.take(PIECE).read_to_end(&mut bytes)?;
     // What stands before the first line end, and behind the last, may be cut.
-    let start = memchr::memchr(b'\n', &bytes)? + 1;
-    let end = memchr::memrchr(b'\n', &bytes)? + 1;
-    let mut rows = ChannelRows::default();
-    rows.read(bytes.get(start..end)?, plan);
-    let stamp = if last {
-        rows.times.last()
-    } else {
-        rows.times.first()
+    let ends = (
+        memchr::memchr(b'\n', &bytes),
+        memchr::memrchr(b'\n', &bytes),
+    );
+    let (Some(start), Some(end)) = ends else {
+        return Ok(None);
     };
-    stamp.copied()
+    let mut rows = ChannelRows::default();
+    rows.read(&bytes[start + 1..=end.max(start)], plan);
+    let stamp = match last {
+        true => rows.times.last(),
+        false => rows.times.first(),
+    };
+    Ok(stamp.copied())
 }
 
 #[cfg(test)]

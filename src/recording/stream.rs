@@ -125,8 +125,11 @@ impl ChannelStream {
         } = file.stream(place, are_stamps_read(&selection, reading));
         let time = match stamps {
             Some(stamps) => {
-                let later = behind_first_rows
-                    .map_or_else(Vec::new, |from| checkpoints::of_text(input, from, &plan));
+                let later = behind_first_rows.map(|from| checkpoints::of_text(input, from, &plan));
+                let later = later
+                    .transpose()
+                    .map_err(|error| input.unreadable(&error))?
+                    .unwrap_or_default();
                 axis_of_stamps(axis, &stamps, &later, reading)?
             }
             None if reading.rate_hz.is_some() => TimeAxis::given(selection.rate_hz),

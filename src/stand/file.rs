@@ -13,6 +13,7 @@ use super::section::{Section, SourceText};
 use super::update::CORRELATIONS;
 use super::{Diagnosed, Given, Mechanics, Stand, StaticGain, TransducerSignal};
 use crate::failure::Failure;
+use crate::io::storage;
 use crate::print::short;
 use crate::warning::Warning;
 
@@ -34,7 +35,7 @@ pub fn read(path: &Path) -> Result<Stand, Failure> {
 /// # Errors
 /// If it cannot be read.
 pub fn text(path: &Path) -> Result<(String, String), Failure> {
-    match std::fs::read_to_string(path) {
+    match storage::read_to_string(path) {
         Ok(text) => Ok((path.display().to_string(), text)),
         Err(error) => Err(Failure::reading(path, &error)),
     }

@@ -15,7 +15,7 @@ use crate::io::mcap::writer::{self, Added};
 use crate::io::output::Output;
 use crate::io::{COMPENSATED, Input};
 use crate::recording::MessageOrigin;
-use crate::stand::Calibration;
+use crate::stand::{self, Calibration};
 
 /// An open result, with its picture and its page as far as they are wanted.
 pub(super) struct Sink {
@@ -210,8 +210,7 @@ fn provenance(
     args: &Compensate,
     report: &CompensateReport,
 ) -> Result<BTreeMap<String, String>, Failure> {
-    let stand = std::fs::read_to_string(&args.stand)
-        .map_err(|error| Failure::reading(&args.stand, &error))?;
+    let (_, stand) = stand::text(&args.stand)?;
     let number = |value: f64| crate::io::digits::text(value, 12);
     let pairs = [
         (

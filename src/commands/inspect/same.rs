@@ -1,8 +1,8 @@
 //! Files that are the same, byte by byte, though named differently.
 
-use std::fs::File;
 use std::io::{self, BufReader, Read};
 
+use crate::io::storage::Stored;
 use crate::warning::Warning;
 
 /// Bytes that are compared at a time.
@@ -43,7 +43,7 @@ fn is_same(a: &str, b: &str) -> io::Result<bool> {
     if a == "-" || b == "-" {
         return Ok(false);
     }
-    let (a, b) = (File::open(a)?, File::open(b)?);
+    let (a, b) = (Stored::open(a.as_ref())?, Stored::open(b.as_ref())?);
     let (of_a, of_b) = (a.metadata()?, b.metadata()?);
     if !of_a.is_file() || !of_b.is_file() || of_a.len() != of_b.len() {
         return Ok(false);

@@ -15,6 +15,7 @@ use super::record::reader::RecordReader;
 use super::selection::FieldRequest;
 use super::signal::{SelectedSignal, TimeOptions, TopicSignal};
 use crate::io::Input;
+use crate::io::storage::Stored;
 
 /// The end of a signal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,11 +27,11 @@ pub struct SignalEnd {
 }
 
 /// A file and its summary; `None` if it cannot be sought, or has no summary that is whole.
-pub(super) fn summary(input: &Input) -> Option<(File, Summary)> {
+pub(super) fn summary(input: &Input) -> Option<(Stored<File>, Summary)> {
     let Input::File(path) = input else {
         return None;
     };
-    let mut file = File::open(path).ok()?;
+    let mut file = Stored::open(path).ok()?;
     let options = SummaryReaderOptions::default()
         .with_file_size(file.metadata().ok()?.len())
         .with_record_length_limit(LARGEST as usize);

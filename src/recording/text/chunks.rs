@@ -155,11 +155,9 @@ impl Chunks {
     fn fill(&mut self, piece: &mut Vec<u8>, mut filled: usize) -> io::Result<()> {
         piece.resize(self.size.max(filled), 0);
         while !self.at_end && filled < piece.len() {
-            match self.input.read(&mut piece[filled..]) {
-                Ok(0) => self.at_end = true,
-                Ok(count) => filled += count,
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                Err(error) => return Err(error),
+            match self.input.read(&mut piece[filled..])? {
+                0 => self.at_end = true,
+                count => filled += count,
             }
         }
         piece.truncate(filled);

@@ -52,11 +52,9 @@ impl CountedInput {
             }
             // What is read beyond the wish must be moved to the front later on.
             let until = self.buffer.len().min(self.end + PIECE);
-            match self.stream.read(&mut self.buffer[self.end..until]) {
-                Ok(0) => return Ok(self.end - self.start),
-                Ok(read) => self.end += read,
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                Err(error) => return Err(error),
+            match self.stream.read(&mut self.buffer[self.end..until])? {
+                0 => return Ok(self.end - self.start),
+                read => self.end += read,
             }
         }
         Ok(count)
