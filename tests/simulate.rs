@@ -158,7 +158,7 @@ fn columns_that_the_stand_does_not_take_are_refused() {
         .map(|(_, l)| l)
         .collect();
     folder.write("gap.csv", kept.join("\n"));
-    simulate("gap.csv", &["applied_n_m"]).says(1, &["not uniform", "sample 200", "61 times"]);
+    simulate("gap.csv", &["applied_n_m"]).says(1, &["not uniform", "line 201", "61 times"]);
     folder.write("again.csv", &text);
     let twice = [
         "diagnose",

@@ -19,6 +19,8 @@ mod identify;
 mod inspect;
 mod mcap_file;
 mod measuring_chains;
+#[cfg(target_os = "linux")] // the system tells how much memory a process had at most
+mod memory;
 mod messages;
 mod mutations;
 mod noise;

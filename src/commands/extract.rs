@@ -8,7 +8,7 @@ use crate::io::output::Output;
 use crate::io::text::Text;
 use crate::io::{COMPENSATED, Input, Reading, names_compensated};
 use crate::print;
-use crate::recording::{Block, ChannelStream, StreamSummary, UniformRecord};
+use crate::recording::{Block, ChannelStream, StreamSummary, UniformStream};
 
 /// Runs the verb.
 pub fn run(args: &Extract) -> Result<Outcome, Failure> {
@@ -101,8 +101,15 @@ fn write_resampled(
     stream: ChannelStream,
     output: &mut Output,
 ) -> Result<StreamSummary, Failure> {
-    let record = UniformRecord::read(stream, |_| Ok(()))?;
-    let axis = (record.rate_hz, record.start);
-    rows::write_uniform(output, args.digits, axis, &record.samples)?;
-    Ok(record.summary)
+    let mut stream = UniformStream::of(stream)?;
+    let axis = (stream.rate_hz, stream.start);
+    let (mut samples, mut first) = (Vec::new(), 0);
+    while stream.next(&mut samples, |_| Ok(()))? {
+        rows::write_uniform(output, args.digits, axis, first, &samples)?;
+        first += samples.len();
+        samples.clear();
+    }
+    let (summary, _) = stream.finish(&mut samples)?;
+    rows::write_uniform(output, args.digits, axis, first, &samples)?;
+    Ok(summary)
 }

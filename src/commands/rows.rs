@@ -40,34 +40,40 @@ pub(super) enum Times<'a> {
 /// Rows that are written at once.
 const ROWS_AT_ONCE: usize = 1 << 14;
 
-/// The parts of a record that is in memory on a uniform time axis, each with the range of its samples.
+/// The parts of some samples of a record on a uniform time axis, each with the range of its samples.
 pub(super) fn uniform_parts(
     (digits, scale): (Digits, f64),
     (rate_hz, start): (f64, Moment),
-    samples: usize,
+    samples: Range<usize>,
 ) -> impl Iterator<Item = (Rows<'static>, Range<usize>)> {
-    (0..samples).step_by(ROWS_AT_ONCE).map(move |first| {
+    let end = samples.end;
+    samples.step_by(ROWS_AT_ONCE).map(move |first| {
         let rows = Rows {
             digits,
             scale,
             rate_hz,
             times: Times::Grid { start, first },
         };
-        (rows, first..samples.min(first + ROWS_AT_ONCE))
+        (rows, first..end.min(first + ROWS_AT_ONCE))
     })
 }
 
-/// Writes a record that is in memory on a uniform time axis.
+/// Writes samples of a record on a uniform time axis, the first of which is the `first` of the record.
 pub(super) fn write_uniform(
     output: &mut Output,
     digits: Digits,
     axis: (f64, Moment),
+    first: usize,
     samples: &[f64],
 ) -> Result<(), Failure> {
     let mut text = Text::default();
-    for (rows, range) in uniform_parts((digits, 1.0), axis, samples.len()) {
+    for (rows, range) in uniform_parts((digits, 1.0), axis, first..first + samples.len()) {
         text.clear();
-        rows.write(&mut text, &samples[range], &[]);
+        rows.write(
+            &mut text,
+            &samples[range.start - first..range.end - first],
+            &[],
+        );
         output.write(text.as_bytes())?;
     }
     Ok(())

@@ -1,8 +1,8 @@
 //! `simulate`: the stand's answer to a given input.
 
 use serde::Serialize;
-use torqcomp_model::simulate::{Excitation, MotionState, substeps};
-use torqcomp_model::{Chain, Unit, UnitSystem};
+use torqcomp_model::simulate::Pieces;
+use torqcomp_model::{Unit, UnitSystem};
 
 use super::{Outcome, conclude, report_beside, rows};
 use crate::cli;
@@ -10,15 +10,10 @@ use crate::failure::Failure;
 use crate::io::{ChannelChoice, Flags, Input};
 use crate::print::{Report, short};
 use crate::recording::moment::Moment;
-use crate::recording::{AlignedChannel, AlignedChannels};
+use crate::recording::{AlignedChannels, ChannelStream, UniformStream};
 use crate::stand::{self, Calibration, Stand, TransducerSignal};
 use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
-
-/// Relative change of the result at which the step of integration is fine enough.
-const FINE: f64 = 1e-5;
-/// Most steps from sample to sample.
-const MOST_SUBSTEPS: usize = 256;
 
 /// A simulated record.
 #[derive(Debug, Serialize)]
@@ -43,63 +38,154 @@ struct SimulateReport {
 /// Runs the verb.
 pub fn run(args: &cli::Simulate) -> Result<Outcome, Failure> {
     let stand = stand::read(&args.stand)?;
-    let flags = Flags {
-        channel: "--applied",
-        unit: Some("--unit"),
-    };
-    let choice = ChannelChoice::of(flags, args.applied.as_deref(), args.unit.as_deref());
-    let read = AlignedChannels::read(&Input::of(&args.input), &[choice], &args.reading)?;
-    let chosen = &read.channels[0];
     if args.json && args.result.is_stdout() {
         return Err(Failure::usage(
             "the record and the JSON document cannot both go to standard output; give the record a file with -o",
         ));
     }
-    if chosen.samples.len() < 2 {
-        return Err(Failure::failed(
-            "the record has fewer than two samples; nothing can be simulated",
-        ));
-    }
+    let mut applied = AppliedInput::open(args)?;
     let inputs = [args.input.as_ref(), args.stand.as_path()];
     let mut output = args.result.open(&inputs)?;
-    let mut warnings = [read.warnings.as_slice(), &stand.warnings].concat();
-    let units = ChannelUnits::of(&stand, chosen, &mut warnings)?;
-    let applied: Vec<f64> = chosen.samples.iter().map(|u| u * units.applied).collect();
+    let mut of_channel = Vec::new();
+    let units = ChannelUnits::of(&stand, applied.channel(), &mut of_channel)?;
     let chain = stand.chain()?;
     let between = args.between.into();
-    let input = Excitation::new(applied, read.rate_hz, read.start.after_s, 1).with_between(between);
-    let (mut simulated, steps) = refined(&chain, &input)?;
-    for value in &mut simulated {
-        let torque = *value + stand.diagnosed.offset;
-        let recorded = match &units.calibration {
-            Some(calibration) => calibration
-                .conversion
-                .record(torque)
-                .map_err(Failure::failed)?,
-            None => torque,
-        };
-        *value = recorded / units.measured;
-    }
+    let axis = applied.axis();
     output.write(b"time_s,measured\n")?;
-    let axis = (read.rate_hz, read.start);
-    rows::write_uniform(&mut output, args.digits, axis, &simulated)?;
+    let mut written = 0;
+    let mut deliver = |simulated: &mut Vec<f64>| {
+        units.record(simulated, stand.diagnosed.offset)?;
+        rows::write_uniform(&mut output, args.digits, axis, written, simulated)?;
+        written += simulated.len();
+        simulated.clear();
+        Ok::<(), Failure>(())
+    };
+    let mut pieces = Pieces::new(&chain, axis.0, between);
+    let (mut samples, mut simulated) = (Vec::new(), Vec::new());
+    loop {
+        let is_end = !applied.next(&mut samples)?;
+        samples.iter_mut().for_each(|u| *u *= units.applied);
+        pieces
+            .push(&samples, &mut simulated)
+            .map_err(Failure::failed)?;
+        deliver(&mut simulated)?;
+        samples.clear();
+        if is_end {
+            break;
+        }
+    }
+    let steps = pieces.finish(&mut simulated).map_err(Failure::failed)?;
+    deliver(&mut simulated)?;
     output.finish()?;
+    let is_lossy = applied.is_lossy;
     let report = SimulateReport {
         input: args.input.clone(),
         stand: args.stand.display().to_string(),
-        applied: chosen.name.clone(),
+        applied: applied.name,
         applied_unit: units.applied_text,
         measured_unit: units.measured_text,
         input_between_samples: between.name(),
-        samples: simulated.len(),
-        rate_hz: read.rate_hz,
-        start: read.start,
+        samples: written,
+        rate_hz: axis.0,
+        start: axis.1,
         steps_per_sample: steps,
         effects: stand.effects.iter().map(|e| e.effect.name).collect(),
-        warnings,
+        warnings: [applied.warnings, stand.warnings.clone(), of_channel].concat(),
     };
     report_beside(&report, args.json, args.quiet || args.json)?;
-    Ok(conclude(&report.warnings, read.is_lossy, &args.strictness))
+    Ok(conclude(&report.warnings, is_lossy, &args.strictness))
+}
+
+/// The applied quantity, in the unit of the file, as it is read.
+struct AppliedInput {
+    name: String,
+    unit: Option<NamedUnit>,
+    unit_text: Option<String>,
+    axis: (f64, Moment),
+    samples: AppliedSamples,
+    /// What should be known of the file, once all of it is read; what was lost comes first.
+    warnings: Vec<Warning>,
+    is_lossy: bool,
+}
+
+/// Where the samples come from: messages are interpolated in memory where their stamps are not uniform.
+enum AppliedSamples {
+    Text(Option<Box<UniformStream>>),
+    Messages(Vec<f64>),
+}
+
+impl AppliedInput {
+    fn open(args: &cli::Simulate) -> Result<Self, Failure> {
+        let input = Input::of(&args.input);
+        let flags = Flags {
+            channel: "--applied",
+            unit: Some("--unit"),
+        };
+        let choice = ChannelChoice::of(flags, args.applied.as_deref(), args.unit.as_deref());
+        if !input.is_mcap()? {
+            let stream = ChannelStream::open(&input, &choice, &args.reading)?;
+            return Ok(Self {
+                name: stream.name.clone(),
+                unit: stream.unit.clone(),
+                unit_text: stream.unit_text.clone(),
+                axis: (stream.rate_hz, stream.start),
+                samples: AppliedSamples::Text(Some(Box::new(UniformStream::of(stream)?))),
+                warnings: Vec::new(),
+                is_lossy: false,
+            });
+        }
+        let mut read = AlignedChannels::read(&input, &[choice], &args.reading)?;
+        let chosen = read.channels.swap_remove(0);
+        if chosen.samples.len() < 2 {
+            return Err(Failure::failed(
+                "the record has fewer than two samples; nothing can be simulated",
+            ));
+        }
+        Ok(Self {
+            name: chosen.name,
+            unit: chosen.unit,
+            unit_text: chosen.unit_text,
+            axis: (read.rate_hz, read.start),
+            samples: AppliedSamples::Messages(chosen.samples),
+            warnings: read.warnings,
+            is_lossy: read.is_lossy,
+        })
+    }
+
+    fn channel(&self) -> RecordedChannel<'_> {
+        RecordedChannel {
+            name: &self.name,
+            unit: self.unit.as_ref(),
+            unit_text: self.unit_text.as_deref(),
+        }
+    }
+
+    /// Samples a second, and the time of the first sample.
+    fn axis(&self) -> (f64, Moment) {
+        self.axis
+    }
+
+    /// Appends the next samples; `false` with the last of them.
+    fn next(&mut self, samples: &mut Vec<f64>) -> Result<bool, Failure> {
+        let stream = match &mut self.samples {
+            AppliedSamples::Messages(all) => {
+                samples.append(all);
+                return Ok(false);
+            }
+            AppliedSamples::Text(stream) => stream,
+        };
+        if let Some(open) = stream
+            && open.next(samples, |_| Ok(()))?
+        {
+            return Ok(true);
+        }
+        if let Some(ended) = stream.take() {
+            let (summary, _) = ended.finish(samples)?;
+            self.is_lossy = summary.lost.is_some();
+            self.warnings = summary.lost.into_iter().chain(summary.warnings).collect();
+        }
+        Ok(false)
+    }
 }
 
 impl Report for SimulateReport {
@@ -139,7 +225,7 @@ struct ChannelUnits {
 impl ChannelUnits {
     fn of(
         stand: &Stand,
-        chosen: &AlignedChannel,
+        chosen: RecordedChannel<'_>,
         warnings: &mut Vec<Warning>,
     ) -> Result<Self, Failure> {
         stand.mechanics()?;
@@ -175,11 +261,27 @@ impl ChannelUnits {
             measured_text: text,
         })
     }
+
+    /// Brings simulated torques to what is recorded of them, in the unit of the result.
+    fn record(&self, simulated: &mut [f64], offset: f64) -> Result<(), Failure> {
+        for value in simulated {
+            let torque = *value + offset;
+            let recorded = match &self.calibration {
+                Some(calibration) => calibration
+                    .conversion
+                    .record(torque)
+                    .map_err(Failure::failed)?,
+                None => torque,
+            };
+            *value = recorded / self.measured;
+        }
+        Ok(())
+    }
 }
 
 /// The unit of the applied column, which must be one that the stand takes.
 fn applied_unit(
-    chosen: &AlignedChannel,
+    chosen: RecordedChannel<'_>,
     expected: &str,
     warnings: &mut Vec<Warning>,
 ) -> Result<NamedUnit, Failure> {
@@ -187,7 +289,7 @@ fn applied_unit(
         text: expected.to_owned(),
         unit: Unit::parse(expected).map_err(Failure::failed)?,
     };
-    match &chosen.unit {
+    match chosen.unit {
         Some(given) if given.unit.dimension() == wanted.unit.dimension() => Ok(given.clone()),
         Some(given) => Err(Failure::failed(format_args!(
             "the channel \"{}\" is in {}, and what acts on this stand is in {expected}; choose another column with \
@@ -196,7 +298,7 @@ fn applied_unit(
         ))),
         None if chosen.unit_text.is_some() => Err(Failure::failed(format_args!(
             "the unit \"{}\" of the channel \"{}\" is unknown; this stand takes {expected}; give the right unit with --unit",
-            chosen.unit_text.as_deref().unwrap_or_default(),
+            chosen.unit_text.unwrap_or_default(),
             chosen.name
         ))),
         None => {
@@ -209,30 +311,5 @@ fn applied_unit(
             ));
             Ok(wanted)
         }
-    }
-}
-
-/// The record from rest, its step halved until that changes nothing that matters; and the steps a sample.
-fn refined(chain: &Chain, input: &Excitation) -> Result<(Vec<f64>, usize), Failure> {
-    let run =
-        |steps: usize| chain.simulate_from(&input.with_substeps(steps), MotionState::default());
-    let rate_hz = input.rate_hz();
-    let mut steps = substeps(chain.mode.natural_frequency_hz(), rate_hz);
-    let mut last = run(steps);
-    loop {
-        let finer = run(2 * steps);
-        steps *= 2;
-        let rms = |values: &mut dyn Iterator<Item = f64>| values.map(|x| x * x).sum::<f64>().sqrt();
-        let change = rms(&mut finer.iter().zip(&last).map(|(a, b)| a - b));
-        let size = rms(&mut finer.iter().copied());
-        if !size.is_finite() {
-            return Err(Failure::failed(
-                "the simulated motion diverges: with these effects the stand is unstable for this input",
-            ));
-        }
-        if change <= FINE * size || steps >= MOST_SUBSTEPS {
-            return Ok((finer, steps));
-        }
-        last = finer;
     }
 }

@@ -3,9 +3,11 @@
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
+use std::path::Path;
 
 use torqcomp_dsp::quality::rounding::uniform_line;
 
+use crate::failure::Failure;
 use crate::io::Input;
 use crate::io::storage::Stored;
 use crate::recording::text::{ChannelPlan, ChannelRows};
@@ -44,15 +46,25 @@ pub(super) fn sharpened(step: f64, first: &[f64], later: &[f64], origin: f64) ->
     Some(line.map_or(step, |line| line.step_s))
 }
 
-/// Stamps of a text at distances that double, and its last one. `from` is the byte behind the head. Empty where the
-/// place cannot be sought, and where a row cannot be read as it stands.
+/// Stamps of a text at distances that double, and its last one. `from` is the byte behind the head, if they are wanted.
+/// Empty where the place cannot be sought, and where a row cannot be read as it stands.
 ///
 /// # Errors
 /// If the file cannot be read.
-pub(super) fn of_text(input: &Input, from: u64, plan: &ChannelPlan) -> io::Result<Vec<f64>> {
-    let Input::File(path) = input else {
-        return Ok(Vec::new());
-    };
+pub(super) fn of_text(
+    input: &Input,
+    from: Option<u64>,
+    plan: &ChannelPlan,
+) -> Result<Vec<f64>, Failure> {
+    match (input, from) {
+        (Input::File(path), Some(from)) => {
+            of_file(path, from, plan).map_err(|error| input.unreadable(&error))
+        }
+        _ => Ok(Vec::new()),
+    }
+}
+
+fn of_file(path: &Path, from: u64, plan: &ChannelPlan) -> io::Result<Vec<f64>> {
     // To open a pipe a second time would wait for a second writer.
     let meta = std::fs::metadata(path)?;
     if !meta.is_file() {

@@ -40,7 +40,7 @@ pub(crate) use message_stream::MessageOrigin;
 pub(crate) use messages::times as message_times;
 pub(crate) use stamps::{COARSE_STAMPS, StampGrid, is_uniform};
 pub(crate) use stream::ChannelStream;
-pub(crate) use uniform::UniformRecord;
+pub(crate) use uniform::{UniformRecord, UniformStream};
 pub(crate) use validator::{StreamSummary, StreamValidator};
 
 /// A file's content.

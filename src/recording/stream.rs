@@ -114,7 +114,7 @@ impl ChannelStream {
         if is_coarse && reading.rate_hz.is_none() {
             return Self::of_recording(file.read()?, choice, reading);
         }
-        let axis = &selection.channel.axis;
+        let of_first_rows = &selection.channel.axis;
         let TextStream {
             chunks,
             plan,
@@ -123,24 +123,16 @@ impl ChannelStream {
             row_bytes,
             behind_first_rows,
         } = file.stream(place, are_stamps_read(&selection, reading));
+        let later = checkpoints::of_text(input, behind_first_rows, &plan)?;
         let time = match stamps {
-            Some(stamps) => {
-                let later = behind_first_rows.map(|from| checkpoints::of_text(input, from, &plan));
-                let later = later
-                    .transpose()
-                    .map_err(|error| input.unreadable(&error))?
-                    .unwrap_or_default();
-                axis_of_stamps(axis, &stamps, &later, reading)?
-            }
+            Some(stamps) => axis_of_stamps(of_first_rows, &stamps, &later, reading)?,
             None if reading.rate_hz.is_some() => TimeAxis::given(selection.rate_hz),
             None => TimeAxis {
                 stamps_s: None,
                 start: Some(selection.start),
-                ..axis.clone()
+                ..of_first_rows.clone()
             },
         };
-        let mut warnings = first_rows.warnings.clone();
-        warnings.extend(selection.warnings);
         Ok(Self {
             dialect: first_rows.dialect.clone(),
             is_compensated: selection.channel.is_compensated,
@@ -153,7 +145,7 @@ impl ChannelStream {
             origin: None,
             any_steps: reading.any_steps,
             filled: Vec::new(),
-            warnings,
+            warnings: [first_rows.warnings.clone(), selection.warnings].concat(),
             blocks: Box::new(TextBlocks {
                 source: first_rows.source.clone(),
                 chunks,

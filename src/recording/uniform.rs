@@ -1,12 +1,94 @@
-//! A channel read as a whole into memory, converted to the applied quantity at rest.
+//! A channel on a uniform time axis: block by block, or read as a whole into memory.
 
 use torqcomp_dsp::resample::{Resampled, Resampler};
 
-use super::block::Block;
+use super::block::{Block, BlockSource};
 use super::moment::Moment;
+use super::stamps::StampGrid;
 use super::stream::ChannelStream;
-use super::validator::StreamSummary;
+use super::text::ChannelPlan;
+use super::validator::{StreamSummary, StreamValidator};
 use crate::failure::Failure;
+
+/// A channel on a uniform time axis, block by block; interpolated where that is asked for.
+pub(crate) struct UniformStream {
+    /// Time of the first sample.
+    pub(crate) start: Moment,
+    /// Samples a second.
+    pub(crate) rate_hz: f64,
+    blocks: Box<dyn BlockSource>,
+    plan: Option<ChannelPlan>,
+    validator: StreamValidator,
+    grid: Option<StampGrid>,
+    resampler: Option<Resampler>,
+    block: Block,
+}
+
+impl UniformStream {
+    /// Before the first block.
+    ///
+    /// # Errors
+    /// If the rate is none.
+    pub(crate) fn of(stream: ChannelStream) -> Result<Self, Failure> {
+        let (rate_hz, start) = (stream.rate_hz, stream.start);
+        let grid = stream.time.grid.clone();
+        let is_resampled = grid.as_ref().is_some_and(|grid| grid.resampled);
+        let resampler = is_resampled.then(|| Resampler::new(1.0 / rate_hz));
+        let resampler = resampler.transpose()?;
+        let (blocks, plan, validator) = stream.into_parts(0);
+        Ok(Self {
+            start,
+            rate_hz,
+            blocks,
+            plan,
+            validator,
+            grid,
+            resampler,
+            block: Block::default(),
+        })
+    }
+
+    /// Appends the samples of the next block; `convert` brings them to the units wanted, or says which cannot be. `false` at
+    /// the end.
+    ///
+    /// # Errors
+    /// The first row that cannot be read or converted, with its line.
+    pub(crate) fn next(
+        &mut self,
+        samples: &mut Vec<f64>,
+        convert: impl Fn(&mut [f64]) -> Result<(), (usize, String)>,
+    ) -> Result<bool, Failure> {
+        let block = &mut self.block;
+        if !self.blocks.next(block)? {
+            return Ok(false);
+        }
+        block.read_rows(self.plan.as_ref(), self.grid.as_ref());
+        self.validator.accept(block)?;
+        if let Err((row, message)) = convert(&mut block.rows.values) {
+            return Err(self.validator.failure_at_row(block, row, &message));
+        }
+        let (Some(resampler), Some(grid)) = (&mut self.resampler, &self.grid) else {
+            samples.extend_from_slice(&block.rows.values);
+            return Ok(true);
+        };
+        for (stamp, value) in block.rows.times.iter().zip(&block.rows.values) {
+            resampler.push(stamp * grid.seconds_per_unit, *value, samples)?;
+        }
+        Ok(true)
+    }
+
+    /// Appends what interpolation has kept back; what the file held, and what was interpolated.
+    ///
+    /// # Errors
+    /// If there were fewer than two samples.
+    pub(crate) fn finish(
+        mut self,
+        samples: &mut Vec<f64>,
+    ) -> Result<(StreamSummary, Option<Resampled>), Failure> {
+        let resampled = self.resampler.map(|resampler| resampler.finish(samples));
+        Ok((self.validator.finish(self.blocks.as_mut())?, resampled))
+    }
+}
 
 /// A uniformly sampled record, in SI units of the applied quantity, not yet compensated.
 #[derive(Debug, Clone)]
@@ -32,39 +114,16 @@ impl UniformRecord {
         stream: ChannelStream,
         convert: impl Fn(&mut [f64]) -> Result<(), (usize, String)>,
     ) -> Result<Self, Failure> {
+        let mut stream = UniformStream::of(stream)?;
         let (rate_hz, start) = (stream.rate_hz, stream.start);
-        let grid = stream.time.grid.clone();
-        let resampled_grid = grid.as_ref().filter(|grid| grid.resampled);
-        let (mut blocks, plan, mut validator) = stream.into_parts(0);
         let mut samples = Vec::new();
-        let mut times = Vec::new();
-        let mut block = Block::default();
-        while blocks.next(&mut block)? {
-            block.read_rows(plan.as_ref(), grid.as_ref());
-            validator.accept(&mut block)?;
-            if let Err((row, message)) = convert(&mut block.rows.values) {
-                return Err(validator.failure_at_row(&block, row, &message));
-            }
-            samples.extend_from_slice(&block.rows.values);
-            if resampled_grid.is_some() {
-                times.extend_from_slice(&block.rows.times);
-            }
-        }
-        let mut resampled = None;
-        if let Some(grid) = resampled_grid {
-            let mut resampler = Resampler::new(1.0 / rate_hz)?;
-            let mut on_grid = Vec::new();
-            for (stamp, value) in times.iter().zip(&samples) {
-                resampler.push(stamp * grid.seconds_per_unit, *value, &mut on_grid)?;
-            }
-            resampled = Some(resampler.finish(&mut on_grid));
-            samples = on_grid;
-        }
+        while stream.next(&mut samples, &convert)? {}
+        let (summary, resampled) = stream.finish(&mut samples)?;
         Ok(Self {
             samples,
             start,
             rate_hz,
-            summary: validator.finish(blocks.as_mut())?,
+            summary,
             resampled,
         })
     }

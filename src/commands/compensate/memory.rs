@@ -71,7 +71,7 @@ fn deliver(
 ) -> Result<(), Failure> {
     let mut text = Text::default();
     let axis = (record.rate_hz, record.start);
-    for (rows, range) in uniform_parts((args.digits, scale), axis, torque.len()) {
+    for (rows, range) in uniform_parts((args.digits, scale), axis, 0..torque.len()) {
         let (torque, recorded) = (&torque[range.clone()], &record.samples[range]);
         text.clear();
         if sink.is_text() {

@@ -1,10 +1,12 @@
 //! From the applied quantity to the record.
 
+use std::ops::Range;
+
 use num_complex::Complex64;
 
 use super::{Chain, Link};
 use crate::effects::{Action, SampleClock, Stage};
-use crate::simulate::{Excitation, MotionState, Torques, free_motion, integrate};
+use crate::simulate::{Excitation, MotionProgress, MotionState, Torques, free_motion, integrate};
 
 /// A record on its way through the chain, in the domain that the last link left it in.
 enum Signal {
@@ -54,7 +56,7 @@ impl Chain {
         if samples.last().is_none_or(|x| !x.is_finite()) {
             return samples;
         }
-        self.record(Signal::Samples(samples), input)
+        self.recorded(samples, input)
     }
 
     /// Records of the free motion from a unit displacement and from a unit speed over `ω₀`.
@@ -101,8 +103,29 @@ impl Chain {
 
     /// What the gage shows of the motion, integrated in time.
     fn integrated(&self, input: &Excitation, start: MotionState) -> Vec<f64> {
-        let torques = self.torques();
-        integrate(&self.mode, self.gain, &torques, input, start, self.shift)
+        let mut progress = self.begin(start);
+        self.integrated_over(input, 0..input.samples().len(), &mut progress)
+    }
+
+    /// A motion that begins.
+    pub(crate) fn begin(&self, start: MotionState) -> MotionProgress {
+        MotionProgress::begin(&self.torques(), start, self.shift)
+    }
+
+    /// What the gage shows of the motion at some samples of the input, see [`integrate`].
+    pub(crate) fn integrated_over(
+        &self,
+        input: &Excitation,
+        range: Range<usize>,
+        progress: &mut MotionProgress,
+    ) -> Vec<f64> {
+        let stand = (&self.mode, self.gain, self.shift);
+        integrate(stand, &self.torques(), input, range, progress)
+    }
+
+    /// What the links after the stand make of what the gage shows.
+    pub(crate) fn recorded(&self, shown: Vec<f64>, input: &Excitation) -> Vec<f64> {
+        self.record(Signal::Samples(shown), input)
     }
 
     fn torques(&self) -> Torques<'_> {

@@ -107,6 +107,11 @@ pub trait Distortion: Send + Sync {
     fn treatment(&self) -> Treatment {
         Treatment::Inverted
     }
+
+    /// Whether it takes each sample by itself, without memory of others and whatever the time.
+    fn is_pointwise(&self) -> bool {
+        false
+    }
 }
 
 /// What a torque remembers from node to node.

@@ -38,6 +38,10 @@ where
         }
     }
 
+    fn is_pointwise(&self) -> bool {
+        true
+    }
+
     /// On the rising branch around zero; the samples beyond it go on along a straight line.
     fn inverse(&self, _: SampleClock, _: f64, samples: &mut [f64]) -> Unrecovered {
         let largest = samples.iter().fold(0.0, |m: f64, x| m.max(x.abs()));

@@ -125,6 +125,10 @@ impl Distortion for Clipping {
     fn treatment(&self) -> Treatment {
         Treatment::Marked
     }
+
+    fn is_pointwise(&self) -> bool {
+        true
+    }
 }
 
 #[cfg(test)]

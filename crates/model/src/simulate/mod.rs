@@ -4,17 +4,21 @@
 //! Torques of the stand are integrated in time, everything linear is applied in the frequency domain, what
 //! gage and recorder do follows sample by sample. Between samples the input is band-limited, not a
 //! straight line, unless it is said to be ([`Between`]).
+//!
+//! A record of any length is simulated piece by piece ([`Pieces`]).
 
 mod between;
 mod input;
 mod integrate;
+mod pieces;
 mod run;
 
 pub use between::Between;
 pub use input::Excitation;
 pub(crate) use integrate::free_motion;
 pub use integrate::{MotionState, substeps};
-pub(crate) use run::{Torques, integrate};
+pub use pieces::{Diverges, Pieces};
+pub(crate) use run::{MotionProgress, Torques, integrate};
 
 #[cfg(test)]
 mod tests;

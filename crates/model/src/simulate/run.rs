@@ -1,5 +1,7 @@
 //! The motion with the torques of the stand, node by node.
 
+use std::ops::Range;
+
 use super::input::Excitation;
 use super::integrate::{LinearStep, MotionState, free};
 use crate::effects::{Memory, Mode, Torque};
@@ -24,40 +26,64 @@ struct Integrator<'a> {
     direction: f64,
 }
 
-/// What the gage shows at the samples, from an initial state on. A load that does not change, and so is not in the
-/// input, shifts the displacement that the torques see. Once the motion is not finite the rest is NaN.
+/// Where a motion stands: all that what follows depends on, besides the input.
+#[derive(Debug, Clone)]
+pub(crate) struct MotionProgress {
+    state: MotionState,
+    memories: Vec<Memory>,
+    direction: f64,
+}
+
+impl MotionProgress {
+    /// A motion that begins. A load that does not change, and so is not in the input, shifts the displacement that the
+    /// torques see.
+    pub(crate) fn begin(torques: &Torques<'_>, start: MotionState, shift: f64) -> Self {
+        Self {
+            state: start,
+            memories: acting(torques)
+                .map(|(torque, _)| torque.begin(start.x + shift))
+                .collect(),
+            direction: match start.speed == 0.0 {
+                true => 0.0,
+                false => start.speed.signum(),
+            },
+        }
+    }
+}
+
+/// All torques but sharp dry friction.
+fn acting<'a>(torques: &Torques<'a>) -> impl Iterator<Item = (&'a dyn Torque, bool)> {
+    let acting = torques.iter().filter(|(torque, _)| torque.dry().is_none());
+    acting.copied()
+}
+
+/// What the gage shows at some samples of the input; `progress` is that at the first of them, and afterwards that at the
+/// sample behind the last. Once the motion is not finite the rest is NaN.
 pub(crate) fn integrate(
-    mode: &Mode,
-    gain: f64,
+    (mode, gain, shift): (&Mode, f64, f64),
     torques: &Torques<'_>,
     input: &Excitation,
-    start: MotionState,
-    shift: f64,
+    range: Range<usize>,
+    progress: &mut MotionProgress,
 ) -> Vec<f64> {
     let substeps = input.substeps();
     let step_s = 1.0 / (input.rate_hz() * substeps as f64);
+    let memories = progress.memories.iter().copied();
     let mut run = Integrator {
         mode: *mode,
         gain,
         step: LinearStep::new(mode, gain, step_s),
         step_s,
         impulse: mode.omega_rad_s * mode.omega_rad_s * step_s,
-        acting: torques
-            .iter()
-            .filter(|(torque, _)| torque.dry().is_none())
-            .map(|(torque, shown)| ((*torque, *shown), torque.begin(start.x + shift)))
-            .collect(),
+        acting: acting(torques).zip(memories).collect(),
         shift,
         dry: torques.iter().filter_map(|(t, _)| t.dry()).sum(),
-        direction: if start.speed == 0.0 {
-            0.0
-        } else {
-            start.speed.signum()
-        },
+        direction: progress.direction,
     };
-    let mut state = start;
-    let mut samples = Vec::with_capacity(input.samples().len());
-    for (node, window) in input.fine().windows(4).enumerate() {
+    let mut state = progress.state;
+    let mut samples = Vec::with_capacity(range.len());
+    let nodes = input.fine().windows(4).skip(range.start * substeps);
+    for (node, window) in nodes.take(range.len() * substeps).enumerate() {
         if node % substeps == 0 {
             if !state.x.is_finite() {
                 break;
@@ -70,7 +96,12 @@ pub(crate) fn integrate(
             (true, false) => run.slide(state, window),
         };
     }
-    samples.resize(input.samples().len(), f64::NAN);
+    samples.resize(range.len(), f64::NAN);
+    *progress = MotionProgress {
+        state,
+        memories: run.acting.iter().map(|(_, memory)| *memory).collect(),
+        direction: run.direction,
+    };
     samples
 }
 

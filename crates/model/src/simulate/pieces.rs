@@ -1,0 +1,316 @@
+//! The record for an input of any length, piece by piece.
+
+use std::fmt;
+
+use super::run::MotionProgress;
+use super::{Between, Excitation, MotionState, substeps};
+use crate::chain::Chain;
+use crate::effects::{Action, Stage};
+
+/// Samples of a piece.
+const PIECE: usize = 1 << 17;
+/// Samples on either side of a piece that the links after the stand see.
+const SIDE: usize = 1 << 14;
+/// Size of an impulse response farther from its middle than the sides reach, over all of it, that is left out.
+const LEFT_OUT: f64 = 1e-4;
+/// Relative change of the result at which the step of integration is fine enough.
+const FINE: f64 = 1e-5;
+/// Most steps from sample to sample.
+const MOST_SUBSTEPS: usize = 256;
+
+/// The motion leaves all bounds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Diverges;
+
+impl fmt::Display for Diverges {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("the simulated motion diverges: with these effects the stand is unstable for this input")
+    }
+}
+
+impl std::error::Error for Diverges {}
+
+/// The record of a stand that is at rest before its input, in memory that does not grow with the input: the motion goes on
+/// from piece to piece with all that it remembers, and what is linear sees 2^14 samples on either side of a piece.
+///
+/// The step of integration is halved until that changes a piece by less than 1e-5 of its rms.
+///
+/// A chain whose links after the stand reach farther (a drift, a play, a slow filter) needs the record as a whole; it is
+/// then kept until the end.
+///
+/// ```
+/// use torqcomp_model::simulate::{Between, Pieces};
+/// use torqcomp_model::{Chain, Mode};
+/// // A constant input of 2 for 0.1 s: 2 after the motion has died out, ζω₀t = 6.3 with 10 Hz and ζ = 1.
+/// let mode = Mode { omega_rad_s: 62.83, damping_ratio: 1.0 };
+/// let chain = Chain::new(mode, 1.0);
+/// let mut pieces = Pieces::new(&chain, 1000.0, Between::Held);
+/// let mut record = Vec::new();
+/// pieces.push(&[2.0; 300], &mut record)?;
+/// pieces.push(&[2.0; 300], &mut record)?;
+/// pieces.finish(&mut record)?;
+/// assert_eq!(record.len(), 600);
+/// // x(t) = 2 (1 − (1 + ω₀t) e^{−ω₀t}): 1.9728 at 0.1 s.
+/// assert!((record[100] - 1.9728).abs() < 0.01 && (record[500] - 2.0).abs() < 1e-3, "{}", record[100]);
+/// # Ok::<(), torqcomp_model::simulate::Diverges>(())
+/// ```
+pub struct Pieces<'a> {
+    chain: &'a Chain,
+    rate_hz: f64,
+    between: Between,
+    /// Samples of a piece, and on either side of it; none if the record cannot be cut.
+    cut: Option<[usize; 2]>,
+    /// Steps from sample to sample that are tried first.
+    steps: usize,
+    /// Steps that a piece has needed.
+    finest: usize,
+    /// The input that is still needed.
+    input: Vec<f64>,
+    /// What the gage shows at the first samples of it.
+    shown: Vec<f64>,
+    /// The motion at the sample behind them.
+    progress: MotionProgress,
+    /// Samples of the input that are given back already.
+    given: usize,
+}
+
+impl<'a> Pieces<'a> {
+    /// Begins at rest.
+    #[must_use]
+    pub fn new(chain: &'a Chain, rate_hz: f64, between: Between) -> Self {
+        Self {
+            cut: is_local(chain, rate_hz, SIDE).then_some([PIECE, SIDE]),
+            steps: substeps(chain.mode.natural_frequency_hz(), rate_hz),
+            progress: chain.begin(MotionState::default()),
+            finest: 0,
+            chain,
+            rate_hz,
+            between,
+            input: Vec::new(),
+            shown: Vec::new(),
+            given: 0,
+        }
+    }
+
+    /// Takes samples of the input and appends the record as far as it is known now.
+    ///
+    /// # Errors
+    /// If the motion leaves all bounds.
+    pub fn push(&mut self, input: &[f64], record: &mut Vec<f64>) -> Result<(), Diverges> {
+        for part in input.chunks(SIDE) {
+            self.input.extend_from_slice(part);
+            if let Some([piece, side]) = self.cut
+                && self.input.len() >= self.given + piece + 2 * side
+            {
+                self.give(self.given + piece, side, record)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Appends the rest of the record; the steps of integration from sample to sample. Fewer than two samples in all have
+    /// no record.
+    ///
+    /// # Errors
+    /// If the motion leaves all bounds.
+    pub fn finish(mut self, record: &mut Vec<f64>) -> Result<usize, Diverges> {
+        if self.input.len() > 1 {
+            self.give(self.input.len(), 0, record)?;
+        }
+        Ok(self.finest)
+    }
+
+    /// Gives the record up to a sample of the input that is in memory; the next piece sees `side` samples before it.
+    fn give(&mut self, end: usize, side: usize, record: &mut Vec<f64>) -> Result<(), Diverges> {
+        // The motion goes on where the input of this piece and the next are both far from their ends.
+        let next = end - side;
+        let samples = std::mem::take(&mut self.input);
+        let input =
+            Excitation::new(samples, self.rate_hz, 0.0, self.steps).with_between(self.between);
+        let (mut steps, mut last) = (self.steps, self.run(&input, next));
+        let (shown, progress) = loop {
+            steps *= 2;
+            let finer = self.run(&input.with_substeps(steps), next);
+            let piece = self.given..end;
+            let rms =
+                |values: &mut dyn Iterator<Item = f64>| values.map(|x| x * x).sum::<f64>().sqrt();
+            let pairs = finer.0[piece.clone()].iter().zip(&last.0[piece.clone()]);
+            let change = rms(&mut pairs.map(|(a, b)| a - b));
+            let size = rms(&mut finer.0[piece.clone()].iter().copied());
+            if !size.is_finite() {
+                return Err(Diverges);
+            }
+            if change <= FINE * size || steps >= MOST_SUBSTEPS {
+                record.extend_from_slice(&finer.0[piece]);
+                break (finer.1, finer.2);
+            }
+            last = finer;
+        };
+        let kept = next - side;
+        self.input = input.samples()[kept..].to_vec();
+        self.shown = shown[kept..next].to_vec();
+        self.progress = progress;
+        self.given = end - kept;
+        self.steps = steps / 2;
+        self.finest = steps;
+        Ok(())
+    }
+
+    /// The record for the input in memory, what the gage shows, and the motion at the sample `next`.
+    fn run(&self, input: &Excitation, next: usize) -> (Vec<f64>, Vec<f64>, MotionProgress) {
+        let mut progress = self.progress.clone();
+        let mut shown = self.shown.clone();
+        let from = shown.len();
+        shown.extend(self.chain.integrated_over(input, from..next, &mut progress));
+        let at_next = progress.clone();
+        let all = next..input.samples().len();
+        shown.extend(self.chain.integrated_over(input, all, &mut progress));
+        let record = match shown.last().is_some_and(|x| x.is_finite()) {
+            true => self.chain.recorded(shown.clone(), input),
+            false => shown.clone(),
+        };
+        (record, shown, at_next)
+    }
+}
+
+/// Whether the links after the stand see no farther than the sides of a piece.
+fn is_local(chain: &Chain, rate_hz: f64, side: usize) -> bool {
+    let after = || {
+        chain
+            .links()
+            .iter()
+            .filter(|link| link.stage > Stage::Stand)
+    };
+    let is_pointwise = after().all(|link| match &link.action {
+        Action::Distortion(distortion) => distortion.is_pointwise(),
+        _ => true,
+    });
+    if !is_pointwise || after().all(|link| !link.is_linear()) {
+        return is_pointwise;
+    }
+    let size = 4 * side;
+    let plan = torqcomp_fourier::inverse(size);
+    let mut spectrum = plan.make_input_vec();
+    for (k, bin) in spectrum.iter_mut().enumerate() {
+        let hz = k as f64 * rate_hz / size as f64;
+        // The motion that comes to them has little above the natural frequency.
+        let motion = 1.0 + (hz / chain.mode.natural_frequency_hz()).powi(2);
+        *bin = chain.response_of(hz, |link| link.stage > Stage::Stand) / motion;
+    }
+    spectrum[0].im = 0.0;
+    spectrum[size / 2].im = 0.0;
+    let mut impulse = plan.make_output_vec();
+    // The lengths are those that the plan was made for.
+    let _ = plan.process(&mut spectrum, &mut impulse);
+    let energy = |part: &[f64]| part.iter().map(|x| x * x).sum::<f64>();
+    energy(&impulse[side..size - side]) <= LEFT_OUT * LEFT_OUT * energy(&impulse)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use super::*;
+    use crate::chain::Link;
+    use crate::effects::{Effect, Mode};
+
+    const RATE_HZ: f64 = 20_000.0;
+    const MODE: Mode = Mode {
+        omega_rad_s: TAU * 590.0,
+        damping_ratio: 0.07,
+    };
+
+    fn chain(effects: &[(&str, &str, &[f64])]) -> Chain {
+        let link = |(effect, form, values): &(&str, &str, &[f64])| {
+            let effect = Effect::named(effect).unwrap();
+            Link::of(effect, effect.form(Some(form)).unwrap(), values)
+        };
+        Chain::new(MODE, 1.0).with_links(effects.iter().map(link))
+    }
+
+    /// Two tones and noise of a tenth.
+    fn input(count: usize) -> Vec<f64> {
+        let mut state = 1_u64;
+        let mut noise = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 40) as f64 / (1_u64 << 24) as f64 - 0.5
+        };
+        let tones = |t: f64| (TAU * 80.0 * t).sin() + 0.8 * (TAU * 310.3 * t).sin();
+        (0..count)
+            .map(|i| tones(i as f64 / RATE_HZ) + 0.2 * noise())
+            .collect()
+    }
+
+    /// The record piece by piece is that of the whole, whatever the effects remember; the pieces begin elsewhere than
+    /// the input that is pushed.
+    #[test]
+    fn pieces_make_the_whole() {
+        let [piece, side] = [1 << 14, 1 << 12];
+        let input = input(2 * piece + 3 * side + 2345);
+        let chains = [
+            chain(&[]),
+            chain(&[
+                ("bouc-wen-hysteresis", "linear", &[0.4, 0.5, 0.2]),
+                ("time-delay", "lag", &[1.3e-4]),
+            ]),
+            chain(&[
+                ("coulomb-friction", "sharp", &[0.3]),
+                ("recorder-lowpass", "order-2", &[900.0]),
+            ]),
+            chain(&[
+                ("backlash", "gap-beside", &[0.2]),
+                ("gage-nonlinearity", "both", &[0.02, 0.003]),
+            ]),
+        ];
+        for (i, chain) in chains.iter().enumerate() {
+            let mut pieces = Pieces::new(chain, RATE_HZ, Between::BandLimited);
+            assert!(is_local(chain, RATE_HZ, side), "{i}");
+            pieces.cut = Some([piece, side]);
+            let (mut record, mut held) = (Vec::new(), 0);
+            for part in input.chunks(5000) {
+                pieces.push(part, &mut record).unwrap();
+                held = held.max(pieces.input.len());
+            }
+            assert!(
+                held < 2 * piece + 5000 && record.len() >= 2 * piece,
+                "{i}: {held}"
+            );
+            let steps = pieces.finish(&mut record).unwrap();
+            assert_eq!(record.len(), input.len());
+            let whole = Excitation::new(input.clone(), RATE_HZ, 0.0, steps);
+            let whole = chain.simulate_from(&whole, MotionState::default());
+            let rms = |x: &mut dyn Iterator<Item = f64>| x.map(|x| x * x).sum::<f64>().sqrt();
+            let difference = rms(&mut record.iter().zip(&whole).map(|(a, b)| a - b));
+            let size = rms(&mut whole.iter().copied());
+            println!("{i}: {:e}", difference / size);
+            assert!(difference < 3e-5 * size, "{i}: {:e}", difference / size);
+        }
+    }
+
+    #[test]
+    fn what_reaches_far_is_not_cut() {
+        assert!(is_local(
+            &chain(&[("saturation", "hard", &[9.0])]),
+            RATE_HZ,
+            SIDE
+        ));
+        for far in [
+            chain(&[("thermal-drift", "linear", &[0.1])]),
+            chain(&[("backlash", "recorded", &[0.1])]),
+            chain(&[("recorder-lowpass", "order-1", &[0.05])]),
+        ] {
+            assert!(!is_local(&far, RATE_HZ, SIDE));
+        }
+    }
+
+    #[test]
+    fn a_motion_that_leaves_all_bounds_is_told() {
+        let unstable = chain(&[("cubic-stiffness", "beside", &[-1.0])]);
+        let mut pieces = Pieces::new(&unstable, RATE_HZ, Between::BandLimited);
+        let mut record = Vec::new();
+        pieces.push(&vec![5.0; 2000], &mut record).unwrap();
+        assert_eq!(pieces.finish(&mut record), Err(Diverges));
+    }
+}
