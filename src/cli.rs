@@ -63,6 +63,19 @@ pub enum Verb {
     Diagnose(Diagnose),
 }
 
+impl Verb {
+    /// Whether only warnings go to standard error.
+    pub(crate) fn is_quiet(&self) -> bool {
+        match self {
+            Self::Compensate(args) => args.work.quiet,
+            Self::Diagnose(args) => args.work.quiet,
+            Self::Extract(args) => args.quiet,
+            Self::Simulate(args) => args.quiet,
+            _ => false,
+        }
+    }
+}
+
 /// Units that results are printed in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Units {

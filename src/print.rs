@@ -1,6 +1,7 @@
 //! Numbers, columns and documents as they are printed.
 
 use std::fmt;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde::Serialize;
 use unicode_width::UnicodeWidthStr;
@@ -50,12 +51,29 @@ struct Document<'a, R> {
 
 /// Says something to a person on standard error. Nobody may be there to read it: that is no failure.
 pub fn say(text: &str) {
+    if IS_LINE_SHOWN.swap(false, Ordering::Relaxed) {
+        show("\r\x1b[K");
+    }
     show(&visible(text.to_owned()));
+}
+
+/// Whether nothing is said of how far the work has got.
+static IS_QUIET: AtomicBool = AtomicBool::new(false);
+
+/// Whether a line of it stands on the terminal.
+static IS_LINE_SHOWN: AtomicBool = AtomicBool::new(false);
+
+/// Says nothing of how far the work has got from now on.
+pub(crate) fn hide_progress() {
+    IS_QUIET.store(true, Ordering::Relaxed);
 }
 
 /// Writes how far the work has got over what the line showed before; an empty text clears the line.
 pub fn say_progress(text: &str) {
-    show(&format!("\r{}\x1b[K", visible(text.to_owned())));
+    if !IS_QUIET.load(Ordering::Relaxed) {
+        IS_LINE_SHOWN.store(!text.is_empty(), Ordering::Relaxed);
+        show(&format!("\r{}\x1b[K", visible(text.to_owned())));
+    }
 }
 
 fn show(text: &str) {

@@ -52,7 +52,7 @@ fn peak_of(folder: &Folder, args: &[&str]) -> f64 {
 }
 
 /// Each with the most bytes a row that docs/reliability.md states.
-const VERBS: [(&str, f64); 5] = [
+const VERBS: [(&str, f64); 6] = [
     (
         "compensate LONG --channel bridge --stand stand.toml -o out.csv --force",
         NONE,
@@ -66,7 +66,8 @@ const VERBS: [(&str, f64); 5] = [
         "harmonics LONG --channel bridge --stand stand.toml --fundamental 60 --orders 1-5",
         60.0,
     ),
-    ("inspect LONG", 100.0),
+    ("inspect LONG", 120.0),
+    ("identify decay LONG --channel ringing", 110.0),
 ];
 
 #[test]
@@ -95,4 +96,26 @@ fn memory_grows_by_no_more_than_is_stated() {
         }
     }
     assert!(wrong.is_empty(), "{wrong}");
+}
+
+/// What cannot have room is refused before anything is read or written.
+#[test]
+fn a_text_without_room_is_refused() {
+    let folder = Folder::new();
+    let file = std::fs::File::create(folder.path("long.csv")).expect("a file");
+    // It takes no room on the disk.
+    file.set_len(1 << 30).expect("a length");
+    let script = "ulimit -v 1000000; exec \"$0\" identify decay long.csv -o out.toml";
+    let ran = std::process::Command::new("sh")
+        .args(["-c", script, env!("CARGO_BIN_EXE_torqcomp")])
+        .current_dir(folder.path(""))
+        .output()
+        .expect("the shell starts");
+    assert_eq!(ran.status.code(), Some(1));
+    let said = String::from_utf8_lossy(&ran.stderr);
+    assert!(
+        said.contains("at least 2.1 GB of memory, and this process may have 1 GB"),
+        "{said}"
+    );
+    assert_eq!(folder.names(), ["long.csv", "stand.toml"]);
 }

@@ -37,6 +37,9 @@ pub enum Outcome {
 /// # Errors
 /// Whatever kept it from being done.
 pub fn run(cli: Cli) -> Result<Outcome, Failure> {
+    if cli.verb.is_quiet() {
+        print::hide_progress();
+    }
     match cli.verb {
         Verb::Init(args) => init::run(&args),
         Verb::Compensate(args) => compensate::run(&args),

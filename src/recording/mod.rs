@@ -15,7 +15,9 @@ mod message_stream;
 mod messages;
 pub mod moment;
 mod part;
+mod progress;
 mod range;
+mod room;
 mod stamps;
 mod stream;
 pub mod text;
@@ -168,6 +170,7 @@ impl Recording {
         for choice in choices {
             refuse_for_text(choice, reading)?;
         }
+        room::look(input)?;
         Self::of_text(input, reading, u64::MAX)
     }
 

@@ -2,6 +2,7 @@
 
 use std::io::Read;
 
+use super::progress;
 use super::text::{self, LONGEST_LINE};
 use crate::failure::Failure;
 use crate::io::Input;
@@ -19,7 +20,7 @@ const PIECE: usize = 1 << 16;
 pub(super) fn first(place: &Input, most: u64) -> Result<(Vec<u8>, Option<Warning>), Failure> {
     let failed = |error| Failure::failed(format_args!("{}: cannot be read: {error}", place.name()));
     let refused = |failure: Failure| failure.at(place.name());
-    let mut input = place.open()?;
+    let mut input = progress::open(place)?;
     let mut bytes = Vec::new();
     let mut read_to = |bytes: &mut Vec<u8>, most: u64| {
         let more = most.saturating_sub(bytes.len() as u64);

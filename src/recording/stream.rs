@@ -10,7 +10,7 @@ use super::moment::Moment;
 use super::stamps::{StampGrid, is_uniform};
 use super::text::{ChannelPlan, StampColumn, TextFile, TextStream};
 use super::validator::{StreamValidator, TextLines};
-use super::{FilledSpan, RateFrom, Recording, TimeAxis, checkpoints};
+use super::{FilledSpan, RateFrom, Recording, TimeAxis, checkpoints, progress};
 use crate::failure::Failure;
 use crate::io::{ChannelChoice, Input, Reading};
 use crate::unit::{NamedUnit, RecordedChannel};
@@ -76,7 +76,7 @@ impl ChannelStream {
             let recording = Recording::read(input, std::slice::from_ref(choice), reading)?;
             return Self::of_recording(recording, choice, reading);
         }
-        let mut bytes = input.open()?;
+        let mut bytes = progress::open(input)?;
         let unreadable = |error| Failure::failed(format_args!("{name}: cannot be read: {error}"));
         let mut head = Vec::new();
         let start = (&mut bytes).take(MAGIC).read_to_end(&mut head);

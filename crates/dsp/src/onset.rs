@@ -10,6 +10,10 @@ const LEAST_BLOCK: usize = 8;
 const RISE: f64 = 3.0;
 /// … and over the largest swing in the record.
 const SIZE: f64 = 0.15;
+/// Swing of a block that rings, over that of noise.
+const ABOVE: f64 = 2.0;
+/// Swing in the third quarter of a record, over that in the last, from which it still falls.
+const FALLS: f64 = 1.1;
 /// Blocks before a hit that it is compared with.
 const BEFORE: usize = 4;
 
@@ -66,6 +70,41 @@ pub fn decays(samples: &[f64]) -> Vec<Range<usize>> {
         .map(|(start, end)| peak_after(samples, *start, end, block)..end)
         .filter(|range| range.len() >= 4 * LEAST_BLOCK)
         .collect()
+}
+
+/// Samples of a stretch up to twice the time after which its ringing is lost in the noise; all of them where the swing still
+/// falls at the end.
+///
+/// ```
+/// // A decay of 0.01 a sample in a noise of ±0.01 is lost after about ln(100/2)/0.01 = 390 of 40 000 samples.
+/// let noise = |i: i32| 0.01 * f64::from(i * 7919 % 1001 - 500) / 500.0;
+/// let record: Vec<f64> = (0..40_000)
+///     .map(|i| (-0.01 * f64::from(i)).exp() * (0.3 * f64::from(i)).cos() + noise(i))
+///     .collect();
+/// let kept = torqcomp_dsp::onset::until_noise(&record);
+/// assert!((700..=1200).contains(&kept), "{kept}");
+/// assert_eq!(torqcomp_dsp::onset::until_noise(&record[..300]), 300);
+/// ```
+#[must_use]
+pub fn until_noise(samples: &[f64]) -> usize {
+    let block = (samples.len() / BLOCKS).max(LEAST_BLOCK);
+    let swings: Vec<f64> = samples.chunks_exact(block).map(swing).collect();
+    let median = |part: &[f64]| {
+        let mut sorted = part.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        sorted.get(sorted.len() / 2).copied().unwrap_or_default()
+    };
+    let quarter = swings.len() / 4;
+    let (before, floor) = (
+        median(&swings[2 * quarter..3 * quarter]),
+        median(&swings[3 * quarter..]),
+    );
+    let still_falls = before > FALLS * floor;
+    let lost = swings.iter().rposition(|swing| *swing > ABOVE * floor);
+    match lost {
+        Some(last) if !still_falls => (2 * (last + 1) * block).min(samples.len()),
+        _ => samples.len(),
+    }
 }
 
 /// Half the difference of the largest and the smallest value.

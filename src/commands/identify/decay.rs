@@ -1,5 +1,7 @@
 //! `identify decay`.
 
+use std::borrow::Cow;
+
 use super::constants::{Ratios, from_ratios};
 use super::{ONE_MODE, Recorded, deliver};
 use crate::cli::identify::Decay;
@@ -79,7 +81,7 @@ fn load(args: &Decay, input: &str, recorded: &mut Recorded) -> Result<Loaded, Fa
     let samples = &selection.channel.samples;
     let count = samples.len();
     let stamps = match (&selection.channel.axis.stamps_s, rate_hz) {
-        (Some(stamps), None) => stamps.to_vec(),
+        (Some(stamps), None) => Cow::Borrowed(stamps.as_slice()),
         _ => {
             let (start, rate) = (selection.start.after_s, selection.rate_hz);
             (0..count).map(|i| start + i as f64 / rate).collect()
@@ -89,7 +91,8 @@ fn load(args: &Decay, input: &str, recorded: &mut Recorded) -> Result<Loaded, Fa
     let rate_hz = (is_whole && is_uniform(&stamps, selection.rate_hz)).then_some(selection.rate_hz);
     let mut last = f64::NEG_INFINITY;
     let (times_s, values) = stamps
-        .into_iter()
+        .iter()
+        .copied()
         .zip(samples.iter().copied())
         .filter(|(t, v)| {
             let later = *t > last && v.is_finite();

@@ -1,5 +1,8 @@
 //! Records cut into stretches of free ringing, decimated where they have more samples than needed.
 
+use std::borrow::Cow;
+use std::ops::Range;
+
 use torqcomp_dsp::{decimate, onset, peaks};
 
 use super::modes::Stretch;
@@ -54,12 +57,22 @@ fn cut(
     result: &mut Identification,
 ) -> Result<Vec<(Stretch, Option<f64>)>, Failure> {
     let mut cut = Vec::new();
+    let mut left_out = 0;
     for record in records {
         let (times, values) = prepared(record, options, result)?;
         for range in onset::decays(&values) {
+            let rings = ringing(&values, &range);
+            left_out += range.end - rings.end;
+            let range = rings;
             let stretch = Stretch::new(&times[range.clone()], values[range].to_vec());
             cut.push((stretch, record.rate_hz));
         }
+    }
+    if left_out > 0 {
+        result.method.push(format!(
+            "each decay is fitted up to twice the time after which its ringing is lost in the noise; {left_out} samples of \
+             noise behind that are left out"
+        ));
     }
     if cut.is_empty() {
         return Err(Failure::failed(
@@ -79,12 +92,21 @@ fn cut(
     Ok(cut)
 }
 
+/// The part of a long stretch that rings, and as much noise behind it.
+fn ringing(values: &[f64], range: &Range<usize>) -> Range<usize> {
+    let kept = match range.len() > MOST_SAMPLES {
+        true => onset::until_noise(&values[range.clone()]),
+        false => range.len(),
+    };
+    range.start..range.start + kept
+}
+
 /// Times and samples, low-passed and decimated if a band is given.
-fn prepared(
-    record: &Ringing,
+fn prepared<'a>(
+    record: &Ringing<'a>,
     options: &DecayOptions,
     result: &mut Identification,
-) -> Result<(Vec<f64>, Vec<f64>), Failure> {
+) -> Result<(Cow<'a, [f64]>, Cow<'a, [f64]>), Failure> {
     if let Some(i) = record.values.iter().position(|v| !v.is_finite()) {
         return Err(Failure::failed(format_args!(
             "{}: sample {} is not a finite number; exclude it with --range",
@@ -101,7 +123,7 @@ fn prepared(
         )));
     }
     let (Some((_, highest)), Some(rate_hz)) = (options.band_hz, record.rate_hz) else {
-        return Ok((times.to_vec(), values.to_vec()));
+        return Ok((times.into(), values.into()));
     };
     let factor = band_factor(rate_hz, highest);
     if factor > 1 {
@@ -112,10 +134,8 @@ fn prepared(
     }
     let few = decimate::decimate(values, factor)?;
     let times = times[few.first..].iter().step_by(factor);
-    Ok((
-        times.take(few.samples.len()).copied().collect(),
-        few.samples,
-    ))
+    let times = times.take(few.samples.len()).copied();
+    Ok((times.collect(), few.samples.into()))
 }
 
 /// Decimation factor for a band.
