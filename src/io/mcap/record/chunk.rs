@@ -1,9 +1,9 @@
 //! A chunk: records put together, mostly compressed.
 //!
-//! The bytes are unpacked into a buffer that grows with what really comes out.
+//! The bytes are unpacked into a buffer that grows with what really comes out; of a long chunk, piece by piece.
 
 use std::fmt;
-use std::io::{self, Read, Write};
+use std::io::{self, BufRead, Read, Write};
 
 use lz4_flex::frame::{BlockMode, BlockSize, FrameDecoder, FrameEncoder, FrameInfo};
 use mcap::records::ChunkHeader;
@@ -13,8 +13,11 @@ use super::fields::RecordFields;
 /// Most bytes a chunk may unpack to.
 pub(crate) const LARGEST: u64 = 1 << 30;
 
+/// Unpacked bytes from which a chunk is read piece by piece.
+const LONG: u64 = 1 << 25;
+
 /// Bytes that the buffer grows by while unpacking.
-const STEP: usize = 1 << 18;
+pub(super) const STEP: usize = 1 << 18;
 
 /// Reads the front of a chunk record; what follows are its records as they are in the file.
 /// `mcap::parse_record` refuses a chunk that is cut off, front and all.
@@ -109,14 +112,7 @@ pub(crate) fn unpack(
     front: Option<&(ChunkHeader, &[u8])>,
     records: &mut Vec<u8>,
 ) -> Result<Unpacked, ChunkError> {
-    let (header, rest) = front.ok_or(ChunkError::Head)?;
-    let packed = usize::try_from(header.compressed_size)
-        .ok()
-        .and_then(|size| rest.get(..size))
-        .ok_or(ChunkError::Length {
-            told: header.compressed_size,
-            found: rest.len() as u64,
-        })?;
+    let (header, packed) = packed(front)?;
     if header.compression.is_empty() {
         check(header, packed)?;
         return Ok(Unpacked::InPlace(packed.len()));
@@ -129,12 +125,68 @@ pub(crate) fn unpack(
     Ok(Unpacked::Buffer)
 }
 
+/// The front of a chunk and its bytes as they are in the file.
+fn packed<'a>(
+    front: Option<&'a (ChunkHeader, &'a [u8])>,
+) -> Result<(&'a ChunkHeader, &'a [u8]), ChunkError> {
+    let (header, rest) = front.ok_or(ChunkError::Head)?;
+    let size = usize::try_from(header.compressed_size).ok();
+    match size.and_then(|size| rest.get(..size)) {
+        Some(packed) => Ok((header, packed)),
+        None => Err(ChunkError::Length {
+            told: header.compressed_size,
+            found: rest.len() as u64,
+        }),
+    }
+}
+
+/// Whether a chunk unpacks to so much that its records are to be read by [`records_of_long`].
+pub(crate) fn is_long(header: &ChunkHeader) -> bool {
+    !header.compression.is_empty() && (LONG + 1..=LARGEST).contains(&header.uncompressed_size)
+}
+
+/// The records of a long chunk, which are unpacked as they are read. Of a whole chunk, length and CRC are checked first.
+///
+/// # Errors
+/// As [`unpack`].
+pub(crate) fn records_of_long(
+    front: Option<&(ChunkHeader, &[u8])>,
+    is_whole: bool,
+) -> Result<Box<dyn Read + Send>, ChunkError> {
+    let (header, bytes) = match (is_whole, front) {
+        (false, Some((header, cut))) => (header, *cut),
+        _ => packed(front)?,
+    };
+    if is_whole {
+        let mut input = decoder(&header.compression, bytes)?.take(header.uncompressed_size + 1);
+        let (mut piece, mut found) = (vec![0; STEP], 0);
+        let mut crc = crc32fast::Hasher::new();
+        loop {
+            let read = input.read(&mut piece);
+            match read.map_err(|error| ChunkError::Damaged(error.to_string()))? {
+                0 => break,
+                count => {
+                    crc.update(&piece[..count]);
+                    found += count as u64;
+                }
+            }
+        }
+        compare(header, found, || crc.finalize())?;
+    }
+    decoder(&header.compression, io::Cursor::new(bytes.to_vec()))
+}
+
 fn check(header: &ChunkHeader, records: &[u8]) -> Result<(), ChunkError> {
-    let (told, found) = (header.uncompressed_size, records.len() as u64);
+    compare(header, records.len() as u64, || crc32fast::hash(records))
+}
+
+/// Compares what came out with what the front says.
+fn compare(header: &ChunkHeader, found: u64, crc: impl FnOnce() -> u32) -> Result<(), ChunkError> {
+    let told = header.uncompressed_size;
     if found != told {
         return Err(ChunkError::Length { told, found });
     }
-    let (told, found) = (header.uncompressed_crc, crc32fast::hash(records));
+    let (told, found) = (header.uncompressed_crc, crc());
     if told != 0 && told != found {
         return Err(ChunkError::Crc { told, found });
     }
@@ -152,17 +204,24 @@ pub(crate) fn unpack_part(
 ) -> Result<(), ChunkError> {
     records.clear();
     let limit = head.uncompressed_size.min(LARGEST);
-    let damaged = |error: io::Error| ChunkError::Damaged(error.to_string());
-    match head.compression.as_str() {
-        "" => {
-            records.extend_from_slice(packed);
-            Ok(())
-        }
-        "zstd" => {
-            let input = zstd::stream::read::Decoder::with_buffer(packed).map_err(damaged)?;
-            drain(input, limit, records)
-        }
-        "lz4" => drain(FrameDecoder::new(packed), limit, records),
+    if head.compression.is_empty() {
+        records.extend_from_slice(packed);
+        return Ok(());
+    }
+    drain(decoder(&head.compression, packed)?, limit, records)
+}
+
+/// What unpacks bytes.
+fn decoder<'a>(
+    compression: &str,
+    packed: impl BufRead + Send + 'a,
+) -> Result<Box<dyn Read + Send + 'a>, ChunkError> {
+    match compression {
+        "zstd" => match zstd::stream::read::Decoder::with_buffer(packed) {
+            Ok(decoder) => Ok(Box::new(decoder)),
+            Err(error) => Err(ChunkError::Damaged(error.to_string())),
+        },
+        "lz4" => Ok(Box::new(FrameDecoder::new(packed))),
         name => Err(ChunkError::Compression(name.to_owned())),
     }
 }

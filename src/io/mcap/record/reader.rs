@@ -1,15 +1,18 @@
 //! The records of an MCAP file one after the other, those in chunks included.
 
 use std::collections::BTreeMap;
+use std::io::Read;
 use std::ops::Range;
 
 use mcap::records::op;
 
 use super::census::Census;
-use super::chunk::{Unpacked, chunk_front, unpack, unpack_part};
+use super::chunk::{
+    ChunkError, STEP, Unpacked, chunk_front, is_long, records_of_long, unpack, unpack_part,
+};
 use super::file::{FileReader, FileRecord, Loss, Losses};
 use super::input::CountedInput;
-use super::{RECORD_HEAD, split_record};
+use super::{RECORD_HEAD, record_head, split_record};
 use crate::failure::Failure;
 use crate::io::Input;
 
@@ -30,6 +33,8 @@ pub(crate) struct RecordReader {
     buffer: Vec<u8>,
     /// Where they lie in the file's record instead, of a chunk that is not compressed.
     in_place: Option<Range<usize>>,
+    /// Where more of them come from, of a long chunk.
+    more: Option<Box<dyn Read + Send>>,
     /// How far they have been delivered.
     at: usize,
     /// Where the current record, or the chunk that it is in, begins in the file.
@@ -38,6 +43,9 @@ pub(crate) struct RecordReader {
     census: Census,
     is_counted: bool,
 }
+
+/// Longest record in a chunk that is read piece by piece.
+const LONGEST_NESTED: u64 = 1 << 28;
 
 /// Where the body of a record is held.
 enum Holder {
@@ -67,6 +75,7 @@ impl RecordReader {
             file,
             buffer: Vec::new(),
             in_place: None,
+            more: None,
             at: 0,
             record_offset: 0,
             chunk_counts: BTreeMap::new(),
@@ -145,6 +154,10 @@ impl RecordReader {
                 }
                 return Ok(Some((op, Holder::Records(start..end))));
             }
+            if self.unpack_more() {
+                continue;
+            }
+            let rest = &self.records()[self.at..];
             // The rest of a chunk that was cut off has been reported already.
             if !rest.is_empty() && !self.file.is_ended {
                 let at = self.record_offset;
@@ -183,6 +196,15 @@ impl RecordReader {
             count.packed = count.packed.saturating_add(header.compressed_size);
             count.unpacked = count.unpacked.saturating_add(header.uncompressed_size);
         }
+        let is_long = front.as_ref().is_some_and(|(header, _)| is_long(header));
+        if is_long {
+            match records_of_long(front.as_ref(), record.is_whole) {
+                Ok(more) => self.more = Some(more),
+                Err(why) if record.is_whole => self.lose_chunk(record.offset, why),
+                Err(_) => {}
+            }
+            return;
+        }
         if !record.is_whole {
             if let Some((header, packed)) = front {
                 // Whatever comes out whole is used; that the chunk is cut off is said anyway.
@@ -196,14 +218,42 @@ impl RecordReader {
                 let start = body.len() - front.map_or(0, |(_, rest)| rest.len());
                 self.in_place = Some(start..start + length);
             }
-            Err(why) => {
-                self.buffer.clear();
-                let span_ns =
-                    front.map(|(header, _)| (header.message_start_time, header.message_end_time));
-                let at = record.offset;
-                self.file.losses.add(Loss::Chunk { at, why, span_ns });
-            }
+            Err(why) => self.lose_chunk(record.offset, why),
         }
+    }
+
+    /// Takes note that the chunk that the file is at was left out.
+    fn lose_chunk(&mut self, at: u64, why: ChunkError) {
+        self.buffer.clear();
+        let front = chunk_front(self.file.body());
+        let span_ns = front.map(|(header, _)| (header.message_start_time, header.message_end_time));
+        self.file.losses.add(Loss::Chunk { at, why, span_ns });
+    }
+
+    /// Unpacks more of a long chunk behind what is not delivered yet; `false` if there is no more.
+    fn unpack_more(&mut self) -> bool {
+        let Some(more) = &mut self.more else {
+            return false;
+        };
+        self.buffer.drain(..self.at);
+        self.at = 0;
+        if let Some((op, length)) = record_head(&self.buffer)
+            && length > LONGEST_NESTED
+        {
+            let at = self.record_offset;
+            self.file.losses.add(Loss::TooLong { at, op, length });
+            self.buffer.clear();
+            self.more = None;
+            return false;
+        }
+        // As much again keeps the work proportional.
+        let step = STEP.max(self.buffer.len()) as u64;
+        let read = more.take(step).read_to_end(&mut self.buffer);
+        let is_more = read.is_ok_and(|count| count > 0);
+        if !is_more {
+            self.more = None;
+        }
+        is_more
     }
 }
 

@@ -118,3 +118,49 @@ fn a_record_past_the_end_of_its_chunk_is_said() {
     let said: Vec<_> = reader.losses().first.iter().map(Loss::code).collect();
     assert_eq!(said, ["mcap-damaged-chunk", "mcap-truncated"]);
 }
+
+/// Ninety-six messages of 1 MB in one chunk of a few kB: all of them come, in memory of a few.
+#[test]
+fn a_long_chunk_is_unpacked_piece_by_piece() {
+    for compression in [Compression::Zstd, Compression::Lz4] {
+        let mut file = File::new(options(Some(compression)).chunk_size(None));
+        let schema = ("std_msgs/msg/Float64", &b"float64 data"[..]);
+        file.channel(1, "/x", "cdr+ros2msg", schema);
+        for i in 0..96 {
+            file.message(1, 5 + i, &vec![0; 1 << 20]);
+        }
+        let bytes = file.finish();
+        assert!(bytes.len() < 1 << 20, "{}", bytes.len());
+        let mut reader = reader(&bytes);
+        let mut messages = 0;
+        while let Some((op, body)) = reader.next().unwrap() {
+            messages += usize::from(op == op::MESSAGE && body.len() == 22 + (1 << 20));
+            assert!(reader.buffer.capacity() < 1 << 23);
+        }
+        assert_eq!((messages, reader.losses().count), (96, 0));
+        // A changed checksum of the chunk: it is left out as a whole.
+        let mut damaged = bytes.clone();
+        let chunk = super::super::super::testing::chunks(&bytes)[0];
+        damaged[chunk + RECORD_HEAD + 24] ^= 1;
+        let (ops, reader) = ops(&damaged);
+        assert!(!ops.contains(&op::MESSAGE));
+        assert!(matches!(
+            reader.losses().first[0],
+            Loss::Chunk {
+                why: ChunkError::Crc { .. },
+                ..
+            }
+        ));
+        // Cut off: what is whole is there.
+        let (ops, reader) = ops_of_cut(&bytes, chunk);
+        assert!(ops.contains(&op::MESSAGE) && reader.losses().count == 1);
+    }
+}
+
+/// The records of a file that ends in the middle of its chunk.
+fn ops_of_cut(bytes: &[u8], chunk: usize) -> (Vec<u8>, RecordReader) {
+    let length = bytes[chunk + 1..]
+        .first_chunk()
+        .map(|b| u64::from_le_bytes(*b));
+    ops(&bytes[..chunk + RECORD_HEAD + length.unwrap() as usize / 2])
+}
