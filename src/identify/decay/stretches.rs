@@ -59,7 +59,7 @@ fn cut(
     let mut cut = Vec::new();
     let mut left_out = 0;
     for record in records {
-        let (times, values) = prepared(record, options, result)?;
+        let [times, values] = prepared(record, options, result)?;
         for range in onset::decays(&values) {
             let rings = ringing(&values, &range);
             left_out += range.end - rings.end;
@@ -106,7 +106,7 @@ fn prepared<'a>(
     record: &Ringing<'a>,
     options: &DecayOptions,
     result: &mut Identification,
-) -> Result<(Cow<'a, [f64]>, Cow<'a, [f64]>), Failure> {
+) -> Result<[Cow<'a, [f64]>; 2], Failure> {
     if let Some(i) = record.values.iter().position(|v| !v.is_finite()) {
         return Err(Failure::failed(format_args!(
             "{}: sample {} is not a finite number; exclude it with --range",
@@ -123,7 +123,7 @@ fn prepared<'a>(
         )));
     }
     let (Some((_, highest)), Some(rate_hz)) = (options.band_hz, record.rate_hz) else {
-        return Ok((times.into(), values.into()));
+        return Ok([times.into(), values.into()]);
     };
     let factor = band_factor(rate_hz, highest);
     if factor > 1 {
@@ -135,7 +135,7 @@ fn prepared<'a>(
     let few = decimate::decimate(values, factor)?;
     let times = times[few.first..].iter().step_by(factor);
     let times = times.take(few.samples.len()).copied();
-    Ok((times.collect(), few.samples.into()))
+    Ok([times.collect(), few.samples.into()])
 }
 
 /// Decimation factor for a band.
