@@ -26,6 +26,7 @@ impl Warning {
 #[rustfmt::skip]
 pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
     ("Compensate and harmonics", &[
+        ["beyond-rated-torque", "the torque lies more than 1.5 times beyond the transducer's rated torque", "check unit, gain and zero of the channel"],
         ["band-lost-in-noise", "part of the band does not rise above the record's noise, which the compensation multiplies there", "choose a lower --band"],
         ["components-lost-in-noise", "components do not exceed twice their own uncertainty", "average over a longer record, or take them as zero"],
         ["direction-unknown", "the speed is not significantly different from zero over part of the record, where a friction depends on its sign", "take the torque there as known to the size of the friction only"],

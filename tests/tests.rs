@@ -31,6 +31,7 @@ mod recordings;
 mod refined;
 mod reports;
 mod simulate;
+mod stated_std;
 mod table;
 mod text_tables;
 mod thesis;

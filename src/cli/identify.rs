@@ -116,6 +116,9 @@ pub struct Response {
     /// Unit of the excitation, if its heading does not say
     #[arg(long, value_name = "UNIT")]
     pub applied_unit: Option<String>,
+    /// Radius at which a force acts: torque = force x radius
+    #[arg(long, value_name = "QUANTITY")]
+    pub radius: Option<String>,
     /// Channel of the response
     #[arg(long, value_name = "NAME")]
     pub measured: String,

@@ -19,7 +19,7 @@ use torqcomp_dsp::noise::NoiseGain;
 use self::band::{BandReport, Wanted};
 use self::report::{CompensateReport, NoiseAt, NoiseReport};
 use self::sink::Sink;
-use super::{Outcome, conclude, uncertainty, unit_text};
+use super::{Outcome, conclude, unit_text};
 use crate::cli::{self, OneChannel};
 use crate::failure::Failure;
 use crate::inverse::ChainInverse;
@@ -27,7 +27,7 @@ use crate::io::output;
 use crate::io::{Input, already_compensated};
 use crate::print::{self, Report};
 use crate::recording::{ChannelStream, StreamSummary};
-use crate::stand::{self, Calibration, Stand};
+use crate::stand::{self, Calibration, Stand, TorqueStd};
 
 /// Frequencies at which the report gives the gain, as fractions of the band.
 const GAIN_POINTS: usize = 9;
@@ -172,6 +172,9 @@ impl Plan {
             output: output.to_owned(),
             unit: chain.applied.unit.clone(),
             calibration: chain.described.clone(),
+            calibration_relative_std: chain.std.known(),
+            constant: chain.std,
+            rated_torque: chain.rated_n_m.map(|rated| rated / chain.applied.factor),
             rate_hz: stream.rate_hz,
             filled: stream.filled.clone(),
             rate_from: stream.time.rate_from.sentence(stream.time.is_resampled()),
@@ -192,13 +195,24 @@ impl Plan {
         }
     }
 
+    /// Standard uncertainty at a frequency; none where no filter describes the stand.
+    fn std(&self, frequency_hz: f64) -> TorqueStd {
+        match self.undo {
+            None => self.stand.torque_std(frequency_hz, self.chain.std),
+            Some(_) => TorqueStd::default(),
+        }
+    }
+
     fn noise(&self) -> NoiseReport {
         let gain = NoiseGain::of(&self.filter, GAIN_POINTS);
-        let at = |&(frequency_hz, gain): &(f64, f64)| NoiseAt {
-            frequency_hz,
-            gain,
-            relative_std: uncertainty(&self.stand, &self.chain, frequency_hz)
-                .map(|u| u.magnitude_relative),
+        let at = |&(frequency_hz, gain): &(f64, f64)| {
+            let std = self.std(frequency_hz);
+            NoiseAt {
+                frequency_hz,
+                gain,
+                relative_std: std.total.map(|u| u.magnitude_relative),
+                response_relative_std: std.response.map(|u| u.magnitude_relative),
+            }
         };
         NoiseReport {
             white_gain: gain.white,

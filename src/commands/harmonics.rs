@@ -9,7 +9,7 @@ use num_complex::Complex64;
 use serde::Serialize;
 use torqcomp_dsp::compensate::Inverse;
 use torqcomp_dsp::harmonics::{self, Fundamental, refine_fundamental};
-use torqcomp_model::UnitSystem;
+use torqcomp_model::{InverseUncertainty, UnitSystem};
 
 use super::{Outcome, conclude, publish, unit_text};
 use crate::cli::{self, OneChannel};
@@ -19,7 +19,7 @@ use crate::print::{Report, columns, rounded, short};
 use crate::quality::excerpt;
 use crate::recording::moment::Moment;
 use crate::recording::{ChannelStream, UniformRecord};
-use crate::stand::{self, Calibration, Stand};
+use crate::stand::{self, Calibration, ConstantStd, Stand, TorqueStd, beyond_rated};
 use crate::unit::NamedUnit;
 use crate::warning::Warning;
 
@@ -42,6 +42,8 @@ struct HarmonicsReport {
     stand: Option<String>,
     /// How the record became torque at rest.
     calibration: String,
+    /// Relative standard uncertainty of the constant of that; `null` if unknown, or if there is none.
+    calibration_relative_std: Option<f64>,
     /// Unit of `mean`, `recorded`, `torque`, `std` and `residual_rms`.
     unit: String,
     samples: usize,
@@ -63,6 +65,8 @@ struct HarmonicsReport {
     /// What the fit leaves over, rms, as recorded.
     residual_rms: f64,
     warnings: Vec<Warning>,
+    #[serde(skip)]
+    constant: ConstantStd,
 }
 
 /// A component torque `A cos(2πft + φ)`.
@@ -83,8 +87,11 @@ struct ComponentTorque {
     std: f64,
     /// Standard uncertainty of `phase_deg` from the noise; `null` if the component is lost in it.
     phase_std_deg: Option<f64>,
-    /// Standard uncertainty of `torque` from the stand's constants; `null` if they have none.
+    /// Standard uncertainty of `torque` from the stand's constants and the calibration; `null` if that of one of them is
+    /// unknown.
     std_stand: Option<f64>,
+    /// The same from the response that is divided out alone; `null` if its constants have none.
+    std_response: Option<f64>,
     /// Standard uncertainty of `phase_deg` from the stand's constants; `null` if they have none.
     phase_std_stand_deg: Option<f64>,
 }
@@ -209,6 +216,11 @@ fn fit(
         .iter()
         .map(|c| component(c, printed, way))
         .collect();
+    warnings.extend(beyond_rated(
+        largest(samples, &components, printed),
+        chain.rated_n_m.map(|rated| rated * printed),
+        &chain.applied.unit,
+    ));
     warnings.extend(speed::warning(record, fundamental.frequency_hz, &orders));
     warnings.extend(lost_warning(&components));
     warnings.extend(mains_warning(&components, duration_s));
@@ -231,6 +243,8 @@ fn fit(
         taken_as: way.taken_as(),
         stand: way.stand.as_ref().map(|(stand, _)| stand.file.clone()),
         calibration: chain.described.clone(),
+        calibration_relative_std: chain.std.known(),
+        constant: chain.std,
         unit: chain.applied.unit.clone(),
         samples: samples.len(),
         rate_hz: record.rate_hz,
@@ -245,6 +259,13 @@ fn fit(
         residual_rms: found.residual_rms * printed,
         warnings,
     })
+}
+
+/// The largest torque of the record or of one of its components, in the printed unit.
+fn largest(samples: &[f64], components: &[ComponentTorque], printed: f64) -> f64 {
+    let recorded = samples.iter().map(|v| v.abs() * printed);
+    let found = components.iter().map(|c| c.torque);
+    recorded.chain(found).fold(0.0, f64::max)
 }
 
 /// Orders below half the sampling rate; those above are said.
@@ -286,9 +307,13 @@ fn component(fitted: &harmonics::Component, printed: f64, way: &WayBack) -> Comp
     let factor = inverse.norm();
     let recorded = fitted.phasor.norm() * printed;
     let torque = recorded * factor;
-    let stand = way.stand.as_ref();
-    let of_stand =
-        stand.and_then(|(stand, _)| super::uncertainty(stand, &way.chain, fitted.frequency_hz));
+    let std = way
+        .stand
+        .as_ref()
+        .map_or_else(TorqueStd::default, |(stand, _)| {
+            stand.torque_std(fitted.frequency_hz, way.chain.std)
+        });
+    let of_torque = |std: &InverseUncertainty| std.magnitude_relative * torque;
     ComponentTorque {
         order: fitted.order,
         frequency_hz: fitted.frequency_hz,
@@ -299,8 +324,9 @@ fn component(fitted: &harmonics::Component, printed: f64, way: &WayBack) -> Comp
         phase_deg: (fitted.phasor * inverse).arg().to_degrees(),
         std: fitted.std_amplitude * printed * factor,
         phase_std_deg: fitted.std_phase_rad.map(f64::to_degrees),
-        std_stand: of_stand.as_ref().map(|u| u.magnitude_relative * torque),
-        phase_std_stand_deg: of_stand.as_ref().map(|u| u.phase_rad.to_degrees()),
+        std_stand: std.total.as_ref().map(of_torque),
+        std_response: std.response.as_ref().map(of_torque),
+        phase_std_stand_deg: std.response.map(|u| u.phase_rad.to_degrees()),
     }
 }
 
@@ -357,7 +383,8 @@ impl Report for HarmonicsReport {
         let mut text = format!(
             "{}, {} in {}, taken as {}: {} samples at {} Hz, {} s\n\
              torque = mean + sum of A cos(2 pi f t + phase), A being the peak, t = 0 at {}\n\
-             fundamental {}{std} Hz, mean {} {}, residual {} {} rms\n\n",
+             fundamental {}{std} Hz, mean {} {}, residual {} {} rms\n\
+             uncertainty of stand and calibration: {}\n\n",
             self.input,
             self.channel,
             self.channel_unit,
@@ -370,9 +397,10 @@ impl Report for HarmonicsReport {
             rounded(self.mean, 5),
             self.unit,
             rounded(self.residual_rms, 3),
-            self.unit
+            self.unit,
+            self.uncertainty_text()
         );
-        let with_stand = self.components.iter().any(|c| c.std_stand.is_some());
+        let of_stand = self.std_column();
         let unit = &self.unit;
         let mut head: Vec<String> = ["order", "Hz"].map(str::to_owned).to_vec();
         head.extend([
@@ -381,21 +409,41 @@ impl Report for HarmonicsReport {
             format!("torque {unit}"),
             "± noise".to_owned(),
         ]);
-        if with_stand {
-            head.push("± stand".to_owned());
-        }
+        head.extend(of_stand.map(str::to_owned));
         head.extend(["phase deg".to_owned(), "± noise".to_owned()]);
-        if with_stand {
-            head.push("± stand".to_owned());
-        }
+        head.extend(of_stand.map(str::to_owned));
         let mut rows = vec![head];
-        rows.extend(self.components.iter().map(|c| c.cells(with_stand)));
+        rows.extend(self.components.iter().map(|c| c.cells(of_stand.is_some())));
         let _ = write!(text, "{}", columns(&rows));
         text
     }
 }
 
 impl HarmonicsReport {
+    /// Heading of the column of uncertainties that the stand brings, if there are any.
+    fn std_column(&self) -> Option<&'static str> {
+        if self.components.iter().any(|c| c.std_stand.is_some()) {
+            return Some("± stand");
+        }
+        let has_response = self.components.iter().any(|c| c.std_response.is_some());
+        has_response.then_some("± response")
+    }
+
+    fn uncertainty_text(&self) -> String {
+        let constant = match (self.constant, self.std_column()) {
+            (_, None) => return "unknown (no std is given)".to_owned(),
+            (ConstantStd::Relative(std), _) => format!("{} %", rounded(100.0 * std, 2)),
+            (ConstantStd::NotNeeded, _) => {
+                return "that of the response, \"± stand\" below".to_owned();
+            }
+            (ConstantStd::Unknown, _) => {
+                return "unknown, since the calibration has no std; that of the response alone is \"± response\" below"
+                    .to_owned();
+            }
+        };
+        format!("{constant} of the static constant; with the response \"± stand\" below")
+    }
+
     fn taken_as_text(&self) -> String {
         match &self.stand {
             Some(stand) => format!("{} (the response of {stand} is divided out)", self.taken_as),
@@ -415,7 +463,8 @@ impl ComponentTorque {
             rounded(self.std, 2),
         ];
         if with_stand {
-            cells.push(self.std_stand.map_or_else(String::new, |s| rounded(s, 2)));
+            let std = self.std_stand.or(self.std_response);
+            cells.push(std.map_or_else(|| "unknown".to_owned(), |s| rounded(s, 2)));
         }
         cells.push(format!("{:.2}", self.phase_deg));
         cells.push(
@@ -424,7 +473,7 @@ impl ComponentTorque {
         );
         if with_stand {
             let std = self.phase_std_stand_deg;
-            cells.push(std.map_or_else(String::new, |s| rounded(s, 2)));
+            cells.push(std.map_or_else(|| "unknown".to_owned(), |s| rounded(s, 2)));
         }
         cells
     }

@@ -13,13 +13,12 @@ mod simulate;
 mod table;
 
 use torqcomp_dsp::conversion::ConversionError;
-use torqcomp_model::InverseUncertainty;
 
 use crate::cli::{Cli, Strictness, Verb};
 use crate::failure::Failure;
 use crate::io::output::{self, Output};
 use crate::print::{self, Report};
-use crate::stand::{Calibration, Stand};
+use crate::stand::Calibration;
 use crate::unit::NamedUnit;
 use crate::warning::Warning;
 
@@ -88,16 +87,6 @@ fn conclude(warnings: &[Warning], lost: bool, strictness: &Strictness) -> Outcom
 /// A unit as written in the file; empty if there is none.
 fn unit_text(unit: Option<&NamedUnit>) -> &str {
     unit.map_or("", |unit| &unit.text)
-}
-
-/// Standard uncertainty of the compensated torque that the stand's constants bring, its calibration
-/// included.
-fn uncertainty(
-    stand: &Stand,
-    chain: &Calibration,
-    frequency_hz: f64,
-) -> Option<InverseUncertainty> {
-    stand.inverse_uncertainty(frequency_hz, chain.relative_std)
 }
 
 /// Largest magnitude that is taken for a measurement: squares and sums of it stay finite.

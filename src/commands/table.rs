@@ -84,7 +84,7 @@ fn row(
     let (more, phase_of_effects) = of_effects.unwrap_or(Complex64::ONE).to_polar();
     let magnitude = more * mechanical.norm() / recorded.norm();
     let phase_rad = mechanical.arg() - recorder.phase_rad(frequency_hz) + phase_of_effects;
-    let std = stand.inverse_uncertainty(frequency_hz, None);
+    let std = stand.inverse_uncertainty(frequency_hz);
     TableRow {
         frequency_hz,
         magnitude,

@@ -6,6 +6,7 @@
 //! share: the band, the continuation beyond the record's ends, the noise. Beyond the band nothing is added.
 
 mod motion;
+mod spread;
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -20,6 +21,8 @@ use torqcomp_model::effects::{
 
 use crate::failure::Failure;
 use crate::stand::Stand;
+
+pub(crate) use spread::{ResultStd, Spread};
 
 /// Rounds in which torques of the stand and a coupling past it are brought into agreement.
 const ROUNDS: usize = 40;

@@ -4,8 +4,9 @@ use torqcomp_dsp::conversion::Conversion;
 use torqcomp_model::{Dimension, Kind, RatioOf, Unit, UnitSystem};
 
 use super::static_law::StaticLaw;
-use super::{Given, Stand, TransducerSignal};
+use super::{ConstantStd, Given, Stand, TransducerSignal};
 use crate::failure::Failure;
+use crate::print::{rounded, short};
 use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
 
@@ -33,10 +34,30 @@ pub struct Calibration {
     pub applied: Applied,
     /// How the static constant came about, for people.
     pub described: String,
-    /// Relative standard uncertainty of the static constant, if known.
-    pub relative_std: Option<f64>,
+    /// Uncertainty of the static constant.
+    pub std: ConstantStd,
+    /// Rated torque of the transducer in N m, if it is given.
+    pub rated_n_m: Option<f64>,
     /// What was assumed on the way.
     pub warnings: Vec<Warning>,
+}
+
+/// Part of the rated torque from which a torque is doubtful: it is about what transducers stand without damage.
+const FAR_BEYOND: f64 = 1.5;
+
+/// A warning if a torque lies far beyond what the transducer is rated for, both in a unit.
+pub fn beyond_rated(largest: f64, rated: Option<f64>, unit: &str) -> Option<Warning> {
+    let rated = rated.filter(|rated| largest > FAR_BEYOND * rated)?;
+    Some(Warning::new(
+        "beyond-rated-torque",
+        format!(
+            "the torque reaches {} {unit}, {} times the rated torque of {} {unit} of the transducer: check unit, gain and zero of \
+             the channel",
+            short(largest),
+            rounded(largest / rated, 3),
+            short(rated)
+        ),
+    ))
 }
 
 const TORQUE: Dimension = Dimension::new([1, 2, -2, 0, 0, 0]);
@@ -107,7 +128,8 @@ impl Calibration {
             zero: 0.0,
             applied: applied_by_unit(&named.text, units)?,
             described: "compensated already; used without change".to_owned(),
-            relative_std: None,
+            std: ConstantStd::NotNeeded,
+            rated_n_m: None,
             warnings: Vec::new(),
         })
     }
@@ -132,6 +154,7 @@ impl Stand {
             (_, Some(signal)) => self.by_signal(signal, channel.name, named, units)?,
             (TORQUE, _) => StaticLaw {
                 described: format!("the record is torque in {}", named.text),
+                std: ConstantStd::NotNeeded,
                 ..StaticLaw::of(Conversion::linear(1.0, 0.0))?
             },
             _ => return Err(no_torque(channel.name, named)),
@@ -142,9 +165,15 @@ impl Stand {
             zero: self.diagnosed.offset,
             applied: Applied::of(Kind::Torque, "torque", units),
             described: law.described,
-            relative_std: law.relative_std,
+            std: law.std,
+            rated_n_m: self.rated_n_m(),
             warnings: law.warnings,
         })
+    }
+
+    /// Rated torque of the transducer in N m, if `[calibration]` gives it.
+    fn rated_n_m(&self) -> Option<f64> {
+        self.calibration.as_ref()?.rated_n_m
     }
 
     /// Recorded over applied quantity at rest, if the stand file gives it.
@@ -183,7 +212,8 @@ impl Stand {
             zero: slope * self.diagnosed.offset,
             applied: applied_by_unit(&gain.applied_unit, units)?,
             described: "static gain of the stand file".to_owned(),
-            relative_std: gain.relative_std,
+            std: ConstantStd::of(gain.relative_std),
+            rated_n_m: None,
             warnings: Vec::new(),
         })
     }

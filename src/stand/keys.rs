@@ -68,7 +68,7 @@ pub(crate) const SECTIONS: &[StandSection] = &[
         ("torque_per_volt", Quantity(Kind::TorquePerVolt), "torque per volt as recorded"),
         ("torque_per_ratio", Quantity(Kind::TorquePerRatio), "torque per bridge output over excitation"),
         ("sensitivity", RecordQuantity, "change of the output from no load to `rated_torque`, with its sign: `\"2.0012 mV/V\"`, `\"10 V\"`, `\"8 mA\"` or `\"30 kHz\"`"),
-        ("rated_torque", Quantity(Kind::Torque), "torque of `sensitivity` or `frequency_at_rated`"),
+        ("rated_torque", Quantity(Kind::Torque), "torque of `sensitivity` or `frequency_at_rated`; beside another form the torque that the transducer is made for. A result 1.5 times beyond it is warned about"),
         ("zero_frequency", Quantity(Kind::Frequency), "output at no load of a transducer with frequency output"),
         ("frequency_at_rated", Quantity(Kind::Frequency), "its output at `rated_torque`"),
         ("lever_arm", Quantity(Kind::Length), "distance from the shaft at which a recorded force acts"),

@@ -21,6 +21,8 @@ pub struct MeasuredCalibration {
     pub zero: Option<f64>,
     /// Relative standard uncertainty of the torque, if known; of a curve that at its largest torque.
     pub relative_std: Option<f64>,
+    /// Rated torque of the transducer in N m, without sign, if it is given.
+    pub rated_n_m: Option<f64>,
 }
 
 /// How a signal becomes torque.
@@ -163,7 +165,14 @@ fn constant(
         relative_std: constant.relative_std(),
         law: CalibrationLaw::Constant(constant),
         zero: None,
+        rated_n_m: optional_rated(section)?,
     })
+}
+
+/// `rated_torque` beside a form that does not need it: what the transducer is made for.
+fn optional_rated(section: &Section) -> Result<Option<f64>, Failure> {
+    let rated = section.quantity("rated_torque", Kind::Torque)?;
+    Ok(rated.map(|rated| rated.value().abs()))
 }
 
 /// `sensitivity` at `rated_torque`, as data sheets say: the change of the output from no load to the rated torque.
@@ -223,6 +232,7 @@ fn per_change(
         law: CalibrationLaw::Constant(law.with_source("stand file")),
         zero,
         relative_std,
+        rated_n_m: Some(rated.value().abs()),
     })
 }
 
@@ -282,6 +292,7 @@ fn points(section: &Section) -> Result<MeasuredCalibration, Failure> {
         law: CalibrationLaw::Curve(curve),
         zero: None,
         relative_std,
+        rated_n_m: optional_rated(section)?,
     })
 }
 

@@ -20,12 +20,14 @@ use torqcomp_model::{Estimate, ParameterStd, SecondOrder};
 
 use crate::warning::Warning;
 
-pub use calibration::{Applied, Calibration, applied_by_unit};
+pub use calibration::{Applied, Calibration, applied_by_unit, beyond_rated};
 pub use effects::DeclaredEffect;
 pub use file::{parse, read, text};
 pub use measured::{CalibrationLaw, MeasuredCalibration};
 pub use refine::{Refined, refine, si_unit};
 pub use signal::TransducerSignal;
+pub use uncertainty::{ConstantStd, TorqueStd};
+pub(crate) use uncertainty::{VariedConstant, combined};
 
 /// A stand: its mechanics, and how its record becomes torque.
 #[derive(Debug, Clone)]

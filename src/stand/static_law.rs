@@ -4,7 +4,7 @@ use torqcomp_dsp::bridge::{ArmLaw, Bridge, Supply};
 use torqcomp_dsp::conversion::{Conversion, ConversionError};
 use torqcomp_model::{Kind, UnitSystem};
 
-use super::{CalibrationLaw, MeasuredCalibration, Stand, TransducerSignal};
+use super::{CalibrationLaw, ConstantStd, MeasuredCalibration, Stand, TransducerSignal};
 use crate::failure::Failure;
 use crate::unit::NamedUnit;
 use crate::warning::Warning;
@@ -14,8 +14,8 @@ pub(super) struct StaticLaw {
     pub(super) conversion: Conversion,
     /// How it came about, for people.
     pub(super) described: String,
-    /// Of the static constant, if known.
-    pub(super) relative_std: Option<f64>,
+    /// Of the static constant.
+    pub(super) std: ConstantStd,
     /// What was assumed on the way.
     pub(super) warnings: Vec<Warning>,
 }
@@ -31,7 +31,7 @@ impl StaticLaw {
         Ok(Self {
             conversion: conversion.map_err(Failure::failed)?,
             described: String::new(),
-            relative_std: None,
+            std: ConstantStd::Unknown,
             warnings: Vec::new(),
         })
     }
@@ -173,14 +173,14 @@ impl Stand {
         let is_other = signal != measured.signal;
         Ok(StaticLaw {
             described: measured.described(units),
-            relative_std: match is_other {
+            std: ConstantStd::of(match is_other {
                 true => together(&[
                     measured.relative_std,
                     self.of_supply(),
                     self.recorder.gain_relative_std,
                 ]),
                 false => measured.relative_std,
-            },
+            }),
             warnings: is_other
                 .then(|| self.assumed_gain())
                 .flatten()
@@ -272,7 +272,7 @@ impl Stand {
                 crate::io::digits::text(small, 5),
                 Kind::Torque.unit(units)
             ),
-            relative_std: self.of_drawing(signal),
+            std: ConstantStd::of(self.of_drawing(signal)),
             warnings: match signal {
                 TransducerSignal::Voltage => self.assumed_gain().into_iter().collect(),
                 _ => Vec::new(),
@@ -291,7 +291,7 @@ impl Stand {
     ) -> Result<StaticLaw, Failure> {
         Ok(StaticLaw {
             described,
-            relative_std: self.of_drawing(signal),
+            std: ConstantStd::of(self.of_drawing(signal)),
             ..StaticLaw::of(Conversion::linear(slope, -slope * zero))?
         })
     }

@@ -7,27 +7,82 @@ use torqcomp_model::{InverseUncertainty, SecondOrder};
 
 use super::{Mechanics, Stand};
 
-impl Stand {
-    /// Standard uncertainty of the inverse response at a frequency: of inertia, damping and stiffness with their
-    /// correlations, of the effects' parameters, of the recorder's low-pass and delay, and of the static gain, whose
-    /// relative uncertainty is given. Constants without a `std` count as exact. `None` if no uncertainty is known, or if
-    /// an effect that is no response over frequency has one.
+/// Relative standard uncertainty of the constant that makes torque of a record at rest.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum ConstantStd {
+    /// The record is the applied quantity; no constant is needed.
+    NotNeeded,
+    /// A constant is used, and nothing says how well it is known.
+    #[default]
+    Unknown,
+    /// It is known that well.
+    Relative(f64),
+}
+
+impl ConstantStd {
+    /// Of a constant whose relative standard uncertainty is given or not.
     #[must_use]
-    pub fn inverse_uncertainty(
-        &self,
-        frequency_hz: f64,
-        static_gain_relative: Option<f64>,
-    ) -> Option<InverseUncertainty> {
+    pub fn of(relative: Option<f64>) -> Self {
+        relative.map_or(Self::Unknown, Self::Relative)
+    }
+
+    /// The number, if one is known.
+    #[must_use]
+    pub fn known(self) -> Option<f64> {
+        match self {
+            Self::Relative(std) => Some(std),
+            Self::NotNeeded | Self::Unknown => None,
+        }
+    }
+}
+
+/// What is known of the standard uncertainty of a compensated torque at one frequency.
+#[derive(Debug, Clone, Default)]
+pub struct TorqueStd {
+    /// Of the response that is divided out; `None` if unknown.
+    pub response: Option<InverseUncertainty>,
+    /// Of response and static constant together; `None` if one of them is unknown.
+    pub total: Option<InverseUncertainty>,
+}
+
+impl Stand {
+    /// Standard uncertainty of a compensated torque at a frequency: of the response, and with that of the constant which
+    /// makes torque of the record at rest. Constants without a `std` count as exact beside others that have one. An
+    /// uncertainty of exactly zero is none that anybody knows: it is `None`.
+    #[must_use]
+    pub fn torque_std(&self, frequency_hz: f64, constant: ConstantStd) -> TorqueStd {
+        let is_known =
+            |std: &InverseUncertainty| std.magnitude_relative > 0.0 || std.phase_rad > 0.0;
+        let response = self.inverse_uncertainty(frequency_hz).filter(is_known);
+        let total = match constant {
+            ConstantStd::NotNeeded => response,
+            ConstantStd::Unknown => None,
+            ConstantStd::Relative(std) => {
+                let [relative, phase_rad] =
+                    response.map_or([0.0; 2], |of| [of.magnitude_relative, of.phase_rad]);
+                Some(InverseUncertainty {
+                    magnitude_relative: relative.hypot(std),
+                    phase_rad,
+                })
+            }
+        };
+        TorqueStd {
+            response,
+            total: total.filter(is_known),
+        }
+    }
+
+    /// Standard uncertainty of the inverse response at a frequency: of inertia, damping and stiffness with their
+    /// correlations, of the effects' parameters, and of the recorder's low-pass and delay. Constants without a `std`
+    /// count as exact. `None` if no uncertainty is known, or if an effect that is no response over frequency has one.
+    #[must_use]
+    pub fn inverse_uncertainty(&self, frequency_hz: f64) -> Option<InverseUncertainty> {
         let of_stand = match self.effects.is_empty() {
             true => self.of_mechanics(frequency_hz),
             false => self.of_mechanics_and_effects(frequency_hz)?,
         };
         let of_recorder = self.of_recorder(frequency_hz);
-        let of_gain = static_gain_relative.map(|std| InverseUncertainty {
-            magnitude_relative: std,
-            phase_rad: 0.0,
-        });
-        let known = [of_stand, of_recorder, of_gain];
+        let known = [of_stand, of_recorder];
         known
             .into_iter()
             .flatten()
@@ -48,54 +103,71 @@ impl Stand {
     /// By the slopes over each parameter, from central differences; `None` if the stand with its effects has
     /// no inverse response.
     fn of_mechanics_and_effects(&self, frequency_hz: f64) -> Option<Option<InverseUncertainty>> {
-        let has_std = |effect: &super::DeclaredEffect| effect.stds.iter().any(Option::is_some);
+        let varied = self.varied();
         if self.inverse().is_err() {
-            let is_exact = !self.effects.iter().any(has_std);
+            let is_exact = !varied
+                .iter()
+                .any(|of| matches!(of, VariedConstant::OfEffect(..)));
             return is_exact.then(|| self.of_mechanics(frequency_hz));
         }
-        let mechanics = self.mechanics.as_ref()?;
-        let mut terms: Vec<Complex64> = Vec::new();
-        for place in 0..3 {
-            let with = |side: f64| -> Option<Self> {
-                let mechanics = mechanics.moved(place, side)?;
-                Some(Self {
-                    mechanics: Some(mechanics),
-                    ..self.clone()
-                })
-            };
-            terms.push(change(&with, frequency_hz).unwrap_or(Complex64::ZERO));
-        }
-        for (i, effect) in self.effects.iter().enumerate() {
-            for (k, std) in effect.stds.iter().enumerate() {
-                let Some(std) = std else { continue };
-                let with = |side: f64| {
-                    let mut stand = self.clone();
-                    stand.effects[i].values[k] += side * std;
-                    Some(stand)
-                };
-                terms.push(change(&with, frequency_hz)?);
-            }
-        }
-        let std = &mechanics.std;
-        let of_constants = [
-            std.inertia_kg_m2,
-            std.damping_n_m_s_per_rad,
-            std.stiffness_n_m_per_rad,
-        ];
-        let is_known = of_constants.iter().any(Option::is_some) || self.effects.iter().any(has_std);
-        let [jf, jk, fk] = std.correlations;
-        let correlated = [(0, 1, jf), (0, 2, jk), (1, 2, fk)];
-        let size = |part: fn(&Complex64) -> f64| -> f64 {
-            let own: f64 = terms.iter().map(|z| part(z) * part(z)).sum();
-            let mixed = correlated
-                .iter()
-                .map(|(i, j, c)| part(&terms[*i]) * part(&terms[*j]) * c);
-            (own + 2.0 * mixed.sum::<f64>()).max(0.0).sqrt()
+        let term = |of: &VariedConstant| change(&|side| self.moved(*of, side), frequency_hz);
+        let terms: Vec<Complex64> = varied.iter().map(term).collect::<Option<_>>()?;
+        let correlations = self.correlations(&varied);
+        let size = |part: fn(&Complex64) -> f64| {
+            let parts: Vec<f64> = terms.iter().map(part).collect();
+            combined(&correlations, &parts)
         };
-        Some(is_known.then(|| InverseUncertainty {
+        Some((!terms.is_empty()).then(|| InverseUncertainty {
             magnitude_relative: size(|z| z.re),
             phase_rad: size(|z| z.im),
         }))
+    }
+
+    /// The constants of mechanics and effects that have a standard uncertainty.
+    pub(crate) fn varied(&self) -> Vec<VariedConstant> {
+        let of_mechanics = self.mechanics.iter().flat_map(|mechanics| {
+            let stds = mechanics.stds();
+            (0..3).filter(move |place| stds[*place].is_some())
+        });
+        let mut all: Vec<VariedConstant> = of_mechanics.map(VariedConstant::OfMechanics).collect();
+        for (place, effect) in self.effects.iter().enumerate() {
+            let known = (0..effect.stds.len()).filter(|k| effect.stds[*k].is_some());
+            all.extend(known.map(|k| VariedConstant::OfEffect(place, k)));
+        }
+        all
+    }
+
+    /// The stand with one constant moved by so many of its standard uncertainties; `None` if that is no stand.
+    pub(crate) fn moved(&self, constant: VariedConstant, by: f64) -> Option<Self> {
+        let mut stand = self.clone();
+        match constant {
+            VariedConstant::OfMechanics(place) => {
+                stand.mechanics = Some(self.mechanics.as_ref()?.moved(place, by)?);
+            }
+            VariedConstant::OfEffect(place, k) => {
+                let effect = &mut stand.effects[place];
+                effect.values[k] += by * effect.stds[k]?;
+            }
+        }
+        Some(stand)
+    }
+
+    /// Correlation coefficients of the errors of such constants.
+    pub(crate) fn correlations(&self, of: &[VariedConstant]) -> Vec<Vec<f64>> {
+        let [jf, jk, fk] = self
+            .mechanics
+            .as_ref()
+            .map_or([0.0; 3], |m| m.std.correlations);
+        let one = |a: &VariedConstant, b: &VariedConstant| match (a, b) {
+            _ if a == b => 1.0,
+            (VariedConstant::OfMechanics(i), VariedConstant::OfMechanics(k)) => {
+                [jf, jk, fk][i + k - 1]
+            }
+            _ => 0.0,
+        };
+        of.iter()
+            .map(|a| of.iter().map(|b| one(a, b)).collect())
+            .collect()
     }
 
     /// Of low-pass and delay, which the inverse divides out: `1/L(f) e^{j2πfτ}`.
@@ -126,7 +198,36 @@ impl Stand {
     }
 }
 
+/// A constant of the stand file that has a standard uncertainty.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum VariedConstant {
+    /// Inertia, damping or stiffness, from 0.
+    OfMechanics(usize),
+    /// An effect's parameter: the effect's place, and its own.
+    OfEffect(usize, usize),
+}
+
+/// Standard uncertainty of a sum whose terms have these ones, with their signs, and these correlations.
+pub(crate) fn combined(correlations: &[Vec<f64>], terms: &[f64]) -> f64 {
+    let row = |(i, row): (usize, &Vec<f64>)| {
+        let mixed: f64 = row.iter().zip(terms).map(|(c, term)| c * term).sum();
+        mixed * terms[i]
+    };
+    let variance: f64 = correlations.iter().enumerate().map(row).sum();
+    variance.max(0.0).sqrt()
+}
+
 impl Mechanics {
+    /// Standard uncertainties of inertia, damping and stiffness.
+    fn stds(&self) -> [Option<f64>; 3] {
+        let std = &self.std;
+        [
+            std.inertia_kg_m2,
+            std.damping_n_m_s_per_rad,
+            std.stiffness_n_m_per_rad,
+        ]
+    }
+
     /// The mechanics with one constant moved by its standard uncertainty; `None` if it has none.
     fn moved(&self, place: usize, side: f64) -> Option<Self> {
         let of = &self.response;
@@ -135,12 +236,7 @@ impl Mechanics {
             of.damping_n_m_s_per_rad(),
             of.stiffness_n_m_per_rad(),
         ];
-        let stds = [
-            self.std.inertia_kg_m2,
-            self.std.damping_n_m_s_per_rad,
-            self.std.stiffness_n_m_per_rad,
-        ];
-        values[place] += side * stds[place]?;
+        values[place] += side * self.stds()[place]?;
         let response = SecondOrder::new(values[0], values[1].max(0.0), values[2]).ok()?;
         Some(Self {
             response,

@@ -217,6 +217,18 @@ fn number_text(number: f64) -> String {
     crate::io::digits::text(number, 9)
 }
 
+/// Whether the text of a stand file says how its record becomes torque.
+pub fn is_calibrated(text: &str) -> bool {
+    let Ok(document) = text.parse::<DocumentMut>() else {
+        return true;
+    };
+    let gain = document.get("mechanics").and_then(|m| m.get("static_gain"));
+    gain.is_some()
+        || ["calibration", "beam"]
+            .iter()
+            .any(|key| document.contains_key(key))
+}
+
 /// A quantity of `[mechanics]` in SI units and its standard uncertainty, from the text of a stand file
 /// that need not be complete.
 ///

@@ -123,7 +123,6 @@ pub(super) fn driven_by(force: impl Fn(f64) -> f64, count: usize) -> (Vec<f64>, 
     (applied, shown)
 }
 
-/// A step, a bouncing drop and the trapezoid of a shock table give the mode of the stand, as a hammer does.
 /// Hits a second apart, bells of 3 ms to both sides, and the answer.
 fn hits(count: usize) -> (Vec<f64>, Vec<f64>) {
     let (applied, shown) = driven_by(|t| (-0.5 * ((t - 0.05) / 0.003).powi(2)).exp(), 1000);
@@ -157,10 +156,10 @@ fn one_mode(applied: &[f64], measured: &[f64], how: response::Excitation) -> Ide
     response::identify(&[record], &options).unwrap()
 }
 
-/// How many of 240 records hold the true frequency and damping ratio, 20 to 60 dB.
-fn coverage_of(how: response::Excitation, seed: u64) -> [Coverage; 2] {
+/// How many of 240 records hold the true frequency, damping ratio and static gain, 20 to 60 dB.
+fn coverage_of(how: response::Excitation, seed: u64) -> [Coverage; 3] {
     let mut noise = Noise(seed);
-    let mut covered = [Coverage::default(), Coverage::default()];
+    let mut covered = [0; 3].map(|_| Coverage::default());
     let struck = hits(6);
     for k in 0..240 {
         let (applied, shown) = match how {
@@ -172,8 +171,8 @@ fn coverage_of(how: response::Excitation, seed: u64) -> [Coverage; 2] {
         let found = one_mode(&applied, &measured, how);
         let codes: Vec<&str> = found.warnings.iter().map(|w| w.code).collect();
         assert!(!codes.contains(&"leakage"), "{how:?}: {codes:?}");
-        let truth = [NATURAL / TAU, RATIO];
-        for ((name, truth), coverage) in ["natural_frequency", "damping_ratio"]
+        let truth = [NATURAL / TAU, RATIO, 1.0];
+        for ((name, truth), coverage) in ["natural_frequency", "damping_ratio", "static_gain"]
             .iter()
             .zip(truth)
             .zip(&mut covered)
@@ -195,6 +194,7 @@ fn intervals_of_responses_cover_the_truth() {
     for (covered, how) in all.iter().zip([Impact, Periodic, Random]) {
         covered[0].check(&format!("{how:?}, frequency"));
         covered[1].check(&format!("{how:?}, damping"));
+        covered[2].check(&format!("{how:?}, static gain"));
     }
 }
 
@@ -488,4 +488,98 @@ fn intervals_of_constants_cover_the_truth() {
     for (coverage, name) in covered.iter().zip(["inertia", "damping", "stiffness"]) {
         coverage.check(name);
     }
+}
+
+/// A hammer in N at an arm of 0.12 m and a bridge that gives 0.5 V per N m: 2 N m/V, written where the stand file says
+/// nothing of it, and left where weights have said it.
+#[test]
+fn a_hammer_at_an_arm_gives_the_torque_of_a_volt() {
+    let folder = Folder::new();
+    let (torque, shown) = hits(5);
+    let mut noise = Noise(31);
+    let (shown, _) = noisy(&shown, 50.0, &mut noise);
+    let mut text = "time_s,hammer [N],bridge [V]\n".to_owned();
+    for (i, (torque, shown)) in torque.iter().zip(&shown).enumerate() {
+        text += &format!(
+            "{},{:.9},{:.9}\n",
+            i as f64 / RATE_HZ,
+            torque / 0.12,
+            0.5 * shown
+        );
+    }
+    folder.write("hits.csv", text);
+    let args = [
+        "identify",
+        "response",
+        "hits.csv",
+        "--applied",
+        "hammer",
+        "--measured",
+        "bridge",
+        "--band",
+        "20..150",
+        "--radius",
+        "120 mm",
+        "--json",
+        "-o",
+        "hammer.toml",
+    ];
+    let report = folder.json(&args);
+    let named = |name: &str| {
+        let all = report["parameters"].as_array().unwrap();
+        all.iter().find(|p| p["name"] == name).unwrap().clone()
+    };
+    let gain = named("static_gain");
+    assert_eq!(gain["unit"], "V/(N m)");
+    let constant = named("torque_per_volt");
+    let (value, std) = (
+        constant["value"].as_f64().unwrap(),
+        constant["std"].as_f64().unwrap(),
+    );
+    assert!(
+        (value - 2.0).abs() < 4.0 * std && std < 0.02,
+        "{value} {std}"
+    );
+    let relative = gain["std"].as_f64().unwrap() / gain["value"].as_f64().unwrap();
+    assert_close(std / value, relative, 1e-9);
+    let stand = folder.read("hammer.toml");
+    assert!(
+        stand.contains("[calibration]\ntorque_per_volt = {"),
+        "{stand}"
+    );
+    folder.write(
+        "run.csv",
+        "time_s,bridge [V]\n0,1\n0.001,1\n0.002,1\n0.003,1\n",
+    );
+    let ran = folder.run(&[
+        "compensate",
+        "run.csv",
+        "--stand",
+        "hammer.toml",
+        "--band",
+        "100",
+        "-q",
+    ]);
+    assert!(
+        ran.code == 0 && ran.stdout.contains(",2.0") | ran.stdout.contains(",1.9"),
+        "{ran:?}"
+    );
+    // The stand of the thesis has a calibration, which stays.
+    folder.write(
+        "by-weights.toml",
+        "schema = \"torqcomp.stand/1\"\n[calibration]\ntorque_per_volt = \"2.01 N m/V\"\n",
+    );
+    folder.json(&[&args[..13], &["by-weights.toml"]].concat());
+    let stand = folder.read("by-weights.toml");
+    assert!(
+        stand.contains("\"2.01 N m/V\"") && stand.contains("natural_frequency"),
+        "{stand}"
+    );
+    // A radius makes a torque of a force only.
+    let mut wrong = args.to_vec();
+    wrong[4] = "bridge";
+    wrong[6] = "hammer";
+    folder
+        .run(&wrong)
+        .says(2, &["--radius goes with a force", "in V"]);
 }

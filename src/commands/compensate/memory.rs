@@ -43,7 +43,7 @@ pub(super) fn run(
     }
     let torque = match &undo {
         None => whole_record(&filter, &record.samples)?,
-        Some(undo) => refined::torque(undo, &stand, &record, report)?,
+        Some(undo) => refined::torque(undo, (&stand, chain.std), &record, report)?,
     };
     deliver(args, sink, &record, &torque, scale)?;
     report.samples = torque.len();

@@ -10,7 +10,6 @@ use super::report::CompensateReport;
 use super::sink::Part;
 use crate::chart::{Chart, MarkedSpan, Page, Series, SpanKind};
 use crate::cli::Compensate;
-use crate::commands::uncertainty;
 use crate::failure::Failure;
 use crate::print::{plural, short};
 use crate::provenance::Provenance;
@@ -50,11 +49,11 @@ impl PageData {
         let inputs = std::slice::from_ref(&args.record.input);
         let point = |i: usize| {
             let frequency_hz = plan.filter.band().end_hz() * i as f64 / GAINS as f64;
-            let relative = uncertainty(&plan.stand, &plan.chain, frequency_hz);
+            let std = plan.std(frequency_hz);
             GainPoint {
                 frequency_hz,
                 gain: plan.filter.response(frequency_hz).norm(),
-                relative_std: relative.map(|u| u.magnitude_relative),
+                relative_std: std.total.or(std.response).map(|u| u.magnitude_relative),
             }
         };
         Ok(Self {
@@ -145,7 +144,7 @@ impl PageData {
             short(report.band_end_hz),
             report.band.text()
         ));
-        let uncertainty = report.noise.uncertainty_text();
+        let uncertainty = report.uncertainty_text();
         page.text(&format!("Uncertainty: {uncertainty}."));
         let points = |p: &GainPoint| (p.frequency_hz, p.gain);
         let gain = Series::new("gain", self.gain.iter().map(points).collect());
@@ -154,9 +153,13 @@ impl PageData {
             Some((p.frequency_hz, p.gain - spread, p.gain + spread))
         };
         let band: Vec<_> = self.gain.iter().filter_map(bounds).collect();
-        let title = match band.is_empty() {
-            true => "Torque per recorded torque",
-            false => "Torque per recorded torque; around it: ± two standard uncertainties",
+        let is_whole = report.noise.gain.iter().any(|g| g.relative_std.is_some());
+        let title = match (band.is_empty(), is_whole) {
+            (true, _) => "Torque per recorded torque",
+            (_, true) => "Torque per recorded torque; around it: ± two standard uncertainties",
+            (_, false) => {
+                "Torque per recorded torque; around it: ± two standard uncertainties of the response alone"
+            }
         };
         page.chart(&Chart {
             band,

@@ -4,10 +4,10 @@ use torqcomp_model::effects::{Action, FoundLine, Unrecovered};
 
 use super::report::{CompensateReport, LostSpan, RemovedLine, UndoneEffect};
 use crate::failure::Failure;
-use crate::inverse::{ChainInverse, InverseResult};
+use crate::inverse::{ChainInverse, InverseResult, Spread};
 use crate::print::rounded;
 use crate::recording::UniformRecord;
-use crate::stand::Stand;
+use crate::stand::{ConstantStd, Stand};
 use crate::warning::Warning;
 
 /// Most samples of a record: about 100 bytes of memory each are needed.
@@ -34,7 +34,7 @@ struct Scales {
 /// The torque behind a record; what was found on the way goes into the report.
 pub(super) fn torque(
     undo: &ChainInverse,
-    stand: &Stand,
+    (stand, constant): (&Stand, ConstantStd),
     record: &UniformRecord,
     report: &mut CompensateReport,
 ) -> Result<Vec<f64>, Failure> {
@@ -51,6 +51,14 @@ pub(super) fn torque(
         let spread = spread(undo, record, (&recorded, &torque), noise_std)?;
         noise.compensated_rms = report.scale * spread;
     }
+    let spread = Spread {
+        stand,
+        band: undo.filter().band(),
+        record: &recorded,
+        noise_std,
+        constant,
+    };
+    report.result_std = spread.find()?.map(|std| std.scaled(report.scale));
     let scales = Scales {
         start_s: record.start.seconds(),
         rate_hz: record.rate_hz,

@@ -8,9 +8,11 @@ use torqcomp_dsp::resample::Resampled;
 
 use super::band::BandReport;
 use super::statistics::Statistics;
+use crate::inverse::ResultStd;
 use crate::print::{Report, plural, rounded, short};
 use crate::recording::FilledSpan;
 use crate::recording::moment::Moment;
+use crate::stand::ConstantStd;
 use crate::warning::Warning;
 
 /// Stretches whose times the text gives.
@@ -32,6 +34,10 @@ pub(super) struct CompensateReport {
     pub(super) unit: String,
     /// How the record became torque at rest.
     pub(super) calibration: String,
+    /// Relative standard uncertainty of the constant of that; `null` if unknown, or if there is none.
+    pub(super) calibration_relative_std: Option<f64>,
+    /// Torque that the transducer is made for, if the stand file gives it.
+    pub(super) rated_torque: Option<f64>,
     pub(super) samples: usize,
     pub(super) rate_hz: f64,
     pub(super) rate_from: String,
@@ -59,12 +65,17 @@ pub(super) struct CompensateReport {
     /// Time from either end within which the result depends on extrapolation beyond the record.
     pub(super) edge_s: f64,
     pub(super) result: Statistics,
+    /// Standard uncertainty of the result, for a stand with effects that no filter describes.
+    pub(super) result_std: Option<ResultStd>,
     pub(super) resampled: Option<Resampled>,
     pub(super) noise: NoiseReport,
     pub(super) warnings: Vec<Warning>,
     /// Printed units per SI unit.
     #[serde(skip)]
     pub(super) scale: f64,
+    /// Uncertainty of the calibration.
+    #[serde(skip)]
+    pub(super) constant: ConstantStd,
 }
 
 /// An effect that was taken out.
@@ -119,8 +130,11 @@ pub(super) struct NoiseAt {
     pub(super) frequency_hz: f64,
     /// `|torque / recorded torque|`.
     pub(super) gain: f64,
-    /// Its relative standard uncertainty, from the stand's constants; `null` if unknown.
+    /// Relative standard uncertainty of the torque, from the stand's constants and the calibration; `null` if that of one
+    /// of them is unknown.
     pub(super) relative_std: Option<f64>,
+    /// The same from the response that is divided out alone.
+    pub(super) response_relative_std: Option<f64>,
 }
 
 impl Report for CompensateReport {
@@ -172,6 +186,7 @@ impl CompensateReport {
         }
         facts.extend([
             fact("gain", self.noise.gain_text()),
+            fact("uncertainty", self.uncertainty_text()),
             fact("noise", self.noise.record_text(&self.unit)),
             fact("result", self.result_text()),
             fact("output", self.output.clone()),
@@ -252,6 +267,73 @@ impl CompensateReport {
         format!("{}: {}{more}", self.filled_summary(), each.join(", "))
     }
 
+    /// Standard uncertainty of the result that stand and calibration bring.
+    pub(super) fn uncertainty_text(&self) -> String {
+        if let Some(found) = &self.result_std {
+            return self.result_std_text(found);
+        }
+        let listed = |std: fn(&NoiseAt) -> Option<f64>| {
+            let at = |g: &NoiseAt| {
+                let std = rounded(100.0 * std(g)?, 2);
+                Some(format!("{std} % at {} Hz", short(g.frequency_hz)))
+            };
+            let known: Vec<String> = self.noise.gain.iter().filter_map(at).collect();
+            match &known[..] {
+                [first, .., last] => Some(format!("{first}, {last}")),
+                _ => known.first().cloned(),
+            }
+        };
+        let total = listed(|g| g.relative_std);
+        match (total, listed(|g| g.response_relative_std)) {
+            (Some(total), _) => {
+                format!("{total} (standard uncertainty of stand and calibration)")
+            }
+            (None, Some(response)) => format!(
+                "unknown, since the calibration has no std in the stand file; that of the stand's response alone is {response}"
+            ),
+            (None, None) => "unknown: the stand file gives no std".to_owned(),
+        }
+    }
+
+    /// The same of a result that no filter describes.
+    fn result_std_text(&self, found: &ResultStd) -> String {
+        let unit = &self.unit;
+        let over = match found.samples < self.samples {
+            true => format!(
+                " over the first {} s",
+                rounded(found.samples as f64 / self.rate_hz, 3)
+            ),
+            false => String::new(),
+        };
+        let mut text = match (found.rms.zip(found.largest), found.of_response_rms) {
+            (Some((rms, largest)), _) => format!(
+                "{} {unit} rms, at most {} {unit}{over} (standard uncertainty of stand, effects and calibration)",
+                rounded(rms, 2),
+                rounded(largest, 2)
+            ),
+            (None, Some(response)) => format!(
+                "unknown, since the calibration has no std in the stand file; that of stand and effects alone is {} {unit} rms{over}",
+                rounded(response, 2)
+            ),
+            (None, None) => "unknown".to_owned(),
+        };
+        if !found.left_out.is_empty() {
+            let _ = write!(
+                text,
+                "; {} cannot be moved by the std given",
+                found.left_out.join(", ")
+            );
+        }
+        if !found.bent.is_empty() {
+            let _ = write!(
+                text,
+                "; approximate, since the result is not linear in {} over its std",
+                found.bent.join(", ")
+            );
+        }
+        text
+    }
+
     fn effects_text(&self) -> String {
         let each = |e: &UndoneEffect| format!("{} ({}) {}", e.effect, e.form, e.done);
         let list: Vec<String> = self.effects.iter().map(each).collect();
@@ -290,25 +372,6 @@ impl NoiseReport {
             })
             .collect();
         points.join(", ")
-    }
-
-    /// What the uncertainties of the stand make of the result.
-    pub(super) fn uncertainty_text(&self) -> String {
-        let known = |g: &NoiseAt| {
-            let std = rounded(100.0 * g.relative_std?, 2);
-            Some(format!("{std} % at {} Hz", short(g.frequency_hz)))
-        };
-        let ends = [self.gain.first(), self.gain.last()];
-        let ends: Option<Vec<String>> = ends.into_iter().map(|g| g.and_then(known)).collect();
-        match ends {
-            Some(ends) => format!(
-                "{} (standard uncertainty of stand and calibration)",
-                ends.join(", ")
-            ),
-            None => {
-                "unknown: the stand file gives no std for its constants, or has effects".to_owned()
-            }
-        }
     }
 
     pub(super) fn record_text(&self, unit: &str) -> String {

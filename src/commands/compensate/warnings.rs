@@ -8,6 +8,7 @@ use super::plot::Traces;
 use super::report::CompensateReport;
 use crate::print::{plural, rounded, short};
 use crate::quality::excerpt;
+use crate::stand::beyond_rated;
 use crate::warning::Warning;
 
 /// Gain from which a record of unknown noise is worth a warning.
@@ -26,6 +27,8 @@ pub(super) fn add(report: &mut CompensateReport, seen: &Seen, traces: Option<&Tr
         None => more.extend(of_unknown_noise(report)),
     }
     more.extend(of_quality(report, seen));
+    let largest = report.result.largest.max(-report.result.smallest);
+    more.extend(beyond_rated(largest, report.rated_torque, &report.unit));
     if traces.is_some_and(Traces::is_empty) {
         more.push(empty_plot(report));
     }

@@ -1,17 +1,19 @@
 //! `identify response`.
 
-use torqcomp_model::Estimate;
+use torqcomp_model::{Estimate, Kind};
 
 use super::constants::{Ratios, from_ratios, from_residue};
-use super::{ONE_MODE, Recorded, TORQUE, deliver};
+use super::{FORCE, ONE_MODE, Recorded, TORQUE, deliver, entry, quantity, stand_text, unit_or};
 use crate::cli::identify::Response;
 use crate::commands::Outcome;
 use crate::failure::Failure;
 use crate::identify::response::{Driven, RATIO, ResponseOptions, identify};
-use crate::identify::{Identification, Motion};
+use crate::identify::{Identification, Motion, NamedEstimate};
 use crate::io::{ChannelChoice, Input};
-use crate::recording::AlignedChannels;
-use crate::stand::update::Entry;
+use crate::recording::{AlignedChannel, AlignedChannels};
+use crate::stand::TransducerSignal;
+use crate::stand::update::{self, Entry};
+use crate::unit::NamedUnit;
 
 /// Runs the test.
 pub fn run(args: &Response) -> Result<Outcome, Failure> {
@@ -22,10 +24,13 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
     let mut recorded = Recorded::default();
     let mut loaded = Vec::new();
     for input in &args.inputs {
-        let read = AlignedChannels::read(&Input::of(input), &choices, &args.reading)?;
+        let mut read = AlignedChannels::read(&Input::of(input), &choices, &args.reading)?;
         read.channels[1].must_be_as_recorded(&read.source)?;
         recorded.add(input, read.channels[0].samples.len(), Some(read.rate_hz));
         recorded.warn(read.warnings.clone(), read.is_lossy);
+        if let Some(radius) = &args.radius {
+            to_torque(&mut read.channels[0], radius)?;
+        }
         loaded.push(read);
     }
     let records: Vec<Driven> = loaded
@@ -61,8 +66,70 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
         let unit = format!("({})/({})", measured.text, applied.text);
         result.label_charts(RATIO, &unit);
     }
-    let entries = entries(args, rad_per_n_m(args, &loaded, motion)?, &mut result)?;
+    let mut entries = entries(args, rad_per_n_m(args, &loaded, motion)?, &mut result)?;
+    entries.extend(calibration(args, units, &mut result)?);
     deliver(result, recorded, &args.findings, &entries)
+}
+
+/// Makes a torque of a force that acts at a radius.
+fn to_torque(force: &mut AlignedChannel, radius: &str) -> Result<(), Failure> {
+    let radius_m = quantity("--radius", radius, Kind::Length)?;
+    if radius_m <= 0.0 {
+        return Err(Failure::usage(format_args!(
+            "--radius {radius}: it must be greater than 0"
+        )));
+    }
+    let unit = unit_or(force.channel(), "--applied-unit")?;
+    if unit.unit.dimension() != FORCE {
+        return Err(Failure::usage(format_args!(
+            "--radius goes with a force; --applied \"{}\" is in {}",
+            force.name, unit.text
+        )));
+    }
+    let factor = unit.unit.factor() * radius_m;
+    force.samples.iter_mut().for_each(|v| *v *= factor);
+    force.unit = NamedUnit::parse("N m");
+    Ok(())
+}
+
+/// The calibration of a signal by a known torque: torque over signal at rest, for a stand file that has none.
+fn calibration(
+    args: &Response,
+    units: [Option<&NamedUnit>; 2],
+    result: &mut Identification,
+) -> Result<Vec<Entry>, Failure> {
+    let [Some(measured), Some(applied)] = units else {
+        return Ok(Vec::new());
+    };
+    let is_torque = applied.unit.dimension() == TORQUE;
+    let gain = result
+        .get("static_gain")
+        .filter(|gain| is_torque && gain.value() != 0.0);
+    let (Some(gain), Some(signal)) = (gain, TransducerSignal::of(&measured.unit)) else {
+        return Ok(Vec::new());
+    };
+    let (key, unit, size) = match signal {
+        TransducerSignal::Voltage => ("torque_per_volt", "N m/V", 1.0),
+        TransducerSignal::Ratio => ("torque_per_ratio", "N m/(mV/V)", 1e-3),
+        _ => return Ok(Vec::new()),
+    };
+    let value = size * applied.unit.factor() / (gain.value() * measured.unit.factor());
+    let std = gain.std().map(|std| (std / gain.value() * value).abs());
+    let constant = NamedEstimate {
+        name: key.to_owned(),
+        estimate: Estimate::of(unit, value, std),
+    };
+    let source = format!("identify response: {}", args.inputs.join(", "));
+    let written = entry("calibration", key, &constant, &source);
+    result.parameters.push(constant);
+    // Weights on the stand are more exact than what a hammer says of a load at rest.
+    let stand = stand_text(&args.findings)?;
+    Ok(
+        match stand.is_some_and(|(_, text)| update::is_calibrated(&text)) {
+            true => Vec::new(),
+            false => vec![written],
+        },
+    )
 }
 
 /// Gives the static gain its unit: that of the measured channel over that of the applied one.

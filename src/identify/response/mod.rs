@@ -105,7 +105,7 @@ pub fn identify(records: &[Driven], options: &ResponseOptions) -> Result<Identif
     });
     result.held_out_errors = held_out;
     present::method(&mut result, &set, &lines, options, &fitted.modal);
-    present::other_constants(&mut result, &set, options, &fitted.modal);
+    present::other_constants(&mut result, &set, options, &fitted);
     present::raw_error(&mut result, &set, &lines);
     present::levels(&mut result, &set, &lines);
     present::draw(&mut result, &set, &lines, &fitted.modal);
@@ -123,6 +123,18 @@ struct FinalFit {
     relative: f64,
     /// Largest relative error of the gain by noise in the applied signal.
     gain_error: f64,
+    /// Standard uncertainty of the static response.
+    static_gain_std: Option<f64>,
+}
+
+/// Standard uncertainty of the static response by the covariance of poles, delay and, from `linear` on, all linear
+/// parameters.
+fn static_gain_std(modal: &Modal, covariance: &Covariance, linear: usize) -> Option<f64> {
+    let (of_poles, of_linear) = modal.slopes_at_rest();
+    let mut slopes = vec![0.0; linear + of_linear.len()];
+    slopes[..of_poles.len()].copy_from_slice(&of_poles);
+    slopes[linear..].copy_from_slice(&of_linear);
+    covariance.std_of(&slopes).filter(|std| *std > 0.0)
 }
 
 impl FinalFit {
@@ -158,7 +170,9 @@ fn final_fit(
     let modal = data.fit(&coarse.poles, Effort::Fine)?;
     check::leakage(result, set, &modal);
     let searched = modal.fit.as_ref().map_or(0, |fit| fit.values.len());
+    let all = scatter::of_all(set, lines, data, &modal)?;
     Ok(FinalFit {
+        static_gain_std: all.and_then(|all| static_gain_std(&modal, &all, searched)),
         covariance: scatter::of_poles(set, lines, data, &modal)?,
         linear: searched,
         relative: set.error(&modal.response, lines),

@@ -381,9 +381,11 @@ impl PoleSearch<'_> {
                 column.unscale_mut(size);
             }
         }
-        let q = design.qr().q();
-        let made_up = &q * q.tr_mul(out);
-        *out -= made_up;
+        if design.ncols() > 0 {
+            let q = design.qr().q();
+            let made_up = &q * q.tr_mul(out);
+            *out -= made_up;
+        }
         Ok(())
     }
 }
@@ -401,14 +403,37 @@ impl Modal {
         (residue * unit, unit)
     }
 
+    /// A pole and its residue, in the units of the linear parameters.
+    fn pole_and_residue(&self, k: usize) -> (Complex64, Complex64) {
+        let pole = self.poles[k];
+        let p = Complex64::new(-pole.rate_per_s, pole.omega_rad_per_s) / self.scale;
+        (
+            p,
+            Complex64::new(self.linear[2 * k], self.linear[2 * k + 1]),
+        )
+    }
+
+    /// Derivatives of the static response `Σ 2 Re(−R/p) + c₁` by σ and ω of each mode, and by the linear parameters.
+    pub(super) fn slopes_at_rest(&self) -> (Vec<f64>, Vec<f64>) {
+        let mut of_poles = Vec::new();
+        let mut of_linear = Vec::new();
+        for k in 0..self.poles.len() {
+            let (p, residue) = self.pole_and_residue(k);
+            let of_pole = residue / (p * p * self.scale);
+            of_poles.extend([-2.0 * of_pole.re, -2.0 * of_pole.im]);
+            of_linear.extend([-2.0 * p.inv().re, 2.0 * p.inv().im]);
+        }
+        of_linear.extend([1.0, 0.0]);
+        (of_poles, of_linear)
+    }
+
     /// Static response per applied unit, from the modes and c₁; for displacement without free motion.
     pub fn at_rest(&self) -> f64 {
-        let one = |(k, pole): (usize, &Pole)| {
-            let p = Complex64::new(-pole.rate_per_s, pole.omega_rad_per_s) / self.scale;
-            let residue = Complex64::new(self.linear[2 * k], self.linear[2 * k + 1]);
+        let one = |k: usize| {
+            let (p, residue) = self.pole_and_residue(k);
             2.0 * (-residue / p).re
         };
-        let modes: f64 = self.poles.iter().enumerate().map(one).sum();
+        let modes: f64 = (0..self.poles.len()).map(one).sum();
         modes + self.linear[self.linear.len() - 2]
     }
 }

@@ -59,8 +59,9 @@ pub(super) fn other_constants(
     result: &mut Identification,
     set: &Set,
     options: &ResponseOptions,
-    fitted: &Modal,
+    found: &FinalFit,
 ) {
+    let fitted = &found.modal;
     let held_out = result.held_out_errors.get(fitted.poles.len()).copied();
     if let Some(error) = held_out.filter(|e| e.is_finite()) {
         let leakage = match set.window {
@@ -75,7 +76,7 @@ pub(super) fn other_constants(
         result.parameters.push(error);
     }
     if options.order == 0 {
-        let gain = NamedEstimate::new("static_gain", "", fitted.at_rest(), None);
+        let gain = NamedEstimate::new("static_gain", "", fitted.at_rest(), found.static_gain_std);
         result.parameters.push(gain);
     }
     if options.with_delay {

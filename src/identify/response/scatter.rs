@@ -58,13 +58,31 @@ pub(super) fn of_poles(
     whole: &Data,
     fitted: &Modal,
 ) -> Result<Covariance, Failure> {
-    Ok(match Linearised::of(whole, fitted)? {
+    let residue = if fitted.poles.len() == 1 { 2 } else { 0 };
+    Ok(match Linearised::of(whole, fitted, residue)? {
         Some(fit) => {
             let matrix = covariance(set, lines, whole, fitted, &fit);
             Covariance::of_some(&fit.free, fit.searched + 2, matrix)
         }
         None => Covariance::independent(&vec![None; 2 * fitted.poles.len() + 3]),
     })
+}
+
+/// Covariance of poles and delay, and of all linear parameters; `None` if these data do not separate them.
+///
+/// # Errors
+/// If the derivatives cannot be computed.
+pub(super) fn of_all(
+    set: &Set,
+    lines: &Lines,
+    whole: &Data,
+    fitted: &Modal,
+) -> Result<Option<Covariance>, Failure> {
+    let linear = fitted.linear().len();
+    Ok(Linearised::of(whole, fitted, linear)?.map(|fit| {
+        let matrix = covariance(set, lines, whole, fitted, &fit);
+        Covariance::of_some(&fit.free, fit.searched + linear, matrix)
+    }))
 }
 
 fn covariance(
@@ -98,7 +116,7 @@ fn covariance(
 
 /// The fit, linearised at its minimum.
 struct Linearised {
-    /// Parameters that are not at a bound: poles and delay, then the residue of a single mode.
+    /// Parameters that are not at a bound: poles and delay, then the first linear parameters.
     free: Vec<usize>,
     /// Number of poles and delay.
     searched: usize,
@@ -110,16 +128,16 @@ struct Linearised {
 }
 
 impl Linearised {
-    fn of(data: &Data, fitted: &Modal) -> Result<Option<Self>, Failure> {
+    /// With the first `linear` linear parameters.
+    fn of(data: &Data, fitted: &Modal, linear: usize) -> Result<Option<Self>, Failure> {
         let Some(fit) = &fitted.fit else {
             return Ok(None);
         };
         let searched = fit.values.len();
-        let residue = if fitted.poles.len() == 1 { 2 } else { 0 };
-        let free: Vec<usize> = (0..searched + residue)
+        let free: Vec<usize> = (0..searched + linear)
             .filter(|i| fit.at_bound.get(*i) != Some(&true))
             .collect();
-        let slopes = data.slopes_at(fitted, residue)?.select_columns(&free);
+        let slopes = data.slopes_at(fitted, linear)?.select_columns(&free);
         let inverse = invert(&slopes.tr_mul(&slopes), 0.0);
         Ok(inverse.map(|inverse| Self {
             free,

@@ -107,11 +107,14 @@ impl Whole {
                 covariance[at] += a * b * gain_error * gain_error / 3.0;
             }
         }
+        let modal = shape.modal_of(&state.poles, delay_s, &state.linear);
+        let covariance = Covariance::of(covariance);
         Some(FinalFit {
             relative: residual_over_measured(&layout, &all, &state),
-            modal: shape.modal_of(&state.poles, delay_s, &state.linear),
+            static_gain_std: super::static_gain_std(&modal, &covariance, layout.searched()),
+            modal,
             linear: layout.searched(),
-            covariance: Covariance::of(covariance),
+            covariance,
             gain_error,
         })
     }

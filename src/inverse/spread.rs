@@ -1,0 +1,176 @@
+//! Standard uncertainty of a record that was taken back, from those of the constants in the stand file.
+//!
+//! No response over frequency describes such a stand, so that each constant is moved by its standard uncertainty to either
+//! side, and the record is taken back with both: half the difference is what this constant contributes, sample by sample.
+
+use serde::Serialize;
+use torqcomp_dsp::band::Band;
+
+use super::ChainInverse;
+use crate::failure::Failure;
+use crate::stand::{ConstantStd, Stand, VariedConstant, combined};
+
+/// Samples from the start of the record that are looked at.
+const LOOKED_AT: usize = 1 << 16;
+/// Part of a constant's contribution by which the result may bend over its standard uncertainty.
+const STRAIGHT: f64 = 0.3;
+
+/// Standard uncertainty of a result, in its unit.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub(crate) struct ResultStd {
+    /// That of stand, effects and calibration together, rms over the record; `null` if one of them is unknown.
+    pub rms: Option<f64>,
+    /// Its largest value.
+    pub largest: Option<f64>,
+    /// That of mechanics and effects alone, rms; `null` if none of them has a `std`.
+    pub of_response_rms: Option<f64>,
+    /// Samples from the start over which these were determined.
+    pub samples: usize,
+    /// Constants over whose standard uncertainty the result is no straight line: their part is an estimate only.
+    pub bent: Vec<String>,
+    /// Constants that cannot be moved by their standard uncertainty; they are left out.
+    pub left_out: Vec<String>,
+}
+
+impl ResultStd {
+    /// In another unit: so many of it per SI unit.
+    pub(crate) fn scaled(mut self, scale: f64) -> Self {
+        for std in [&mut self.rms, &mut self.largest, &mut self.of_response_rms] {
+            *std = std.map(|std| std * scale);
+        }
+        self
+    }
+}
+
+/// A record that is taken back with moved constants.
+pub(crate) struct Spread<'a> {
+    pub stand: &'a Stand,
+    pub band: &'a Band,
+    /// In SI units of the record.
+    pub record: &'a [f64],
+    pub noise_std: f64,
+    /// Of the constant that made the record.
+    pub constant: ConstantStd,
+}
+
+impl Spread<'_> {
+    /// The standard uncertainty; `None` if nothing has one.
+    ///
+    /// # Errors
+    /// If the record cannot be taken back.
+    pub(crate) fn find(&self) -> Result<Option<ResultStd>, Failure> {
+        let varied = self.stand.varied();
+        if varied.is_empty() && self.constant.known().is_none() {
+            return Ok(None);
+        }
+        let middle = self.back(self.stand, 1.0)?;
+        let mut found = ResultStd {
+            samples: middle.len(),
+            ..ResultStd::default()
+        };
+        let mut terms = Vec::new();
+        let mut kept = Vec::new();
+        for constant in varied {
+            let name = self.name(constant);
+            match self.sides(constant) {
+                Some(sides) => {
+                    let term = half_difference(&sides);
+                    if bend(&sides, &middle) > STRAIGHT * rms(&term) {
+                        found.bent.push(name);
+                    }
+                    terms.push(term);
+                    kept.push(constant);
+                }
+                None => found.left_out.push(name),
+            }
+        }
+        let correlations = self.stand.correlations(&kept);
+        let response = per_sample(&correlations, &terms, middle.len());
+        let is_whole = found.left_out.is_empty();
+        found.of_response_rms = (!kept.is_empty() && is_whole).then(|| rms(&response));
+        let total = match self.constant {
+            ConstantStd::Unknown => None,
+            ConstantStd::NotNeeded => found.of_response_rms.map(|_| response),
+            ConstantStd::Relative(std) => {
+                let of_constant = self.of_constant(std, &middle)?;
+                let pairs = response.iter().zip(&of_constant);
+                is_whole.then(|| pairs.map(|(a, b)| a.hypot(*b)).collect())
+            }
+        };
+        if let Some(total) = total {
+            found.rms = Some(rms(&total));
+            found.largest = Some(total.iter().copied().fold(0.0, f64::max));
+        }
+        Ok(Some(found))
+    }
+
+    /// What acted on a stand by the record times a factor.
+    fn back(&self, stand: &Stand, factor: f64) -> Result<Vec<f64>, Failure> {
+        let inverse = ChainInverse::new(stand, self.band.clone())?;
+        let count = self.record.len().min(LOOKED_AT);
+        let record: Vec<f64> = self.record[..count].iter().map(|y| y * factor).collect();
+        let undone = inverse.run(&record, self.band.sample_rate_hz(), self.noise_std)?;
+        Ok(undone.applied)
+    }
+
+    /// The record taken back with a constant moved to either side.
+    fn sides(&self, constant: VariedConstant) -> Option<[Vec<f64>; 2]> {
+        let side = |by: f64| self.back(&self.stand.moved(constant, by)?, 1.0).ok();
+        let [low, high] = [side(-1.0)?, side(1.0)?];
+        let is_finite = low.iter().chain(&high).all(|v| v.is_finite());
+        is_finite.then_some([low, high])
+    }
+
+    /// What the constant contributes that made the record: a static gain divides the result, a calibration scales the
+    /// record.
+    fn of_constant(&self, std: f64, middle: &[f64]) -> Result<Vec<f64>, Failure> {
+        if self.stand.static_gain().is_some() {
+            return Ok(middle.iter().map(|v| std * v).collect());
+        }
+        let sides = [
+            self.back(self.stand, 1.0 - std)?,
+            self.back(self.stand, 1.0 + std)?,
+        ];
+        Ok(half_difference(&sides))
+    }
+
+    fn name(&self, constant: VariedConstant) -> String {
+        match constant {
+            VariedConstant::OfMechanics(place) => match self.stand.static_gain() {
+                None => ["inertia", "damping", "stiffness"][place].to_owned(),
+                Some(_) => ["natural frequency", "damping ratio", "stiffness"][place].to_owned(),
+            },
+            VariedConstant::OfEffect(place, k) => {
+                let effect = &self.stand.effects[place];
+                format!(
+                    "{} of {}",
+                    effect.form.parameters[k].name, effect.effect.name
+                )
+            }
+        }
+    }
+}
+
+fn half_difference([low, high]: &[Vec<f64>; 2]) -> Vec<f64> {
+    low.iter().zip(high).map(|(a, b)| (b - a) / 2.0).collect()
+}
+
+/// Rms of the distance of the middle from the straight line between both sides.
+fn bend([low, high]: &[Vec<f64>; 2], middle: &[f64]) -> f64 {
+    let sides = low.iter().zip(high).zip(middle);
+    let off: Vec<f64> = sides.map(|((a, b), m)| (a + b) / 2.0 - m).collect();
+    rms(&off)
+}
+
+/// Standard uncertainty of each sample.
+fn per_sample(correlations: &[Vec<f64>], terms: &[Vec<f64>], count: usize) -> Vec<f64> {
+    let at = |i: usize| {
+        let each: Vec<f64> = terms.iter().map(|term| term[i]).collect();
+        combined(correlations, &each)
+    };
+    (0..count).map(at).collect()
+}
+
+fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}

@@ -1,0 +1,179 @@
+//! The uncertainty that results state: that of the calibration, of the response, of effects that bend, and none where the
+//! stand file gives none. And torques beyond what the transducer is made for.
+
+use std::f64::consts::TAU;
+
+use serde_json::Value;
+
+use crate::util::{Folder, assert_close};
+
+const MECHANICS: &str = "schema = \"torqcomp.stand/1\"\n[mechanics]\n\
+    natural_frequency = { value = \"590 Hz\", std = \"2 Hz\" }\ndamping_ratio = \"0.02\"\n";
+
+/// `2 + cos` of 20 Hz, 2 s at 2 kHz.
+fn record(heading: &str) -> String {
+    let row = |i: i32| {
+        let t = f64::from(i) / 2000.0;
+        format!("{t:.4},{:.9}\n", 2.0 + (TAU * 20.0 * t).cos())
+    };
+    format!(
+        "time_s,{heading}\n{}",
+        (0..4000).map(row).collect::<String>()
+    )
+}
+
+fn folder(heading: &str, more: &str) -> Folder {
+    let folder = Folder::new();
+    folder.write("in.csv", record(heading));
+    folder.write("stand.toml", format!("{MECHANICS}{more}"));
+    folder
+}
+
+const COMPENSATE: [&str; 6] = [
+    "compensate",
+    "in.csv",
+    "--stand",
+    "stand.toml",
+    "-o",
+    "out.csv",
+];
+const HARMONICS: [&str; 8] = [
+    "harmonics",
+    "in.csv",
+    "--stand",
+    "stand.toml",
+    "--fundamental",
+    "20",
+    "--orders",
+    "1",
+];
+
+fn both(folder: &Folder) -> [Value; 2] {
+    [&COMPENSATE[..], &HARMONICS[..]].map(|args| {
+        folder.json(
+            &[
+                args,
+                &["--json", "--force"][..1 + usize::from(args.len() == 6)],
+            ]
+            .concat(),
+        )
+    })
+}
+
+/// `s = f/f_n`: the inverse response is `1 − s²` but for the damping, so that 2 of 590 Hz change it by `2 s² δ/(1 − s²)`.
+fn of_response(frequency_hz: f64) -> f64 {
+    let square = (frequency_hz / 590.0).powi(2);
+    2.0 * square * (2.0 / 590.0) / (1.0 - square)
+}
+
+#[test]
+fn a_calibration_without_std_makes_the_uncertainty_unknown() {
+    let folder = folder("U [V]", "[calibration]\ntorque_per_volt = \"12.5 N m/V\"\n");
+    let [compensated, harmonics] = both(&folder);
+    let points = compensated["noise"]["gain"].as_array().unwrap();
+    assert!(points.iter().all(|p| p["relative_std"].is_null()));
+    assert!(points[0]["response_relative_std"].is_null());
+    let at = points[1]["frequency_hz"].as_f64().unwrap();
+    assert_close(
+        points[1]["response_relative_std"].as_f64().unwrap(),
+        of_response(at),
+        1e-2,
+    );
+    assert!(compensated["calibration_relative_std"].is_null());
+    let first = &harmonics["components"][0];
+    assert!(first["std_stand"].is_null() && harmonics["calibration_relative_std"].is_null());
+    let relative = first["std_response"].as_f64().unwrap() / first["torque"].as_f64().unwrap();
+    assert_close(relative, of_response(20.0), 1e-2);
+    for args in [&COMPENSATE[..], &HARMONICS[..]] {
+        let ran = folder.run(&[args, &["--force"][..usize::from(args.len() == 6)]].concat());
+        let said = ran.stdout + &ran.stderr;
+        assert!(
+            said.contains("unknown, since the calibration has no std"),
+            "{said}"
+        );
+        assert!(
+            !said.contains("± 0 ") && !said.contains("± stand"),
+            "{said}"
+        );
+    }
+}
+
+#[test]
+fn calibration_and_response_are_stated_together() {
+    let folder = folder(
+        "U [V]",
+        "[calibration]\ntorque_per_volt = { value = \"12.5 N m/V\", std = \"0.025 N m/V\" }\n",
+    );
+    let [compensated, harmonics] = both(&folder);
+    for point in compensated["noise"]["gain"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .take(4)
+    {
+        let want = 0.002_f64.hypot(of_response(point["frequency_hz"].as_f64().unwrap()));
+        assert_close(point["relative_std"].as_f64().unwrap(), want, 1e-2);
+    }
+    assert_close(
+        harmonics["calibration_relative_std"].as_f64().unwrap(),
+        0.002,
+        1e-9,
+    );
+}
+
+/// `T = x + c x³` at rest: with `x = 2 + cos` and a std of 1e-5 of `c` that is 1e-5 x³, at most 2.7e-4, and by the moments of
+/// the cosine `⟨x⁶⟩ = 64 + 120 + 22.5 + 0.3125`. A calibration of ± 0.2 % adds 0.002 x (1 + 3 c x²).
+#[test]
+fn an_effect_that_bends_is_part_of_the_uncertainty() {
+    let effect = "[[effects]]\nkind = \"cubic-stiffness\"\n\
+        coefficient = { value = \"1e-4 1/(N m)^2\", std = \"1e-5 1/(N m)^2\" }\n";
+    let stiff = MECHANICS.replace("590 Hz\", std = \"2 Hz", "590 Hz\", std = \"0.001 Hz");
+    let folder = folder("T [N m]", "");
+    folder.write("stand.toml", format!("{stiff}{effect}"));
+    let report = folder.json(&[&COMPENSATE[..], &["--json", "--band", "200"]].concat());
+    let found = &report["result_std"];
+    assert_close(
+        found["rms"].as_f64().unwrap(),
+        1e-5 * 206.8125_f64.sqrt(),
+        1e-2,
+    );
+    assert_close(found["largest"].as_f64().unwrap(), 2.7e-4, 1e-2);
+    assert_eq!(found["bent"].as_array().unwrap().len(), 0);
+    let calibration =
+        "[calibration]\ntorque_per_volt = { value = \"1 N m/V\", std = \"0.002 N m/V\" }\n";
+    folder.write("stand.toml", format!("{stiff}{calibration}{effect}"));
+    folder.write("in.csv", record("U [V]"));
+    let report = folder.json(&[&COMPENSATE[..], &["--json", "--band", "200", "--force"]].concat());
+    let largest = report["result_std"]["largest"].as_f64().unwrap();
+    assert_close(
+        largest,
+        2.7e-4_f64.hypot(0.002 * 3.0 * (1.0 + 3e-4 * 9.0)),
+        1e-2,
+    );
+    assert_close(
+        report["result_std"]["of_response_rms"].as_f64().unwrap(),
+        1e-5 * 206.8125_f64.sqrt(),
+        1e-2,
+    );
+}
+
+#[test]
+fn a_torque_far_beyond_the_rated_one_is_warned_about() {
+    let codes = |more: &str| -> Vec<bool> {
+        let folder = folder("U [V]", more);
+        let has = |report: &Value| {
+            let all = report["warnings"].as_array().unwrap();
+            all.iter().any(|w| w["code"] == "beyond-rated-torque")
+        };
+        both(&folder).iter().map(has).collect()
+    };
+    // The record reaches 3 V: 37.5 N m.
+    let of = |rated: &str| {
+        format!("[calibration]\ntorque_per_volt = \"12.5 N m/V\"\nrated_torque = \"{rated}\"\n")
+    };
+    assert_eq!(codes(&of("24 N m")), [true, true]);
+    assert_eq!(codes(&of("-26 N m")), [false, false]);
+    let sheet = "[calibration]\nsensitivity = \"2 V\"\nrated_torque = \"20 N m\"\n";
+    assert_eq!(codes(sheet), [false, false]);
+    assert_eq!(codes(&sheet.replace("2 V", "200 mV")), [true, true]);
+}
