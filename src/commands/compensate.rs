@@ -176,8 +176,9 @@ impl Plan {
             constant: chain.std,
             rated_torque: chain.rated_n_m.map(|rated| rated / chain.applied.factor),
             rate_hz: stream.rate_hz,
+            rate_std_hz: stream.time.rate_std_hz,
             filled: stream.filled.clone(),
-            rate_from: stream.time.rate_from.sentence(stream.time.is_resampled()),
+            rate_from: stream.time.rate_sentence(),
             method: match self.undo {
                 Some(_) => "refined",
                 None if args.whole_record => "whole-record",

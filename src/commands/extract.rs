@@ -30,7 +30,7 @@ pub fn run(args: &Extract) -> Result<Outcome, Failure> {
         stream.source,
         stream.dialect,
         print::rounded(stream.rate_hz, 9),
-        stream.time.rate_from.sentence(stream.time.is_resampled())
+        stream.time.rate_sentence()
     );
     let summary = if stream.time.is_resampled() {
         write_resampled(args, stream, &mut output)?

@@ -48,6 +48,8 @@ struct HarmonicsReport {
     unit: String,
     samples: usize,
     rate_hz: f64,
+    /// Its standard uncertainty by the stamps; `null` if it does not come from stamps.
+    rate_std_hz: Option<f64>,
     duration_s: f64,
     fundamental_hz: f64,
     /// Its standard uncertainty, if it was found from the data.
@@ -248,6 +250,7 @@ fn fit(
         unit: chain.applied.unit.clone(),
         samples: samples.len(),
         rate_hz: record.rate_hz,
+        rate_std_hz: record.rate_std_hz,
         duration_s,
         fundamental_hz: fundamental.frequency_hz,
         fundamental_std_hz: fundamental.std_hz,

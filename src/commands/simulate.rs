@@ -27,6 +27,8 @@ struct SimulateReport {
     input_between_samples: &'static str,
     samples: usize,
     rate_hz: f64,
+    /// Its standard uncertainty by the stamps; `null` if it does not come from stamps.
+    rate_std_hz: Option<f64>,
     #[serde(flatten)]
     start: Moment,
     /// Steps of integration from sample to sample.
@@ -87,6 +89,7 @@ pub fn run(args: &cli::Simulate) -> Result<Outcome, Failure> {
         input_between_samples: between.name(),
         samples: written,
         rate_hz: axis.0,
+        rate_std_hz: applied.rate_std_hz,
         start: axis.1,
         steps_per_sample: steps,
         effects: stand.effects.iter().map(|e| e.effect.name).collect(),
@@ -102,6 +105,8 @@ struct AppliedInput {
     unit: Option<NamedUnit>,
     unit_text: Option<String>,
     axis: (f64, Moment),
+    /// Standard uncertainty of the rate, if it comes from stamps.
+    rate_std_hz: Option<f64>,
     samples: AppliedSamples,
     /// What should be known of the file, once all of it is read; what was lost comes first.
     warnings: Vec<Warning>,
@@ -129,6 +134,7 @@ impl AppliedInput {
                 unit: stream.unit.clone(),
                 unit_text: stream.unit_text.clone(),
                 axis: (stream.rate_hz, stream.start),
+                rate_std_hz: stream.time.rate_std_hz,
                 samples: AppliedSamples::Text(Some(Box::new(UniformStream::of(stream)?))),
                 warnings: Vec::new(),
                 is_lossy: false,
@@ -146,6 +152,7 @@ impl AppliedInput {
             unit: chosen.unit,
             unit_text: chosen.unit_text,
             axis: (read.rate_hz, read.start),
+            rate_std_hz: read.rate_std_hz,
             samples: AppliedSamples::Messages(chosen.samples),
             warnings: read.warnings,
             is_lossy: read.is_lossy,

@@ -190,6 +190,8 @@ pub struct Identification {
     pub samples: usize,
     /// Sampling rate; `None` for a table of loads.
     pub rate_hz: Option<f64>,
+    /// Its standard uncertainty by the stamps; `None` if it does not come from stamps.
+    pub rate_std_hz: Option<f64>,
     /// The constants, the main ones first.
     pub parameters: Vec<NamedEstimate>,
     /// How well the model follows the data.

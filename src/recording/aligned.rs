@@ -64,6 +64,8 @@ pub(crate) struct AlignedChannels {
     pub(crate) source: String,
     /// Samples a second.
     pub(crate) rate_hz: f64,
+    /// Standard uncertainty of that, if it comes from stamps.
+    pub(crate) rate_std_hz: Option<f64>,
     /// Time of the first sample.
     pub(crate) start: Moment,
     /// The channels, in the order in which they were asked for.
@@ -130,6 +132,7 @@ impl AlignedChannels {
         let mut aligned = Self {
             source: recording.source.clone(),
             rate_hz: first.rate_hz,
+            rate_std_hz: first.rate_std_hz,
             start: first.start,
             channels: Vec::new(),
             warnings,

@@ -27,6 +27,8 @@ const CLOSE: [f64; 2] = [0.01, 0.05];
 pub struct TimeAxis {
     /// Samples a second; `None` if the file says nothing of it, or if its stamps have no usual step.
     pub rate_hz: Option<f64>,
+    /// Standard uncertainty of a rate that comes from stamps, by their rounding and jitter; that of the clock is not in it.
+    pub rate_std_hz: Option<f64>,
     /// Where the rate comes from.
     pub rate_from: RateFrom,
     /// Time of the first sample on the file's own axis.
@@ -156,27 +158,72 @@ fn equal_step(stamps: &[f64]) -> Option<f64> {
     alike.then(|| (stamps[stamps.len() - 1] - first) / (stamps.len() - 1) as f64)
 }
 
+/// A step from stamp to stamp.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct SampleStep {
+    /// In the unit of the stamps.
+    pub(super) step: f64,
+    /// Its relative standard uncertainty, if the stamps say.
+    pub(super) relative_std: Option<f64>,
+}
+
+impl SampleStep {
+    fn new(step: f64, relative_std: f64) -> Self {
+        let is_known = relative_std > 0.0 && relative_std.is_finite();
+        Self {
+            step,
+            relative_std: is_known.then_some(relative_std),
+        }
+    }
+
+    /// Of a line through rounded stamps over a span: any step between two bounds, or one quantum more or less over the
+    /// span, is as likely, which is half their distance over √3.
+    pub(super) fn of_line(line: &Rounded, span: f64) -> Self {
+        let half = 0.5 * (line.steps_s[1] - line.steps_s[0]);
+        let half = match half > 0.0 {
+            true => half,
+            false => line.quantum_s * line.step_s / span,
+        };
+        Self::new(line.step_s, half / line.step_s / 3.0_f64.sqrt())
+    }
+
+    /// Of the mean of usual steps: their scatter is that of both ends, over all of them.
+    fn of_mean(step: f64, stamps: &[f64]) -> Self {
+        let usual = stamps.windows(2).map(|pair| pair[1] - pair[0]);
+        let usual = usual.filter(|d| (d / step - 1.0).abs() <= USUAL);
+        let (count, squares) = usual.fold((0.0, 0.0), |(n, sum), d| {
+            (n + 1.0, sum + (d - step).powi(2))
+        });
+        Self::new(step, (squares / count).sqrt() / (count * step))
+    }
+
+    /// Standard uncertainty of a rate that is this step's.
+    pub(super) fn rate_std_hz(&self, rate_hz: f64) -> Option<f64> {
+        self.relative_std.map(|relative| relative * rate_hz)
+    }
+}
+
 /// The step of the straight line that stamps are but for their rounding (3 and 4 ms by turns are a step of 3.5 ms), or
 /// of their longest part without a gap; else the usual step.
-pub(super) fn step_of(stamps_s: &[f64], origin_s: f64) -> Option<f64> {
-    let line = |part: &[f64]| line_of(part, origin_s);
-    if let Some(line) = line(stamps_s) {
-        return Some(line.step_s);
+pub(super) fn step_of(stamps_s: &[f64], origin_s: f64) -> Option<SampleStep> {
+    let line = |part: &[f64]| {
+        let span = part.last()? - part.first()?;
+        line_of(part, origin_s).map(|line| SampleStep::of_line(&line, span))
+    };
+    if let Some(found) = line(stamps_s) {
+        return Some(found);
     }
     let step = typical_step(stamps_s)?;
+    let usual = SampleStep::of_mean(step, stamps_s);
     let span = stamps_s.last()? - stamps_s.first()?;
     let mean = span / (stamps_s.len() - 1) as f64;
     if (step / mean - 1.0).abs() <= SAME {
-        return Some(step);
+        return Some(usual);
     }
     let parts = stamps_s.chunk_by(|a, b| (0.0..GAP * step).contains(&(b - a)));
     let longest = parts.max_by_key(|part| part.len())?;
     let is_most = 4 * longest.len() > stamps_s.len();
-    Some(
-        line(longest)
-            .filter(|_| is_most)
-            .map_or(step, |line| line.step_s),
-    )
+    Some(line(longest).filter(|_| is_most).unwrap_or(usual))
 }
 
 /// How stamps about a step apart are rounded, if that is all that is wrong with them.
@@ -217,10 +264,11 @@ impl TimeAxis {
         let origin_s = origin_ns as f64 * 1e-9;
         let step = step_of(&stamps_s, origin_s);
         let rate_hz = step
-            .map(|step| without_rounding(1.0 / step))
+            .map(|found| without_rounding(1.0 / found.step))
             .filter(|hz| hz.is_finite() && *hz > 0.0);
         Self {
             rate_hz,
+            rate_std_hz: rate_hz.and_then(|hz| step?.rate_std_hz(hz)),
             rate_from: rate_hz.map_or(RateFrom::None, |_| RateFrom::Stamps(heading.to_owned())),
             start: stamps_s
                 .first()
@@ -244,6 +292,15 @@ impl TimeAxis {
             0.0 => Arc::clone(stamps),
             _ => Arc::new(stamps.iter().map(|stamp| stamp + later_s).collect()),
         })
+    }
+
+    /// Where its rate comes from, with the uncertainty that is known of it.
+    pub(crate) fn rate_sentence(&self) -> String {
+        let from = self.rate_from.sentence(self.is_resampled());
+        match self.rate_std_hz {
+            Some(std) => format!("{from}, ± {} Hz", digits::text(std, 2)),
+            None => from,
+        }
     }
 
     /// A time on it, in seconds after its origin.

@@ -7,6 +7,7 @@ use std::path::Path;
 
 use torqcomp_dsp::quality::rounding::uniform_line;
 
+use super::axis::SampleStep;
 use crate::failure::Failure;
 use crate::io::Input;
 use crate::io::storage::Stored;
@@ -23,10 +24,15 @@ const COUNTABLE: f64 = 0.25;
 ///
 /// A step of 1.01 that is found with 101 stamps is 1.0099 when the stamp after 10 100 steps is known to be 10 200:
 /// 10 200 / 1.01 = 10 099.01.
-pub(super) fn sharpened(step: f64, first: &[f64], later: &[f64], origin: f64) -> Option<f64> {
-    let (mut step, start) = (step, *first.first()?);
+pub(super) fn sharpened(
+    found: SampleStep,
+    first: &[f64],
+    later: &[f64],
+    origin: f64,
+) -> Option<SampleStep> {
+    let (mut step, start) = (found.step, *first.first()?);
     if later.is_empty() {
-        return Some(step);
+        return Some(found);
     }
     let place = |stamp: f64| ((stamp - start) / step).round().max(0.0) as usize;
     let mut known: Vec<(usize, f64)> = first.iter().map(|stamp| (place(*stamp), *stamp)).collect();
@@ -41,9 +47,19 @@ pub(super) fn sharpened(step: f64, first: &[f64], later: &[f64], origin: f64) ->
             known.push((count as usize, *stamp));
         }
     }
-    let resolution = 2.0 * f64::EPSILON * (origin.abs() + known.last()?.1.abs());
+    let last = known.last()?.1;
+    let resolution = 2.0 * f64::EPSILON * (origin.abs() + last.abs());
     let line = uniform_line(known.iter().copied(), resolution);
-    Some(line.map_or(step, |line| line.step_s))
+    Some(match line {
+        Some(line) => SampleStep::of_line(&line, last - start),
+        // The jitter of both ends counts less over a longer time.
+        None => SampleStep {
+            step,
+            relative_std: found
+                .relative_std
+                .map(|std| std * (first[first.len() - 1] - start) / (last - start)),
+        },
+    })
 }
 
 /// Stamps of a text at distances that double, and its last one. `from` is the byte behind the head, if they are wanted.
@@ -122,9 +138,15 @@ mod tests {
     fn steps_are_counted_as_far_as_they_are_known() {
         // 1.01 per step in the head; in truth 10 200 are 10 099 steps.
         let first = [0.0, 1.01];
-        let step = sharpened(1.01, &first, &[101.0, 1010.0, 10_200.0], 0.0).unwrap();
+        let about = |step| SampleStep {
+            step,
+            relative_std: None,
+        };
+        let step = sharpened(about(1.01), &first, &[101.0, 1010.0, 10_200.0], 0.0)
+            .unwrap()
+            .step;
         assert!((step - 10_200.0 / 10_099.0).abs() < 1e-12, "{step}");
-        assert_eq!(sharpened(1.0, &[0.0], &[100.4], 0.0), None);
-        assert_eq!(sharpened(1.0, &[0.0], &[], 0.0), Some(1.0));
+        assert_eq!(sharpened(about(1.0), &[0.0], &[100.4], 0.0), None);
+        assert_eq!(sharpened(about(1.0), &[0.0], &[], 0.0), Some(about(1.0)));
     }
 }

@@ -172,6 +172,8 @@ pub(crate) struct Selection<'a> {
     pub(crate) channel: &'a Channel,
     /// Samples a second.
     pub(crate) rate_hz: f64,
+    /// Standard uncertainty of that, if it comes from stamps.
+    pub(crate) rate_std_hz: Option<f64>,
     /// Time of the first sample: 0 if the file does not say, or the rate was given.
     pub(crate) start: Moment,
     /// Unit of the samples, if it is known.
@@ -234,6 +236,7 @@ impl Recording {
         Ok(Selection {
             channel,
             rate_hz,
+            rate_std_hz: axis.rate_std_hz.filter(|_| reading.rate_hz.is_none()),
             start,
             unit,
             warnings,

@@ -62,16 +62,19 @@ impl TimeAxis {
         let typical = sharpened(typical, first, later, origin).unwrap_or(typical);
         grid.resampled = reading.resample;
         grid.step = match reading.rate_hz {
-            None => typical,
+            None => typical.step,
             Some(rate_hz) => {
-                check_resampled(rate_hz, 1.0 / (typical * grid.seconds_per_unit))?;
+                check_resampled(rate_hz, 1.0 / (typical.step * grid.seconds_per_unit))?;
                 1.0 / rate_hz / grid.seconds_per_unit
             }
         };
         grid.allow_rounding(first);
         let start = grid.moment(first[0]);
+        let rate_hz = without_rounding(1.0 / (grid.step * grid.seconds_per_unit));
+        let rate_std_hz = typical.rate_std_hz(rate_hz);
         Ok(Self {
-            rate_hz: Some(without_rounding(1.0 / (grid.step * grid.seconds_per_unit))),
+            rate_hz: Some(rate_hz),
+            rate_std_hz: rate_std_hz.filter(|_| reading.rate_hz.is_none()),
             rate_from: RateFrom::Stamps(heading.to_owned()),
             start: Some(start),
             origin_ns: grid.origin_ns,

@@ -205,6 +205,7 @@ fn axis_of_stamps(
     Ok(match &of_first_rows.rate_from {
         RateFrom::Header(_) if !reading.resample => TimeAxis {
             rate_hz: of_first_rows.rate_hz,
+            rate_std_hz: None,
             rate_from: of_first_rows.rate_from.clone(),
             ..found
         },

@@ -16,6 +16,8 @@ pub(crate) struct UniformStream {
     pub(crate) start: Moment,
     /// Samples a second.
     pub(crate) rate_hz: f64,
+    /// Standard uncertainty of that, if it comes from stamps.
+    pub(crate) rate_std_hz: Option<f64>,
     blocks: Box<dyn BlockSource>,
     plan: Option<ChannelPlan>,
     validator: StreamValidator,
@@ -31,6 +33,7 @@ impl UniformStream {
     /// If the rate is none.
     pub(crate) fn of(stream: ChannelStream) -> Result<Self, Failure> {
         let (rate_hz, start) = (stream.rate_hz, stream.start);
+        let rate_std_hz = stream.time.rate_std_hz;
         let grid = stream.time.grid.clone();
         let is_resampled = grid.as_ref().is_some_and(|grid| grid.resampled);
         let resampler = is_resampled.then(|| Resampler::new(1.0 / rate_hz));
@@ -39,6 +42,7 @@ impl UniformStream {
         Ok(Self {
             start,
             rate_hz,
+            rate_std_hz,
             blocks,
             plan,
             validator,
@@ -98,6 +102,8 @@ pub(crate) struct UniformRecord {
     pub(crate) start: Moment,
     /// Samples a second.
     pub(crate) rate_hz: f64,
+    /// Standard uncertainty of that, if it comes from stamps.
+    pub(crate) rate_std_hz: Option<f64>,
     /// What the file held.
     pub(crate) summary: StreamSummary,
     /// What was interpolated, if anything.
@@ -116,6 +122,7 @@ impl UniformRecord {
     ) -> Result<Self, Failure> {
         let mut stream = UniformStream::of(stream)?;
         let (rate_hz, start) = (stream.rate_hz, stream.start);
+        let rate_std_hz = stream.rate_std_hz;
         let mut samples = Vec::new();
         while stream.next(&mut samples, &convert)? {}
         let (summary, resampled) = stream.finish(&mut samples)?;
@@ -123,6 +130,7 @@ impl UniformRecord {
             samples,
             start,
             rate_hz,
+            rate_std_hz,
             summary,
             resampled,
         })

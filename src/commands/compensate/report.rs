@@ -40,6 +40,8 @@ pub(super) struct CompensateReport {
     pub(super) rated_torque: Option<f64>,
     pub(super) samples: usize,
     pub(super) rate_hz: f64,
+    /// Its standard uncertainty by the stamps; `null` if it does not come from stamps.
+    pub(super) rate_std_hz: Option<f64>,
     pub(super) rate_from: String,
     /// First time of the result.
     #[serde(flatten)]

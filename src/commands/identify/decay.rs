@@ -101,7 +101,11 @@ fn load(args: &Decay, input: &str, recorded: &mut Recorded) -> Result<Loaded, Fa
         })
         .unzip();
     let values: Vec<f64> = values;
-    recorded.add(input, values.len(), rate_hz);
+    recorded.add(
+        input,
+        values.len(),
+        rate_hz.map(|hz| (hz, selection.rate_std_hz)),
+    );
     let warnings = [recording.all_warnings(), selection.warnings].concat();
     recorded.warn(warnings, recording.lost.is_some());
     Ok(Loaded {
@@ -118,7 +122,11 @@ fn resampled(input: &str, mut aligned: AlignedChannels, recorded: &mut Recorded)
     let channel = aligned.channels.swap_remove(0);
     let (start_s, rate_hz) = (aligned.start.after_s, aligned.rate_hz);
     let time_s = |i: usize| start_s + i as f64 / rate_hz;
-    recorded.add(input, channel.samples.len(), Some(rate_hz));
+    recorded.add(
+        input,
+        channel.samples.len(),
+        Some((rate_hz, aligned.rate_std_hz)),
+    );
     recorded.warn(aligned.warnings, aligned.is_lossy);
     Loaded {
         name: input.to_owned(),

@@ -47,15 +47,17 @@ struct Recorded {
     inputs: Vec<String>,
     samples: usize,
     rate_hz: Option<f64>,
+    rate_std_hz: Option<f64>,
     warnings: Vec<Warning>,
     is_lossy: bool,
 }
 
 impl Recorded {
-    /// Adds a file; the sampling rate is that of the first one.
-    fn add(&mut self, input: &str, samples: usize, rate_hz: Option<f64>) {
+    /// Adds a file; the sampling rate, with its standard uncertainty, is that of the first one.
+    fn add(&mut self, input: &str, samples: usize, rate_hz: Option<(f64, Option<f64>)>) {
         if self.inputs.is_empty() {
-            self.rate_hz = rate_hz;
+            self.rate_hz = rate_hz.map(|(rate_hz, _)| rate_hz);
+            self.rate_std_hz = rate_hz.and_then(|(_, std_hz)| std_hz);
         }
         self.inputs.push(input.to_owned());
         self.samples += samples;
@@ -112,6 +114,7 @@ fn deliver(
     result.inputs = recorded.inputs;
     result.samples = recorded.samples;
     result.rate_hz = recorded.rate_hz;
+    result.rate_std_hz = recorded.rate_std_hz;
     result.warnings.extend(recorded.warnings);
     result.convert(UnitSystem::from(findings.units));
     let mut targets = Targets::open(findings, &result.inputs)?;

@@ -26,7 +26,11 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
     for input in &args.inputs {
         let mut read = AlignedChannels::read(&Input::of(input), &choices, &args.reading)?;
         read.channels[1].must_be_as_recorded(&read.source)?;
-        recorded.add(input, read.channels[0].samples.len(), Some(read.rate_hz));
+        recorded.add(
+            input,
+            read.channels[0].samples.len(),
+            Some((read.rate_hz, read.rate_std_hz)),
+        );
         recorded.warn(read.warnings.clone(), read.is_lossy);
         if let Some(radius) = &args.radius {
             to_torque(&mut read.channels[0], radius)?;

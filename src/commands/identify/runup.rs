@@ -51,7 +51,11 @@ pub fn run(args: &Runup) -> Result<Outcome, Failure> {
     let result = identify(&run, &options)?;
     let entries = entries(args, &result)?;
     let mut recorded = Recorded::default();
-    recorded.add(&args.input, positions.len(), Some(read.rate_hz));
+    recorded.add(
+        &args.input,
+        positions.len(),
+        Some((read.rate_hz, read.rate_std_hz)),
+    );
     recorded.warn(read.warnings, read.is_lossy);
     deliver(result, recorded, &args.findings, &entries)
 }

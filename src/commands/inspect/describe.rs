@@ -221,6 +221,7 @@ fn describe(channel: &Channel, found: &Findings, time: Option<&TimeFindings>) ->
         unit_known: channel.unit.is_some(),
         samples: channel.samples.len(),
         rate_hz: axis.rate_hz,
+        rate_std_hz: axis.rate_std_hz,
         rate_from: axis.rate_from.describe(),
         header_rate_hz: axis.header_rate_hz,
         start: axis.start.map(Moment::seconds),

@@ -81,6 +81,8 @@ pub(super) struct InspectedChannel {
     /// Number of samples, missing ones included.
     pub(super) samples: usize,
     pub(super) rate_hz: Option<f64>,
+    /// Its standard uncertainty by the stamps; `null` if it does not come from stamps.
+    pub(super) rate_std_hz: Option<f64>,
     /// Where the rate comes from.
     pub(super) rate_from: String,
     /// Rate that the head of the file gives, used or not.
