@@ -661,3 +661,61 @@ fn init_writes_a_stand_file_that_converts() {
     let named = "identify decay tap.csv -o fan.toml";
     assert!(folder.read("fan.toml").contains(named));
 }
+
+/// The file claims the uncertainties that are given, and no other.
+#[test]
+fn init_takes_the_uncertainties_that_are_given() {
+    let folder = Folder::new();
+    let args = [
+        "init",
+        "--from",
+        "transducer",
+        "--sensitivity",
+        "2 mV/V",
+        "--rated-torque",
+        "50 N m",
+        "--natural-frequency",
+        "590 Hz",
+        "--damping-ratio",
+        "0.02",
+        "-o",
+        "stand.toml",
+        "--force",
+    ];
+    let stds = [
+        "--std",
+        "sensitivity=0.004 mV/V",
+        "--std",
+        "natural_frequency=2 Hz",
+    ];
+    folder.write("in.csv", record("U [mV/V]", None, |c| c));
+    let ran = folder.run(&[&args[..], &stds].concat());
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    let part = amplitude(&folder, &[]).1["components"][0].clone();
+    let stated = part["std_stand"].as_f64().unwrap() / part["torque"].as_f64().unwrap();
+    let response = part["std_response"].as_f64().unwrap() / part["torque"].as_f64().unwrap();
+    assert!(
+        (stated - 0.002_f64.hypot(response)).abs() < 1e-9 && response > 0.0,
+        "{stated} {response}"
+    );
+    folder.run(&args);
+    let text = folder.read("stand.toml");
+    let lines = text.lines().filter(|line| !line.starts_with('#'));
+    assert!(lines.clone().all(|line| !line.contains("std =")), "{text}");
+    let part = amplitude(&folder, &[]).1["components"][0].clone();
+    assert!(part["std_stand"].is_null() && part["std_response"].is_null());
+    for (std, said) in [
+        ("sensitivty=1 mV/V", "--sensitivty is not given"),
+        ("gain=1", "--gain is not given"),
+        ("rated-torque=1 V", "torque"),
+        ("sensitivity=0.1 %", "sensitivity"),
+        ("sensitivity", "FLAG=QUANTITY"),
+    ] {
+        let ran = folder.run(&[&args[..], &["--std", std]].concat());
+        assert!(
+            ran.code == 2 && ran.stderr.contains(said),
+            "{std}: {}",
+            ran.stderr
+        );
+    }
+}

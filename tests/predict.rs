@@ -119,3 +119,80 @@ fn a_stand_without_a_drawing_is_told_what_to_add() {
         .run(&["predict", "--stand", "stand.toml"])
         .says(1, &["[beam]", "[[parts]]"]);
 }
+
+/// A calibration in another signal stands beside what the drawing gives for that signal. One strain at the gage is
+/// `E b d² R/(6 (L − x))` = 44,444 N m, so 500 µε, 1 mV/V of a full bridge of gage factor 2, is 22.2222 N m; with 10 V of supply and
+/// a gain of 100 that is 1 V. The data sheet says 25 N m per mV/V: the prediction is 11.1 % below.
+#[test]
+fn a_calibration_in_any_signal_stands_beside_the_drawing() {
+    let drawing = "schema = \"torqcomp.stand/1\"\n[mechanics]\nnatural_frequency = \"590 Hz\"\ndamping_ratio = 0.02\n\
+        [beam]\nwidth = \"20 mm\"\ndepth = \"10 mm\"\nlength = \"200 mm\"\nelastic_modulus = \"200 GPa\"\nradius = \"100 mm\"\n\
+        gage_position = \"50 mm\"\n[gage]\ngage_factor = 2\nresistance = \"350 ohm\"\n[bridge]\nlayout = \"full\"\n\
+        excitation = \"10 V\"\n[recorder]\ngain = 100\n";
+    let of_calibration = |lines: &str| {
+        let folder = Folder::new();
+        folder.write("stand.toml", format!("{drawing}{lines}"));
+        let report = folder.json(&["predict", "--stand", "stand.toml", "--json"]);
+        report["constants"].as_array().unwrap().clone()
+    };
+    let sheet =
+        "sensitivity = { value = \"2 mV/V\", std = \"0.002 mV/V\" }\nrated_torque = \"50 N m\"\n";
+    let found = of_calibration(&format!("[calibration]\n{sheet}"));
+    let ratio = of(&found, "torque_per_ratio");
+    assert_eq!(ratio["unit"], "N m/(mV/V)");
+    close(&ratio["predicted"], 22.2222, 1e-3);
+    close(&ratio["measured"], 25.0, 1e-9);
+    close(&ratio["measured_std"], 0.025, 1e-9);
+    close(&ratio["residual_percent"], -11.111, 1e-2);
+    let volts = of(&found, "torque_per_volt");
+    close(&volts["predicted"], 22.2222, 1e-3);
+    close(&volts["measured"], 25.0, 1e-9);
+    let cases = [
+        (
+            "lever_arm = \"0.11 m\"",
+            "torque_per_force",
+            Some(0.1),
+            0.11,
+        ),
+        (
+            "sensitivity = \"500 ustrain\"\nrated_torque = \"20 N m\"",
+            "torque_per_strain",
+            Some(0.0444444),
+            0.04,
+        ),
+        (
+            "sensitivity = \"8 mA\"\nrated_torque = \"50 N m\"",
+            "torque_per_current",
+            None,
+            6.25,
+        ),
+        (
+            "zero_frequency = \"60 kHz\"\nfrequency_at_rated = \"90 kHz\"\nrated_torque = \"50 N m\"",
+            "torque_per_frequency",
+            None,
+            50.0 / 30e3,
+        ),
+        (
+            "points = [{ reading = \"-2 mV/V\", torque = \"-50 N m\" }, { reading = \"2 mV/V\", torque = \"50 N m\" }]",
+            "torque_per_ratio",
+            Some(22.2222),
+            25.0,
+        ),
+        // 2.5 V ± 2.5 V.
+        (
+            "sensitivity = \"2.5 V\"\nrated_torque = \"50 N m\"",
+            "torque_per_volt",
+            Some(22.2222),
+            20.0,
+        ),
+    ];
+    for (lines, name, predicted, measured) in cases {
+        let found = of_calibration(&format!("[calibration]\n{lines}\n"));
+        let constant = of(&found, name);
+        close(&constant["measured"], measured, 1e-9);
+        match predicted {
+            Some(predicted) => close(&constant["predicted"], predicted, 1e-4 * predicted),
+            None => assert!(constant["predicted"].is_null(), "{name}"),
+        }
+    }
+}

@@ -298,3 +298,112 @@ fn what_was_bridged_is_listed_and_marked_with_what_it_affects() {
         "{outside} {largest}"
     );
 }
+
+/// Labels of the axes of all charts in a picture or a page: texts in the middle below a panel, and above it.
+fn axis_labels(svg: &str) -> Vec<String> {
+    let mut found = Vec::new();
+    for text in svg.split("<text ").skip(1) {
+        let (attributes, rest) = text.split_once('>').unwrap();
+        let content = rest.split_once("</text>").unwrap().0;
+        let plain = content
+            .replace("<tspan class=\"name\">", "")
+            .replace("</tspan>", "");
+        let is_number = plain.trim().replace('\u{2212}', "-").parse::<f64>().is_ok();
+        let is_x = attributes.contains("text-anchor=\"middle\"") && !is_number;
+        let is_left = ["x=\"8\"", "x=\"78\""]
+            .iter()
+            .any(|x| attributes.starts_with(x));
+        let is_y = is_left && !attributes.contains("text-anchor") && !attributes.contains("class=");
+        if is_x || is_y {
+            found.push(plain);
+        }
+    }
+    found
+}
+
+/// Every axis of every chart names its quantity and its unit.
+#[test]
+fn every_axis_has_a_quantity_and_a_unit() {
+    let folder = Folder::new();
+    folder.write("run.csv", recorded(4000));
+    let mut pictures = Vec::new();
+    let args = compensate(&["-o", "t.csv", "--plot", "plot.svg", "--html", "page.html"]);
+    folder.run(&args).says(0, &[]);
+    pictures.extend(["plot.svg", "page.html"]);
+    folder
+        .run(&["inspect", "run.csv", "--plot", "inspect.svg", "-o", "i.txt"])
+        .says(0, &[]);
+    folder.write("no-time.csv", "1\n2\n4\n3\n2\n");
+    folder.run(&[
+        "inspect",
+        "no-time.csv",
+        "--plot",
+        "no-time.svg",
+        "-o",
+        "n.txt",
+    ]);
+    pictures.extend(["inspect.svg", "no-time.svg"]);
+    let mut ring = "time_s,T [N m],a [rad]\n".to_owned();
+    let mut torque = "time_s,T [N m],w [rad/s]\n".to_owned();
+    let mut noise = crate::noise::Noise(7);
+    let (mut x, mut v, mut w) = (0.0, 0.0, 0.0);
+    for i in 0..6000 {
+        let t = f64::from(i) / 1000.0;
+        let drive = if i % 1000 == 100 { 200.0 } else { 0.0 };
+        // A spring of 2800 N m/rad at 40 Hz.
+        for _ in 0..20 {
+            let a = drive - (2.0 * std::f64::consts::PI * 40.0_f64).powi(2) * x - 20.0 * v;
+            v += a * 5e-5;
+            x += v * 5e-5;
+        }
+        ring += &format!("{t},{drive},{:.9}\n", x + 1e-6 * noise.uniform());
+        let push = (t * 3.0).sin();
+        w += (push - 0.1 * w) * 1e-3 / 0.05;
+        torque += &format!("{t},{:.6},{w:.6}\n", push + 1e-3 * noise.uniform());
+    }
+    folder.write("hits.csv", ring).write("runup.csv", torque);
+    folder.write("decay.csv", {
+        let row = |i: i32| {
+            let t = f64::from(i) / 1000.0;
+            format!("{t},{:.6}\n", (-3.0 * t).exp() * (250.0 * t).cos())
+        };
+        format!("time_s,U [mV]\n{}", (0..2000).map(row).collect::<String>())
+    });
+    folder.write(
+        "loads.csv",
+        "load [N m],U [V]\n0,0.01\n5,1.01\n10,2.012\n5,1.011\n0,0.011\n",
+    );
+    let tests: [&[&str]; 4] = [
+        &["decay", "decay.csv"],
+        &["response", "hits.csv", "--applied", "T", "--measured", "a"],
+        &["runup", "runup.csv", "--torque", "T", "--motion", "w"],
+        &["static", "loads.csv", "--load", "load", "--reading", "U"],
+    ];
+    let pages = ["decay.html", "response.html", "runup.html", "static.html"];
+    for (test, page) in tests.iter().zip(pages) {
+        let ran = folder.run(&[&["identify"], *test, &["--html", page]].concat());
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+    }
+    pictures.extend(pages);
+    let known = [
+        "no unit",
+        "unit not given",
+        "as recorded",
+        "samples",
+        "%",
+        "degrees",
+    ];
+    for picture in pictures {
+        let labels = axis_labels(&folder.read(picture));
+        assert!(labels.len() >= 2, "{picture}: {labels:?}");
+        for label in labels {
+            let label = label.replace(" (no numbers)", "");
+            let (quantity, unit) = label
+                .rsplit_once(", ")
+                .unwrap_or_else(|| panic!("{picture}: \"{label}\""));
+            let bare = unit.trim_end_matches("/√Hz");
+            let is_unit = known.contains(&unit) || torqcomp_model::Unit::parse(bare).is_ok();
+            assert!(is_unit && !quantity.is_empty(), "{picture}: \"{label}\"");
+        }
+    }
+}

@@ -288,3 +288,48 @@ fn a_number_means_the_same_channel_in_every_verb() {
     };
     assert_eq!(simulated("2"), simulated("answer_n_m"));
 }
+
+/// Rows and columns swapped, as some exports have them: a question in a few lines, whatever the verb.
+#[test]
+fn a_table_on_its_side_is_asked_about() {
+    let folder = Folder::new();
+    let row = |name: &str, value: &dyn Fn(usize) -> f64| {
+        let cells: Vec<String> = (0..5000).map(|i| format!("{:.6}", value(i))).collect();
+        format!("{name},{}\n", cells.join(","))
+    };
+    let time = row("time_s", &|i| i as f64 * 1e-4);
+    let torque = row("torque [N m]", &|i| (i as f64 * 0.01).sin());
+    folder.write("side.csv", format!("{time}{torque}"));
+    let bare = |text: &str| text.split_once(',').unwrap().1.to_owned();
+    folder.write("bare.csv", bare(&time) + &bare(&torque));
+    for name in ["side.csv", "bare.csv"] {
+        for args in [
+            &["inspect", name][..],
+            &["extract", name],
+            &["compensate", name, "--stand", "stand.toml"],
+            &["identify", "decay", name],
+        ] {
+            let ran = folder.run(args);
+            ran.says(1, &["columns", "transpose"]);
+            assert!(
+                ran.stdout.is_empty() && ran.stderr.len() < 1000,
+                "{args:?}: {}",
+                ran.stderr.len()
+            );
+        }
+    }
+    // Many channels are no question where there are rows for them.
+    let head: Vec<String> = (0..400).map(|i| format!("c{i} [V]")).collect();
+    let rows: String = (0..60)
+        .map(|r| format!("{},{}\n", r as f64 * 0.001, vec!["1.5"; 400].join(",")))
+        .collect();
+    folder.write("many.csv", format!("time_s,{}\n{rows}", head.join(",")));
+    let report = folder.json(&["inspect", "many.csv", "--json"]);
+    assert_eq!(
+        report["files"][0]["channels"].as_array().unwrap().len(),
+        400
+    );
+    folder
+        .run(&["extract", "many.csv", "--channel", "x"])
+        .says(1, &["and 380 more"]);
+}

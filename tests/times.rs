@@ -484,3 +484,132 @@ fn a_record_of_two_samples_is_simulated_or_refused() {
         }
     }
 }
+
+/// One record as a table and as messages, its clock beginning at the start of the machine or in 1970: a range is the same
+/// instant in both and in every verb, and phases refer to the same moment.
+#[test]
+fn a_range_is_the_same_instant_in_a_table_and_in_messages() {
+    use crate::mcap_file::McapFile;
+    for (first_ns, range) in [
+        (0_u64, ["0.25..0.75", "0.25..0.75"]),
+        (5_000_000_000, ["5.25..5.75", "5.25..5.75"]),
+        (
+            1_710_250_000_000_000_000,
+            ["0.25..0.75", "1710250000.25..1710250000.75"],
+        ),
+    ] {
+        let folder = Folder::new();
+        let mut text = "time_s,torque [N m]\n".to_owned();
+        let mut file = McapFile::new(None, "", "");
+        let schema = r#"{"type":"object","properties":{"Torque":{"type":"number"},"speed":{"type":"number"}}}"#;
+        let channel = file.channel(
+            "/stand",
+            "json",
+            Some(("s", "jsonschema", schema.as_bytes())),
+        );
+        for i in 0..1000_u64 {
+            let ns = first_ns + i * 1_000_000;
+            let value = (std::f64::consts::TAU * 40.0 * i as f64 * 1e-3).cos();
+            text += &format!(
+                "{}.{:09},{value:.9}\n",
+                ns / 1_000_000_000,
+                ns % 1_000_000_000
+            );
+            let message = format!("{{\"Torque\":{value:.9},\"speed\":1}}");
+            file.message(channel, i as usize, ns, message.as_bytes());
+        }
+        folder.write("in.csv", text).write("in.mcap", file.finish());
+        // A part of a name in any case chooses a number of messages as it chooses a column.
+        let mcap = ["--time", "publish", "--unit", "N m", "--channel", "torque"];
+        for range in range {
+            let both = |args: &[&'static str]| {
+                let csv = [args, &["in.csv", "--range", range]].concat();
+                let messages = [args, &["in.mcap", "--range", range], &mcap].concat();
+                [csv, messages]
+            };
+            let rows = both(&["extract", "-q"]).map(|args| {
+                let ran = folder.run(&args);
+                assert_eq!(ran.code, 0, "{args:?}: {}", ran.stderr);
+                ran.stdout
+                    .lines()
+                    .skip(1)
+                    .map(str::to_owned)
+                    .collect::<Vec<_>>()
+            });
+            assert_eq!(rows[0].len(), 501, "{range}");
+            assert_eq!(rows[0], rows[1], "{range}");
+            let harmonics = both(&[
+                "harmonics",
+                "--stand",
+                "stand.toml",
+                "--fundamental",
+                "40",
+                "--orders",
+                "1",
+                "--json",
+            ]);
+            let [table, messages] = harmonics.map(|args| folder.json(&args));
+            for key in ["phase_reference", "start_s", "samples", "rate_hz"] {
+                assert_eq!(table[key], messages[key], "{key} of {range}");
+            }
+            let phase =
+                |report: &serde_json::Value| report["components"][0]["phase_deg"].as_f64().unwrap();
+            assert!((phase(&table) - phase(&messages)).abs() < 1e-6, "{range}");
+        }
+    }
+}
+
+/// Stamps in µs over 1 s: the rate is known to 1e-6/√3 of it. Stamps that scatter: by the scatter of both ends.
+#[test]
+fn a_rate_from_stamps_has_an_uncertainty() {
+    let folder = Folder::new();
+    let mut noise = crate::noise::Noise(3);
+    let mut table = |jitter_s: f64| {
+        let row = |i: usize| {
+            let t = i as f64 / 2000.0 + jitter_s * (noise.uniform() - 0.5);
+            format!("{t:.6},{}\n", (i as f64 * 0.1).sin())
+        };
+        format!(
+            "time_s,torque [N m]\n{}",
+            (0..2001).map(row).collect::<String>()
+        )
+    };
+    folder
+        .write("even.csv", table(0.0))
+        .write("uneven.csv", table(1e-4));
+    let std = |args: &[&str]| folder.json(args)["rate_std_hz"].as_f64();
+    let harmonics = [
+        "harmonics",
+        "even.csv",
+        "--stand",
+        "stand.toml",
+        "--fundamental",
+        "40",
+        "--orders",
+        "1",
+        "--json",
+    ];
+    let stated = std(&harmonics).unwrap();
+    assert!(
+        (stated / (2000.0 * 1e-6 / 3.0_f64.sqrt()) - 1.0).abs() < 0.05,
+        "{stated}"
+    );
+    let compensate = [
+        "compensate",
+        "even.csv",
+        "--stand",
+        "stand.toml",
+        "--json",
+        "-o",
+        "out.csv",
+    ];
+    assert_eq!(std(&compensate), Some(stated));
+    assert_eq!(std(&[&harmonics[..], &["--rate", "2000"]].concat()), None);
+    let inspected = folder.json(&["inspect", "uneven.csv", "--json"]);
+    let stated = inspected["files"][0]["channels"][0]["rate_std_hz"]
+        .as_f64()
+        .unwrap();
+    // A uniform jitter of ± 50 µs has a standard deviation of 29 µs: √2 of it over 1 s, of 2000 Hz.
+    let want = 2000.0 * 2.0_f64.sqrt() * 1e-4 / 12.0_f64.sqrt();
+    assert!((stated / want - 1.0).abs() < 0.1, "{stated} {want}");
+}

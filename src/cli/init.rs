@@ -4,6 +4,17 @@ use clap::{Args, ValueEnum};
 
 use super::OutputArgs;
 
+fn named_std(text: &str) -> Result<(String, String), String> {
+    let (flag, std) = text.split_once('=').unwrap_or_default();
+    match (
+        flag.trim().trim_start_matches('-').replace('_', "-"),
+        std.trim(),
+    ) {
+        (flag, std) if !flag.is_empty() && !std.is_empty() => Ok((flag, std.to_owned())),
+        _ => Err("expected FLAG=QUANTITY, such as \"sensitivity=0.0005 mV/V\"".to_owned()),
+    }
+}
+
 /// What a stand file is made from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum InitFrom {
@@ -23,7 +34,8 @@ pub enum InitFrom {
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  torqcomp init -o stand.toml\n  torqcomp init --from transducer --sensitivity \"2 mV/V\" \
-                        --rated-torque \"50 N m\" --natural-frequency \"590 Hz\" --damping-ratio 0.02 -o stand.toml"
+                        --rated-torque \"50 N m\" \
+                        --std \"sensitivity=0.001 mV/V\" --natural-frequency \"590 Hz\" --damping-ratio 0.02 -o stand.toml"
 )]
 pub struct Init {
     /// What there is to start from
@@ -86,6 +98,10 @@ pub struct Init {
     /// Record at no load, such as "12 mA"
     #[arg(long, value_name = "QUANTITY")]
     pub zero: Option<String>,
+    /// Standard uncertainty of one of these, by the name of its flag, such as "sensitivity=0.0005 mV/V"; repeatable. A limit
+    /// within which all values are as likely is to be divided by 1.73
+    #[arg(long, value_name = "FLAG=QUANTITY", value_parser = named_std)]
+    pub std: Vec<(String, String)>,
     /// Output.
     #[command(flatten)]
     pub result: OutputArgs,

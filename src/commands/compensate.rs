@@ -174,6 +174,7 @@ impl Plan {
             calibration: chain.described.clone(),
             calibration_relative_std: chain.std.known(),
             constant: chain.std,
+            quantity: chain.applied.name,
             rated_torque: chain.rated_n_m.map(|rated| rated / chain.applied.factor),
             rate_hz: stream.rate_hz,
             rate_std_hz: stream.time.rate_std_hz,

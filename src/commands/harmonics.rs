@@ -437,7 +437,7 @@ impl HarmonicsReport {
             (_, None) => return "unknown (no std is given)".to_owned(),
             (ConstantStd::Relative(std), _) => format!("{} %", rounded(100.0 * std, 2)),
             (ConstantStd::NotNeeded, _) => {
-                return "that of the response, \"± stand\" below".to_owned();
+                return "that of the response is \"± stand\" below; that of the recorded torque is unknown".to_owned();
             }
             (ConstantStd::Unknown, _) => {
                 return "unknown, since the calibration has no std; that of the response alone is \"± response\" below"

@@ -99,8 +99,8 @@ fn compose<R: BufRead, W: Write>(
             ));
         }
     };
-    let questions: Vec<&Question> = of(from).iter().chain(&MECHANICS).collect();
-    let mut answers: Vec<(&Question, String)> = Vec::new();
+    let questions: Vec<&'static Question> = of(from).iter().chain(&MECHANICS).collect();
+    let mut answers: Vec<Answer> = Vec::new();
     let mut missing = Vec::new();
     for question in questions {
         let given = args.given(question.flag).map(str::to_owned);
@@ -116,8 +116,22 @@ fn compose<R: BufRead, W: Write>(
             }
             (None, None) => None,
         };
-        answers.extend(answer.map(|answer| (question, answer)));
+        let Some(value) = answer else { continue };
+        let std = match (args.given_std(question.flag), &mut dialogue) {
+            (Some(given), _) => Some(given.to_owned()),
+            (None, Some(dialogue)) if question.has_std() => {
+                let asked = dialogue.ask(&question.std_text(), |text| question.check_std(text))?;
+                Some(asked).filter(|std| !std.is_empty())
+            }
+            (None, _) => None,
+        };
+        answers.push(Answer {
+            question,
+            value,
+            std,
+        });
     }
+    args.check_stds(&answers)?;
     if let Some(flag) = args.given_beside(from) {
         return Err(Failure::usage(format_args!(
             "--{flag} does not belong to --from {}",
@@ -134,8 +148,25 @@ fn compose<R: BufRead, W: Write>(
     Ok(page(args, from, &answers))
 }
 
+/// An answer with its standard uncertainty, if one is given.
+struct Answer {
+    question: &'static Question,
+    value: String,
+    std: Option<String>,
+}
+
+impl Answer {
+    fn toml(&self) -> String {
+        let text = |text: &str| toml_edit::Value::from(text).to_string();
+        match &self.std {
+            Some(std) => format!("{{ value = {}, std = {} }}", text(&self.value), text(std)),
+            None => text(&self.value),
+        }
+    }
+}
+
 /// What the file says, section by section; what is missing stands there as a comment.
-fn page(args: &Init, from: InitFrom, answers: &[(&Question, String)]) -> String {
+fn page(args: &Init, from: InitFrom, answers: &[Answer]) -> String {
     let name = args.name.as_deref().unwrap_or("my stand");
     let file = args.result.output.as_deref().filter(|file| *file != "-");
     let file = file.unwrap_or("FILE");
@@ -145,7 +176,10 @@ fn page(args: &Init, from: InitFrom, answers: &[(&Question, String)]) -> String 
         toml_edit::Value::from(name)
     );
     for (section, about) in SECTIONS {
-        let of_section: Vec<_> = answers.iter().filter(|a| a.0.section == section).collect();
+        let of_section: Vec<_> = answers
+            .iter()
+            .filter(|a| a.question.section == section)
+            .collect();
         if of_section.is_empty() {
             let how = match (section, from) {
                 ("mechanics", _) => NO_MECHANICS,
@@ -156,9 +190,9 @@ fn page(args: &Init, from: InitFrom, answers: &[(&Question, String)]) -> String 
             continue;
         }
         let _ = write!(text, "\n# {about}\n[{section}]\n");
-        for (question, answer) in of_section {
-            let value = toml_edit::Value::from(answer.as_str());
-            let _ = writeln!(text, "{} = {value}  # {}", question.key, question.meaning);
+        for answer in of_section {
+            let Question { key, meaning, .. } = answer.question;
+            let _ = writeln!(text, "{key} = {}  # {meaning}", answer.toml());
         }
     }
     text
@@ -221,6 +255,27 @@ impl Init {
         given
             .find(|(flag, _)| !known.contains(flag))
             .map(|(flag, _)| flag)
+    }
+
+    /// The standard uncertainty that is given for a flag.
+    fn given_std(&self, flag: &str) -> Option<&str> {
+        let found = self.std.iter().find(|(name, _)| name == flag)?;
+        Some(&found.1)
+    }
+
+    /// Refuses a standard uncertainty of what is not given or has none.
+    fn check_stds(&self, answers: &[Answer]) -> Result<(), Failure> {
+        for (flag, std) in &self.std {
+            let answer = answers.iter().find(|a| a.question.flag == flag);
+            let Some(answer) = answer.filter(|a| a.question.has_std()) else {
+                return Err(Failure::usage(format_args!(
+                    "--std {flag}={std}: --{flag} is not given, or takes no uncertainty"
+                )));
+            };
+            let checked = answer.question.check_std(std);
+            checked.map_err(|why| Failure::usage(format_args!("--std {flag}={std}: {why}")))?;
+        }
+        Ok(())
     }
 
     fn flags(&self) -> [(&'static str, Option<&str>); 18] {

@@ -12,7 +12,7 @@ use super::{Outcome, conclude, publish};
 use crate::cli::{Predict, Strictness};
 use crate::failure::Failure;
 use crate::print::rounded;
-use crate::stand::{self, BeamDrawing, BridgeData, Given, Stand};
+use crate::stand::{self, BeamDrawing, BridgeData, Given, Stand, TransducerSignal};
 
 /// Part of a residual that must be left at most for an effect to explain it.
 const EXPLAINED: f64 = 0.5;
@@ -135,14 +135,9 @@ impl<'a> Drawing<'a> {
         loss.note = damping_note(&loss);
         let [natural, damping_ratio] = self.modal(units)?;
         let per_volt = self.torque_per_volt(units)?;
-        Ok(vec![
-            stiffness,
-            ring,
-            loss,
-            natural,
-            damping_ratio,
-            per_volt,
-        ])
+        let mut all = vec![stiffness, ring, loss, natural, damping_ratio, per_volt];
+        all.extend(self.calibration(units));
+        Ok(all)
     }
 
     /// Natural frequency and damping ratio.
@@ -225,6 +220,40 @@ impl<'a> Drawing<'a> {
         }
     }
 
+    /// The calibration in its own signal, where that is not a voltage.
+    fn calibration(&self, units: UnitSystem) -> Option<PredictedConstant> {
+        let measured = self.stand.calibration.as_ref()?;
+        let (name, by) = match measured.signal {
+            TransducerSignal::Voltage => return None,
+            TransducerSignal::Ratio => (
+                "torque_per_ratio",
+                "strain at the gage, gage factor and bridge",
+            ),
+            TransducerSignal::Strain => ("torque_per_strain", "strain at the gage"),
+            TransducerSignal::Force => ("torque_per_force", "radius of the beam"),
+            TransducerSignal::Current => ("torque_per_current", "no drawing gives it"),
+            TransducerSignal::Frequency => ("torque_per_frequency", "no drawing gives it"),
+        };
+        let (unit, factor) = measured.signal.slope_unit(units);
+        let estimate = |(slope, relative): (f64, Option<f64>), source: &'static str| {
+            let value = slope / factor;
+            let std = relative.map(|relative| (relative * value).abs());
+            Estimate::of(unit.clone(), value, std).with_source(source)
+        };
+        let predicted = self
+            .stand
+            .drawn_slope(measured.signal)
+            .map(|slope| estimate(slope, "drawing"));
+        let found = self
+            .stand
+            .measured_slope(measured.signal)
+            .map(|slope| estimate(slope, "calibration"));
+        Some(PredictedConstant {
+            by,
+            ..PredictedConstant::between(name, predicted.as_ref(), found.as_ref(), &unit)
+        })
+    }
+
     fn torque_per_volt(&self, units: UnitSystem) -> Result<PredictedConstant, Failure> {
         let stand = self.stand;
         let is_whole = |bridge: &BridgeData| bridge.layout.is_some() && bridge.supply.is_some();
@@ -248,11 +277,17 @@ impl<'a> Drawing<'a> {
             let made = Estimate::new(Kind::TorquePerVolt, gain, None, "drawing");
             predicted = Some(made.map_err(Failure::failed)?);
         }
-        let measured = stand
-            .calibration
-            .as_ref()
-            .and_then(|c| c.torque_per_volt())
-            .cloned();
+        // Of a calibration in mV/V through gain and supply.
+        let by_ratio = || {
+            let (slope, relative) = stand.measured_slope(TransducerSignal::Voltage)?;
+            let std = relative.map(|relative| (relative * slope).abs());
+            Some(
+                Estimate::of(Kind::TorquePerVolt, slope, std)
+                    .with_source("calibration, gain and supply"),
+            )
+        };
+        let of_volts = stand.calibration.as_ref().and_then(|c| c.torque_per_volt());
+        let measured = of_volts.cloned().or_else(by_ratio);
         let mut made = constant(
             "torque_per_volt",
             predicted.as_ref(),
@@ -377,23 +412,20 @@ fn constant(
     kind: Kind,
     units: UnitSystem,
 ) -> PredictedConstant {
-    let value = |e: &Estimate| kind.to(units, e.value());
-    let std = |e: &Estimate| Some(kind.difference_to(units, e.std_uncertainty()?));
-    let (predicted_value, measured_value) = (predicted.map(value), measured.as_ref().map(value));
-    PredictedConstant {
+    let printed = |e: &Estimate| {
+        let std = e
+            .std_uncertainty()
+            .map(|std| kind.difference_to(units, std));
+        Estimate::of(kind.unit(units), kind.to(units, e.value()), std)
+            .with_source(e.source().to_owned())
+    };
+    let (predicted, measured) = (predicted.map(printed), measured.as_ref().map(printed));
+    PredictedConstant::between(
         name,
-        unit: kind.unit(units).to_owned(),
-        predicted: predicted_value,
-        predicted_std: predicted.and_then(std),
-        measured: measured_value,
-        measured_std: measured.as_ref().and_then(std),
-        measured_source: measured.as_ref().map(|m| m.source().to_owned()),
-        residual_percent: residual_percent(predicted_value, measured_value),
-        explained_by: None,
-        by: "",
-        refinements: Vec::new(),
-        note: None,
-    }
+        predicted.as_ref(),
+        measured.as_ref(),
+        kind.unit(units),
+    )
 }
 
 fn damping_note(damping: &PredictedConstant) -> Option<String> {

@@ -7,7 +7,7 @@ use super::moment::Moment;
 use super::{Channel, RateFrom, Recording, TimeAxis, typical_step};
 use crate::failure::{Failure, did_you_mean};
 use crate::io::{ChannelChoice, Reading, digits};
-use crate::print::list;
+use crate::print::{list, plural};
 use crate::unit::NamedUnit;
 use crate::warning::Warning;
 
@@ -18,6 +18,24 @@ pub(crate) struct Label<'a> {
     pub(crate) name: &'a str,
     /// Its segment, from 0, if there are several.
     pub(crate) segment: Option<usize>,
+}
+
+/// Channels from which on a table with fewer rows than a tenth of that is taken for a transposed one.
+const WIDE: usize = 300;
+/// Channels that a message names at most.
+const NAMED: usize = 20;
+
+/// The question whether a table of so many channels is transposed, if it looks like that.
+pub(super) fn transposed(columns: usize, rows: Option<usize>) -> Option<Failure> {
+    let is_short = rows.is_none_or(|rows| 10 * rows < columns);
+    (columns >= WIDE && is_short).then(|| {
+        let rows = rows.map_or_else(String::new, |rows| format!("{} and ", plural(rows, "row")));
+        Failure::failed(format_args!(
+            "the table has {rows}{columns} columns: are the samples of a channel in one row? Each channel must be a column; \
+             transpose the table (in a spreadsheet: paste special, transpose), or choose a column with --channel if each is a \
+             channel"
+        ))
+    })
 }
 
 /// The place of the channel that is wanted: by its heading, its name without the unit, either of them in any case, its
@@ -32,30 +50,17 @@ pub(crate) fn choose(
         return match channels {
             [_] => Ok(0),
             [] => Err(Failure::failed("there is no channel with numbers in it")),
-            several => Err(Failure::failed(format_args!(
-                "{} channels could be the signal; choose one with {flag} {}",
-                several.len(),
-                names(channels)
-            ))),
+            several => Err(transposed(several.len(), None).unwrap_or_else(|| {
+                Failure::failed(format_args!(
+                    "{} channels could be the signal; choose one with {flag} {}",
+                    several.len(),
+                    names(channels)
+                ))
+            })),
         };
     };
-    let ways: [&dyn Fn(&Label) -> bool; 3] =
-        [&|c| c.heading == wanted, &|c| c.name == wanted, &|c| {
-            c.name.eq_ignore_ascii_case(wanted) || c.heading.eq_ignore_ascii_case(wanted)
-        }];
-    for is in ways {
-        let found: Vec<usize> = (0..channels.len()).filter(|i| is(&channels[*i])).collect();
-        match found.as_slice() {
-            [] => {}
-            [one] => return Ok(*one),
-            several => {
-                return Err(Failure::failed(format_args!(
-                    "{} channels are called \"{wanted}\"; give the number of the one you mean, {flag} {}",
-                    several.len(),
-                    list(several.iter().map(|i| (i + 1).to_string()))
-                )));
-            }
-        }
+    if let Some(place) = by_name(channels, wanted, flag)? {
+        return Ok(place);
     }
     if let Ok(number) = wanted.parse::<usize>()
         && (1..=channels.len()).contains(&number)
@@ -73,8 +78,35 @@ pub(crate) fn choose(
     )))
 }
 
+/// The place of the channel with such a heading or name, in any case.
+pub(super) fn by_name(
+    channels: &[Label],
+    wanted: &str,
+    flag: &str,
+) -> Result<Option<usize>, Failure> {
+    let ways: [&dyn Fn(&Label) -> bool; 3] =
+        [&|c| c.heading == wanted, &|c| c.name == wanted, &|c| {
+            c.name.eq_ignore_ascii_case(wanted) || c.heading.eq_ignore_ascii_case(wanted)
+        }];
+    for is in ways {
+        let found: Vec<usize> = (0..channels.len()).filter(|i| is(&channels[*i])).collect();
+        match found.as_slice() {
+            [] => {}
+            [one] => return Ok(Some(*one)),
+            several => {
+                return Err(Failure::failed(format_args!(
+                    "{} channels are called \"{wanted}\"; give the number of the one you mean, {flag} {}",
+                    several.len(),
+                    list(several.iter().map(|i| (i + 1).to_string()))
+                )));
+            }
+        }
+    }
+    Ok(None)
+}
+
 /// The place of the only channel whose heading has a part, in any case.
-fn by_part(channels: &[Label], wanted: &str) -> Result<Option<usize>, Failure> {
+pub(super) fn by_part(channels: &[Label], wanted: &str) -> Result<Option<usize>, Failure> {
     let part = wanted.to_lowercase();
     let has_part = |place: &usize| channels[*place].heading.to_lowercase().contains(&part);
     match *(0..channels.len()).filter(has_part).collect::<Vec<_>>() {
@@ -83,12 +115,24 @@ fn by_part(channels: &[Label], wanted: &str) -> Result<Option<usize>, Failure> {
         ref several => Err(Failure::failed(format_args!(
             "\"{wanted}\" is a part of the names of {} channels: {}; give more of it",
             several.len(),
-            list(
+            named(
                 several
                     .iter()
                     .map(|place| format!("\"{}\"", channels[*place].name))
             )
         ))),
+    }
+}
+
+/// The first of many names, and how many more there are.
+fn named(names: impl ExactSizeIterator<Item = String>) -> String {
+    let more = names.len().saturating_sub(NAMED);
+    match more {
+        0 => list(names),
+        _ => {
+            let first: Vec<String> = names.take(NAMED).collect();
+            format!("{} and {more} more", first.join(", "))
+        }
     }
 }
 
@@ -109,7 +153,7 @@ fn names(channels: &[Label]) -> String {
             }
         }
     };
-    list(channels.iter().enumerate().map(one))
+    named(channels.iter().enumerate().map(one))
 }
 
 /// The unit of a channel: the one that is given, or that of the file. A warning if both differ.

@@ -35,7 +35,14 @@ impl ChannelStream {
         reading: &Reading,
     ) -> Result<Self, Failure> {
         let (field, times) = (messages::field(choice, reading), messages::times(reading));
-        let mut source = SignalReader::with_stream(input, bytes, &field, &times)?;
+        let source = SignalReader::with_stream(input, bytes, &field, &times);
+        let mut source = match source {
+            Ok(source) => source,
+            Err(missed) => match messages::by_part(input, &field, choice.flags.channel)? {
+                Some(found) => SignalReader::open(input, &found, &times)?,
+                None => return Err(missed),
+            },
+        };
         let (name, chosen) = (source.name().to_owned(), source.selected().clone());
         let mut times_ns = Vec::new();
         let mut values = Vec::new();

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::choice::{self, Label, by_name};
 use super::moment::Moment;
 use super::{Channel, Recording, TimeAxis};
 use crate::failure::Failure;
@@ -22,13 +23,31 @@ pub(super) fn read(
     choices: &[ChannelChoice],
     reading: &Reading,
 ) -> Result<Recording, Failure> {
-    let fields: Vec<FieldChoice> = choices.iter().map(|c| field(c, reading)).collect();
-    let mut held = vec![(Vec::new(), Vec::new()); choices.len()];
+    let mut fields: Vec<FieldChoice> = choices.iter().map(|c| field(c, reading)).collect();
     let options = times(reading);
-    let results = mcap::read_fields(input, &fields, &options, |number, times_ns, values| {
-        held[number].0.extend_from_slice(times_ns);
-        held[number].1.extend_from_slice(values);
-    })?;
+    let mut held;
+    let mut is_named = false;
+    let results = loop {
+        held = vec![(Vec::new(), Vec::new()); choices.len()];
+        let results = mcap::read_fields(input, &fields, &options, |number, times_ns, values| {
+            held[number].0.extend_from_slice(times_ns);
+            held[number].1.extend_from_slice(values);
+        })?;
+        if is_named || results.iter().all(Result::is_ok) {
+            break results;
+        }
+        is_named = true;
+        for ((field, choice), _) in fields
+            .iter_mut()
+            .zip(choices)
+            .zip(&results)
+            .filter(|(_, r)| r.is_err())
+        {
+            if let Some(found) = by_part(input, field, choice.flags.channel)? {
+                *field = found;
+            }
+        }
+    };
     let mut recording = Recording::empty("mcap", input.name());
     let origin_ns = held
         .iter()
@@ -91,6 +110,49 @@ pub(super) fn field(choice: &ChannelChoice, reading: &Reading) -> FieldChoice {
             signal: signal.clone().or_else(|| channel.clone()),
         },
     }
+}
+
+/// The number whose name is what a choice says in another case, or the only one that has it as a part; `None` if there is
+/// none, or the file can only be read once.
+pub(super) fn by_part(
+    input: &Input,
+    choice: &FieldChoice,
+    flag: &str,
+) -> Result<Option<FieldChoice>, Failure> {
+    let (Input::File(_), Some(wanted)) = (input, choice.signal.as_ref().or(choice.field.as_ref()))
+    else {
+        return Ok(None);
+    };
+    let inventory = mcap::Inventory::scan(input)?;
+    let topics = inventory.channels.iter();
+    let topics = topics.filter(|c| choice.topic.as_ref().is_none_or(|topic| c.topic == *topic));
+    let mut numbers: Vec<[String; 2]> = topics
+        .flat_map(mcap::inventory::ChannelReport::choosable)
+        .collect();
+    // A topic can have several channels.
+    numbers.sort();
+    numbers.dedup();
+    let names: Vec<String> = numbers
+        .iter()
+        .map(|[topic, field]| format!("{topic}.{field}"))
+        .collect();
+    let labels: Vec<Label> = names
+        .iter()
+        .map(|name| Label {
+            heading: name,
+            name,
+            segment: None,
+        })
+        .collect();
+    let place = match by_name(&labels, wanted, flag)? {
+        Some(place) => Some(place),
+        None => choice::by_part(&labels, wanted)?,
+    };
+    Ok(place.map(|place| FieldChoice {
+        topic: Some(numbers[place][0].clone()),
+        field: Some(numbers[place][1].clone()),
+        signal: None,
+    }))
 }
 
 /// Which time of the messages counts.

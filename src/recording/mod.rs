@@ -190,6 +190,19 @@ impl Recording {
         Ok(recording)
     }
 
+    /// Asks whether the table is transposed, if it has a few rows and hundreds of columns.
+    pub(crate) fn must_not_be_transposed(&self) -> Result<(), Failure> {
+        let rows = self
+            .channels
+            .iter()
+            .map(|channel| channel.samples.len())
+            .max();
+        match choice::transposed(self.channels.len(), Some(rows.unwrap_or(0))) {
+            Some(question) => Err(question.at(&self.source)),
+            None => Ok(()),
+        }
+    }
+
     /// What was lost, and what else should be known.
     pub(crate) fn all_warnings(&self) -> Vec<Warning> {
         self.lost.iter().chain(&self.warnings).cloned().collect()

@@ -48,7 +48,11 @@ impl TimeBound {
         Ok(match self {
             Self::Seconds { seconds, .. } if axis.origin_ns == 0 => seconds,
             // Of a clock that counts from 1970, small numbers are seconds after the first sample.
-            Self::Seconds { seconds, .. } if seconds < SINCE_1970 => start.after_s + seconds,
+            Self::Seconds { seconds, .. }
+                if seconds < SINCE_1970 && start.seconds() >= SINCE_1970 =>
+            {
+                start.after_s + seconds
+            }
             Self::Seconds { ns, .. } => ns.saturating_sub(axis.origin_ns) as f64 * 1e-9,
             Self::Clock(clock) => {
                 let zero_ns = axis.clock_ns.ok_or_else(|| {

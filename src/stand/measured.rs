@@ -55,14 +55,8 @@ impl MeasuredCalibration {
                     format!("measured constant of {}", constant.text(units))
                 }
                 signal => {
-                    let (unit, factor) = signal.usual_unit();
-                    let per = if unit.contains('/') {
-                        format!("({unit})")
-                    } else {
-                        unit.to_owned()
-                    };
-                    let scaled = |v: f64| Kind::Torque.to(units, v) * factor;
-                    let unit = format!("{}/{per}", Kind::Torque.unit(units));
+                    let (unit, factor) = signal.slope_unit(units);
+                    let scaled = |v: f64| v / factor;
                     let std = constant.std_uncertainty().map(scaled);
                     let printed = Estimate::of(unit, scaled(constant.value()), std);
                     format!("measured constant of {}", printed.text(units))

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use torqcomp_model::{Dimension, Estimate, Kind, RatioOf, Unit};
+use torqcomp_model::{Dimension, Estimate, Kind, RatioOf, Unit, UnitSystem};
 
 use super::section::Section;
 use crate::failure::Failure;
@@ -86,6 +86,21 @@ impl TransducerSignal {
             Self::Strain => ("ustrain", 1e-6),
             Self::Force => ("N", 1.0),
         }
+    }
+
+    /// The unit of torque per signal, and SI units of torque per signal in it.
+    #[must_use]
+    pub fn slope_unit(self, units: UnitSystem) -> (String, f64) {
+        let (unit, factor) = self.usual_unit();
+        let per = match unit.contains('/') {
+            true => format!("({unit})"),
+            false => unit.to_owned(),
+        };
+        let torque = Kind::Torque.unit(units);
+        (
+            format!("{torque}/{per}"),
+            1.0 / (Kind::Torque.to(units, 1.0) * factor),
+        )
     }
 
     /// A value in SI units with its usual unit, for people and stand files.

@@ -223,6 +223,25 @@ impl Stand {
         })
     }
 
+    /// Torque per signal about no load by the drawing, in SI units, with its relative standard uncertainty; `None` if the
+    /// drawing does not give it.
+    pub(crate) fn drawn_slope(&self, signal: TransducerSignal) -> Option<(f64, Option<f64>)> {
+        let law = self.by_drawing(signal, 0.0, UnitSystem::Si).ok()?;
+        Some((law.conversion.small_signal_gain(), law.std.known()))
+    }
+
+    /// Torque per signal about no load by the calibration, in SI units, with its relative standard uncertainty; volts and
+    /// ratios become each other through gain and supply. `None` if it is of another signal.
+    pub(crate) fn measured_slope(&self, signal: TransducerSignal) -> Option<(f64, Option<f64>)> {
+        let measured = self.calibration.as_ref()?;
+        let scale = self.per_signal(signal, measured.signal).ok()??;
+        // The zero does not change the slope.
+        let law = self
+            .by_measured(measured, signal, scale, Some(0.0), UnitSystem::Si)
+            .ok()?;
+        Some((law.conversion.small_signal_gain(), law.std.known()))
+    }
+
     /// By beam, gage and bridge.
     fn by_drawing(
         &self,

@@ -122,7 +122,7 @@ impl PageData {
             floors.push(Series::new("noise floor, compensated", after));
         }
         let series = [recorded, compensated].into_iter().chain(floors);
-        let label = format!("{}/√Hz", report.unit);
+        let label = format!("{}, {}/√Hz", report.quantity, report.unit);
         page.chart(&Chart {
             x_log: true,
             y_log: true,

@@ -71,9 +71,10 @@ impl Traces {
                 around(report.reach_s, SpanKind::Smeared),
             ]
         });
+        let y_label = format!("{}, {}", report.quantity, report.unit);
         Chart {
             spans: marked.collect(),
-            ..Chart::new("", &label, &report.unit, series)
+            ..Chart::new("", &label, &y_label, series)
         }
     }
 

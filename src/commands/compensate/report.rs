@@ -75,6 +75,9 @@ pub(super) struct CompensateReport {
     /// Printed units per SI unit.
     #[serde(skip)]
     pub(super) scale: f64,
+    /// What the result is, for people.
+    #[serde(skip)]
+    pub(super) quantity: &'static str,
     /// Uncertainty of the calibration.
     #[serde(skip)]
     pub(super) constant: ConstantStd,
@@ -287,6 +290,9 @@ impl CompensateReport {
         };
         let total = listed(|g| g.relative_std);
         match (total, listed(|g| g.response_relative_std)) {
+            (Some(total), _) if self.constant == ConstantStd::NotNeeded => format!(
+                "{total} (standard uncertainty of the stand's response; that of the recorded torque is unknown)"
+            ),
             (Some(total), _) => {
                 format!("{total} (standard uncertainty of stand and calibration)")
             }

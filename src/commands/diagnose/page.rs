@@ -151,8 +151,12 @@ impl Draft<'_> {
             "{}, where the plain stand has its largest error",
             file_name(&worst.record.source)
         );
-        self.page
-            .chart(&Chart::new(&title, "time, s", self.unit, series));
+        self.page.chart(&Chart::new(
+            &title,
+            "time, s",
+            &self.label("measured"),
+            series,
+        ));
     }
 
     fn responses(&mut self) {
@@ -178,12 +182,12 @@ impl Draft<'_> {
             let times_s = first.times_s();
             let chart = self.of_residuals(
                 &file_name(&first.record.source),
-                ["time, s", self.unit],
+                ["time, s", &self.label("residual")],
                 |name, residuals| self.line(name, &times_s, &residuals[k].samples),
             );
             self.page.chart(&chart);
         }
-        let label = format!("{}/√Hz", self.unit);
+        let label = self.label("residual") + "/√Hz";
         let mut spectrum =
             self.of_residuals("Spectrum", ["frequency, Hz", &label], |name, residuals| {
                 let (x, y) = density(residuals);
@@ -200,6 +204,11 @@ impl Draft<'_> {
             let chart = self.over_motion(axis, name, unit);
             self.page.chart(&chart);
         }
+    }
+
+    /// The label of an axis of such a quantity.
+    fn label(&self, quantity: &str) -> String {
+        format!("{quantity}, {}", unit_or_as_recorded(self.unit))
     }
 
     /// A chart with a series for each model, in the colours that they have beside the measured record.
@@ -230,7 +239,7 @@ impl Draft<'_> {
 
     fn autocorrelation(&self) -> Chart {
         let title = "Autocorrelation; within the band: white at 99 %";
-        let labels = ["lag, samples", "share of the mean square"];
+        let labels = ["lag, samples", "autocorrelation, no unit"];
         let (shares, bound) = autocorrelation(&self.diagnosis.before.holdout, LAGS);
         let lags: Vec<f64> = (0..shares.len()).map(|lag| lag as f64).collect();
         Chart {
@@ -258,11 +267,15 @@ impl Draft<'_> {
         let band = band.map(|b| (b.motion, b.mean - 2.0 * b.std, b.mean + 2.0 * b.std));
         Chart {
             band: band.collect(),
-            ..self.of_residuals(&title, [&x_label, self.unit], |name, residuals| {
-                let points = bins(residuals).into_iter().map(|b| (b.motion, b.mean));
-                let (x, y): (Vec<f64>, Vec<f64>) = points.unzip();
-                Series::line(name, &x, &y)
-            })
+            ..self.of_residuals(
+                &title,
+                [&x_label, &self.label("residual")],
+                |name, residuals| {
+                    let points = bins(residuals).into_iter().map(|b| (b.motion, b.mean));
+                    let (x, y): (Vec<f64>, Vec<f64>) = points.unzip();
+                    Series::line(name, &x, &y)
+                },
+            )
         }
     }
 

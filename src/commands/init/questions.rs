@@ -172,6 +172,28 @@ impl Question {
         )
     }
 
+    /// Whether the file takes a standard uncertainty of it.
+    pub(super) fn has_std(&self) -> bool {
+        !matches!(self.key, "layout" | "zero" | "resistance")
+    }
+
+    pub(super) fn std_text(&self) -> String {
+        format!(
+            "standard uncertainty of the {} in its unit (a limit divided by 1.73); Enter if unknown",
+            self.key.replace('_', " ")
+        )
+    }
+
+    pub(super) fn check_std(&self, answer: &str) -> Result<(), String> {
+        match (answer, self.kind) {
+            ("", _) | (_, None) => Ok(()),
+            (text, Some(kind)) => kind
+                .parse_std(text)
+                .map(|_| ())
+                .map_err(|error| error.to_string()),
+        }
+    }
+
     pub(super) fn check(&self, answer: &str) -> Result<(), String> {
         match (answer, self.kind) {
             ("", _) if self.is_needed => Err(format!("it is needed, as {}", self.example)),

@@ -31,8 +31,10 @@ pub fn read(place: &Input, reading: &Reading) -> Result<Content, Failure> {
         return messages::read(place, reading);
     }
     refuse_for_text(&ChannelChoice::default(), reading)?;
+    let recording = Recording::of_text(place, reading, MOST_TEXT)?;
+    recording.must_not_be_transposed()?;
     Ok(Content {
-        recording: Recording::of_text(place, reading, MOST_TEXT)?,
+        recording,
         wholes: Vec::new(),
         listed: Vec::new(),
         inventory: None,

@@ -142,7 +142,7 @@ fn keep_topic(inventory: &mut Inventory, wanted: &str) -> Result<(), Failure> {
 fn choice(topic: &ChannelReport, number: &LeafReport) -> FieldChoice {
     FieldChoice {
         topic: Some(topic.topic.clone()),
-        field: Some(first_item(&number.path)),
+        field: Some(number.first_item()),
         signal: None,
     }
 }
@@ -238,20 +238,9 @@ fn axis(stamps: Stamps, words: String) -> TimeAxis {
 /// Name of a number: topic and path, the first item of lists.
 fn name(topic: &ChannelReport, number: Option<&LeafReport>) -> String {
     match number {
-        Some(number) => format!("{}.{}", topic.topic, first_item(&number.path)),
+        Some(number) => format!("{}.{}", topic.topic, number.first_item()),
         None => topic.topic.clone(),
     }
-}
-
-/// A path with the first item in place of lists and arrays.
-fn first_item(path: &str) -> String {
-    let mut pieces = path.split('[');
-    let mut item = pieces.next().unwrap_or_default().to_owned();
-    for piece in pieces {
-        item.push_str("[0]");
-        item.push_str(piece.split_once(']').map_or("", |(_, behind)| behind));
-    }
-    item
 }
 
 /// A channel whose samples are not known.
@@ -373,12 +362,6 @@ mod tests {
         assert!((longest.mean.unwrap() - 49.5).abs() < 1e-12);
         assert!((longest.duration_s - 4.999).abs() < 1e-9);
         assert_eq!(content.recording.warnings[0].code, "first-samples-only");
-    }
-
-    #[test]
-    fn first_items() {
-        assert_eq!(first_item("wrench.force.x"), "wrench.force.x");
-        assert_eq!(first_item("poses[].c[9].x"), "poses[0].c[0].x");
     }
 
     #[test]

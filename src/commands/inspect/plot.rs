@@ -8,6 +8,9 @@ use crate::print::rounded;
 use crate::quality::{labels, unit_of};
 use crate::recording::{Channel, Recording};
 
+/// Label of x where nothing says how the samples lie in time.
+const SAMPLES: &str = "sample number, no unit";
+
 /// Height of a channel's panel, in user units.
 const HEIGHT: f64 = 120.0;
 /// Times farther from zero than this many lengths of the record are counted from its start.
@@ -53,10 +56,10 @@ fn chart(channel: &Channel, found: &InspectedChannel, name: String) -> Chart {
             Some((uniform(0, rate_hz), uniform(last, rate_hz))),
             "time, s",
         ),
-        (None, None) => (Some((1.0, drawn as f64)), "sample"),
+        (None, None) => (Some((1.0, drawn as f64)), SAMPLES),
     };
     let (from, to) = ends.unwrap_or((0.0, 0.0));
-    let is_far = from.abs() > FAR * (to - from) && x_label != "sample";
+    let is_far = from.abs() > FAR * (to - from) && x_label != SAMPLES;
     let zero = if is_far { from } else { 0.0 };
     let x = |i: usize| match (&axis.stamps_s, axis.rate_hz) {
         (Some(stamps), _) => stamps.get(i).copied().unwrap_or(f64::NAN) - zero,

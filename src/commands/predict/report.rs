@@ -1,6 +1,7 @@
 //! The constants of a drawing beside the measured ones, as they are printed.
 
 use serde::Serialize;
+use torqcomp_model::Estimate;
 
 use crate::print::{Report, columns, rounded, with_std};
 
@@ -106,6 +107,31 @@ fn percent(value: Option<f64>) -> String {
 }
 
 impl PredictedConstant {
+    /// A predicted number beside a measured one, both in the printed unit.
+    pub(super) fn between(
+        name: &'static str,
+        predicted: Option<&Estimate>,
+        measured: Option<&Estimate>,
+        unit: &str,
+    ) -> Self {
+        let (value, std) = (Estimate::value, Estimate::std_uncertainty);
+        let residual = residual_percent(predicted.map(value), measured.map(value));
+        Self {
+            name,
+            unit: unit.to_owned(),
+            predicted: predicted.map(value),
+            predicted_std: predicted.and_then(std),
+            measured: measured.map(value),
+            measured_std: measured.and_then(std),
+            measured_source: measured.map(|m| m.source().to_owned()),
+            residual_percent: residual,
+            explained_by: None,
+            by: "",
+            refinements: Vec::new(),
+            note: None,
+        }
+    }
+
     fn cells(&self) -> Vec<String> {
         vec![
             self.name.to_owned(),

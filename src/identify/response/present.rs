@@ -201,7 +201,7 @@ pub(super) fn draw(result: &mut Identification, set: &Set, lines: &Lines, fitted
     let error = vec![Series::dots("hold-out error", &counts, &percent)];
     let chart = Chart::new(
         "Error and number of modes",
-        "number of modes",
+        "number of modes, no unit",
         "hold-out error, %",
         error,
     );

@@ -72,9 +72,11 @@ pub(super) fn draw(result: &mut Identification, run: &FreeRun, fitted: &FittedRo
     ];
     let rest = vec![Series::line("measured − model", &times, &left)];
     let time = "time from the start, s";
+    let quantity = if unit == "N m" { "torque" } else { "force" };
+    let label = format!("{quantity}, {unit}");
     result.charts.extend([
-        Chart::new("Torque or force, averaged", time, unit, both),
-        Chart::new("Residual", time, unit, rest),
+        Chart::new("Torque or force, averaged", time, &label, both),
+        Chart::new("Residual", time, &label, rest),
     ]);
 }
 

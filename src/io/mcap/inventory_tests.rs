@@ -92,3 +92,20 @@ fn a_cut_file_is_lossy_and_says_where() {
     let said = &inventory.warnings[0].message;
     assert!(said.contains("the file ends within a chunk"), "{said}");
 }
+
+#[test]
+fn first_items() {
+    let first = |path: &str| {
+        let leaf = LeafReport {
+            path: path.to_owned(),
+            kind: "f64",
+            unit: None,
+            example: None,
+            names: Vec::new(),
+            is_stamp: false,
+        };
+        leaf.first_item()
+    };
+    assert_eq!(first("wrench.force.x"), "wrench.force.x");
+    assert_eq!(first("poses[].c[9].x"), "poses[0].c[0].x");
+}

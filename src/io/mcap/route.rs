@@ -80,7 +80,10 @@ fn only_leaf(schema: &Schema) -> Result<Vec<PathPart>, String> {
     let mut numbers = found.iter().filter(|leaf| !leaf.is_stamp);
     match (numbers.next(), numbers.next()) {
         (Some(leaf), None) => path::parse(&leaf.with_items("[:]")),
-        _ => Err(format!("choose a field with --field; {}", list(&found))),
+        _ => Err(format!(
+            "its messages have several numbers; choose one with --topic TOPIC --field FIELD, or in one as TOPIC.FIELD; {}",
+            list(&found)
+        )),
     }
 }
 
