@@ -43,8 +43,10 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["signal-above-band", "much of the signal lies above the band and is left out", "choose a higher --band"],
     ]),
     ("Stand file", &[
+        ["scale-in-heading", "the heading of the channel names a scale such as x10, which was not applied", "say the unit with the scale, or rename the column"],
         ["calibration-not-used", "a record in strain was taken through the beam's drawing although a calibration is given", "record in the unit of the calibration"],
         ["damping-above-one", "the damping ratio is above 1", "write 7 % as 0.07"],
+        ["gain-not-used", "a calibration of recorded volts does not need the gain that is given", "leave the gain out, or divide the calibration by it"],
         ["gain-assumed", "the gain between bridge and record is not given; 1 was assumed", "add [recorder] gain"],
         ["modulus-unusual", "the elastic modulus is that of no usual beam", "check its unit: steel has 200 GPa"],
     ]),

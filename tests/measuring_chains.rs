@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use serde_json::Value;
+
 use crate::util::{Folder, sampled};
 
 /// Samples per second, and of a record: 20 periods of 10 Hz.
@@ -717,5 +719,48 @@ fn init_takes_the_uncertainties_that_are_given() {
             "{std}: {}",
             ran.stderr
         );
+    }
+}
+
+/// What could silently give a wrong torque is asked or said: a rate in 1/s, a gain beside a calibration of recorded volts, a
+/// scale behind the unit.
+#[test]
+fn doubtful_numbers_are_asked_or_said() {
+    let folder = Folder::new();
+    folder.write("in.csv", record("U [V]", None, |c| c));
+    let volts = "[calibration]\ntorque_per_volt = \"12.5 N m/V\"\n";
+    let angular = MECHANICS.replace("590 Hz", "3707 1/s");
+    assert_ne!(angular, MECHANICS);
+    folder.write("stand.toml", format!("{angular}{volts}"));
+    let said = refusal(&folder, &[]);
+    assert!(
+        said.contains("\"3707 Hz\"") && said.contains("\"3707 rad/s\""),
+        "{said}"
+    );
+    let codes = |report: &Value| -> Vec<String> {
+        let all = report["warnings"].as_array().unwrap().iter();
+        all.map(|w| w["code"].as_str().unwrap().to_owned())
+            .collect()
+    };
+    folder.write(
+        "stand.toml",
+        format!("{MECHANICS}{volts}[recorder]\ngain = 100\n"),
+    );
+    let (_, report) = amplitude(&folder, &[]);
+    assert!(
+        codes(&report).contains(&"gain-not-used".to_owned()),
+        "{report}"
+    );
+    folder.write("stand.toml", format!("{MECHANICS}{volts}"));
+    for (heading, is_doubtful) in [
+        ("U [V] x10", true),
+        ("U *1000 [V]", true),
+        ("U [V]", false),
+        ("Ux1 [V]", false),
+    ] {
+        folder.write("in.csv", record(heading, None, |c| c));
+        let (_, report) = amplitude(&folder, &[]);
+        let is_said = codes(&report).contains(&"scale-in-heading".to_owned());
+        assert_eq!(is_said, is_doubtful, "{heading}");
     }
 }

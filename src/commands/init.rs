@@ -117,14 +117,7 @@ fn compose<R: BufRead, W: Write>(
             (None, None) => None,
         };
         let Some(value) = answer else { continue };
-        let std = match (args.given_std(question.flag), &mut dialogue) {
-            (Some(given), _) => Some(given.to_owned()),
-            (None, Some(dialogue)) if question.has_std() => {
-                let asked = dialogue.ask(&question.std_text(), |text| question.check_std(text))?;
-                Some(asked).filter(|std| !std.is_empty())
-            }
-            (None, _) => None,
-        };
+        let std = std_of(args, question, dialogue.as_deref_mut())?;
         answers.push(Answer {
             question,
             value,
@@ -146,6 +139,22 @@ fn compose<R: BufRead, W: Write>(
         )));
     }
     Ok(page(args, from, &answers))
+}
+
+/// The standard uncertainty of an answer: given by a flag, or asked for.
+fn std_of<R: BufRead, W: Write>(
+    args: &Init,
+    question: &Question,
+    dialogue: Option<&mut Dialogue<R, W>>,
+) -> Result<Option<String>, Failure> {
+    Ok(match (args.given_std(question.flag), dialogue) {
+        (Some(given), _) => Some(given.to_owned()),
+        (None, Some(dialogue)) if question.has_std() => {
+            let asked = dialogue.ask(&question.std_text(), |text| question.check_std(text))?;
+            Some(asked).filter(|std| !std.is_empty())
+        }
+        (None, _) => None,
+    })
 }
 
 /// An answer with its standard uncertainty, if one is given.

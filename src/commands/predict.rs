@@ -1,5 +1,6 @@
 //! `predict`: what follows from the drawing, beside what was measured.
 
+mod calibration;
 mod report;
 
 use torqcomp_dsp::bridge::BridgeLayout;
@@ -218,40 +219,6 @@ impl<'a> Drawing<'a> {
                 effects.join(" and ")
             ));
         }
-    }
-
-    /// The calibration in its own signal, where that is not a voltage.
-    fn calibration(&self, units: UnitSystem) -> Option<PredictedConstant> {
-        let measured = self.stand.calibration.as_ref()?;
-        let (name, by) = match measured.signal {
-            TransducerSignal::Voltage => return None,
-            TransducerSignal::Ratio => (
-                "torque_per_ratio",
-                "strain at the gage, gage factor and bridge",
-            ),
-            TransducerSignal::Strain => ("torque_per_strain", "strain at the gage"),
-            TransducerSignal::Force => ("torque_per_force", "radius of the beam"),
-            TransducerSignal::Current => ("torque_per_current", "no drawing gives it"),
-            TransducerSignal::Frequency => ("torque_per_frequency", "no drawing gives it"),
-        };
-        let (unit, factor) = measured.signal.slope_unit(units);
-        let estimate = |(slope, relative): (f64, Option<f64>), source: &'static str| {
-            let value = slope / factor;
-            let std = relative.map(|relative| (relative * value).abs());
-            Estimate::of(unit.clone(), value, std).with_source(source)
-        };
-        let predicted = self
-            .stand
-            .drawn_slope(measured.signal)
-            .map(|slope| estimate(slope, "drawing"));
-        let found = self
-            .stand
-            .measured_slope(measured.signal)
-            .map(|slope| estimate(slope, "calibration"));
-        Some(PredictedConstant {
-            by,
-            ..PredictedConstant::between(name, predicted.as_ref(), found.as_ref(), &unit)
-        })
     }
 
     fn torque_per_volt(&self, units: UnitSystem) -> Result<PredictedConstant, Failure> {

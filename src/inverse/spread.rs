@@ -8,7 +8,7 @@ use torqcomp_dsp::band::Band;
 
 use super::ChainInverse;
 use crate::failure::Failure;
-use crate::stand::{ConstantStd, Stand, VariedConstant, combined};
+use crate::stand::{ConstantStd, Given, Stand, VariedConstant, combined};
 
 /// Samples from the start of the record that are looked at.
 const LOOKED_AT: usize = 1 << 16;
@@ -136,10 +136,16 @@ impl Spread<'_> {
 
     fn name(&self, constant: VariedConstant) -> String {
         match constant {
-            VariedConstant::OfMechanics(place) => match self.stand.static_gain() {
-                None => ["inertia", "damping", "stiffness"][place].to_owned(),
-                Some(_) => ["natural frequency", "damping ratio", "stiffness"][place].to_owned(),
-            },
+            VariedConstant::OfMechanics(place) => {
+                match self.stand.mechanics.as_ref().map(|m| &m.given) {
+                    Some(Given::Constants { .. }) | None => {
+                        ["inertia", "damping", "stiffness"][place].to_owned()
+                    }
+                    Some(Given::Modal { .. }) => {
+                        ["natural frequency", "damping ratio", "stiffness"][place].to_owned()
+                    }
+                }
+            }
             VariedConstant::OfEffect(place, k) => {
                 let effect = &self.stand.effects[place];
                 format!(

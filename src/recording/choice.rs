@@ -26,7 +26,7 @@ const WIDE: usize = 300;
 const NAMED: usize = 20;
 
 /// The question whether a table of so many channels is transposed, if it looks like that.
-pub(super) fn transposed(columns: usize, rows: Option<usize>) -> Option<Failure> {
+pub(in crate::recording) fn transposed(columns: usize, rows: Option<usize>) -> Option<Failure> {
     let is_short = rows.is_none_or(|rows| 10 * rows < columns);
     (columns >= WIDE && is_short).then(|| {
         let rows = rows.map_or_else(String::new, |rows| format!("{} and ", plural(rows, "row")));

@@ -23,31 +23,7 @@ pub(super) fn read(
     choices: &[ChannelChoice],
     reading: &Reading,
 ) -> Result<Recording, Failure> {
-    let mut fields: Vec<FieldChoice> = choices.iter().map(|c| field(c, reading)).collect();
-    let options = times(reading);
-    let mut held;
-    let mut is_named = false;
-    let results = loop {
-        held = vec![(Vec::new(), Vec::new()); choices.len()];
-        let results = mcap::read_fields(input, &fields, &options, |number, times_ns, values| {
-            held[number].0.extend_from_slice(times_ns);
-            held[number].1.extend_from_slice(values);
-        })?;
-        if is_named || results.iter().all(Result::is_ok) {
-            break results;
-        }
-        is_named = true;
-        for ((field, choice), _) in fields
-            .iter_mut()
-            .zip(choices)
-            .zip(&results)
-            .filter(|(_, r)| r.is_err())
-        {
-            if let Some(found) = by_part(input, field, choice.flags.channel)? {
-                *field = found;
-            }
-        }
-    };
+    let (held, results) = read_chosen(input, choices, reading)?;
     let mut recording = Recording::empty("mcap", input.name());
     let origin_ns = held
         .iter()
@@ -93,6 +69,49 @@ pub(super) fn read(
         recording.keep(range).map_err(|f| f.at(input.name()))?;
     }
     Ok(recording)
+}
+
+/// Times and values of a number.
+type Held = (Vec<i64>, Vec<f64>);
+
+/// The numbers that are chosen, each with its times, and what is known of them. Where a name is none as it stands, it is
+/// looked for as a part of one.
+#[expect(clippy::type_complexity)]
+fn read_chosen(
+    input: &Input,
+    choices: &[ChannelChoice],
+    reading: &Reading,
+) -> Result<
+    (
+        Vec<Held>,
+        Vec<Result<(SelectedSignal, SignalSummary), Failure>>,
+    ),
+    Failure,
+> {
+    let mut fields: Vec<FieldChoice> = choices.iter().map(|c| field(c, reading)).collect();
+    let options = times(reading);
+    let read = |fields: &[FieldChoice]| {
+        let mut held: Vec<Held> = vec![Held::default(); choices.len()];
+        let results = mcap::read_fields(input, fields, &options, |number, times_ns, values| {
+            held[number].0.extend_from_slice(times_ns);
+            held[number].1.extend_from_slice(values);
+        })?;
+        Ok((held, results))
+    };
+    let (held, results) = read(&fields)?;
+    let mut is_other = false;
+    for ((field, choice), result) in fields.iter_mut().zip(choices).zip(&results) {
+        if result.is_err()
+            && let Some(found) = by_part(input, field, choice.flags.channel)?
+        {
+            *field = found;
+            is_other = true;
+        }
+    }
+    match is_other {
+        true => read(&fields),
+        false => Ok((held, results)),
+    }
 }
 
 /// Topic and field of a choice. Where a topic is given, a channel is named by the field alone.

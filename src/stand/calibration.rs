@@ -167,7 +167,11 @@ impl Stand {
             described: law.described,
             std: law.std,
             rated_n_m: self.rated_n_m(),
-            warnings: law.warnings,
+            warnings: law
+                .warnings
+                .into_iter()
+                .chain(scaled(channel.name))
+                .collect(),
         })
     }
 
@@ -217,6 +221,23 @@ impl Stand {
             warnings: Vec::new(),
         })
     }
+}
+
+/// A warning if the name of a channel ends with a scale, as `x10` or `*1000`.
+fn scaled(name: &str) -> Option<Warning> {
+    let last = name.rsplit(' ').next()?;
+    let digits = last.strip_prefix(['x', 'X', '×', '*', '/'])?;
+    let is_power =
+        digits.starts_with('1') && digits.len() > 1 && digits[1..].bytes().all(|b| b == b'0');
+    is_power.then(|| {
+        Warning::new(
+            "scale-in-heading",
+            format!(
+                "the heading of \"{name}\" ends with \"{last}\", which was not applied to the numbers: they were taken as they \
+                 are; if that is wrong, rename the column and scale it"
+            ),
+        )
+    })
 }
 
 /// The question for a unit.

@@ -250,7 +250,25 @@ fn own_std(section: &Section, estimate: &Estimate, common: f64) -> Result<Option
     Ok(Some((std * std - shared * shared).max(0.0).sqrt()))
 }
 
+/// Asks for a natural frequency in 1/s, which is one in Hz to some and an angular one to others.
+fn refuse_bare_rate(section: &Section) -> Result<(), Failure> {
+    let Some(text) = section.raw("natural_frequency")? else {
+        return Ok(());
+    };
+    let (number, unit) = text.trim().split_once(' ').unwrap_or_default();
+    match unit.replace([' ', '{', '}'], "").as_str() {
+        "1/s" | "/s" | "s^-1" | "s-1" | "s⁻¹" => Err(section.fail(
+            "natural_frequency",
+            format_args!(
+                "\"{text}\" can be read as cycles or as radians a second; write \"{number} Hz\" or \"{number} rad/s\""
+            ),
+        )),
+        _ => Ok(()),
+    }
+}
+
 fn modal_mechanics(section: &Section) -> Result<Mechanics, Failure> {
+    refuse_bare_rate(section)?;
     let natural_frequency = section.positive("natural_frequency", Kind::Frequency)?;
     let damping_ratio = section.not_negative("damping_ratio", Kind::Ratio)?;
     let static_gain = static_gain(section)?;

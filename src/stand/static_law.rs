@@ -181,11 +181,12 @@ impl Stand {
                 ]),
                 false => measured.relative_std,
             }),
-            warnings: is_other
-                .then(|| self.assumed_gain())
-                .flatten()
-                .into_iter()
-                .collect(),
+            warnings: match is_other {
+                true => self.assumed_gain(),
+                false => self.unused_gain(signal),
+            }
+            .into_iter()
+            .collect(),
             ..StaticLaw::of(conversion)?
         })
     }
@@ -240,6 +241,22 @@ impl Stand {
             .by_measured(measured, signal, scale, Some(0.0), UnitSystem::Si)
             .ok()?;
         Some((law.conversion.small_signal_gain(), law.std.known()))
+    }
+
+    /// A warning if a gain is given that a calibration of recorded volts does not need, and that nothing else uses.
+    fn unused_gain(&self, signal: TransducerSignal) -> Option<Warning> {
+        let gain = self.recorder.recorder.gain();
+        let is_unused = signal == TransducerSignal::Voltage && self.gage.is_none() && gain != 1.0;
+        is_unused.then(|| {
+            Warning::new(
+                "gain-not-used",
+                format!(
+                    "[calibration] of {} is torque per recorded volt, so that [recorder] gain = {gain} was not used; if it is per \
+                     volt of the bridge, divide it by the gain, and leave the gain out",
+                    self.file
+                ),
+            )
+        })
     }
 
     /// By beam, gage and bridge.

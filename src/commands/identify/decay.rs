@@ -101,11 +101,8 @@ fn load(args: &Decay, input: &str, recorded: &mut Recorded) -> Result<Loaded, Fa
         })
         .unzip();
     let values: Vec<f64> = values;
-    recorded.add(
-        input,
-        values.len(),
-        rate_hz.map(|hz| (hz, selection.rate_std_hz)),
-    );
+    let rate = rate_hz.map(|hz| (hz, selection.rate_std_hz));
+    recorded.add(input, values.len(), rate);
     let warnings = [recording.all_warnings(), selection.warnings].concat();
     recorded.warn(warnings, recording.lost.is_some());
     Ok(Loaded {

@@ -111,41 +111,6 @@ pub struct LeafReport {
     pub is_stamp: bool,
 }
 
-impl LeafReport {
-    /// Its path with the first item in place of lists and arrays: `poses[].c[9].x` is `poses[0].c[0].x`.
-    #[must_use]
-    pub fn first_item(&self) -> String {
-        let mut pieces = self.path.split('[');
-        let mut item = pieces.next().unwrap_or_default().to_owned();
-        for piece in pieces {
-            item.push_str("[0]");
-            item.push_str(piece.split_once(']').map_or("", |(_, behind)| behind));
-        }
-        item
-    }
-}
-
-impl ChannelReport {
-    /// The numbers that a part of a name can choose, as topic and field: those of lists only by the names of their items,
-    /// since without them any item could be meant.
-    #[must_use]
-    pub fn choosable(&self) -> Vec<[String; 2]> {
-        let one = |leaf: &LeafReport| -> Vec<String> {
-            match leaf.path.split_once('[') {
-                None => vec![leaf.path.clone()],
-                Some((list, behind)) => {
-                    let behind = behind.split_once(']').map_or("", |(_, behind)| behind);
-                    let named = |name: &String| format!("{list}[name={name}]{behind}");
-                    leaf.names.iter().map(named).collect()
-                }
-            }
-        };
-        let numbers = self.leaves.iter().filter(|leaf| !leaf.is_stamp);
-        let fields = numbers.flat_map(one);
-        fields.map(|field| [self.topic.clone(), field]).collect()
-    }
-}
-
 /// An attachment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AttachmentReport {

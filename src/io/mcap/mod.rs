@@ -19,6 +19,7 @@ mod attack_tests;
 mod blocks;
 pub mod cdr;
 mod channels;
+mod choosable;
 mod clock;
 pub mod decode;
 mod index;

@@ -4,6 +4,7 @@ use super::cell::Cell;
 use super::head::{Head, Table};
 use super::rows::ColumnKind;
 use crate::failure::Failure;
+use crate::recording::choice::transposed;
 use crate::recording::text::dialect::is_skipped;
 
 /// Most columns of text, as a part of all, in a table that is a recording.
@@ -31,6 +32,9 @@ pub fn refuse(head: &Head, table: &Table) -> Result<(), Failure> {
         .collect();
     let names: Vec<String> = rows.iter().filter_map(|row| row.first().cloned()).collect();
     if is_list_of_results(&read, &names) {
+        if let Some(question) = transposed(table.width, Some(rows.len())) {
+            return Err(question);
+        }
         return Err(Failure::failed(format_args!(
             "the file is a list of results, not a recording: each of its {} rows from line {} on has a \
              name of its own in the first column; expected rows of numbers, one row for each moment",

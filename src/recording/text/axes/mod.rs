@@ -240,9 +240,22 @@ impl Sources<'_> {
     }
 
     fn header_start(&self) -> Option<f64> {
-        self.entries
-            .iter()
-            .filter(|entry| entry.topic() == Some(keys::Topic::Start))
+        // "Start" alone may count samples, as Keysight's Infiniium has it beside "XOrg".
+        let is_bare = |entry: &&keys::Entry| {
+            entry
+                .key
+                .trim_end_matches(':')
+                .eq_ignore_ascii_case("start")
+        };
+        let starts = || {
+            self.entries
+                .iter()
+                .filter(|entry| entry.topic() == Some(keys::Topic::Start))
+        };
+        let mut ordered = starts()
+            .filter(|e| !is_bare(e))
+            .chain(starts().filter(is_bare));
+        ordered
             .find_map(|entry| keys::seconds(entry, None, self.decimal))
             .or_else(|| self.start_of_position())
     }

@@ -15,8 +15,10 @@ use crate::recording::Recording;
 mod gwinstek;
 mod lecroy;
 mod lvm;
+mod mathcad;
 mod names;
 mod rigol;
+mod rohde;
 mod tektronix;
 
 /// A way to write recordings.
@@ -43,6 +45,8 @@ const RULES: &[&[Rule]] = &[
     tektronix::ALL,
     rigol::ALL,
     gwinstek::ALL,
+    rohde::ALL,
+    mathcad::ALL,
     names::ALL,
 ];
 
