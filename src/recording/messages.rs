@@ -73,10 +73,11 @@ pub(super) fn read(
 
 /// Times and values of a number.
 type Held = (Vec<i64>, Vec<f64>);
+/// What was read of a number besides.
+type ReadNumber = Result<(SelectedSignal, SignalSummary), Failure>;
 
 /// The numbers that are chosen, each with its times, and what is known of them. Where a name is none as it stands, it is
 /// looked for as a part of one.
-#[expect(clippy::type_complexity)]
 fn read_chosen(
     input: &Input,
     choices: &[ChannelChoice],
