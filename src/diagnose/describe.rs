@@ -30,7 +30,7 @@ pub fn residual(
     let tests = &found.tests;
     let mut parts = Vec::new();
     if let Some(floor) = found.noise_floor {
-        let ratio = found.after.holdout_rms() / floor.rms;
+        let ratio = found.after.compared_rms() / floor.rms;
         parts.push(format!("{} times the noise floor", rounded(ratio, 3)));
     }
     parts.push(if tests.white { "white" } else { "not white" }.to_owned());

@@ -26,9 +26,9 @@ pub struct GuardModel {
     pub model: ScoredModel,
 }
 
-/// Minimum significance with which a guard model leaves less than an effect on the held-out records.
+/// Minimum significance with which a guard model leaves less than an effect.
 const LEAST_SIGNIFICANCE: f64 = 3.0;
-/// Minimum reduction of the criterion on all records from an effect to a guard model.
+/// Minimum reduction of the criterion from an effect to a guard model.
 const LEAST_REDUCTION: f64 = 20.0;
 /// Largest part of an effect's excess error power that a guard model may leave: a law that explains half of it is not its cause.
 const LEFT: f64 = 0.5;
@@ -52,7 +52,7 @@ impl GuardModel {
         let passing = fits
             .flatten()
             .filter(|model| refusal(model, &base.scored).is_none());
-        let model = passing.min_by(|a, b| a.pooled_criterion().total_cmp(&b.pooled_criterion()))?;
+        let model = passing.min_by(|a, b| a.criterion().total_cmp(&b.criterion()))?;
         if accepted.is_some_and(|accepted| !outdoes(&model, accepted, noise_rms)) {
             return None;
         }
@@ -70,9 +70,9 @@ impl GuardModel {
 
     /// Why a candidate is not accepted beside this law.
     pub fn instead_of(&self, candidate: &CandidateFit) -> Reason {
-        let error = candidate.model.as_ref().map(ScoredModel::holdout_rms);
+        let error = candidate.model.as_ref().map(ScoredModel::compared_rms);
         Reason::GuardModel {
-            ratio: error.unwrap_or(f64::INFINITY) / self.model.holdout_rms(),
+            ratio: error.unwrap_or(f64::INFINITY) / self.model.compared_rms(),
             law: self.effect.name,
             equation: self.equation,
         }
@@ -81,6 +81,6 @@ impl GuardModel {
 
 fn outdoes(guard: &ScoredModel, accepted: &ScoredModel, noise_rms: f64) -> bool {
     guard.against(accepted).significance() >= LEAST_SIGNIFICANCE
-        && guard.pooled_criterion() + LEAST_REDUCTION <= accepted.pooled_criterion()
+        && guard.criterion() + LEAST_REDUCTION <= accepted.criterion()
         && guard.excess_power(noise_rms) <= LEFT * accepted.excess_power(noise_rms)
 }

@@ -27,8 +27,8 @@ pub fn better_course(
         let changed = model.again(&changed[course])?;
         let helps = refusal(&changed, model).is_none()
             && changed.excess_power(noise_rms) <= LEFT * model.excess_power(noise_rms);
-        let criterion = changed.pooled_criterion();
-        (helps && criterion < last.pooled_criterion()).then_some((criterion, others[course]))
+        let criterion = changed.criterion();
+        (helps && criterion < last.criterion()).then_some((criterion, others[course]))
     });
     let found = found.into_iter().flatten();
     let best = found.min_by(|a, b| a.0.total_cmp(&b.0));

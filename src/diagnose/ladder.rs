@@ -82,8 +82,8 @@ impl ScoredModel {
         })
     }
 
-    fn holdout_sum(&self) -> f64 {
-        let samples = self.holdout_samples();
+    fn compared_sum(&self) -> f64 {
+        let samples = self.compared_samples();
         dot(&samples, &samples)
     }
 }
@@ -101,7 +101,7 @@ impl Ladder {
         if names.is_empty() {
             return Self::default();
         }
-        let explained = before.holdout_sum() - after.holdout_sum();
+        let explained = before.compared_sum() - after.compared_sum();
         let share = |(k, effect): (usize, &&'static str)| {
             let without = match names.len() {
                 1 => Some(before),
@@ -109,7 +109,7 @@ impl Ladder {
             };
             Some(EffectShare {
                 effect,
-                share: (without?.holdout_sum() - after.holdout_sum()) / explained,
+                share: (without?.compared_sum() - after.compared_sum()) / explained,
             })
         };
         Self {
@@ -168,9 +168,9 @@ fn correlations(
     if names.len() < 2 {
         return Vec::new();
     }
-    let residual = before.holdout_samples();
+    let residual = before.compared_samples();
     let change = |model: &Option<ScoredModel>| {
-        let left = model.as_ref()?.holdout_samples();
+        let left = model.as_ref()?.compared_samples();
         Some(residual.iter().zip(left).map(|(b, a)| b - a).collect())
     };
     let changes: Vec<Option<Vec<f64>>> = match without {

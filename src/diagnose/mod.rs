@@ -1,15 +1,18 @@
 //! Closing the loop: what the model leaves unexplained, the effect that causes it, and the error before and after.
 //!
-//! [`run`] fits the plain stand ([`plain`]), adds effects ([`search`]) as long as they explain enough ([`verdict`]), and makes
-//! the [`Diagnosis`] of what it found, which is the JSON document of `diagnose`.
+//! [`run`] fits the plain stand ([`plain`]), adds effects ([`search`]) as long as they explain enough of the training records,
+//! takes the errors of what it found on the held-out ones ([`judge`]), and makes the [`Diagnosis`] of that ([`verdict`]), which
+//! is the JSON document of `diagnose`.
 
 mod blocks;
 mod columns;
 mod declared;
 mod describe;
+mod exchange;
 mod fit;
 mod guard_models;
 mod intersample;
+mod judge;
 mod ladder;
 mod noise_floor;
 mod pairs;
@@ -79,7 +82,8 @@ pub struct Case {
     pub warnings: Vec<Warning>,
 }
 
-/// The state of a diagnosis with one course of the input between its samples.
+/// The state of a diagnosis with one course of the input between its samples. While it searches, it has no held-out
+/// records.
 struct SearchState {
     records: Records,
     /// The stand file as it is.
@@ -153,11 +157,13 @@ pub fn run(mut case: Case, workers: Workers) -> Result<Diagnosis, Failure> {
         plain,
         effects: &case.declared_effects,
     });
-    let look = |records: &Records| SearchState::with(records.clone(), &context, declared, workers);
-    let mut found = look(&case.records)?;
+    let training = case.records.training();
+    let look = |records: Records| SearchState::with(records, &context, declared, workers);
+    let mut found = look(training.clone())?;
     if let Some(between) = found.other_course(workers.threads) {
-        found = look(&case.records.with_between(between))?;
+        found = look(training.with_between(between))?;
     }
+    found.judge_on(&case.records, workers.threads)?;
     Ok(Diagnosis::of(case, found))
 }
 
@@ -171,7 +177,6 @@ impl SearchState {
     ) -> Result<Self, Failure> {
         let mut plain = plain::refine_plain(context.clone(), declared, &records.train)?;
         plain::set_starts(&plain, &mut records.train);
-        plain::set_starts(&plain, &mut records.holdout);
         plain.initial = records.train.iter().map(|r| r.initial).collect();
         let declared = declared.and_then(|declared| {
             let declared = FittedModel {
@@ -182,13 +187,13 @@ impl SearchState {
             ScoredModel::of(declared, &records)
         });
         let before = ScoredModel::of(plain, &records).ok_or_else(|| {
-            Failure::failed("the plain stand cannot be run on the held-out records")
+            Failure::failed("the plain stand cannot be run on the training records")
         })?;
         let tests = tests(&before);
         let mut found = Self {
             records,
             declared,
-            noise_floor: NoiseFloor::of(&before.holdout, &before.fitted.mode()),
+            noise_floor: NoiseFloor::of(&before.compared, &before.fitted.mode()),
             after: before.clone(),
             before,
             rounds: Vec::new(),
@@ -212,7 +217,7 @@ impl SearchState {
             old.is_some_and(|old| old.from == NoiseFloorSource::Periods && new.rms < old.rms)
         };
         let mode = self.before.fitted.mode();
-        let new = NoiseFloor::of_residuals(&self.after.holdout, &mode);
+        let new = NoiseFloor::of_residuals(&self.after.compared, &mode);
         if let Some(new) = new.filter(is_lower) {
             self.noise_floor = Some(new);
         }
@@ -237,12 +242,12 @@ impl SearchState {
     /// Lines that stand out of the residual after.
     fn lines(&self) -> Vec<SpectralLine> {
         let to_hz = 0.49 * self.records.rate_hz();
-        let mut lines = lines_of(&self.after.holdout, to_hz, MOST_LINES);
+        let mut lines = lines_of(&self.after.compared, to_hz, MOST_LINES);
         lines.retain(|line| line.prominence > PROMINENT);
         lines
     }
 }
 
 fn tests(model: &ScoredModel) -> ResidualTests {
-    ResidualTests::of(&model.holdout, &model.fitted.mode())
+    ResidualTests::of(&model.compared, &model.fitted.mode())
 }

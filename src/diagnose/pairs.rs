@@ -78,7 +78,7 @@ pub fn best_pairs(
     let mut scored: Vec<ScoredModel> = fits
         .filter_map(|fit| ScoredModel::of(fit, records))
         .collect();
-    scored.sort_by(|a, b| a.pooled_criterion().total_cmp(&b.pooled_criterion()));
+    scored.sort_by(|a, b| a.criterion().total_cmp(&b.criterion()));
     scored
 }
 

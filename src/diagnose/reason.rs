@@ -29,11 +29,11 @@ impl Status {
 pub enum Reason {
     /// No fit came about.
     NotFitted,
-    /// The hold-out error changes by this part.
+    /// The error changes by this part.
     NoReduction {
         change: f64,
     },
-    /// The hold-out error changes by this part.
+    /// The error changes by this part.
     NotSignificant {
         change: f64,
     },
@@ -48,7 +48,7 @@ pub enum Reason {
     CriterionNotLower,
     /// The best of all.
     Best,
-    /// Its hold-out error over that of the best.
+    /// Its error over that of the best.
     Worse {
         ratio: f64,
         best: String,
@@ -79,6 +79,12 @@ pub enum Reason {
     SmallPart {
         explained: f64,
     },
+    /// The hold-out error changes by this part only.
+    NotConfirmed {
+        change: f64,
+    },
+    /// Its motion diverges on the held-out records.
+    Diverges,
     NoneAccepted,
 }
 
@@ -99,14 +105,13 @@ impl Reason {
             }
             Self::NoReduction { change } => {
                 format!(
-                    "does not reduce the hold-out error (change: {})",
+                    "does not reduce the error (change: {})",
                     percent(*change)
                 )
             }
-            Self::NotSignificant { change } => format!(
-                "hold-out error changes by {}: not significant",
-                percent(*change)
-            ),
+            Self::NotSignificant { change } => {
+                format!("changes the error by {}: not significant", percent(*change))
+            }
             Self::SmallShare { share } => format!(
                 "explains only {} % of the residual power: too little to distinguish from other model errors",
                 rounded(100.0 * share, 2)
@@ -115,9 +120,9 @@ impl Reason {
                 format!("its {name} is not significantly different from zero")
             }
             Self::CriterionNotLower => "too small a gain for its extra parameters (BIC)".to_owned(),
-            Self::Best => "largest significant reduction of the hold-out error".to_owned(),
+            Self::Best => "largest significant reduction of the error".to_owned(),
             Self::Worse { ratio, best } => format!(
-                "improves the fit, but its hold-out error is {} times that of {best}",
+                "improves the fit, but its error is {} times that of {best}",
                 rounded(*ratio, 3)
             ),
             Self::MoreParameters { best } => {
@@ -140,12 +145,19 @@ impl Reason {
                 100.0 * rest
             ),
             Self::Needless { others } => format!(
-                "not needed: the hold-out error of {others} without it is not significantly larger"
+                "not needed: the error of {others} without it is not significantly larger"
             ),
             Self::SmallPart { explained } => format!(
                 "improves the fit, but explains only {:.0} % of the error above the noise: the main cause is something else",
                 100.0 * explained.max(0.0)
             ),
+            Self::NotConfirmed { change } => format!(
+                "reduces the error of the training records, but that of the held-out ones changes by {} only: not confirmed",
+                percent(*change)
+            ),
+            Self::Diverges => {
+                "the motion that it gives diverges on the held-out records".to_owned()
+            }
             Self::NoneAccepted => "no effect is accepted".to_owned(),
         }
     }
@@ -154,7 +166,7 @@ impl Reason {
 /// An effect behind a law that is not in the list.
 fn beside_the_list(ratio: f64, law: &str, equation: &str) -> String {
     format!(
-        "improves the fit, but its hold-out error is {} times that of {law} ({equation}), a law that is not in the list of \
+        "improves the fit, but its error is {} times that of {law} ({equation}), a law that is not in the list of \
          effects",
         rounded(ratio, 3)
     )

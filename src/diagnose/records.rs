@@ -9,7 +9,9 @@ use super::structure::PlainStand;
 
 #[derive(Clone)]
 pub struct Records {
+    /// Models are fitted to these and chosen by them.
     pub train: Vec<StandRecord>,
+    /// The errors that are reported are taken on these. None while something is chosen.
     pub holdout: Vec<StandRecord>,
 }
 
@@ -37,6 +39,14 @@ impl Records {
             rest.range = cut..count;
             record.range.end = cut;
             self.holdout.push(rest);
+        }
+    }
+
+    /// The training records alone: while something is chosen, nothing is held out.
+    pub fn training(&self) -> Self {
+        Self {
+            train: self.train.clone(),
+            holdout: Vec::new(),
         }
     }
 

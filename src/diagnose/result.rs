@@ -196,7 +196,7 @@ impl ErrorTable {
         let size = holdout_rms(before);
         let errors = |model: &ScoredModel| ModelErrors {
             rms: model.errors(),
-            holdout_relative: model.holdout_rms() / size,
+            holdout_relative: model.compared_rms() / size,
         };
         let has_effects = !after.effect_names().is_empty();
         Self {
@@ -214,7 +214,7 @@ impl ErrorTable {
 /// Rms of the held-out records about their means, nuisance terms removed.
 fn holdout_rms(before: &ScoredModel) -> f64 {
     let (mut sum, mut count) = (0.0, 0_usize);
-    for residual in &before.holdout {
+    for residual in before.compared.iter() {
         let pairs = residual.modelled.iter().zip(&residual.samples);
         let y: Vec<f64> = pairs.map(|(m, r)| m + r).collect();
         let mean = y.iter().sum::<f64>() / y.len() as f64;

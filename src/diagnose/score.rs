@@ -1,4 +1,5 @@
-//! Models with their errors on the training and on the held-out records.
+//! Models with their errors on the records on which they are compared: the training records while something is chosen, the
+//! held-out ones in the report.
 
 use std::sync::Arc;
 
@@ -17,9 +18,9 @@ use super::structure::EffectForm;
 pub struct ScoredModel {
     pub fitted: FittedModel,
     /// Residuals on the training records.
-    pub train: Vec<RecordResidual>,
-    /// Residuals on the held-out records.
-    pub holdout: Vec<RecordResidual>,
+    pub train: Arc<[RecordResidual]>,
+    /// Residuals on the records on which models are compared: these, or the held-out ones if the records have any.
+    pub compared: Arc<[RecordResidual]>,
 }
 
 /// A parameter of an effect, as it is reported.
@@ -44,7 +45,7 @@ pub struct RmsErrors {
 const SIGNIFICANT: f64 = 3.0;
 /// A repeated fit with a finer step of integration or another course of the input.
 const REPEATED_FIT: FitEffort = FitEffort::full(6);
-/// Change of a record with half the step of integration, over the hold-out rms, above which the step is halved.
+/// Change of a record with half the step of integration, over the rms of the residual, above which the step is halved.
 const STEP_ERROR: f64 = 0.1;
 /// Most steps of integration, over those of the stand without effects: a listed effect needs one to four of them, a law that
 /// imitates something else (a hard stop, say) does not converge.
@@ -55,21 +56,33 @@ impl ScoredModel {
     pub fn of(fitted: FittedModel, records: &Records) -> Option<Self> {
         let train = fitted.with_initial_states(&records.train);
         let train = train.iter().map(|record| fitted.residual(record));
-        let train = train.collect::<Option<Vec<_>>>()?;
-        let holdout = records.holdout.iter().map(|record| {
+        let train: Arc<[_]> = train.collect::<Option<Vec<_>>>()?.into();
+        let trained = Self {
+            fitted,
+            compared: train.clone(),
+            train,
+        };
+        match records.holdout.is_empty() {
+            true => Some(trained),
+            false => trained.compared_on_holdout(records),
+        }
+    }
+
+    /// The same model with its residuals on the held-out records; `None` if the motion diverges on one of them.
+    pub fn compared_on_holdout(mut self, records: &Records) -> Option<Self> {
+        let residuals = records.holdout.iter().map(|record| {
             // A part of a training record starts where that record starts.
             let mut whole = records.train.iter();
             match whole.position(|t| Arc::ptr_eq(&t.input, &record.input)) {
-                Some(k) => fitted.residual(&record.starting_from(fitted.initial[k])),
-                None => fitted.residual(record),
+                Some(k) => {
+                    let initial = self.fitted.initial[k];
+                    self.fitted.residual(&record.starting_from(initial))
+                }
+                None => self.fitted.residual(record),
             }
         });
-        let holdout = holdout.collect::<Option<Vec<_>>>()?;
-        Some(Self {
-            fitted,
-            train,
-            holdout,
-        })
+        self.compared = residuals.collect::<Option<Vec<_>>>()?.into();
+        Some(self)
     }
 
     /// The same model fitted again, with the step and the course of the input that the records have now.
@@ -85,7 +98,7 @@ impl ScoredModel {
             let Some(change) = self.fitted.step_change(&records.train[0]) else {
                 return (self, false);
             };
-            if change <= STEP_ERROR * self.holdout_rms() {
+            if change <= STEP_ERROR * self.compared_rms() {
                 break;
             }
             let steps = 2 * records.substeps();
@@ -105,8 +118,8 @@ impl ScoredModel {
         rms(&self.train)
     }
 
-    pub fn holdout_rms(&self) -> f64 {
-        rms(&self.holdout)
+    pub fn compared_rms(&self) -> f64 {
+        rms(&self.compared)
     }
 
     /// Errors in the printed unit.
@@ -114,18 +127,18 @@ impl ScoredModel {
         let unit = self.fitted.structure.context.units.per_printed;
         RmsErrors {
             train_rms: self.train_rms() / unit,
-            holdout_rms: self.holdout_rms() / unit,
+            holdout_rms: self.compared_rms() / unit,
         }
     }
 
-    /// Mean square on the held-out records above that of the noise.
+    /// Mean square of the compared residuals above that of the noise.
     pub fn excess_power(&self, noise_rms: f64) -> f64 {
-        self.holdout_rms().powi(2) - noise_rms.powi(2)
+        self.compared_rms().powi(2) - noise_rms.powi(2)
     }
 
-    /// All held-out residuals, one after the other.
-    pub fn holdout_samples(&self) -> Vec<f64> {
-        let all = self.holdout.iter().map(|r| r.samples.as_slice());
+    /// All compared residuals, one after the other.
+    pub fn compared_samples(&self) -> Vec<f64> {
+        let all = self.compared.iter().map(|r| r.samples.as_slice());
         all.collect::<Vec<_>>().concat()
     }
 
@@ -153,22 +166,16 @@ impl ScoredModel {
             .map(|(_, p)| p.name)
     }
 
-    /// Comparison with another model on the held-out records.
+    /// Comparison with another model.
     pub fn against(&self, before: &Self) -> Comparison {
-        compare(&before.holdout_samples(), &self.holdout_samples())
+        compare(&before.compared_samples(), &self.compared_samples())
     }
 
     /// Bayesian information criterion on the training records, less a constant: smaller is better
     /// (G. Schwarz, Ann. Stat. 6 (1978), 461).
     pub fn criterion(&self) -> f64 {
-        let (fit, n) = likelihood(&self.train);
-        fit + self.parameter_count() as f64 * n.ln()
-    }
-
-    /// The same on all records.
-    pub fn pooled_criterion(&self) -> f64 {
-        let ((train, n), (holdout, m)) = (likelihood(&self.train), likelihood(&self.holdout));
-        train + holdout + self.parameter_count() as f64 * (n + m).ln()
+        let n = self.train.iter().map(|r| r.samples.len()).sum::<usize>() as f64;
+        2.0 * n * self.train_rms().ln() + self.parameter_count() as f64 * n.ln()
     }
 
     /// Names of the effects that were added to those of the stand file.
@@ -227,12 +234,6 @@ impl ScoredModel {
     pub fn last_parameters(&self) -> Vec<EffectParameter> {
         self.parameters().pop().unwrap_or_default()
     }
-}
-
-/// `n ln s²`, twice the negative log-likelihood of normal residuals less a constant, and `n`.
-fn likelihood(residuals: &[RecordResidual]) -> (f64, f64) {
-    let n = residuals.iter().map(|r| r.samples.len()).sum::<usize>() as f64;
-    (2.0 * n * rms(residuals).ln(), n)
 }
 
 fn rms(residuals: &[RecordResidual]) -> f64 {

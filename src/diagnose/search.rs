@@ -1,4 +1,4 @@
-//! The search: every effect is fitted, the best is accepted if it reduces the hold-out error significantly.
+//! The search: every effect is fitted, the best is accepted if it reduces the error significantly.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -46,19 +46,19 @@ pub struct Workers<'p> {
     pub progress: &'p (dyn Fn(usize, usize) + Sync),
 }
 
-/// Minimum reduction of the hold-out sum of squares, in residual variances.
+/// Minimum reduction of the sum of squares, in residual variances.
 const LEAST_GAIN: f64 = 40.0;
-/// Minimum relative reduction of the hold-out sum of squares.
+/// Minimum relative reduction of the sum of squares.
 const LEAST_SHARE: f64 = 0.005;
-/// Minimum significance of the reduction over the blocks of the held-out records.
+/// Minimum significance of the reduction over the blocks of the records.
 const LEAST_SIGNIFICANCE: f64 = 3.0;
 /// Significance up to which one effect counts as no better than another.
 const TIED_SIGNIFICANCE: f64 = 2.33;
-/// Reduction of the hold-out sum of squares, in residual variances, up to which one effect counts as no better than
+/// Reduction of the sum of squares, in residual variances, up to which one effect counts as no better than
 /// another.
 const TIED_GAIN: f64 = 9.0;
-/// Difference of the criterion on all records that counts as none.
-const SAME: f64 = 4.0;
+/// Difference of the criterion that counts as none.
+pub const SAME: f64 = 4.0;
 /// Lines of the residual's spectrum that may be that of a shaft.
 const LINES: usize = 3;
 /// Minimum power of such a line over the spectrum around it.
@@ -157,7 +157,7 @@ impl CandidateFit {
             form: last.map(|e| e.form.name),
             with: base.effect_names(),
             train_rms: errors.map(|e| e.train_rms),
-            holdout_rms: errors.map(|e| e.holdout_rms),
+            holdout_rms: None,
             p_value: None,
             parameters: model
                 .as_ref()
@@ -293,12 +293,12 @@ pub fn refusal(model: &ScoredModel, before: &ScoredModel) -> Option<Reason> {
     (model.criterion() >= before.criterion()).then_some(Reason::CriterionNotLower)
 }
 
-/// Why a model is not better on the held-out records than one with less in it.
+/// Why a model is not better than one with less in it.
 pub fn no_gain(model: &ScoredModel, before: &ScoredModel) -> Option<Reason> {
     let comparison = model.against(before);
-    let (gain, variance) = (comparison.gain(), model.holdout_rms().powi(2));
-    let total = before.holdout_rms().powi(2) * before.holdout_samples().len() as f64;
-    let change = model.holdout_rms() / before.holdout_rms() - 1.0;
+    let (gain, variance) = (comparison.gain(), model.compared_rms().powi(2));
+    let total = before.compared_rms().powi(2) * before.compared_samples().len() as f64;
+    let change = model.compared_rms() / before.compared_rms() - 1.0;
     if gain <= 0.0 {
         return Some(Reason::NoReduction { change });
     }
@@ -317,12 +317,9 @@ fn decide(tried: &mut [CandidateFit]) {
     let passing: Vec<usize> = (0..tried.len())
         .filter(|k| tried[*k].reason == Reason::Best)
         .collect();
-    let error = |k: &usize| {
-        let model = tried[*k].model.as_ref();
-        model.map_or(f64::INFINITY, ScoredModel::holdout_rms)
-    };
-    let by_error = |a: &usize, b: &usize| error(a).total_cmp(&error(b));
-    let Some(best) = passing.iter().copied().min_by(by_error) else {
+    let best = passing.iter().copied();
+    let Some(best) = best.min_by(|a, b| criterion(tried, *a).total_cmp(&criterion(tried, *b)))
+    else {
         return;
     };
     let tied: Vec<usize> = passing
@@ -347,20 +344,23 @@ fn is_tied(tried: &[CandidateFit], k: usize, best: usize) -> bool {
     let comparison = other.against(one);
     k == best
         || comparison.significance() < TIED_SIGNIFICANCE
-        || comparison.gain() < TIED_GAIN * other.holdout_rms().powi(2)
+        || comparison.gain() < TIED_GAIN * other.compared_rms().powi(2)
 }
 
-/// Of effects that the held-out records cannot distinguish: the one with the smallest criterion on all records, which
-/// penalises parameters; of those close to it, the one that comes first in the list. So a line at the mains frequency
-/// is mains pickup rather than a shaft that happens to turn so fast, and a lag without a corner is a delay.
+/// Of effects that the records cannot distinguish: the one with the smallest criterion, which penalises parameters; of
+/// those close to it, the one that comes first in the list. So a line at the mains frequency is mains pickup rather than a
+/// shaft that happens to turn so fast, and a lag without a corner is a delay.
 fn simplest(tried: &[CandidateFit], tied: &[usize]) -> Option<usize> {
-    let criterion = |k: &usize| {
-        let model = tried[*k].model.as_ref();
-        model.map_or(f64::INFINITY, ScoredModel::pooled_criterion)
-    };
-    let least = tied.iter().map(criterion).fold(f64::INFINITY, f64::min);
+    let least = tied.iter().map(|k| criterion(tried, *k));
+    let least = least.fold(f64::INFINITY, f64::min);
     // The candidates are in the order of the list.
-    tied.iter().copied().find(|k| criterion(k) <= least + SAME)
+    let mut tied = tied.iter().copied();
+    tied.find(|k| criterion(tried, *k) <= least + SAME)
+}
+
+fn criterion(tried: &[CandidateFit], k: usize) -> f64 {
+    let model = tried[k].model.as_ref();
+    model.map_or(f64::INFINITY, ScoredModel::criterion)
 }
 
 /// Why a candidate that passes is not the accepted one.
@@ -368,7 +368,7 @@ fn behind(other: &CandidateFit, chosen: &CandidateFit, is_tied: bool) -> Option<
     let (model, accepted) = (other.model.as_ref()?, chosen.model.as_ref()?);
     let best = chosen.effect.name;
     let reason = if !is_tied {
-        let ratio = model.holdout_rms() / accepted.holdout_rms();
+        let ratio = model.compared_rms() / accepted.compared_rms();
         let best = best.to_owned();
         Reason::Worse { ratio, best }
     } else if model.parameter_count() > accepted.parameter_count() {

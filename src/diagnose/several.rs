@@ -2,8 +2,8 @@
 //! laws beside the list may speak against what is left.
 
 use super::SearchState;
+use super::exchange::MANY;
 use super::guard_models::GuardModel;
-use super::ladder::Ladder;
 use super::noise_floor::NoiseFloorSource;
 use super::pairs::best_pairs;
 use super::reason::{Reason, Status};
@@ -43,24 +43,22 @@ impl SearchState {
         for start in starts.iter().take(WAYS) {
             let beats = |best: &Way| {
                 let is_open = remains(&best.after, &best.tests, self.noise_floor);
-                is_open || start.pooled_criterion() < best.after.pooled_criterion()
+                is_open || start.criterion() < best.after.criterion()
             };
             if !best.as_ref().is_none_or(beats) {
                 continue;
             }
             let way = self.follow(start, coarse, workers);
-            let criterion = way.after.pooled_criterion();
+            let criterion = way.after.criterion();
             if best
                 .as_ref()
-                .is_none_or(|best| criterion < best.after.pooled_criterion())
+                .is_none_or(|best| criterion < best.after.criterion())
             {
                 best = Some(way);
             }
         }
         let without = best.map_or_else(Vec::new, |way| self.arrive(way));
-        let without = self.ask_guards(&base, without, workers);
-        let threads = workers.threads;
-        self.ladder = Ladder::of(&self.after, &self.before, without, &self.records, threads);
+        self.ask_guards(&base, &without, workers);
     }
 
     /// Where ways begin: with the best effect, with the best pair if that explains more; that first if the best effect is in no
@@ -70,7 +68,9 @@ impl SearchState {
         let tests = single.map(super::tests);
         let best = single.zip(tests.as_ref());
         let (model, tests) = best.unwrap_or((&self.before, &self.tests_before));
-        if !self.is_worthwhile(model, tests) {
+        // An effect with many parameters may imitate two others.
+        let is_simple = single.is_none_or(|m| m.fitted.structure.added()[0].moved() < MANY);
+        if is_simple && !self.is_worthwhile(model, tests) {
             return single.cloned().into_iter().collect();
         }
         let mut starts = best_pairs(base, &round.fits, &self.records, workers);
@@ -85,13 +85,22 @@ impl SearchState {
         starts
     }
 
-    /// Follows one way from its start: further effects, then without those that are not needed.
+    /// Follows one way from its start: further effects, then others in their place, and without those that are not needed.
     fn follow(&mut self, start: &ScoredModel, coarse: usize, workers: Workers) -> Way {
         let rounds = self.rounds.clone();
         self.path.clear();
         self.take(start, coarse);
         while self.has_room() && self.add_another(coarse, workers) {}
-        let without = self.eliminate(workers.threads);
+        let mut without = self.eliminate(workers.threads);
+        let others = self.exchange(&without, coarse, workers);
+        if let Some(others) = others {
+            without = others;
+            // What only resembled one of them is gone: what it hid may show now.
+            if self.has_room() && self.add_another(coarse, workers) {
+                while self.has_room() && self.add_another(coarse, workers) {}
+                without = self.eliminate(workers.threads);
+            }
+        }
         Way {
             after: self.after.clone(),
             tests: self.tests.clone(),
@@ -131,7 +140,7 @@ impl SearchState {
     }
 
     /// Makes a model the one with the effects found so far.
-    fn take(&mut self, next: &ScoredModel, coarse: usize) {
+    pub(super) fn take(&mut self, next: &ScoredModel, coarse: usize) {
         (self.after, self.settled) = next.clone().refine_step(&mut self.records, coarse);
         self.tests = super::tests(&self.after);
         self.path.push(self.after.clone());
@@ -151,12 +160,12 @@ impl SearchState {
         let floor = self.noise_floor;
         let of_periods = floor.filter(|floor| floor.from == NoiseFloorSource::Periods);
         let is_at_floor =
-            of_periods.is_some_and(|floor| model.holdout_rms() <= ALL_NOISE * floor.rms);
+            of_periods.is_some_and(|floor| model.compared_rms() <= ALL_NOISE * floor.rms);
         remains(model, tests, floor) || !is_noise && !is_at_floor
     }
 
     /// Takes out again what is not needed; the model without each of the effects that are left.
-    fn eliminate(&mut self, threads: usize) -> Vec<Option<ScoredModel>> {
+    pub(super) fn eliminate(&mut self, threads: usize) -> Vec<Option<ScoredModel>> {
         while self.after.effect_names().len() > 1 {
             let mut without = self.after.without_each(&self.records, threads);
             let Some(k) = self.needless(&without) else {
@@ -195,14 +204,14 @@ impl SearchState {
         least.map(|(k, _)| k)
     }
 
-    /// Asks laws beside the list whether they explain more: than all effects, than the last of several, and beside all.
-    /// The model without each of the effects that are left.
+    /// Asks laws beside the list whether they explain more: than all effects, than each of several, and beside all.
+    /// `without` is the model without each of its effects.
     fn ask_guards(
         &mut self,
         base: &BaseModel,
-        mut without: Vec<Option<ScoredModel>>,
+        without: &[Option<ScoredModel>],
         workers: Workers,
-    ) -> Vec<Option<ScoredModel>> {
+    ) {
         let noise_rms = noise_rms(self.noise_floor);
         let count = self.after.effect_names().len();
         let is_left = remains(&self.after, &self.tests, self.noise_floor);
@@ -217,27 +226,20 @@ impl SearchState {
         };
         if let Some(guard) = instead {
             self.withdraw(guard, self.before.clone());
-            return Vec::new();
+            return;
         }
         if count > 1 && is_left {
-            for k in 0..without.len() {
-                let Some(less) = &without[k] else { continue };
+            for less in without.iter().flatten() {
                 let beside = BaseModel::of(less.clone(), records);
                 if let Some(guard) = ask(&beside, Some(&self.after)) {
-                    let less = less.clone();
-                    self.withdraw(guard, less);
-                    without = match count {
-                        2 => Vec::new(),
-                        _ => self.after.without_each(&self.records, workers.threads),
-                    };
-                    return without;
+                    self.withdraw(guard, less.clone());
+                    return;
                 }
             }
         }
         if count > 0 && is_left {
             self.suspected = ask(&BaseModel::of(self.after.clone(), records), None);
         }
-        without
     }
 
     /// Goes back to a model with fewer effects, as a law beside the list explains more than the others.
@@ -265,7 +267,7 @@ impl SearchState {
     /// Brings the candidates in line with the effects that were added in the end.
     pub(super) fn settle_candidates(&mut self) {
         let names = self.after.effect_names();
-        let left = self.after.holdout_rms();
+        let left = self.after.compared_rms();
         let all = names.join(" + ");
         for candidate in self.rounds.iter_mut().flatten() {
             let is_stale = match &candidate.reason {
@@ -277,7 +279,7 @@ impl SearchState {
             };
             if let Some(model) = candidate.model.as_ref().filter(|_| is_stale) {
                 candidate.reason = Reason::Worse {
-                    ratio: model.holdout_rms() / left,
+                    ratio: model.compared_rms() / left,
                     best: all.clone(),
                 };
             }

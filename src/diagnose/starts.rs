@@ -104,7 +104,7 @@ fn evaluate(
     let (model, terms) = structure.model(&values);
     let reference = structure.context.plain.mode();
     let (mut left, mut along, mut size) = (0.0, 0.0, 0.0);
-    let residuals = training.iter().zip(&base.scored.train);
+    let residuals = training.iter().zip(base.scored.train.iter());
     let slopes = base.slopes.iter().zip(&base.nuisance);
     for ((record, before), (slopes, nuisance)) in residuals.zip(slopes) {
         if terms.disturb() {

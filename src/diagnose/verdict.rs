@@ -59,7 +59,7 @@ impl PlainExcess<'_> {
     /// Part of the plain stand's excess error power by which one model is better than another.
     fn share(&self, from: &ScoredModel, to: &ScoredModel) -> f64 {
         let excess = self.before.excess_power(noise_rms(self.noise_floor));
-        (from.holdout_rms().powi(2) - to.holdout_rms().powi(2)) / excess.max(1e-300)
+        (from.compared_rms().powi(2) - to.compared_rms().powi(2)) / excess.max(1e-300)
     }
 
     /// Part of it that a model explains.
@@ -71,7 +71,7 @@ impl PlainExcess<'_> {
     /// no model describes exactly resembles many effects a little.
     pub fn is_too_small(&self, after: &ScoredModel, next: &ScoredModel) -> bool {
         let left = after.excess_power(noise_rms(self.noise_floor));
-        let gain = after.holdout_rms().powi(2) - next.holdout_rms().powi(2);
+        let gain = after.compared_rms().powi(2) - next.compared_rms().powi(2);
         self.share(after, next) < SECOND && gain < MOST_OF_REST * left
     }
 
@@ -101,7 +101,7 @@ pub fn remains(model: &ScoredModel, tests: &ResidualTests, floor: Option<NoiseFl
     let Some(floor) = floor else {
         return is_dependent;
     };
-    let ratio = model.holdout_rms() / floor.rms;
+    let ratio = model.compared_rms() / floor.rms;
     let is_enough = match floor.from {
         NoiseFloorSource::Periods => true,
         NoiseFloorSource::OutOfBand => is_dependent || ratio > FAR_ABOVE && !tests.white,
@@ -118,7 +118,7 @@ impl SearchState {
 
     /// Whether the residual after is above the noise, coloured, and depends on the input, small as it may be.
     fn follows_input(&self) -> bool {
-        let error = self.after.holdout_rms();
+        let error = self.after.compared_rms();
         let is_above = self.noise_floor.is_some_and(|f| error > ABOVE * f.rms);
         is_above && !self.tests.white && !self.tests.independent_of_input
     }
@@ -128,7 +128,8 @@ impl SearchState {
         let is_suspected = self.suspected.is_some();
         let is_left = !self.settled || is_suspected || self.leaves(&self.after, &self.tests);
         if self.after.effect_names().is_empty() {
-            let is_missing = is_suspected || self.leaves(&self.before, &self.tests_before);
+            let is_left = self.leaves(&self.before, &self.tests_before);
+            let is_missing = is_suspected || is_left || self.is_refuted();
             return match is_missing {
                 true => Verdict::Unexplained,
                 false => Verdict::NothingMissing,
@@ -137,7 +138,7 @@ impl SearchState {
         let explained = self.excess().explained(&self.after);
         let is_known = self.noise_floor.is_some_and(|floor| {
             floor.from == NoiseFloorSource::Periods
-                && self.before.holdout_rms() > CLEARLY_ABOVE * floor.rms
+                && self.before.compared_rms() > CLEARLY_ABOVE * floor.rms
         });
         if explained >= NAMED || !is_left && !is_known {
             return match is_left || self.follows_input() {

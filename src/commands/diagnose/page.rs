@@ -107,7 +107,7 @@ impl Draft<'_> {
         };
         let before = &self.diagnosis.before;
         rows.extend(before.train.iter().map(|r| row(r, "training")));
-        rows.extend(before.holdout.iter().map(|r| row(r, "held out")));
+        rows.extend(before.compared.iter().map(|r| row(r, "held out")));
         self.page.table(&rows);
     }
 
@@ -118,9 +118,9 @@ impl Draft<'_> {
 
     /// The models that are drawn, with their residuals on the held-out records: without an accepted effect, after is before.
     fn models(&self) -> Vec<(&'static str, &[RecordResidual])> {
-        let mut models = vec![("before", &self.diagnosis.before.holdout[..])];
+        let mut models = vec![("before", &self.diagnosis.before.compared[..])];
         if !self.diagnosis.effects.is_empty() {
-            models.push(("after", &self.diagnosis.after.holdout));
+            models.push(("after", &self.diagnosis.after.compared));
         }
         models
     }
@@ -133,7 +133,7 @@ impl Draft<'_> {
 
     fn models_over_time(&mut self) {
         self.page.heading("Measured and modelled, held out");
-        let before = &self.diagnosis.before.holdout;
+        let before = &self.diagnosis.before.compared;
         let worst = (0..before.len()).max_by(|a, b| before[*a].rms().total_cmp(&before[*b].rms()));
         let Some((k, worst)) = worst.map(|k| (k, &before[k])) else {
             return;
@@ -161,7 +161,7 @@ impl Draft<'_> {
 
     fn responses(&mut self) {
         let measured = |r: &RecordResidual| r.record.measured_in_range().to_vec();
-        let (x, y) = response(&self.diagnosis.before.holdout, measured);
+        let (x, y) = response(&self.diagnosis.before.compared, measured);
         let mut series = vec![self.line("measured", &x, &y)];
         series.extend(self.models().into_iter().map(|(name, residuals)| {
             let (x, y) = response(residuals, RecordResidual::prediction);
@@ -178,7 +178,7 @@ impl Draft<'_> {
 
     fn residuals(&mut self) {
         self.page.heading("Residual, held out");
-        for (k, first) in self.diagnosis.before.holdout.iter().enumerate() {
+        for (k, first) in self.diagnosis.before.compared.iter().enumerate() {
             let times_s = first.times_s();
             let chart = self.of_residuals(
                 &file_name(&first.record.source),
@@ -229,7 +229,7 @@ impl Draft<'_> {
     /// Density of white noise that has the power of the noise floor.
     fn noise_floor(&self) -> Option<Series> {
         let rms = self.diagnosis.error.noise_floor_rms?;
-        let holdout = &self.diagnosis.before.holdout;
+        let holdout = &self.diagnosis.before.compared;
         let rate_hz = holdout.first()?.record.rate_hz();
         let (x, _) = density(holdout);
         let level = rms * (2.0 / rate_hz).sqrt();
@@ -240,7 +240,7 @@ impl Draft<'_> {
     fn autocorrelation(&self) -> Chart {
         let title = "Autocorrelation; within the band: white at 99 %";
         let labels = ["lag, samples", "autocorrelation, no unit"];
-        let (shares, bound) = autocorrelation(&self.diagnosis.before.holdout, LAGS);
+        let (shares, bound) = autocorrelation(&self.diagnosis.before.compared, LAGS);
         let lags: Vec<f64> = (0..shares.len()).map(|lag| lag as f64).collect();
         Chart {
             band: lags.iter().map(|lag| (*lag, -bound, bound)).collect(),
@@ -253,7 +253,7 @@ impl Draft<'_> {
     /// Residuals over the displacement or speed in the model.
     fn over_motion(&self, axis: MotionAxis, name: &str, per: &str) -> Chart {
         let bins = |residuals: &[RecordResidual]| {
-            let mut bins = binned(residuals, &self.diagnosis.after.holdout, axis);
+            let mut bins = binned(residuals, &self.diagnosis.after.compared, axis);
             for bin in &mut bins {
                 for number in [&mut bin.motion, &mut bin.mean, &mut bin.std] {
                     *number /= self.per_printed;
@@ -263,7 +263,7 @@ impl Draft<'_> {
         };
         let title = format!("Over {name}: mean in each bin; band: before ± two standard errors");
         let x_label = format!("modelled {name}, {}{per}", self.unit);
-        let band = bins(&self.diagnosis.before.holdout).into_iter();
+        let band = bins(&self.diagnosis.before.compared).into_iter();
         let band = band.map(|b| (b.motion, b.mean - 2.0 * b.std, b.mean + 2.0 * b.std));
         Chart {
             band: band.collect(),

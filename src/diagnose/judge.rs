@@ -1,0 +1,90 @@
+//! The errors on the held-out records. Everything was chosen by the training records; what the others do not show goes again.
+
+use super::SearchState;
+use super::ladder::Ladder;
+use super::noise_floor::NoiseFloor;
+use super::plain::set_starts;
+use super::reason::{Reason, Status};
+use super::records::Records;
+use super::score::ScoredModel;
+use super::search::{CandidateFit, no_gain};
+use crate::failure::Failure;
+use crate::parallel::parallel;
+
+impl SearchState {
+    /// Takes the errors of all models on the held-out records of a case, and takes out the effects that these do not show.
+    ///
+    /// # Errors
+    /// If the plain stand cannot be run on them.
+    pub(super) fn judge_on(&mut self, case: &Records, threads: usize) -> Result<(), Failure> {
+        let substeps = self.records.substeps();
+        self.records = case.with_between(self.records.between());
+        self.records.set_substeps(substeps);
+        set_starts(&self.before.fitted, &mut self.records.train);
+        set_starts(&self.before.fitted, &mut self.records.holdout);
+        self.before = self.held_out(&self.before).ok_or_else(|| {
+            Failure::failed("the plain stand cannot be run on the held-out records")
+        })?;
+        self.declared = self.declared.as_ref().and_then(|m| self.held_out(m));
+        self.judge_candidates(threads);
+        self.suspected = self.suspected.take().and_then(|mut guard| {
+            guard.model = self.held_out(&guard.model)?;
+            guard.errors = guard.model.errors();
+            Some(guard)
+        });
+        self.noise_floor = NoiseFloor::of(&self.before.compared, &self.before.fitted.mode());
+        self.tests_before = super::tests(&self.before);
+        match self.held_out(&self.after) {
+            Some(after) => self.after = after,
+            None => self.drop_all(&Reason::Diverges),
+        }
+        self.tests = super::tests(&self.after);
+        self.lower_noise_floor();
+        let without = self.confirm(threads);
+        self.ladder = Ladder::of(&self.after, &self.before, without, &self.records, threads);
+        Ok(())
+    }
+
+    fn held_out(&self, model: &ScoredModel) -> Option<ScoredModel> {
+        model.clone().compared_on_holdout(&self.records)
+    }
+
+    /// The errors of all candidates.
+    fn judge_candidates(&mut self, threads: usize) {
+        let all: Vec<&CandidateFit> = self.rounds.iter().flatten().collect();
+        let judged = parallel(all.len(), threads, |k| self.held_out(all[k].model.as_ref()?));
+        for (candidate, model) in self.rounds.iter_mut().flatten().zip(judged) {
+            candidate.holdout_rms = model.as_ref().map(|model| model.errors().holdout_rms);
+            if model.is_some() {
+                candidate.model = model;
+            }
+        }
+    }
+
+    /// Takes out the effects that the held-out records do not show; the model without each of the others.
+    fn confirm(&mut self, threads: usize) -> Vec<Option<ScoredModel>> {
+        let without = self.eliminate(threads);
+        if self.after.effect_names().len() == 1 && no_gain(&self.after, &self.before).is_some() {
+            let change = self.after.compared_rms() / self.before.compared_rms() - 1.0;
+            self.drop_all(&Reason::NotConfirmed { change });
+        }
+        without
+    }
+
+    /// Goes back to the plain stand.
+    fn drop_all(&mut self, reason: &Reason) {
+        for candidate in self.rounds.iter_mut().flatten() {
+            if candidate.status() == Status::Accepted {
+                candidate.reason = reason.clone();
+            }
+        }
+        self.after = self.before.clone();
+        self.tests = self.tests_before.clone();
+    }
+
+    /// Whether the training records show an effect that the held-out ones do not.
+    pub(super) fn is_refuted(&self) -> bool {
+        let mut all = self.rounds.iter().flatten();
+        all.any(|c| matches!(c.reason, Reason::NotConfirmed { .. } | Reason::Diverges))
+    }
+}
