@@ -48,7 +48,7 @@ impl GuardModel {
             progress: &|_, _| {},
             ..workers
         };
-        let fits = fit_all(base, &forms, &[], records, silent).into_iter();
+        let fits = fit_all(base, &forms, &[], base.effort(), records, silent).into_iter();
         let passing = fits
             .flatten()
             .filter(|model| refusal(model, &base.scored).is_none());

@@ -239,10 +239,10 @@ impl SearchState {
         intersample::better_course(&models, &self.after, noise_rms, &self.records, threads)
     }
 
-    /// Lines that stand out of the residual after.
-    fn lines(&self) -> Vec<SpectralLine> {
+    /// Lines that stand out of the residual of a model.
+    fn lines_of(&self, model: &ScoredModel) -> Vec<SpectralLine> {
         let to_hz = 0.49 * self.records.rate_hz();
-        let mut lines = lines_of(&self.after.compared, to_hz, MOST_LINES);
+        let mut lines = lines_of(&model.compared, to_hz, MOST_LINES);
         lines.retain(|line| line.prominence > PROMINENT);
         lines
     }

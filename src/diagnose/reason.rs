@@ -66,9 +66,11 @@ pub enum Reason {
         law: &'static str,
         equation: &'static str,
     },
-    /// A further effect that explains less than this part of the initial excess error and less than this part of the rest.
+    /// A further effect that explains less than this part of the initial excess error, or less than the second part although
+    /// it explains this part of the rest.
     SmallSecond {
         least: f64,
+        least_of_rest: f64,
         rest: f64,
     },
     /// It was added and taken out again: without it, these leave no more.
@@ -138,10 +140,15 @@ impl Reason {
                 law,
                 equation,
             } => beside_the_list(*ratio, law, equation),
-            Self::SmallSecond { least, rest } => format!(
-                "explains less than {:.0} % of what the plain stand leaves above the noise, and less than {:.0} % of what is \
-                 left now: too little for a further effect",
+            Self::SmallSecond {
+                least,
+                least_of_rest,
+                rest,
+            } => format!(
+                "explains less than {:.0} % of what the plain stand leaves above the noise (or less than {:.0} %, and {:.0} % of \
+                 what is left now): too little for a further effect",
                 100.0 * least,
+                100.0 * least_of_rest,
                 100.0 * rest
             ),
             Self::Needless { others } => format!(

@@ -104,6 +104,11 @@ impl ResidualTests {
         found.map(|(share, _)| share)
     }
 
+    /// Whether the zero drifts.
+    pub fn drifts(&self) -> bool {
+        self.wandering_zero.exceeds([DRIFTING, NONSTATIONARY])
+    }
+
     /// The shares of what changes over the record.
     pub fn stationarity(&self) -> [&PowerShare; 4] {
         [

@@ -124,7 +124,7 @@ pub struct ExcitationLevels {
 
 impl Diagnosis {
     pub(super) fn of(case: Case, mut found: SearchState) -> Self {
-        let lines = found.lines();
+        let lines = found.lines_of(&found.after);
         let unit = case.units.per_printed;
         let verdict = found.conclude();
         found.settle_candidates();

@@ -73,13 +73,13 @@ const SECOND_FIT: FitEffort = FitEffort::brief(5);
 const FULL_FIT: FitEffort = FitEffort::full(15);
 
 /// How many forms go on from one stage of fitting to the next.
-struct SearchEffort {
+pub struct SearchEffort {
     /// Forms that get a first fit, by the residual that their starts leave.
-    first: usize,
+    pub first: usize,
     /// Gain of the first fit, over the largest of all, from which on a second one follows.
-    second: f64,
+    pub second: f64,
     /// Forms that get a full fit, ties aside.
-    full: usize,
+    pub full: usize,
 }
 
 const FOR_FIRST_EFFECT: SearchEffort = SearchEffort {
@@ -113,14 +113,26 @@ impl Round {
 
 /// Adds every effect to a base model in turn.
 pub fn try_all(base: &BaseModel, records: &Records, workers: Workers) -> Round {
+    try_effects(base, |_| true, base.effort(), records, workers)
+}
+
+/// Adds every effect of some to a base model in turn.
+pub fn try_effects(
+    base: &BaseModel,
+    among: impl Fn(&Effect) -> bool,
+    effort: &SearchEffort,
+    records: &Records,
+    workers: Workers,
+) -> Round {
     let present: Vec<&str> = base.scored.fitted.structure.names().collect();
     let gain_is_free = base.scored.fitted.structure.context.gain_is_free;
     let effects = EFFECTS.iter().copied().filter(|effect| {
-        !(present.contains(&effect.name) || gain_is_free && effect.name == "gain-error")
+        let is_free = gain_is_free && effect.name == "gain-error";
+        !present.contains(&effect.name) && !is_free && among(effect)
     });
     let forms = EffectForm::all(effects.clone());
     let lines = residual_lines(base, records);
-    let fits = fit_all(base, &forms, &lines, records, workers);
+    let fits = fit_all(base, &forms, &lines, effort, records, workers);
     let mut rest = fits.iter();
     let mut tried: Vec<CandidateFit> = effects
         .map(|effect| {
@@ -200,15 +212,12 @@ pub fn fit_all(
     base: &BaseModel,
     forms: &[EffectForm],
     lines: &[SpectralLine],
+    limits: &SearchEffort,
     records: &Records,
     workers: Workers,
 ) -> Vec<Option<ScoredModel>> {
     let fitted = &base.scored.fitted;
-    let limits = match fitted.structure.effects.is_empty() {
-        true => FOR_FIRST_EFFECT,
-        false => FOR_SECOND_EFFECT,
-    };
-    let first = first_fits(base, forms, lines, records, &limits, workers);
+    let first = first_fits(base, forms, lines, records, limits, workers);
     let gain = |fit: &FittedModel| fitted.train_sum - fit.train_sum;
     let largest = first.iter().flatten().map(gain).fold(0.0, f64::max);
     let second = parallel(forms.len(), workers.threads, |k| {
@@ -237,6 +246,16 @@ pub fn fit_all(
         let full = full.and_then(Result::ok);
         ScoredModel::of(full.unwrap_or_else(|| fit.clone()), records)
     })
+}
+
+impl BaseModel {
+    /// How many forms are fitted beside it.
+    pub fn effort(&self) -> &'static SearchEffort {
+        match self.scored.fitted.structure.effects.is_empty() {
+            true => &FOR_FIRST_EFFECT,
+            false => &FOR_SECOND_EFFECT,
+        }
+    }
 }
 
 /// Fits with very few iterations from the best starts of each form, where these leave least.

@@ -57,7 +57,15 @@ impl SearchState {
                 best = Some(way);
             }
         }
-        let without = best.map_or_else(Vec::new, |way| self.arrive(way));
+        let mut without = best.map_or_else(Vec::new, |way| self.arrive(way));
+        if let Some(others) = self.exchange(&without, coarse, workers) {
+            without = others;
+            // What only resembled one of them is gone: what it hid may show now.
+            if self.has_room() && self.add_another(coarse, workers) {
+                while self.has_room() && self.add_another(coarse, workers) {}
+                without = self.eliminate(workers.threads);
+            }
+        }
         self.ask_guards(&base, &without, workers);
     }
 
@@ -85,22 +93,13 @@ impl SearchState {
         starts
     }
 
-    /// Follows one way from its start: further effects, then others in their place, and without those that are not needed.
+    /// Follows one way from its start: further effects, then without those that are not needed.
     fn follow(&mut self, start: &ScoredModel, coarse: usize, workers: Workers) -> Way {
         let rounds = self.rounds.clone();
         self.path.clear();
         self.take(start, coarse);
         while self.has_room() && self.add_another(coarse, workers) {}
-        let mut without = self.eliminate(workers.threads);
-        let others = self.exchange(&without, coarse, workers);
-        if let Some(others) = others {
-            without = others;
-            // What only resembled one of them is gone: what it hid may show now.
-            if self.has_room() && self.add_another(coarse, workers) {
-                while self.has_room() && self.add_another(coarse, workers) {}
-                without = self.eliminate(workers.threads);
-            }
-        }
+        let without = self.eliminate(workers.threads);
         Way {
             after: self.after.clone(),
             tests: self.tests.clone(),
@@ -155,12 +154,14 @@ impl SearchState {
 
     /// Whether a model leaves enough for another effect: something above the noise, or a residual that is not noise alone
     /// and larger than the differences of the periods.
-    fn is_worthwhile(&self, model: &ScoredModel, tests: &ResidualTests) -> bool {
+    pub(super) fn is_worthwhile(&self, model: &ScoredModel, tests: &ResidualTests) -> bool {
         let is_noise = tests.white && tests.independent_of_input;
         let floor = self.noise_floor;
         let of_periods = floor.filter(|floor| floor.from == NoiseFloorSource::Periods);
         let is_at_floor =
             of_periods.is_some_and(|floor| model.compared_rms() <= ALL_NOISE * floor.rms);
+        // What does not repeat with the input is part of that floor.
+        let is_at_floor = is_at_floor && !tests.drifts() && self.lines_of(model).is_empty();
         remains(model, tests, floor) || !is_noise && !is_at_floor
     }
 

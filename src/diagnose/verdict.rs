@@ -45,7 +45,8 @@ const CLEARLY_ABOVE: f64 = 1.05;
 const ABOVE: f64 = 1.005;
 /// Minimum part of the initial excess error power that a further effect must explain to be named.
 const SECOND: f64 = 0.02;
-/// Part of what is left above the noise from which on one is named that explains less than that.
+/// The same for one that explains more than half of what is left above the noise.
+const SECOND_OF_REST: f64 = 0.01;
 const MOST_OF_REST: f64 = 0.5;
 
 /// What the plain stand leaves, and the noise in it.
@@ -72,13 +73,18 @@ impl PlainExcess<'_> {
     pub fn is_too_small(&self, after: &ScoredModel, next: &ScoredModel) -> bool {
         let left = after.excess_power(noise_rms(self.noise_floor));
         let gain = after.compared_rms().powi(2) - next.compared_rms().powi(2);
-        self.share(after, next) < SECOND && gain < MOST_OF_REST * left
+        let least = match gain < MOST_OF_REST * left {
+            true => SECOND,
+            false => SECOND_OF_REST,
+        };
+        self.share(after, next) < least
     }
 
     /// The reason for that.
     pub fn too_small() -> Reason {
         Reason::SmallSecond {
             least: SECOND,
+            least_of_rest: SECOND_OF_REST,
             rest: MOST_OF_REST,
         }
     }

@@ -130,6 +130,12 @@ pub struct Form {
 }
 
 impl Effect {
+    /// Whether it and another one can leave the same residual.
+    #[must_use]
+    pub fn resembles(&self, other: &Self) -> bool {
+        self.mistaken_for.contains(&other.name) || other.mistaken_for.contains(&self.name)
+    }
+
     /// The effect of a name.
     #[must_use]
     pub fn named(name: &str) -> Option<&'static Self> {
