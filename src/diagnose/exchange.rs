@@ -5,7 +5,7 @@ use torqcomp_model::effects::{EFFECTS, Effect};
 use super::SearchState;
 use super::pairs::best_pairs;
 use super::score::{BaseModel, ScoredModel};
-use super::search::{SAME, SearchEffort, Workers, refusal, try_effects};
+use super::search::{FOR_FIRST_EFFECT, SAME, SearchEffort, Workers, refusal, try_effects};
 
 /// Most exchanges on one way.
 const MOST: usize = 3;
@@ -19,64 +19,60 @@ const FOR_EXCHANGE: SearchEffort = SearchEffort {
 pub const MANY: usize = 3;
 
 impl SearchState {
-    /// Exchanges effects for others as long as that explains the records better, or as well with less; if so, the model
-    /// without each of the effects then. `without` is the model without each of the effects now, `coarse` the number of
-    /// steps of integration for the stand without effects.
-    pub(super) fn exchange(
-        &mut self,
-        without: &[Option<ScoredModel>],
-        coarse: usize,
-        workers: Workers,
-    ) -> Option<Vec<Option<ScoredModel>>> {
+    /// Exchanges effects for others as long as that explains the records better, or as well with less; whether any was.
+    /// `coarse` is the number of steps of integration for the stand without effects.
+    pub(super) fn exchange(&mut self, coarse: usize, workers: Workers) -> bool {
         let mut seen = vec![sorted(&self.after)];
-        let mut exchanged: Option<Vec<Option<ScoredModel>>> = None;
         for _ in 0..MOST {
-            let without = exchanged.as_deref().unwrap_or(without);
-            let Some(other) = self.other_effects(without, &seen, workers) else {
+            let Some(other) = self.other_effects(&seen, workers) else {
                 break;
             };
             self.take(&other, coarse);
             seen.push(sorted(&self.after));
-            exchanged = Some(self.eliminate(workers.threads));
         }
-        exchanged
+        seen.len() > 1
     }
 
-    /// The best model in which one effect is exchanged, if it is better than the one found, or as good and first in the list.
-    /// While something is left, any effect may come in; otherwise only one that resembles the other.
-    fn other_effects(
-        &self,
-        without: &[Option<ScoredModel>],
-        seen: &[Vec<&'static str>],
-        workers: Workers,
-    ) -> Option<ScoredModel> {
+    /// The best model in which one effect is exchanged or found anew, if it is better than the one found, or as good and first
+    /// in the list. While something is left, any effect may come in; otherwise only one that resembles the other.
+    fn other_effects(&self, seen: &[Vec<&'static str>], workers: Workers) -> Option<ScoredModel> {
+        let present = self.after.fitted.structure.added();
+        if present.len() < 2 {
+            return None;
+        }
         let silent = Workers {
             progress: &|_, _| {},
             ..workers
         };
         let is_open = self.is_worthwhile(&self.after, &self.tests);
-        let present = self.after.fitted.structure.added();
+        let without = self.after.without_each(&self.records, workers.threads);
         let mut found = Vec::new();
         for (form, less) in present.iter().zip(without) {
             let Some(less) = less else { continue };
+            let effect = form.effect;
             let base = BaseModel::of(less.clone(), &self.records);
-            let among = |other: &Effect| {
-                other.name != form.effect.name && (is_open || form.effect.resembles(other))
-            };
+            let among = |e: &Effect| is_open || e.name == effect.name || effect.resembles(e);
             let round = try_effects(&base, among, &FOR_EXCHANGE, &self.records, silent);
-            let singles = round.tried.iter().filter_map(|c| {
-                let model = c.model.as_ref()?;
-                (self.is_better(model, form.effect, c.effect)).then_some(model)
+            let passes = |model: &ScoredModel| refusal(model, &less).is_none();
+            let singles = round.tried.into_iter().filter_map(|c| {
+                let model = c.model.filter(passes)?;
+                self.is_better(&model, effect, c.effect).then_some(model)
             });
-            found.extend(singles.filter(|m| refusal(m, less).is_none()).cloned());
+            found.extend(singles);
             if form.moved() >= MANY {
+                let alike = |e: &Effect| effect.resembles(e);
+                let round = try_effects(&base, alike, &FOR_FIRST_EFFECT, &self.records, silent);
                 let pairs = best_pairs(&base, &round.fits, &self.records, silent).into_iter();
                 let better = pairs.filter(|pair| pair.criterion() < self.after.criterion());
-                found.extend(better.filter(|pair| refusal(pair, less).is_none()));
+                found.extend(better.filter(passes));
             }
         }
-        found.retain(|model| !seen.contains(&sorted(model)));
-        let found = found.into_iter();
+        let is_new = |model: &ScoredModel| {
+            let names = sorted(model);
+            let is_last = seen.last() == Some(&names);
+            !seen.contains(&names) || is_last && model.criterion() < self.after.criterion() - SAME
+        };
+        let found = found.into_iter().filter(is_new);
         found.min_by(|a, b| a.criterion().total_cmp(&b.criterion()))
     }
 

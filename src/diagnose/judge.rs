@@ -52,7 +52,9 @@ impl SearchState {
     /// The errors of all candidates.
     fn judge_candidates(&mut self, threads: usize) {
         let all: Vec<&CandidateFit> = self.rounds.iter().flatten().collect();
-        let judged = parallel(all.len(), threads, |k| self.held_out(all[k].model.as_ref()?));
+        let judged = parallel(all.len(), threads, |k| {
+            self.held_out(all[k].model.as_ref()?)
+        });
         for (candidate, model) in self.rounds.iter_mut().flatten().zip(judged) {
             candidate.holdout_rms = model.as_ref().map(|model| model.errors().holdout_rms);
             if model.is_some() {

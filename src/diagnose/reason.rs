@@ -106,10 +106,7 @@ impl Reason {
                 "not fitted: no starting point reduces the training error".to_owned()
             }
             Self::NoReduction { change } => {
-                format!(
-                    "does not reduce the error (change: {})",
-                    percent(*change)
-                )
+                format!("does not reduce the error (change: {})", percent(*change))
             }
             Self::NotSignificant { change } => {
                 format!("changes the error by {}: not significant", percent(*change))
@@ -151,9 +148,9 @@ impl Reason {
                 100.0 * least_of_rest,
                 100.0 * rest
             ),
-            Self::Needless { others } => format!(
-                "not needed: the error of {others} without it is not significantly larger"
-            ),
+            Self::Needless { others } => {
+                format!("not needed: the error of {others} without it is not significantly larger")
+            }
             Self::SmallPart { explained } => format!(
                 "improves the fit, but explains only {:.0} % of the error above the noise: the main cause is something else",
                 100.0 * explained.max(0.0)

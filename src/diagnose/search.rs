@@ -82,7 +82,7 @@ pub struct SearchEffort {
     pub full: usize,
 }
 
-const FOR_FIRST_EFFECT: SearchEffort = SearchEffort {
+pub const FOR_FIRST_EFFECT: SearchEffort = SearchEffort {
     first: usize::MAX,
     second: 0.03,
     full: 12,

@@ -28,8 +28,6 @@ struct Way {
     settled: bool,
     rounds: Vec<Vec<CandidateFit>>,
     path: Vec<ScoredModel>,
-    /// The model without each of its effects.
-    without: Vec<Option<ScoredModel>>,
 }
 
 impl SearchState {
@@ -57,15 +55,14 @@ impl SearchState {
                 best = Some(way);
             }
         }
-        let mut without = best.map_or_else(Vec::new, |way| self.arrive(way));
-        if let Some(others) = self.exchange(&without, coarse, workers) {
-            without = others;
-            // What only resembled one of them is gone: what it hid may show now.
-            if self.has_room() && self.add_another(coarse, workers) {
-                while self.has_room() && self.add_another(coarse, workers) {}
-                without = self.eliminate(workers.threads);
-            }
+        if let Some(way) = best {
+            self.arrive(way);
         }
+        if self.exchange(coarse, workers) {
+            // What only resembled an effect is gone: what it hid may show now.
+            while self.has_room() && self.add_another(coarse, workers) {}
+        }
+        let without = self.eliminate(workers.threads);
         self.ask_guards(&base, &without, workers);
     }
 
@@ -93,31 +90,28 @@ impl SearchState {
         starts
     }
 
-    /// Follows one way from its start: further effects, then without those that are not needed.
+    /// Follows one way from its start to further effects.
     fn follow(&mut self, start: &ScoredModel, coarse: usize, workers: Workers) -> Way {
         let rounds = self.rounds.clone();
         self.path.clear();
         self.take(start, coarse);
         while self.has_room() && self.add_another(coarse, workers) {}
-        let without = self.eliminate(workers.threads);
         Way {
             after: self.after.clone(),
             tests: self.tests.clone(),
             settled: self.settled,
             rounds: std::mem::replace(&mut self.rounds, rounds),
             path: std::mem::take(&mut self.path),
-            without,
         }
     }
 
-    /// Takes over where a way led; the model without each of its effects.
-    fn arrive(&mut self, way: Way) -> Vec<Option<ScoredModel>> {
+    /// Takes over where a way led.
+    fn arrive(&mut self, way: Way) {
         self.after = way.after;
         self.tests = way.tests;
         self.settled = way.settled;
         self.rounds = way.rounds;
         self.path = way.path;
-        way.without
     }
 
     /// Adds one more effect; whether there was one.
@@ -207,12 +201,7 @@ impl SearchState {
 
     /// Asks laws beside the list whether they explain more: than all effects, than each of several, and beside all.
     /// `without` is the model without each of its effects.
-    fn ask_guards(
-        &mut self,
-        base: &BaseModel,
-        without: &[Option<ScoredModel>],
-        workers: Workers,
-    ) {
+    fn ask_guards(&mut self, base: &BaseModel, without: &[Option<ScoredModel>], workers: Workers) {
         let noise_rms = noise_rms(self.noise_floor);
         let count = self.after.effect_names().len();
         let is_left = remains(&self.after, &self.tests, self.noise_floor);
