@@ -7,8 +7,12 @@ use super::pairs::best_pairs;
 use super::score::{BaseModel, ScoredModel};
 use super::search::{FOR_FIRST_EFFECT, SAME, SearchEffort, Workers, refusal, try_effects};
 
-/// Most exchanges on one way.
+/// Most exchanges.
 const MOST: usize = 3;
+/// Most effects beside which all others are tried in the place of one, and most steps of integration for that, over those of
+/// the stand without effects: what takes more is not of the list.
+const MOST_OPEN: usize = 3;
+const FINEST_OPEN: usize = 2;
 /// Forms that are fitted in the place of an effect.
 const FOR_EXCHANGE: SearchEffort = SearchEffort {
     first: 8,
@@ -24,7 +28,7 @@ impl SearchState {
     pub(super) fn exchange(&mut self, coarse: usize, workers: Workers) -> bool {
         let mut seen = vec![sorted(&self.after)];
         for _ in 0..MOST {
-            let Some(other) = self.other_effects(&seen, workers) else {
+            let Some(other) = self.other_effects(&seen, coarse, workers) else {
                 break;
             };
             self.take(&other, coarse);
@@ -35,16 +39,22 @@ impl SearchState {
 
     /// The best model in which one effect is exchanged or found anew, if it is better than the one found, or as good and first
     /// in the list. While something is left, any effect may come in; otherwise only one that resembles the other.
-    fn other_effects(&self, seen: &[Vec<&'static str>], workers: Workers) -> Option<ScoredModel> {
+    fn other_effects(
+        &self,
+        seen: &[Vec<&'static str>],
+        coarse: usize,
+        workers: Workers,
+    ) -> Option<ScoredModel> {
         let present = self.after.fitted.structure.added();
-        if present.len() < 2 {
+        let is_open = self.is_worthwhile(&self.after, &self.tests);
+        let is_long = present.len() > MOST_OPEN || self.records.substeps() > FINEST_OPEN * coarse;
+        if present.len() < 2 || !self.settled || is_open && is_long {
             return None;
         }
         let silent = Workers {
             progress: &|_, _| {},
             ..workers
         };
-        let is_open = self.is_worthwhile(&self.after, &self.tests);
         let without = self.after.without_each(&self.records, workers.threads);
         let mut found = Vec::new();
         for (form, less) in present.iter().zip(without) {

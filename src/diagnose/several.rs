@@ -18,6 +18,9 @@ const MOST_EFFECTS: usize = 5;
 /// Ways to several effects that are followed: the second if the first leaves more than noise, or if it begins with less.
 const WAYS: usize = 2;
 
+/// Excess error power of a law beside the list, over that of the best effect, up to which nothing else is looked for.
+const FAR_LESS: f64 = 0.1;
+
 /// Error over the differences of the periods up to which nothing but noise is left.
 const ALL_NOISE: f64 = 1.005;
 
@@ -35,8 +38,11 @@ impl SearchState {
     pub(super) fn build(&mut self, coarse: usize, workers: Workers) {
         let base = BaseModel::of(self.before.clone(), &self.records);
         let round = search::try_all(&base, &self.records, workers);
+        self.rounds.push(round.tried.clone());
+        if let Some(guard) = self.only_law(&base, round.accepted(), workers) {
+            return self.withdraw(guard, self.before.clone());
+        }
         let starts = self.starts(&base, &round, workers);
-        self.rounds.push(round.tried);
         let mut best: Option<Way> = None;
         for start in starts.iter().take(WAYS) {
             let beats = |best: &Way| {
@@ -64,6 +70,27 @@ impl SearchState {
         }
         let without = self.eliminate(workers.threads);
         self.ask_guards(&base, &without, workers);
+    }
+
+    /// A law beside the list that leaves nothing but noise, or far less than the best effect: several effects in its place
+    /// would only imitate it.
+    fn only_law(
+        &self,
+        base: &BaseModel,
+        best: Option<&ScoredModel>,
+        workers: Workers,
+    ) -> Option<GuardModel> {
+        let leaves = |model: &ScoredModel| self.is_worthwhile(model, &super::tests(model));
+        let rival = best.unwrap_or(&self.before);
+        if !leaves(rival) {
+            return None;
+        }
+        let noise_rms = noise_rms(self.noise_floor);
+        let guard = GuardModel::best(base, best, noise_rms, &self.records, workers);
+        guard.filter(|guard| {
+            let left = guard.model.excess_power(noise_rms);
+            left <= FAR_LESS * rival.excess_power(noise_rms) || !leaves(&guard.model)
+        })
     }
 
     /// Where ways begin: with the best effect, with the best pair if that explains more; that first if the best effect is in no
