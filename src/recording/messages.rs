@@ -82,13 +82,7 @@ fn read_chosen(
     input: &Input,
     choices: &[ChannelChoice],
     reading: &Reading,
-) -> Result<
-    (
-        Vec<Held>,
-        Vec<Result<(SelectedSignal, SignalSummary), Failure>>,
-    ),
-    Failure,
-> {
+) -> Result<(Vec<Held>, Vec<ReadNumber>), Failure> {
     let mut fields: Vec<FieldChoice> = choices.iter().map(|c| field(c, reading)).collect();
     let options = times(reading);
     let read = |fields: &[FieldChoice]| {
