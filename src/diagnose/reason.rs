@@ -141,13 +141,7 @@ impl Reason {
                 least,
                 least_of_rest,
                 rest,
-            } => format!(
-                "explains less than {:.0} % of what the plain stand leaves above the noise (or less than {:.0} %, and {:.0} % of \
-                 what is left now): too little for a further effect",
-                100.0 * least,
-                100.0 * least_of_rest,
-                100.0 * rest
-            ),
+            } => too_little([*least, *least_of_rest, *rest].map(|part| 100.0 * part)),
             Self::Needless { others } => {
                 format!("not needed: the error of {others} without it is not significantly larger")
             }
@@ -165,6 +159,14 @@ impl Reason {
             Self::NoneAccepted => "no effect is accepted".to_owned(),
         }
     }
+}
+
+/// A further effect that explains too little, with the least parts in percent.
+fn too_little([least, least_of_rest, rest]: [f64; 3]) -> String {
+    format!(
+        "explains less than {least:.0} % of what the plain stand leaves above the noise (or less than {least_of_rest:.0} %, and \
+         {rest:.0} % of what is left now): too little for a further effect"
+    )
 }
 
 /// An effect behind a law that is not in the list.

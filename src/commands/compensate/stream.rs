@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use torqcomp_dsp::compensate::{BlockConvolver, Windows};
+use torqcomp_dsp::compensate::{BlockConvolver, InverseFilter, Windows};
 use torqcomp_dsp::noise::RecordNoise;
 use torqcomp_dsp::resample::{Resampled, Resampler};
 use torqcomp_dsp::spectrum::{Density, PowerSum, welch};
@@ -116,15 +116,9 @@ pub(super) fn run(
     };
     pipeline::run(threads + SPARE_JOBS, convolvers(convolver, threads), stages)?;
 
-    report.scale = steps.scale;
-    report.start = steps.start;
     report.samples = joiner.samples;
     report.resampled = joiner.resampled;
-    report.result = gathered.sums.statistics(steps.scale);
-    if let Some(density) = gathered.density(rate_hz) {
-        let density = density.scaled(steps.scale * steps.scale);
-        report.noise.record = RecordNoise::of(&filter, &density);
-    }
+    gathered.tell(&steps, &filter, report);
     Ok(Seen {
         summary: validator.finish(blocks.as_mut())?,
         excerpt: gathered.first,
@@ -157,6 +151,17 @@ impl Gathered<'_> {
             self.first.extend_from_slice(recorded);
         }
         Ok(())
+    }
+
+    /// Puts what was gathered into the report.
+    fn tell(&self, steps: &Steps, filter: &InverseFilter, report: &mut CompensateReport) {
+        report.scale = steps.scale;
+        report.start = steps.start;
+        report.result = self.sums.statistics(steps.scale);
+        if let Some(density) = self.density(steps.rate_hz) {
+            let density = density.scaled(steps.scale * steps.scale);
+            report.noise.record = RecordNoise::of(filter, &density);
+        }
     }
 
     /// Power density of the record, if it is long enough.
