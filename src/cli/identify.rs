@@ -49,7 +49,7 @@ pub struct Findings {
     /// The stand file.
     #[command(flatten)]
     pub result: OutputArgs,
-    /// Stand file with declared constants [default: that of -o, if it exists]
+    /// Stand file [default: that of -o, if it exists]
     #[arg(long, value_name = "FILE")]
     pub stand: Option<PathBuf>,
     /// Units of printed values

@@ -325,7 +325,8 @@ mod tests {
         let Verb::Init(args) = cli.verb else {
             unreachable!()
         };
-        let answers = "data sheet\ntransducer\n2 mV/V\n\n\n\n590\n590 Hz\n0.02\n";
+        // Each quantity is followed by its standard uncertainty; that of the given torque is asked for, too.
+        let answers = "data sheet\ntransducer\n2 mV/V\n\n\n\n\n\n590\n590 Hz\n1 Hz\n0.02\n\n";
         let mut said = Vec::new();
         let mut dialogue = Dialogue {
             input: answers.as_bytes(),
@@ -337,7 +338,8 @@ mod tests {
             "{text}"
         );
         assert!(
-            text.contains("natural_frequency = \"590 Hz\"") && !text.contains("[recorder]"),
+            text.contains("natural_frequency = { value = \"590 Hz\", std = \"1 Hz\" }")
+                && !text.contains("[recorder]"),
             "{text}"
         );
         let said = String::from_utf8(said).unwrap();
