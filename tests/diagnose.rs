@@ -247,6 +247,26 @@ fn laws_beside_the_list_are_suspected_and_not_added() {
     }
 }
 
+/// What the training record shows and the held-out one does not, as it is of a stand without it, is taken out again and not
+/// taken for nothing.
+#[test]
+fn an_effect_that_the_held_out_record_lacks_is_not_confirmed() {
+    let case = make(7, "cubic-stiffness", 1).expect("the catalogue has it");
+    let other = make(7, "none", 1).expect("the catalogue has it");
+    let folder = folder(&case);
+    let whole = write::table(&other.holdout, false);
+    let kept: Vec<&str> = whole.lines().take(KEPT + 1).collect();
+    folder.write("holdout.csv", kept.join("\n") + "\n");
+    let report = folder.json(&diagnose(&["--json"]));
+    assert_eq!(report["verdict"], "unexplained", "{report}");
+    assert_eq!(report["effects"], serde_json::json!([]));
+    let candidates = report["candidates"].as_array().expect("a list");
+    let cubic = candidates.iter().find(|c| c["effect"] == "cubic-stiffness");
+    let why = cubic.expect("it was tried")["why"].as_str().expect("text");
+    assert!(why.contains("not confirmed"), "{why}");
+    assert!(candidates.iter().all(|c| c["status"] == "rejected"));
+}
+
 /// Two effects of the generator in one stand are both found, and no third; the ladder of errors falls from step to step.
 #[test]
 fn two_effects_are_found_together() {

@@ -172,3 +172,43 @@ fn columns_that_the_stand_does_not_take_are_refused() {
         .run(&[&twice[..], &columns].concat())
         .says(1, &["same samples as the training record record.csv"]);
 }
+
+/// Ten samples are missing, and one stamp is 20 % of a step late.
+#[test]
+fn resampling_says_what_it_bridged() {
+    let folder = Folder::new();
+    folder.write("stand.toml", STAND);
+    let applied = input(5, 3000);
+    let text = record(&applied, &applied);
+    let kept = text.lines().enumerate();
+    let kept = kept.filter(|(row, _)| !(1000..1010).contains(row));
+    let rows: Vec<String> = kept
+        .map(|(row, line)| match row {
+            500 => line.replacen("0.024950", "0.024960", 1),
+            _ => line.to_owned(),
+        })
+        .collect();
+    folder.write("record.csv", rows.join("\n") + "\n");
+    let args = [
+        "simulate",
+        "record.csv",
+        "--stand",
+        "stand.toml",
+        "--applied",
+        "applied_n_m",
+        "--resample",
+        "-o",
+        "out.csv",
+        "--json",
+    ];
+    let report = folder.json(&args);
+    let warnings = report["warnings"].as_array().expect("a list");
+    let told = warnings.iter().find(|w| w["code"] == "resampled");
+    let message = told.expect("it is said")["message"].as_str().expect("text");
+    // From the sample before to the one after: 11 steps of 50 us.
+    assert!(
+        message.contains("1 gap, the longest of 0.00055 s"),
+        "{message}"
+    );
+    assert_eq!(report["samples"], 3000);
+}

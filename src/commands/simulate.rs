@@ -10,7 +10,7 @@ use crate::failure::Failure;
 use crate::io::{ChannelChoice, Flags, Input};
 use crate::print::{Report, short};
 use crate::recording::moment::Moment;
-use crate::recording::{AlignedChannels, ChannelStream, UniformStream};
+use crate::recording::{AlignedChannels, ChannelStream, UniformStream, resampled};
 use crate::stand::{self, Calibration, Stand, TransducerSignal};
 use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
@@ -78,6 +78,9 @@ pub fn run(args: &cli::Simulate) -> Result<Outcome, Failure> {
     }
     let steps = pieces.finish(&mut simulated).map_err(Failure::failed)?;
     deliver(&mut simulated)?;
+    if written < 2 {
+        return Err(too_short());
+    }
     output.finish()?;
     let is_lossy = applied.is_lossy;
     let report = SimulateReport {
@@ -143,9 +146,7 @@ impl AppliedInput {
         let mut read = AlignedChannels::read(&input, &[choice], &args.reading)?;
         let chosen = read.channels.swap_remove(0);
         if chosen.samples.len() < 2 {
-            return Err(Failure::failed(
-                "the record has fewer than two samples; nothing can be simulated",
-            ));
+            return Err(too_short());
         }
         Ok(Self {
             name: chosen.name,
@@ -187,12 +188,19 @@ impl AppliedInput {
             return Ok(true);
         }
         if let Some(ended) = stream.take() {
-            let (summary, _) = ended.finish(samples)?;
+            let (summary, done) = ended.finish(samples)?;
             self.is_lossy = summary.lost.is_some();
             self.warnings = summary.lost.into_iter().chain(summary.warnings).collect();
+            let was = ["was", "are not uniform"];
+            let told = done.map(|done| resampled(&self.name, was, self.axis, &done));
+            self.warnings.extend(told);
         }
         Ok(false)
     }
+}
+
+fn too_short() -> Failure {
+    Failure::failed("the record has fewer than two samples; nothing can be simulated")
 }
 
 impl Report for SimulateReport {

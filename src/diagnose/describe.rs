@@ -8,6 +8,7 @@ use super::refuse::plain_stands_apart;
 use super::residual_tests::{FROM_INPUT, ResidualTests};
 use super::result::ExcitationLevels;
 use super::score::ScoredModel;
+use super::search::CandidateFit;
 use super::spectra::SpectralLine;
 use super::verdict::Verdict;
 use crate::print::rounded;
@@ -140,7 +141,8 @@ pub fn next_experiment(
         return Some(record.to_owned());
     }
     let fitted = found.rounds.last()?.iter().filter(|c| c.model.is_some());
-    let closest = fitted.min_by(|a, b| a.holdout_error().total_cmp(&b.holdout_error()));
+    let error = |c: &CandidateFit| c.train_rms.unwrap_or(f64::INFINITY);
+    let closest = fitted.min_by(|a, b| error(a).total_cmp(&error(b)));
     closest.map(|c| c.effect.experiment.to_owned())
 }
 

@@ -4,10 +4,10 @@ use super::SearchState;
 use super::ladder::Ladder;
 use super::noise_floor::NoiseFloor;
 use super::plain::set_starts;
-use super::reason::{Reason, Status};
+use super::reason::Reason;
 use super::records::Records;
 use super::score::ScoredModel;
-use super::search::{CandidateFit, no_gain};
+use super::search::{CandidateFit, no_gain, reject_all};
 use crate::failure::Failure;
 use crate::parallel::parallel;
 
@@ -75,18 +75,15 @@ impl SearchState {
 
     /// Goes back to the plain stand.
     fn drop_all(&mut self, reason: &Reason) {
-        for candidate in self.rounds.iter_mut().flatten() {
-            if candidate.status() == Status::Accepted {
+        let names = self.after.effect_names();
+        for round in &mut self.rounds {
+            reject_all(round, |_| Reason::NoneAccepted);
+            for candidate in round.iter_mut().filter(|c| names.contains(&c.effect.name)) {
                 candidate.reason = reason.clone();
             }
         }
+        self.is_refuted = true;
         self.after = self.before.clone();
         self.tests = self.tests_before.clone();
-    }
-
-    /// Whether the training records show an effect that the held-out ones do not.
-    pub(super) fn is_refuted(&self) -> bool {
-        let mut all = self.rounds.iter().flatten();
-        all.any(|c| matches!(c.reason, Reason::NotConfirmed { .. } | Reason::Diverges))
     }
 }

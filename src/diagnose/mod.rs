@@ -107,6 +107,8 @@ struct SearchState {
     tests: ResidualTests,
     /// Whether the error of the integration stays below what is left.
     settled: bool,
+    /// Whether the held-out records show none of the effects that the training records show.
+    is_refuted: bool,
 }
 
 /// Power over the spectrum around it from which on a line of the residual is reported, and most such lines.
@@ -203,6 +205,7 @@ impl SearchState {
             tests_before: tests.clone(),
             tests,
             settled: true,
+            is_refuted: false,
         };
         let coarse = found.records.substeps();
         found.build(coarse, workers);

@@ -106,10 +106,16 @@ impl Reason {
                 "not fitted: no starting point reduces the training error".to_owned()
             }
             Self::NoReduction { change } => {
-                format!("does not reduce the error (change: {})", percent(*change))
+                format!(
+                    "does not reduce the training error (change: {})",
+                    percent(*change)
+                )
             }
             Self::NotSignificant { change } => {
-                format!("changes the error by {}: not significant", percent(*change))
+                format!(
+                    "changes the training error by {}: not significant",
+                    percent(*change)
+                )
             }
             Self::SmallShare { share } => format!(
                 "explains only {} % of the residual power: too little to distinguish from other model errors",
@@ -119,9 +125,9 @@ impl Reason {
                 format!("its {name} is not significantly different from zero")
             }
             Self::CriterionNotLower => "too small a gain for its extra parameters (BIC)".to_owned(),
-            Self::Best => "largest significant reduction of the error".to_owned(),
+            Self::Best => "largest significant reduction of the training error".to_owned(),
             Self::Worse { ratio, best } => format!(
-                "improves the fit, but its error is {} times that of {best}",
+                "improves the fit, but its training error is {} times that of {best}",
                 rounded(*ratio, 3)
             ),
             Self::MoreParameters { best } => {
@@ -172,7 +178,7 @@ fn too_little([least, least_of_rest, rest]: [f64; 3]) -> String {
 /// An effect behind a law that is not in the list.
 fn beside_the_list(ratio: f64, law: &str, equation: &str) -> String {
     format!(
-        "improves the fit, but its error is {} times that of {law} ({equation}), a law that is not in the list of \
+        "improves the fit, but its training error is {} times that of {law} ({equation}), a law that is not in the list of \
          effects",
         rounded(ratio, 3)
     )

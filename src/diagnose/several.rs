@@ -284,7 +284,7 @@ impl SearchState {
     /// Brings the candidates in line with the effects that were added in the end.
     pub(super) fn settle_candidates(&mut self) {
         let names = self.after.effect_names();
-        let left = self.after.compared_rms();
+        let left = self.after.train_rms();
         let all = names.join(" + ");
         for candidate in self.rounds.iter_mut().flatten() {
             let is_stale = match &candidate.reason {
@@ -296,7 +296,7 @@ impl SearchState {
             };
             if let Some(model) = candidate.model.as_ref().filter(|_| is_stale) {
                 candidate.reason = Reason::Worse {
-                    ratio: model.compared_rms() / left,
+                    ratio: model.train_rms() / left,
                     best: all.clone(),
                 };
             }

@@ -135,7 +135,7 @@ impl SearchState {
         let is_left = !self.settled || is_suspected || self.leaves(&self.after, &self.tests);
         if self.after.effect_names().is_empty() {
             let is_left = self.leaves(&self.before, &self.tests_before);
-            let is_missing = is_suspected || is_left || self.is_refuted();
+            let is_missing = is_suspected || is_left || self.is_refuted;
             return match is_missing {
                 true => Verdict::Unexplained,
                 false => Verdict::NothingMissing,

@@ -84,6 +84,15 @@ impl Spread<'_> {
                 None => found.left_out.push(name),
             }
         }
+        let recorder = &self.stand.recorder;
+        let of_recorder = [
+            ("low_pass of the recorder", recorder.cutoff_std_hz),
+            ("delay of the recorder", recorder.delay_std_s),
+        ];
+        let uncertain = of_recorder.into_iter().filter(|(_, std)| std.is_some());
+        found
+            .left_out
+            .extend(uncertain.map(|(name, _)| name.to_owned()));
         let correlations = self.stand.correlations(&kept);
         let response = per_sample(&correlations, &terms, middle.len());
         let is_whole = found.left_out.is_empty();

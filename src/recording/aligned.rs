@@ -208,41 +208,44 @@ impl AlignedChannels {
             .iter_mut()
             .for_each(|t| t.samples.truncate(shortest));
         self.start = chosen[0].channel.axis.moment(start_s);
-        self.warnings.push(self.resampled(chosen, &worst));
+        let whats = match chosen.len() > 1 {
+            true => ["were", "are not uniform or not the same"],
+            false => ["was", "are not uniform"],
+        };
+        let axis = (self.rate_hz, self.start);
+        let warning = resampled(&names(chosen), whats, axis, &worst);
+        self.warnings.push(warning);
         Ok(())
     }
+}
 
-    fn resampled(&self, chosen: &[Selection], done: &Resampled) -> Warning {
-        let several = chosen.len() > 1;
-        let mut message = format!(
-            "{} {} interpolated to {} Hz from {} on, because the time stamps {} (jitter up to {} % of a \
-             step)",
-            names(chosen),
-            if several { "were" } else { "was" },
-            print::short(self.rate_hz),
-            self.start.short(),
-            if several {
-                "are not uniform or not the same"
-            } else {
-                "are not uniform"
-            },
-            print::rounded(100.0 * done.largest_jitter, 2),
+/// Says that channels of these names were interpolated: in which words, to which rate and from when on, and what was met with.
+pub(crate) fn resampled(
+    names: &str,
+    [were, stamps_are]: [&str; 2],
+    (rate_hz, start): (f64, Moment),
+    done: &Resampled,
+) -> Warning {
+    let mut message = format!(
+        "{names} {were} interpolated to {} Hz from {} on, because the time stamps {stamps_are} (jitter up to {} % of a step)",
+        print::short(rate_hz),
+        start.short(),
+        print::rounded(100.0 * done.largest_jitter, 2),
+    );
+    if done.gaps > 0 {
+        message += &format!(
+            "; bridged by straight lines: {}, the longest of {} s; do not trust results from there",
+            print::plural(done.gaps, "gap"),
+            print::rounded(done.longest_step_s, 4)
         );
-        if done.gaps > 0 {
-            message += &format!(
-                "; bridged by straight lines: {}, the longest of {} s; do not trust results from there",
-                print::plural(done.gaps, "gap"),
-                print::rounded(done.longest_step_s, 4)
-            );
-        }
-        if done.repeated > 0 {
-            message += &format!(
-                "; left out: {}",
-                print::plural(done.repeated, "repeated stamp")
-            );
-        }
-        Warning::new("resampled", message)
     }
+    if done.repeated > 0 {
+        message += &format!(
+            "; left out: {}",
+            print::plural(done.repeated, "repeated stamp")
+        );
+    }
+    Warning::new("resampled", message)
 }
 
 /// Keeps the worst of what resampling met with.

@@ -31,7 +31,7 @@ use crate::io::{ChannelChoice, Input, Reading};
 use crate::unit::NamedUnit;
 use crate::warning::Warning;
 
-pub(crate) use aligned::{AlignedChannel, AlignedChannels};
+pub(crate) use aligned::{AlignedChannel, AlignedChannels, resampled};
 pub(crate) use axis::without_rounding;
 pub use axis::{RateFrom, TimeAxis, typical_step};
 pub(crate) use block::Block;

@@ -4,8 +4,9 @@ use crate::failure::Failure;
 use crate::io::Input;
 use crate::print;
 
-/// Memory for each byte of a text, at least: itself, and eight bytes for each of its numbers.
-const LEAST_PER_BYTE: u64 = 2;
+/// Memory for each byte of a text, at least: itself. Its numbers take eight bytes each, which is little beside cells of twenty
+/// characters or columns of words.
+const LEAST_PER_BYTE: u64 = 1;
 /// The same with the copies of a channel or two that a verb works on.
 const USUAL_PER_BYTE: u64 = 4;
 

@@ -166,7 +166,10 @@ fn constant(
 /// `rated_torque` beside a form that does not need it: what the transducer is made for.
 fn optional_rated(section: &Section) -> Result<Option<f64>, Failure> {
     let rated = section.quantity("rated_torque", Kind::Torque)?;
-    Ok(rated.map(|rated| rated.value().abs()))
+    match rated.map(|rated| rated.value().abs()) {
+        Some(0.0) => Err(section.fail("rated_torque", "the rated torque must not be zero")),
+        rated => Ok(rated),
+    }
 }
 
 /// `sensitivity` at `rated_torque`, as data sheets say: the change of the output from no load to the rated torque.

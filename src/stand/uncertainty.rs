@@ -228,7 +228,7 @@ impl Mechanics {
         ]
     }
 
-    /// The mechanics with one constant moved by its standard uncertainty; `None` if it has none.
+    /// The mechanics with one constant moved by its standard uncertainty; `None` if it has none, or if no stand has that value.
     fn moved(&self, place: usize, side: f64) -> Option<Self> {
         let of = &self.response;
         let mut values = [
@@ -237,7 +237,7 @@ impl Mechanics {
             of.stiffness_n_m_per_rad(),
         ];
         values[place] += side * self.stds()[place]?;
-        let response = SecondOrder::new(values[0], values[1].max(0.0), values[2]).ok()?;
+        let response = SecondOrder::new(values[0], values[1], values[2]).ok()?;
         Some(Self {
             response,
             ..self.clone()
