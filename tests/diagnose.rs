@@ -247,10 +247,10 @@ fn laws_beside_the_list_are_suspected_and_not_added() {
     }
 }
 
-/// What the training record shows and the held-out one does not, as it is of a stand without it, is taken out again and not
-/// taken for nothing.
+/// What the training record shows and the held-out one does not, as it is of another stand without it, is not named, and the
+/// verdict is not that nothing is missing.
 #[test]
-fn an_effect_that_the_held_out_record_lacks_is_not_confirmed() {
+fn an_effect_that_the_held_out_record_lacks_is_not_named() {
     let case = make(7, "cubic-stiffness", 1).expect("the catalogue has it");
     let other = make(7, "none", 1).expect("the catalogue has it");
     let folder = folder(&case);
@@ -261,9 +261,6 @@ fn an_effect_that_the_held_out_record_lacks_is_not_confirmed() {
     assert_eq!(report["verdict"], "unexplained", "{report}");
     assert_eq!(report["effects"], serde_json::json!([]));
     let candidates = report["candidates"].as_array().expect("a list");
-    let cubic = candidates.iter().find(|c| c["effect"] == "cubic-stiffness");
-    let why = cubic.expect("it was tried")["why"].as_str().expect("text");
-    assert!(why.contains("not confirmed"), "{why}");
     assert!(candidates.iter().all(|c| c["status"] == "rejected"));
 }
 
