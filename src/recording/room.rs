@@ -106,7 +106,7 @@ mod tests {
             "{said}"
         );
         let refused = room
-            .said_of(1_100_000_000, "a.csv")
+            .said_of(2_200_000_000, "a.csv")
             .unwrap_err()
             .to_string();
         assert!(
