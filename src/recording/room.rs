@@ -4,9 +4,8 @@ use crate::failure::Failure;
 use crate::io::Input;
 use crate::print;
 
-/// Memory for each byte of a text, at least: itself. Its numbers take eight bytes each, which is little beside cells of twenty
-/// characters or columns of words.
-const LEAST_PER_BYTE: u64 = 1;
+/// Memory for each byte of a text, at least: itself, and eight bytes for each of its numbers.
+const LEAST_PER_BYTE: u64 = 2;
 /// The same with the copies of a channel or two that a verb works on.
 const USUAL_PER_BYTE: u64 = 4;
 
@@ -106,7 +105,7 @@ mod tests {
             "{said}"
         );
         let refused = room
-            .said_of(2_200_000_000, "a.csv")
+            .said_of(1_100_000_000, "a.csv")
             .unwrap_err()
             .to_string();
         assert!(
