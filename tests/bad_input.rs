@@ -1,6 +1,6 @@
 //! Bad input gets an error that names the place and the remedy, and leaves nothing behind.
 
-use crate::util::{Folder, Ran, record, steady};
+use crate::util::{COMPENSATE, Folder, Ran, record, steady};
 
 /// A small good record.
 fn good() -> String {
@@ -11,16 +11,7 @@ fn good() -> String {
 fn refused(content: &[u8], more: &[&str], code: i32, parts: &[&str]) -> Ran {
     let folder = Folder::new();
     folder.write("in.csv", content);
-    let mut args = vec![
-        "compensate",
-        "in.csv",
-        "--stand",
-        "stand.toml",
-        "-o",
-        "out.csv",
-    ];
-    args.extend(more);
-    let ran = folder.run(&args);
+    let ran = folder.run(&[&COMPENSATE[..], more].concat());
     ran.says(code, parts);
     assert_eq!(folder.names(), ["in.csv", "stand.toml"], "{content:?}");
     ran

@@ -1,7 +1,7 @@
 //! `compensate` gives back the torque that acted.
 
 use crate::noise::Noise;
-use crate::util::{Folder, column, hertel_response, record, sampled, steady, table};
+use crate::util::{COMPENSATE, Folder, column, hertel_response, record, sampled, steady, table};
 
 const PARTS: [(f64, f64, f64); 5] = [
     (0.8, 0.0, 0.0),
@@ -343,20 +343,8 @@ fn values_that_no_recorder_measures_are_refused() {
     let folder = Folder::new();
     folder.write("in.csv", sampled("bridge_V", 1e4, 500, |_| 1e305));
     for more in [&[][..], &["--whole-record"]] {
-        let args = [
-            &[
-                "compensate",
-                "in.csv",
-                "--stand",
-                "stand.toml",
-                "-o",
-                "out.csv",
-            ][..],
-            more,
-        ]
-        .concat();
         folder
-            .run(&args)
+            .run(&[&COMPENSATE[..], more].concat())
             .says(1, &["line 2", "no recorder measures"]);
     }
     assert_eq!(folder.names(), ["in.csv", "stand.toml"]);

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use serde_json::Value;
 
-use crate::util::{Folder, assert_close};
+use crate::util::{COMPENSATE, Folder, assert_close};
 
 const MECHANICS: &str = "schema = \"torqcomp.stand/1\"\n[mechanics]\n\
     natural_frequency = { value = \"590 Hz\", std = \"2 Hz\" }\ndamping_ratio = \"0.02\"\n";
@@ -29,14 +29,6 @@ fn folder(heading: &str, more: &str) -> Folder {
     folder
 }
 
-const COMPENSATE: [&str; 6] = [
-    "compensate",
-    "in.csv",
-    "--stand",
-    "stand.toml",
-    "-o",
-    "out.csv",
-];
 const HARMONICS: [&str; 8] = [
     "harmonics",
     "in.csv",

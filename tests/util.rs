@@ -16,6 +16,16 @@ stiffness = "8.1e4 ft lbf/rad"
 torque_per_volt = "1.23e3 ft lbf/V"
 "#;
 
+/// Compensates `in.csv`.
+pub const COMPENSATE: [&str; 6] = [
+    "compensate",
+    "in.csv",
+    "--stand",
+    "stand.toml",
+    "-o",
+    "out.csv",
+];
+
 /// A folder that is removed with its files.
 pub struct Folder(tempfile::TempDir);
 

@@ -51,10 +51,7 @@ impl SearchState {
         if present.len() < 2 || !self.settled || is_open && is_long {
             return None;
         }
-        let silent = Workers {
-            progress: &|_, _| {},
-            ..workers
-        };
+        let silent = workers.silent();
         let without = self.after.without_each(&self.records, workers.threads);
         let mut found = Vec::new();
         for (form, less) in present.iter().zip(without) {

@@ -44,11 +44,8 @@ impl GuardModel {
         workers: Workers,
     ) -> Option<Self> {
         let forms = EffectForm::all(RIVALS.iter().copied());
-        let silent = Workers {
-            progress: &|_, _| {},
-            ..workers
-        };
-        let fits = fit_all(base, &forms, &[], base.effort(), records, silent).into_iter();
+        let workers = workers.silent();
+        let fits = fit_all(base, &forms, &[], base.effort(), records, workers).into_iter();
         let passing = fits
             .flatten()
             .filter(|model| refusal(model, &base.scored).is_none());

@@ -46,6 +46,16 @@ pub struct Workers<'p> {
     pub progress: &'p (dyn Fn(usize, usize) + Sync),
 }
 
+impl Workers<'_> {
+    /// The same, and nobody is told.
+    pub fn silent(self) -> Workers<'static> {
+        Workers {
+            progress: &|_, _| {},
+            threads: self.threads,
+        }
+    }
+}
+
 /// Minimum reduction of the sum of squares, in residual variances.
 const LEAST_GAIN: f64 = 40.0;
 /// Minimum relative reduction of the sum of squares.
