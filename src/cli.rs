@@ -4,6 +4,7 @@ pub mod diagnose;
 mod help;
 pub mod identify;
 pub mod init;
+pub(crate) mod many;
 pub mod simulate;
 mod values;
 
@@ -19,6 +20,7 @@ use crate::io::{ChannelChoice, Reading, frequency, positive_frequency};
 
 pub use diagnose::Diagnose;
 pub use help::parse;
+pub use many::BatchOptions;
 pub use simulate::Simulate;
 pub use values::{BandOption, Orders};
 use values::{band, digits, orders, percent, range, svg_file, warning_code};
@@ -36,6 +38,9 @@ pub struct Cli {
     /// What to do.
     #[command(subcommand)]
     pub verb: Verb,
+    /// The options given that a result may depend on, as `--name=value`.
+    #[arg(skip)]
+    pub options: Vec<String>,
 }
 
 /// The verbs.
@@ -103,22 +108,34 @@ pub enum Format {
     Mcap,
 }
 
-/// One channel of a recording.
-#[derive(Debug, Args)]
+/// One channel of a recording, or of each of many.
+#[derive(Debug, Clone, Args)]
 pub struct OneChannel {
-    /// Recording to read (CSV, TSV, a recorder's text export, or MCAP), or - for standard input
-    #[arg(value_name = "INPUT")]
-    pub input: String,
+    /// Recording to read (CSV, TSV, a recorder's text export, or MCAP), or - for standard input; several, folders and
+    /// patterns such as 'logs/**/*.csv' with -o FOLDER/ (--help)
+    #[arg(value_name = "INPUT", required_unless_present = "files_from")]
+    pub inputs: Vec<String>,
     /// Which channel.
     #[command(flatten)]
     pub choice: ChannelChoice,
     /// How it is read.
     #[command(flatten)]
     pub reading: Reading,
+    /// Of many recordings, how.
+    #[command(flatten)]
+    pub many: BatchOptions,
+}
+
+impl OneChannel {
+    /// The one recording that is read.
+    #[must_use]
+    pub fn input(&self) -> &str {
+        &self.inputs[0]
+    }
 }
 
 /// Where a result goes.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub struct OutputArgs {
     /// File to write, or - for standard output
     #[arg(short, long, value_name = "OUT")]
@@ -163,7 +180,7 @@ impl OutputArgs {
 }
 
 /// How a verb works on.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub struct Work {
     /// Threads to use [default: one for each core, at most 8]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
@@ -202,7 +219,7 @@ impl Strictness {
 }
 
 /// Arguments of `compensate`.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub struct Compensate {
     /// The recording.
     #[command(flatten)]
@@ -256,7 +273,7 @@ pub struct Compensate {
 }
 
 /// Arguments of `extract`.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub struct Extract {
     /// The recording.
     #[command(flatten)]
@@ -276,7 +293,7 @@ pub struct Extract {
 }
 
 /// Arguments of `harmonics`.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub struct Harmonics {
     /// The recording.
     #[command(flatten)]
@@ -354,10 +371,11 @@ pub struct Predict {
 }
 
 /// Arguments of `inspect`.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub struct Inspect {
-    /// Recordings to inspect, or - for standard input; several are also compared with each other
-    #[arg(value_name = "FILE", required = true)]
+    /// Recordings to inspect, folders and patterns such as 'logs/**/*.csv', or - for standard input; several are compared
+    /// with each other, or reported one by one with -o FOLDER/
+    #[arg(value_name = "FILE", required_unless_present = "files_from")]
     pub files: Vec<String>,
     /// The result.
     #[command(flatten)]
@@ -365,6 +383,9 @@ pub struct Inspect {
     /// How the files are read.
     #[command(flatten)]
     pub reading: Reading,
+    /// Of many recordings, how.
+    #[command(flatten)]
+    pub many: BatchOptions,
     /// Plot the channels to an SVG file
     #[arg(long, value_name = "FILE", value_parser = svg_file)]
     pub plot: Option<PathBuf>,

@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod batch;
 mod chart;
 mod cli;
 mod commands;
@@ -10,6 +11,7 @@ pub mod failure;
 pub mod identify;
 pub mod inverse;
 pub mod io;
+pub mod outcome;
 mod parallel;
 mod pipeline;
 pub mod print;
@@ -22,8 +24,6 @@ pub mod warning;
 
 use std::process::ExitCode;
 
-use commands::Outcome;
-
 /// Runs the command line of this process.
 #[must_use]
 pub fn run() -> ExitCode {
@@ -33,8 +33,7 @@ pub fn run() -> ExitCode {
     }
     // clap itself exits with code 2 for wrong usage, and with 0 for help.
     match commands::run(cli::parse()) {
-        Ok(Outcome::Done) => ExitCode::SUCCESS,
-        Ok(Outcome::WithLoss) => ExitCode::from(3),
+        Ok(outcome) => ExitCode::from(outcome.exit_code()),
         Err(failure) => {
             let code = failure.exit_code();
             if code != 0 {

@@ -71,9 +71,14 @@ pub(crate) fn hide_progress() {
 /// Writes how far the work has got over what the line showed before; an empty text clears the line.
 pub fn say_progress(text: &str) {
     if !IS_QUIET.load(Ordering::Relaxed) {
-        IS_LINE_SHOWN.store(!text.is_empty(), Ordering::Relaxed);
-        show(&format!("\r{}\x1b[K", visible(text.to_owned())));
+        show_progress(text);
     }
+}
+
+/// The same of many recordings, where nothing is said of each of them.
+pub(crate) fn show_progress(text: &str) {
+    IS_LINE_SHOWN.store(!text.is_empty(), Ordering::Relaxed);
+    show(&format!("\r{}\x1b[K", visible(text.to_owned())));
 }
 
 fn show(text: &str) {

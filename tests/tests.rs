@@ -6,6 +6,7 @@ mod util;
 mod agreement;
 mod bad_input;
 mod band;
+mod batch;
 #[allow(dead_code)] // the example writes and scores what the tests only look into
 mod blind;
 mod blind_generator;

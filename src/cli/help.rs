@@ -1,11 +1,12 @@
 //! Help pages: options by groups, the rare ones in the long help only, and two examples at the end.
 
-use clap::{Arg, Command, CommandFactory, FromArgMatches};
+use clap::parser::ValueSource;
+use clap::{Arg, ArgMatches, Command, CommandFactory, FromArgMatches};
 
 use super::Cli;
 
 /// Headings of the help, with the options below each.
-const GROUPS: [(&str, &[&str]); 6] = [
+const GROUPS: [(&str, &[&str]); 7] = [
     (
         "Input",
         &[
@@ -123,6 +124,39 @@ const GROUPS: [(&str, &[&str]); 6] = [
             "strict",
         ],
     ),
+    (
+        "Many recordings",
+        &[
+            "dry-run",
+            "fail-fast",
+            "files-from",
+            "jobs",
+            "manifest",
+            "max-failures",
+            "null",
+            "skip-existing",
+            "summary",
+        ],
+    ),
+];
+
+/// Options that no result depends on, or whose files the manifest names by their content.
+const NOT_IN_RESULTS: &[&str] = &[
+    "dry-run",
+    "fail-fast",
+    "files-from",
+    "force",
+    "jobs",
+    "manifest",
+    "max-failures",
+    "no-sync",
+    "null",
+    "output",
+    "quiet",
+    "skip-existing",
+    "stand",
+    "summary",
+    "threads",
 ];
 
 /// Options that the short help leaves out.
@@ -133,15 +167,24 @@ const RARE: &[&str] = &[
     "delay",
     "delimiter",
     "digits",
+    "dry-run",
+    "fail-fast",
+    "files-from",
+    "jobs",
+    "manifest",
+    "max-failures",
     "measured-as",
     "measured-unit",
     "no-sync",
+    "null",
     "output-topic",
     "period",
     "plot-range",
     "segment",
     "signal",
+    "skip-existing",
     "spacing",
+    "summary",
     "threads",
     "time",
     "time-column",
@@ -257,8 +300,31 @@ pub fn command() -> Command {
 /// Reads the command line of the process; help, version and mistakes end it.
 #[must_use]
 pub fn parse() -> Cli {
-    let matches = command().get_matches();
-    Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
+    let command = command();
+    let matches = command.clone().get_matches();
+    let mut cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    cli.options = options(&command, &matches);
+    cli
+}
+
+/// The options given that a result may depend on, in the order of their names.
+fn options(command: &Command, matches: &ArgMatches) -> Vec<String> {
+    let Some((name, given)) = matches.subcommand() else {
+        return Vec::new();
+    };
+    let verb = command.find_subcommand(name);
+    let mut options = Vec::new();
+    for arg in verb.into_iter().flat_map(Command::get_arguments) {
+        let (id, long) = (arg.get_id().as_str(), arg.get_long().unwrap_or_default());
+        let is_given = given.value_source(id) == Some(ValueSource::CommandLine);
+        if long.is_empty() || !is_given || NOT_IN_RESULTS.contains(&long) {
+            continue;
+        }
+        let values = given.get_raw(id).into_iter().flatten();
+        options.extend(values.map(|value| format!("--{long}={}", value.to_string_lossy())));
+    }
+    options.sort();
+    options
 }
 
 fn grouped(path: &str, command: Command) -> Command {
@@ -300,6 +366,10 @@ fn in_group(arg: Arg) -> Arg {
     };
     let has_it = |names: &[&str]| names.contains(&long.as_str());
     let arg = arg.hide_short_help(has_it(RARE));
+    // --name of a result is another one than that of a stand.
+    if arg.get_help_heading().is_some() {
+        return arg.hide_short_help(true);
+    }
     match GROUPS.iter().find(|(_, names)| has_it(names)) {
         Some((heading, _)) => arg.help_heading(*heading),
         None => arg,

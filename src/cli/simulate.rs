@@ -5,16 +5,17 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use torqcomp_model::simulate;
 
-use super::{OutputArgs, Strictness, digits};
+use super::{BatchOptions, OutputArgs, Strictness, digits};
 use crate::io::Reading;
 use crate::io::digits::Digits;
 
 /// Arguments of `simulate`.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub struct Simulate {
-    /// Recording with the applied quantity, or - for standard input
-    #[arg(value_name = "INPUT")]
-    pub input: String,
+    /// Recording with the applied quantity, or - for standard input; several, folders and patterns such as
+    /// 'logs/**/*.csv' with -o FOLDER/
+    #[arg(value_name = "INPUT", required_unless_present = "files_from")]
+    pub inputs: Vec<String>,
     /// The result.
     #[command(flatten)]
     pub result: OutputArgs,
@@ -34,6 +35,9 @@ pub struct Simulate {
     /// How the recording is read.
     #[command(flatten)]
     pub reading: Reading,
+    /// Of many recordings, how.
+    #[command(flatten)]
+    pub many: BatchOptions,
     /// Significant digits of the result, 1 to 15, or "shortest" for the fewest that restore every bit
     #[arg(long, value_name = "N", default_value = "12", value_parser = digits)]
     pub digits: Digits,
@@ -46,6 +50,14 @@ pub struct Simulate {
     /// Print only warnings to standard error
     #[arg(short, long)]
     pub quiet: bool,
+}
+
+impl Simulate {
+    /// The one recording that is read.
+    #[must_use]
+    pub fn input(&self) -> &str {
+        &self.inputs[0]
+    }
 }
 
 /// Courses of a quantity between its samples.

@@ -19,13 +19,13 @@ use torqcomp_dsp::noise::NoiseGain;
 use self::band::{BandReport, Wanted};
 use self::report::{CompensateReport, NoiseAt, NoiseReport};
 use self::sink::Sink;
-use super::{Outcome, conclude, unit_text};
+use super::{judged, unit_text, warned};
 use crate::cli::{self, OneChannel};
 use crate::failure::Failure;
 use crate::inverse::ChainInverse;
-use crate::io::output;
 use crate::io::{Input, already_compensated};
-use crate::print::{self, Report};
+use crate::outcome::Made;
+use crate::print::Report;
 use crate::recording::{ChannelStream, StreamSummary};
 use crate::stand::{self, Calibration, Stand, TorqueStd};
 
@@ -58,15 +58,18 @@ struct Seen {
     excerpt: Vec<f64>,
 }
 
-/// Runs the verb.
-pub fn run(args: &cli::Compensate) -> Result<Outcome, Failure> {
+/// Compensates one record.
+///
+/// # Errors
+/// Whatever kept it from being done.
+pub fn work(args: &cli::Compensate) -> Result<Made, Failure> {
     if args.json && args.result.is_stdout() {
         return Err(Failure::usage(
             "--json and the samples both go to standard output; give the samples a file with -o",
         ));
     }
     let opened = Opened::new(args)?;
-    let inputs = [args.record.input.as_ref(), args.stand.as_path()];
+    let inputs = [args.record.input().as_ref(), args.stand.as_path()];
     let output = args.result.open(&inputs)?;
     let mut plot = args.result.open_beside(args.plot.as_deref(), &inputs)?;
     let taken: Vec<&Path> = inputs.into_iter().chain(args.plot.as_deref()).collect();
@@ -81,26 +84,30 @@ pub fn run(args: &cli::Compensate) -> Result<Outcome, Failure> {
     };
     report.note_bridged();
     warnings::add(&mut report, &seen, sink.traces());
-    // Do everything that can fail before renaming the first output.
     if let (Some(plot), Some(traces)) = (&mut plot, sink.traces()) {
         plot.write(traces.svg(&report).as_bytes())?;
     }
     if let (Some(html), Some(page)) = (&mut html, sink.page()) {
         html.write(page.html(&report).as_bytes())?;
     }
-    if args.json {
-        output::print(&report.document(true))?;
-    }
     let beside = plot.into_iter().chain(html);
-    output::finish_all(beside.chain([sink.finish(args, &report)?]))?;
-    if !args.work.quiet {
-        print::say(&report.text());
-    }
-    Ok(conclude(
-        &report.warnings,
-        seen.summary.lost.is_some(),
-        &args.strictness,
-    ))
+    let outputs = beside.chain([sink.finish(args, &report)?]).collect();
+    let text = match args.work.quiet {
+        true => String::new(),
+        false => report.text(),
+    };
+    Ok(Made {
+        outputs,
+        document: args.json.then(|| report.document(true)),
+        talk: text + &warned(&report.warnings),
+        outcome: judged(
+            &report.warnings,
+            seen.summary.lost.is_some(),
+            &args.strictness,
+        ),
+        figures: report.figures(),
+        warnings: report.warnings,
+    })
 }
 
 impl Opened {
@@ -108,11 +115,10 @@ impl Opened {
         let stand = stand::read(&args.stand)?;
         stand.mechanics()?;
         let OneChannel {
-            input,
-            choice,
-            reading,
+            choice, reading, ..
         } = &args.record;
-        let stream = ChannelStream::open(&Input::of(input), choice, reading)?;
+        let input = Input::of(args.record.input());
+        let stream = ChannelStream::open(&input, choice, reading)?;
         if stream.is_compensated {
             return Err(already_compensated(&stream.source, &stream.name));
         }

@@ -1,29 +1,31 @@
 //! `extract`: one channel of a recording as plain rows, for other programs.
 
 use super::rows::{self, Rows, Times};
-use super::{Outcome, conclude};
+use super::{judged, warned};
 use crate::cli::{Extract, OneChannel};
 use crate::failure::Failure;
 use crate::io::output::Output;
 use crate::io::text::Text;
 use crate::io::{COMPENSATED, Input, Reading, names_compensated};
+use crate::outcome::{Made, RecordFigures};
 use crate::print;
 use crate::recording::{Block, ChannelStream, StreamSummary, UniformStream};
 
-/// Runs the verb.
-pub fn run(args: &Extract) -> Result<Outcome, Failure> {
+/// Writes the channel of one record.
+///
+/// # Errors
+/// Whatever kept it from being done.
+pub fn work(args: &Extract) -> Result<Made, Failure> {
     let OneChannel {
-        input,
-        choice,
-        reading,
+        choice, reading, ..
     } = &args.record;
     let reading = Reading {
         any_steps: true,
         ..reading.clone()
     };
+    let input = args.record.input();
     let stream = ChannelStream::open(&Input::of(input), choice, &reading)?;
-    let inputs = [args.record.input.as_ref()];
-    let mut output = args.result.open(&inputs)?;
+    let mut output = args.result.open(&[input.as_ref()])?;
     output.write(&heading(&stream))?;
     let said = format!(
         "{}: {}; {} Hz {}\n",
@@ -32,22 +34,27 @@ pub fn run(args: &Extract) -> Result<Outcome, Failure> {
         print::rounded(stream.rate_hz, 9),
         stream.time.rate_sentence()
     );
-    let summary = if stream.time.is_resampled() {
+    let rate_hz = stream.rate_hz;
+    let (samples, summary) = if stream.time.is_resampled() {
         write_resampled(args, stream, &mut output)?
     } else {
         write_as_it_is(args, stream, &mut output)?
     };
-    output.finish()?;
-    if !args.quiet {
-        print::say(&said);
-    }
     let mut warnings: Vec<_> = summary.lost.iter().cloned().collect();
     warnings.extend(summary.warnings);
-    Ok(conclude(
-        &warnings,
-        summary.lost.is_some(),
-        &args.strictness,
-    ))
+    let said = if args.quiet { String::new() } else { said };
+    Ok(Made {
+        outputs: vec![output],
+        document: None,
+        talk: said + &warned(&warnings),
+        outcome: judged(&warnings, summary.lost.is_some(), &args.strictness),
+        figures: RecordFigures {
+            samples: Some(samples),
+            rate_hz: Some(rate_hz),
+            ..RecordFigures::default()
+        },
+        warnings,
+    })
 }
 
 /// `time_s`, and the name of the channel with its unit in brackets.
@@ -73,7 +80,7 @@ fn write_as_it_is(
     args: &Extract,
     stream: ChannelStream,
     output: &mut Output,
-) -> Result<StreamSummary, Failure> {
+) -> Result<(usize, StreamSummary), Failure> {
     let (grid, rate_hz, start) = (stream.time.grid.clone(), stream.rate_hz, stream.start);
     let (mut blocks, plan, mut validator) = stream.into_parts(0);
     let mut block = Block::default();
@@ -93,14 +100,14 @@ fn write_as_it_is(
         output.write(text.as_bytes())?;
         first += block.rows.values.len();
     }
-    validator.finish(blocks.as_mut())
+    Ok((first, validator.finish(blocks.as_mut())?))
 }
 
 fn write_resampled(
     args: &Extract,
     stream: ChannelStream,
     output: &mut Output,
-) -> Result<StreamSummary, Failure> {
+) -> Result<(usize, StreamSummary), Failure> {
     let mut stream = UniformStream::of(stream)?;
     let axis = (stream.rate_hz, stream.start);
     let (mut samples, mut first) = (Vec::new(), 0);
@@ -111,5 +118,5 @@ fn write_resampled(
     }
     let (summary, _) = stream.finish(&mut samples)?;
     rows::write_uniform(output, args.digits, axis, first, &samples)?;
-    Ok(summary)
+    Ok((first + samples.len(), summary))
 }

@@ -11,11 +11,12 @@ use torqcomp_dsp::compensate::Inverse;
 use torqcomp_dsp::harmonics::{self, Fundamental, refine_fundamental};
 use torqcomp_model::{InverseUncertainty, UnitSystem};
 
-use super::{Outcome, conclude, publish, unit_text};
+use super::{judged, unit_text, warned};
 use crate::cli::{self, OneChannel};
 use crate::failure::Failure;
 use crate::io::{COMPENSATED, Input};
-use crate::print::short;
+use crate::outcome::{Made, RecordFigures};
+use crate::print::{Report, short};
 use crate::quality::excerpt;
 use crate::recording::moment::Moment;
 use crate::recording::{ChannelStream, UniformRecord};
@@ -98,31 +99,41 @@ struct ComponentTorque {
     phase_std_stand_deg: Option<f64>,
 }
 
-/// Runs the verb.
-pub fn run(args: &cli::Harmonics) -> Result<Outcome, Failure> {
+/// Fits the components of one record.
+///
+/// # Errors
+/// Whatever kept it from being done.
+pub fn work(args: &cli::Harmonics) -> Result<Made, Failure> {
     let stand = args.stand.as_deref().map(stand::read).transpose()?;
     let OneChannel {
-        input,
-        choice,
-        reading,
+        choice, reading, ..
     } = &args.record;
+    let input = args.record.input();
     let stream = ChannelStream::open(&Input::of(input), choice, reading)?;
     let way = WayBack::new(&stream, stand, args.units.into())?;
-    let inputs = [Some(args.record.input.as_ref()), args.stand.as_deref()];
+    let inputs = [Some(input.as_ref()), args.stand.as_deref()];
     let inputs: Vec<&Path> = inputs.into_iter().flatten().collect();
-    let output = args.result.open(&inputs)?;
+    let mut output = args.result.open(&inputs)?;
     let source = stream.source.clone();
     let (name, unit) = (stream.name.clone(), stream.unit.clone());
     let record = UniformRecord::read(stream, |values| super::convert(&way.chain, values))?;
     let channel = (name.as_str(), unit.as_ref());
     let report = fit(args, &way, &record, &source, channel);
     let report = report.map_err(|failure| failure.at(&source))?;
-    publish(&report, args.json, output)?;
-    Ok(conclude(
-        &report.warnings,
-        record.summary.lost.is_some(),
-        &args.strictness,
-    ))
+    output.write(report.document(args.json).as_bytes())?;
+    let is_lossy = record.summary.lost.is_some();
+    Ok(Made {
+        outputs: vec![output],
+        document: None,
+        talk: warned(&report.warnings),
+        outcome: judged(&report.warnings, is_lossy, &args.strictness),
+        figures: RecordFigures {
+            samples: Some(report.samples),
+            rate_hz: Some(report.rate_hz),
+            ..RecordFigures::default()
+        },
+        warnings: report.warnings,
+    })
 }
 
 /// From the record to the torque that acted.

@@ -7,6 +7,7 @@ mod harmonics;
 mod identify;
 mod init;
 mod inspect;
+mod many;
 mod predict;
 mod rows;
 mod simulate;
@@ -16,20 +17,12 @@ use torqcomp_dsp::conversion::ConversionError;
 
 use crate::cli::{Cli, Strictness, Verb};
 use crate::failure::Failure;
-use crate::io::output::{self, Output};
+use crate::io::output::Output;
+use crate::outcome::Outcome;
 use crate::print::{self, Report};
 use crate::stand::Calibration;
 use crate::unit::NamedUnit;
 use crate::warning::Warning;
-
-/// How a command ended well.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Outcome {
-    /// All was done.
-    Done,
-    /// It was done, but data were lost, or `--strict` made a warning count.
-    WithLoss,
-}
 
 /// Runs a command.
 ///
@@ -41,14 +34,14 @@ pub fn run(cli: Cli) -> Result<Outcome, Failure> {
     }
     match cli.verb {
         Verb::Init(args) => init::run(&args),
-        Verb::Compensate(args) => compensate::run(&args),
-        Verb::Extract(args) => extract::run(&args),
-        Verb::Harmonics(args) => harmonics::run(&args),
-        Verb::Inspect(args) => inspect::run(&args),
+        Verb::Compensate(args) => many::run(&args, &cli.options),
+        Verb::Extract(args) => many::run(&args, &cli.options),
+        Verb::Harmonics(args) => many::run(&args, &cli.options),
+        Verb::Inspect(args) => inspect::run(&args, &cli.options),
         Verb::Table(args) => table::run(&args),
         Verb::Predict(args) => predict::run(&args),
         Verb::Identify(args) => identify::run(&args),
-        Verb::Simulate(args) => simulate::run(&args),
+        Verb::Simulate(args) => many::run(&args, &cli.options),
         Verb::Diagnose(args) => diagnose::run(&args),
     }
 }
@@ -59,25 +52,20 @@ fn publish(report: &impl Report, as_json: bool, mut output: Output) -> Result<()
     output.finish()
 }
 
-/// Gives the report of a verb whose result is a record: the document to standard output, the text to a person.
-fn report_beside(report: &impl Report, as_json: bool, quiet: bool) -> Result<(), Failure> {
-    if as_json {
-        output::print(&report.document(true))?;
-    }
-    if !quiet {
-        print::say(&report.text());
-    }
-    Ok(())
-}
-
 /// Says the warnings, what was lost among them, and how the command ended.
 fn conclude(warnings: &[Warning], lost: bool, strictness: &Strictness) -> Outcome {
-    for warning in warnings {
-        print::say(&format!(
-            "torqcomp: warning [{}]: {}\n",
-            warning.code, warning.message
-        ));
-    }
+    print::say(&warned(warnings));
+    judged(warnings, lost, strictness)
+}
+
+/// Warnings for people, a line each.
+fn warned(warnings: &[Warning]) -> String {
+    let line = |w: &Warning| format!("torqcomp: warning [{}]: {}\n", w.code, w.message);
+    warnings.iter().map(line).collect()
+}
+
+/// How a command ended.
+fn judged(warnings: &[Warning], lost: bool, strictness: &Strictness) -> Outcome {
     match lost || strictness.refuses(warnings.iter().map(|w| w.code)) {
         true => Outcome::WithLoss,
         false => Outcome::Done,

@@ -4,10 +4,11 @@ use serde::Serialize;
 use torqcomp_model::simulate::Pieces;
 use torqcomp_model::{Unit, UnitSystem};
 
-use super::{Outcome, conclude, report_beside, rows};
+use super::{judged, rows, warned};
 use crate::cli;
 use crate::failure::Failure;
 use crate::io::{ChannelChoice, Flags, Input};
+use crate::outcome::{Made, RecordFigures};
 use crate::print::{Report, short};
 use crate::recording::moment::Moment;
 use crate::recording::{AlignedChannels, ChannelStream, UniformStream, resampled};
@@ -37,8 +38,11 @@ struct SimulateReport {
     warnings: Vec<Warning>,
 }
 
-/// Runs the verb.
-pub fn run(args: &cli::Simulate) -> Result<Outcome, Failure> {
+/// Simulates the answer to one record.
+///
+/// # Errors
+/// Whatever kept it from being done.
+pub fn work(args: &cli::Simulate) -> Result<Made, Failure> {
     let stand = stand::read(&args.stand)?;
     if args.json && args.result.is_stdout() {
         return Err(Failure::usage(
@@ -46,7 +50,7 @@ pub fn run(args: &cli::Simulate) -> Result<Outcome, Failure> {
         ));
     }
     let mut applied = AppliedInput::open(args)?;
-    let inputs = [args.input.as_ref(), args.stand.as_path()];
+    let inputs = [args.input().as_ref(), args.stand.as_path()];
     let mut output = args.result.open(&inputs)?;
     let mut of_channel = Vec::new();
     let units = ChannelUnits::of(&stand, applied.channel(), &mut of_channel)?;
@@ -62,29 +66,14 @@ pub fn run(args: &cli::Simulate) -> Result<Outcome, Failure> {
         simulated.clear();
         Ok::<(), Failure>(())
     };
-    let mut pieces = Pieces::new(&chain, axis.0, between);
-    let (mut samples, mut simulated) = (Vec::new(), Vec::new());
-    loop {
-        let is_end = !applied.next(&mut samples)?;
-        samples.iter_mut().for_each(|u| *u *= units.applied);
-        pieces
-            .push(&samples, &mut simulated)
-            .map_err(Failure::failed)?;
-        deliver(&mut simulated)?;
-        samples.clear();
-        if is_end {
-            break;
-        }
-    }
-    let steps = pieces.finish(&mut simulated).map_err(Failure::failed)?;
-    deliver(&mut simulated)?;
+    let pieces = Pieces::new(&chain, axis.0, between);
+    let steps = simulate(&mut applied, units.applied, pieces, &mut deliver)?;
     if written < 2 {
         return Err(too_short());
     }
-    output.finish()?;
     let is_lossy = applied.is_lossy;
     let report = SimulateReport {
-        input: args.input.clone(),
+        input: args.input().to_owned(),
         stand: args.stand.display().to_string(),
         applied: applied.name,
         applied_unit: units.applied_text,
@@ -98,8 +87,47 @@ pub fn run(args: &cli::Simulate) -> Result<Outcome, Failure> {
         effects: stand.effects.iter().map(|e| e.effect.name).collect(),
         warnings: [applied.warnings, stand.warnings.clone(), of_channel].concat(),
     };
-    report_beside(&report, args.json, args.quiet || args.json)?;
-    Ok(conclude(&report.warnings, is_lossy, &args.strictness))
+    let text = match args.quiet || args.json {
+        true => String::new(),
+        false => report.text(),
+    };
+    Ok(Made {
+        outputs: vec![output],
+        document: args.json.then(|| report.document(true)),
+        talk: text + &warned(&report.warnings),
+        outcome: judged(&report.warnings, is_lossy, &args.strictness),
+        figures: RecordFigures {
+            samples: Some(written),
+            rate_hz: Some(axis.0),
+            ..RecordFigures::default()
+        },
+        warnings: report.warnings,
+    })
+}
+
+/// Sends the applied quantity through the stand piece by piece; steps of integration from sample to sample.
+fn simulate(
+    applied: &mut AppliedInput,
+    factor: f64,
+    mut pieces: Pieces,
+    deliver: &mut dyn FnMut(&mut Vec<f64>) -> Result<(), Failure>,
+) -> Result<usize, Failure> {
+    let (mut samples, mut simulated) = (Vec::new(), Vec::new());
+    loop {
+        let is_end = !applied.next(&mut samples)?;
+        samples.iter_mut().for_each(|u| *u *= factor);
+        pieces
+            .push(&samples, &mut simulated)
+            .map_err(Failure::failed)?;
+        deliver(&mut simulated)?;
+        samples.clear();
+        if is_end {
+            break;
+        }
+    }
+    let steps = pieces.finish(&mut simulated).map_err(Failure::failed)?;
+    deliver(&mut simulated)?;
+    Ok(steps)
 }
 
 /// The applied quantity, in the unit of the file, as it is read.
@@ -124,7 +152,7 @@ enum AppliedSamples {
 
 impl AppliedInput {
     fn open(args: &cli::Simulate) -> Result<Self, Failure> {
-        let input = Input::of(&args.input);
+        let input = Input::of(args.input());
         let flags = Flags {
             channel: "--applied",
             unit: Some("--unit"),

@@ -10,6 +10,7 @@ pub mod output;
 mod parts;
 mod reading;
 pub(crate) mod storage;
+pub(crate) mod sum;
 pub mod text;
 
 pub use input::Input;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
 
-use super::{parts, storage};
+use super::{parts, storage, sum};
 use crate::failure::Failure;
 
 /// Most links that lead to one file.
@@ -123,6 +123,14 @@ impl Output {
             Kind::Device(file) => file.flush(),
             Kind::File { part, policy, .. } if policy.sync => storage::sync(part.as_file()),
             Kind::File { .. } => Ok(()),
+        }
+    }
+
+    /// SHA-256 of what was written; `None` of what is no file.
+    pub(crate) fn sum(&self) -> io::Result<Option<String>> {
+        match &self.kind {
+            Kind::File { part, .. } => sum::of_file(part.path()).map(Some),
+            Kind::Stdout(_) | Kind::Device(_) => Ok(None),
         }
     }
 
@@ -266,7 +274,7 @@ fn folder_of(path: &Path) -> &Path {
 }
 
 /// The file that a name leads to, whether it is there or not.
-fn end_of_links(path: &Path) -> PathBuf {
+pub(crate) fn end_of_links(path: &Path) -> PathBuf {
     let mut path = path.to_owned();
     for _ in 0..LINKS {
         let Ok(next) = std::fs::read_link(&path) else {

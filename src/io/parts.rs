@@ -1,5 +1,6 @@
 //! Temporary files of outputs that are not complete, and their removal when a run ends early.
 
+use std::collections::BTreeSet;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -11,12 +12,22 @@ use super::storage;
 
 /// Files to be removed if the run is interrupted.
 static OPEN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+/// Folders in which this run has looked for files that others left.
+static TIDIED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+/// Files among which those that are gone are looked for.
+const MOST_OPEN: usize = 256;
 /// How the names of all of them begin and end.
 const PREFIX: &str = ".torqcomp-";
 const SUFFIX: &str = ".part";
 
 fn open() -> MutexGuard<'static, Vec<PathBuf>> {
     OPEN.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Whether a folder has not been looked at before.
+fn is_first_in(folder: &Path) -> bool {
+    let mut tidied = TIDIED.lock().unwrap_or_else(PoisonError::into_inner);
+    tidied.insert(folder.to_owned())
 }
 
 /// Removes what is not complete.
@@ -73,7 +84,9 @@ fn is_ignored(signal: i32) -> bool {
 /// made it and when.
 pub fn create_in(folder: &Path) -> io::Result<NamedTempFile> {
     let owner = Owner::of_this_process();
-    remove_orphans(folder, &owner);
+    if is_first_in(folder) {
+        remove_orphans(folder, &owner);
+    }
     let since_epoch = SystemTime::now().duration_since(UNIX_EPOCH);
     let seconds = since_epoch.map_or(0, |since| since.as_secs());
     let prefix = format!("{PREFIX}{}-{}-{seconds}-", owner.place, owner.process);
@@ -81,7 +94,11 @@ pub fn create_in(folder: &Path) -> io::Result<NamedTempFile> {
     builder.prefix(&prefix).suffix(SUFFIX);
     set_permissions(&mut builder);
     let part = storage::create(&builder, folder)?;
-    open().push(part.path().to_owned());
+    let mut open = open();
+    if open.len() >= MOST_OPEN {
+        open.retain(|path| path.exists());
+    }
+    open.push(part.path().to_owned());
     Ok(part)
 }
 

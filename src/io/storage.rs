@@ -51,6 +51,13 @@ impl Seek for Stored<File> {
     }
 }
 
+/// The bytes of a file.
+pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    Stored::open(path)?.read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
 /// A file as text.
 pub fn read_to_string(path: &Path) -> io::Result<String> {
     let mut text = String::new();
@@ -62,6 +69,40 @@ pub fn read_to_string(path: &Path) -> io::Result<String> {
 pub(super) fn open_for_writing(path: &Path) -> io::Result<File> {
     check(Call::Open)?;
     File::options().write(true).open(path)
+}
+
+/// Opens a file for writing at its end, and makes it if it is not there.
+pub(crate) fn open_at_end(path: &Path) -> io::Result<File> {
+    check(Call::Open)?;
+    File::options().append(true).create(true).open(path)
+}
+
+/// Whether the last line of a file has no end; one that is not there has no line.
+pub(crate) fn ends_without_line(path: &Path) -> io::Result<bool> {
+    let mut file = match Stored::open(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(false),
+        file => file?,
+    };
+    if file.metadata()?.len() == 0 {
+        return Ok(false);
+    }
+    file.seek(SeekFrom::End(-1))?;
+    let mut last = [0];
+    file.read_exact(&mut last)?;
+    Ok(last != *b"\n")
+}
+
+/// Writes all bytes at the end of a file.
+pub(crate) fn write_all(mut file: &File, mut bytes: &[u8]) -> io::Result<()> {
+    while !bytes.is_empty() {
+        match write(&mut file, bytes) {
+            Ok(0) => return Err(io::ErrorKind::WriteZero.into()),
+            Ok(count) => bytes = &bytes[count..],
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(())
 }
 
 /// Creates a temporary file.
@@ -80,7 +121,7 @@ pub(super) fn write(to: &mut impl Write, bytes: &[u8]) -> io::Result<usize> {
 }
 
 /// Has the names in a folder on the disk, where the system can do that.
-pub(super) fn sync_folder(folder: &Path) -> io::Result<()> {
+pub(crate) fn sync_folder(folder: &Path) -> io::Result<()> {
     use io::ErrorKind::{InvalidInput, PermissionDenied, Unsupported};
     match Stored::open(folder).and_then(|folder| sync(&folder.0)) {
         Err(error) if matches!(error.kind(), InvalidInput | PermissionDenied | Unsupported) => {
@@ -91,7 +132,7 @@ pub(super) fn sync_folder(folder: &Path) -> io::Result<()> {
 }
 
 /// Has a file on the disk.
-pub(super) fn sync(file: &File) -> io::Result<()> {
+pub(crate) fn sync(file: &File) -> io::Result<()> {
     check(Call::Sync)?;
     file.sync_all()
 }

@@ -46,7 +46,6 @@ impl PageData {
     /// If an input cannot be read for its hash.
     pub(super) fn new(args: &Compensate, plan: &Plan) -> Result<Self, Failure> {
         let (name, text) = stand::text(&args.stand)?;
-        let inputs = std::slice::from_ref(&args.record.input);
         let point = |i: usize| {
             let frequency_hz = plan.filter.band().end_hz() * i as f64 / GAINS as f64;
             let std = plan.std(frequency_hz);
@@ -57,7 +56,7 @@ impl PageData {
             }
         };
         Ok(Self {
-            provenance: Provenance::of(inputs, Some((&name, &text)))?,
+            provenance: Provenance::of(&args.record.inputs, Some((&name, &text)))?,
             traces: Traces::new(None),
             recorded: StreamedPower::new(BLOCK),
             compensated: StreamedPower::new(BLOCK),

@@ -9,6 +9,7 @@ use torqcomp_dsp::resample::Resampled;
 use super::band::BandReport;
 use super::statistics::Statistics;
 use crate::inverse::ResultStd;
+use crate::outcome::RecordFigures;
 use crate::print::{Report, plural, rounded, short};
 use crate::recording::FilledSpan;
 use crate::recording::moment::Moment;
@@ -156,6 +157,29 @@ impl Report for CompensateReport {
 }
 
 impl CompensateReport {
+    /// The figures that tables of many records give.
+    pub(super) fn figures(&self) -> RecordFigures {
+        let Statistics {
+            rms,
+            smallest,
+            largest,
+            ..
+        } = self.result;
+        RecordFigures {
+            samples: Some(self.samples),
+            rate_hz: Some(self.rate_hz),
+            band_hz: Some(self.band_hz),
+            unit: Some(self.unit.clone()),
+            rms: Some(rms),
+            peak: Some(largest.max(-smallest)),
+            noise_rms: self
+                .noise
+                .record
+                .as_ref()
+                .map(|noise| noise.compensated_rms),
+        }
+    }
+
     /// What was done and what came of it: names with their values.
     pub(super) fn facts(&self) -> Vec<[String; 2]> {
         let fact = |label: &str, value: String| [label.to_owned(), value];

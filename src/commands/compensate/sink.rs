@@ -141,7 +141,7 @@ impl Messages {
             encoding,
         };
         let name = output.name().to_owned();
-        let writer = Writer::copying(&Input::of(&args.record.input), output, &name, &added)?;
+        let writer = Writer::copying(&Input::of(args.record.input()), output, &name, &added)?;
         Ok(Self {
             writer,
             origin,
@@ -186,7 +186,7 @@ fn origin(args: &Compensate, plan: &Plan) -> Result<MessageOrigin, Failure> {
              use --format csv",
         ));
     };
-    if args.record.input == "-" {
+    if args.record.input() == "-" {
         return Err(Failure::usage(
             "an MCAP result needs its input twice, and standard input can be read once only; name the file",
         ));

@@ -13,17 +13,53 @@ use std::path::Path;
 
 use self::content::Content;
 use self::report::{ChannelWarning, InspectReport, Inspected};
-use super::Outcome;
+use super::{Outcome, judged, many};
+use crate::batch;
 use crate::cli::Inspect;
 use crate::failure::Failure;
 use crate::io::Input;
-use crate::io::output::{self, Output};
+use crate::io::output::Output;
+use crate::outcome::Made;
 use crate::print::{self, Report};
 use crate::quality::copies;
 use crate::recording::Recording;
+use crate::warning::Warning;
 
-/// Runs the verb.
-pub fn run(args: &Inspect) -> Result<Outcome, Failure> {
+/// Runs the verb: reports of many files one by one, or one report that compares them.
+///
+/// # Errors
+/// Whatever kept it from being done.
+pub fn run(args: &Inspect, options: &[String]) -> Result<Outcome, Failure> {
+    if many::are_asked(args) {
+        return many::run(args, options);
+    }
+    let args = Inspect {
+        files: batch::expand(&args.files)?,
+        ..args.clone()
+    };
+    let (made, failed) = compare(&args)?;
+    let outcome = made.publish()?;
+    match failed.split_last() {
+        None => Ok(outcome),
+        Some((last, others)) => {
+            for failure in others {
+                print::say(&format!("torqcomp: {failure}\n"));
+            }
+            Err(last.clone())
+        }
+    }
+}
+
+/// Inspects one file.
+///
+/// # Errors
+/// Whatever kept it from being done.
+pub fn work(args: &Inspect) -> Result<Made, Failure> {
+    compare(args).map(|(made, _)| made)
+}
+
+/// Inspects files and compares them; also why some of several could not be read.
+fn compare(args: &Inspect) -> Result<(Made, Vec<Failure>), Failure> {
     check(args)?;
     let inputs: Vec<&Path> = args.files.iter().map(Path::new).collect();
     let output = args.result.open(&inputs)?;
@@ -41,7 +77,8 @@ pub fn run(args: &Inspect) -> Result<Outcome, Failure> {
         files: read.iter().zip(&args.files).map(entry).collect(),
         warnings: between(&args.files, &read),
     };
-    finish(args, &report, &read, output, plot)
+    let made = finish(args, &report, &read, output, plot)?;
+    Ok((made, read.into_iter().filter_map(Result::err).collect()))
 }
 
 /// Refuses what cannot be done.
@@ -83,34 +120,28 @@ fn between(files: &[String], read: &[Result<Content, Failure>]) -> Vec<ChannelWa
         .collect()
 }
 
-/// Writes everything that was found; files that could not be read are a failure in the end.
+/// Writes everything that was found.
 fn finish(
     args: &Inspect,
     report: &InspectReport,
     read: &[Result<Content, Failure>],
     mut output: Output,
     mut plot: Option<Output>,
-) -> Result<Outcome, Failure> {
+) -> Result<Made, Failure> {
     output.write(report.document(args.json).as_bytes())?;
     if let Some(plot) = &mut plot {
         let contents = read.iter().flatten();
         let recordings: Vec<&Recording> = contents.map(|content| &content.recording).collect();
         plot.write(plot::svg(&recordings, report).as_bytes())?;
     }
-    output::finish_all(plot.into_iter().chain([output]))?;
-    let failed: Vec<&Failure> = read.iter().filter_map(|r| r.as_ref().err()).collect();
-    if let Some((last, others)) = failed.split_last() {
-        for failure in others {
-            print::say(&format!("torqcomp: {failure}\n"));
-        }
-        return Err((*last).clone());
-    }
-    let warned = args
-        .strictness
-        .refuses(report.all_warnings().map(|w| w.code));
-    Ok(if report.is_lossy() || warned {
-        Outcome::WithLoss
-    } else {
-        Outcome::Done
+    let warning = |w: &ChannelWarning| Warning::new(w.code, w.message.clone());
+    let warnings: Vec<Warning> = report.all_warnings().map(warning).collect();
+    Ok(Made {
+        outputs: plot.into_iter().chain([output]).collect(),
+        document: None,
+        talk: String::new(),
+        outcome: judged(&warnings, report.is_lossy(), &args.strictness),
+        figures: report.figures(),
+        warnings,
     })
 }

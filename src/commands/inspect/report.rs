@@ -5,6 +5,7 @@ use torqcomp_dsp::quality::mains::MainsLine;
 use torqcomp_dsp::quality::steps::Event;
 
 use crate::io::mcap::Inventory;
+use crate::outcome::RecordFigures;
 use crate::recording::Segment;
 
 /// Everything that was found in the files.
@@ -177,6 +178,27 @@ impl InspectReport {
             Inspected::Failed { .. } => &[],
         });
         of_files.chain(&self.warnings)
+    }
+
+    /// Figures of the longest channel; those that have a unit only if there is no other channel.
+    pub(super) fn figures(&self) -> RecordFigures {
+        let [Inspected::Read(file)] = self.files.as_slice() else {
+            return RecordFigures::default();
+        };
+        let longest = file.channels.iter().max_by_key(|c| c.samples);
+        let only = match file.channels.as_slice() {
+            [only] => Some(only),
+            _ => None,
+        };
+        let peak = |c: &InspectedChannel| Some(c.largest?.max(-c.smallest?));
+        RecordFigures {
+            samples: longest.map(|c| c.samples),
+            rate_hz: longest.and_then(|c| c.rate_hz),
+            unit: only.and_then(|c| c.unit.clone()),
+            rms: only.and_then(|c| c.rms),
+            peak: only.and_then(peak),
+            ..RecordFigures::default()
+        }
     }
 
     /// Whether data of a file were lost.

@@ -1,0 +1,72 @@
+//! Whether a file in a folder is a recording, by its first bytes.
+
+use std::io::Read;
+use std::path::Path;
+
+use super::{manifest, summary};
+use crate::io::storage::Stored;
+
+/// Bytes that are looked at.
+const HEAD: u64 = 1 << 16;
+/// Beginning of an MCAP file.
+const MCAP: &[u8] = b"\x89MCAP";
+/// Marks of text in two bytes a letter.
+const WIDE_TEXT: [&[u8]; 2] = [b"\xff\xfe", b"\xfe\xff"];
+/// Beginning of a stand file's first key.
+const STAND: &str = "schema = \"torqcomp.";
+
+/// Whether it begins as an MCAP file does, or as a text with rows of numbers that torqcomp did not write as a stand file,
+/// manifest or summary. A file that cannot be read is one: the reason is said when it is read.
+pub(super) fn is_recording(path: &Path) -> bool {
+    let mut head = Vec::new();
+    let read = Stored::open(path).and_then(|file| file.take(HEAD).read_to_end(&mut head));
+    if read.is_err()
+        || head.starts_with(MCAP)
+        || WIDE_TEXT.iter().any(|mark| head.starts_with(mark))
+    {
+        return true;
+    }
+    if head.contains(&0) {
+        return false;
+    }
+    let text = String::from_utf8_lossy(&head);
+    let is_ours = text.starts_with(manifest::BEGINNING)
+        || text.starts_with(summary::BEGINNING)
+        || text.lines().any(|line| line.starts_with(STAND));
+    !is_ours && text.lines().any(is_row)
+}
+
+/// Whether a line begins with a number and has more digits and separators than letters.
+fn is_row(line: &str) -> bool {
+    let cell = line.trim_start_matches(|c: char| c.is_whitespace() || c == '"');
+    let number = cell.trim_start_matches(['+', '-', '.', ',']);
+    let letters = cell.chars().filter(|c| c.is_alphabetic()).count();
+    number.starts_with(|c: char| c.is_ascii_digit()) && 2 * letters < cell.chars().count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_begin_with_numbers() {
+        for row in [
+            "0,1.5",
+            "  -.5;2",
+            "\"1,5\";\"2\"",
+            "12:00:01.5\t3",
+            "2024-05-01T10:00,4,OK",
+        ] {
+            assert!(is_row(row), "{row}");
+        }
+        for text in [
+            "# 5",
+            "1. Switch the bridge on",
+            "time_s,V",
+            "",
+            "- 5 things to do",
+        ] {
+            assert!(!is_row(text), "{text}");
+        }
+    }
+}

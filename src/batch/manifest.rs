@@ -1,0 +1,312 @@
+//! What was made from what: a file of JSON lines, appended to durably before the results get their names.
+
+use std::collections::{HashMap, HashSet};
+use std::fs::File;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use crate::failure::Failure;
+use crate::io::{storage, sum};
+use crate::outcome::RecordFigures;
+use crate::warning::Warning;
+
+/// Name and version of a line.
+const SCHEMA: &str = "torqcomp.manifest/1";
+/// How every manifest begins.
+pub(super) const BEGINNING: &str = "{\"schema\":\"torqcomp.manifest/";
+/// Beginning and end of the name of a manifest in the folder of results.
+const NAME: [&str; 2] = ["torqcomp-manifest", ".jsonl"];
+
+/// What one recording became.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct ManifestEntry {
+    pub(super) schema: String,
+    /// That of torqcomp.
+    pub(super) version: String,
+    #[serde(flatten)]
+    pub(super) made_by: MadeBy,
+    /// Path of the recording below its root, the folders separated by `/`.
+    pub(super) file: String,
+    /// Its path as given.
+    pub(super) input: String,
+    #[serde(flatten)]
+    pub(super) made_from: MadeFrom,
+    pub(super) outputs: Vec<OutputSum>,
+    /// Exit code that a run over this recording alone has.
+    pub(super) exit: u8,
+    /// Why it failed, if it did.
+    pub(super) error: Option<String>,
+    pub(super) warnings: Vec<NotedWarning>,
+    #[serde(flatten)]
+    pub(super) figures: RecordFigures,
+    /// Time that it took.
+    pub(super) seconds: f64,
+}
+
+/// A verb and its options.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct MadeBy {
+    pub(super) verb: String,
+    /// Those given that a result may depend on.
+    pub(super) options: Vec<String>,
+}
+
+/// The content that a result was made from; `None` where it could not be read, or where no stand is needed.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct MadeFrom {
+    pub(super) input_sha256: Option<String>,
+    pub(super) stand: Option<String>,
+    pub(super) stand_sha256: Option<String>,
+}
+
+/// A result.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct OutputSum {
+    /// Its path below the folder of the results.
+    pub(super) file: String,
+    pub(super) sha256: String,
+}
+
+/// A warning as it was said.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct NotedWarning {
+    pub(super) code: String,
+    pub(super) message: String,
+}
+
+impl NotedWarning {
+    pub(super) fn of(warning: &Warning) -> Self {
+        Self {
+            code: warning.code.to_owned(),
+            message: warning.message.clone(),
+        }
+    }
+}
+
+impl MadeFrom {
+    /// The sums of a recording and of a stand file.
+    ///
+    /// # Errors
+    /// If one of them cannot be read.
+    pub(super) fn read(input: &str, stand: Option<&Path>) -> Result<Self, Failure> {
+        let sum = |path: &Path| sum::of_file(path).map_err(|error| Failure::reading(path, &error));
+        Ok(Self {
+            input_sha256: Some(sum(Path::new(input))?),
+            stand: stand.map(|path| path.display().to_string()),
+            stand_sha256: stand.map(sum).transpose()?,
+        })
+    }
+
+    /// Whether both have the same content, whatever their names.
+    fn is_same(&self, other: &Self) -> bool {
+        self.input_sha256 == other.input_sha256 && self.stand_sha256 == other.stand_sha256
+    }
+}
+
+impl ManifestEntry {
+    /// One of this version that nothing is known of yet.
+    pub(super) fn new(made_by: MadeBy, file: &str, input: &str) -> Self {
+        Self {
+            schema: SCHEMA.to_owned(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            made_by,
+            file: file.to_owned(),
+            input: input.to_owned(),
+            made_from: MadeFrom::default(),
+            outputs: Vec::new(),
+            exit: 1,
+            error: None,
+            warnings: Vec::new(),
+            figures: RecordFigures::default(),
+            seconds: 0.0,
+        }
+    }
+
+    /// Whether the recording failed.
+    pub(super) fn has_failed(&self) -> bool {
+        !matches!(self.exit, 0 | 3)
+    }
+}
+
+/// What manifests say of the results in a folder.
+#[derive(Debug, Default)]
+pub(super) struct History {
+    /// The last entry of each recording and verb.
+    last: HashMap<(String, String), ManifestEntry>,
+    /// Results that were ever made, and the recordings they were made from.
+    made: HashMap<String, HashSet<String>>,
+    /// Lines that could not be read: cut, or not of this kind.
+    pub(super) unread: usize,
+}
+
+impl History {
+    /// Reads manifests; those that are not there say nothing.
+    ///
+    /// # Errors
+    /// If one is there and cannot be read.
+    pub(super) fn read(manifests: &[PathBuf]) -> Result<Self, Failure> {
+        let mut history = Self::default();
+        for path in manifests {
+            match storage::read(path) {
+                Ok(bytes) => bytes.split(|b| *b == b'\n').for_each(|l| history.take(l)),
+                Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+                Err(error) => return Err(Failure::reading(path, &error)),
+            }
+        }
+        Ok(history)
+    }
+
+    fn take(&mut self, line: &[u8]) {
+        let entry = serde_json::from_slice::<ManifestEntry>(line).ok();
+        let Some(entry) = entry.filter(|entry| entry.schema == SCHEMA) else {
+            self.unread += usize::from(!line.is_empty());
+            return;
+        };
+        for output in &entry.outputs {
+            let inputs = self.made.entry(output.file.clone()).or_default();
+            inputs.insert(entry.input.clone());
+        }
+        let key = (entry.made_by.verb.clone(), entry.file.clone());
+        self.last.insert(key, entry);
+    }
+
+    /// Results that torqcomp made, by their paths below the folder of the results.
+    pub(super) fn results(&self) -> impl Iterator<Item = &str> {
+        self.made.keys().map(String::as_str)
+    }
+
+    /// Whether a result was made from the recording of that path before.
+    pub(super) fn made(&self, output: &str, input: &str) -> bool {
+        let inputs = self.made.get(output);
+        inputs.is_some_and(|inputs| inputs.contains(input))
+    }
+
+    /// The entry of a recording whose results need not be made again: they are in `folder`, as they were made, by the same
+    /// version, verb and options from the same content, and have the same names.
+    pub(super) fn standing(
+        &self,
+        folder: &Path,
+        outputs: &[String],
+        wanted: &ManifestEntry,
+    ) -> Option<&ManifestEntry> {
+        let key = (wanted.made_by.verb.clone(), wanted.file.clone());
+        let entry = self.last.get(&key)?;
+        let is_same = !entry.has_failed()
+            && entry.version == wanted.version
+            && entry.made_by == wanted.made_by
+            && entry.made_from.is_same(&wanted.made_from)
+            && entry.outputs.len() == outputs.len();
+        let is_there = |output: &OutputSum| {
+            let sum = sum::of_file(&folder.join(&output.file));
+            outputs.contains(&output.file) && sum.is_ok_and(|sum| sum == output.sha256)
+        };
+        (is_same && entry.outputs.iter().all(is_there)).then_some(entry)
+    }
+}
+
+/// The manifests in a folder of results.
+pub(super) fn in_folder(folder: &Path) -> Vec<PathBuf> {
+    let is_one = |path: &PathBuf| {
+        let name = path.file_name().map(|name| name.to_string_lossy());
+        name.is_some_and(|name| name.starts_with(NAME[0]) && name.ends_with(NAME[1]))
+    };
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut found: Vec<PathBuf> = entries.map(|entry| entry.path()).filter(is_one).collect();
+    found.sort();
+    found
+}
+
+/// The manifest of a folder of results.
+pub(super) fn usual(folder: &Path) -> PathBuf {
+    folder.join(NAME.concat())
+}
+
+/// A manifest that is appended to.
+pub(super) struct Manifest {
+    path: PathBuf,
+    file: File,
+    sync: bool,
+    /// Whether its last line is cut: the next one begins on a line of its own.
+    is_cut: bool,
+}
+
+impl Manifest {
+    /// Opens a manifest, and makes it if it is not there.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub(super) fn open(path: &Path, sync: bool) -> Result<Self, Failure> {
+        let unwritable = |error| Failure::writing(&path.display().to_string(), &error);
+        let is_cut = storage::ends_without_line(path).map_err(unwritable)?;
+        let file = storage::open_at_end(path).map_err(unwritable)?;
+        if sync {
+            let folder = path
+                .parent()
+                .filter(|folder| !folder.as_os_str().is_empty());
+            storage::sync_folder(folder.unwrap_or(Path::new("."))).map_err(unwritable)?;
+        }
+        Ok(Self {
+            path: path.to_owned(),
+            file,
+            sync,
+            is_cut,
+        })
+    }
+
+    /// Adds a line, which is on the disk afterwards.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub(super) fn append(&mut self, entry: &ManifestEntry) -> Result<(), Failure> {
+        let mut line = String::new();
+        if self.is_cut {
+            line.push('\n');
+        }
+        line.push_str(&serde_json::to_string(entry).expect("an entry is plain data"));
+        line.push('\n');
+        let written = storage::write_all(&self.file, line.as_bytes());
+        self.is_cut = written.is_err();
+        let synced = written.and_then(|()| match self.sync {
+            true => storage::sync(&self.file),
+            false => Ok(()),
+        });
+        synced.map_err(|error| Failure::writing(&self.path.display().to_string(), &error))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cut_last_line_costs_that_line_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = usual(folder.path());
+        let made_by = MadeBy {
+            verb: "compensate".to_owned(),
+            options: vec!["--band=800".to_owned()],
+        };
+        let mut entry = ManifestEntry::new(made_by, "a/ü x.csv", "logs/a/ü x.csv");
+        entry.exit = 0;
+        entry.figures.rms = Some(0.1);
+        let mut manifest = Manifest::open(&path, true).unwrap();
+        manifest.append(&entry).unwrap();
+        drop(manifest);
+        let whole = std::fs::read(&path).unwrap();
+        assert!(whole.starts_with(BEGINNING.as_bytes()) && whole.ends_with(b"}\n"));
+        for cut in 1..whole.len() {
+            std::fs::write(&path, [&whole, &whole[..cut]].concat()).unwrap();
+            Manifest::open(&path, false)
+                .unwrap()
+                .append(&entry)
+                .unwrap();
+            let history = History::read(std::slice::from_ref(&path)).unwrap();
+            // A line that lacks its end only is whole.
+            assert_eq!(history.unread, usize::from(cut < whole.len() - 1), "{cut}");
+            let key = ("compensate".to_owned(), "a/ü x.csv".to_owned());
+            assert_eq!(history.last[&key], entry);
+        }
+    }
+}

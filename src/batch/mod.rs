@@ -1,0 +1,288 @@
+//! Many recordings through a verb that reads one: which they are, where their results go, what was made from what.
+//!
+//! Each recording is worked on as by a run of its own. Before its results get their names, the manifest has a line with
+//! their SHA-256 on the disk: a run that is killed goes on where it was, and nothing is there that no line explains.
+
+mod content;
+mod list;
+mod manifest;
+mod plan;
+mod progress;
+mod summary;
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+use self::list::Listing;
+use self::manifest::{MadeFrom, Manifest, ManifestEntry, NotedWarning, OutputSum};
+use self::plan::{BatchFile, BatchPlan};
+use self::progress::{Amount, BatchProgress};
+use self::summary::{BatchResult, Treated};
+use crate::cli::{BatchOptions, OutputArgs};
+use crate::failure::Failure;
+use crate::io::output::{self, Output};
+use crate::outcome::{Made, Outcome};
+use crate::{parallel, print};
+
+/// What a verb is asked to do with many recordings.
+pub(crate) struct BatchTask<'a> {
+    pub(crate) verb: &'static str,
+    pub(crate) inputs: &'a [String],
+    pub(crate) many: &'a BatchOptions,
+    pub(crate) result: &'a OutputArgs,
+    /// Template of the names of its results, unless another is asked for.
+    pub(crate) name: &'static str,
+    /// Options of outputs beside the result, with their templates.
+    pub(crate) beside: Vec<(&'static str, &'a Path)>,
+    pub(crate) stand: Option<&'a Path>,
+    /// Whether the table is printed as a JSON document.
+    pub(crate) as_json: bool,
+    /// Whether `--json` is the format of the results, too.
+    pub(crate) makes_json: bool,
+    pub(crate) is_quiet: bool,
+}
+
+/// What a verb is to do with one of them.
+pub(crate) struct OneRun<'a> {
+    pub(crate) input: &'a str,
+    /// The result, then those beside it.
+    pub(crate) outputs: &'a [PathBuf],
+    /// Whether these are replaced if they are there.
+    pub(crate) replace: bool,
+    /// Threads, unless a number is asked for.
+    pub(crate) threads: usize,
+}
+
+/// The verb, on one recording.
+type OnOne<'a> = dyn Fn(&OneRun) -> Result<Made, Failure> + Sync + 'a;
+
+/// Whether these arguments ask for many recordings, each by itself.
+pub(crate) fn is_asked(inputs: &[String], many: &BatchOptions, result: &OutputArgs) -> bool {
+    let output = result.output.as_deref().unwrap_or_default();
+    many.is_asked()
+        || output.ends_with(std::path::is_separator)
+        || (Path::new(output).is_dir() && is_several(inputs))
+}
+
+/// Whether these are several recordings, or may be.
+pub(crate) fn is_several(inputs: &[String]) -> bool {
+    inputs.len() > 1 || inputs.iter().any(|input| list::is_several(input))
+}
+
+/// Paths with folders and patterns in the place of which stand the recordings that they mean.
+///
+/// # Errors
+/// If one of them means none.
+pub(crate) fn expand(inputs: &[String]) -> Result<Vec<String>, Failure> {
+    let mut paths = Vec::new();
+    for input in inputs {
+        if list::is_several(input) {
+            let mut listing = Listing::default();
+            listing.add(input, &|_| false)?;
+            paths.extend(listing.files.into_iter().map(|file| file.path));
+        } else {
+            paths.push(input.clone());
+        }
+    }
+    Ok(paths)
+}
+
+/// Runs a verb over many recordings; `options` are those that its results may depend on.
+///
+/// # Errors
+/// If nothing could be begun, or some recordings failed.
+pub(crate) fn run(
+    task: &BatchTask,
+    options: &[String],
+    on_one: &OnOne,
+) -> Result<Outcome, Failure> {
+    let begun = Instant::now();
+    let plan = BatchPlan::new(task, options)?;
+    if task.many.dry_run {
+        output::print(&print::visible(dry_run(&plan)))?;
+        return Ok(Outcome::Done);
+    }
+    make_folder(&plan.folder)?;
+    let summary = open_summary(task)?;
+    let bytes = plan.files.iter().map(|file| file.bytes).sum();
+    let all = Amount {
+        files: plan.files.len(),
+        bytes,
+    };
+    let running = Running {
+        on_one,
+        shared: Mutex::new(Shared {
+            manifest: Manifest::open(&plan.manifest, task.result.policy().sync)?,
+            progress: BatchProgress::new(all, task.is_quiet),
+            failures: 0,
+            broken: None,
+        }),
+        plan: &plan,
+    };
+    let treat = |i: usize| running.treat(&plan.files[i]);
+    let treated = parallel::parallel(plan.files.len(), plan.workers(), treat);
+    running.lock().progress.end();
+    if let Some(failure) = running.lock().broken.take() {
+        return Err(failure);
+    }
+    BatchResult {
+        plan: &plan,
+        treated,
+        seconds: begun.elapsed().as_secs_f64(),
+    }
+    .conclude(summary)
+}
+
+/// What would be done, a line for each recording.
+fn dry_run(plan: &BatchPlan) -> String {
+    let line = |file: &BatchFile| {
+        let outputs: Vec<String> = file.outputs.iter().map(|o| plan.path(o)).collect();
+        let to = outputs.join(", ");
+        format!("{}: {} -> {to}\n", plan.intent(file), file.found.path)
+    };
+    plan.files.iter().map(line).collect()
+}
+
+fn make_folder(folder: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(folder)
+        .map_err(|error| Failure::writing(&folder.display().to_string(), &error))
+}
+
+/// Opens the table of all recordings. With `--skip-existing`, that of a run before is replaced.
+fn open_summary(task: &BatchTask) -> Result<Option<Output>, Failure> {
+    let Some(path) = task.many.summary.as_deref() else {
+        return Ok(None);
+    };
+    let mut policy = task.result.policy();
+    policy.replace |= task.many.skip_existing && summary::is_one(path);
+    let taken: Vec<&Path> = task.stand.into_iter().collect();
+    Output::open(Some(path), policy, &taken).map(Some)
+}
+
+/// The work while it is under way.
+struct Running<'a> {
+    plan: &'a BatchPlan<'a>,
+    on_one: &'a OnOne<'a>,
+    shared: Mutex<Shared>,
+}
+
+/// What the workers share.
+struct Shared {
+    manifest: Manifest,
+    progress: BatchProgress,
+    failures: u32,
+    /// Why nothing can go on.
+    broken: Option<Failure>,
+}
+
+impl Running<'_> {
+    fn lock(&self) -> MutexGuard<'_, Shared> {
+        self.shared.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Whether no other recording is begun.
+    fn is_over(&self) -> bool {
+        let shared = self.lock();
+        let most = self.plan.task.many.most_failures();
+        shared.broken.is_some() || most.is_some_and(|most| shared.failures >= most)
+    }
+
+    /// Does what is to be done with a recording; `None` if it is not begun.
+    fn treat(&self, file: &BatchFile) -> Option<Treated> {
+        if self.is_over() {
+            return None;
+        }
+        let begun = Instant::now();
+        let mut entry = self.plan.entry(file);
+        let treated = match self.make(file, &mut entry, begun) {
+            Ok(treated) => treated,
+            Err(failure) => {
+                entry.outputs.clear();
+                entry.exit = failure.exit_code().max(1);
+                entry.error = Some(failure.to_string());
+                entry.seconds = begun.elapsed().as_secs_f64();
+                self.note(&entry);
+                Treated::Made(entry)
+            }
+        };
+        let mut shared = self.lock();
+        shared.failures += u32::from(treated.entry().has_failed());
+        shared.progress.add(file.bytes);
+        Some(treated)
+    }
+
+    /// Makes the results of a recording, unless they are there.
+    fn make(
+        &self,
+        file: &BatchFile,
+        entry: &mut ManifestEntry,
+        begun: Instant,
+    ) -> Result<Treated, Failure> {
+        let plan = self.plan;
+        if let Some(problem) = &file.found.problem {
+            return Err(problem.clone());
+        }
+        entry.made_from = MadeFrom::read(&file.found.path, plan.task.stand)?;
+        if let Some(standing) = plan.standing(file, entry) {
+            return Ok(Treated::Skipped(standing.clone()));
+        }
+        let outputs: Vec<PathBuf> = file.outputs.iter().map(|o| plan.folder.join(o)).collect();
+        outputs
+            .iter()
+            .filter_map(|path| path.parent())
+            .try_for_each(make_folder)?;
+        let one = OneRun {
+            input: &file.found.path,
+            outputs: &outputs,
+            replace: plan.may_replace(file),
+            threads: plan.threads(),
+        };
+        let made = catch_unwind(AssertUnwindSafe(|| (self.on_one)(&one)));
+        let made = made.unwrap_or_else(|_| Err(internal_error(one.input)))?;
+        entry.exit = made.outcome.exit_code();
+        entry.warnings = made.warnings.iter().map(NotedWarning::of).collect();
+        entry.figures = made.figures.clone();
+        entry.outputs = sums(&made.outputs, &plan.folder)?;
+        entry.seconds = begun.elapsed().as_secs_f64();
+        if self.note(entry) {
+            made.publish_silently()?;
+        }
+        Ok(Treated::Made(entry.clone()))
+    }
+
+    /// Adds a line to the manifest; whether that went well. Without it, no result gets its name.
+    fn note(&self, entry: &ManifestEntry) -> bool {
+        let mut shared = self.lock();
+        if shared.broken.is_none()
+            && let Err(failure) = shared.manifest.append(entry)
+        {
+            shared.broken = Some(failure);
+        }
+        shared.broken.is_none()
+    }
+}
+
+/// The results with their sums, by their paths below the folder.
+fn sums(outputs: &[Output], folder: &Path) -> Result<Vec<OutputSum>, Failure> {
+    let each = outputs.iter().map(|output| {
+        let unreadable = |error| Failure::reading(Path::new(output.name()), &error);
+        let below = Path::new(output.name()).strip_prefix(folder);
+        let parts = below.unwrap_or(Path::new(output.name())).iter();
+        let parts: Vec<_> = parts.map(|part| part.to_string_lossy()).collect();
+        let sum = output.sum().map_err(unreadable)?;
+        Ok(sum.map(|sha256| OutputSum {
+            file: parts.join("/"),
+            sha256,
+        }))
+    });
+    let known: Vec<Option<OutputSum>> = each.collect::<Result<_, Failure>>()?;
+    Ok(known.into_iter().flatten().collect())
+}
+
+fn internal_error(input: &str) -> Failure {
+    Failure::failed(format_args!(
+        "{input}: internal error, as said above; please report it with this recording"
+    ))
+}

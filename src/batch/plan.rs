@@ -1,0 +1,292 @@
+//! Which results each recording has, before anything is written.
+
+use std::collections::{HashMap, HashSet};
+use std::path::{Path, PathBuf};
+
+use super::BatchTask;
+use super::list::{FoundFile, Listing};
+use super::manifest::{self, History, MadeBy, MadeFrom, ManifestEntry};
+use crate::failure::Failure;
+use crate::io::output::end_of_links;
+
+/// All that is settled before the first recording is read.
+pub(super) struct BatchPlan<'a> {
+    pub(super) task: &'a BatchTask<'a>,
+    /// Where the results go.
+    pub(super) folder: PathBuf,
+    pub(super) manifest: PathBuf,
+    pub(super) history: History,
+    pub(super) made_by: MadeBy,
+    pub(super) files: Vec<BatchFile>,
+    /// Files of folders that are no recordings by their content.
+    pub(super) left_out: Vec<String>,
+}
+
+/// A recording and the names of its results below their folder: the result proper, then those beside it.
+pub(super) struct BatchFile {
+    pub(super) found: FoundFile,
+    pub(super) outputs: Vec<String>,
+    pub(super) bytes: u64,
+}
+
+impl<'a> BatchPlan<'a> {
+    /// # Errors
+    /// If the results have no folder, or two recordings would have the same result.
+    pub(super) fn new(task: &'a BatchTask<'a>, options: &[String]) -> Result<Self, Failure> {
+        let folder = folder(task)?;
+        let manifest = match &task.many.manifest {
+            Some(path) => path.clone(),
+            None => manifest::usual(&folder),
+        };
+        let mut manifests = manifest::in_folder(&folder);
+        if !manifests.contains(&manifest) {
+            manifests.push(manifest.clone());
+        }
+        let history = History::read(&manifests)?;
+        let mut plan = Self {
+            task,
+            folder,
+            manifest,
+            history,
+            made_by: MadeBy {
+                verb: task.verb.to_owned(),
+                options: options
+                    .iter()
+                    .filter(|option| task.makes_json || !option.starts_with("--json="))
+                    .cloned()
+                    .collect(),
+            },
+            files: Vec::new(),
+            left_out: Vec::new(),
+        };
+        let Listing { files, left_out } = plan.list()?;
+        plan.left_out = left_out;
+        let files = files.into_iter();
+        plan.files = files
+            .map(|found| plan.assign(found))
+            .collect::<Result<_, Failure>>()?;
+        plan.check_names()?;
+        Ok(plan)
+    }
+
+    /// The recordings that are meant.
+    fn list(&self) -> Result<Listing, Failure> {
+        let task = self.task;
+        let results = self.history.results().map(|name| self.folder.join(name));
+        let single = [
+            Some(self.manifest.as_path()),
+            task.many.summary.as_deref(),
+            task.stand,
+        ];
+        let single = single.into_iter().flatten().map(Path::to_owned);
+        let ours: HashSet<PathBuf> = results
+            .chain(single)
+            .map(|path| end_of_links(&path))
+            .collect();
+        let folder = self.folder.canonicalize().ok();
+        let is_ours = |path: &Path| folder.as_deref() == Some(path) || ours.contains(path);
+        let mut listing = Listing::default();
+        for input in task.inputs {
+            listing.add(input, &is_ours)?;
+        }
+        if let Some(list) = &task.many.files_from {
+            listing.add_listed(list, task.many.null)?;
+        }
+        Ok(listing.without_repetitions())
+    }
+
+    /// Names the results of a recording.
+    fn assign(&self, found: FoundFile) -> Result<BatchFile, Failure> {
+        let task = self.task;
+        let name = task.many.name.as_deref().unwrap_or(task.name);
+        let beside = task.beside.iter().map(|(option, path)| {
+            let text = path.to_str().unwrap_or_default();
+            crate::cli::many::template(text).map_err(|expected| {
+                Failure::usage(format_args!(
+                    "{option} {}: of many recordings each has its own, in the folder of -o: {expected}",
+                    path.display()
+                ))
+            })
+        });
+        let beside = beside.collect::<Result<Vec<String>, Failure>>()?;
+        let names = std::iter::once(name).chain(beside.iter().map(String::as_str));
+        Ok(BatchFile {
+            outputs: names.map(|name| named(name, &found.relative)).collect(),
+            bytes: std::fs::metadata(&found.path).map_or(0, |meta| meta.len()),
+            found,
+        })
+    }
+
+    /// Refuses two recordings with the same result, and a result in the place of a recording.
+    fn check_names(&self) -> Result<(), Failure> {
+        let mut owners: HashMap<&str, &str> = HashMap::new();
+        let inputs: HashMap<PathBuf, &str> = self
+            .files
+            .iter()
+            .map(|file| {
+                (
+                    end_of_links(Path::new(&file.found.path)),
+                    file.found.path.as_str(),
+                )
+            })
+            .collect();
+        for file in &self.files {
+            for output in &file.outputs {
+                let path = &file.found.path;
+                if let Some(other) = owners.insert(output, path) {
+                    return Err(Failure::usage(format_args!(
+                        "{other} and {path} would both become {output}; give --name '{{name}}…' if they differ in their \
+                         endings, or one folder that holds both, so that its tree is kept"
+                    )));
+                }
+                if let Some(input) = inputs.get(&end_of_links(&self.folder.join(output))) {
+                    return Err(Failure::usage(format_args!(
+                        "the result of {path} would take the place of the recording {input}; give another --name, or \
+                         another folder with -o"
+                    )));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// What is known of a recording beforehand.
+    pub(super) fn entry(&self, file: &BatchFile) -> ManifestEntry {
+        let FoundFile { path, relative, .. } = &file.found;
+        ManifestEntry::new(self.made_by.clone(), relative, path)
+    }
+
+    /// The entry of results that need not be made again, if such are asked for.
+    pub(super) fn standing(
+        &self,
+        file: &BatchFile,
+        wanted: &ManifestEntry,
+    ) -> Option<&ManifestEntry> {
+        let history = self.task.many.skip_existing.then_some(&self.history)?;
+        history.standing(&self.folder, &file.outputs, wanted)
+    }
+
+    /// Whether results that are there are replaced: with `--force`, or if they came from this recording by a run before.
+    pub(super) fn may_replace(&self, file: &BatchFile) -> bool {
+        let is_known = |output: &String| {
+            self.history.made(output, &file.found.path) || !self.folder.join(output).exists()
+        };
+        let is_ours = self.task.many.skip_existing && file.outputs.iter().all(is_known);
+        self.task.result.force || is_ours
+    }
+
+    /// The path of a result, for people.
+    pub(super) fn path(&self, output: &str) -> String {
+        self.folder.join(output).display().to_string()
+    }
+
+    /// What will be done with a recording, in a word.
+    pub(super) fn intent(&self, file: &BatchFile) -> &'static str {
+        let mut wanted = self.entry(file);
+        let read = match &file.found.problem {
+            Some(problem) => Err(problem.clone()),
+            None => MadeFrom::read(&file.found.path, self.task.stand),
+        };
+        let Ok(made_from) = read else {
+            return "fail (unreadable)";
+        };
+        wanted.made_from = made_from;
+        let exists = |output: &String| self.folder.join(output).exists();
+        if self.standing(file, &wanted).is_some() {
+            "skip"
+        } else if !file.outputs.iter().any(exists) {
+            "make"
+        } else if self.may_replace(file) {
+            "replace"
+        } else {
+            "fail (exists)"
+        }
+    }
+
+    /// Recordings worked on at a time.
+    pub(super) fn workers(&self) -> usize {
+        let allowed = match self.task.many.jobs {
+            Some(jobs) => usize::from(jobs),
+            None => cores(),
+        };
+        allowed.min(self.files.len()).max(1)
+    }
+
+    /// Threads for each of them.
+    pub(super) fn threads(&self) -> usize {
+        (cores() / self.workers()).max(1)
+    }
+}
+
+/// Cores that this process may use: as many as Slurm gives the task, and no more than the system (its cgroup included) has.
+fn cores() -> usize {
+    let system = std::thread::available_parallelism().map_or(1, usize::from);
+    let slurm = std::env::var("SLURM_CPUS_PER_TASK").ok();
+    let slurm = slurm.and_then(|text| text.parse::<usize>().ok());
+    slurm
+        .filter(|count| *count > 0)
+        .map_or(system, |count| count.min(system))
+}
+
+/// The folder of the results.
+fn folder(task: &BatchTask) -> Result<PathBuf, Failure> {
+    let missing = "the results of several recordings need a folder; give -o FOLDER/";
+    let Some(text) = task.result.output.as_deref().filter(|text| *text != "-") else {
+        return Err(Failure::usage(missing));
+    };
+    let path = Path::new(text);
+    let is_file = match std::fs::metadata(path) {
+        Ok(meta) => !meta.is_dir(),
+        Err(_) => !text.ends_with(std::path::is_separator) && path.extension().is_some(),
+    };
+    match is_file {
+        true => Err(Failure::usage(format_args!(
+            "{missing} ({text} names a file)"
+        ))),
+        false => Ok(path.to_owned()),
+    }
+}
+
+/// The path that a template gives the result of a recording.
+fn named(template: &str, relative: &str) -> String {
+    let (folder, name) = match relative.rsplit_once('/') {
+        Some((folder, name)) => (format!("{folder}/"), name),
+        None => (String::new(), relative),
+    };
+    let (stem, ext) = match name.rsplit_once('.') {
+        Some((stem, ext)) if !stem.is_empty() => (stem, ext),
+        _ => (name, ""),
+    };
+    // Braces in the name of a recording are no placeholders.
+    let mut parts = template.split('{');
+    let mut text = folder + parts.next().unwrap_or_default();
+    for part in parts {
+        let (placeholder, rest) = part.split_once('}').unwrap_or(("", part));
+        text.push_str(match placeholder {
+            "stem" => stem,
+            "ext" => ext,
+            _ => name,
+        });
+        text.push_str(rest);
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::named;
+
+    #[test]
+    fn results_are_named_after_their_recordings() {
+        assert_eq!(
+            named("{stem}.torque.csv", "a b/ü.x.csv"),
+            "a b/ü.x.torque.csv"
+        );
+        assert_eq!(
+            named("{name}.{ext}-{stem}", "{ext}.dat"),
+            "{ext}.dat.dat-{ext}"
+        );
+        assert_eq!(named("{stem}.t{ext}", "run"), "run.t");
+        assert_eq!(named("{stem}.csv", "a/.run"), "a/.run.csv");
+    }
+}

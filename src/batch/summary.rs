@@ -1,0 +1,336 @@
+//! What became of all recordings: a table for people, a CSV file, a JSON document, and how the run ended.
+
+use std::collections::BTreeMap;
+use std::io::Read;
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::manifest::{ManifestEntry, NotedWarning};
+use super::plan::BatchPlan;
+use super::progress::{Amount, rate};
+use crate::failure::Failure;
+use crate::io::output::{self, Output};
+use crate::io::storage::Stored;
+use crate::outcome::Outcome;
+use crate::print::{self, plural, rounded};
+
+/// Headings of the CSV file.
+const HEADINGS: [&str; 12] = [
+    "file",
+    "exit",
+    "samples",
+    "rate_hz",
+    "band_hz",
+    "unit",
+    "rms",
+    "peak",
+    "noise_rms",
+    "warnings",
+    "codes",
+    "error",
+];
+/// How such a file begins.
+pub(super) const BEGINNING: &str = "file,exit,samples,rate_hz,band_hz,unit,rms,peak,noise_rms,";
+/// Significant digits in it.
+const DIGITS: u32 = 12;
+/// Files that are no recordings whose names are said.
+const LISTED: usize = 10;
+
+/// What became of a recording.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "status", rename_all = "lowercase")]
+pub(super) enum Treated {
+    /// It was worked on, well or not.
+    Made(ManifestEntry),
+    /// Its results were there.
+    Skipped(ManifestEntry),
+}
+
+impl Treated {
+    pub(super) fn entry(&self) -> &ManifestEntry {
+        match self {
+            Self::Made(entry) | Self::Skipped(entry) => entry,
+        }
+    }
+}
+
+/// Whether a file is the table of a run.
+pub(super) fn is_one(path: &Path) -> bool {
+    let mut head = Vec::new();
+    let read = Stored::open(path)
+        .and_then(|file| file.take(BEGINNING.len() as u64).read_to_end(&mut head));
+    read.is_ok() && head == BEGINNING.as_bytes()
+}
+
+/// What became of all recordings.
+pub(super) struct BatchResult<'a> {
+    pub(super) plan: &'a BatchPlan<'a>,
+    /// In the order of the recordings; `None` for those that were not begun.
+    pub(super) treated: Vec<Option<Treated>>,
+    pub(super) seconds: f64,
+}
+
+/// The document of a run.
+#[derive(Serialize)]
+struct BatchReport<'a> {
+    schema: &'static str,
+    version: &'static str,
+    verb: &'a str,
+    /// Folder of the results.
+    output: String,
+    manifest: String,
+    recordings: usize,
+    made: usize,
+    skipped: usize,
+    failed: usize,
+    not_begun: usize,
+    seconds: f64,
+    /// Files of folders that are no recordings by their content.
+    left_out: &'a [String],
+    files: Vec<&'a Treated>,
+}
+
+impl BatchResult<'_> {
+    /// Writes the tables and tells how the run ended.
+    ///
+    /// # Errors
+    /// If a recording failed, or a table cannot be written.
+    pub(super) fn conclude(&self, summary: Option<Output>) -> Result<Outcome, Failure> {
+        if let Some(mut summary) = summary {
+            summary.write(&csv(self.entries()))?;
+            summary.finish()?;
+        }
+        let task = self.plan.task;
+        if task.as_json {
+            output::print(&print::json(&self.report()))?;
+        } else if !task.is_quiet {
+            print::say(&self.text());
+        }
+        print::say(&self.failures());
+        let failed = self.failed();
+        if failed > 0 {
+            return Err(Failure::failed(format_args!(
+                "{} of {} failed{}",
+                failed,
+                plural(self.treated.len() as u64, "recording"),
+                match self.not_begun() {
+                    0 => "; the others are done".to_owned(),
+                    count => format!(", {count} were not begun"),
+                }
+            )));
+        }
+        match self.entries().any(|entry| entry.exit != 0) {
+            true => Ok(Outcome::WithLoss),
+            false => Ok(Outcome::Done),
+        }
+    }
+
+    fn entries(&self) -> impl Iterator<Item = &ManifestEntry> {
+        self.treated.iter().flatten().map(Treated::entry)
+    }
+
+    fn failed(&self) -> usize {
+        self.entries().filter(|entry| entry.has_failed()).count()
+    }
+
+    fn skipped(&self) -> usize {
+        let is_skipped = |treated: &&Treated| matches!(treated, Treated::Skipped(_));
+        self.treated.iter().flatten().filter(is_skipped).count()
+    }
+
+    fn not_begun(&self) -> usize {
+        self.treated
+            .iter()
+            .filter(|treated| treated.is_none())
+            .count()
+    }
+
+    fn report(&self) -> BatchReport<'_> {
+        let count = self.treated.len();
+        let (skipped, failed, not_begun) = (self.skipped(), self.failed(), self.not_begun());
+        BatchReport {
+            schema: "torqcomp.batch/1",
+            version: env!("CARGO_PKG_VERSION"),
+            verb: self.plan.task.verb,
+            output: self.plan.folder.display().to_string(),
+            manifest: self.plan.manifest.display().to_string(),
+            recordings: count,
+            made: count - skipped - failed - not_begun,
+            skipped,
+            failed,
+            not_begun,
+            seconds: self.seconds,
+            left_out: &self.plan.left_out,
+            files: self.treated.iter().flatten().collect(),
+        }
+    }
+
+    /// The table, and what holds for all.
+    fn text(&self) -> String {
+        let headings = [
+            "file", "samples", "rate/Hz", "band/Hz", "rms", "peak", "noise", "unit", "warnings",
+            "time/s",
+        ];
+        let mut rows = vec![headings.map(str::to_owned).to_vec()];
+        rows.extend(self.treated.iter().flatten().map(row));
+        let mut text = print::columns(&rows);
+        text += &self.totals();
+        text += &self.codes();
+        let left_out = &self.plan.left_out;
+        if !left_out.is_empty() {
+            let more = match left_out.len().saturating_sub(LISTED) {
+                0 => String::new(),
+                more => format!(" and {more} more"),
+            };
+            let names = left_out[..left_out.len().min(LISTED)].join(", ");
+            text += &format!("no recordings by their content, left out: {names}{more}\n");
+        }
+        if self.plan.history.unread > 0 {
+            let lines = plural(self.plan.history.unread as u64, "line");
+            text += &format!(
+                "{lines} of the manifest cannot be read and say nothing: cut, or of another version\n"
+            );
+        }
+        text
+    }
+
+    fn totals(&self) -> String {
+        let report = self.report();
+        let mut parts = vec![format!("{} done", report.made)];
+        let others = [
+            (report.skipped, "skipped (unchanged)"),
+            (report.failed, "failed"),
+            (report.not_begun, "not begun"),
+        ];
+        let others = others.into_iter().filter(|(count, _)| *count > 0);
+        parts.extend(others.map(|(count, what)| format!("{count} {what}")));
+        let is_made = |treated: &&Option<Treated>| matches!(treated, Some(Treated::Made(_)));
+        let files = self.plan.files.iter().zip(&self.treated);
+        let bytes = files
+            .filter(|(_, t)| is_made(t))
+            .map(|(file, _)| file.bytes);
+        let amount = Amount {
+            files: report.recordings - report.skipped - report.not_begun,
+            bytes: bytes.sum(),
+        };
+        format!(
+            "{} into {}: {}; {} s ({})\n",
+            plural(report.recordings as u64, "recording"),
+            report.output,
+            parts.join(", "),
+            rounded(self.seconds, 3),
+            rate(amount, self.seconds.max(1e-3))
+        )
+    }
+
+    /// How many recordings each warning concerns.
+    fn codes(&self) -> String {
+        let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+        for entry in self.entries() {
+            for code in codes(&entry.warnings) {
+                *counts.entry(code).or_default() += 1;
+            }
+        }
+        if counts.is_empty() {
+            return String::new();
+        }
+        let each = counts
+            .iter()
+            .map(|(code, count)| format!("{code} in {count}"));
+        let each: Vec<String> = each.collect();
+        format!(
+            "warnings: {} (their words are in {})\n",
+            each.join(", "),
+            self.plan.manifest.display()
+        )
+    }
+
+    /// The recordings that failed or lost data, and why.
+    fn failures(&self) -> String {
+        let line = |entry: &ManifestEntry| {
+            let (word, input) = (word(entry.exit), &entry.input);
+            let why = entry.error.as_deref();
+            let why = why.unwrap_or("data were lost, or --strict made a warning count");
+            match why.starts_with(input) {
+                true => format!("torqcomp: {word}: {why}\n"),
+                false => format!("torqcomp: {word}: {input}: {why}\n"),
+            }
+        };
+        let bad = self.entries().filter(|entry| entry.exit != 0);
+        bad.map(line).collect()
+    }
+}
+
+/// How a recording ended.
+fn word(exit: u8) -> &'static str {
+    match exit {
+        0 => "done",
+        3 => "incomplete",
+        _ => "failed",
+    }
+}
+
+/// The different codes of warnings, in their order.
+fn codes(warnings: &[NotedWarning]) -> Vec<&str> {
+    let mut codes: Vec<&str> = Vec::new();
+    for warning in warnings {
+        if !codes.contains(&warning.code.as_str()) {
+            codes.push(&warning.code);
+        }
+    }
+    codes
+}
+
+/// A row of the table for people; unknown figures are `-`.
+fn row(treated: &Treated) -> Vec<String> {
+    let entry = treated.entry();
+    let figures = &entry.figures;
+    let text = |value: Option<f64>, digits| {
+        value.map_or_else(|| "-".to_owned(), |value| rounded(value, digits))
+    };
+    let samples = figures.samples.map(|samples| samples.to_string());
+    vec![
+        entry.file.clone(),
+        samples.unwrap_or_else(|| "-".to_owned()),
+        text(figures.rate_hz, 6),
+        text(figures.band_hz, 4),
+        text(figures.rms, 4),
+        text(figures.peak, 4),
+        text(figures.noise_rms, 3),
+        figures.unit.clone().unwrap_or_else(|| "-".to_owned()),
+        entry.warnings.len().to_string(),
+        match treated {
+            Treated::Skipped(_) => "skipped".to_owned(),
+            Treated::Made(_) if entry.has_failed() => "failed".to_owned(),
+            Treated::Made(_) => rounded(entry.seconds, 2),
+        },
+    ]
+}
+
+/// The table as CSV. It has no times, so that the same recordings give the same bytes.
+pub(super) fn csv<'a>(entries: impl Iterator<Item = &'a ManifestEntry>) -> Vec<u8> {
+    let mut rows = csv::Writer::from_writer(Vec::new());
+    let written = "a table in memory can be written";
+    rows.write_record(HEADINGS).expect(written);
+    for entry in entries {
+        let figures = &entry.figures;
+        let text = |value: Option<f64>| value.map_or_else(String::new, |v| rounded(v, DIGITS));
+        let cells = [
+            entry.file.clone(),
+            entry.exit.to_string(),
+            figures.samples.map_or_else(String::new, |n| n.to_string()),
+            text(figures.rate_hz),
+            text(figures.band_hz),
+            figures.unit.clone().unwrap_or_default(),
+            text(figures.rms),
+            text(figures.peak),
+            text(figures.noise_rms),
+            entry.warnings.len().to_string(),
+            codes(&entry.warnings).join(" "),
+            entry.error.clone().unwrap_or_default(),
+        ];
+        rows.write_record(&cells).expect(written);
+    }
+    rows.into_inner().expect(written)
+}

@@ -1,0 +1,107 @@
+//! The options of a verb that takes many recordings, one at a time.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+/// Many recordings, each read by itself.
+#[derive(Debug, Clone, Default, Args)]
+pub struct BatchOptions {
+    /// Also take the recordings that a file lists, one path a line (- for standard input)
+    #[arg(long, value_name = "FILE")]
+    pub files_from: Option<String>,
+    /// Paths of --files-from end with a zero byte instead of a line end
+    #[arg(short = '0', long, requires = "files_from")]
+    pub null: bool,
+    /// Names of the results in the folder of -o: {stem} and {ext} are the recording's name before and behind its last point,
+    /// {name} is all of it
+    #[arg(long, value_name = "TEMPLATE", value_parser = template, help_heading = "Many recordings")]
+    pub name: Option<String>,
+    /// Skip recordings whose results are there and, by the manifest, made from the same recording, stand, options and
+    /// version; results of before are replaced
+    #[arg(long)]
+    pub skip_existing: bool,
+    /// What was made from what, a JSON line for each recording [default: torqcomp-manifest.jsonl in the folder of -o]
+    #[arg(long, value_name = "FILE")]
+    pub manifest: Option<PathBuf>,
+    /// Write a CSV table with a row for each recording
+    #[arg(long, value_name = "FILE")]
+    pub summary: Option<PathBuf>,
+    /// Recordings worked on at a time [default: SLURM_CPUS_PER_TASK, else the cores that this process may use]
+    #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub jobs: Option<u16>,
+    /// Begin no other recording after the first failure
+    #[arg(long, conflicts_with = "max_failures")]
+    pub fail_fast: bool,
+    /// Begin no other recording after N failures
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub max_failures: Option<u32>,
+    /// List what would be done and write nothing
+    #[arg(long)]
+    pub dry_run: bool,
+}
+
+impl BatchOptions {
+    /// Whether one of these options is given.
+    #[must_use]
+    pub fn is_asked(&self) -> bool {
+        self.files_from.is_some()
+            || self.name.is_some()
+            || self.skip_existing
+            || self.manifest.is_some()
+            || self.summary.is_some()
+            || self.jobs.is_some()
+            || self.fail_fast
+            || self.max_failures.is_some()
+            || self.dry_run
+    }
+
+    /// Failures after which no other recording is begun.
+    #[must_use]
+    pub fn most_failures(&self) -> Option<u32> {
+        match self.fail_fast {
+            true => Some(1),
+            false => self.max_failures,
+        }
+    }
+}
+
+/// What stands for a part of the recording's name in that of a result.
+const PLACEHOLDERS: [&str; 3] = ["{stem}", "{ext}", "{name}"];
+
+/// The template of a file's name.
+pub(crate) fn template(text: &str) -> Result<String, String> {
+    let mut rest = text.to_owned();
+    for placeholder in PLACEHOLDERS {
+        rest = rest.replace(placeholder, "");
+    }
+    if rest.contains(['{', '}']) {
+        return Err("expected {stem}, {ext} or {name} in braces, and no other".to_owned());
+    }
+    if rest.contains(['/', '\\']) {
+        return Err(
+            "expected a name without a folder: the folders are those of the recordings".to_owned(),
+        );
+    }
+    match text.contains("{stem}") || text.contains("{name}") {
+        true => Ok(text.to_owned()),
+        false => Err(
+            "expected {stem} or {name} in it, so that each recording has a result of its own"
+                .to_owned(),
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::template;
+
+    #[test]
+    fn templates_name_each_recording() {
+        assert_eq!(template("{stem}.torque.csv").unwrap(), "{stem}.torque.csv");
+        assert!(template("torque.csv").unwrap_err().contains("{stem}"));
+        assert!(template("{stam}.csv").unwrap_err().contains("braces"));
+        assert!(template("a/{stem}.csv").unwrap_err().contains("folder"));
+        assert!(template("{ext}").is_err());
+    }
+}

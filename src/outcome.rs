@@ -1,0 +1,80 @@
+//! How a run of a verb ended well, and what it made.
+
+use serde::{Deserialize, Serialize};
+
+use crate::failure::Failure;
+use crate::io::output::{self, Output};
+use crate::print;
+use crate::warning::Warning;
+
+/// How a command ended well.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// All was done.
+    Done,
+    /// It was done, but data were lost, or `--strict` made a warning count.
+    WithLoss,
+}
+
+impl Outcome {
+    /// The exit code.
+    #[must_use]
+    pub fn exit_code(self) -> u8 {
+        match self {
+            Self::Done => 0,
+            Self::WithLoss => 3,
+        }
+    }
+}
+
+/// Figures of a record and its result. `None` is unknown, or nothing that the verb determines.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct RecordFigures {
+    pub(crate) samples: Option<usize>,
+    pub(crate) rate_hz: Option<f64>,
+    /// End of the part of the spectrum that is compensated in full.
+    pub(crate) band_hz: Option<f64>,
+    /// Unit of `rms`, `peak` and `noise_rms`.
+    pub(crate) unit: Option<String>,
+    /// Root mean square about the mean.
+    pub(crate) rms: Option<f64>,
+    /// Largest magnitude.
+    pub(crate) peak: Option<f64>,
+    pub(crate) noise_rms: Option<f64>,
+}
+
+/// What a verb made of one record. The outputs are complete and get their names in [`Made::publish`].
+pub(crate) struct Made {
+    pub(crate) outputs: Vec<Output>,
+    /// JSON document for standard output.
+    pub(crate) document: Option<String>,
+    /// Report and warnings for standard error.
+    pub(crate) talk: String,
+    pub(crate) warnings: Vec<Warning>,
+    pub(crate) outcome: Outcome,
+    pub(crate) figures: RecordFigures,
+}
+
+impl Made {
+    /// Names the outputs and says what is to be said.
+    ///
+    /// # Errors
+    /// As [`Output::write`].
+    pub(crate) fn publish(self) -> Result<Outcome, Failure> {
+        // Do everything that can fail before renaming the first output.
+        if let Some(document) = &self.document {
+            output::print(document)?;
+        }
+        output::finish_all(self.outputs)?;
+        print::say(&self.talk);
+        Ok(self.outcome)
+    }
+
+    /// Names the outputs.
+    ///
+    /// # Errors
+    /// As [`Output::write`].
+    pub(crate) fn publish_silently(self) -> Result<(), Failure> {
+        output::finish_all(self.outputs)
+    }
+}
