@@ -102,9 +102,10 @@ fn memory_grows_by_no_more_than_is_stated() {
 #[test]
 fn a_text_without_room_is_refused() {
     let folder = Folder::new();
-    let file = std::fs::File::create(folder.path("long.csv")).expect("a file");
-    // It takes no room on the disk.
-    file.set_len(1 << 30).expect("a length");
+    folder.write("long.csv", record(10_000));
+    let file = std::fs::File::options().write(true).open(folder.path("long.csv"));
+    // The rest takes no room on the disk.
+    file.expect("a file").set_len(3 << 30).expect("a length");
     let script = "ulimit -v 1000000; exec \"$0\" identify decay long.csv -o out.toml";
     let ran = std::process::Command::new("sh")
         .args(["-c", script, env!("CARGO_BIN_EXE_torqcomp")])

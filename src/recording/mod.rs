@@ -4,6 +4,7 @@
 //! samples and stamps are as read, cells that hold no number are `NaN` and listed with their lines.
 
 mod aligned;
+mod all_samples;
 mod axis;
 mod block;
 mod checkpoints;
@@ -14,7 +15,6 @@ mod memory_stream;
 mod message_stream;
 mod messages;
 pub mod moment;
-mod part;
 mod progress;
 mod range;
 mod room;
@@ -33,6 +33,7 @@ use crate::warning::Warning;
 
 pub(crate) use aligned::{AlignedChannel, AlignedChannels, resampled};
 pub(crate) use axis::without_rounding;
+pub use all_samples::AllSamples;
 pub use axis::{RateFrom, TimeAxis, typical_step};
 pub(crate) use block::Block;
 pub(crate) use choice::{Selection, contradicted, unit_of};
@@ -144,8 +145,7 @@ pub enum HoleKind {
     Text,
 }
 
-/// Reads a recording of any format and dialect as a whole into memory: the text, and eight bytes for
-/// each number in it. Of an MCAP file that is the only number in it.
+/// Reads a recording of any format and dialect as a whole into memory: eight bytes for each number in it. Of an MCAP file that is the only number in it.
 ///
 /// # Errors
 /// If the file cannot be read, is no recording, or leaves open how it is to be read.
@@ -170,24 +170,27 @@ impl Recording {
         for choice in choices {
             refuse_for_text(choice, reading)?;
         }
-        room::look(input)?;
-        Self::of_text(input, reading, u64::MAX)
+        let (mut recording, _) = Self::of_text(input, reading, usize::MAX)?;
+        if let Some(range) = &reading.range {
+            recording.keep(range).map_err(|f| f.at(input.name()))?;
+        }
+        Ok(recording)
     }
 
-    /// The channels of a text in no more than so many bytes of it, in whole lines; what was left out is
-    /// among the warnings.
+    /// The channels of a text, of long tables only about so many numbers; and of channels that have more, what all of
+    /// their samples come to.
     ///
     /// # Errors
     /// See [`read`].
-    pub(crate) fn of_text(input: &Input, reading: &Reading, most: u64) -> Result<Self, Failure> {
-        let name = input.name();
-        let (bytes, left_out) = part::first(input, most)?;
-        let mut recording = text::read(&name, bytes, reading).map_err(|f| f.at(&name))?;
-        recording.warnings.extend(left_out);
-        if let Some(range) = &reading.range {
-            recording.keep(range).map_err(|f| f.at(&name))?;
-        }
-        Ok(recording)
+    pub(crate) fn of_text(
+        input: &Input,
+        reading: &Reading,
+        most: usize,
+    ) -> Result<(Self, Vec<Option<AllSamples>>), Failure> {
+        let (name, bytes) = (input.name(), progress::open(input)?);
+        let file = text::TextFile::open(&name, bytes, reading).map_err(|f| f.at(&name))?;
+        room::look(input, &file, most)?;
+        file.read_first(most).map_err(|f| f.at(&name))
     }
 
     /// Asks whether the table is transposed, if it has a few rows and hundreds of columns.

@@ -1,13 +1,14 @@
-//! Whether a text that is read as a whole has room in memory.
+//! Whether the numbers of a text have room in memory.
 
+use super::text::TextFile;
 use crate::failure::Failure;
 use crate::io::Input;
 use crate::print;
 
-/// Memory for each byte of a text, at least: itself, and eight bytes for each of its numbers.
-const LEAST_PER_BYTE: u64 = 2;
-/// The same with the copies of a channel or two that a verb works on.
-const USUAL_PER_BYTE: u64 = 4;
+/// Memory for each number of a text, at least.
+const LEAST: u64 = 8;
+/// The same with what a verb makes of the samples.
+const USUAL: u64 = 24;
 
 /// Memory in bytes, as far as the system says.
 #[derive(Debug, Clone, Copy, Default)]
@@ -18,16 +19,17 @@ struct Room {
     allowed: Option<u64>,
 }
 
-/// Says it beforehand if a text will take more memory than the machine has free.
+/// Says it beforehand if the numbers of a text, no more than so many, will take more memory than the machine has free.
 ///
 /// # Errors
-/// If it cannot have room within what the process may have: before anything is read or written.
-pub(super) fn look(input: &Input) -> Result<(), Failure> {
+/// If they cannot have room within what the process may have: before they are read or anything is written.
+pub(super) fn look(input: &Input, text: &TextFile, most: usize) -> Result<(), Failure> {
     let Input::File(path) = input else {
         return Ok(());
     };
     let length = std::fs::metadata(path).map_or(0, |meta| meta.len());
-    if let Some(text) = Room::of_system().said_of(length, &input.name())? {
+    let numbers = text.numbers_in(length).min(most as u64);
+    if let Some(text) = Room::of_system().said_of(numbers, &input.name())? {
         print::say(&format!("torqcomp: {text}\n"));
     }
     Ok(())
@@ -42,13 +44,13 @@ impl Room {
         }
     }
 
-    fn said_of(self, length: u64, name: &str) -> Result<Option<String>, Failure> {
-        let least = LEAST_PER_BYTE.saturating_mul(length);
-        let usual = USUAL_PER_BYTE.saturating_mul(length);
+    fn said_of(self, numbers: u64, name: &str) -> Result<Option<String>, Failure> {
+        let least = LEAST.saturating_mul(numbers);
+        let usual = USUAL.saturating_mul(numbers);
         let gb = |bytes: u64| print::rounded(bytes as f64 * 1e-9, 2);
         if let Some(allowed) = self.allowed.filter(|allowed| least > *allowed) {
             return Err(Failure::failed(format_args!(
-                "{name}: read as a whole it takes at least {} GB of memory, and this process may have {} GB; raise the limit \
+                "{name}: its numbers take at least {} GB of memory, and this process may have {} GB; raise the limit \
                  (ulimit -v), or cut the file into parts",
                 gb(least),
                 gb(allowed)
@@ -97,19 +99,19 @@ mod tests {
             free: Some(3_000_000_000),
             allowed: Some(2_000_000_000),
         };
-        assert_eq!(room.said_of(700_000_000, "a.csv"), Ok(None));
-        // Four times 0.8 GB are 3.2 GB.
-        let said = room.said_of(800_000_000, "a.csv").unwrap().unwrap();
+        assert_eq!(room.said_of(120_000_000, "a.csv"), Ok(None));
+        // 0.15 thousand million numbers of 24 bytes.
+        let said = room.said_of(150_000_000, "a.csv").unwrap().unwrap();
         assert!(
-            said.contains("about 3.2 GB of memory, and 3 GB are free"),
+            said.contains("about 3.6 GB of memory, and 3 GB are free"),
             "{said}"
         );
         let refused = room
-            .said_of(1_100_000_000, "a.csv")
+            .said_of(300_000_000, "a.csv")
             .unwrap_err()
             .to_string();
         assert!(
-            refused.contains("at least 2.2 GB of memory, and this process may have 2 GB"),
+            refused.contains("at least 2.4 GB of memory, and this process may have 2 GB"),
             "{refused}"
         );
         assert_eq!(Room::default().said_of(u64::MAX, "a.csv"), Ok(None));

@@ -2,22 +2,22 @@
 
 use super::messages;
 use super::report::InspectedChannel;
-use super::whole::Whole;
+use super::whole;
 use crate::failure::Failure;
 use crate::io::mcap::Inventory;
 use crate::io::{ChannelChoice, Input, Reading};
-use crate::recording::{Recording, refuse_for_messages, refuse_for_text};
+use crate::recording::{self, AllSamples, Recording, refuse_for_messages, refuse_for_text};
 
-/// Bytes of a text that are read at most.
-const MOST_TEXT: u64 = 1 << 27;
+/// Numbers of a text that are kept at most: eight bytes each.
+const MOST_NUMBERS: usize = 1 << 22;
 
 /// What is in a file.
 #[derive(Debug, Clone)]
 pub struct Content {
     /// The channels whose samples were read.
     pub recording: Recording,
-    /// What all samples of a channel come to, where only the first were kept; of a text, nothing.
-    pub wholes: Vec<Option<Whole>>,
+    /// What all samples of a channel come to, where only the first were kept.
+    pub wholes: Vec<Option<AllSamples>>,
     /// Channels that are only listed: their samples cannot be read, or are too many.
     pub listed: Vec<InspectedChannel>,
     /// Everything in an MCAP file.
@@ -31,11 +31,17 @@ pub fn read(place: &Input, reading: &Reading) -> Result<Content, Failure> {
         return messages::read(place, reading);
     }
     refuse_for_text(&ChannelChoice::default(), reading)?;
-    let recording = Recording::of_text(place, reading, MOST_TEXT)?;
+    let (mut recording, wholes) = match reading.range.is_some() {
+        // Which samples are wanted is known when all are there.
+        true => (recording::read(place, reading)?, Vec::new()),
+        false => Recording::of_text(place, reading, MOST_NUMBERS)?,
+    };
     recording.must_not_be_transposed()?;
+    let said = whole::warning(&recording.channels, &wholes);
+    recording.warnings.extend(said);
     Ok(Content {
         recording,
-        wholes: Vec::new(),
+        wholes,
         listed: Vec::new(),
         inventory: None,
     })

@@ -7,6 +7,7 @@ use torqcomp_dsp::quality::steps::Event;
 
 use super::content::Content;
 use super::report::{ChannelWarning, Detail, InspectedChannel, InspectedFile};
+use super::whole;
 use crate::parallel::{parallel, threads};
 use crate::quality::{self, Findings, TimeFindings, copies, labels, unit_of};
 use crate::recording::moment::Moment;
@@ -51,7 +52,7 @@ pub fn file(content: &Content) -> InspectedFile {
                 let time = time_of(i).map(|place| &times[place]);
                 let described = describe(channel, found, time);
                 match content.wholes.get(i).copied().flatten() {
-                    Some(whole) => whole.describe(described),
+                    Some(all) => whole::describe(&all, described),
                     None => described,
                 }
             })

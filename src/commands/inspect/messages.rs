@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 use super::content::Content;
 use super::report::InspectedChannel;
-use super::whole::{self, Kept, Stamps, Whole};
+use super::whole::{self, Kept, Stamps};
 use crate::failure::Failure;
 use crate::io::mcap::inventory::{ChannelReport, LeafReport};
 use crate::io::mcap::{self, FieldChoice, Inventory, SelectedSignal};
 use crate::io::{Input, Reading};
 use crate::print::plural;
 use crate::recording::moment::{Moment, date_and_time};
-use crate::recording::{Channel, Recording, TimeAxis, message_times};
+use crate::recording::{AllSamples, Channel, Recording, TimeAxis, message_times};
 use crate::unit::NamedUnit;
 use crate::warning::Warning;
 
@@ -78,7 +78,10 @@ fn read_most(place: &Input, reading: &Reading, most: u64) -> Result<Content, Fai
     }
     let said = &mut content.recording.warnings;
     said.extend((left_out > 0).then(|| not_read(left_out)));
-    said.extend(whole::warning(&content.wholes));
+    said.extend(whole::warning(
+        &content.recording.channels,
+        &content.wholes,
+    ));
     content.inventory = Some(Inventory {
         is_lossy,
         ..inventory
@@ -198,7 +201,7 @@ fn channel(
     number: &LeafReport,
     selected: &SelectedSignal,
     kept: Kept,
-) -> (Channel, Option<Whole>) {
+) -> (Channel, Option<AllSamples>) {
     let (stamps, samples, whole) = kept.finish();
     let unit = selected.unit.as_ref().map(|found| found.unit.clone());
     let time = &selected.time;
@@ -355,12 +358,12 @@ mod tests {
         let content = read_most(&Input::File(path), &Reading::default(), 610).unwrap();
         let kept = content.recording.channels.iter().map(|c| c.samples.len());
         assert_eq!(kept.collect::<Vec<_>>(), [10, 300, 300]);
-        let all = content.wholes.iter().map(|whole| whole.map(|w| w.samples));
+        let all = content.wholes.iter().map(|whole| whole.map(|w| w.sums.samples));
         assert_eq!(all.collect::<Vec<_>>(), [None, Some(1000), Some(5000)]);
         let longest = content.wholes[2].unwrap();
-        assert_eq!(longest.range, Some((0.0, 99.0)));
-        assert!((longest.mean.unwrap() - 49.5).abs() < 1e-12);
-        assert!((longest.duration_s - 4.999).abs() < 1e-9);
+        assert_eq!(longest.sums.range(), Some((0.0, 99.0)));
+        assert!((longest.sums.mean().unwrap() - 49.5).abs() < 1e-12);
+        assert!((longest.duration_s.unwrap() - 4.999).abs() < 1e-9);
         assert_eq!(content.recording.warnings[0].code, "first-samples-only");
     }
 

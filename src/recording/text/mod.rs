@@ -27,12 +27,13 @@ mod sparse;
 mod stream;
 mod summary;
 mod table;
+mod tail;
 mod units;
 mod vocabulary;
 
 use std::io::{Cursor, Read};
 
-use super::{Recording, Segment};
+use super::{AllSamples, Recording, Segment};
 use crate::failure::Failure;
 use crate::io::Reading;
 use crate::recording::text::dialect::decode_line;
@@ -47,6 +48,7 @@ pub use head::is_end as is_end_of_data;
 use keys::Entry;
 pub use last_line::{LastLine, last_line};
 use makers::Maker;
+use rows::ColumnKind;
 pub use rows::{LineNotes, RowPlan, place_of};
 pub use stream::{BRIDGE, ChannelPlan, ChannelRows, Problem, StampColumn, TextStream};
 pub use table::Layout;
@@ -154,17 +156,40 @@ impl TextFile {
     ///
     /// # Errors
     /// If it cannot be read, or leaves open how.
-    pub fn read(mut self) -> Result<Recording, Failure> {
+    pub fn read(self) -> Result<Recording, Failure> {
+        self.read_first(usize::MAX).map(|(recording, _)| recording)
+    }
+
+    /// Numbers that a text of so many bytes holds, as its first rows show; 0 if that is unknown.
+    pub fn numbers_in(&self, bytes: u64) -> u64 {
+        self.layout.as_ref().map_or(0, |layout| {
+            let rows = layout.first_rows.count as u64;
+            let is_read = |kind: &&ColumnKind| **kind != ColumnKind::Nothing;
+            let columns = layout.plan.kinds.iter().filter(is_read).count() as u64;
+            bytes / (layout.first_bytes as u64 / rows.max(1)).max(1) * columns
+        })
+    }
+
+    /// Reads it, and keeps no more than about so many numbers of a long table; of its channels, what all of their samples
+    /// come to.
+    ///
+    /// # Errors
+    /// If it cannot be read, or leaves open how.
+    pub fn read_first(
+        mut self,
+        most: usize,
+    ) -> Result<(Recording, Vec<Option<AllSamples>>), Failure> {
         let reader = self.maker.and_then(|maker| maker.read);
-        let mut read = match (self.layout.take(), reader) {
+        let (mut read, tails) = match (self.layout.take(), reader) {
             (Some(layout), _) => {
                 let hints = self.maker.map_or(Hints::default(), |maker| maker.hints);
-                general(&mut self.chunks, layout, hints, &self.reading)?
+                let parts = tables(&mut self.chunks, layout, (hints, most), &self.reading)?;
+                recording_of(parts)
             }
             (None, Some(read)) => {
                 let mut read = read(&mut self.chunks, &self.reading)?;
                 read.lost = read.lost.or_else(|| self.chunks.unended_line());
-                read
+                (read, Vec::new())
             }
             (None, None) => return Err(no_channel()),
         };
@@ -177,7 +202,7 @@ impl TextFile {
         }
         read.source = self.recording.source;
         read.warnings.splice(0..0, self.recording.warnings);
-        Ok(read)
+        Ok((read, tails))
     }
 
     /// Reads one of its channels, by its place, piece by piece, unless it is held whole.
@@ -200,20 +225,31 @@ pub fn read(source: &str, bytes: Vec<u8>, reading: &Reading) -> Result<Recording
     TextFile::open(source, Box::new(Cursor::new(bytes)), reading)?.read()
 }
 
-/// A table, or several below each other under the same headings.
+/// A table, or several below each other under the same headings, as a recording.
 fn general(
     chunks: &mut Chunks,
     first: Layout,
     hints: Hints,
     reading: &Reading,
 ) -> Result<Recording, Failure> {
-    let dialect = first.plan.dialect.describe();
-    let mut parts = Vec::new();
+    let parts = tables(chunks, first, (hints, usize::MAX), reading)?;
+    Ok(recording_of(parts).0)
+}
+
+/// A table, or several below each other under the same headings, of all together no more than about so many numbers.
+fn tables(
+    chunks: &mut Chunks,
+    first: Layout,
+    (hints, mut most): (Hints, usize),
+    reading: &Reading,
+) -> Result<Vec<ReadTable>, Failure> {
+    let mut parts: Vec<ReadTable> = Vec::new();
     let mut next = Ok(first);
     // What follows the last table need not be one.
     while let Ok(layout) = next {
-        let part = layout.read(chunks)?;
+        let part = layout.read(chunks, most)?;
         let (number, begins_anew) = (part.next_line, part.begins_anew);
+        most = most.saturating_sub(part.numbers());
         parts.push(part);
         let (rest, _) = chunks.peek(FIRST_ROWS)?;
         let line = decode_line(rest.split(|byte| *byte == b'\n').next().unwrap_or(&[]));
@@ -236,20 +272,27 @@ fn general(
             )));
         }
     }
-    Ok(recording_of(parts, dialect))
+    Ok(parts)
 }
 
 /// Puts the numbers of a text that is one line of them into lines of their own: some oscilloscopes write
 /// the samples so.
 fn one_line(chunks: &mut Chunks, reading: &Reading) -> Result<bool, Failure> {
-    let (text, complete) = chunks.peek(FIRST_ROWS)?;
-    if text.trim_ascii().contains(&b'\n') || reading.dialect.delimiter.is_some() {
-        return Ok(false);
+    let mut complete = false;
+    for most in [FIRST_ROWS, LONGEST_LINE] {
+        let text;
+        (text, complete) = chunks.peek(most)?;
+        if text.trim_ascii().contains(&b'\n') || reading.dialect.delimiter.is_some() {
+            return Ok(false);
+        }
+        if complete {
+            break;
+        }
     }
-    let text = match complete {
-        true => text.to_vec(),
-        false => chunks.take_all()?,
-    };
+    if !complete {
+        return Err(too_long_a_line());
+    }
+    let text = chunks.take_all()?;
     let column = in_lines(&text, reading.dialect.decimal.unwrap_or(b'.'));
     let is_found = column.is_some();
     *chunks = Chunks::new(Box::new(Cursor::new(column.unwrap_or(text))));
@@ -275,13 +318,14 @@ fn in_lines(text: &[u8], decimal: u8) -> Option<Vec<u8>> {
 }
 
 /// Puts tables together as the segments of a recording.
-fn recording_of(parts: Vec<ReadTable>, dialect: String) -> Recording {
+fn recording_of(parts: Vec<ReadTable>) -> (Recording, Vec<Option<AllSamples>>) {
+    let mut tails = Vec::new();
     let blocks: usize = parts.iter().map(|part| part.blocks.len()).sum();
     let mut recording = Recording::empty("csv", String::new());
-    recording.dialect = dialect;
     for (place, part) in parts.into_iter().enumerate() {
         if place == 0 {
             recording.details = details(&part.header.entries);
+            recording.dialect = part.dialect.describe();
         }
         for channels in part.blocks {
             let segment = recording.segments.len();
@@ -297,10 +341,13 @@ fn recording_of(parts: Vec<ReadTable>, dialect: String) -> Recording {
                 recording.channels.push(channel);
             }
         }
+        // What was not kept belongs to the last block.
+        tails.resize(recording.channels.len() - part.tails.len(), None);
+        tails.extend(part.tails);
         recording.warnings.extend(part.warnings);
         recording.lost = recording.lost.or(part.lost);
     }
-    recording
+    (recording, tails)
 }
 
 /// Keys and values for people.

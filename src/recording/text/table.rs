@@ -13,11 +13,12 @@ use super::head::{self, Head, Table};
 use super::header::{self, Field, Header};
 use super::last_line::{LastLine, last_line};
 use super::rows::{Column, ColumnKind, RowPlan, Rows, cleaned};
+use super::tail::Tail;
 use super::{listing, sparse, summary};
 use crate::failure::Failure;
 use crate::io::{Reading, names_compensated};
-use crate::recording::text::dialect::{decode_line, is_skipped};
-use crate::recording::{Channel, TimeAxis};
+use crate::recording::text::dialect::{Dialect, decode_line, is_skipped};
+use crate::recording::{AllSamples, Channel, TimeAxis};
 use crate::warning::Warning;
 use counts::Counts;
 
@@ -67,6 +68,10 @@ pub struct ReadTable {
     pub blocks: Vec<Vec<Channel>>,
     /// Its head.
     pub header: Header,
+    /// How its rows are written.
+    pub dialect: Dialect,
+    /// If not all rows were kept: for each channel of the last block, what all of its samples come to.
+    pub tails: Vec<Option<AllSamples>>,
     /// What should be known.
     pub warnings: Vec<Warning>,
     /// What is missing.
@@ -226,21 +231,30 @@ impl Layout {
         roles.filter_map(|(place, role)| matches!(role, Role::Channel(_)).then_some(place))
     }
 
-    /// Reads the whole table.
+    /// Reads the whole table, and keeps no more than about so many numbers of it.
     ///
     /// # Errors
     /// Those of the input, and rows of too different lengths.
-    pub fn read(self, chunks: &mut Chunks) -> Result<ReadTable, Failure> {
+    pub fn read(self, chunks: &mut Chunks, most: usize) -> Result<ReadTable, Failure> {
         chunks.skip(self.offset);
         let mut rows = Rows::default();
         rows.begin(self.line, self.plan.kinds.len());
         let (mut piece, mut lost, mut begins_anew) = (Vec::new(), None, false);
+        let mut tail: Option<Tail> = None;
+        let most_rows = most / self.plan.kinds.len().max(1);
         loop {
             let kind = chunks.next(&mut piece)?;
-            if kind == Piece::Unended {
-                lost = self.look_at_last_line(&mut piece, &rows);
+            if tail.is_none() && rows.count > most_rows && !piece.is_empty() {
+                tail = Some(Tail::behind(&rows, &self));
             }
-            let end = rows.read(&piece, &self.plan)?;
+            let line = tail.as_ref().map_or(rows.line, Tail::line);
+            if kind == Piece::Unended {
+                lost = self.look_at_last_line(&mut piece, line);
+            }
+            let end = match &mut tail {
+                Some(tail) => tail.read(&piece, &self.plan)?,
+                None => rows.read(&piece, &self.plan)?,
+            };
             if end < piece.len() {
                 let next = decode_line(piece[end..].split(|b| *b == b'\n').next().unwrap_or(&[]));
                 begins_anew = self.plan.end.begins_anew(next.trim_end_matches('\r'));
@@ -253,18 +267,23 @@ impl Layout {
         }
         Ok(ReadTable {
             lost,
-            next_line: rows.line,
+            next_line: tail.as_ref().map_or(rows.line, Tail::line),
             begins_anew,
-            ..self.part_of(rows)
+            ..self.part_of(rows, tail)
         })
     }
 
     /// Channels of rows as read, and what should be known of them.
-    fn part_of(self, mut rows: Rows) -> ReadTable {
-        let mut skipped: Vec<Warning> = summary::leave_out_count(&mut rows, true)
-            .into_iter()
-            .collect();
-        skipped.extend(summary::leave_out(&mut rows, &self.axes.roles));
+    fn part_of(self, mut rows: Rows, tail: Option<Tail>) -> ReadTable {
+        let mut skipped: Vec<Warning> = Vec::new();
+        match &tail {
+            // What stands above and below the samples is told from all of them.
+            None => {
+                skipped.extend(summary::leave_out_count(&mut rows, true));
+                skipped.extend(summary::leave_out(&mut rows, &self.axes.roles));
+            }
+            Some(tail) => rows.notes.join(tail.notes(), 0),
+        }
         let longest = rows.columns.iter().map(|column| column.values.len()).max();
         let mut warnings = self.warnings(&rows.notes, longest.unwrap_or(0));
         warnings.extend(skipped);
@@ -277,12 +296,16 @@ impl Layout {
             .rev()
             .map(|row| rows.split_off(*row))
             .collect();
-        let blocks = std::iter::once(rows)
+        let blocks: Vec<Vec<Channel>> = std::iter::once(rows)
             .chain(further.into_iter().rev())
             .map(|rows| self.channels(rows))
             .collect();
+        let last = blocks.last().map_or(&[][..], Vec::as_slice);
+        let tails = tail.map_or_else(Vec::new, |tail| tail.of_channels(&self, last));
         ReadTable {
+            tails,
             blocks,
+            dialect: self.plan.dialect,
             header: self.header,
             warnings,
             lost: None,
@@ -340,14 +363,22 @@ impl Layout {
     }
 
     /// Judges a last line that has no line end, and takes it away if the file was cut within it.
-    fn look_at_last_line(&self, piece: &mut Vec<u8>, rows: &Rows) -> Option<Warning> {
-        let judged = LastLine::of(piece, rows.line == 1, &self.plan);
-        let line = rows.line + memchr::memchr_iter(b'\n', piece).count();
+    fn look_at_last_line(&self, piece: &mut Vec<u8>, first: usize) -> Option<Warning> {
+        let judged = LastLine::of(piece, first == 1, &self.plan);
+        let line = first + memchr::memchr_iter(b'\n', piece).count();
         let text = cleaned(last_line(piece)).0;
         if judged == LastLine::Cut {
             piece.truncate(piece.len() - last_line(piece).len());
         }
         judged.warning(&format!("line {line}"), &text)
+    }
+}
+
+impl ReadTable {
+    /// How many numbers of it were kept.
+    pub fn numbers(&self) -> usize {
+        let channels = self.blocks.iter().flatten();
+        channels.map(|channel| channel.samples.len()).sum()
     }
 }
 

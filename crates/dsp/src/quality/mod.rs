@@ -14,6 +14,7 @@
 //! | samples that repeat the one before | [`repeats`](mod@repeats) |
 //! | coarse resolution | [`quantisation`](mod@quantisation) |
 //! | mains hum | [`mains`](mod@mains) |
+//! | number, range, mean and spread of samples that are not kept | [`sums`] |
 //! | channels that are copies of each other | [`copies`](mod@copies) |
 
 pub mod clipping;
@@ -27,6 +28,7 @@ pub mod rounding;
 mod runs;
 pub mod steps;
 pub mod stuck;
+pub mod sums;
 #[cfg(test)]
 mod testing;
 

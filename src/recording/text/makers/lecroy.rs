@@ -31,8 +31,7 @@ fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
         .as_ref()
         .filter(is_cut)
         .map(|segments| segments.size);
-    let dialect = layout.plan.dialect.describe();
-    let mut recording = recording_of(vec![layout.read(chunks)?], dialect);
+    let (mut recording, _) = recording_of(vec![layout.read(chunks, usize::MAX)?]);
     let Some(Segments { size, list }) = segments else {
         return Ok(recording);
     };
