@@ -103,7 +103,9 @@ fn memory_grows_by_no_more_than_is_stated() {
 fn a_text_without_room_is_refused() {
     let folder = Folder::new();
     folder.write("long.csv", record(10_000));
-    let file = std::fs::File::options().write(true).open(folder.path("long.csv"));
+    let file = std::fs::File::options()
+        .write(true)
+        .open(folder.path("long.csv"));
     // The rest takes no room on the disk.
     file.expect("a file").set_len(3 << 30).expect("a length");
     let script = "ulimit -v 1000000; exec \"$0\" identify decay long.csv -o out.toml";

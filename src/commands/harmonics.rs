@@ -9,6 +9,7 @@ use num_complex::Complex64;
 use serde::Serialize;
 use torqcomp_dsp::compensate::Inverse;
 use torqcomp_dsp::harmonics::{self, Fundamental, refine_fundamental};
+use torqcomp_dsp::store::SampleStore;
 use torqcomp_model::{InverseUncertainty, UnitSystem};
 
 use super::{judged, unit_text, warned};
@@ -19,7 +20,7 @@ use crate::outcome::{Made, RecordFigures};
 use crate::print::{Report, short};
 use crate::quality::excerpt;
 use crate::recording::moment::Moment;
-use crate::recording::{ChannelStream, UniformRecord};
+use crate::recording::{ChannelStream, Spool, UniformRecord};
 use crate::stand::{self, Calibration, ConstantStd, Stand, TorqueStd, beyond_rated};
 use crate::unit::NamedUnit;
 use crate::warning::Warning;
@@ -186,7 +187,7 @@ impl WayBack {
 }
 
 /// What was lost comes first, then what is known of the record, its stand and its channel.
-fn of_inputs(way: &WayBack, record: &UniformRecord) -> Vec<Warning> {
+fn of_inputs(way: &WayBack, record: &UniformRecord<Spool>) -> Vec<Warning> {
     let of_stand = way.stand.iter().flat_map(|(stand, _)| &stand.warnings);
     let lost = record.summary.lost.iter();
     let said = lost.chain(&record.summary.warnings).chain(of_stand);
@@ -205,12 +206,12 @@ fn phase_reference(start: Moment, duration_s: f64) -> (Moment, f64) {
 fn fit(
     args: &cli::Harmonics,
     way: &WayBack,
-    record: &UniformRecord,
+    record: &UniformRecord<Spool>,
     source: &str,
     (channel, channel_unit): (&str, Option<&NamedUnit>),
 ) -> Result<HarmonicsReport, Failure> {
     let samples = &record.samples;
-    let duration_s = samples.len() as f64 / record.rate_hz;
+    let duration_s = samples.count() as f64 / record.rate_hz;
     let mut warnings = of_inputs(way, record);
     let orders = visible_orders(args, record.rate_hz, &mut warnings)?;
     let fundamental = if args.refine {
@@ -230,14 +231,14 @@ fn fit(
         .map(|c| component(c, printed, way))
         .collect();
     warnings.extend(beyond_rated(
-        largest(samples, &components, printed),
+        largest(samples, &components, printed)?,
         chain.rated_n_m.map(|rated| rated * printed),
         &chain.applied.unit,
     ));
     warnings.extend(speed::warning(record, fundamental.frequency_hz, &orders));
     warnings.extend(lost_warning(&components));
     warnings.extend(mains_warning(&components, duration_s));
-    warnings.extend(of_quality(record, channel, chain));
+    warnings.extend(of_quality(record, channel, chain)?);
     Ok(HarmonicsReport {
         input: source.to_owned(),
         channel: channel.to_owned(),
@@ -248,7 +249,7 @@ fn fit(
         calibration_relative_std: chain.std.known(),
         constant: chain.std,
         unit: chain.applied.unit.clone(),
-        samples: samples.len(),
+        samples: samples.count(),
         rate_hz: record.rate_hz,
         rate_std_hz: record.rate_std_hz,
         duration_s,
@@ -265,25 +266,32 @@ fn fit(
 }
 
 /// What the samples themselves show.
-fn of_quality(record: &UniformRecord, channel: &str, chain: &Calibration) -> Vec<Warning> {
-    let samples = &record.samples;
-    let seen = &samples[..samples.len().min(excerpt::OF_MEMORY)];
+fn of_quality(
+    record: &UniformRecord<Spool>,
+    channel: &str,
+    chain: &Calibration,
+) -> Result<Vec<Warning>, Failure> {
+    let count = record.samples.count();
+    let seen = record.samples.part(0..count.min(excerpt::OF_PASSES))?;
     let of = excerpt::Of {
         name: channel,
         unit: &chain.applied.unit,
         scale: 1.0 / chain.applied.factor,
         rate_hz: record.rate_hz,
         start: record.start,
-        samples: samples.len(),
+        samples: count,
     };
-    excerpt::warnings(seen, of)
+    Ok(excerpt::warnings(&seen, of))
 }
 
 /// The largest torque of the record or of one of its components, in the printed unit.
-fn largest(samples: &[f64], components: &[ComponentTorque], printed: f64) -> f64 {
-    let recorded = samples.iter().map(|v| v.abs() * printed);
-    let found = components.iter().map(|c| c.torque);
-    recorded.chain(found).fold(0.0, f64::max)
+fn largest(samples: &Spool, components: &[ComponentTorque], printed: f64) -> Result<f64, Failure> {
+    let mut largest = components.iter().map(|c| c.torque).fold(0.0, f64::max);
+    samples.pass(0..samples.count(), &mut |_, piece| {
+        let recorded = piece.iter().map(|v| v.abs() * printed);
+        largest = recorded.fold(largest, f64::max);
+    })?;
+    Ok(largest)
 }
 
 /// Orders below half the sampling rate; those above are said.

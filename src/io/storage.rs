@@ -153,3 +153,37 @@ pub(super) fn link(path: &Path, part: &TempPath) -> io::Result<()> {
     std::fs::remove_file(part)?;
     std::fs::hard_link(path, part)
 }
+
+/// A file without a name in the folder for temporary files, gone with the process.
+#[derive(Debug)]
+pub struct Scratch(Stored<File>);
+
+impl Scratch {
+    /// Creates it.
+    ///
+    /// # Errors
+    /// Those of the system.
+    pub fn new() -> io::Result<Self> {
+        check(Call::Create)?;
+        tempfile::tempfile().map(|file| Self(Stored(file)))
+    }
+
+    /// Reads the bytes at an offset.
+    ///
+    /// # Errors
+    /// Those of the system, and if there are fewer.
+    pub fn read_at(&mut self, offset: u64, bytes: &mut [u8]) -> io::Result<()> {
+        self.0.seek(SeekFrom::Start(offset))?;
+        self.0.read_exact(bytes)
+    }
+}
+
+impl Write for Scratch {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        write(&mut self.0.0, bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}

@@ -10,6 +10,8 @@ pub const OF_STREAM: usize = 1 << 15;
 const FEWEST: usize = 1 << 12;
 /// Samples of a longer stream of which one is looked at.
 const SHARE: usize = 1 << 10;
+/// Samples that are looked at of a record that is gone through several times.
+pub const OF_PASSES: usize = 1 << 18;
 /// Samples that are looked at of a record in memory.
 pub const OF_MEMORY: usize = 1 << 20;
 

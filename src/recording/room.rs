@@ -106,10 +106,7 @@ mod tests {
             said.contains("about 3.6 GB of memory, and 3 GB are free"),
             "{said}"
         );
-        let refused = room
-            .said_of(300_000_000, "a.csv")
-            .unwrap_err()
-            .to_string();
+        let refused = room.said_of(300_000_000, "a.csv").unwrap_err().to_string();
         assert!(
             refused.contains("at least 2.4 GB of memory, and this process may have 2 GB"),
             "{refused}"

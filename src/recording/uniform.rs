@@ -94,10 +94,26 @@ impl UniformStream {
     }
 }
 
+/// Where the samples of a record are kept.
+pub(crate) trait KeepSamples: Default {
+    /// Keeps samples that follow those before.
+    ///
+    /// # Errors
+    /// If there is no room.
+    fn keep(&mut self, samples: &[f64]) -> Result<(), Failure>;
+}
+
+impl KeepSamples for Vec<f64> {
+    fn keep(&mut self, samples: &[f64]) -> Result<(), Failure> {
+        self.extend_from_slice(samples);
+        Ok(())
+    }
+}
+
 /// A uniformly sampled record, in SI units of the applied quantity, not yet compensated.
 #[derive(Debug, Clone)]
-pub(crate) struct UniformRecord {
-    pub(crate) samples: Vec<f64>,
+pub(crate) struct UniformRecord<S = Vec<f64>> {
+    pub(crate) samples: S,
     /// Time of the first one.
     pub(crate) start: Moment,
     /// Samples a second.
@@ -110,7 +126,7 @@ pub(crate) struct UniformRecord {
     pub(crate) resampled: Option<Resampled>,
 }
 
-impl UniformRecord {
+impl<S: KeepSamples> UniformRecord<S> {
     /// Reads a channel to its end; `convert` brings its samples to the units wanted, or says which
     /// cannot be.
     ///
@@ -123,9 +139,13 @@ impl UniformRecord {
         let mut stream = UniformStream::of(stream)?;
         let (rate_hz, start) = (stream.rate_hz, stream.start);
         let rate_std_hz = stream.rate_std_hz;
-        let mut samples = Vec::new();
-        while stream.next(&mut samples, &convert)? {}
-        let (summary, resampled) = stream.finish(&mut samples)?;
+        let (mut samples, mut piece) = (S::default(), Vec::new());
+        while stream.next(&mut piece, &convert)? {
+            samples.keep(&piece)?;
+            piece.clear();
+        }
+        let (summary, resampled) = stream.finish(&mut piece)?;
+        samples.keep(&piece)?;
         Ok(Self {
             samples,
             start,

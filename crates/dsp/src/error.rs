@@ -112,6 +112,12 @@ pub enum Error {
         /// What went wrong.
         why: &'static str,
     },
+    /// Samples that were kept can no longer be read.
+    #[error("the samples cannot be read again: {why}")]
+    Unreadable {
+        /// What went wrong.
+        why: String,
+    },
     /// A gap in the time stamps is too long to be bridged.
     #[error(
         "a gap of {gap_s} s, {steps} steps long, ends at {time_s} s: more would be invented than \

@@ -14,11 +14,15 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use num_complex::Complex64;
 use std::f64::consts::{PI, TAU};
+use std::ops::Range;
 
 use crate::Error;
-use crate::spectrum::{Density, periodogram};
+use crate::store::SampleStore;
 
+mod leftover;
 mod refine;
+
+use leftover::Leftover;
 
 pub use refine::refine_fundamental;
 
@@ -26,11 +30,6 @@ pub use refine::refine_fundamental;
 const RESET_STEPS: usize = 512;
 /// Phasors that rotate side by side.
 const TURNS: usize = 4;
-/// Bins of the residual's periodogram, on either side of a component, that its uncertainty is taken
-/// from. The nearest one is left out: the fit has emptied it.
-const NEAR_BINS: std::ops::RangeInclusive<usize> = 2..=12;
-/// Fewest residual samples that a periodogram is made of; below, the residual is taken as white.
-const FEWEST_FOR_SPECTRUM: usize = 256;
 /// Variance of an amplitude over that of a well-separated one, above which components are refused.
 const LARGEST_INFLATION: f64 = 1e4;
 
@@ -107,28 +106,28 @@ impl Fundamental {
 /// # Ok::<(), torqcomp_dsp::Error>(())
 /// ```
 pub fn fit(
-    samples: &[f64],
+    samples: &(impl SampleStore + ?Sized),
     sample_rate_hz: f64,
     start_s: f64,
     fundamental: Fundamental,
     orders: &[f64],
 ) -> Result<Harmonics, Error> {
-    let solution = SineFit::solve(samples, sample_rate_hz, fundamental.frequency_hz, orders)?;
-    let residual = solution.residual(samples);
-    let residual_rms = mean_square(&residual).sqrt();
-    let freedom = samples.len() as f64 - solution.unknowns() as f64;
-    let white = sum_squares(&residual) / freedom.max(1.0);
-    let density = residual_density(&residual, sample_rate_hz);
-    let middle_s = start_s + 0.5 * (samples.len() - 1) as f64 / sample_rate_hz;
+    let count = samples.count();
+    let solution = SineFit::solve(
+        samples,
+        count,
+        sample_rate_hz,
+        fundamental.frequency_hz,
+        orders,
+    )?;
+    let leftover = Leftover::of(samples, &solution, solution.unknowns())?;
+    let middle_s = start_s + 0.5 * (count - 1) as f64 / sample_rate_hz;
     let components = orders
         .iter()
         .enumerate()
         .map(|(k, &order)| {
             let frequency_hz = order * fundamental.frequency_hz;
-            let near = density.as_ref().map_or(white, |d| {
-                density_near(d, frequency_hz) * 0.5 * sample_rate_hz
-            });
-            let std_amplitude = (near * solution.variance_factor(k)).sqrt();
+            let std_amplitude = (leftover.near[k] * solution.variance_factor(k)).sqrt();
             let centred = solution.phasor(k);
             let turn = -TAU * frequency_hz * middle_s;
             let drift = fundamental
@@ -148,7 +147,7 @@ pub fn fit(
     Ok(Harmonics {
         mean: solution.mean(),
         components,
-        residual_rms,
+        residual_rms: (leftover.sum_squares / count as f64).sqrt(),
     })
 }
 
@@ -166,23 +165,29 @@ struct SineFit {
 }
 
 impl SineFit {
+    /// The fit of the first samples of a record, `length` of them.
     fn solve(
-        samples: &[f64],
+        samples: &(impl SampleStore + ?Sized),
+        length: usize,
         sample_rate_hz: f64,
         fundamental_hz: f64,
         orders: &[f64],
     ) -> Result<Self, Error> {
-        check(samples, sample_rate_hz, fundamental_hz, orders)?;
-        let length = samples.len();
+        check(length, sample_rate_hz, fundamental_hz, orders)?;
         let steps: Vec<f64> = orders
             .iter()
             .map(|order| TAU * order * fundamental_hz / sample_rate_hz)
             .collect();
+        let mut sums = Projections::new(&steps, length);
+        samples.pass(0..length, &mut |start, piece| sums.add(start, piece))?;
+        let (even, odd) = sums.even_and_odd();
+        if !even[0].is_finite() {
+            all_finite(samples, length)?;
+        }
         let (even_gram, odd_gram) = gram(&steps, length);
         let inseparable = || not_separable(orders, fundamental_hz, length as f64 / sample_rate_hz);
         let even_gram = Cholesky::new(even_gram).ok_or_else(inseparable)?;
         let odd_gram = Cholesky::new(odd_gram).ok_or_else(inseparable)?;
-        let (even, odd) = projections(samples, &steps);
         let fit = Self {
             even: even_gram.solve(&even),
             odd: odd_gram.solve(&odd),
@@ -224,20 +229,26 @@ impl SineFit {
         diagonal(&self.even_gram, k + 1, n + 1).max(diagonal(&self.odd_gram, k, n))
     }
 
-    fn residual(&self, samples: &[f64]) -> Vec<f64> {
+    /// What is left of samples from a place on.
+    fn residual(&self, start: usize, samples: &[f64]) -> Vec<f64> {
         let mut residual: Vec<f64> = samples.iter().map(|x| x - self.mean()).collect();
         for (k, &step) in self.steps.iter().enumerate() {
             let phasor = self.phasor(k);
-            rotate(self.length, step, |i, turn| {
-                residual[i] -= phasor.re * turn.re - phasor.im * turn.im;
-            });
+            rotate(
+                start..start + samples.len(),
+                self.length,
+                step,
+                |i, turn| {
+                    residual[i - start] -= phasor.re * turn.re - phasor.im * turn.im;
+                },
+            );
         }
         residual
     }
 }
 
 fn check(
-    samples: &[f64],
+    length: usize,
     sample_rate_hz: f64,
     fundamental_hz: f64,
     orders: &[f64],
@@ -266,18 +277,26 @@ fn check(
         }
     }
     let unknowns = 2 * orders.len() + 1;
-    if samples.len() <= unknowns {
-        return Err(Error::TooShort {
+    match length <= unknowns {
+        true => Err(Error::TooShort {
             what: "a fit of that many components",
             expected: unknowns + 1,
-            got: samples.len(),
-        });
-    }
-    match samples.iter().position(|x| !x.is_finite()) {
-        Some(index) => Err(Error::NonFinite {
-            index,
-            value: samples[index],
+            got: length,
         }),
+        false => Ok(()),
+    }
+}
+
+/// Names the first of the first samples that is no number.
+fn all_finite(samples: &(impl SampleStore + ?Sized), length: usize) -> Result<(), Error> {
+    let mut found = None;
+    samples.pass(0..length, &mut |start, piece| {
+        let place = piece.iter().position(|x| !x.is_finite());
+        let here = place.map(|i| (start + i, piece[i]));
+        found = found.or(here);
+    })?;
+    match found {
+        Some((index, value)) => Err(Error::NonFinite { index, value }),
         None => Ok(()),
     }
 }
@@ -330,31 +349,63 @@ fn gram(steps: &[f64], length: usize) -> (DMatrix<f64>, DMatrix<f64>) {
     (even, odd)
 }
 
-/// Sums of the samples times constant, cosines and sines about the middle.
-fn projections(samples: &[f64], steps: &[f64]) -> (DVector<f64>, DVector<f64>) {
-    let mut even = DVector::zeros(steps.len() + 1);
-    let mut odd = DVector::zeros(steps.len());
-    even[0] = samples.iter().sum();
-    for (k, &step) in steps.iter().enumerate() {
-        let mut sum = Complex64::ZERO;
-        rotate(samples.len(), step, |i, turn| sum += turn * samples[i]);
-        even[k + 1] = sum.re;
-        odd[k] = sum.im;
-    }
-    (even, odd)
+/// Sums of samples that go by, times constant, cosines and sines about the middle.
+struct Projections<'a> {
+    steps: &'a [f64],
+    length: usize,
+    sum: f64,
+    turned: Vec<Complex64>,
 }
 
-/// Calls `visit(i, e^{jω(i − (N−1)/2)})` for every sample.
-fn rotate(length: usize, step: f64, mut visit: impl FnMut(usize, Complex64)) {
+impl<'a> Projections<'a> {
+    fn new(steps: &'a [f64], length: usize) -> Self {
+        Self {
+            steps,
+            length,
+            sum: 0.0,
+            turned: vec![Complex64::ZERO; steps.len()],
+        }
+    }
+
+    fn add(&mut self, start: usize, samples: &[f64]) {
+        self.sum = samples.iter().fold(self.sum, |sum, x| sum + x);
+        for (all, &step) in self.turned.iter_mut().zip(self.steps) {
+            let mut sum = *all;
+            rotate(
+                start..start + samples.len(),
+                self.length,
+                step,
+                |i, turn| {
+                    sum += turn * samples[i - start];
+                },
+            );
+            *all = sum;
+        }
+    }
+
+    fn even_and_odd(&self) -> (DVector<f64>, DVector<f64>) {
+        let even = std::iter::once(self.sum).chain(self.turned.iter().map(|sum| sum.re));
+        let odd = self.turned.iter().map(|sum| sum.im);
+        let count = self.steps.len();
+        (
+            DVector::from_iterator(count + 1, even),
+            DVector::from_iterator(count, odd),
+        )
+    }
+}
+
+/// Calls `visit(i, e^{jω(i − (N−1)/2)})` for the samples of a part.
+fn rotate(part: Range<usize>, length: usize, step: f64, mut visit: impl FnMut(usize, Complex64)) {
     let middle = 0.5 * (length - 1) as f64;
     // A turn waits for the one before: several go side by side.
     let ahead: [Complex64; TURNS] =
         std::array::from_fn(|k| Complex64::from_polar(1.0, step * k as f64));
     let advance = Complex64::from_polar(1.0, step * TURNS as f64);
-    for start in (0..length).step_by(RESET_STEPS) {
+    let mut start = part.start;
+    while start < part.end {
         let first = Complex64::from_polar(1.0, step * (start as f64 - middle));
         let mut turns = ahead.map(|turn| first * turn);
-        let end = (start + RESET_STEPS).min(length);
+        let end = (start + RESET_STEPS - start % RESET_STEPS).min(part.end);
         let whole = end - (end - start) % TURNS;
         for i in (start..whole).step_by(TURNS) {
             for (k, turn) in turns.iter_mut().enumerate() {
@@ -365,34 +416,8 @@ fn rotate(length: usize, step: f64, mut visit: impl FnMut(usize, Complex64)) {
         for (i, turn) in (whole..end).zip(turns) {
             visit(i, turn);
         }
+        start = end;
     }
-}
-
-fn sum_squares(values: &[f64]) -> f64 {
-    values.iter().map(|x| x * x).sum()
-}
-
-fn mean_square(values: &[f64]) -> f64 {
-    sum_squares(values) / values.len() as f64
-}
-
-/// Density of the residual, `None` for a short one. Without a window, because the fit has none: what a
-/// strong line beside the components leaks into them shows here, too.
-fn residual_density(residual: &[f64], sample_rate_hz: f64) -> Option<Density> {
-    (residual.len() >= FEWEST_FOR_SPECTRUM).then(|| periodogram(residual, sample_rate_hz))
-}
-
-/// Mean density over the bins next to a frequency, mirrored at zero.
-fn density_near(density: &Density, frequency_hz: f64) -> f64 {
-    let centre = (frequency_hz / density.step_hz).round() as usize;
-    let last = density.values.len() - 1;
-    let near: Vec<f64> = NEAR_BINS
-        .flat_map(|away| [centre + away, centre.abs_diff(away)])
-        // The constant is fitted as well.
-        .filter(|bin| (1..=last).contains(bin))
-        .map(|bin| density.values[bin])
-        .collect();
-    near.iter().sum::<f64>() / near.len().max(1) as f64
 }
 
 #[cfg(test)]

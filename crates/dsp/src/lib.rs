@@ -33,6 +33,7 @@ pub mod quality;
 pub mod recorder;
 pub mod resample;
 pub mod spectrum;
+pub mod store;
 pub mod weak;
 pub mod zero_phase;
 

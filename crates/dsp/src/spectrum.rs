@@ -201,38 +201,6 @@ impl Density {
     }
 }
 
-/// Density of a record from one transform over all of it, without a window: its periodogram.
-///
-/// Each value scatters as much as it is large; what matters is their mean over some of them.
-///
-/// ```
-/// use torqcomp_dsp::spectrum::periodogram;
-/// // Ten whole periods of amplitude 2: all of the mean square of 2 in the tenth bin.
-/// let x: Vec<f64> = (0..500).map(|i| 2.0 * (std::f64::consts::TAU * 0.02 * i as f64).cos()).collect();
-/// let density = periodogram(&x, 1000.0);
-/// assert!((density.values[10] * density.step_hz - 2.0).abs() < 1e-12);
-/// ```
-#[must_use]
-pub fn periodogram(samples: &[f64], sample_rate_hz: f64) -> Density {
-    let length = samples.len();
-    let transform = torqcomp_fourier::forward(length);
-    let mut spectrum = transform.make_output_vec();
-    transform
-        .process(&mut samples.to_vec(), &mut spectrum)
-        .expect("buffers were made for this length");
-    let scale = 2.0 / (sample_rate_hz * length as f64);
-    let mut values: Vec<f64> = spectrum.iter().map(|bin| bin.norm_sqr() * scale).collect();
-    values[0] *= 0.5;
-    if length.is_multiple_of(2) {
-        values[length / 2] *= 0.5;
-    }
-    Density {
-        step_hz: sample_rate_hz / length as f64,
-        values,
-        blocks: 1,
-    }
-}
-
 /// Density of a record by Welch's method: Hann windows, half overlapping, the mean taken off each.
 ///
 /// Source: P. D. Welch, IEEE Trans. Audio Electroacoust. 15 (1967), 70.

@@ -1,9 +1,10 @@
 //! Whether the speed changes over a record, which a fit of fixed frequencies cannot follow.
 
 use torqcomp_dsp::harmonics::{Fundamental, refine_fundamental};
+use torqcomp_dsp::store::SampleStore;
 
 use crate::print::rounded;
-use crate::recording::UniformRecord;
+use crate::recording::{Spool, UniformRecord};
 use crate::warning::Warning;
 
 /// Parts of the record whose speeds are compared.
@@ -22,18 +23,19 @@ const TURNS: f64 = 0.2;
 /// A warning if the fundamental differs between the parts of a record by more than its uncertainty there, and by so much
 /// that the highest order loses its phase.
 pub(super) fn warning(
-    record: &UniformRecord,
+    record: &UniformRecord<Spool>,
     fundamental_hz: f64,
     orders: &[f64],
 ) -> Option<Warning> {
-    let length = (record.samples.len() / PARTS).min(MOST);
+    let count = record.samples.count();
+    let length = (count / PARTS).min(MOST);
     if (length as f64) * fundamental_hz < FEWEST * record.rate_hz {
         return None;
     }
     let part = |place: usize| {
-        let start = place * (record.samples.len() - length) / (PARTS - 1);
-        let samples = &record.samples[start..start + length];
-        refine_fundamental(samples, record.rate_hz, fundamental_hz, SPAN, orders).ok()
+        let start = place * (count - length) / (PARTS - 1);
+        let samples = record.samples.part(start..start + length).ok()?;
+        refine_fundamental(&samples, record.rate_hz, fundamental_hz, SPAN, orders).ok()
     };
     let found: Vec<Fundamental> = (0..PARTS).map(part).collect::<Option<_>>()?;
     let by_speed = |a: &&Fundamental, b: &&Fundamental| a.frequency_hz.total_cmp(&b.frequency_hz);
@@ -43,7 +45,7 @@ pub(super) fn warning(
     );
     let change_hz = fastest.frequency_hz - slowest.frequency_hz;
     let std_hz = slowest.std_hz?.hypot(fastest.std_hz?);
-    let duration_s = record.samples.len() as f64 / record.rate_hz;
+    let duration_s = count as f64 / record.rate_hz;
     let highest = orders.iter().copied().fold(0.0, f64::max);
     let matters = change_hz > SIGNIFICANT * std_hz && change_hz * highest * duration_s > TURNS;
     matters.then(|| {

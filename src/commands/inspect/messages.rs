@@ -78,10 +78,7 @@ fn read_most(place: &Input, reading: &Reading, most: u64) -> Result<Content, Fai
     }
     let said = &mut content.recording.warnings;
     said.extend((left_out > 0).then(|| not_read(left_out)));
-    said.extend(whole::warning(
-        &content.recording.channels,
-        &content.wholes,
-    ));
+    said.extend(whole::warning(&content.recording.channels, &content.wholes));
     content.inventory = Some(Inventory {
         is_lossy,
         ..inventory
@@ -358,7 +355,10 @@ mod tests {
         let content = read_most(&Input::File(path), &Reading::default(), 610).unwrap();
         let kept = content.recording.channels.iter().map(|c| c.samples.len());
         assert_eq!(kept.collect::<Vec<_>>(), [10, 300, 300]);
-        let all = content.wholes.iter().map(|whole| whole.map(|w| w.sums.samples));
+        let all = content
+            .wholes
+            .iter()
+            .map(|whole| whole.map(|w| w.sums.samples));
         assert_eq!(all.collect::<Vec<_>>(), [None, Some(1000), Some(5000)]);
         let longest = content.wholes[2].unwrap();
         assert_eq!(longest.sums.range(), Some((0.0, 99.0)));

@@ -117,7 +117,10 @@ mod tests {
         let whole = whole.unwrap();
         assert_eq!((whole.sums.samples, whole.duration_s), (5, Some(2.0)));
         // Mean of 1, 2, 3, 6 is 3.
-        assert_eq!(describe(&whole, InspectedChannel::default()).mean, Some(3.0));
+        assert_eq!(
+            describe(&whole, InspectedChannel::default()).mean,
+            Some(3.0)
+        );
     }
 
     #[test]

@@ -1,11 +1,13 @@
 //! Finding the fundamental from the data.
 
-use nalgebra::DVector;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
+use std::ops::Range;
 
-use super::{Fundamental, SineFit, density_near, residual_density, rotate, sum_squares};
+use super::leftover::Leftover;
+use super::{Fundamental, Projections, SineFit, rotate};
 use crate::Error;
+use crate::store::SampleStore;
 
 /// Longest piece that the search by spectrum looks at.
 const LONGEST_SEARCH: usize = 1 << 17;
@@ -38,34 +40,39 @@ const LAST_TURNS: f64 = 1e-10;
 /// # Ok::<(), torqcomp_dsp::Error>(())
 /// ```
 pub fn refine_fundamental(
-    samples: &[f64],
+    samples: &(impl SampleStore + ?Sized),
     sample_rate_hz: f64,
     start_hz: f64,
     span: f64,
     orders: &[f64],
 ) -> Result<Fundamental, Error> {
-    let mut length = samples.len().min(LONGEST_SEARCH);
+    let count = samples.count();
+    let mut length = count.min(LONGEST_SEARCH);
     // Errors of the input are told before the search begins.
-    SineFit::solve(samples, sample_rate_hz, start_hz, orders)?;
-    let mut frequency_hz = search(&samples[..length], sample_rate_hz, start_hz, span, orders);
+    SineFit::solve(samples, count, sample_rate_hz, start_hz, orders)?;
+    let first = samples.part(0..length)?;
+    let mut frequency_hz = search(&first, sample_rate_hz, start_hz, span, orders);
     loop {
-        let piece = &samples[..length];
-        let turns = match length == samples.len() {
+        let turns = match length == count {
             true => LAST_TURNS,
             false => KEPT_TURNS,
         };
-        let refined = settle(piece, sample_rate_hz, frequency_hz, orders, turns)?;
-        if (refined.frequency_hz / start_hz - 1.0).abs() > span {
+        let settled = Settled::of(samples, length, sample_rate_hz, frequency_hz, orders, turns)?;
+        frequency_hz = settled.frequency_hz;
+        if (frequency_hz / start_hz - 1.0).abs() > span {
             return Err(Error::NotRefined {
                 start_hz,
                 why: "no clear maximum within the span searched",
             });
         }
-        if length == samples.len() {
-            return Ok(refined);
+        if length == count {
+            let std_hz = settled.std_hz(samples, orders)?;
+            return Ok(Fundamental {
+                frequency_hz,
+                std_hz: Some(std_hz),
+            });
         }
-        frequency_hz = refined.frequency_hz;
-        length = samples.len().min(2 * length);
+        length = count.min(2 * length);
     }
 }
 
@@ -99,98 +106,106 @@ fn search(samples: &[f64], rate_hz: f64, start_hz: f64, span: f64, orders: &[f64
         .0
 }
 
-/// Gauss-Newton on the frequency, the amplitudes being fitted anew at each step, until a step turns the ends of the record
-/// by less than `turns`.
-fn settle(
-    samples: &[f64],
-    rate_hz: f64,
-    mut frequency_hz: f64,
-    orders: &[f64],
-    turns: f64,
-) -> Result<Fundamental, Error> {
-    let start_hz = frequency_hz;
-    let duration_s = samples.len() as f64 / rate_hz;
-    for _ in 0..STEPS {
-        let fit = SineFit::solve(samples, rate_hz, frequency_hz, orders)?;
-        let residual = fit.residual(samples);
-        let slope = fit.slope(orders, rate_hz);
-        // The residual has nothing in common with what the amplitudes can take up.
-        let pull = slope.iter().zip(&residual).map(|(d, r)| d * r).sum::<f64>();
-        let weight = sum_squares(&slope) - fit.taken_up(&slope);
-        if weight <= 0.0 {
-            break;
-        }
-        let step_hz = pull / weight;
-        frequency_hz += step_hz;
-        if !(frequency_hz > 0.0 && frequency_hz.is_finite()) {
-            break;
-        }
-        if step_hz.abs() < turns / duration_s {
-            let std_hz = fit.std_of_frequency(&residual, rate_hz, frequency_hz, orders, weight);
-            return Ok(Fundamental {
-                frequency_hz,
-                std_hz: Some(std_hz),
-            });
-        }
-    }
-    Err(Error::NotRefined {
-        start_hz,
-        why: "the steps of the fit do not settle",
-    })
+/// A frequency of which the last step was small enough.
+struct Settled {
+    frequency_hz: f64,
+    /// The fit before the last step.
+    fit: SineFit,
+    /// Sum of squares of the derivative by the frequency, less what the amplitudes take up.
+    weight: f64,
 }
 
-impl SineFit {
-    /// Derivative of the model by the fundamental.
-    fn slope(&self, orders: &[f64], rate_hz: f64) -> Vec<f64> {
-        let middle = 0.5 * (self.length - 1) as f64;
-        let mut slope = vec![0.0; self.length];
-        for (k, (&step, order)) in self.steps.iter().zip(orders).enumerate() {
-            let phasor = self.phasor(k) * (TAU * order / rate_hz);
-            rotate(self.length, step, |i, turn| {
-                // d/df of Re[P e^{jωm}] = Re[j (2π n m / f_s) P e^{jωm}].
-                slope[i] -= (i as f64 - middle) * (phasor * turn).im;
-            });
+impl Settled {
+    /// Gauss-Newton on the frequency, the amplitudes being fitted anew at each step, until a step turns the ends of the
+    /// first `length` samples by less than `turns`.
+    fn of(
+        samples: &(impl SampleStore + ?Sized),
+        length: usize,
+        rate_hz: f64,
+        mut frequency_hz: f64,
+        orders: &[f64],
+        turns: f64,
+    ) -> Result<Self, Error> {
+        let start_hz = frequency_hz;
+        let duration_s = length as f64 / rate_hz;
+        for _ in 0..STEPS {
+            let fit = SineFit::solve(samples, length, rate_hz, frequency_hz, orders)?;
+            let (pull, weight) = fit.pull_and_weight(samples, orders, rate_hz)?;
+            if weight <= 0.0 {
+                break;
+            }
+            let step_hz = pull / weight;
+            frequency_hz += step_hz;
+            if !(frequency_hz > 0.0 && frequency_hz.is_finite()) {
+                break;
+            }
+            if step_hz.abs() < turns / duration_s {
+                return Ok(Self {
+                    frequency_hz,
+                    fit,
+                    weight,
+                });
+            }
         }
-        slope
-    }
-
-    /// Sum of squares of the part of a signal that mean and amplitudes can take up: `bᵀ G⁻¹ b`.
-    fn taken_up(&self, signal: &[f64]) -> f64 {
-        let (even, odd) = super::projections(signal, &self.steps);
-        even.dot(&self.even_gram.solve(&even)) + odd.dot(&self.odd_gram.solve(&odd))
+        Err(Error::NotRefined {
+            start_hz,
+            why: "the steps of the fit do not settle",
+        })
     }
 
     /// `σ²_f = Σ_k w_k S(f_k)(f_s/2) / (Σ w_k)²`, `w_k` being the part of the slope's square that
     /// order `k` brings.
-    fn std_of_frequency(
-        &self,
-        residual: &[f64],
-        rate_hz: f64,
-        frequency_hz: f64,
-        orders: &[f64],
-        weight: f64,
-    ) -> f64 {
-        let freedom = (self.length as f64 - self.unknowns() as f64 - 1.0).max(1.0);
-        let white = sum_squares(residual) / freedom;
-        let density = residual_density(residual, rate_hz);
-        let pulls = DVector::from_iterator(
-            orders.len(),
-            orders
-                .iter()
-                .enumerate()
-                .map(|(k, n)| (n * self.phasor(k).norm()).powi(2)),
-        );
-        let total = pulls.sum();
-        let variance: f64 = pulls
+    fn std_hz(&self, samples: &(impl SampleStore + ?Sized), orders: &[f64]) -> Result<f64, Error> {
+        let leftover = Leftover::of(samples, &self.fit, self.fit.unknowns() + 1)?;
+        let pulls: Vec<f64> = orders
             .iter()
-            .zip(orders)
-            .map(|(pull, n)| {
-                let near = density
-                    .as_ref()
-                    .map_or(white, |d| density_near(d, n * frequency_hz) * 0.5 * rate_hz);
-                pull / total * near
-            })
-            .sum();
-        (variance / weight).sqrt()
+            .enumerate()
+            .map(|(k, n)| (n * self.fit.phasor(k).norm()).powi(2))
+            .collect();
+        let total: f64 = pulls.iter().sum();
+        let parts = pulls.iter().zip(&leftover.near);
+        let variance: f64 = parts.map(|(pull, near)| pull / total * near).sum();
+        Ok((variance / self.weight).sqrt())
+    }
+}
+
+impl SineFit {
+    /// Product of the residual and the model's derivative by the fundamental, and the sum of squares of what of that
+    /// derivative mean and amplitudes cannot take up, `Σ d² − bᵀ G⁻¹ b`. The residual has nothing in common with what
+    /// they can.
+    fn pull_and_weight(
+        &self,
+        samples: &(impl SampleStore + ?Sized),
+        orders: &[f64],
+        rate_hz: f64,
+    ) -> Result<(f64, f64), Error> {
+        let (mut pull, mut square) = (0.0, 0.0);
+        let mut sums = Projections::new(&self.steps, self.length);
+        samples.pass(0..self.length, &mut |start, piece| {
+            let residual = self.residual(start, piece);
+            let slope = self.slope(start..start + piece.len(), orders, rate_hz);
+            for (d, r) in slope.iter().zip(&residual) {
+                pull += d * r;
+                square += d * d;
+            }
+            sums.add(start, &slope);
+        })?;
+        let (even, odd) = sums.even_and_odd();
+        let taken_up = even.dot(&self.even_gram.solve(&even)) + odd.dot(&self.odd_gram.solve(&odd));
+        Ok((pull, square - taken_up))
+    }
+
+    /// Derivative of the model by the fundamental, at the samples of a part.
+    fn slope(&self, part: Range<usize>, orders: &[f64], rate_hz: f64) -> Vec<f64> {
+        let middle = 0.5 * (self.length - 1) as f64;
+        let mut slope = vec![0.0; part.len()];
+        for (k, (&step, order)) in self.steps.iter().zip(orders).enumerate() {
+            let phasor = self.phasor(k) * (TAU * order / rate_hz);
+            rotate(part.clone(), self.length, step, |i, turn| {
+                // d/df of Re[P e^{jωm}] = Re[j (2π n m / f_s) P e^{jωm}].
+                slope[i - part.start] -= (i as f64 - middle) * (phasor * turn).im;
+            });
+        }
+        slope
     }
 }

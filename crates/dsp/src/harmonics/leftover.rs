@@ -1,0 +1,199 @@
+//! What a fit leaves over: its size, and its density next to the components.
+
+use std::f64::consts::TAU;
+
+use num_complex::Complex64;
+
+use super::{SineFit, rotate};
+use crate::Error;
+use crate::store::SampleStore;
+
+/// Bins of the residual's periodogram, on either side of a component, that its uncertainty is taken
+/// from. The nearest one is left out: the fit has emptied it.
+const NEAR_BINS: std::ops::RangeInclusive<usize> = 2..=12;
+/// Fewest residual samples that a periodogram is made of; below, the residual is taken as white.
+const FEWEST_FOR_SPECTRUM: usize = 256;
+/// Blocks of a record; within one, the turn between neighbouring bins is a short Taylor series.
+const BLOCKS: usize = 1024;
+/// Terms of that series. The turn is at most 2π·12/1024/2 = 0.037 rad, and 0.037⁵/5! = 6e-10.
+const TERMS: usize = 5;
+
+/// The residual of a fit.
+pub(super) struct Leftover {
+    pub(super) sum_squares: f64,
+    /// Variance of white noise with the residual's density near each component.
+    pub(super) near: Vec<f64>,
+}
+
+impl Leftover {
+    /// Goes once through the first samples of a record, as many as the fit is of. `lost` are the unknowns that the
+    /// residual has lost.
+    pub(super) fn of(
+        samples: &(impl SampleStore + ?Sized),
+        fit: &SineFit,
+        lost: usize,
+    ) -> Result<Self, Error> {
+        let mut sum_squares = 0.0;
+        let is_long = fit.length >= FEWEST_FOR_SPECTRUM;
+        let mut bins: Vec<NearBins> = match is_long {
+            true => fit
+                .steps
+                .iter()
+                .map(|step| NearBins::new(*step, fit.length))
+                .collect(),
+            false => Vec::new(),
+        };
+        samples.pass(0..fit.length, &mut |start, piece| {
+            let residual = fit.residual(start, piece);
+            sum_squares = residual.iter().fold(sum_squares, |sum, x| sum + x * x);
+            bins.iter_mut().for_each(|bins| bins.add(start, &residual));
+        })?;
+        let freedom = (fit.length as f64 - lost as f64).max(1.0);
+        let near = match is_long {
+            true => bins.iter().map(NearBins::variance).collect(),
+            false => vec![sum_squares / freedom; fit.steps.len()],
+        };
+        Ok(Self { sum_squares, near })
+    }
+}
+
+/// The transform of a record that goes by, at the bins next to a frequency.
+///
+/// `X(c + d) = Σ_i x_i e^{−2πj (c + d) i/N}`, the sum over the samples taken at the bin c; from it, that at the bins beside
+/// it follows block by block. Without a window, because the fit has none: what a strong line beside the components leaks
+/// into them shows here, too.
+struct NearBins {
+    /// The bin that is nearest to the component.
+    centre: usize,
+    length: usize,
+    /// Samples of a block.
+    block: usize,
+    /// Of the present block, about its middle: `Σ x_i e^{−2πj c i/N} u^q`, u from −1 to 1.
+    moments: [Complex64; TERMS],
+    /// At the bins from the lowest to the highest beside the centre.
+    sums: Vec<Complex64>,
+}
+
+impl NearBins {
+    fn new(step: f64, length: usize) -> Self {
+        Self {
+            centre: (step / TAU * length as f64).round() as usize,
+            length,
+            block: length.div_ceil(BLOCKS),
+            moments: [Complex64::ZERO; TERMS],
+            sums: vec![Complex64::ZERO; 2 * NEAR_BINS.end() + 1],
+        }
+    }
+
+    /// Adds samples that follow those before.
+    fn add(&mut self, start: usize, samples: &[f64]) {
+        let (mut at, end) = (start, start + samples.len());
+        while at < end {
+            let first = at - at % self.block;
+            let last = (first + self.block).min(self.length);
+            let to = last.min(end);
+            self.add_to_block(first, at, &samples[at - start..to - start]);
+            if to == last {
+                self.close(first);
+            }
+            at = to;
+        }
+    }
+
+    /// Half the length of a block, and the middle of one.
+    fn half_and_middle(&self, first: usize) -> (f64, f64) {
+        let half = 0.5 * self.block as f64;
+        (half, first as f64 + half - 0.5)
+    }
+
+    fn add_to_block(&mut self, first: usize, at: usize, samples: &[f64]) {
+        let (half, middle) = self.half_and_middle(first);
+        let step = -TAU * self.centre as f64 / self.length as f64;
+        let mut moments = self.moments;
+        rotate(at..at + samples.len(), self.length, step, |i, turn| {
+            let u = (i as f64 - middle) / half;
+            let mut term = turn * samples[i - at];
+            for moment in &mut moments {
+                *moment += term;
+                term *= u;
+            }
+        });
+        self.moments = moments;
+    }
+
+    /// Adds a whole block to the bins.
+    fn close(&mut self, first: usize) {
+        let (half, middle) = self.half_and_middle(first);
+        let widest = *NEAR_BINS.end() as f64;
+        for (place, sum) in self.sums.iter_mut().enumerate() {
+            let step = -TAU * (place as f64 - widest) / self.length as f64;
+            let mut factor =
+                Complex64::from_polar(1.0, step * (middle - 0.5 * (self.length - 1) as f64));
+            for (power, moment) in (1..).zip(&self.moments) {
+                *sum += factor * moment;
+                factor *= Complex64::new(0.0, step * half / f64::from(power));
+            }
+        }
+        self.moments = [Complex64::ZERO; TERMS];
+    }
+
+    /// Variance of white noise of the mean density over the bins. Those below zero mirror those above; the constant is
+    /// fitted as well.
+    fn variance(&self) -> f64 {
+        let (last, widest) = (self.length / 2, *NEAR_BINS.end());
+        let power = |place: usize, bin: usize| {
+            let is_alone = self.length.is_multiple_of(2) && bin == last;
+            self.sums[place].norm_sqr() * if is_alone { 0.5 } else { 1.0 }
+        };
+        let near: Vec<f64> = NEAR_BINS
+            .flat_map(|away| {
+                let places = [widest + away, widest - away];
+                let bins = [self.centre + away, self.centre.abs_diff(away)];
+                places.into_iter().zip(bins)
+            })
+            .filter(|(_, bin)| (1..=last).contains(bin))
+            .map(|(place, bin)| power(place, bin))
+            .collect();
+        near.iter().sum::<f64>() / (near.len().max(1) * self.length) as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By the definition, term by term.
+    fn power(samples: &[f64], bin: usize) -> f64 {
+        let turn = |i: usize| -TAU * ((bin * i) % samples.len()) as f64 / samples.len() as f64;
+        let terms = samples.iter().enumerate();
+        let sum: Complex64 = terms.map(|(i, x)| x * Complex64::cis(turn(i))).sum();
+        let is_alone = 2 * bin == samples.len();
+        sum.norm_sqr() / samples.len() as f64 * if is_alone { 0.5 } else { 1.0 }
+    }
+
+    #[test]
+    fn bins_beside_a_line_are_those_of_a_transform_of_all() {
+        let noise = |i: usize| ((i * i % 1009) as f64).sin() + 0.3 * ((i * i % 97) as f64).cos();
+        for length in [300, 4096, 5001] {
+            let samples: Vec<f64> = (0..length).map(noise).collect();
+            for frequency in [0.01, 0.123, 0.495] {
+                let mut bins = NearBins::new(TAU * frequency, length);
+                for (place, piece) in samples.chunks(1000).enumerate() {
+                    bins.add(1000 * place, piece);
+                }
+                let centre = (frequency * length as f64).round() as usize;
+                let near: Vec<f64> = NEAR_BINS
+                    .flat_map(|away| [centre + away, centre.abs_diff(away)])
+                    .filter(|bin| (1..=length / 2).contains(bin))
+                    .map(|bin| power(&samples, bin))
+                    .collect();
+                let want = near.iter().sum::<f64>() / near.len() as f64;
+                let got = bins.variance();
+                assert!(
+                    (got / want - 1.0).abs() < 1e-7,
+                    "{length} {frequency}: {got} {want}"
+                );
+            }
+        }
+    }
+}
