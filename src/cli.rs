@@ -79,6 +79,20 @@ impl Verb {
             _ => false,
         }
     }
+
+    /// How its records are read, if it reads any.
+    pub(crate) fn reading(&self) -> Option<&Reading> {
+        match self {
+            Self::Compensate(args) => Some(&args.record.reading),
+            Self::Harmonics(args) => Some(&args.record.reading),
+            Self::Extract(args) => Some(&args.record.reading),
+            Self::Inspect(args) => Some(&args.reading),
+            Self::Identify(args) => Some(args.test.reading()),
+            Self::Simulate(args) => Some(&args.reading),
+            Self::Diagnose(args) => Some(&args.reading),
+            Self::Init(_) | Self::Table(_) | Self::Predict(_) => None,
+        }
+    }
 }
 
 /// Units that results are printed in.

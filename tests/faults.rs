@@ -17,7 +17,7 @@ use crate::golden::{words, workplace};
 use crate::util::{Folder, HERTEL};
 
 /// Whatever writes, with what it may read and write at once: names that begin with `out` are its outputs.
-const RUNS: [&str; 17] = [
+const RUNS: [&str; 18] = [
     "compensate made/short.csv --channel bridge --stand stands/declared.toml -o out.csv --plot out.svg --html out.html --json",
     "compensate made/short.csv --channel bridge --stand stands/cubic.toml -o out.csv --no-sync",
     "compensate made/short.csv --channel bridge --stand stands/declared.toml --with-recorded",
@@ -30,6 +30,7 @@ const RUNS: [&str; 17] = [
     "inspect made/blocks.mcap -o out.txt --json",
     "inspect made/short.csv -o out.txt --plot out.svg",
     "identify decay made/decay.csv --stand stands/declared.toml -o out.toml --html out.html --json",
+    "identify response made/periods.csv --applied force --measured beam --band 20..150 --modes 1 --excitation periodic --period 500 -o out.toml --html out.html",
     "identify runup made/runup.csv --motion angle --torque torque -o out.toml",
     "identify static recordings/loads.csv --load weight --reading bridge -o out.toml --html out.html",
     "simulate made/sweep.csv --applied load --stand stands/cubic.toml -o out.csv --json",

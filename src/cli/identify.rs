@@ -31,6 +31,16 @@ pub enum Test {
 }
 
 impl Test {
+    /// How its records are read.
+    pub(crate) fn reading(&self) -> &Reading {
+        match self {
+            Self::Decay(test) => &test.reading,
+            Self::Response(test) => &test.reading,
+            Self::Runup(test) => &test.reading,
+            Self::Static(test) => &test.table,
+        }
+    }
+
     /// What is written, and the records that must not be replaced.
     #[must_use]
     pub fn target(&self) -> (&Findings, &[String]) {

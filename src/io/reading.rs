@@ -50,6 +50,9 @@ pub struct Reading {
     /// Field with the spacing of the samples, for messages that hold many
     #[arg(long, value_name = "FIELD")]
     pub spacing: Option<String>,
+    /// Longest metadata, schema and channel records of an MCAP file that are read, in MiB [default: 64]
+    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1024))]
+    pub longest_metadata: Option<u64>,
     /// Whether stamps may be irregular, because they are only handed on.
     #[arg(skip)]
     pub any_steps: bool,

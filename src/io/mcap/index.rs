@@ -9,7 +9,7 @@ use mcap::{MAGIC, Summary};
 
 use super::channels::Channels;
 use super::record::RawMessage;
-use super::record::chunk::LARGEST;
+use super::record::file::longest;
 use super::record::input::CountedInput;
 use super::record::reader::RecordReader;
 use super::selection::FieldRequest;
@@ -34,7 +34,7 @@ pub(super) fn summary(input: &Input) -> Option<(Stored<File>, Summary)> {
     let mut file = Stored::open(path).ok()?;
     let options = SummaryReaderOptions::default()
         .with_file_size(file.metadata().ok()?.len())
-        .with_record_length_limit(LARGEST as usize);
+        .with_record_length_limit(longest(op::CHANNEL) as usize);
     let mut reader = SummaryReader::new_with_options(options);
     while let Some(event) = reader.next_event() {
         match event.ok()? {

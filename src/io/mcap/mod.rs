@@ -44,6 +44,7 @@ pub mod writer;
 
 pub use index::SignalEnd;
 pub use inventory::Inventory;
+pub(crate) use record::file::limit_metadata;
 pub use selection::FieldChoice;
 pub use signal::{SelectedSignal, TimeOptions};
 pub use source::{SignalReader, read_fields};

@@ -1,6 +1,7 @@
 //! The records of a file one after the other, chunks as they are.
 
 use std::fmt;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use mcap::MAGIC;
 use mcap::records::op;
@@ -13,6 +14,8 @@ use crate::io::Input;
 
 /// Longest record that is taken into memory; attachments may be longer, they are passed over.
 const LONGEST: u64 = chunk::LARGEST;
+/// The same for metadata, schemas and channels, of which whole lists are kept.
+static LONGEST_METADATA: AtomicU64 = AtomicU64::new(64 << 20);
 /// Bytes of an attachment that are looked at: its names.
 const ATTACHMENT_FRONT: u64 = 1 << 16;
 /// Bytes of an end record.
@@ -24,6 +27,19 @@ const FIRST_PRIVATE: u8 = 0x80;
 const LOSSES_KEPT: usize = 20;
 /// Where a file ends that ends within an attachment.
 pub(crate) const IN_ATTACHMENT: &str = "within an attachment";
+
+/// Has metadata, schemas and channels of so many bytes read, in all files from now on.
+pub(crate) fn limit_metadata(bytes: u64) {
+    LONGEST_METADATA.store(bytes.min(LONGEST), Ordering::Relaxed);
+}
+
+/// Longest record of a kind that is taken into memory.
+pub(crate) fn longest(op: u8) -> u64 {
+    match op {
+        op::METADATA | op::SCHEMA | op::CHANNEL => LONGEST_METADATA.load(Ordering::Relaxed),
+        _ => LONGEST,
+    }
+}
 
 /// Data that are lost.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -138,11 +154,16 @@ impl fmt::Display for Loss {
                 "a record in the chunk at byte {at} runs past the end of the chunk; the rest of \
                  the chunk was left out"
             ),
-            Self::TooLong { at, op, length } => write!(
-                f,
-                "the record at byte {at} (opcode 0x{op:02x}) says it is {length} bytes long, more \
-                 than any record; nothing behind it could be read"
-            ),
+            Self::TooLong { at, op, length } => {
+                let rest = match *length > LONGEST {
+                    true => "more than any record; nothing behind it could be read",
+                    false => "and was left out; --longest-metadata reads longer ones",
+                };
+                write!(
+                    f,
+                    "the record at byte {at} (opcode 0x{op:02x}) says it is {length} bytes long, {rest}"
+                )
+            }
             other => other.describe_record(f),
         }
     }
@@ -309,11 +330,15 @@ impl FileReader {
         };
         let is_attachment = op == op::ATTACHMENT;
         // A recorder that was stopped leaves its last chunk without a length.
-        if length > LONGEST && !is_attachment && op != op::CHUNK {
-            self.is_ended = true;
+        if length > longest(op) && !is_attachment && op != op::CHUNK {
             let at = offset;
             self.losses.add(Loss::TooLong { at, op, length });
-            return Ok(None);
+            if length > LONGEST {
+                self.is_ended = true;
+                return Ok(None);
+            }
+            (self.held, self.behind) = (RECORD_HEAD, length);
+            return self.next();
         }
         let most = if is_attachment {
             ATTACHMENT_FRONT

@@ -10,7 +10,7 @@ use super::census::Census;
 use super::chunk::{
     ChunkError, STEP, Unpacked, chunk_front, is_long, records_of_long, unpack, unpack_part,
 };
-use super::file::{FileReader, FileRecord, Loss, Losses};
+use super::file::{FileReader, FileRecord, Loss, Losses, longest};
 use super::input::CountedInput;
 use super::{RECORD_HEAD, record_head, split_record};
 use crate::failure::Failure;
@@ -238,7 +238,7 @@ impl RecordReader {
         self.buffer.drain(..self.at);
         self.at = 0;
         if let Some((op, length)) = record_head(&self.buffer)
-            && length > LONGEST_NESTED
+            && length > longest(op).min(LONGEST_NESTED)
         {
             let at = self.record_offset;
             self.file.losses.add(Loss::TooLong { at, op, length });

@@ -75,6 +75,29 @@ fn an_attachment_is_told_by_its_front() {
 }
 
 #[test]
+fn long_metadata_are_left_out_and_named() {
+    let mut file = File::new(options(None));
+    let schema = ("std_msgs/msg/Float64", &b"float64 data"[..]);
+    file.channel(1, "/x", "cdr+ros2msg", schema);
+    let text = "a".repeat((64 << 20) + 1);
+    let metadata = mcap::records::Metadata {
+        name: "log".to_owned(),
+        metadata: [("text".to_owned(), text)].into(),
+    };
+    file.writer().write_metadata(&metadata).unwrap();
+    file.message(1, 5, &float64(1.0));
+    let (ops, reader) = ops(&file.finish());
+    assert!(ops.contains(&op::MESSAGE) && !ops.contains(&op::METADATA));
+    let losses = reader.losses();
+    assert_eq!(losses.count, 1, "{:?}", losses.first);
+    let said = losses.first[0].to_string();
+    assert!(
+        said.contains("(opcode 0x0c) says it is 671088") && said.contains("--longest-metadata"),
+        "{said}"
+    );
+}
+
+#[test]
 fn hostile_lengths_end_the_reading() {
     let mut bytes = MAGIC.to_vec();
     bytes.push(op::MESSAGE);
