@@ -7,6 +7,7 @@
 
 mod motion;
 mod spread;
+mod windows;
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -22,7 +23,9 @@ use torqcomp_model::effects::{
 use crate::failure::Failure;
 use crate::stand::Stand;
 
+pub(crate) use motion::Carried;
 pub(crate) use spread::{ResultStd, Spread};
+pub(crate) use windows::RecordWindow;
 
 /// Rounds in which torques of the stand and a coupling past it are brought into agreement.
 const ROUNDS: usize = 40;
@@ -59,6 +62,8 @@ pub(crate) struct InverseResult {
     pub stuck: Option<f64>,
     /// Highest frequency that curves and torques have seen.
     pub seen_to_hz: Option<f64>,
+    /// What the torques in the stand leave to the next window of a long record.
+    next: Option<motion::Carried>,
 }
 
 /// A record on its way back.
@@ -71,6 +76,7 @@ struct Pass<'a> {
     noise_std: f64,
     /// Torques of the stand, as far as they are known, for couplings past it.
     torque: Option<&'a [f64]>,
+    beside: motion::Beside,
     result: InverseResult,
 }
 
@@ -117,12 +123,27 @@ impl ChainInverse {
         rate_hz: f64,
         noise_std: f64,
     ) -> Result<InverseResult, Failure> {
-        let lead = (4 * self.filter.half_length()).max(SHORTEST_LEAD);
-        let extension = Extension::new(record.len(), rate_hz, lead);
+        self.beside(record, rate_hz, noise_std, motion::Beside::default())
+    }
+
+    /// Samples beyond an end of a record that the way back looks at.
+    fn lead(&self) -> usize {
+        (4 * self.filter.half_length()).max(SHORTEST_LEAD)
+    }
+
+    /// Takes a record back, or a window of one.
+    fn beside(
+        &self,
+        record: &[f64],
+        rate_hz: f64,
+        noise_std: f64,
+        beside: motion::Beside,
+    ) -> Result<InverseResult, Failure> {
+        let extension = Extension::new(record.len(), rate_hz, self.lead());
         let clock = SampleClock {
             step_s: 1.0 / rate_hz,
         };
-        let back = |torque: Option<&[f64]>| {
+        let back = |torque: Option<&[f64]>, beside: motion::Beside| {
             let pass = Pass {
                 inverse: self,
                 extension: extension.clone(),
@@ -130,18 +151,19 @@ impl ChainInverse {
                 samples: record.to_vec(),
                 noise_std,
                 torque,
+                beside,
                 result: InverseResult::default(),
             };
             pass.back()
         };
         let couples = self.links().iter().any(Link::is_feedthrough);
         if !(couples && self.chain.has_torques()) {
-            return Ok(back(None).0);
+            return Ok(back(None, beside).0);
         }
         let size = record.iter().map(|y| y * y).sum::<f64>().sqrt();
         let mut torque = vec![0.0; record.len()];
         for _ in 0..ROUNDS {
-            let (result, now) = back(Some(&torque));
+            let (result, now) = back(Some(&torque), motion::Beside::default());
             let change = now.iter().zip(&torque).map(|(a, b)| (a - b).powi(2));
             let change = change.sum::<f64>().sqrt();
             torque = now;
@@ -338,7 +360,14 @@ impl Pass<'_> {
         };
         let torques: Vec<&dyn Torque> = torques.iter().map(|(torque, _)| *torque).collect();
         let gage_path = GagePath::new(gage_path, chain.shift, self.noise_std);
-        let found = motion::motion(&torques, gage_path, &self.samples, &view);
+        let found = motion::motion(
+            &torques,
+            gage_path,
+            &self.samples,
+            &view,
+            std::mem::take(&mut self.beside),
+        );
+        self.result.next = found.next;
         let hides = torques.iter().position(|torque| torque.hidden() > 0.0);
         let lost = Unrecovered {
             why: "the gage shows nothing within the gap".to_owned(),

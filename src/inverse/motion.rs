@@ -5,14 +5,16 @@
 //! not alias; memory moves on from the record's start. The applied quantity follows as
 //! `G u = x''/ω₀² + 2ζ x'/ω₀ + x + n` (the linear part by its response).
 
+use std::ops::Range;
+
 use num_complex::Complex64;
 use torqcomp_dsp::band::Band;
 use torqcomp_dsp::compensate::{Fine, continued};
-use torqcomp_model::chain::GagePath;
+use torqcomp_model::chain::{GagePath, GageState};
 use torqcomp_model::effects::{Memory, Torque};
 
 /// Samples of a block, and those on both sides that are computed to spare.
-const BLOCK: usize = 16_384;
+pub const BLOCK: usize = 16_384;
 const MARGIN: usize = 1024;
 /// Shortest block of a short record.
 const SHORTEST: usize = 256;
@@ -42,10 +44,39 @@ pub struct Motion {
     pub hidden: Vec<usize>,
     /// Part of the record in which the speed is within two standard uncertainties of zero.
     pub stuck: f64,
+    /// Where the next window goes on, if one does.
+    pub next: Option<Carried>,
+}
+
+/// The end of a window's own part: what the next one, which begins a margin before, goes on from.
+#[derive(Debug)]
+pub(crate) struct Carried {
+    /// Displacement and torques over that margin.
+    x: Vec<f64>,
+    torque: Vec<f64>,
+    memories: Vec<Memory>,
+    kept: Option<Vec<f64>>,
+    gage: GageState,
+}
+
+/// What a window of a long record has to do with those beside it.
+#[derive(Debug, Default)]
+pub struct Beside {
+    /// What the window before has left.
+    pub before: Option<Carried>,
+    /// Where the window's own part ends, a number of whole blocks behind its beginning, and how many samples before that
+    /// the next window begins.
+    pub end: Option<(usize, usize)>,
 }
 
 /// Displacement and torques along a signal of the gage.
-pub fn motion(torques: &[&dyn Torque], gage_path: GagePath, signal: &[f64], view: &View) -> Motion {
+pub fn motion(
+    torques: &[&dyn Torque],
+    gage_path: GagePath,
+    signal: &[f64],
+    view: &View,
+    beside: Beside,
+) -> Motion {
     let block = signal.len().next_multiple_of(SHORTEST).min(BLOCK);
     let margin = MARGIN.min(4 * block);
     let mut walk = MotionPass {
@@ -59,14 +90,27 @@ pub fn motion(torques: &[&dyn Torque], gage_path: GagePath, signal: &[f64], view
         stuck: 0,
         found: Motion::default(),
     };
-    for start in (0..signal.len()).step_by(block) {
+    if let Some(before) = beside.before {
+        walk.memories = before.memories;
+        walk.kept = before.kept;
+        walk.gage_path = walk.gage_path.from(before.gage);
+        (walk.found.x, walk.found.torque) = (before.x, before.torque);
+    }
+    let first = walk.found.x.len();
+    let last = beside.end.map_or(signal.len(), |(end, _)| end);
+    for start in (first..signal.len()).step_by(block) {
         let window: Vec<f64> = (0..block + 2 * margin)
             .map(|i| continued(signal, (start + i) as isize - margin as isize))
             .collect();
         walk.block(&window, start, block.min(signal.len() - start));
+        if start < last {
+            walk.found.stuck = walk.stuck as f64;
+        }
+        if let Some((end, margin)) = beside.end.filter(|(end, _)| *end == start + block) {
+            walk.found.next = Some(walk.carried(end - margin..end));
+        }
     }
-    let steps = (signal.len() * view.factor) as f64;
-    walk.found.stuck = walk.stuck as f64 / steps;
+    walk.found.stuck /= ((last - first) * view.factor) as f64;
     walk.found
 }
 
@@ -84,6 +128,17 @@ struct MotionPass<'a> {
 }
 
 impl MotionPass<'_> {
+    /// The present state, with what was found over a range.
+    fn carried(&self, range: Range<usize>) -> Carried {
+        Carried {
+            x: self.found.x[range.clone()].to_vec(),
+            torque: self.found.torque[range].to_vec(),
+            memories: self.memories.clone(),
+            kept: self.kept.clone(),
+            gage: self.gage_path.state(),
+        }
+    }
+
     fn block(&mut self, window: &[f64], start: usize, count: usize) {
         let (margin, factor) = (self.margin, self.view.factor);
         let inner = margin..margin + count;

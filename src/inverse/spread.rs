@@ -10,8 +10,6 @@ use super::ChainInverse;
 use crate::failure::Failure;
 use crate::stand::{ConstantStd, Given, Stand, VariedConstant, combined};
 
-/// Samples from the start of the record that are looked at.
-const LOOKED_AT: usize = 1 << 16;
 /// Part of a constant's contribution by which the result may bend over its standard uncertainty.
 const STRAIGHT: f64 = 0.3;
 
@@ -46,7 +44,7 @@ impl ResultStd {
 pub(crate) struct Spread<'a> {
     pub stand: &'a Stand,
     pub band: &'a Band,
-    /// In SI units of the record.
+    /// In SI units of the record, its first samples at least.
     pub record: &'a [f64],
     pub noise_std: f64,
     /// Of the constant that made the record.
@@ -54,6 +52,9 @@ pub(crate) struct Spread<'a> {
 }
 
 impl Spread<'_> {
+    /// Samples from the start of the record that are looked at.
+    pub(crate) const LOOKED_AT: usize = 1 << 16;
+
     /// The standard uncertainty; `None` if nothing has one.
     ///
     /// # Errors
@@ -116,7 +117,7 @@ impl Spread<'_> {
     /// What acted on a stand by the record times a factor.
     fn back(&self, stand: &Stand, factor: f64) -> Result<Vec<f64>, Failure> {
         let inverse = ChainInverse::new(stand, self.band.clone())?;
-        let count = self.record.len().min(LOOKED_AT);
+        let count = self.record.len().min(Self::LOOKED_AT);
         let record: Vec<f64> = self.record[..count].iter().map(|y| y * factor).collect();
         let undone = inverse.run(&record, self.band.sample_rate_hz(), self.noise_std)?;
         Ok(undone.applied)

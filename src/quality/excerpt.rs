@@ -12,8 +12,6 @@ const FEWEST: usize = 1 << 12;
 const SHARE: usize = 1 << 10;
 /// Samples that are looked at of a record that is gone through several times.
 pub const OF_PASSES: usize = 1 << 18;
-/// Samples that are looked at of a record in memory.
-pub const OF_MEMORY: usize = 1 << 20;
 
 /// The record that an excerpt is from.
 #[derive(Debug, Clone, Copy)]
@@ -44,13 +42,6 @@ pub struct Of<'a> {
 #[must_use]
 pub fn of_stream(kept: &[f64], samples: usize) -> &[f64] {
     &kept[..kept.len().min((samples / SHARE).clamp(FEWEST, OF_STREAM))]
-}
-
-/// The part of a record in memory that is looked at.
-#[must_use]
-pub fn of_memory(mut samples: Vec<f64>) -> Vec<f64> {
-    samples.truncate(OF_MEMORY);
-    samples
 }
 
 /// The warnings of [`super::warnings`] about the first samples of a record; that it has more is said.

@@ -1,8 +1,10 @@
-//! The whole record in memory: one transform, or the inverse of effects that no filter describes.
+//! Records that are gone through more than once: in one transform over all of them, or back through effects that no filter
+//! describes.
 
 use torqcomp_dsp::compensate::whole_record;
 use torqcomp_dsp::noise::RecordNoise;
-use torqcomp_dsp::spectrum::{Density, welch};
+use torqcomp_dsp::spectrum::{Density, StreamedPower};
+use torqcomp_dsp::store::SampleStore;
 
 use super::report::CompensateReport;
 use super::sink::{Part, Sink};
@@ -14,7 +16,8 @@ use crate::commands::rows::uniform_parts;
 use crate::failure::Failure;
 use crate::io::text::Text;
 use crate::quality::excerpt;
-use crate::recording::UniformRecord;
+use crate::recording::moment::Moment;
+use crate::recording::{Spool, UniformRecord};
 
 /// Longest block of the noise estimate.
 const LONGEST_BLOCK: usize = 1 << 12;
@@ -34,45 +37,64 @@ pub(super) fn run(
         undo,
         ..
     } = plan;
-    let record = UniformRecord::read(stream, |values| convert(&chain, values))?;
+    let record: UniformRecord<Spool> =
+        UniformRecord::read(stream, |values| convert(&chain, values))?;
+    let count = record.samples.count();
     let scale = 1.0 / chain.applied.factor;
     report.scale = scale;
     report.start = record.start;
-    if let Some(density) = density(&record, scale) {
+    if let Some(density) = density(&record, scale)? {
         report.noise.record = RecordNoise::of(&filter, &density);
     }
-    let torque = match &undo {
-        None => whole_record(&filter, &record.samples)?,
-        Some(undo) => refined::torque(undo, (&stand, chain.std), &record, report)?,
+    let mut sums = Sums::NONE;
+    let mut deliver = |first: usize, torque: &[f64], recorded: &[f64]| {
+        sums.join(&Sums::of(torque));
+        let axis = (record.rate_hz, record.start);
+        deliver(args, sink, axis, (first, scale), [torque, recorded])
     };
-    deliver(args, sink, &record, &torque, scale)?;
-    report.samples = torque.len();
-    report.result = Sums::of(&torque).statistics(scale);
+    match &undo {
+        None => {
+            let samples = record.samples.part(0..count)?;
+            deliver(0, &whole_record(&filter, &samples)?, &samples)?;
+        }
+        Some(undo) => refined::run(undo, (&stand, chain.std), &record, report, deliver)?,
+    }
+    report.samples = count;
+    report.result = sums.statistics(scale);
     report.resampled = record.resampled;
     Ok(Seen {
         summary: record.summary,
-        excerpt: excerpt::of_memory(record.samples),
+        excerpt: record.samples.part(0..count.min(excerpt::OF_PASSES))?,
     })
 }
 
 /// Power density of a record in printed units, if it is long enough.
-fn density(record: &UniformRecord, scale: f64) -> Option<Density> {
-    let block = (record.samples.len() / 2).next_power_of_two() / 2;
-    let printed: Vec<f64> = record.samples.iter().map(|x| x * scale).collect();
-    welch(&printed, record.rate_hz, block.min(LONGEST_BLOCK)).ok()
+fn density(record: &UniformRecord<Spool>, scale: f64) -> Result<Option<Density>, Failure> {
+    let count = record.samples.count();
+    let block = ((count / 2).next_power_of_two() / 2).min(LONGEST_BLOCK);
+    if block < 4 {
+        return Ok(None);
+    }
+    let mut power = StreamedPower::new(block);
+    record.samples.pass(0..count, &mut |_, piece| {
+        let printed: Vec<f64> = piece.iter().map(|x| x * scale).collect();
+        power.push(&printed);
+    })?;
+    Ok(power.density(record.rate_hz))
 }
 
+/// Writes samples of the result, from a place on, beside those recorded.
 fn deliver(
     args: &Compensate,
     sink: &mut Sink,
-    record: &UniformRecord,
-    torque: &[f64],
-    scale: f64,
+    axis: (f64, Moment),
+    (first, scale): (usize, f64),
+    [torque, recorded]: [&[f64]; 2],
 ) -> Result<(), Failure> {
     let mut text = Text::default();
-    let axis = (record.rate_hz, record.start);
-    for (rows, range) in uniform_parts((args.digits, scale), axis, 0..torque.len()) {
-        let (torque, recorded) = (&torque[range.clone()], &record.samples[range]);
+    for (rows, range) in uniform_parts((args.digits, scale), axis, first..first + torque.len()) {
+        let range = range.start - first..range.end - first;
+        let (torque, recorded) = (&torque[range.clone()], &recorded[range]);
         text.clear();
         if sink.is_text() {
             let beside = if args.with_recorded { recorded } else { &[] };

@@ -1,16 +1,17 @@
 //! The inverse of a stand with effects that no filter describes.
 
+use torqcomp_dsp::store::SampleStore;
 use torqcomp_model::effects::{Action, FoundLine, Unrecovered};
 
 use super::report::{CompensateReport, LostSpan, RemovedLine, UndoneEffect};
 use crate::failure::Failure;
-use crate::inverse::{ChainInverse, InverseResult, Spread};
+use crate::inverse::{Carried, ChainInverse, InverseResult, RecordWindow, Spread};
 use crate::print::rounded;
-use crate::recording::UniformRecord;
+use crate::recording::{Spool, UniformRecord};
 use crate::stand::{ConstantStd, Stand};
 use crate::warning::Warning;
 
-/// Most samples of a record: about 100 bytes of memory each are needed.
+/// Most samples of a record that is taken back as a whole: about 100 bytes of memory each are needed.
 const MOST_SAMPLES: usize = 1 << 24;
 /// Spans whose times a warning gives.
 const SPANS_TOLD: usize = 5;
@@ -31,30 +32,46 @@ struct Scales {
     printed: f64,
 }
 
-/// The torque behind a record; what was found on the way goes into the report.
-pub(super) fn torque(
+/// Takes a record back window by window and gives the torque and the recorded samples of each away; what was found on the
+/// way goes into the report.
+pub(super) fn run(
     undo: &ChainInverse,
     (stand, constant): (&Stand, ConstantStd),
-    record: &UniformRecord,
+    record: &UniformRecord<Spool>,
     report: &mut CompensateReport,
-) -> Result<Vec<f64>, Failure> {
-    check(record)?;
+    mut deliver: impl FnMut(usize, &[f64], &[f64]) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    let count = record.samples.count();
+    check(record, undo)?;
     // From the density in printed units to the deviation of a sample of the record in SI units.
     let noise_std = report.noise.record.as_ref().map_or(0.0, |noise| {
         let density = noise.floor_per_root_hz.powi(2);
         (0.5 * density * record.rate_hz).sqrt() * stand.gain() / report.scale
     });
-    let recorded: Vec<f64> = record.samples.iter().map(|x| x * stand.gain()).collect();
-    let mut undone = undo.run(&recorded, record.rate_hz, noise_std)?;
-    let torque = std::mem::take(&mut undone.applied);
-    if let (Some(noise), true) = (&mut report.noise.record, noise_std > 0.0) {
-        let spread = spread(undo, record, (&recorded, &torque), noise_std)?;
-        noise.compensated_rms = report.scale * spread;
+    let in_units_of_record =
+        |samples: &[f64]| -> Vec<f64> { samples.iter().map(|x| x * stand.gain()).collect() };
+    let scales = (record.rate_hz, noise_std);
+    let (mut found, mut carried) = (InverseResult::default(), None);
+    let mut noise = AddedNoise::default();
+    for window in undo.windows(count) {
+        let samples = record.samples.part(window.seen.clone())?;
+        let recorded = in_units_of_record(&samples);
+        let mut undone = undo.window(&recorded, &window, scales, &mut carried)?;
+        let torque = std::mem::take(&mut undone.applied);
+        if report.noise.record.is_some() && noise_std > 0.0 {
+            noise.add(undo, &recorded, &window, scales, &torque)?;
+        }
+        deliver(window.own.start, &torque, &samples[window.inner()])?;
+        found.join(undone, window.own.len() as f64 / count as f64);
     }
+    if let (Some(record), true) = (&mut report.noise.record, noise_std > 0.0) {
+        record.compensated_rms = report.scale * (noise.square / count as f64).sqrt();
+    }
+    let first = record.samples.part(0..count.min(Spread::LOOKED_AT))?;
     let spread = Spread {
         stand,
         band: undo.filter().band(),
-        record: &recorded,
+        record: &in_units_of_record(&first),
         noise_std,
         constant,
     };
@@ -65,18 +82,18 @@ pub(super) fn torque(
         reach_s: reach(undo.filter().taps()) as f64 / record.rate_hz,
         printed: report.scale / stand.gain(),
     };
-    describe(report, &undone, &scales);
-    Ok(torque)
+    describe(report, &found, &scales);
+    Ok(())
 }
 
-fn check(record: &UniformRecord) -> Result<(), Failure> {
-    let count = record.samples.len();
+fn check(record: &UniformRecord<Spool>, undo: &ChainInverse) -> Result<(), Failure> {
+    let count = record.samples.count();
     if count < 2 {
         return Err(Failure::failed(
             "the record has fewer than two samples; nothing can be compensated",
         ));
     }
-    if count > MOST_SAMPLES {
+    if count > MOST_SAMPLES && undo.margin().is_none() {
         return Err(Failure::failed(format_args!(
             "the record has {count} samples; the effects of this stand are removed in memory, from at most \
              {MOST_SAMPLES}; cut the record into parts of {} s",
@@ -86,27 +103,55 @@ fn check(record: &UniformRecord) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Rms of what noise of that deviation makes of a result: from a second run with such noise added.
-fn spread(
-    undo: &ChainInverse,
-    record: &UniformRecord,
-    (recorded, torque): (&[f64], &[f64]),
-    noise_std: f64,
-) -> Result<f64, Failure> {
-    let mut state = 0x9e37_79b9_7f4a_7c15_u64;
-    let mut uniform = || {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        (state >> 11) as f64 / (1_u64 << 53) as f64
-    };
-    // Twelve uniform numbers have a variance of one together.
-    let mut normal = || (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
-    let noisy: Vec<f64> = recorded.iter().map(|y| y + noise_std * normal()).collect();
-    let other = undo.run(&noisy, record.rate_hz, noise_std)?;
-    let pairs = other.applied.iter().zip(torque);
-    let square: f64 = pairs.map(|(a, b)| (a - b).powi(2)).sum();
-    Ok((square / torque.len() as f64).sqrt())
+/// What noise makes of a result: from a second run with such noise added.
+struct AddedNoise {
+    state: u64,
+    carried: Option<Carried>,
+    /// Sum of the squared differences of the results.
+    square: f64,
+}
+
+impl Default for AddedNoise {
+    fn default() -> Self {
+        Self {
+            state: 0x9e37_79b9_7f4a_7c15,
+            carried: None,
+            square: 0.0,
+        }
+    }
+}
+
+impl AddedNoise {
+    fn uniform(&mut self) -> f64 {
+        self.state ^= self.state << 13;
+        self.state ^= self.state >> 7;
+        self.state ^= self.state << 17;
+        (self.state >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// Twelve uniform numbers have a variance of one together.
+    fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+    }
+
+    /// Takes a window back with noise of that deviation added.
+    fn add(
+        &mut self,
+        undo: &ChainInverse,
+        recorded: &[f64],
+        window: &RecordWindow,
+        scales: (f64, f64),
+        torque: &[f64],
+    ) -> Result<(), Failure> {
+        let noisy: Vec<f64> = recorded
+            .iter()
+            .map(|y| y + scales.1 * self.normal())
+            .collect();
+        let other = undo.window(&noisy, window, scales, &mut self.carried)?;
+        let pairs = other.applied.iter().zip(torque);
+        self.square = pairs.fold(self.square, |sum, (a, b)| sum + (a - b).powi(2));
+        Ok(())
+    }
 }
 
 /// Taps on either side of the middle, beyond which less than a small part of the weight is left.

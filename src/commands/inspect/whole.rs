@@ -1,6 +1,6 @@
 //! Channels too long to be kept: their first samples, and what all of them come to.
 
-use torqcomp_dsp::quality::sums::Sums;
+use torqcomp_dsp::quality::sums::SampleSums;
 
 use super::report::InspectedChannel;
 use crate::print::plural;
@@ -23,7 +23,7 @@ pub struct Kept {
     stamps: Stamps,
     samples: Vec<f64>,
     last_ns: i64,
-    sums: Sums,
+    sums: SampleSums,
 }
 
 impl Kept {

@@ -1,6 +1,6 @@
 //! The rows of a long table behind those that are kept: read, summed up and forgotten.
 
-use torqcomp_dsp::quality::sums::Sums;
+use torqcomp_dsp::quality::sums::SampleSums;
 
 use super::axes::Role;
 use super::rows::{LineNotes, RowPlan, Rows};
@@ -22,7 +22,7 @@ pub struct Tail {
 /// What the values of a column come to.
 #[derive(Debug, Clone, Copy, Default)]
 struct ColumnSums {
-    sums: Sums,
+    sums: SampleSums,
     /// Whether it is slower than the rows: its empty cells are no samples.
     is_slow: bool,
     /// Rows up to the last that had a value.

@@ -5,8 +5,8 @@
 /// Mean and squares without the loss of digits of a sum of squares: B. P. Welford, Technometrics 4 (1962) 419.
 ///
 /// ```
-/// use torqcomp_dsp::quality::sums::Sums;
-/// let mut sums = Sums::default();
+/// use torqcomp_dsp::quality::sums::SampleSums;
+/// let mut sums = SampleSums::default();
 /// [1.0, 2.0, f64::NAN, 3.0, 6.0].map(|sample| sums.add(sample));
 /// assert_eq!((sums.samples, sums.non_finite()), (5, 1));
 /// assert_eq!((sums.range(), sums.mean()), (Some((1.0, 6.0)), Some(3.0)));
@@ -14,7 +14,7 @@
 /// assert_eq!(sums.std(), Some(3.5_f64.sqrt()));
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sums {
+pub struct SampleSums {
     /// How many there were.
     pub samples: usize,
     finite: usize,
@@ -25,7 +25,7 @@ pub struct Sums {
     squares: f64,
 }
 
-impl Default for Sums {
+impl Default for SampleSums {
     fn default() -> Self {
         Self {
             samples: 0,
@@ -38,7 +38,7 @@ impl Default for Sums {
     }
 }
 
-impl Sums {
+impl SampleSums {
     /// Adds a sample.
     pub fn add(&mut self, sample: f64) {
         self.samples += 1;

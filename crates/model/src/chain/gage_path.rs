@@ -15,12 +15,18 @@ const NOTHING: f64 = 3.0;
 /// The torques that a gage shows beside the displacement.
 pub struct GagePath<'a> {
     torques: Vec<&'a dyn Torque>,
-    memories: Vec<Memory>,
     shift: f64,
     /// Half the range in which nothing is shown.
     hidden: f64,
     /// Signal that counts as nothing.
     nothing: f64,
+    state: GageState,
+}
+
+/// What a gage's path remembers from window to window.
+#[derive(Debug, Clone, Default)]
+pub struct GageState {
+    memories: Vec<Memory>,
     /// Displacements of the end of the block before.
     kept: Option<Vec<f64>>,
 }
@@ -33,11 +39,23 @@ impl<'a> GagePath<'a> {
         Self {
             hidden: torques.iter().map(|torque| torque.hidden()).sum(),
             torques,
-            memories: Vec::new(),
             shift,
             nothing: NOTHING * noise_std,
-            kept: None,
+            state: GageState::default(),
         }
+    }
+
+    /// Goes on from a state.
+    #[must_use]
+    pub fn from(mut self, state: GageState) -> Self {
+        self.state = state;
+        self
+    }
+
+    /// What it remembers behind the last window.
+    #[must_use]
+    pub fn state(&self) -> GageState {
+        self.state.clone()
     }
 
     /// Whether it holds no torque: the signal is then the displacement.
@@ -52,11 +70,11 @@ impl<'a> GagePath<'a> {
         let mut x = signal.to_vec();
         let mut unknown = vec![false; signal.len()];
         let mut last = signal[inner.start];
-        if self.memories.is_empty() {
+        if self.state.memories.is_empty() {
             let begin = |torque: &&dyn Torque| torque.begin(last + self.shift);
-            self.memories = self.torques.iter().map(begin).collect();
+            self.state.memories = self.torques.iter().map(begin).collect();
         }
-        let mut memories = std::mem::take(&mut self.memories);
+        let mut memories = std::mem::take(&mut self.state.memories);
         let mut after = Vec::new();
         for i in inner.start..signal.len() {
             if i == inner.end {
@@ -68,19 +86,19 @@ impl<'a> GagePath<'a> {
             x[i] = last;
             let _ = self.sum(&mut memories, last);
         }
-        self.memories = if after.is_empty() { memories } else { after };
+        self.state.memories = if after.is_empty() { memories } else { after };
         self.before(&mut x, signal, inner.start);
         if self.hidden > 0.0 {
             let shifted: Vec<f64> = signal.iter().map(|y| y + self.shift).collect();
             bridge(&mut x, &mut unknown, &shifted, self.nothing);
         }
-        self.kept = Some(x[inner.end - inner.start..inner.end].to_vec());
+        self.state.kept = Some(x[inner.end - inner.start..inner.end].to_vec());
         (x, inner.filter(|i| unknown[*i]).collect())
     }
 
     /// What comes before the part that is solved: from the block before, or as far off as the first.
     fn before(&self, x: &mut [f64], signal: &[f64], start: usize) {
-        match &self.kept {
+        match &self.state.kept {
             Some(kept) => x[..start].copy_from_slice(kept),
             None => {
                 let off = x[start] - signal[start];

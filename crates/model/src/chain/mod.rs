@@ -20,7 +20,7 @@ use num_complex::Complex64;
 use crate::effects::{Action, Effect, Fixed, Form, Stage, Torque};
 use crate::mode::Mode;
 
-pub use gage_path::GagePath;
+pub use gage_path::{GagePath, GageState};
 
 /// Frequency, over the natural one, that is next to rest.
 const NEAR_REST: f64 = 1e-6;
