@@ -57,15 +57,17 @@ fn cut(
     result: &mut Identification,
 ) -> Result<Vec<(Stretch, Option<f64>)>, Failure> {
     let mut cut = Vec::new();
-    let mut left_out = 0;
+    let (mut found, mut left_out) = (0, 0);
     for record in records {
         let [times, values] = prepared(record, options, result)?;
         for range in onset::decays(&values) {
             let rings = ringing(&values, &range);
             left_out += range.end - rings.end;
-            let range = rings;
-            let stretch = Stretch::new(&times[range.clone()], values[range].to_vec());
-            cut.push((stretch, record.rate_hz));
+            found += 1;
+            if found <= MOST_STRETCHES {
+                let stretch = Stretch::new(&times[rings.clone()], values[rings].to_vec());
+                cut.push((stretch, record.rate_hz));
+            }
         }
     }
     if left_out > 0 {
@@ -79,15 +81,11 @@ fn cut(
             "no free decay found; try another channel or --range",
         ));
     }
-    if cut.len() > MOST_STRETCHES {
+    if found > MOST_STRETCHES {
         result.warn(
             "decays-left-out",
-            format!(
-                "only the first {MOST_STRETCHES} of {} decays are used",
-                cut.len()
-            ),
+            format!("only the first {MOST_STRETCHES} of {found} decays are used"),
         );
-        cut.truncate(MOST_STRETCHES);
     }
     Ok(cut)
 }

@@ -24,6 +24,12 @@ pub fn transform(applied: &[f64], measured: &[f64], window: Window) -> Block {
     Block { applied, measured }
 }
 
+/// Spectrum of a signal at a range of lines; the others are not kept.
+#[must_use]
+pub fn lines_of(samples: &[f64], lines: std::ops::Range<usize>) -> Vec<Complex64> {
+    Transform::new(samples.len(), Window::None).spectrum(samples)[lines].to_vec()
+}
+
 /// Fewest samples for which both channels are processed in parallel.
 const WORTH_A_THREAD: usize = 1 << 17;
 

@@ -10,7 +10,7 @@ mod hits;
 
 use num_complex::Complex64;
 
-pub use blocks::{Periodic, Window, average_periods, find_period, segments, transform};
+pub use blocks::{Periodic, Window, average_periods, find_period, lines_of, segments, transform};
 pub use hits::{Hit, HitFault, find_hits};
 
 /// Spectra of one block, at frequencies k times the step, from 0 to half the rate.
