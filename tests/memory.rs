@@ -10,14 +10,23 @@ const ROWS: [usize; 2] = [400_000, 1_200_000];
 /// Bytes a row that count as none: pieces of several sizes leave gaps between them.
 const NONE: f64 = 12.0;
 
-/// A record of 20 kHz with some of its channels: torque, bridge voltage and a decay that begins anew every 2 s.
+/// A record of 20 kHz with some of its channels: torque, bridge voltage, a decay that begins anew every 2 s, and noise with the
+/// answer of a resonance to it.
 fn record(rows: usize, channels: &[&str]) -> String {
     let names: Vec<String> = channels.iter().map(|name| format!(",{name}")).collect();
     let mut text = format!("time_s{}\n", names.concat());
+    let (mut noise, mut ringing) = (1_u64, [0.0; 2]);
     for i in 0..rows {
         let t = i as f64 / 20_000.0;
         let since = (i % 40_000) as f64 / 20_000.0;
         let torque = (377.0 * t).cos() + 0.3 * ((i * i % 1000) as f64).sin();
+        noise = noise
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        let applied = (noise >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
+        // A resonance at 0.3 rad a sample: 955 Hz.
+        let answer = applied + 2.0 * 0.98 * 0.3_f64.cos() * ringing[0] - 0.98 * 0.98 * ringing[1];
+        ringing = [answer, ringing[0]];
         let _ = write!(text, "{t:.5}");
         for channel in channels {
             let _ = match *channel {
@@ -30,6 +39,8 @@ fn record(rows: usize, channels: &[&str]) -> String {
                         (-20.0 * since).exp() * (3707.0 * since).cos()
                     )
                 }
+                "noise_Nm" => write!(text, ",{applied:.5}"),
+                "answer_V" => write!(text, ",{answer:.5}"),
                 other => panic!("no channel {other}"),
             };
         }
@@ -103,10 +114,16 @@ const VERBS: [Measured; 8] = [
         [1_100_000, 2_000_000],
         NONE,
     ),
-    ("identify decay LONG", &["ringing_V"], ROWS, 40.0),
+    // Twelve decays are fitted, those of 24 s.
     (
-        "identify response LONG --applied torque --measured bridge --excitation random --modes 1",
-        &["torque_Nm", "bridge_V"],
+        "identify decay LONG",
+        &["ringing_V"],
+        [1_100_000, 2_000_000],
+        40.0,
+    ),
+    (
+        "identify response LONG --applied noise --measured answer --excitation random --modes 1",
+        &["noise_Nm", "answer_V"],
         ROWS,
         80.0,
     ),
