@@ -122,10 +122,10 @@ const VERBS: [Measured; 8] = [
         40.0,
     ),
     (
-        "identify response LONG --applied noise --measured answer --excitation random --modes 1",
+        "identify response LONG --applied noise --measured answer --excitation random --modes 1 --band 300..3000",
         &["noise_Nm", "answer_V"],
         ROWS,
-        80.0,
+        100.0,
     ),
 ];
 
