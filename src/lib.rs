@@ -32,7 +32,12 @@ pub fn run() -> ExitCode {
         print::say(&format!("torqcomp: {message}: {error}\n"));
     }
     // clap itself exits with code 2 for wrong usage, and with 0 for help.
-    match commands::run(cli::parse()) {
+    let cli = cli::parse();
+    let reading = cli.verb.reading();
+    if let Some(mebibytes) = reading.and_then(|reading| reading.longest_metadata) {
+        io::mcap::limit_metadata(mebibytes << 20);
+    }
+    match commands::run(cli) {
         Ok(outcome) => ExitCode::from(outcome.exit_code()),
         Err(failure) => {
             let code = failure.exit_code();

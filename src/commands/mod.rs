@@ -17,7 +17,6 @@ use torqcomp_dsp::conversion::ConversionError;
 
 use crate::cli::{Cli, Strictness, Verb};
 use crate::failure::Failure;
-use crate::io::mcap;
 use crate::io::output::Output;
 use crate::outcome::Outcome;
 use crate::print::{self, Report};
@@ -32,13 +31,6 @@ use crate::warning::Warning;
 pub fn run(cli: Cli) -> Result<Outcome, Failure> {
     if cli.verb.is_quiet() {
         print::hide_progress();
-    }
-    let longest = cli
-        .verb
-        .reading()
-        .and_then(|reading| reading.longest_metadata);
-    if let Some(mebibytes) = longest {
-        mcap::limit_metadata(mebibytes << 20);
     }
     match cli.verb {
         Verb::Init(args) => init::run(&args),
