@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use crate::cli::many::Shard;
 use crate::failure::Failure;
 use crate::io::{storage, sum};
 use crate::outcome::RecordFigures;
@@ -43,6 +44,40 @@ pub(crate) struct ManifestEntry {
     pub(super) figures: RecordFigures,
     /// Time that it took.
     pub(super) seconds: f64,
+}
+
+/// What a run over many recordings is about to do: the line before those of its recordings.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct RunBegin {
+    pub(super) schema: String,
+    /// That of torqcomp.
+    pub(super) version: String,
+    #[serde(flatten)]
+    pub(super) made_by: MadeBy,
+    /// Which part of the recordings, as `3/8`; `None` if all.
+    pub(super) shard: Option<String>,
+    /// The recordings, by their paths below their roots.
+    pub(super) files: Vec<String>,
+}
+
+/// A line of a manifest.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(untagged)]
+pub(super) enum ManifestLine {
+    Entry(Box<ManifestEntry>),
+    Begin(RunBegin),
+}
+
+impl ManifestLine {
+    /// Reads a line; `None` if it is cut, or not of this version.
+    pub(super) fn read(line: &[u8]) -> Option<Self> {
+        let line: Self = serde_json::from_slice(line).ok()?;
+        let schema = match &line {
+            Self::Entry(entry) => &entry.schema,
+            Self::Begin(run) => &run.schema,
+        };
+        (schema == SCHEMA).then_some(line)
+    }
 }
 
 /// A verb and its options.
@@ -124,17 +159,35 @@ impl ManifestEntry {
         }
     }
 
+    fn key(&self) -> (String, String) {
+        (self.made_by.verb.clone(), self.file.clone())
+    }
+
     /// Whether the recording failed.
     pub(super) fn has_failed(&self) -> bool {
         !matches!(self.exit, 0 | 3)
     }
 }
 
+impl RunBegin {
+    pub(super) fn new(made_by: MadeBy, shard: Option<String>, files: Vec<String>) -> Self {
+        Self {
+            schema: SCHEMA.to_owned(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            made_by,
+            shard,
+            files,
+        }
+    }
+}
+
 /// What manifests say of the results in a folder.
 #[derive(Debug, Default)]
 pub(super) struct History {
-    /// The last entry of each recording and verb.
+    /// The last entry of each recording and verb; the last of the manifests read counts most.
     last: HashMap<(String, String), ManifestEntry>,
+    /// Those of them that are in the last of the manifests read.
+    of_last: HashSet<(String, String)>,
     /// Results that were ever made, and the recordings they were made from.
     made: HashMap<String, HashSet<String>>,
     /// Lines that could not be read: cut, or not of this kind.
@@ -149,6 +202,7 @@ impl History {
     pub(super) fn read(manifests: &[PathBuf]) -> Result<Self, Failure> {
         let mut history = Self::default();
         for path in manifests {
+            history.of_last.clear();
             match storage::read(path) {
                 Ok(bytes) => bytes.split(|b| *b == b'\n').for_each(|l| history.take(l)),
                 Err(error) if error.kind() == io::ErrorKind::NotFound => {}
@@ -159,17 +213,25 @@ impl History {
     }
 
     fn take(&mut self, line: &[u8]) {
-        let entry = serde_json::from_slice::<ManifestEntry>(line).ok();
-        let Some(entry) = entry.filter(|entry| entry.schema == SCHEMA) else {
-            self.unread += usize::from(!line.is_empty());
-            return;
+        let entry = match ManifestLine::read(line) {
+            Some(ManifestLine::Entry(entry)) => entry,
+            Some(ManifestLine::Begin(_)) => return,
+            None => {
+                self.unread += usize::from(!line.is_empty());
+                return;
+            }
         };
         for output in &entry.outputs {
             let inputs = self.made.entry(output.file.clone()).or_default();
             inputs.insert(entry.input.clone());
         }
-        let key = (entry.made_by.verb.clone(), entry.file.clone());
-        self.last.insert(key, entry);
+        self.of_last.insert(entry.key());
+        self.last.insert(entry.key(), *entry);
+    }
+
+    /// Whether the last of the manifests read has an entry of that recording and verb.
+    pub(super) fn is_in_last(&self, entry: &ManifestEntry) -> bool {
+        self.of_last.contains(&entry.key())
     }
 
     /// Results that torqcomp made, by their paths below the folder of the results.
@@ -191,8 +253,7 @@ impl History {
         outputs: &[String],
         wanted: &ManifestEntry,
     ) -> Option<&ManifestEntry> {
-        let key = (wanted.made_by.verb.clone(), wanted.file.clone());
-        let entry = self.last.get(&key)?;
+        let entry = self.last.get(&wanted.key())?;
         let is_same = !entry.has_failed()
             && entry.version == wanted.version
             && entry.made_by == wanted.made_by
@@ -218,9 +279,13 @@ pub(super) fn in_folder(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// The manifest of a folder of results.
-pub(super) fn usual(folder: &Path) -> PathBuf {
-    folder.join(NAME.concat())
+/// The manifest of a folder of results, or of a part of them.
+pub(super) fn usual(folder: &Path, shard: Option<Shard>) -> PathBuf {
+    let [front, end] = NAME;
+    folder.join(match shard {
+        Some(Shard { index, of }) => format!("{front}.{index}-of-{of}{end}"),
+        None => format!("{front}{end}"),
+    })
 }
 
 /// A manifest that is appended to.
@@ -259,12 +324,12 @@ impl Manifest {
     ///
     /// # Errors
     /// If it cannot be written.
-    pub(super) fn append(&mut self, entry: &ManifestEntry) -> Result<(), Failure> {
+    pub(super) fn append(&mut self, entry: &impl Serialize) -> Result<(), Failure> {
         let mut line = String::new();
         if self.is_cut {
             line.push('\n');
         }
-        line.push_str(&serde_json::to_string(entry).expect("an entry is plain data"));
+        line.push_str(&serde_json::to_string(entry).expect("a line is plain data"));
         line.push('\n');
         let written = storage::write_all(&self.file, line.as_bytes());
         self.is_cut = written.is_err();
@@ -283,7 +348,7 @@ mod tests {
     #[test]
     fn a_cut_last_line_costs_that_line_alone() {
         let folder = tempfile::tempdir().unwrap();
-        let path = usual(folder.path());
+        let path = usual(folder.path(), None);
         let made_by = MadeBy {
             verb: "compensate".to_owned(),
             options: vec!["--band=800".to_owned()],

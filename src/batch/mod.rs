@@ -111,10 +111,12 @@ pub(crate) fn run(
         files: plan.files.len(),
         bytes,
     };
+    let mut manifest = Manifest::open(&plan.manifest, task.result.policy().sync)?;
+    manifest.append(&plan.begin())?;
     let running = Running {
         on_one,
         shared: Mutex::new(Shared {
-            manifest: Manifest::open(&plan.manifest, task.result.policy().sync)?,
+            manifest,
             progress: BatchProgress::new(all, task.is_quiet),
             failures: 0,
             broken: None,
@@ -226,6 +228,10 @@ impl Running<'_> {
         }
         entry.made_from = MadeFrom::read(&file.found.path, plan.task.stand)?;
         if let Some(standing) = plan.standing(file, entry) {
+            // Each manifest says all of what its last run was about.
+            if !plan.history.is_in_last(standing) {
+                self.note(standing);
+            }
             return Ok(Treated::Skipped(standing.clone()));
         }
         let outputs: Vec<PathBuf> = file.outputs.iter().map(|o| plan.folder.join(o)).collect();

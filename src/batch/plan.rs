@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::BatchTask;
 use super::list::{FoundFile, Listing};
-use super::manifest::{self, History, MadeBy, MadeFrom, ManifestEntry};
+use super::manifest::{self, History, MadeBy, MadeFrom, ManifestEntry, RunBegin};
 use crate::failure::Failure;
 use crate::io::output::end_of_links;
 
@@ -36,12 +36,12 @@ impl<'a> BatchPlan<'a> {
         let folder = folder(task)?;
         let manifest = match &task.many.manifest {
             Some(path) => path.clone(),
-            None => manifest::usual(&folder),
+            None => manifest::usual(&folder, task.many.shard),
         };
         let mut manifests = manifest::in_folder(&folder);
-        if !manifests.contains(&manifest) {
-            manifests.push(manifest.clone());
-        }
+        // Its own counts most.
+        manifests.retain(|other| *other != manifest);
+        manifests.push(manifest.clone());
         let history = History::read(&manifests)?;
         let mut plan = Self {
             task,
@@ -66,6 +66,9 @@ impl<'a> BatchPlan<'a> {
             .map(|found| plan.assign(found))
             .collect::<Result<_, Failure>>()?;
         plan.check_names()?;
+        if let Some(shard) = task.many.shard {
+            plan.files.retain(|file| shard.takes(&file.found.relative));
+        }
         Ok(plan)
     }
 
@@ -148,6 +151,13 @@ impl<'a> BatchPlan<'a> {
             }
         }
         Ok(())
+    }
+
+    /// The first line of the manifest.
+    pub(super) fn begin(&self) -> RunBegin {
+        let files = self.files.iter().map(|file| file.found.relative.clone());
+        let shard = self.task.many.shard.map(|shard| shard.to_string());
+        RunBegin::new(self.made_by.clone(), shard, files.collect())
     }
 
     /// What is known of a recording beforehand.

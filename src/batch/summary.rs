@@ -308,8 +308,11 @@ fn row(treated: &Treated) -> Vec<String> {
     ]
 }
 
-/// The table as CSV. It has no times, so that the same recordings give the same bytes.
+/// The table as CSV, in the order of folders and names. It has no times, so that the same recordings give the same bytes,
+/// in one run or merged from several.
 pub(super) fn csv<'a>(entries: impl Iterator<Item = &'a ManifestEntry>) -> Vec<u8> {
+    let mut entries: Vec<&ManifestEntry> = entries.collect();
+    entries.sort_by(|a, b| a.file.split('/').cmp(b.file.split('/')));
     let mut rows = csv::Writer::from_writer(Vec::new());
     let written = "a table in memory can be written";
     rows.write_record(HEADINGS).expect(written);

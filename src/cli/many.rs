@@ -1,8 +1,11 @@
 //! The options of a verb that takes many recordings, one at a time.
 
+use std::fmt;
 use std::path::PathBuf;
 
 use clap::Args;
+
+use crate::io::sum;
 
 /// Many recordings, each read by itself.
 #[derive(Debug, Clone, Default, Args)]
@@ -36,6 +39,9 @@ pub struct BatchOptions {
     /// Begin no other recording after N failures
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub max_failures: Option<u32>,
+    /// Take the I-th of N parts of the recordings only, I from 1; each stays in its part when others are added
+    #[arg(long, value_name = "I/N", value_parser = shard)]
+    pub shard: Option<Shard>,
     /// List what would be done and write nothing
     #[arg(long)]
     pub dry_run: bool,
@@ -53,6 +59,7 @@ impl BatchOptions {
             || self.jobs.is_some()
             || self.fail_fast
             || self.max_failures.is_some()
+            || self.shard.is_some()
             || self.dry_run
     }
 
@@ -63,6 +70,39 @@ impl BatchOptions {
             true => Some(1),
             false => self.max_failures,
         }
+    }
+}
+
+/// A part of many recordings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shard {
+    /// Number of the part, from 1.
+    pub index: u32,
+    /// How many parts there are.
+    pub of: u32,
+}
+
+impl Shard {
+    /// Whether a recording with that path below its root is in the part: the first eight bytes of the SHA-256 of the path,
+    /// as a number, modulo N is I − 1.
+    pub(crate) fn takes(self, relative: &str) -> bool {
+        sum::number_of(relative) % u64::from(self.of) == u64::from(self.index - 1)
+    }
+}
+
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.index, self.of)
+    }
+}
+
+/// A part, as in `3/8`.
+pub(crate) fn shard(text: &str) -> Result<Shard, String> {
+    let parts = text.split_once('/');
+    let numbers = parts.and_then(|(i, n)| Some((i.trim().parse().ok()?, n.trim().parse().ok()?)));
+    match numbers {
+        Some((index, of)) if (1..=of).contains(&index) => Ok(Shard { index, of }),
+        _ => Err("expected a part of all, from 1/N to N/N, such as 3/8".to_owned()),
     }
 }
 
@@ -94,7 +134,16 @@ pub(crate) fn template(text: &str) -> Result<String, String> {
 
 #[cfg(test)]
 mod tests {
-    use super::template;
+    use super::*;
+
+    #[test]
+    fn parts_are_counted_from_one() {
+        assert_eq!(shard("3/8").unwrap(), Shard { index: 3, of: 8 });
+        assert!(shard("0/8").is_err() && shard("9/8").is_err() && shard("3").is_err());
+        // The first bytes of the SHA-256 of "abc" (FIPS 180-2, B.1) are 0xba7816bf8f01cfea: even, and 2 modulo 7.
+        assert!(shard("3/7").unwrap().takes("abc") && !shard("2/7").unwrap().takes("abc"));
+        assert!(shard("1/2").unwrap().takes("abc"));
+    }
 
     #[test]
     fn templates_name_each_recording() {

@@ -30,12 +30,14 @@ fn is_first_in(folder: &Path) -> bool {
     tidied.insert(folder.to_owned())
 }
 
-/// Removes what is not complete.
-fn remove_open() {
-    for part in open().drain(..) {
+/// Removes what is not complete, and ends the process before any other file is made.
+fn remove_open_and_exit(code: i32) -> ! {
+    let mut open = open();
+    for part in open.drain(..) {
         // It may have got its name already, or be gone.
         let _ = std::fs::remove_file(part);
     }
+    std::process::exit(code)
 }
 
 /// Has incomplete outputs removed when the run is told to end; the exit code is 128 and the number of the signal, as shells
@@ -55,8 +57,7 @@ pub fn remove_when_interrupted() -> io::Result<()> {
         .name("signals".to_owned())
         .spawn(move || {
             if let Some(signal) = signals.forever().next() {
-                remove_open();
-                std::process::exit(128 + signal);
+                remove_open_and_exit(128 + signal);
             }
         })?;
     Ok(())
@@ -64,11 +65,7 @@ pub fn remove_when_interrupted() -> io::Result<()> {
 
 #[cfg(not(unix))]
 pub fn remove_when_interrupted() -> io::Result<()> {
-    ctrlc::set_handler(|| {
-        remove_open();
-        std::process::exit(130);
-    })
-    .map_err(io::Error::other)
+    ctrlc::set_handler(|| remove_open_and_exit(130)).map_err(io::Error::other)
 }
 
 /// Whether this process ignores a signal, as far as the system says.
@@ -93,8 +90,9 @@ pub fn create_in(folder: &Path) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(&prefix).suffix(SUFFIX);
     set_permissions(&mut builder);
-    let part = storage::create(&builder, folder)?;
+    // Held over the creation, so that an interruption meets all files or prevents them.
     let mut open = open();
+    let part = storage::create(&builder, folder)?;
     if open.len() >= MOST_OPEN {
         open.retain(|path| path.exists());
     }

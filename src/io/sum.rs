@@ -28,6 +28,14 @@ pub(crate) fn of_bytes(bytes: &[u8]) -> String {
     hexadecimal(&Sha256::digest(bytes))
 }
 
+/// The first eight bytes of the SHA-256 of a text, as a number.
+pub(crate) fn number_of(text: &str) -> u64 {
+    let sum = Sha256::digest(text.as_bytes());
+    sum[..8]
+        .iter()
+        .fold(0, |number, byte| number << 8 | u64::from(*byte))
+}
+
 fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
@@ -43,6 +51,7 @@ mod tests {
             of_bytes(b"abc"),
             "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
         );
+        assert_eq!(number_of("abc"), 0xba78_16bf_8f01_cfea);
         let mut long = tempfile::NamedTempFile::new().unwrap();
         io::Write::write_all(&mut long, &vec![b'a'; 1_000_000]).unwrap();
         assert_eq!(

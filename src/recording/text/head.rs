@@ -15,6 +15,9 @@ const HEADS: [usize; 4] = [FIRST_ROWS, 1 << 18, 1 << 20, 1 << 23];
 /// Part of the lines from the first row on that must be rows.
 const MOSTLY: f64 = 0.8;
 
+/// Lines at the end of a head by which the most promising dialect is told.
+const PROMISING: usize = 32;
+
 /// Lines that a maker is told from.
 const FOR_NAMES: usize = 120;
 
@@ -140,18 +143,12 @@ fn find_in(head: &Head, marks: &DialectOverride) -> Result<Table, Failure> {
         Delimiter::Byte(byte) => marks.delimiter.is_some() || occurs(byte),
         Delimiter::Spaces | Delimiter::None => true,
     });
-    let strict: Vec<Found> = all
-        .iter()
-        .filter_map(|dialect| Found::of(head, *dialect, strict_row))
-        .collect();
+    let strict = tables(head, &all, strict_row);
     if let Some(best) = best(&strict) {
         let table = unambiguous(head, &strict, best)?.table.clone();
         return Ok(below_numbering(head, table));
     }
-    let lenient: Vec<Found> = all
-        .iter()
-        .filter_map(|dialect| Found::of(head, *dialect, lenient_row))
-        .collect();
+    let lenient = tables(head, &all, lenient_row);
     let Some(best) = best(&lenient) else {
         return Err(Failure::failed(no_table(head)));
     };
@@ -245,15 +242,45 @@ struct Found {
     grouped: usize,
 }
 
+/// Reads a line as a row.
+type ReadRow = fn(&str, Dialect) -> Option<Shape>;
+
+/// The tables under the dialects that explain most rows, in the order of the dialects; others may be left out.
+fn tables(head: &Head, dialects: &[Dialect], row: ReadRow) -> Vec<Found> {
+    let lines = head.lines.iter().enumerate();
+    let lines: Vec<(usize, &Line)> = lines.filter(|(_, line)| !is_skipped(&line.text)).collect();
+    // With the best of them first, the others are soon known to explain less.
+    let end = &lines[lines.len().saturating_sub(PROMISING)..];
+    let promise = |dialect: Dialect| {
+        let rows = end.iter().filter_map(|(_, line)| row(&line.text, dialect));
+        rows.count()
+    };
+    let mut order: Vec<(usize, Dialect)> = dialects.iter().copied().enumerate().collect();
+    order.sort_by_cached_key(|(_, dialect)| std::cmp::Reverse(promise(*dialect)));
+    let mut found = BTreeMap::new();
+    let mut least = 0;
+    for (place, dialect) in order {
+        if let Some(table) = Found::of(&lines, dialect, row, least) {
+            least = least.max(table.rows);
+            found.insert(place, table);
+        }
+    }
+    found.into_values().collect()
+}
+
 impl Found {
-    fn of(head: &Head, dialect: Dialect, row: fn(&str, Dialect) -> Option<Shape>) -> Option<Self> {
-        let shapes: Vec<(usize, Option<Shape>)> = head
-            .lines
-            .iter()
-            .enumerate()
-            .filter(|(_, line)| !is_skipped(&line.text))
-            .map(|(place, line)| (place, row(&line.text, dialect)))
-            .collect();
+    /// `None` as well if it explains less than `least` rows.
+    fn of(lines: &[(usize, &Line)], dialect: Dialect, row: ReadRow, least: usize) -> Option<Self> {
+        let mut shapes: Vec<(usize, Option<Shape>)> = Vec::with_capacity(lines.len());
+        let mut possible = lines.len();
+        for (place, line) in lines {
+            let shape = row(&line.text, dialect);
+            possible -= usize::from(shape.is_none());
+            if possible < least {
+                return None;
+            }
+            shapes.push((*place, shape));
+        }
         let from = first_row(&shapes)?;
         let rows: Vec<Shape> = shapes[from..].iter().filter_map(|(_, s)| *s).collect();
         // One row is a table only where there is nothing else.
