@@ -14,6 +14,7 @@ mod compensate;
 mod diagnose;
 #[cfg(debug_assertions)] // optimised builds have no faults on purpose
 mod faults;
+mod first_moves;
 mod golden;
 mod harmonics;
 mod identify;

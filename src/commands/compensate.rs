@@ -25,12 +25,15 @@ use crate::failure::Failure;
 use crate::inverse::ChainInverse;
 use crate::io::{Input, already_compensated};
 use crate::outcome::Made;
-use crate::print::Report;
+use crate::print::{Report, rounded, short};
 use crate::recording::{ChannelStream, StreamSummary};
 use crate::stand::{self, Calibration, Stand, TorqueStd};
+use crate::warning::Warning;
 
 /// Frequencies at which the report gives the gain, as fractions of the band.
 const GAIN_POINTS: usize = 9;
+/// How far above half the sampling rate a resonance is hardly excited any more, times that.
+const FAR_ABOVE: f64 = 4.0;
 
 /// What is read before anything is written.
 struct Opened {
@@ -180,6 +183,7 @@ impl Plan {
             calibration: chain.described.clone(),
             calibration_relative_std: chain.std.known(),
             constant: chain.std,
+            zero_std: chain.zero_std.map(|std| std / chain.applied.factor),
             quantity: chain.applied.name,
             rated_torque: chain.rated_n_m.map(|rated| rated / chain.applied.factor),
             rate_hz: stream.rate_hz,
@@ -198,9 +202,40 @@ impl Plan {
             band_end_hz: band.end_hz(),
             edge_s: self.filter.half_length() as f64 / band.sample_rate_hz(),
             noise: self.noise(),
-            warnings: [self.stand.warnings.as_slice(), &chain.warnings].concat(),
+            warnings: [
+                self.stand.warnings.as_slice(),
+                &chain.warnings,
+                self.folded_ringing().as_slice(),
+            ]
+            .concat(),
             ..CompensateReport::default()
         }
+    }
+
+    /// A warning if the stand rings above half the sampling rate, and nothing before the recorder keeps that out.
+    fn folded_ringing(&self) -> Option<Warning> {
+        let response = &self.stand.mechanics.as_ref()?.response;
+        let limit_hz = 0.5 * self.stream.rate_hz;
+        let resonance_hz = response.natural_frequency_hz();
+        let is_kept_out = self
+            .stand
+            .recorder
+            .low_pass
+            .is_some_and(|low_pass| low_pass.cutoff_hz <= limit_hz);
+        let is_near = resonance_hz > limit_hz && resonance_hz < FAR_ABOVE * limit_hz;
+        (is_near && !is_kept_out && response.damping_ratio() < 0.5).then(|| {
+            Warning::new(
+                "resonance-above-nyquist",
+                format!(
+                    "the stand resonates at {} Hz, above half the sampling rate of {} Hz: steps and shocks make it ring, and the \
+                     ringing folds into the record, where nothing can take it out; record at {} Hz or more, or behind a \
+                     low-pass (say so with [recorder] low_pass)",
+                    rounded(resonance_hz, 4),
+                    short(self.stream.rate_hz),
+                    rounded(5.0 * resonance_hz, 2)
+                ),
+            )
+        })
     }
 
     /// Standard uncertainty at a frequency; none where no filter describes the stand.

@@ -20,7 +20,7 @@ use crate::failure::Failure;
 use crate::io::output::Output;
 use crate::outcome::Outcome;
 use crate::print::{self, Report};
-use crate::stand::Calibration;
+use crate::stand::{Calibration, TransducerSignal};
 use crate::unit::NamedUnit;
 use crate::warning::Warning;
 
@@ -85,6 +85,11 @@ const LARGEST: f64 = 1e100;
 pub(crate) fn convert(chain: &Calibration, values: &mut [f64]) -> Result<(), (usize, String)> {
     if chain.recorded_factor != 1.0 {
         values.iter_mut().for_each(|v| *v *= chain.recorded_factor);
+    }
+    if let Some((largest, why)) = chain.signal.and_then(TransducerSignal::largest)
+        && let Some(index) = values.iter().position(|v| v.abs() > largest)
+    {
+        return Err((index, why.to_owned()));
     }
     match chain.conversion.convert_slice(values) {
         Ok(()) => {}

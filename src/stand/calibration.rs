@@ -1,7 +1,7 @@
 //! From the recorded channel to the applied quantity: unit, calibration, response.
 
 use torqcomp_dsp::conversion::Conversion;
-use torqcomp_model::{Dimension, Kind, RatioOf, Unit, UnitSystem};
+use torqcomp_model::{Dimension, Estimate, Kind, RatioOf, Unit, UnitSystem};
 
 use super::static_law::StaticLaw;
 use super::{ConstantStd, Given, Stand, TransducerSignal};
@@ -26,10 +26,14 @@ pub struct Applied {
 pub struct Calibration {
     /// SI units per unit of the record.
     pub recorded_factor: f64,
+    /// What the record is; `None` for torque and what only a static gain knows.
+    pub signal: Option<TransducerSignal>,
     /// From the record in SI units to the applied quantity in SI units, at rest.
     pub conversion: Conversion,
     /// Constant that a diagnosis found in the records, as the applied quantity at rest in SI units.
     pub zero: f64,
+    /// Standard uncertainty that the given record at no load brings, in SI units of the applied quantity.
+    pub zero_std: Option<f64>,
     /// What comes out.
     pub applied: Applied,
     /// How the static constant came about, for people.
@@ -124,8 +128,10 @@ impl Calibration {
         })?;
         Ok(Self {
             recorded_factor: named.unit.factor(),
+            signal: None,
             conversion: Conversion::linear(1.0, 0.0).map_err(Failure::failed)?,
             zero: 0.0,
+            zero_std: None,
             applied: applied_by_unit(&named.text, units)?,
             described: "compensated already; used without change".to_owned(),
             std: ConstantStd::NotNeeded,
@@ -161,6 +167,8 @@ impl Stand {
         };
         Ok(Calibration {
             recorded_factor: signal.map_or(named.unit.factor(), |s| s.factor(&named.unit)),
+            signal,
+            zero_std: self.zero_std(signal, &law.conversion),
             conversion: law.conversion,
             zero: self.diagnosed.offset,
             applied: Applied::of(Kind::Torque, "torque", units),
@@ -171,7 +179,43 @@ impl Stand {
                 .warnings
                 .into_iter()
                 .chain(scaled(channel.name))
+                .chain(self.unused_zero(signal, named))
                 .collect(),
+        })
+    }
+
+    /// The given record at no load, if it is of that signal.
+    fn zero_as(&self, signal: Option<TransducerSignal>) -> Option<&Estimate> {
+        let (of, zero) = self.recorder.zero.as_ref()?;
+        (Some(*of) == signal).then_some(zero)
+    }
+
+    /// What the standard uncertainty of the record at no load is as torque, in N m.
+    fn zero_std(&self, signal: Option<TransducerSignal>, conversion: &Conversion) -> Option<f64> {
+        let of_calibration = || {
+            let measured = self.calibration.as_ref()?;
+            let is_its_own = Some(measured.signal) == signal;
+            is_its_own.then_some(measured.zero.as_ref()).flatten()
+        };
+        let zero = self.zero_as(signal).or_else(of_calibration)?;
+        let std = zero.std_uncertainty()?;
+        let torque = |side: f64| conversion.convert(zero.value() + side * std).ok();
+        Some(0.5 * (torque(1.0)? - torque(-1.0)?).abs())
+    }
+
+    /// A warning if the file gives the record at no load in another quantity than the record's.
+    fn unused_zero(&self, signal: Option<TransducerSignal>, named: &NamedUnit) -> Option<Warning> {
+        let (of, zero) = self.recorder.zero.as_ref()?;
+        (zero.value() != 0.0 && Some(*of) != signal).then(|| {
+            Warning::new(
+                "zero-not-used",
+                format!(
+                    "[recorder] zero of {} is in {} and the record in {}: it was not subtracted",
+                    self.file,
+                    of.usual_unit().0,
+                    named.text
+                ),
+            )
         })
     }
 
@@ -205,14 +249,16 @@ impl Stand {
             )));
         }
         // A zero in volts belongs to a record in volts.
-        let zero = match (self.recorder.zero, TransducerSignal::of(&named.unit)) {
-            (Some((of, zero)), Some(signal)) if of == signal => zero,
-            _ => 0.0,
-        };
+        let zero = self.zero_as(TransducerSignal::of(&named.unit));
+        let at_rest = zero.map_or(0.0, Estimate::value);
         let slope = 1.0 / gain.value;
         Ok(Calibration {
             recorded_factor: named.unit.factor(),
-            conversion: Conversion::linear(slope, -slope * zero).map_err(Failure::failed)?,
+            signal: None,
+            conversion: Conversion::linear(slope, -slope * at_rest).map_err(Failure::failed)?,
+            zero_std: zero
+                .and_then(Estimate::std_uncertainty)
+                .map(|std| (slope * std).abs()),
             zero: slope * self.diagnosed.offset,
             applied: applied_by_unit(&gain.applied_unit, units)?,
             described: "static gain of the stand file".to_owned(),

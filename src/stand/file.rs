@@ -137,15 +137,10 @@ fn one_calibration(top: &Section, stand: &Stand) -> Result<(), Failure> {
             "this section and the static_gain of [mechanics] both convert the record to torque; keep one of them",
         ));
     }
-    let zero = stand
-        .calibration
-        .as_ref()
-        .and_then(|calibration| calibration.zero);
-    if zero.is_some()
-        && stand
-            .recorder
-            .zero
-            .is_some_and(|(of, _)| of == TransducerSignal::Frequency)
+    let of_calibration = stand.calibration.as_ref();
+    let of_recorder = stand.recorder.zero.as_ref();
+    if of_calibration.is_some_and(|calibration| calibration.zero.is_some())
+        && of_recorder.is_some_and(|(of, _)| *of == TransducerSignal::Frequency)
     {
         return Err(top.fail(
             "recorder",

@@ -18,7 +18,7 @@ pub struct MeasuredCalibration {
     /// How.
     pub law: CalibrationLaw,
     /// TransducerSignal at no load, in SI units, where the calibration itself gives it.
-    pub zero: Option<f64>,
+    pub zero: Option<Estimate>,
     /// Relative standard uncertainty of the torque, if known; of a curve that at its largest torque.
     pub relative_std: Option<f64>,
     /// Rated torque of the transducer in N m, without sign, if it is given.
@@ -194,7 +194,7 @@ fn frequency(section: &Section) -> Result<MeasuredCalibration, Failure> {
         TransducerSignal::Frequency,
         &change,
         key,
-        Some(zero.value()),
+        Some(zero),
     )
 }
 
@@ -204,7 +204,7 @@ fn per_change(
     signal: TransducerSignal,
     change: &Estimate,
     key: &'static str,
-    zero: Option<f64>,
+    zero: Option<Estimate>,
 ) -> Result<MeasuredCalibration, Failure> {
     let rated = section.required("rated_torque", Kind::Torque)?;
     for (key, value) in [(key, change.value()), ("rated_torque", rated.value())] {

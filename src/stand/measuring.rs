@@ -10,6 +10,9 @@ use super::signal::TransducerSignal;
 use super::{BridgeData, GageData, RecorderData};
 use crate::failure::Failure;
 
+/// Smallest gain that an amplifier has; below, another quantity is meant.
+const LEAST_GAIN: f64 = 0.01;
+
 pub(super) fn gage(section: &Section) -> Result<GageData, Failure> {
     let optional = |key, kind| section.quantity(key, kind).map(|e| e.map(|e| e.value()));
     // A metal-foil gage is linear, and temperature does not enter its law.
@@ -143,6 +146,14 @@ pub(super) fn recorder(section: Option<&Section>) -> Result<RecorderData, Failur
     // An amplifier may invert.
     let given = section.quantity("gain", Kind::Gain)?;
     let gain = given.as_ref().map_or(1.0, Estimate::value);
+    if gain.abs() < LEAST_GAIN {
+        return Err(section.fail(
+            "gain",
+            "an amplifier between bridge and record has a gain of 10 to 10000, and this one is below 0.01; the gain is recorded \
+             volts per volt of the bridge: an amplifier that gives 10 V at 2 mV/V with a supply of 5 V has 10 V/(2 mV/V x 5 V) \
+             = 1000",
+        ));
+    }
     let cutoff = section.positive_if_any("low_pass", Kind::Frequency)?;
     let order = section.whole("low_pass_order")?;
     if order.is_some() && cutoff.is_none() {
@@ -172,6 +183,6 @@ pub(super) fn recorder(section: Option<&Section>) -> Result<RecorderData, Failur
         has_gain: given.is_some(),
         gain_relative_std: given.and_then(|gain| gain.relative_std()),
         input_resistance_ohm,
-        zero: zero.map(|(signal, zero)| (signal, zero.value())),
+        zero,
     })
 }

@@ -203,7 +203,7 @@ pub struct RecorderData {
     /// Input resistance in Ω that loads the bridge.
     pub input_resistance_ohm: Option<f64>,
     /// Record at no load in SI units, if it is given.
-    pub zero: Option<(TransducerSignal, f64)>,
+    pub zero: Option<(TransducerSignal, Estimate)>,
 }
 
 impl Stand {

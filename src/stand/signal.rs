@@ -52,6 +52,22 @@ impl TransducerSignal {
         }
     }
 
+    /// Largest magnitude in SI units that such a signal has, and why; `None` where nothing limits it.
+    #[must_use]
+    pub fn largest(self) -> Option<(f64, &'static str)> {
+        match self {
+            Self::Strain => Some((
+                0.1,
+                "a strain of more than 10 %, which no gage survives: check the unit of the channel (microstrain is --unit ustrain)",
+            )),
+            Self::Ratio => Some((
+                1.0,
+                "more than the supply of the bridge, which no bridge gives: check the unit of the channel (mV/V, not V/V)",
+            )),
+            _ => None,
+        }
+    }
+
     /// The kind of its quantities.
     #[must_use]
     pub fn kind(self) -> Kind {

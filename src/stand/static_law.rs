@@ -2,7 +2,7 @@
 
 use torqcomp_dsp::bridge::{ArmLaw, Bridge, Supply};
 use torqcomp_dsp::conversion::{Conversion, ConversionError};
-use torqcomp_model::{Kind, UnitSystem};
+use torqcomp_model::{Estimate, Kind, UnitSystem};
 
 use super::{CalibrationLaw, ConstantStd, MeasuredCalibration, Stand, TransducerSignal};
 use crate::failure::Failure;
@@ -89,7 +89,8 @@ impl Stand {
     /// The record at no load, if it is given for such a signal.
     fn zero_of(&self, signal: TransducerSignal) -> Result<Option<f64>, Failure> {
         use TransducerSignal::{Ratio, Voltage};
-        match self.recorder.zero {
+        let given = self.recorder.zero.as_ref();
+        match given.map(|(of, zero)| (*of, zero.value())) {
             Some((of, zero)) if of == signal => Ok(Some(zero)),
             // The same signal in two forms.
             Some((of @ (Voltage | Ratio), zero))
@@ -147,7 +148,7 @@ impl Stand {
     ) -> Result<StaticLaw, Failure> {
         let conversion = match &measured.law {
             CalibrationLaw::Constant(constant) => {
-                let zero = match zero.or(measured.zero) {
+                let zero = match zero.or(measured.zero.as_ref().map(Estimate::value)) {
                     Some(zero) => zero,
                     None if matches!(
                         signal,

@@ -213,7 +213,7 @@ fn the_law_of_damping_is_told() {
     let mut law = |envelope: &dyn Fn(f64) -> f64| {
         let y: Vec<f64> = t
             .iter()
-            .map(|t| envelope(*t) * (TAU * 120.0 * t).cos() + 2e-3 * noise.normal())
+            .map(|t| envelope(*t) * (TAU * 130.0 * t).cos() + 2e-3 * noise.normal())
             .collect();
         ring(&t, &y, rate_hz).0
     };
@@ -228,6 +228,7 @@ fn the_law_of_damping_is_told() {
     assert!(
         both.warnings
             .iter()
-            .any(|w| w.code == "amplitude-dependent" || w.code == "not-viscous")
+            .any(|w| w.code == "amplitude-dependent" || w.code == "not-viscous"),
+        "{both:?}"
     );
 }

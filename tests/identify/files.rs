@@ -277,7 +277,10 @@ fn loads_and_runs_of_nonsense_are_refused() {
     };
     loads("flat.csv", "weight", "bridge").says(1, &["does not change with load"]);
     loads("wild.csv", "bridge", "weight").says(2, &["swapped"]);
-    loads("wild.csv", "weight", "bridge").says(0, &["poor-fit"]);
+    loads("wild.csv", "weight", "bridge").says(1, &["does not follow the load"]);
+    let rough = "0,0\n5,0.4\n10,1.1\n5,0.6\n0,0.1\n5,0.45\n10,0.9\n5,0.5\n0,0\n";
+    folder.write("rough.csv", format!("{head}{rough}"));
+    loads("rough.csv", "weight", "bridge").says(0, &["poor-fit"]);
     // An angle of the wrong sign.
     let torque: Vec<f64> = (0..4000)
         .map(|i| (TAU * 0.7e-3 * f64::from(i)).sin())

@@ -97,3 +97,65 @@ fn intervals_of_known_loads_cover_the_truth() {
         }
     }
 }
+
+/// Readings of a display with one decimal: 20.49 N m/(mV/V) reads as 20, and the last digit says how sure that is.
+#[test]
+fn the_last_digit_of_a_display_is_part_of_the_uncertainty() {
+    let folder = Folder::new();
+    let loads = [0.0, 10.0, 20.0, 30.0, 40.0];
+    let rows: Vec<String> = loads
+        .iter()
+        .map(|load| format!("{load},{:.1}", load * 0.0488))
+        .collect();
+    folder.write(
+        "w.csv",
+        format!("load (N m),reading (mV/V)\n{}\n", rows.join("\n")),
+    );
+    let args = ["identify", "static", "w.csv", "--load", "load"];
+    let report = folder.json(&[&args[..], &["--reading", "reading", "--json"]].concat());
+    let (value, std, _) = parameter(&report, "torque_per_ratio");
+    // 0.1/√12 mV/V over √Σ(x − x̄)² = √1000 N m, enlarged by Student's quantile for 3 degrees of freedom, 3.18/1.96,
+    // times 20².
+    assert_close(
+        std.unwrap(),
+        0.1 / 12.0_f64.sqrt() / 1000.0_f64.sqrt() * 400.0 * 3.182 / 1.96,
+        0.01,
+    );
+    assert!((value - 1.0 / 0.0488).abs() < 2.0 * std.unwrap(), "{value}");
+}
+
+/// Loads of both signs, readings without: nothing follows anything, and no stand file comes of it.
+#[test]
+fn readings_that_do_not_follow_the_load_are_refused() {
+    let folder = Folder::new();
+    let loads = [0.0, 10.0, 20.0, 10.0, 0.0, -10.0, -20.0, -10.0, 0.0];
+    for (file, without) in [("readings.csv", 0), ("loads.csv", 1)] {
+        let rows: Vec<String> = loads
+            .iter()
+            .enumerate()
+            .map(|(i, load)| {
+                let reading = 0.04 * load + 1e-4 * (i as f64).sin();
+                match without {
+                    0 => format!("{load},{:.5}", reading.abs()),
+                    _ => format!("{},{reading:.5}", load.abs()),
+                }
+            })
+            .collect();
+        folder.write(
+            file,
+            format!("load (N m),reading (mV/V)\n{}\n", rows.join("\n")),
+        );
+        let args = [
+            "identify",
+            "static",
+            file,
+            "--load",
+            "load",
+            "--reading",
+            "reading",
+        ];
+        folder
+            .run(&[&args[..], &["-o", "new.toml"]].concat())
+            .says(1, &["does not follow the load", "minus sign"]);
+    }
+}

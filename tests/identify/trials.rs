@@ -46,11 +46,13 @@ enum Colour {
     Pink,
     /// A pole pair: frequency in cycles a sample, damping per sample.
     Resonant(f64, f64),
+    /// The pole pair of the stand, as of another torque on it.
+    OfStand,
 }
 
 impl Colour {
-    /// So many samples with a standard deviation of about 1.
-    fn samples(self, count: usize, noise: &mut Noise) -> Vec<f64> {
+    /// So many samples with a standard deviation of about 1, on a stand with that pole pair.
+    fn samples(self, count: usize, of_stand: (f64, f64), noise: &mut Noise) -> Vec<f64> {
         let settle = 4000;
         let mut first_order = |a: f64| -> Vec<f64> {
             let mut x = 0.0;
@@ -77,7 +79,11 @@ impl Colour {
                 let part = first_order(1.0 - 0.5_f64.powi(k));
                 sum.iter().zip(part).map(|(s, x)| s + x).collect()
             }),
-            Self::Resonant(frequency, damping) => {
+            Self::Resonant(..) | Self::OfStand => {
+                let (frequency, damping) = match self {
+                    Self::Resonant(frequency, damping) => (frequency, damping),
+                    _ => of_stand,
+                };
                 let (a, b) = (
                     2.0 * (-damping).exp() * (TAU * frequency).cos(),
                     (-2.0 * damping).exp(),
@@ -110,7 +116,8 @@ fn decays(colour: Colour, count: usize) -> ([Coverage; 2], usize) {
         let size = 2.0 * 10_f64.powf(-[20.0, 30.0, 40.0, 50.0][(k / 2) % 4] / 20.0);
         let t = times(length, rate_hz);
         let free = |t: &f64| 2.0 * (-sigma * t).exp() * (omega * t).cos() + 0.1;
-        let drawn = colour.samples(length, &mut noise);
+        let of_stand = (omega / TAU / rate_hz, sigma / rate_hz);
+        let drawn = colour.samples(length, of_stand, &mut noise);
         let values: Vec<f64> = t
             .iter()
             .zip(drawn)
@@ -129,6 +136,13 @@ fn decays(colour: Colour, count: usize) -> ([Coverage; 2], usize) {
             1 => what.to_owned(),
             _ => format!("mode_1_{what}"),
         };
+        let z = |e: &torqcomp::identify::NamedEstimate, t: f64| (e.value() - t) / e.std().unwrap();
+        eprintln!(
+            "Z {} {} {}",
+            k % 2,
+            z(of(&found, &name("natural_frequency")), natural / TAU),
+            z(of(&found, &name("damping_ratio")), sigma / natural)
+        );
         covered[0].count(of(&found, &name("natural_frequency")), natural / TAU);
         covered[1].count(of(&found, &name("damping_ratio")), sigma / natural);
     }
@@ -140,12 +154,14 @@ fn intervals_of_decays_cover_the_truth_in_coloured_noise() {
     let number = records(24);
     let (mut found, mut all) = (0, 0);
     for colour in [
+        Colour::OfStand,
         Colour::White,
         Colour::FirstOrder(0.9),
         Colour::FirstOrder(0.99),
         Colour::LowPassed(0.8),
         Colour::Pink,
         Colour::Resonant(0.1, 0.05),
+        Colour::OfStand,
     ] {
         let (covered, spurious) = decays(colour, number);
         println!("{colour:?}: {spurious} modes that are not there in {number} records");

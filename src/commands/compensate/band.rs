@@ -3,6 +3,7 @@
 use serde::Serialize;
 use torqcomp_dsp::band::{Band, BandSearch, band_of_stand};
 use torqcomp_dsp::compensate::Inverse;
+use torqcomp_dsp::quality::repeats::repeats;
 
 use crate::cli::BandOption;
 use crate::commands::convert;
@@ -13,6 +14,8 @@ use crate::stand::Calibration;
 
 /// The band of `--band rated`, as far as the rate allows: that of the thesis.
 const RATED_BAND_HZ: f64 = 2400.0;
+/// Highest frequency over the rate at which new values come: holding them lowers a sine there by 6 % (sin(πx)/(πx)).
+const HELD: f64 = 0.2;
 /// Samples that a band is chosen from, at least, if there are so many.
 const FIRST_SAMPLES: usize = 1 << 17;
 
@@ -39,6 +42,8 @@ pub(super) enum BandSource {
     FirstSeconds,
     /// The stand alone, since the record does not rise above its noise.
     Stand,
+    /// The rate at which new values come, where each is held for several samples.
+    HeldSamples,
     /// `--band HZ`.
     Option,
     /// `--band rated`.
@@ -75,13 +80,15 @@ impl Wanted<'_> {
                     true => BandSource::Record,
                     false => BandSource::FirstSeconds,
                 };
-                match search.and_then(|search| search.best()) {
-                    Some(best) => (Band::new(rate_hz, best.top_hz), from, Some(seconds)),
-                    None => {
-                        let top_hz = band_of_stand(rate_hz, self.inverse);
-                        (Band::new(rate_hz, top_hz), BandSource::Stand, Some(seconds))
-                    }
-                }
+                let (top_hz, from) = match search.and_then(|search| search.best()) {
+                    Some(best) => (best.top_hz, from),
+                    None => (band_of_stand(rate_hz, self.inverse), BandSource::Stand),
+                };
+                let (top_hz, from) = match of_held(&first.values, rate_hz) {
+                    Some(held_hz) if held_hz < top_hz => (held_hz, BandSource::HeldSamples),
+                    _ => (top_hz, from),
+                };
+                (Band::new(rate_hz, top_hz), from, Some(seconds))
             }
         };
         let band = band.map_err(|error| Failure::failed(error).at(&stream.source))?;
@@ -95,6 +102,12 @@ impl Wanted<'_> {
     }
 }
 
+/// Highest frequency that samples show which are held for several steps; `None` if they are not.
+fn of_held(samples: &[f64], rate_hz: f64) -> Option<f64> {
+    let hold = repeats(samples)?.hold?;
+    Some(HELD * rate_hz / hold as f64)
+}
+
 impl BandReport {
     /// Where the band comes from, for people.
     pub(super) fn text(&self) -> String {
@@ -106,6 +119,10 @@ impl BandReport {
                 "chosen from the stand alone, up to a gain of 10, because the first {} s do not rise above their noise",
                 length(self.seconds)
             ),
+            BandSource::HeldSamples => {
+                "a fifth of the rate at which new values come: each is held for several samples"
+                    .to_owned()
+            }
             BandSource::Record => {
                 "chosen for the least expected error from the record and its noise".to_owned()
             }

@@ -37,6 +37,8 @@ pub(super) struct CompensateReport {
     pub(super) calibration: String,
     /// Relative standard uncertainty of the constant of that; `null` if unknown, or if there is none.
     pub(super) calibration_relative_std: Option<f64>,
+    /// Standard uncertainty that the given record at no load brings to every value; `null` if it has none.
+    pub(super) zero_std: Option<f64>,
     /// Torque that the transducer is made for, if the stand file gives it.
     pub(super) rated_torque: Option<f64>,
     pub(super) samples: usize,
@@ -296,8 +298,21 @@ impl CompensateReport {
         format!("{}: {}{more}", self.filled_summary(), each.join(", "))
     }
 
-    /// Standard uncertainty of the result that stand and calibration bring.
+    /// Standard uncertainty of the result that stand, calibration and zero bring.
     pub(super) fn uncertainty_text(&self) -> String {
+        let text = self.of_stand_text();
+        match self.zero_std {
+            Some(std) => format!(
+                "{text}; that of the zero adds {} {} to every value",
+                rounded(std, 2),
+                self.unit
+            ),
+            None => text,
+        }
+    }
+
+    /// The same without the zero.
+    fn of_stand_text(&self) -> String {
         if let Some(found) = &self.result_std {
             return self.result_std_text(found);
         }

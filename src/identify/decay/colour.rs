@@ -11,18 +11,34 @@
 //! minimises Akaike's criterion, from the autocovariances of S by Levinson's recursion; Ω: covariance of the noise with
 //! that spectrum. For white noise, Cov is s² (JᵀJ)⁻¹. (P. Stoica, R. Moses, Spectral Analysis of Signals, 2005, 3.4;
 //! W. K. Newey, K. D. West, Econometrica 55 (1987), 703, for covariances of this form.)
+//!
+//! The spectrum itself is known from n samples only, so that a variance u = Σ_f w(f) S(f) has as many degrees of freedom
+//! as a chi-square of the same relative variance; the standard uncertainty is enlarged by Student's quantile for them,
+//! so that ±1.96 of it include 95 %:
+//!
+//! ```text
+//! ν = 2 u²/var(u),   var(u) = 2 u²/n + (∂u/∂a)ᵀ (v/n) Γ⁻¹ (∂u/∂a),   ∂S/∂a_k = 2 S Re(e^(−j2πfk)/(1 − Σ a_m e^(−j2πfm)))
+//! ```
+//!
+//! Γ: autocovariances of the noise, p by p. (JCGM 100:2008, G.4; P. J. Brockwell, R. A. Davis, Time Series, 1991, 8.1.)
 
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
+
+use crate::identify::student;
 
 /// Highest order of the autoregression, and fewest samples for each order.
 const MOST_ORDERS: usize = 40;
 const SAMPLES_PER_ORDER: usize = 10;
 /// Largest part of the noise that counts as absorbed at a frequency.
-const MOST_ABSORBED: f64 = 0.8;
+const MOST_ABSORBED: f64 = 0.9;
+/// How often the colour is learnt again with what the fit absorbs of noise of the last colour.
+const REFINEMENTS: usize = 2;
+/// Fewest degrees of freedom, below which their linear estimate means nothing.
+const LEAST_FREEDOM: f64 = 2.0;
 
 /// An autoregression of noise, in samples.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,8 +46,10 @@ pub(super) struct NoiseColour {
     coefficients: Vec<f64>,
     /// v, in squared units of the samples.
     innovation: f64,
-    /// Variance of the noise.
-    variance: f64,
+    /// Autocovariances from lag 0, which is the variance of the noise, to the order.
+    covariances: Vec<f64>,
+    /// Samples that it is known from.
+    count: usize,
 }
 
 /// Residuals of a stretch with the transforms of its orthonormal derivatives.
@@ -45,11 +63,12 @@ struct Transformed {
 /// dependent.
 ///
 /// `stretches`: residuals of each stretch; `groups`: stretches of one sampling rate; `jacobian`: derivatives by the
-/// parameters, over all stretches.
+/// parameters, over all stretches, of which the first `wanted` allow for what is not known of the spectrum.
 pub(super) fn learn(
     stretches: &[Vec<f64>],
     groups: &[Range<usize>],
     jacobian: &DMatrix<f64>,
+    wanted: usize,
 ) -> Option<(Vec<NoiseColour>, DMatrix<f64>)> {
     let sizes: Vec<f64> = jacobian.column_iter().map(|c| c.norm()).collect();
     if sizes.contains(&0.0) {
@@ -64,18 +83,37 @@ pub(super) fn learn(
     let longest = stretches.iter().map(Vec::len).max()?;
     let size = (2 * longest).next_power_of_two();
     let transformed = transformed(stretches, &q, size);
-    let mut middle = DMatrix::zeros(sizes.len(), sizes.len());
-    let mut colours = Vec::with_capacity(groups.len());
-    for group in groups {
-        let colour = NoiseColour::of(&transformed[group.clone()], size);
-        middle += colour.gathered(&transformed[group.clone()], size, sizes.len());
-        colours.push(colour);
-    }
     let inverse = r.solve_upper_triangular(&DMatrix::identity(sizes.len(), sizes.len()))?;
+    let each = || groups.iter().map(|group| &transformed[group.clone()]);
+    let gathered = |colours: &[NoiseColour]| {
+        let pairs = colours.iter().zip(each());
+        pairs.fold(DMatrix::zeros(sizes.len(), sizes.len()), |sum, (c, g)| {
+            sum + c.gathered(g, size, sizes.len())
+        })
+    };
+    let mut colours: Vec<NoiseColour> = each().map(|g| NoiseColour::first(g, size)).collect();
+    let mut middle = gathered(&colours);
+    for _ in 0..REFINEMENTS {
+        let pairs = colours.iter().zip(each());
+        colours = pairs.map(|(c, g)| c.refined(g, size, &middle)).collect();
+        middle = gathered(&colours);
+    }
+    let variance_of = |i: usize| -> f64 {
+        let row: Vec<f64> = inverse.row(i).iter().copied().collect();
+        let pairs = colours.iter().zip(each());
+        pairs
+            .map(|(c, g)| c.variance_of_variance(g, size, &row))
+            .sum()
+    };
     let mut covariance = &inverse * middle * inverse.transpose();
+    let enlarged = |i: usize| match i < wanted {
+        true => student((2.0 * covariance[(i, i)].powi(2) / variance_of(i)).max(LEAST_FREEDOM)),
+        false => 1.0,
+    };
+    let factors: Vec<f64> = (0..sizes.len()).map(|i| enlarged(i) / sizes[i]).collect();
     for i in 0..sizes.len() {
         for j in 0..sizes.len() {
-            covariance[(i, j)] /= sizes[i] * sizes[j];
+            covariance[(i, j)] *= factors[i] * factors[j];
         }
     }
     let is_finite = covariance.iter().all(|v| v.is_finite());
@@ -109,35 +147,113 @@ fn transformed(stretches: &[Vec<f64>], q: &DMatrix<f64>, size: usize) -> Vec<Tra
     all
 }
 
+/// Inverse transform.
+fn inverse(spectrum: &mut [Complex64], size: usize) -> Vec<f64> {
+    let plan = torqcomp_fourier::inverse(size);
+    let mut samples = plan.make_output_vec();
+    plan.process(spectrum, &mut samples)
+        .expect("buffers were made for this length");
+    samples.iter_mut().for_each(|v| *v /= size as f64);
+    samples
+}
+
+impl Transformed {
+    /// Expected |R(f)|² where the noise has that density.
+    fn expected(&self, density: &[f64], size: usize, middle: &DMatrix<f64>) -> Vec<f64> {
+        let forward = torqcomp_fourier::forward(size);
+        let transform = |mut samples: Vec<f64>| {
+            let mut out = forward.make_output_vec();
+            forward
+                .process(&mut samples, &mut out)
+                .expect("buffers were made for this length");
+            out
+        };
+        let mut spectrum: Vec<Complex64> = density.iter().map(|s| (*s).into()).collect();
+        let mut lags = inverse(&mut spectrum, size);
+        for (lag, covariance) in lags.iter_mut().enumerate() {
+            *covariance *= self.count.saturating_sub(lag.min(size - lag)) as f64;
+        }
+        let mut expected: Vec<f64> = transform(lags).iter().map(|s| s.re).collect();
+        for (i, column) in self.columns.iter().enumerate() {
+            let mut coloured: Vec<Complex64> =
+                column.iter().zip(density).map(|(c, s)| c * s).collect();
+            let mut inside = inverse(&mut coloured, size);
+            inside[self.count..].fill(0.0);
+            let others = self.columns.iter().enumerate();
+            let mut both = transform(inside);
+            both.iter_mut().for_each(|b| *b *= -2.0);
+            for (j, other) in others {
+                for (b, o) in both.iter_mut().zip(other) {
+                    *b += middle[(i, j)] * o;
+                }
+            }
+            for ((e, c), b) in expected.iter_mut().zip(column).zip(both) {
+                *e += c.re * b.re + c.im * b.im;
+            }
+        }
+        expected
+    }
+}
+
 impl NoiseColour {
-    /// White noise of that variance.
-    pub(super) fn white(variance: f64) -> Self {
+    /// White noise of that variance, from so many samples.
+    pub(super) fn white(variance: f64, count: usize) -> Self {
         Self {
             coefficients: Vec::new(),
             innovation: variance,
-            variance,
+            covariances: vec![variance],
+            count,
         }
     }
 
-    fn of(stretches: &[Transformed], size: usize) -> Self {
-        let spectrum = (0..=size / 2).map(|k| {
-            let mut sums = (0.0, 0.0);
-            for stretch in stretches {
-                let absorbed: f64 = stretch.columns.iter().map(|c| c[k].norm_sqr()).sum();
-                let count = stretch.count as f64;
-                sums.0 += stretch.residual[k].norm_sqr();
-                sums.1 += (count - absorbed).max((1.0 - MOST_ABSORBED) * count);
+    /// The colour of residuals, if the residuals of noise of that colour, whose density is given, have that expectation.
+    fn of(
+        stretches: &[Transformed],
+        size: usize,
+        expected: impl Fn(&Transformed) -> Vec<f64>,
+        density: impl Fn(usize) -> f64,
+    ) -> Self {
+        let mut sums = vec![(0.0, 0.0); size / 2 + 1];
+        for stretch in stretches {
+            let pairs = stretch.residual.iter().zip(expected(stretch));
+            for (sum, (residual, expected)) in sums.iter_mut().zip(pairs) {
+                sum.0 += residual.norm_sqr();
+                sum.1 += expected;
             }
-            Complex64::new(sums.0 / sums.1, 0.0)
-        });
-        let mut spectrum: Vec<Complex64> = spectrum.collect();
-        let plan = torqcomp_fourier::inverse(size);
-        let mut covariances = plan.make_output_vec();
-        plan.process(&mut spectrum, &mut covariances)
-            .expect("buffers were made for this length");
-        covariances.iter_mut().for_each(|c| *c /= size as f64);
+        }
+        let bins = sums.iter().enumerate();
+        let mut spectrum: Vec<Complex64> = bins
+            .map(|(k, sum)| Complex64::new(density(k) * sum.0 / sum.1, 0.0))
+            .collect();
+        let covariances = inverse(&mut spectrum, size);
         let count: usize = stretches.iter().map(|s| s.count).sum();
         Self::from_autocovariances(&covariances, count)
+    }
+
+    /// The colour as if the noise were white.
+    fn first(stretches: &[Transformed], size: usize) -> Self {
+        let expected = |stretch: &Transformed| {
+            let count = stretch.count as f64;
+            let absorbed = |k: usize| stretch.columns.iter().map(|c| c[k].norm_sqr()).sum::<f64>();
+            let left = (0..=size / 2).map(|k| count - absorbed(k));
+            left.map(|left| left.max((1.0 - MOST_ABSORBED) * count))
+                .collect()
+        };
+        Self::of(stretches, size, expected, |_| 1.0)
+    }
+
+    /// The colour that the residuals show if the fit absorbs noise of this colour; `middle`: QᵀΩQ.
+    fn refined(&self, stretches: &[Transformed], size: usize, middle: &DMatrix<f64>) -> Self {
+        let density: Vec<f64> = (0..=size / 2)
+            .map(|k| self.density(TAU * k as f64 / size as f64))
+            .collect();
+        let expected = |stretch: &Transformed| {
+            let least = (1.0 - MOST_ABSORBED) * stretch.count as f64;
+            let each = stretch.expected(&density, size, middle);
+            let pairs = each.into_iter().zip(&density);
+            pairs.map(|(e, s)| e.max(least * s)).collect()
+        };
+        Self::of(stretches, size, expected, |k| density[k])
     }
 
     /// The autoregression of the order with the least criterion, by Levinson's recursion.
@@ -146,7 +262,7 @@ impl NoiseColour {
         let most = MOST_ORDERS.min(count / SAMPLES_PER_ORDER).min(known);
         let mut innovation = covariances[0];
         let mut coefficients: Vec<f64> = Vec::new();
-        let mut best = Self::white(innovation);
+        let mut best = Self::white(innovation, count);
         let criterion =
             |innovation: f64, order: usize| count as f64 * innovation.ln() + 2.0 * order as f64;
         let mut least = criterion(innovation, 0);
@@ -168,7 +284,8 @@ impl NoiseColour {
                 best = Self {
                     coefficients: coefficients.clone(),
                     innovation,
-                    variance: covariances[0],
+                    covariances: covariances[..=order].to_vec(),
+                    count,
                 };
             }
         }
@@ -177,33 +294,67 @@ impl NoiseColour {
 
     /// S at an angular frequency in rad per sample: the variance of white noise with as much power there.
     pub(super) fn density(&self, rad_per_sample: f64) -> f64 {
+        self.innovation / self.whitener(rad_per_sample).norm_sqr()
+    }
+
+    /// 1 − Σ a_k e^(−jωk).
+    fn whitener(&self, rad_per_sample: f64) -> Complex64 {
         let turned = |(k, a): (usize, &f64)| *a * Complex64::cis(-rad_per_sample * (k + 1) as f64);
         let sum: Complex64 = self.coefficients.iter().enumerate().map(turned).sum();
-        self.innovation / (Complex64::ONE - sum).norm_sqr()
+        Complex64::ONE - sum
     }
 
     /// Variance of the noise.
     pub(super) fn variance(&self) -> f64 {
-        self.variance
+        self.covariances[0]
     }
 
     /// S at an angular frequency in rad per sample over the variance of the noise; 1 for white noise.
     pub(super) fn relative_density(&self, rad_per_sample: f64) -> f64 {
-        match self.variance > 0.0 {
-            true => self.density(rad_per_sample) / self.variance,
+        match self.variance() > 0.0 {
+            true => self.density(rad_per_sample) / self.variance(),
             false => 1.0,
         }
     }
 
+    /// Power of the noise in each bin of a transform, with that of its mirror image.
+    fn densities(&self, size: usize) -> Vec<f64> {
+        let of_bin = |k: usize| {
+            let sides = if k == 0 || k == size / 2 { 1.0 } else { 2.0 };
+            sides * self.density(TAU * k as f64 / size as f64) / size as f64
+        };
+        (0..=size / 2).map(of_bin).collect()
+    }
+
+    /// var(u) of the variance u that the noise gives the sum of the columns times these factors.
+    fn variance_of_variance(&self, stretches: &[Transformed], size: usize, factors: &[f64]) -> f64 {
+        let mut variance = 0.0;
+        let mut slopes = DVector::zeros(self.coefficients.len());
+        for (k, density) in self.densities(size).into_iter().enumerate() {
+            let of_stretch = |stretch: &Transformed| {
+                let parts = stretch.columns.iter().zip(factors);
+                parts.map(|(c, f)| c[k] * f).sum::<Complex64>().norm_sqr()
+            };
+            let part = density * stretches.iter().map(of_stretch).sum::<f64>();
+            variance += part;
+            let angle = TAU * k as f64 / size as f64;
+            let whitener = self.whitener(angle);
+            for (m, slope) in slopes.iter_mut().enumerate() {
+                let turned = Complex64::cis(-angle * (m + 1) as f64);
+                *slope += 2.0 * part * (turned / whitener).re;
+            }
+        }
+        let order = slopes.len();
+        let lags = DMatrix::from_fn(order, order, |i, j| self.covariances[i.abs_diff(j)]);
+        let along = lags
+            .cholesky()
+            .map_or(0.0, |c| slopes.dot(&c.solve(&slopes)));
+        (2.0 * variance * variance + self.innovation * along) / self.count as f64
+    }
+
     /// Qᵀ Ω Q.
     fn gathered(&self, stretches: &[Transformed], size: usize, columns: usize) -> DMatrix<f64> {
-        let density: Vec<f64> = (0..=size / 2)
-            .map(|k| {
-                // Every bin but the first and the last stands for its mirror image too.
-                let sides = if k == 0 || k == size / 2 { 1.0 } else { 2.0 };
-                sides * self.density(TAU * k as f64 / size as f64) / size as f64
-            })
-            .collect();
+        let density = self.densities(size);
         let mut sum = DMatrix::zeros(columns, columns);
         for stretch in stretches {
             for i in 0..columns {
@@ -245,7 +396,8 @@ mod tests {
         let colour = NoiseColour {
             coefficients: vec![0.8],
             innovation: 1.0,
-            variance: 1.0 / 0.36,
+            covariances: vec![1.0 / 0.36, 0.8 / 0.36],
+            count: n,
         };
         let q = DMatrix::from_element(n, 1, 1.0 / (n as f64).sqrt());
         let size = 512;

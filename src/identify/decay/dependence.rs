@@ -55,6 +55,9 @@ pub(super) fn damping_law(
 /// Smallest relative change of decay rate and of frequency between the halves of a decay that is reported.
 const NOTABLE: [f64; 2] = [0.02, 1e-4];
 
+/// The same in their standard uncertainties, which are enlarged for what is not known of the noise.
+const CHANGED: f64 = 3.0;
+
 /// Fits the early and the late half (in amplitude) separately and compares them.
 pub(super) fn amplitude_dependence(
     result: &mut Identification,
@@ -99,7 +102,7 @@ fn compare_halves(result: &mut Identification, early: &ModesFit, late: &ModesFit
         };
         let (first, second) = (early.fit.values[i], late.fit.values[i]);
         let change = second / first - 1.0;
-        if (second - first).abs() > 4.0 * a.hypot(b) && change.abs() > NOTABLE[i] {
+        if (second - first).abs() > CHANGED * a.hypot(b) && change.abs() > NOTABLE[i] {
             result.warn(
                 "amplitude-dependent",
                 format!(

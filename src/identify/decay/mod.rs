@@ -3,17 +3,20 @@
 mod by_hand;
 mod colour;
 mod dependence;
+mod hum;
 mod laws;
 mod modes;
 mod present;
+mod search;
 mod stretches;
 
 use super::{FitQuality, Identification, ModalPole, rms};
 use crate::failure::Failure;
 
 pub use laws::{Law, LawFit, envelope};
+use modes::ModesFit;
 pub use modes::Stretch;
-use modes::{ModeSearch, ModesFit};
+use search::ModeSearch;
 
 /// A recording with decays in it.
 #[derive(Debug, Clone, Copy)]
@@ -50,19 +53,18 @@ pub fn identify(
     options: &DecayOptions,
 ) -> Result<(Identification, Vec<Stretch>), Failure> {
     let mut result = Identification::new("decay");
-    let stretches = stretches::stretches(records, options, &mut result)?;
-    let search = ModeSearch {
+    let (mut stretches, mut lines) = stretches::stretches(records, options, &mut result)?;
+    let wanted = ModeSearch {
         count: options.modes,
         most: MOST_MODES,
         band_hz: options.band_hz.unwrap_or((0.0, f64::INFINITY)),
     };
-    let fit = modes::search(&stretches, &search)?;
+    let (fit, more) = search::search(&mut stretches, &wanted)?;
+    lines.extend(more);
     if fit.poles.is_empty() {
-        return Err(Failure::failed(
-            "no decaying sine stands out of the noise; check the channel, or cut the record to the decay with \
-             --range",
-        ));
+        return Err(present::no_mode(&lines));
     }
+    present::lines(&mut result, &lines);
     present::fit_warnings(&mut result, &fit);
     let order = fit.by_strength(stretches.len());
     for (place, k) in order.iter().enumerate() {

@@ -1,7 +1,9 @@
 //! Warnings, method and charts of a decay.
 
 use super::modes::{ModesFit, Stretch};
+use super::search::SteadyLine;
 use crate::chart::{Chart, Series};
+use crate::failure::Failure;
 use crate::identify::{self, Identification};
 use crate::print::{plural, rounded};
 
@@ -31,6 +33,46 @@ pub(super) fn fit_warnings(result: &mut Identification, fit: &ModesFit) {
     }
     if !fit.fit.stop.converged() {
         result.warn("not-converged", "the fit did not converge");
+    }
+}
+
+fn listed(lines: &[SteadyLine]) -> String {
+    let each = |line: &SteadyLine| {
+        let [frequency, amplitude] =
+            [(line.frequency_hz, 5), (line.amplitude, 2)].map(|(v, digits)| rounded(v, digits));
+        format!("{frequency} Hz (amplitude {amplitude})")
+    };
+    // What is left of a line after the first fit is the same line.
+    let is_same = |a: &SteadyLine, b: &SteadyLine| (a.frequency_hz - b.frequency_hz).abs() < 0.5;
+    let first = |(i, line): &(usize, &SteadyLine)| !lines[..*i].iter().any(|l| is_same(l, line));
+    let different = lines.iter().enumerate().filter(first);
+    let each: Vec<String> = different.map(|(_, line)| each(line)).collect();
+    each.join(", ")
+}
+
+/// Why a record has no mode.
+pub(super) fn no_mode(lines: &[SteadyLine]) -> Failure {
+    let but = match lines {
+        [] => String::new(),
+        _ => format!(" beside the steady lines of the mains at {}", listed(lines)),
+    };
+    Failure::failed(format_args!(
+        "no decaying sine stands out of the noise{but}; check the channel, or cut the record to the decay with --range (a \
+         stand that is damped so much that it does not swing gives no decay: use identify response)"
+    ))
+}
+
+/// Warns about lines of the mains, which were taken off.
+pub(super) fn lines(result: &mut Identification, lines: &[SteadyLine]) {
+    if !lines.is_empty() {
+        result.warn(
+            "mains-taken-off",
+            format!(
+                "steady lines of the mains were fitted and taken off: {}; if one of them is the stand's own, record for \
+                 longer, until it has decayed",
+                listed(lines)
+            ),
+        );
     }
 }
 

@@ -5,7 +5,9 @@ use std::ops::Range;
 
 use torqcomp_dsp::{decimate, onset, peaks};
 
+use super::hum::without_mains;
 use super::modes::Stretch;
+use super::search::SteadyLine;
 use super::{DecayOptions, Ringing};
 use crate::failure::Failure;
 use crate::identify::Identification;
@@ -23,13 +25,15 @@ const WORTH: f64 = 1e-6;
 /// Fewest samples of a record.
 const LEAST_SAMPLES: usize = 40;
 
-/// Cuts all records into stretches of free ringing and decimates them where nothing is lost.
+/// Cuts all records into stretches of free ringing and decimates them where nothing is lost; with the lines of the mains that
+/// were taken off.
 pub(super) fn stretches(
     records: &[Ringing],
     options: &DecayOptions,
     result: &mut Identification,
-) -> Result<Vec<Stretch>, Failure> {
-    let cut = cut(records, options, result)?;
+) -> Result<(Vec<Stretch>, Vec<SteadyLine>), Failure> {
+    let mut lines = Vec::new();
+    let cut = cut(records, options, (result, &mut lines))?;
     let total: usize = cut.iter().map(|(stretch, _)| stretch.values.len()).sum();
     let mut all = Vec::new();
     for (stretch, rate_hz) in cut {
@@ -47,18 +51,25 @@ pub(super) fn stretches(
         all.push(decimated(&stretch, factor)?);
     }
     result.method.dedup();
-    Ok(all)
+    Ok((all, lines))
 }
 
 /// All stretches as recorded, with the sampling rate of their record.
 fn cut(
     records: &[Ringing],
     options: &DecayOptions,
-    result: &mut Identification,
+    (result, lines): (&mut Identification, &mut Vec<SteadyLine>),
 ) -> Result<Vec<(Stretch, Option<f64>)>, Failure> {
     let mut cut = Vec::new();
     let (mut found, mut left_out) = (0, 0);
     for record in records {
+        check(record)?;
+        let (values, of_mains) = without_mains(record.values, record.rate_hz);
+        lines.extend(of_mains);
+        let record = &Ringing {
+            values: &values,
+            ..*record
+        };
         let [times, values] = prepared(record, options, result)?;
         for range in onset::decays(&values) {
             let rings = ringing(&values, &range);
@@ -99,12 +110,8 @@ fn ringing(values: &[f64], range: &Range<usize>) -> Range<usize> {
     range.start..range.start + kept
 }
 
-/// Times and samples, low-passed and decimated if a band is given.
-fn prepared<'a>(
-    record: &Ringing<'a>,
-    options: &DecayOptions,
-    result: &mut Identification,
-) -> Result<[Cow<'a, [f64]>; 2], Failure> {
+/// Refuses a record that is too short or has holes.
+fn check(record: &Ringing) -> Result<(), Failure> {
     if let Some(i) = record.values.iter().position(|v| !v.is_finite()) {
         return Err(Failure::failed(format_args!(
             "{}: sample {} is not a finite number; exclude it with --range",
@@ -112,14 +119,23 @@ fn prepared<'a>(
             i + 1
         )));
     }
-    let (times, values) = (record.times_s, record.values);
-    if values.len() < LEAST_SAMPLES {
+    if record.values.len() < LEAST_SAMPLES {
         return Err(Failure::failed(format_args!(
             "{}: {} samples are too few for a decay; at least {LEAST_SAMPLES} are needed",
             record.name,
-            values.len()
+            record.values.len()
         )));
     }
+    Ok(())
+}
+
+/// Times and samples, low-passed and decimated if a band is given.
+fn prepared<'a>(
+    record: &Ringing<'a>,
+    options: &DecayOptions,
+    result: &mut Identification,
+) -> Result<[Cow<'a, [f64]>; 2], Failure> {
+    let (times, values) = (record.times_s, record.values);
     let (Some((_, highest)), Some(rate_hz)) = (options.band_hz, record.rate_hz) else {
         return Ok([times.into(), values.into()]);
     };

@@ -13,12 +13,16 @@
 //! An estimate whose variance comes from few series follows Student's distribution, with the degrees of freedom of Welch
 //! and Satterthwaite; its standard uncertainty is enlarged so that ±1.96 of it include 95 %. The sensitivity over m
 //! mountings has the uncertainty of the mean of m sensitivities, with m − 1 degrees of freedom.
+//!
+//! Readings are rounded to their last digit d: however small the residual, e is taken as no smaller than d/√12, unless
+//! the readings come with uncertainties of their own (JCGM 100:2008, F.2.2.1).
 
 use nalgebra::{DMatrix, DVector};
-use statrs::distribution::{ContinuousCDF, FisherSnedecor, StudentsT};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use torqcomp_model::fit::FitError;
 
 use super::{Point, SAME, terms};
+use crate::identify::student;
 
 /// Significance level of the hysteresis.
 const CHANCE: f64 = 0.01;
@@ -44,6 +48,8 @@ pub(super) struct LoadCurve {
     pub degrees_of_freedom: usize,
     /// Standard deviations of the random parts, in units of the reading.
     pub spreads: Spreads,
+    /// Last digit of the readings, if the uncertainties come from it; otherwise 0.
+    pub resolution: f64,
     /// Whether an even drift of the zero is part of the model.
     pub has_even_drift: bool,
     /// Whether a hysteresis is part of the model.
@@ -161,13 +167,23 @@ fn over_mountings(
     Some((squares / freedom / count).sqrt() * student(freedom))
 }
 
-/// Student's 97.5 % quantile over the normal one.
-fn student(freedom: f64) -> f64 {
-    if freedom.is_infinite() {
-        return 1.0;
-    }
-    let quantile = StudentsT::new(0.0, 1.0, freedom).map(|d| d.inverse_cdf(0.975));
-    quantile.map_or(1.0, |q| q / 1.959_963_984_540_054)
+/// Smallest digits that are looked for, as powers of 10, and part of one that rounding in memory may be.
+const DIGITS: (i32, i32) = (-12, 6);
+const OF_DIGIT: f64 = 1e-4;
+
+/// The last digit of readings: the largest power of 10 that all are multiples of; `None` if they have more digits than
+/// their display could show.
+fn resolution(readings: &[f64]) -> Option<f64> {
+    let is_multiple = |digit: f64| {
+        readings.iter().all(|r| {
+            let digits = (r / digit).round();
+            (r / digit - digits).abs() < OF_DIGIT && (digits != 0.0 || *r == 0.0)
+        })
+    };
+    let largest = readings.iter().fold(0.0_f64, |m, r| m.max(r.abs()));
+    let digits = (DIGITS.0..=DIGITS.1).rev().map(|k| 10.0_f64.powi(k));
+    let shown = digits.filter(|digit| largest / digit < 0.1 * OF_DIGIT / f64::EPSILON);
+    shown.into_iter().find(|digit| is_multiple(*digit))
 }
 
 /// A column for each load step that is read in both directions: 1 in loading, −1 in unloading.
@@ -277,7 +293,14 @@ impl Mixed {
     fn fit(&self, degree: usize, ratios: VarianceRatios) -> Result<LoadCurve, FitError> {
         let singular = || FitError::Model("the loads do not determine the curve".to_owned());
         let solved = self.solve(ratios).ok_or_else(singular)?;
-        let scale = if self.is_known { 1.0 } else { solved.variance };
+        let (digit, rounding) = match resolution(&self.readings) {
+            Some(digit) if !self.is_known => (digit, digit * digit / 12.0),
+            _ => (0.0, 0.0),
+        };
+        let scale = match self.is_known {
+            true => 1.0,
+            false => solved.variance.max(rounding),
+        };
         let spread = |ratio: f64| (ratio * scale).sqrt();
         let std = |k: usize| -> Option<f64> {
             if self.freedom() == 0 && !self.is_known {
@@ -290,6 +313,11 @@ impl Mixed {
             values: solved.values.as_slice()[..=degree].to_vec(),
             std: (0..=degree).map(std).collect(),
             degrees_of_freedom: self.readings.len().saturating_sub(degree + 1),
+            resolution: if solved.variance < rounding {
+                digit
+            } else {
+                0.0
+            },
             spreads: Spreads {
                 drift: spread(ratios[0]),
                 zero: spread(ratios[1]),

@@ -117,6 +117,7 @@ pub fn identify(
         ));
     }
     let fit = mixed::fit(points, degree, (&steps, largest))?;
+    follows(points, &fit, largest)?;
     let unscale = |(k, v): (usize, &f64)| v / largest.powi(k as i32);
     let curve: Vec<f64> = fit.values.iter().enumerate().map(unscale).collect();
     let mut result = Identification::new("static");
@@ -137,6 +138,51 @@ pub fn identify(
         );
     }
     Ok(result)
+}
+
+/// Standard uncertainties by which the sensitivity must differ from zero.
+const FOLLOWS: f64 = 3.0;
+
+/// Refuses readings that do not follow the loads.
+fn follows(points: &[Point], fit: &LoadCurve, largest: f64) -> Result<(), Failure> {
+    let (slope, std) = (fit.values[1].abs(), fit.std[1].unwrap_or(0.0));
+    // Of the readings' rounding in memory.
+    let size = points.iter().fold(0.0_f64, |m, p| m.max(p.reading.abs()));
+    if slope > FOLLOWS * std && slope > 1e-12 * size {
+        return Ok(());
+    }
+    let empty: Vec<&Point> = points
+        .iter()
+        .filter(|p| p.load.abs() <= NONE * largest)
+        .collect();
+    let zero = empty.iter().map(|p| p.reading).sum::<f64>() / empty.len().max(1) as f64;
+    let unsigned = points
+        .iter()
+        .map(|p| (p.load.abs(), (p.reading - zero).abs()));
+    let why = match correlation(&unsigned.collect::<Vec<_>>()) > ALIKE {
+        true => {
+            "without their signs they do: write the minus sign of the loads, or of the readings, that turn the other way"
+        }
+        false => {
+            "check that the columns are the right ones and the rows in the order in which they were taken"
+        }
+    };
+    Err(Failure::failed(format_args!(
+        "the reading does not follow the load: the sensitivity differs from zero by less than {FOLLOWS} standard \
+         uncertainties; {why}"
+    )))
+}
+
+/// Correlation of loads and readings without signs above which the signs are at fault.
+const ALIKE: f64 = 0.9;
+
+/// Coefficient of correlation of pairs.
+fn correlation(pairs: &[(f64, f64)]) -> f64 {
+    let count = pairs.len() as f64;
+    let sum = |of: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>();
+    let (x, y) = (sum(&|p| p.0) / count, sum(&|p| p.1) / count);
+    let products = sum(&|p| (p.0 - x) * (p.1 - y));
+    products / (sum(&|p| (p.0 - x).powi(2)) * sum(&|p| (p.1 - y).powi(2))).sqrt()
 }
 
 /// Mean reading at each load, and the standard uncertainty of the load that the readings' scatter gives it.
@@ -211,6 +257,12 @@ fn method(result: &mut Identification, fit: &LoadCurve, points: &[Point], unit: 
             " at the largest load",
         ),
     ];
+    if fit.resolution > 0.0 {
+        result.method.push(format!(
+            "uncertainties come from the last digit of the readings, {} {unit}",
+            rounded(fit.resolution, 1)
+        ));
+    }
     for (spread, what, when) in allowed.iter().filter(|a| a.0 > 0.0) {
         let size = rounded(*spread, 2);
         result.method.push(format!(

@@ -1,0 +1,235 @@
+//! Which modes a decay has, found one by one.
+
+use torqcomp_dsp::peaks::{self, Peak};
+use torqcomp_model::fit::FitError;
+
+use super::modes::{ModesFit, Stretch, fit, linear_part};
+use crate::identify::Pole;
+
+/// Which modes are searched for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ModeSearch {
+    /// Their number, if it is known.
+    pub count: Option<usize>,
+    /// Maximum number otherwise.
+    pub most: usize,
+    /// Lowest and highest frequency in Hz.
+    pub band_hz: (f64, f64),
+}
+
+/// Relative distance in frequency below which two lines are one mode, unless the number of modes is given: a frequency
+/// or damping that changes with amplitude or time looks the same.
+const CLOSE: f64 = 0.03;
+
+/// Lines of the mains that are taken off, at most.
+const MOST_LINES: usize = 8;
+/// Harmonics of the mains among which a steady line is looked for.
+const HARMONICS: f64 = 10.0;
+/// How far the mains may be off 50 or 60 Hz.
+const OFF_HZ: f64 = 0.3;
+/// Part of its amplitude, as an exponent, that a steady line may seem to lose over a record.
+const STEADY: f64 = 0.3;
+
+/// A line of the mains in a decay.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct SteadyLine {
+    pub frequency_hz: f64,
+    /// Amplitude in the stretch where it is largest.
+    pub amplitude: f64,
+}
+
+/// Adds modes one by one as long as the criterion falls enough, each starting at the strongest line of the residual.
+/// Lines of the mains that do not decay are no modes: they are taken off the stretches.
+///
+/// # Errors
+/// [`FitError`] if there are too few samples. Without a significant mode the fit is empty.
+pub(super) fn search(
+    stretches: &mut [Stretch],
+    wanted: &ModeSearch,
+) -> Result<(ModesFit, Vec<SteadyLine>), FitError> {
+    let mut lines = Vec::new();
+    let mut best = fit(stretches, &[])?;
+    while best.poles.len() < wanted.count.unwrap_or(wanted.most) {
+        let Some(pole) = next_pole(stretches, &best, wanted.band_hz) else {
+            break;
+        };
+        let mut starts = best.poles.clone();
+        starts.push(pole);
+        let next = fit(stretches, &starts)?;
+        if let Some(line) = steady(&next, stretches)
+            && lines.len() < MOST_LINES
+        {
+            take_off(stretches, &next);
+            lines.push(line);
+            best = fit(stretches, &best.poles)?;
+            continue;
+        }
+        let pays = gain(&best, &next, stretches) > LEAST_GAIN
+            && next.fit.sum_of_squares < 0.98 * best.fit.sum_of_squares
+            && physical(&next, stretches);
+        if wanted.count.is_none() {
+            if !pays {
+                break;
+            }
+            if let Some(frequency_hz) = close(&next.poles) {
+                best.close_hz = Some(frequency_hz);
+                break;
+            }
+        }
+        best = next;
+    }
+    Ok((best, lines))
+}
+
+/// The last mode of a fit, if it is a line of the mains that does not decay.
+fn steady(found: &ModesFit, stretches: &[Stretch]) -> Option<SteadyLine> {
+    let last = found.poles.len().checked_sub(1)?;
+    let pole = found.poles[last];
+    let frequency_hz = pole.frequency_hz();
+    let of_grid = |grid_hz: f64| {
+        let harmonic = (frequency_hz / grid_hz).round();
+        let std_hz = found.fit.std[2 * last + 1].map(|std| std / std::f64::consts::TAU);
+        (1.0..=HARMONICS).contains(&harmonic)
+            && (frequency_hz / harmonic - grid_hz).abs() < OFF_HZ
+            && std_hz.is_some_and(|std| std < OFF_HZ * harmonic)
+    };
+    let is_steady = pole.rate_per_s * length_s(stretches) < STEADY;
+    let amplitudes = (0..stretches.len()).map(|s| found.amplitude(last, s));
+    (is_steady && [50.0, 60.0].into_iter().any(of_grid)).then(|| SteadyLine {
+        frequency_hz,
+        amplitude: amplitudes.fold(0.0, f64::max),
+    })
+}
+
+/// Takes the last mode of a fit off the stretches.
+fn take_off(stretches: &mut [Stretch], found: &ModesFit) {
+    for s in 0..stretches.len() {
+        let line = found.part(stretches, found.poles.len() - 1, s);
+        let values = stretches[s].values.iter_mut();
+        values.zip(line).for_each(|(value, line)| *value -= line);
+    }
+}
+
+/// Length of the longest stretch.
+fn length_s(stretches: &[Stretch]) -> f64 {
+    let ends = stretches.iter().filter_map(|s| s.times_s.last());
+    ends.fold(0.0_f64, |m, t| m.max(*t))
+}
+
+/// Minimum gain for one more mode.
+const LEAST_GAIN: f64 = 20.0;
+
+/// Gain of one more mode, the last of `after`: the reduction of the sum of squares over the power of the noise at the
+/// mode's frequency, less ln n for each parameter (Bayesian information criterion, where that power is known). Noise that
+/// is strongest at the frequency of the first mode counts with its mean power: a stand that rings has a mode.
+fn gain(before: &ModesFit, after: &ModesFit, stretches: &[Stretch]) -> f64 {
+    let Some(pole) = after.poles.last() else {
+        return 0.0;
+    };
+    let squares = |residuals: &[f64]| residuals.iter().map(|r| r * r).sum::<f64>();
+    let of_stretch = |s: usize| {
+        let colour = &after.colours[s];
+        let density = colour.density(pole.omega_rad_per_s * stretches[s].step_s());
+        let density = match before.poles.is_empty() {
+            true => density.min(colour.variance()),
+            false => density,
+        };
+        (squares(&before.residuals[s]) - squares(&after.residuals[s])) / density
+    };
+    let n = after.fit.residuals.len() as f64;
+    let more = (after.fit.values.len() - before.fit.values.len()) as f64;
+    (0..stretches.len()).map(of_stretch).sum::<f64>() - more * n.ln()
+}
+
+/// Frequency in Hz of a mode that is too close to the last one, if there is one.
+fn close(poles: &[Pole]) -> Option<f64> {
+    let last = poles.last()?;
+    let near = |p: &&Pole| (p.omega_rad_per_s / last.omega_rad_per_s - 1.0).abs() < CLOSE;
+    let found = poles[..poles.len() - 1].iter().find(near)?;
+    Some(found.frequency_hz())
+}
+
+/// Standard uncertainties by which the decay rate of the first mode and of any other one must differ from zero. A stand
+/// that rings has a mode, even if the record is too short to say much of its damping.
+const DECAYS: [f64; 2] = [0.5, 2.0];
+
+/// Whether every mode decays significantly, swings more than once, and differs from the others.
+fn physical(found: &ModesFit, stretches: &[Stretch]) -> bool {
+    let length = length_s(stretches);
+    let one = |(k, pole): (usize, &Pole)| {
+        let rate_std = found.fit.std[2 * k];
+        let turns = pole.frequency_hz() * length;
+        let least = match k {
+            0 => DECAYS[0],
+            _ => DECAYS[1],
+        };
+        let known = rate_std.is_some_and(|std| pole.rate_per_s > least * std);
+        let rings = pole.omega_rad_per_s > pole.rate_per_s && turns > 1.5;
+        let apart = found.poles[..k].iter().all(|other| {
+            let near = (other.omega_rad_per_s - pole.omega_rad_per_s).abs();
+            near > 0.2 * (other.rate_per_s + pole.rate_per_s) || near * length > 3.0
+        });
+        known && rings && apart
+    };
+    found.poles.iter().enumerate().all(one)
+}
+
+/// A start for one more mode.
+fn next_pole(stretches: &[Stretch], so_far: &ModesFit, band_hz: (f64, f64)) -> Option<Pole> {
+    let loudest = (0..stretches.len()).max_by(|a, b| {
+        let power = |s: usize| so_far.residuals[s].iter().map(|r| r * r).sum::<f64>();
+        power(*a).total_cmp(&power(*b))
+    })?;
+    let stretch = &stretches[loudest];
+    let left: Vec<f64> = so_far.residuals[loudest].iter().map(|r| -r).collect();
+    let length = *stretch.times_s.last()?;
+    let rate_hz = (stretch.times_s.len() - 1) as f64 / length;
+    let uniform = on_grid(&stretch.times_s, &left, rate_hz);
+    let lowest = band_hz.0.max(1.5 / length);
+    let highest = band_hz.1.min(0.49 * rate_hz);
+    let within = |from, to| peaks::strongest(&uniform, rate_hz, from, to);
+    let peak = within(lowest, highest)?;
+    // Coloured noise can have a stronger line than a mode that rings for a short time.
+    let below = within(lowest, peak.frequency_hz / APART);
+    let above = within(peak.frequency_hz * APART, highest);
+    let rest = Stretch::new(&stretch.times_s, left);
+    let starts = [Some(peak), below, above];
+    let starts = starts.into_iter().flatten().flat_map(starts_at);
+    let tried = starts.filter_map(|pole| {
+        let (_, residuals) = linear_part(&rest, &[pole]).ok()?;
+        Some((residuals.iter().map(|r| r * r).sum::<f64>(), pole))
+    });
+    let best = tried.min_by(|a, b| a.0.total_cmp(&b.0));
+    best.map(|(_, pole)| pole)
+}
+
+/// Ratio of the frequencies of lines that are tried beside the strongest.
+const APART: f64 = 1.5;
+
+/// Poles that a line could be.
+fn starts_at(peak: Peak) -> impl Iterator<Item = Pole> {
+    let omega = std::f64::consts::TAU * peak.frequency_hz;
+    let wide = std::f64::consts::PI * peak.width_hz;
+    [0.05, 0.15, 0.4, 1.0, 2.0].into_iter().flat_map(move |f| {
+        [-0.5, 0.0, 0.5].into_iter().map(move |shift| Pole {
+            rate_per_s: f * wide,
+            omega_rad_per_s: (omega + shift * wide).max(0.1 * omega),
+        })
+    })
+}
+
+/// Values interpolated linearly at equal steps; good enough for a start.
+fn on_grid(times_s: &[f64], values: &[f64], rate_hz: f64) -> Vec<f64> {
+    let mut out = Vec::with_capacity(values.len());
+    let mut k = 0;
+    for i in 0..values.len() {
+        let t = (i as f64 / rate_hz).min(times_s[times_s.len() - 1]);
+        while k + 2 < times_s.len() && times_s[k + 1] < t {
+            k += 1;
+        }
+        let (t0, t1) = (times_s[k], times_s[k + 1]);
+        let part = ((t - t0) / (t1 - t0)).clamp(0.0, 1.0);
+        out.push(values[k] + part * (values[k + 1] - values[k]));
+    }
+    out
+}
