@@ -31,6 +31,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["components-lost-in-noise", "components do not exceed twice their own uncertainty", "average over a longer record, or take them as zero"],
         ["direction-unknown", "the speed is not significantly different from zero over part of the record, where a friction depends on its sign", "take the torque there as known to the size of the friction only"],
         ["empty-plot", "no sample lies within --plot-range", "choose a range within the record"],
+        ["fundamental-off", "another fundamental near the given one fits the record better", "add --refine"],
         ["mostly-noise", "most of the result is noise", "choose a lower --band, or record with less noise"],
         ["noise-unknown", "the noise of the record cannot be determined", "choose a lower --band if the result looks noisy"],
         ["not-recovered", "samples do not determine the torque, as at the limit of the recorder or within a gap", "take the torque near them as unknown"],

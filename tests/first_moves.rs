@@ -149,3 +149,35 @@ fn hum_is_not_taken_for_the_stand() {
             .says(1, &["no decaying sine", "mains at 50.0"]);
     }
 }
+
+/// The speed of the nameplate is not that of the record: 30 Hz given, 29.7 Hz there.
+#[test]
+fn a_fundamental_beside_the_line_is_said() {
+    let folder = Folder::new();
+    folder.write("stand.toml", stand(""));
+    let mut noise = crate::noise::Noise(5);
+    let noise: Vec<f64> = (0..10_000).map(|_| 0.05 * noise.normal()).collect();
+    let run = |actual_hz: f64, seconds: f64| {
+        let torque = |t: f64| {
+            let order = |n: f64, size: f64| size * (TAU * n * actual_hz * t + n).cos();
+            5.0 + order(1.0, 1.0) + order(2.0, 0.5) + noise[(t * 1000.0).round() as usize]
+        };
+        let count = (seconds * 1000.0) as usize;
+        folder.write("in.csv", over_time("T [N m]", 1000.0, count, torque));
+        let args = ["harmonics", "in.csv", "--stand", "stand.toml", "--json"];
+        folder.json(&[&args[..], &["--fundamental", "30", "--orders", "1,2"]].concat())
+    };
+    for (actual_hz, seconds) in [(29.7, 2.0), (29.9, 10.0), (30.6, 2.0)] {
+        let report = run(actual_hz, seconds);
+        let warnings = report["warnings"].to_string();
+        assert!(
+            warnings.contains("fundamental-off"),
+            "{actual_hz}: {warnings}"
+        );
+        assert!(warnings.contains("--refine"), "{warnings}");
+    }
+    for seconds in [2.0, 10.0] {
+        let report = run(30.0, seconds);
+        assert!(!codes(&report).contains(&"fundamental-off"), "{report}");
+    }
+}

@@ -235,6 +235,9 @@ fn fit(
         chain.rated_n_m.map(|rated| rated * printed),
         &chain.applied.unit,
     ));
+    if !args.refine {
+        warnings.extend(speed::off(record, fundamental.frequency_hz, &orders));
+    }
     warnings.extend(speed::warning(record, fundamental.frequency_hz, &orders));
     warnings.extend(lost_warning(&components));
     warnings.extend(mains_warning(&components, duration_s));

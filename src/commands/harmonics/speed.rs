@@ -1,6 +1,6 @@
-//! Whether the speed changes over a record, which a fit of fixed frequencies cannot follow.
+//! Whether the speed is the one given and stays it, without which a fit of fixed frequencies is wrong.
 
-use torqcomp_dsp::harmonics::{Fundamental, refine_fundamental};
+use torqcomp_dsp::harmonics::{Fundamental, Harmonics, fit, refine_fundamental};
 use torqcomp_dsp::store::SampleStore;
 
 use crate::print::rounded;
@@ -19,6 +19,51 @@ const SPAN: f64 = 0.05;
 const SIGNIFICANT: f64 = 5.0;
 /// Turns that the highest order gains or loses over the record by a change that is worth saying.
 const TURNS: f64 = 0.2;
+
+/// Most samples from which the speed is found.
+const FIRST: usize = 1 << 17;
+/// Part of the components' power that a wrong speed loses before it is worth saying.
+const LOST: f64 = 0.02;
+/// Amplitude over its uncertainty from which a component is surely there.
+const THERE: f64 = 10.0;
+
+/// A warning if another fundamental near the given one leaves much less of the record over: the speed on the nameplate is
+/// not that of the record, and its components come out too small.
+pub(super) fn off(
+    record: &UniformRecord<Spool>,
+    fundamental_hz: f64,
+    orders: &[f64],
+) -> Option<Warning> {
+    let length = record.samples.count().min(FIRST);
+    if (length as f64) * fundamental_hz < FEWEST * record.rate_hz {
+        return None;
+    }
+    let samples = record.samples.part(0..length).ok()?;
+    let rate_hz = record.rate_hz;
+    let found = refine_fundamental(&samples[..], rate_hz, fundamental_hz, SPAN, orders).ok()?;
+    let of = |fundamental| fit(&samples[..], rate_hz, 0.0, fundamental, orders).ok();
+    let given: Harmonics = of(Fundamental::given(fundamental_hz))?;
+    let better = of(Fundamental::given(found.frequency_hz))?;
+    let power = |c: &torqcomp_dsp::harmonics::Component| 0.5 * c.phasor.norm_sqr();
+    let there = better.components.iter();
+    let is_there = there
+        .clone()
+        .any(|c| c.phasor.norm() > THERE * c.std_amplitude);
+    let lost = given.residual_rms.powi(2) - better.residual_rms.powi(2);
+    let shift_hz = (found.frequency_hz - fundamental_hz).abs();
+    let matters = lost > LOST * there.map(power).sum::<f64>();
+    (is_there && matters && shift_hz > SIGNIFICANT * found.std_hz?).then(|| {
+        let digits = rounded(found.frequency_hz, 7);
+        Warning::new(
+            "fundamental-off",
+            format!(
+                "the record fits a fundamental of {digits} Hz better than {} Hz, at which components come out too small and \
+                 their noise too: add --refine, or give --fundamental {digits}",
+                rounded(fundamental_hz, 7)
+            ),
+        )
+    })
+}
 
 /// A warning if the fundamental differs between the parts of a record by more than its uncertainty there, and by so much
 /// that the highest order loses its phase.

@@ -34,7 +34,7 @@ use crate::identify::student;
 const MOST_ORDERS: usize = 40;
 const SAMPLES_PER_ORDER: usize = 10;
 /// Largest part of the noise that counts as absorbed at a frequency.
-const MOST_ABSORBED: f64 = 0.9;
+const MOST_ABSORBED: f64 = 0.8;
 /// How often the colour is learnt again with what the fit absorbs of noise of the last colour.
 const REFINEMENTS: usize = 2;
 /// Fewest degrees of freedom, below which their linear estimate means nothing.
@@ -63,7 +63,8 @@ struct Transformed {
 /// dependent.
 ///
 /// `stretches`: residuals of each stretch; `groups`: stretches of one sampling rate; `jacobian`: derivatives by the
-/// parameters, over all stretches, of which the first `wanted` allow for what is not known of the spectrum.
+/// parameters, over all stretches. If `wanted` is not 0, the colour allows for what the fit absorbs of it, and the first
+/// `wanted` parameters for what is not known of the spectrum.
 pub(super) fn learn(
     stretches: &[Vec<f64>],
     groups: &[Range<usize>],
@@ -93,7 +94,7 @@ pub(super) fn learn(
     };
     let mut colours: Vec<NoiseColour> = each().map(|g| NoiseColour::first(g, size)).collect();
     let mut middle = gathered(&colours);
-    for _ in 0..REFINEMENTS {
+    for _ in 0..if wanted > 0 { REFINEMENTS } else { 0 } {
         let pairs = colours.iter().zip(each());
         colours = pairs.map(|(c, g)| c.refined(g, size, &middle)).collect();
         middle = gathered(&colours);

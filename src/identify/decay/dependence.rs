@@ -55,8 +55,8 @@ pub(super) fn damping_law(
 /// Smallest relative change of decay rate and of frequency between the halves of a decay that is reported.
 const NOTABLE: [f64; 2] = [0.02, 1e-4];
 
-/// The same in their standard uncertainties, which are enlarged for what is not known of the noise.
-const CHANGED: f64 = 3.0;
+/// The same in their standard uncertainties.
+const CHANGED: f64 = 4.0;
 
 /// Fits the early and the late half (in amplitude) separately and compares them.
 pub(super) fn amplitude_dependence(

@@ -66,11 +66,12 @@ pub fn identify(
     }
     present::lines(&mut result, &lines);
     present::fit_warnings(&mut result, &fit);
+    let reported = modes::with_honest_std(&fit, &stretches)?;
     let order = fit.by_strength(stretches.len());
     for (place, k) in order.iter().enumerate() {
         let mode = ModalPole::new(
             fit.poles[*k],
-            fit.fit.covariance.select(&[2 * k, 2 * k + 1]),
+            reported.fit.covariance.select(&[2 * k, 2 * k + 1]),
         );
         let names = [
             "damped_frequency",
@@ -86,7 +87,7 @@ pub fn identify(
     present::poor(&mut result, quality.relative);
     result.fit = Some(quality);
     result.method.push(present::method(&fit, stretches.len()));
-    present::correlations(&mut result, &fit);
+    present::correlations(&mut result, &reported);
     dependence::damping_law(&mut result, &fit, &stretches)?;
     dependence::amplitude_dependence(&mut result, &fit, &stretches, order[0]);
     by_hand::compare(&mut result, &fit, &stretches, order[0]);

@@ -185,7 +185,21 @@ pub(super) fn fit(stretches: &[Stretch], starts: &[Pole]) -> Result<ModesFit, Fi
             ..Options::default()
         },
     )?;
-    with_colour(fit, &problem)
+    with_colour(fit, &problem, 0)
+}
+
+/// The same fit with standard uncertainties of frequencies and damping that also hold where the noise has the colour of the
+/// modes. What is no noise, but a stand that is not linear, counts as such noise, so that nothing is judged by them.
+///
+/// # Errors
+/// [`FitError`] as of a fit.
+pub(super) fn with_honest_std(
+    found: &ModesFit,
+    stretches: &[Stretch],
+) -> Result<ModesFit, FitError> {
+    let modes = found.poles.len();
+    let problem = SineSum { stretches, modes };
+    with_colour(found.fit.clone(), &problem, 2 * modes)
 }
 
 /// Half the usual sampling rate, as an angular frequency.
@@ -198,7 +212,7 @@ fn fastest_rad_per_s(stretches: &[Stretch]) -> f64 {
 }
 
 /// The fit with its covariance for the colour of the noise.
-fn with_colour(mut fit: Fit, problem: &SineSum) -> Result<ModesFit, FitError> {
+fn with_colour(mut fit: Fit, problem: &SineSum, wanted: usize) -> Result<ModesFit, FitError> {
     let stretches = problem.stretches;
     let mut residuals = Vec::new();
     let mut from = 0;
@@ -211,7 +225,7 @@ fn with_colour(mut fit: Fit, problem: &SineSum) -> Result<ModesFit, FitError> {
     let mut jacobian = DMatrix::zeros(from, count);
     problem.jacobian(&fit.values, &mut jacobian)?;
     let groups = of_one_rate(stretches);
-    let wanted = free.iter().filter(|i| **i < 2 * problem.modes).count();
+    let wanted = free.iter().filter(|i| **i < wanted).count();
     let learnt = colour::learn(&residuals, &groups, &jacobian.select_columns(&free), wanted);
     let colours = match learnt {
         Some((colours, covariance)) => {

@@ -151,7 +151,7 @@ fn close(poles: &[Pole]) -> Option<f64> {
 
 /// Standard uncertainties by which the decay rate of the first mode and of any other one must differ from zero. A stand
 /// that rings has a mode, even if the record is too short to say much of its damping.
-const DECAYS: [f64; 2] = [0.5, 2.0];
+const DECAYS: [f64; 2] = [1.0, 2.0];
 
 /// Whether every mode decays significantly, swings more than once, and differs from the others.
 fn physical(found: &ModesFit, stretches: &[Stretch]) -> bool {
