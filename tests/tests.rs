@@ -36,6 +36,7 @@ mod simulate;
 mod stated_std;
 mod table;
 mod text_tables;
+mod text_values;
 mod thesis;
 mod times;
 mod ways;

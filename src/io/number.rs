@@ -21,7 +21,7 @@ const EXACT_MANTISSA: u64 = 1 << 53;
 
 /// Reads a number at `text[at..]`: its value and the position after it.
 ///
-/// `None` if no finite number begins there. `text` may go on with anything after it.
+/// `None` if no finite number begins there, or one with which instruments say that they have none. `text` may go on with anything after it.
 #[inline(always)]
 pub fn read(text: &[u8], at: usize, decimal: u8) -> Option<(f64, usize)> {
     read_as::<true>(text, at, decimal)
@@ -281,7 +281,21 @@ fn slow(text: &[u8], decimal: u8) -> Option<f64> {
             .collect();
         fast_float2::parse(&text).ok()?
     };
-    value.is_finite().then_some(value)
+    (value.is_finite() && !is_instruments_mark(value)).then_some(value)
+}
+
+/// Numbers with which instruments say that they have none: 9.91e37 is not a number, ±9.9e37 is over the range
+/// (SCPI-1999, volume 1, 7.2.1.4 and 7.2.1.5).
+const INSTRUMENTS_MARKS: [f64; 2] = [9.9e37, 9.91e37];
+/// Relative deviation of such a mark that went through an `f32` or was written in few digits.
+const OF_MARKS: f64 = 1e-5;
+
+/// Whether an instrument says with a number that it has none, or that the signal is over its range.
+#[must_use]
+pub fn is_instruments_mark(value: f64) -> bool {
+    INSTRUMENTS_MARKS
+        .iter()
+        .any(|mark| (value.abs() / mark - 1.0).abs() < OF_MARKS)
 }
 
 /// Reads a whole cell, spaces around it allowed.

@@ -142,6 +142,10 @@ fn non_finite_cells(name: &str, found: &NonFinite, axis: &TimeAxis, holes: &[Hol
         (HoleKind::Empty, "empty"),
         (HoleKind::Missing, "beyond the end of their line"),
         (HoleKind::NonFinite, "NaN or infinite"),
+        (
+            HoleKind::InstrumentsMark,
+            "9.91e37 or \u{b1}9.9e37, with which instruments mark no value or over range",
+        ),
         (HoleKind::Text, "text"),
     ];
     let counts: Vec<String> = kinds

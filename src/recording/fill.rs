@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use super::Recording;
 use super::memory_stream::used_stamps;
+use super::{Hole, HoleKind, Recording};
 use crate::failure::Failure;
 use crate::io::{Fill, Reading};
 use crate::print::plural;
@@ -58,10 +58,19 @@ impl Recording {
         channel.samples = filled.samples;
         channel.axis.stamps_s = Some(Arc::new(filled.stamps_s)).filter(|_| is_stamped);
         channel.axis.start = filled.first_s.map(|first_s| channel.axis.moment(first_s));
-        (channel.holes, channel.axis.holes) = (Vec::new(), Vec::new());
-        let warning = said(&channel.name, fill, &filled.spans, |after_s| {
+        let holes = std::mem::take(&mut channel.holes);
+        channel.axis.holes = Vec::new();
+        let mut warning = said(&channel.name, fill, &filled.spans, |after_s| {
             channel.axis.moment(after_s).short()
         });
+        let is_mark = |hole: &&Hole| hole.what == HoleKind::InstrumentsMark;
+        let marks = holes.iter().filter(is_mark).count();
+        if let Some(warning) = warning.as_mut().filter(|_| marks > 0) {
+            warning.message += &format!(
+                "; {} read 9.91e37 or \u{b1}9.9e37, with which instruments mark no value or over range",
+                plural(marks, "cell")
+            );
+        }
         let absolute = |span: FilledSpan| FilledSpan {
             from_s: span.from_s + origin_s,
             to_s: span.to_s + origin_s,

@@ -114,6 +114,9 @@ fn refuse_holes(channel: &Channel, by_stamps: bool) -> Result<(), Failure> {
         HoleKind::Missing => "is missing: the line ends before it",
         HoleKind::Empty => "is empty",
         HoleKind::NonFinite => "is not a finite number",
+        HoleKind::InstrumentsMark => {
+            "is 9.91e37 or \u{b1}9.9e37, with which instruments mark no value or over range"
+        }
         HoleKind::Text => "is a text, expected a number",
     };
     Err(Failure::failed(format_args!(

@@ -143,6 +143,8 @@ pub enum HoleKind {
     Empty,
     /// NaN, infinity, overflow.
     NonFinite,
+    /// A number with which instruments say that they have none: 9.91e37, ±9.9e37.
+    InstrumentsMark,
     /// A text.
     Text,
 }

@@ -27,6 +27,9 @@ impl Cell {
         if text.is_empty() {
             return Self::Empty;
         }
+        if let Some(plain) = with_plain_minus(text) {
+            return Self::read(&plain, decimal);
+        }
         if let Some(clock) = Clock::compact(text) {
             return Self::Clock(clock);
         }
@@ -67,6 +70,21 @@ impl Cell {
     }
 }
 
+/// A number with the minus sign of typesetters (U+2212) or an en dash in its place: `−0.5`, `1.5e–03`.
+fn with_plain_minus(text: &str) -> Option<String> {
+    let is_long = |c: char| matches!(c, '\u{2212}' | '\u{2013}');
+    let is_number = |c: char| c.is_ascii_digit() || matches!(c, '.' | ',' | '∞');
+    let mut plain = String::with_capacity(text.len());
+    let mut characters = text.chars().peekable();
+    while let Some(c) = characters.next() {
+        let is_sign = is_long(c)
+            && (plain.is_empty() || plain.ends_with(['e', 'E']))
+            && characters.peek().is_some_and(|next| is_number(*next));
+        plain.push(if is_sign { '-' } else { c });
+    }
+    (plain != text).then_some(plain)
+}
+
 /// Whether a cell says that there is no number: NaN, infinity and their Windows spellings.
 fn is_not_a_number(cell: &str) -> bool {
     const WORDS: [&str; 6] = ["nan", "inf", "infinity", "1.#qnan", "1.#ind", "1.#inf"];
@@ -90,10 +108,28 @@ fn fortran(text: &str, decimal: u8) -> Option<f64> {
 
 /// Ways to say that there is no number, besides those of floating point: over range, no value.
 pub fn is_non_finite(text: &str) -> bool {
-    const WORDS: [&str; 19] = [
+    const WORDS: [&str; 37] = [
         "burnout",
         "open",
+        "ol",
+        "+ol",
+        "-ol",
+        "o.l",
+        "o.l.",
+        "oload",
+        "ovl",
+        "overload",
         "overrange",
+        "over range",
+        "out of range",
+        "underrange",
+        "under range",
+        "underflow",
+        "no value",
+        "#div/0!",
+        "#num!",
+        "#ref!",
+        "#value!",
         "∞",
         "-∞",
         "+∞",
@@ -116,7 +152,16 @@ pub fn is_non_finite(text: &str) -> bool {
         || text.to_ascii_lowercase().starts_with("1.#")
         || WORDS.contains(&text.to_lowercase().as_str())
         || exceeds(text)
+        || is_instruments_mark(text)
         || is_over_range(text)
+}
+
+/// Whether a cell holds a number with which instruments say that they have none.
+#[must_use]
+pub fn is_instruments_mark(text: &str) -> bool {
+    let plain = text.replace(',', ".");
+    text.contains(|c: char| c.is_ascii_digit())
+        && plain.parse().is_ok_and(number::is_instruments_mark)
 }
 
 /// `+++++++` and `-------`, as Graphtec writes what lies beyond the range.
@@ -200,8 +245,37 @@ mod tests {
         assert_eq!(Cell::read("", b'.'), Cell::Empty);
         assert_eq!(Cell::read("-1.5D-03", b'.'), Cell::Number(-0.0015));
         assert_eq!(Cell::read("15D", b'.'), Cell::Text);
+        for (text, value) in [
+            ("\u{2212}0.25", -0.25),
+            ("\u{2013}.5", -0.5),
+            ("\u{2212}1.5e\u{2212}03", -0.0015),
+            ("9.8e37", 9.8e37),
+        ] {
+            assert_eq!(Cell::read(text, b'.'), Cell::Number(value), "{text}");
+        }
+        for text in ["10\u{2013}20", "\u{2212}", "\u{2013}", "a\u{2212}1"] {
+            assert_eq!(Cell::read(text, b'.'), Cell::Text, "{text}");
+        }
         for text in [
-            "NaN", "-∞", "-1.#IND", "1e999", "N/A", "BURNOUT", "+++++++", "-------",
+            "NaN",
+            "-∞",
+            "\u{2212}∞",
+            "-1.#IND",
+            "1e999",
+            "N/A",
+            "BURNOUT",
+            "+++++++",
+            "-------",
+            "----",
+            "OL",
+            "OVLD",
+            "Overload",
+            "#N/A",
+            "9.91E+37",
+            "+9.900000E+37",
+            "-9.9e37",
+            "9.90999998e37",
+            "99000000000000000000000000000000000000",
         ] {
             assert_eq!(Cell::read(text, b'.'), Cell::NonFinite, "{text}");
         }

@@ -6,6 +6,7 @@ use super::cell::Cell;
 use super::chunks::Chunks;
 use super::rows::cleaned;
 use super::table::FIRST_ROWS;
+use super::upward;
 use crate::failure::Failure;
 use crate::io::DialectOverride;
 use crate::recording::text::dialect::{Delimiter, Dialect, dialects, is_skipped};
@@ -145,7 +146,8 @@ fn find_in(head: &Head, marks: &DialectOverride) -> Result<Table, Failure> {
     });
     let strict = tables(head, &all, strict_row);
     if let Some(best) = best(&strict) {
-        let table = unambiguous(head, &strict, best)?.table.clone();
+        let mut table = unambiguous(head, &strict, best)?.table.clone();
+        table.first = upward::first_row(head, &table);
         return Ok(below_numbering(head, table));
     }
     let lenient = tables(head, &all, lenient_row);
@@ -411,9 +413,12 @@ fn has_heading(head: &Head, table: &Table) -> bool {
         let text = line.text.trim_start().trim_start_matches(['#', '%']);
         let cells = table.dialect.cells(text);
         cells.len() >= table.width
-            && cells[..table.width]
-                .iter()
-                .all(|cell| Cell::read(cell, table.dialect.decimal) == Cell::Text)
+            && cells[..table.width].iter().all(|cell| {
+                matches!(
+                    Cell::read(cell, table.dialect.decimal),
+                    Cell::Text | Cell::NonFinite
+                )
+            })
     })
 }
 

@@ -29,6 +29,7 @@ mod summary;
 mod table;
 mod tail;
 mod units;
+mod upward;
 mod vocabulary;
 
 use std::io::{Cursor, Read};

@@ -8,7 +8,7 @@ mod cut;
 mod plain_row;
 
 use super::blocks::TableEnd;
-use super::cell::Cell;
+use super::cell::{Cell, is_instruments_mark};
 use super::clock::Clock;
 use super::row_template::RowTemplate;
 use crate::failure::Failure;
@@ -266,6 +266,7 @@ impl Rows {
                 let after = after.filter(|(_, end)| *end == text.len());
                 Ok(after.map_or(value - origin as f64, |(after, _)| after))
             }
+            (_, Cell::NonFinite) if is_instruments_mark(text) => Err(HoleKind::InstrumentsMark),
             (_, Cell::NonFinite) => Err(HoleKind::NonFinite),
             _ => Err(HoleKind::Text),
         };

@@ -1,7 +1,7 @@
 //! One channel of a table, piece by piece.
 
 use super::axes::Role;
-use super::cell::is_non_finite;
+use super::cell::{is_instruments_mark, is_non_finite};
 use super::chunks::Chunks;
 use super::clock::unwrap_midnights;
 use super::last_line::shortened;
@@ -182,6 +182,10 @@ impl ChannelPlan {
                 shortened(line)
             ),
             Some("") => self.describe_empty(column, name),
+            Some(text) if is_instruments_mark(text) => format!(
+                "column {column} (\"{name}\") reads \"{text}\", with which instruments mark no value or over range; \
+                 {BRIDGE}"
+            ),
             Some(text) if is_non_finite(text) => format!(
                 "column {column} (\"{name}\") reads \"{text}\", which is not a finite number; {BRIDGE}"
             ),

@@ -1,0 +1,123 @@
+//! Cells that are no plain numbers: other minus signs, words and numbers that mark missing values.
+
+use crate::util::{COMPENSATE, Folder, assert_close, column};
+
+/// Two thousand samples of 6 N m with 2 N m at 10 Hz around it, at 1 kHz.
+fn torque(i: usize) -> f64 {
+    6.0 + 2.0 * (std::f64::consts::TAU * 0.01 * i as f64).sin()
+}
+
+fn table(cell: impl Fn(usize) -> String) -> String {
+    let rows: String = (0..2000)
+        .map(|i| format!("{:.3},{}\n", 1e-3 * i as f64, cell(i)))
+        .collect();
+    format!("Time [s],Torque [Nm]\n{rows}")
+}
+
+fn plain(i: usize) -> String {
+    format!("{:.6}", torque(i))
+}
+
+#[test]
+fn a_typeset_minus_is_a_minus() {
+    let folder = Folder::new();
+    let below = |minus: &'static str| {
+        let time = move |i: usize| format!("{:.3}", 1e-3 * (i as f64 - 500.0));
+        let rows: String = (0..2000)
+            .map(|i| format!("{},{:.6}\n", time(i), torque(i) - 6.5).replace('-', minus))
+            .collect();
+        format!("Time [s],Torque [Nm]\n{rows}")
+    };
+    let mut results = Vec::new();
+    for minus in ["-", "\u{2212}", "\u{2013}"] {
+        folder.write("in.csv", below(minus));
+        folder
+            .run(&[&COMPENSATE[..], &["--force"]].concat())
+            .says(0, &["2000 samples at 1000 Hz", "from -0.5 s"]);
+        let out = folder.read("out.csv");
+        results.push((
+            column(&out, "time_s"),
+            column(&out, "compensated_torque_n_m"),
+        ));
+    }
+    assert_eq!(results[0].0.len(), 2000);
+    assert!(results.iter().all(|result| *result == results[0]));
+}
+
+#[test]
+fn words_for_missing_values_neither_begin_nor_end_a_table() {
+    let folder = Folder::new();
+    for word in ["OL", "OVLD", "----", "Overload", "#N/A", "sensor lost"] {
+        for lost in [300..900, 0..300, 1900..1990] {
+            let content = table(|i| {
+                if lost.contains(&i) {
+                    word.to_owned()
+                } else {
+                    plain(i)
+                }
+            });
+            folder.write("in.csv", content);
+            let what = format!("{word} {lost:?}");
+            let report = folder.json(&["inspect", "in.csv", "--json"]);
+            let channel = &report["channels"][0];
+            assert_eq!(
+                (channel["name"].as_str(), channel["samples"].as_u64()),
+                (Some("Torque"), Some(2000)),
+                "{what}"
+            );
+            assert_eq!(
+                channel["non_finite"].as_u64(),
+                Some(lost.len() as u64),
+                "{what}: {channel}"
+            );
+            let refused = folder.run(&[&COMPENSATE[..], &["--force"]].concat());
+            refused.says(
+                1,
+                &[&format!("line {}", lost.start + 2), word, "--fill linear"],
+            );
+        }
+        // Every second sample around the peaks is lost; filled in, all are there.
+        let content = table(|i| {
+            if torque(i) > 7.0 && i % 2 == 1 {
+                word.to_owned()
+            } else {
+                plain(i)
+            }
+        });
+        folder.write("in.csv", content);
+        let filled = folder.run(&[&COMPENSATE[..], &["--force", "--fill", "linear"]].concat());
+        filled.says(0, &["2000 samples at 1000 Hz"]);
+    }
+}
+
+#[test]
+fn numbers_that_mark_missing_values_are_none() {
+    let folder = Folder::new();
+    for mark in ["9.91E+37", "9.9E+37", "-9.900000e+37"] {
+        folder.write(
+            "in.csv",
+            table(|i| if i == 700 { mark.to_owned() } else { plain(i) }),
+        );
+        let report = folder.run(&["inspect", "in.csv"]);
+        assert!(
+            report
+                .stdout
+                .contains("instruments mark no value or over range"),
+            "{}",
+            report.stdout
+        );
+        let report = folder.json(&["inspect", "in.csv", "--json"]);
+        assert_close(
+            report["channels"][0]["largest"].as_f64().unwrap(),
+            8.0,
+            1e-6,
+        );
+        folder
+            .run(&[&COMPENSATE[..], &["--force"]].concat())
+            .says(1, &["line 702", mark, "over range"]);
+        let run = folder.run(&[&COMPENSATE[..], &["--force", "--fill", "linear"]].concat());
+        run.says(0, &["[filled]", "no value or over range"]);
+        let out = column(&folder.read("out.csv"), "compensated_torque_n_m");
+        assert!(out.iter().all(|torque| torque.abs() < 10.0));
+    }
+}
