@@ -98,6 +98,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["non-finite-stamps", "cells of the time column hold no number", "repair them"],
         ["rate-contradicts-stamps", "the stated rate differs from that of the time stamps", "find out which is right, and give it with --rate"],
         ["rate-drift", "the rate of the first rows differs from the mean rate", "give --rate"],
+        ["rate-joins-gaps", "--rate joins the samples on both sides of gaps or backward steps in the time stamps", "leave out --rate if the stamps are right; bridge gaps with --fill, or leave them out with --range"],
         ["rate-overrides-stamps", "--rate differs from the rate of the stamps; --rate was used", "leave out --rate if the stamps are right"],
         ["repeated-stamps", "a time stamp equals the one before it", "remove the sample, or give --rate"],
         ["rounded-time-stamps", "the stamps are rounded to a quarter of a step or more; the rate is that of all of them", "nothing, or give --rate if it is known better"],

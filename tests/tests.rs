@@ -29,6 +29,7 @@ mod noise;
 mod once;
 mod output;
 mod predict;
+mod rates;
 mod recordings;
 mod refined;
 mod reports;

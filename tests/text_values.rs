@@ -121,3 +121,57 @@ fn numbers_that_mark_missing_values_are_none() {
         assert!(out.iter().all(|torque| torque.abs() < 10.0));
     }
 }
+
+#[test]
+fn decimal_commas_between_commas_are_asked_about() {
+    let folder = Folder::new();
+    let comma = |text: String| text.replace('.', ",");
+    let rows = |decimals: usize| -> String {
+        (0..2000)
+            .map(|i| {
+                comma(format!("{:.3}_{:.decimals$}\n", 1e-3 * i as f64, torque(i)))
+                    .replace('_', ",")
+            })
+            .collect()
+    };
+    let asks = [
+        "0,000,6,00",
+        "2 numbers with decimal commas",
+        "decimal points",
+        "semicolons",
+    ];
+    for heading in ["Zeit [s],Moment [Nm]\n", ""] {
+        folder.write("in.csv", format!("{heading}{}", rows(6)));
+        for more in [
+            &[][..],
+            &["--channel", "3", "--rate", "1000", "--unit", "N m"],
+        ] {
+            folder.run(&[&COMPENSATE[..], more].concat()).says(1, &asks);
+        }
+    }
+    // Whole numbers under as many headings are whole numbers.
+    let counts: String = (0..2000)
+        .map(|i| format!("{i},{},{},{}\n", i % 7, i % 10, i % 100))
+        .collect();
+    folder.write("counts.csv", format!("n,a,b,c\n{counts}"));
+    assert_eq!(folder.run(&["inspect", "counts.csv"]).code, 0);
+}
+
+#[test]
+fn the_heading_of_a_single_column_may_have_spaces() {
+    let folder = Folder::new();
+    let rows: String = (0..2000).map(|i| plain(i) + "\n").collect();
+    for (heading, name) in [
+        ("T [Nm]", "T"),
+        ("Motor torque (N m)", "Motor torque"),
+        ("# Drehmoment Nm", "Drehmoment"),
+    ] {
+        folder.write("in.csv", format!("{heading}\n{rows}"));
+        let run = folder.run(&[&COMPENSATE[..], &["--force", "--rate", "1000"]].concat());
+        run.says(0, &[&format!("{name} in N"), "2000 samples"]);
+    }
+    // A setting above a column is none of its headings.
+    folder.write("in.csv", format!("Sampling rate 1000 Hz\n{rows}"));
+    let report = folder.json(&["inspect", "in.csv", "--json"]);
+    assert_eq!(report["channels"][0]["name"], "column 1");
+}

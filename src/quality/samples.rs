@@ -3,6 +3,7 @@
 use torqcomp_dsp::quality::clipping::{Clipping, Rail, clipping};
 use torqcomp_dsp::quality::finite::{NonFinite, non_finite};
 use torqcomp_dsp::quality::mains::{Mains, mains};
+use torqcomp_dsp::quality::pile_up::pile_up;
 use torqcomp_dsp::quality::quantisation::{Quantisation, quantisation};
 use torqcomp_dsp::quality::repeats::{Repeats, repeats};
 use torqcomp_dsp::quality::stuck::{constant, standstills};
@@ -58,7 +59,7 @@ impl Findings {
     #[must_use]
     pub fn of(samples: &[f64], rate_hz: Option<f64>) -> Self {
         let (mean, std) = mean_and_std(samples).unzip();
-        let clipping = clipping(samples);
+        let clipping = clipping(samples).or_else(|| pile_up(samples));
         let rails = clipping.map(|c| [c.low, c.high]).unwrap_or_default();
         let at_rail = |run: &Run| rails.iter().flatten().any(|rail| rail.value == run.value);
         let mut standstills = standstills(samples);
@@ -175,14 +176,21 @@ fn non_finite_cells(name: &str, found: &NonFinite, axis: &TimeAxis, holes: &[Hol
 }
 
 fn clipped(name: &str, unit: &str, end: &str, rail: &Rail, axis: &TimeAxis) -> Warning {
+    let samples = plural(rail.samples, "sample");
+    let (level, there) = match rail.spread > 0.0 {
+        false => ("value", "exactly there".to_owned()),
+        true => (
+            "level",
+            format!("within {} there", with_unit(rail.spread, unit, 2)),
+        ),
+    };
     Warning::new(
         "clipped",
         format!(
-            "\"{name}\" is cut off at its {end} value of {}: {} are exactly there, in {} of up to {} \
+            "\"{name}\" is cut off at its {end} {level} of {}: {samples} are {there}, in {} of up to {} \
              samples that the signal enters or leaves in full motion, the first at {}; use a larger range of the \
              recorder, unless the signal itself is limited there",
             with_unit(rail.value, unit, 6),
-            plural(rail.samples, "sample"),
             plural(rail.runs, "run"),
             rail.longest,
             place(axis, rail.first)

@@ -7,7 +7,7 @@ use torqcomp_dsp::quality::steps::{Event, Events, Steps, rounded_steps, steps};
 
 use crate::print::plural;
 use crate::print::rounded as number;
-use crate::recording::{COARSE_STAMPS, Channel, TimeAxis, contradicted};
+use crate::recording::{COARSE_STAMPS, Channel, TimeAxis, contradicted, rates_of};
 use crate::warning::Warning;
 
 /// Largest deviation of a step, as a part of it, in an axis that counts as uniform.
@@ -83,7 +83,7 @@ impl TimeFindings {
         found.extend(gaps(whose, axis, steps));
         found.extend(match &self.rounded {
             Some(rounded) if rounded.quantum_s <= COARSE_STAMPS * rounded.step_s => None,
-            Some(rounded) => Some(rounded_stamps(whose, rounded)),
+            Some(rounded) => Some(rounded_stamps(whose, rounded, axis)),
             None => jitter(whose, steps),
         });
         found
@@ -211,12 +211,19 @@ fn jitter(whose: &str, steps: &Steps) -> Option<Warning> {
     ))
 }
 
-fn rounded_stamps(whose: &str, rounded: &Rounded) -> Warning {
+fn rounded_stamps(whose: &str, rounded: &Rounded, axis: &TimeAxis) -> Warning {
+    let ends = axis.stamps_s.as_ref().and_then(|stamps_s| {
+        let (first, last) = (stamps_s.first()?, stamps_s.last()?);
+        Some(last - first)
+    });
+    let allowed = ends.map_or_else(String::new, |span_s| {
+        format!(" (they allow {})", rates_of(rounded.steps_over(span_s)))
+    });
     Warning::new(
         "rounded-time-stamps",
         format!(
             "{whose}: the time stamps are written in multiples of {} s; but for that they are \
-             uniform, and all of them together give {} Hz",
+             uniform, and all of them together give {} Hz{allowed}",
             number(rounded.quantum_s, 3),
             number(1.0 / rounded.step_s, 9)
         ),

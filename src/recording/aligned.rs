@@ -105,6 +105,10 @@ impl AlignedChannels {
         let is_text = recording.format != "mcap";
         for (i, choice) in choices.iter().enumerate() {
             let place = if is_text { recording.place(choice)? } else { i };
+            let joined = recording.channels[place].joined_breaks(&recording.source, reading);
+            let is_new = |warning: &Warning| !recording.warnings.contains(warning);
+            let joined = joined.filter(is_new);
+            recording.warnings.extend(joined);
             recording.fill(place, reading)?;
         }
         let mut warnings = recording.all_warnings();
@@ -142,6 +146,7 @@ impl AlignedChannels {
         if is_given || !reading.resample && is_one_axis(&chosen, is_text)? {
             let count = chosen.iter().map(|c| c.channel.samples.len()).min();
             if !is_given {
+                chosen[0].channel.check_rounding(chosen[0].rate_hz)?;
                 let rounded = chosen[0]
                     .channel
                     .rounded_stamps(&aligned.source, chosen[0].rate_hz);

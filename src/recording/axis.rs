@@ -45,6 +45,8 @@ pub struct TimeAxis {
     pub stamps_in: Option<String>,
     /// Of samples that pass as a stream, the grid that their stamps lie on.
     pub(crate) grid: Option<StampGrid>,
+    /// Of samples that pass as a stream at a given rate, the grid of the stamps that they have besides.
+    pub(crate) beside: Option<StampGrid>,
     /// Nanoseconds since 1970, or since midnight, at which the stamps are zero, where the file gives dates or times of day.
     pub(crate) clock_ns: Option<i64>,
     /// Rate that the head of the file gives, in Hz, used or not.
@@ -179,12 +181,11 @@ impl SampleStep {
     /// Of a line through rounded stamps over a span: any step between two bounds, or one quantum more or less over the
     /// span, is as likely, which is half their distance over √3.
     pub(super) fn of_line(line: &Rounded, span: f64) -> Self {
-        let half = 0.5 * (line.steps_s[1] - line.steps_s[0]);
-        let half = match half > 0.0 {
-            true => half,
-            false => line.quantum_s * line.step_s / span,
-        };
-        Self::new(line.step_s, half / line.step_s / 3.0_f64.sqrt())
+        let [low, high] = line.steps_over(span);
+        Self::new(
+            line.step_s,
+            0.5 * (high - low) / line.step_s / 3.0_f64.sqrt(),
+        )
     }
 
     /// Of the mean of usual steps: their scatter is that of both ends, over all of them.

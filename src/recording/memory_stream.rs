@@ -27,6 +27,7 @@ impl ChannelStream {
     ) -> Result<Self, Failure> {
         let source = recording.source.clone();
         let place = recording.place(choice).map_err(|f| f.at(&source))?;
+        let joined = recording.channels[place].joined_breaks(&source, reading);
         recording.fill(place, reading).map_err(|f| f.at(&source))?;
         let selection = recording
             .select_at(place, choice, reading)
@@ -43,15 +44,20 @@ impl ChannelStream {
                 };
                 TimeAxis::of_stream(heading, grid, stamps, &[], reading)?
             }
-            None if reading.rate_hz.is_some() => TimeAxis::given(selection.rate_hz),
+            None if reading.rate_hz.is_some() => TimeAxis::given(selection.rate_hz, None),
             None => TimeAxis {
                 stamps_s: None,
                 start: Some(selection.start),
                 ..channel.axis.clone()
             },
         };
+        if !reading.any_steps {
+            time.check_rounding()
+                .map_err(|failure| failure.at(&source))?;
+        }
         let mut warnings = recording.warnings.clone();
         warnings.extend(selection.warnings.iter().cloned());
+        warnings.extend(joined);
         Ok(Self {
             dialect: recording.dialect.clone(),
             is_compensated: channel.is_compensated,

@@ -64,6 +64,9 @@ impl ChannelStream {
         let heading = messages::clock(&chosen.time);
         let time = blocks.axis(&heading, &later, reading);
         let time = time.map_err(|failure| failure.at(&name))?;
+        if !reading.any_steps {
+            time.check_rounding().map_err(|failure| failure.at(&name))?;
+        }
         Ok(Self {
             source: name,
             dialect: format!("MCAP, {}", messages::describe(&chosen)),
@@ -127,15 +130,16 @@ struct MessageBlocks {
 impl MessageBlocks {
     /// The time axis of the first messages and of stamps `later`, of a clock named by `heading`.
     fn axis(&self, heading: &str, later: &[f64], reading: &Reading) -> Result<TimeAxis, Failure> {
-        if let Some(rate_hz) = reading.rate_hz.filter(|_| !reading.resample) {
-            return Ok(TimeAxis::given(rate_hz));
-        }
         let grid = StampGrid {
             unit: "ns".to_owned(),
             seconds_per_unit: 1e-9,
             origin_ns: self.origin_ns,
             ..StampGrid::of_seconds()
         };
+        if let Some(rate_hz) = reading.rate_hz.filter(|_| !reading.resample) {
+            let beside = grid.beside_given_rate(&self.relative()?);
+            return Ok(TimeAxis::given(rate_hz, beside));
+        }
         TimeAxis::of_stream(heading, grid, &self.relative()?, later, reading)
     }
 

@@ -11,6 +11,10 @@ use crate::warning::Warning;
 
 /// Rounding of stamps, over their step, from which on it is said.
 pub(crate) const COARSE_STAMPS: f64 = 0.25;
+/// Relative uncertainty of the rate of rounded stamps from which on it is asked for. Off by 0.1 %, the inverse response
+/// of a stand with the damping ratio 0.02 is off by 0.001/0.02 = 5 % of itself at the resonance, and the phase of a
+/// component turns by a third of a degree in each of its periods.
+const TOLERABLE: f64 = 1e-3;
 /// Rates, over the recorded one, that stamps may be brought to.
 const RESAMPLED_RATES: (f64, f64) = (0.9, 1.4);
 
@@ -84,13 +88,18 @@ impl TimeAxis {
         })
     }
 
-    /// The axis of samples at a rate that the user gave; the first is at time 0.
-    pub(super) fn given(rate_hz: f64) -> Self {
-        Self {
-            rate_hz: Some(rate_hz),
-            rate_from: RateFrom::Given,
-            start: Some(Moment::default()),
-            ..Self::default()
+    /// Refuses a rate that the rounding of its stamps leaves open.
+    ///
+    /// # Errors
+    /// If the rates that the stamps allow differ too much.
+    pub(super) fn check_rounding(&self) -> Result<(), Failure> {
+        let of_stamps = matches!(self.rate_from, RateFrom::Stamps(_));
+        let (Some(grid), Some(rate_hz), true) = (&self.grid, self.rate_hz, of_stamps) else {
+            return Ok(());
+        };
+        match self.rate_std_hz.filter(|_| !grid.resampled) {
+            Some(std_hz) => grid.check_rounding(rate_hz, std_hz),
+            None => Ok(()),
         }
     }
 
@@ -139,12 +148,33 @@ impl StampGrid {
         self.quantum > self.step
     }
 
+    /// Whether stamps are rounded so coarsely that single steps mean little.
+    fn is_rounded_coarsely(&self) -> bool {
+        !self.resampled && self.quantum > COARSE_STAMPS * self.step
+    }
+
+    /// Refuses the rate of coarsely rounded stamps if its standard uncertainty, that of a rectangular distribution, is
+    /// that of rates too far apart.
+    fn check_rounding(&self, rate_hz: f64, std_hz: f64) -> Result<(), Failure> {
+        let part = 3.0_f64.sqrt() * std_hz / rate_hz;
+        if !self.is_rounded_coarsely() || part <= TOLERABLE {
+            return Ok(());
+        }
+        let step_s = 1.0 / rate_hz;
+        Err(Failure::failed(format_args!(
+            "the time stamps are rounded to {} s and allow {}; a resonance cannot be divided out with that: give the \
+             recorder's rate with --rate HZ",
+            digits::text(self.quantum * self.seconds_per_unit, 3),
+            rates_of([step_s * (1.0 - part), step_s * (1.0 + part)])
+        )))
+    }
+
     /// A warning if stamps are rounded so coarsely that single steps mean little; `span` is the time that they cover, in
     /// their unit.
     pub(super) fn rounded_warning(&self, source: &str, span: f64) -> Option<Warning> {
         let of_seconds = self.seconds_per_unit;
         let rate_hz = 1.0 / (self.step * of_seconds);
-        (!self.resampled && self.quantum > COARSE_STAMPS * self.step).then(|| {
+        self.is_rounded_coarsely().then(|| {
             Warning::new(
                 "rounded-time-stamps",
                 format!(
@@ -209,7 +239,7 @@ impl StampGrid {
     }
 
     /// A stamp as the file has it, with its unit.
-    fn time_text(&self, stamp: f64) -> String {
+    pub(super) fn time_text(&self, stamp: f64) -> String {
         match self.origin_ns {
             0 => format!("{} {}", digits::text(stamp, 12), self.unit),
             _ => self.moment(stamp).text(),
@@ -234,17 +264,31 @@ impl StampGrid {
             );
         }
         let length = (found.after - found.before) / step;
-        let is_gap = length > 1.5 && (length - length.round()).abs() < 0.1;
+        let is_gap = is_gap(length, 0.0);
         let remedy = match is_gap {
             true => "use --fill linear to bridge the gap, or --range to leave it out",
-            false => "use --resample to interpolate",
+            false => "use --resample to interpolate, or --rate HZ if the stamps are wrong",
         };
         format!(
             "the time stamps are not uniform: the step from {before} to {after} \
-             is {} times the usual one of {} {unit}; {remedy}, or --rate HZ if the stamps are wrong",
+             is {} times the usual one of {} {unit}; {remedy}",
             digits::text(length, 4),
             digits::text(*step, 6)
         )
+    }
+}
+
+/// Whether a step of so many usual ones, known to within `slack` of one, leaves out whole samples.
+pub(super) fn is_gap(length: f64, slack: f64) -> bool {
+    length > 1.5 + slack && (length - length.round()).abs() < 0.1 + slack
+}
+
+/// The rates between two steps in s, in words.
+pub(crate) fn rates_of([least_s, largest_s]: [f64; 2]) -> String {
+    let hz = |step_s: f64| digits::text(1.0 / step_s, 4);
+    match least_s > 1e-9 * largest_s {
+        true => format!("any rate from {} Hz to {} Hz", hz(largest_s), hz(least_s)),
+        false => format!("any rate from {} Hz on", hz(largest_s)),
     }
 }
 
@@ -262,6 +306,23 @@ impl Channel {
         let span_s = stamps_s.last()? - stamps_s.first()?;
         let grid = StampGrid::at_rate(rate_hz, self.axis.origin_ns, stamps_s);
         grid.rounded_warning(source, span_s)
+    }
+
+    /// Refuses a rate that the rounding of the stamps leaves open.
+    ///
+    /// # Errors
+    /// If the rates that the stamps allow differ too much.
+    pub(super) fn check_rounding(&self, rate_hz: f64) -> Result<(), Failure> {
+        let axis = &self.axis;
+        let by_stamps = matches!(axis.rate_from, RateFrom::Stamps(_));
+        let stamps_s = axis.stamps_s.as_ref().filter(|_| by_stamps);
+        match stamps_s.zip(axis.rate_std_hz) {
+            Some((stamps_s, std_hz)) => {
+                let grid = StampGrid::at_rate(rate_hz, axis.origin_ns, stamps_s);
+                grid.check_rounding(rate_hz, std_hz)
+            }
+            None => Ok(()),
+        }
     }
 
     /// The first of its stamps that is not uniform, if it is placed by stamps.

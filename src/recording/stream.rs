@@ -8,7 +8,7 @@ use super::memory_stream::used_stamps;
 use super::message_stream::MessageOrigin;
 use super::moment::Moment;
 use super::stamps::{StampGrid, is_uniform};
-use super::text::{ChannelPlan, StampColumn, TextFile, TextStream};
+use super::text::{ChannelPlan, StampColumn, StampUse, TextFile, TextStream};
 use super::validator::{StreamValidator, TextLines};
 use super::{FilledSpan, RateFrom, Recording, TimeAxis, checkpoints, progress};
 use crate::failure::Failure;
@@ -122,11 +122,16 @@ impl ChannelStream {
             stamps,
             row_bytes,
             behind_first_rows,
-        } = file.stream(place, are_stamps_read(&selection, reading));
+        } = file.stream(place, stamp_use(&selection, reading));
         let later = checkpoints::of_text(input, behind_first_rows, &plan)?;
+        let is_given = reading.rate_hz.is_some() && !reading.resample;
         let time = match stamps {
+            Some(stamps) if is_given => {
+                let beside = grid_of(&stamps).beside_given_rate(&stamps.first);
+                TimeAxis::given(selection.rate_hz, beside)
+            }
             Some(stamps) => axis_of_stamps(of_first_rows, &stamps, &later, reading)?,
-            None if reading.rate_hz.is_some() => TimeAxis::given(selection.rate_hz),
+            None if is_given => TimeAxis::given(selection.rate_hz, None),
             None => TimeAxis {
                 stamps_s: None,
                 start: Some(selection.start),
@@ -180,11 +185,28 @@ impl ChannelStream {
 
 /// Whether the stamps of a text are read beside its samples: a rate in the head is better than that of rounded stamps, but
 /// only stamps show a gap.
-fn are_stamps_read(selection: &Selection, reading: &Reading) -> bool {
+fn stamp_use(selection: &Selection, reading: &Reading) -> StampUse {
     let stamps_s = selection.channel.axis.stamps_s.as_ref();
     let are_checked = reading.rate_hz.is_none()
         && stamps_s.is_some_and(|stamps_s| is_uniform(stamps_s, selection.rate_hz));
-    are_checked || used_stamps(selection.channel, reading).is_some()
+    if are_checked || used_stamps(selection.channel, reading).is_some() {
+        StampUse::Placing
+    } else if reading.rate_hz.is_some() && stamps_s.is_some() {
+        StampUse::Watched
+    } else {
+        StampUse::Unread
+    }
+}
+
+/// How stamps are written, their step still unknown.
+fn grid_of(stamps: &StampColumn) -> StampGrid {
+    StampGrid {
+        unit: stamps.unit.to_owned(),
+        seconds_per_unit: stamps.seconds_per_unit,
+        copied: stamps.copied,
+        origin_ns: stamps.origin_ns,
+        ..StampGrid::of_seconds()
+    }
 }
 
 /// The axis of a column of stamps of which more will be read; a rate in the head is better than that of rounded stamps.
@@ -194,14 +216,13 @@ fn axis_of_stamps(
     later: &[f64],
     reading: &Reading,
 ) -> Result<TimeAxis, Failure> {
-    let grid = StampGrid {
-        unit: stamps.unit.to_owned(),
-        seconds_per_unit: stamps.seconds_per_unit,
-        copied: stamps.copied,
-        origin_ns: stamps.origin_ns,
-        ..StampGrid::of_seconds()
-    };
-    let found = TimeAxis::of_stream(&stamps.heading, grid, &stamps.first, later, reading)?;
+    let found = TimeAxis::of_stream(
+        &stamps.heading,
+        grid_of(stamps),
+        &stamps.first,
+        later,
+        reading,
+    )?;
     Ok(match &of_first_rows.rate_from {
         RateFrom::Header(_) if !reading.resample => TimeAxis {
             rate_hz: of_first_rows.rate_hz,

@@ -2,6 +2,7 @@
 
 use super::TimeAxis;
 use super::block::{Block, BlockSource};
+use super::joined::JoinedBreaks;
 use super::stamps::IrregularStep;
 use super::text::{ChannelPlan, Layout, LineNotes, Problem, is_end_of_data};
 use crate::failure::Failure;
@@ -31,6 +32,8 @@ pub(crate) struct StreamValidator {
     empty_line: Option<usize>,
     lost: Option<Warning>,
     warnings: Vec<Warning>,
+    /// Breaks in stamps that a given rate passes over.
+    joined: JoinedBreaks,
     /// Whether irregular stamps are only said.
     any_steps: bool,
 }
@@ -87,6 +90,7 @@ impl StreamValidator {
             empty_line: None,
             lost: None,
             warnings,
+            joined: JoinedBreaks::default(),
             any_steps,
         }
     }
@@ -101,6 +105,9 @@ impl StreamValidator {
             return Ok(());
         }
         self.pass_midnights(block);
+        if let Some(grid) = &self.time.beside {
+            self.joined.look(grid, self.last_stamp, &block.rows.times);
+        }
         if let Some(found) = self.irregular_step(block) {
             let line = self.line_of_row(block, found.row);
             if self.any_steps {
@@ -208,6 +215,10 @@ impl StreamValidator {
         if let Some(text) = &self.text {
             let more = text.layout.warnings(&text.notes, self.samples);
             self.warnings.extend(more);
+        }
+        if let Some(grid) = &self.time.beside {
+            let joined = self.joined.warning(&self.source, grid);
+            self.warnings.extend(joined);
         }
         if let Some(grid) = self.time.grid.as_ref().filter(|grid| !grid.resampled)
             && let Some((first, last)) = self.first_stamp.zip(self.last_stamp)

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::cell::Cell;
 use super::chunks::Chunks;
+use super::commas;
 use super::rows::cleaned;
 use super::table::FIRST_ROWS;
 use super::upward;
@@ -148,6 +149,9 @@ fn find_in(head: &Head, marks: &DialectOverride) -> Result<Table, Failure> {
     if let Some(best) = best(&strict) {
         let mut table = unambiguous(head, &strict, best)?.table.clone();
         table.first = upward::first_row(head, &table);
+        if marks.delimiter.is_none() {
+            commas::refuse(head, &table)?;
+        }
         return Ok(below_numbering(head, table));
     }
     let lenient = tables(head, &all, lenient_row);

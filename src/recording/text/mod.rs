@@ -11,6 +11,7 @@ mod blocks;
 mod cell;
 mod chunks;
 mod clock;
+mod commas;
 mod decode;
 mod dialect;
 mod encoding;
@@ -51,7 +52,7 @@ pub use last_line::{LastLine, last_line};
 use makers::Maker;
 use rows::ColumnKind;
 pub use rows::{LineNotes, RowPlan, place_of};
-pub use stream::{BRIDGE, ChannelPlan, ChannelRows, Problem, StampColumn, TextStream};
+pub use stream::{BRIDGE, ChannelPlan, ChannelRows, Problem, StampColumn, StampUse, TextStream};
 pub use table::Layout;
 use table::{FIRST_ROWS, Hints, ReadTable};
 
@@ -207,10 +208,10 @@ impl TextFile {
     }
 
     /// Reads one of its channels, by its place, piece by piece, unless it is held whole.
-    pub fn stream(self, channel: usize, with_stamps: bool) -> TextStream {
+    pub fn stream(self, channel: usize, stamp_use: StampUse) -> TextStream {
         let layout = self.layout.expect("a text that streams has one table");
         let place = layout.channel_places().nth(channel).unwrap_or(0);
-        TextStream::new(self.chunks, layout, place, with_stamps, self.is_decoded)
+        TextStream::new(self.chunks, layout, place, stamp_use, self.is_decoded)
     }
 }
 

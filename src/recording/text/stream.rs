@@ -28,6 +28,17 @@ pub struct TextStream {
     pub behind_first_rows: Option<u64>,
 }
 
+/// What the stamps beside a channel are read for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StampUse {
+    /// Not at all.
+    Unread,
+    /// The samples are placed by them.
+    Placing,
+    /// A rate is given in their place; gaps among them are said.
+    Watched,
+}
+
 /// A column of stamps.
 pub struct StampColumn {
     /// Its heading.
@@ -50,6 +61,8 @@ pub struct ChannelPlan {
     rows: RowPlan,
     time: Option<usize>,
     value: usize,
+    /// Whether the stamps are not needed: what cannot be read among them is no fault.
+    is_watched: bool,
     /// Whether stamps are times of day, which begin anew at midnight.
     pub is_time_of_day: bool,
     headings: Vec<String>,
@@ -93,15 +106,17 @@ impl TextStream {
         mut chunks: Chunks,
         layout: Layout,
         value: usize,
-        with_stamps: bool,
+        stamp_use: StampUse,
         is_decoded: bool,
     ) -> Self {
         let rule = match layout.axes.roles[value] {
             Role::Channel(rule) => layout.axes.rules[rule].stamps.clone(),
             _ => None,
         };
-        let stamps = rule.filter(|_| with_stamps);
-        let plan = ChannelPlan::new(&layout, stamps.as_ref().map(|rule| rule.place), value);
+        let stamps = rule.filter(|_| stamp_use != StampUse::Unread);
+        let is_watched = stamp_use == StampUse::Watched;
+        let time = stamps.as_ref().map(|rule| rule.place);
+        let plan = ChannelPlan::new(&layout, time, value, is_watched);
         chunks.skip(layout.offset);
         let rows = &layout.first_rows;
         let stamps = stamps.map(|rule| {
@@ -136,7 +151,7 @@ impl TextStream {
 }
 
 impl ChannelPlan {
-    fn new(layout: &Layout, time: Option<usize>, value: usize) -> Self {
+    fn new(layout: &Layout, time: Option<usize>, value: usize, is_watched: bool) -> Self {
         let last = value.max(time.unwrap_or(0));
         let kind = |place: usize| match Some(place) == time || place == value {
             true => layout.plan.kinds[place],
@@ -145,10 +160,11 @@ impl ChannelPlan {
         Self {
             rows: RowPlan {
                 kinds: (0..=last).map(kind).collect(),
-                stamps: time,
-                keeps_stamp_text: time.is_some(),
+                stamps: time.filter(|_| !is_watched),
+                keeps_stamp_text: time.is_some() && !is_watched,
                 ..layout.plan.clone()
             },
+            is_watched,
             is_time_of_day: time.is_some_and(|place| {
                 matches!(layout.plan.kinds[place], ColumnKind::Clock(first) if first.day.is_none())
             }),
@@ -230,7 +246,8 @@ impl ChannelRows {
         self.rows.begin(0, plan.rows.kinds.len());
         let end = self.rows.read(text, &plan.rows);
         self.ends = end.is_ok_and(|end| end < text.len());
-        let places = [plan.time.unwrap_or(plan.value), plan.value];
+        let time = plan.time.filter(|_| !plan.is_watched);
+        let places = [time.unwrap_or(plan.value), plan.value];
         self.rows.fill_together(&places);
         let holes = places.iter().filter_map(|place| {
             let hole = self.rows.columns[*place].holes.first()?;
@@ -239,7 +256,7 @@ impl ChannelRows {
         // The leftmost cell of the first line that is wrong.
         let first = holes.min_by_key(|(index, _, place)| (*index, *place));
         let filled = self.rows.columns[plan.value].values.len();
-        if filled < self.rows.count && plan.time.is_none() {
+        if filled < self.rows.count && time.is_none() {
             self.empty_at = Some(self.rows.line_of(filled));
         }
         self.lines = self.rows.line;

@@ -10,7 +10,7 @@ const SHORTEST: usize = 3;
 const LONGER: usize = 2;
 /// Resolution steps that a parabola through three rounded samples can be wrong by: (3 + 3 + 1)/2 of
 /// its own and a half of the extreme one.
-const ROUNDING: f64 = 4.0;
+pub(super) const ROUNDING: f64 = 4.0;
 /// Resolution, as a part of the range, that is assumed where it cannot be seen.
 const FINE: f64 = 1e-3;
 /// Part of the runs at the extreme value that must be cut off, not smooth.
@@ -32,7 +32,9 @@ pub struct Clipping {
 pub struct Rail {
     /// The value.
     pub value: f64,
-    /// Samples that have exactly this value.
+    /// Width of the part of the range in which the samples lie; 0 if all have exactly this value.
+    pub spread: f64,
+    /// Samples that have this value, or lie in that part.
     pub samples: usize,
     /// Runs of them that are longer than anywhere else.
     pub runs: usize,
@@ -132,6 +134,7 @@ fn rail(samples: &[f64], at: &[Run], sign: f64, step: f64) -> Option<Rail> {
         .count();
     (cut as f64 >= PART * at.len() as f64).then(|| Rail {
         value: first.value,
+        spread: 0.0,
         samples: samples.iter().filter(|x| **x == first.value).count(),
         runs: at.len(),
         longest: at.iter().map(|r| r.length).max().unwrap_or(0),
@@ -141,6 +144,12 @@ fn rail(samples: &[f64], at: &[Run], sign: f64, step: f64) -> Option<Rail> {
 
 /// Whether the signal was on its way beyond the run's value, before it or (backwards) after it.
 fn is_cut(samples: &[f64], run: &Run, sign: f64, tolerance: f64) -> bool {
+    let beyond = goes_beyond(samples, run, sign, run.value * sign + tolerance);
+    beyond.contains(&true)
+}
+
+/// Whether the signal was on its way beyond a bound (times `sign`) before a run, and backwards after it.
+pub(super) fn goes_beyond(samples: &[f64], run: &Run, sign: f64, bound: f64) -> [bool; 2] {
     let before = |distance: usize| run.start.checked_sub(1 + distance).map(|i| samples[i]);
     let after = |distance: usize| samples.get(run.end() + distance).copied();
     let passes = |at: &dyn Fn(usize) -> Option<f64>, s: usize| {
@@ -148,11 +157,16 @@ fn is_cut(samples: &[f64], run: &Run, sign: f64, tolerance: f64) -> bool {
             return false;
         };
         // Not true for samples that are no numbers.
-        sign * (3.0 * y1 - 3.0 * y2 + y3 - run.value) > tolerance
+        sign * (3.0 * y1 - 3.0 * y2 + y3) > bound
     };
-    std::iter::successors(Some(1), |s| Some(2 * s))
-        .take_while(|s| 2 * s <= run.length)
-        .any(|s| passes(&before, s) || passes(&after, s))
+    let distances = || {
+        let doubled = std::iter::successors(Some(1), |s| Some(2 * s));
+        doubled.take_while(|s| 2 * s <= run.length)
+    };
+    [
+        distances().any(|s| passes(&before, s)),
+        distances().any(|s| passes(&after, s)),
+    ]
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@
 //! | stamps that are rounded | [`rounding`] |
 //! | a stated rate that the stamps contradict | [`rate`] |
 //! | cells that are no finite numbers | [`finite`] |
-//! | clipping | [`clipping`](mod@clipping) |
+//! | clipping | [`clipping`](mod@clipping), under noise [`pile_up`](mod@pile_up) |
 //! | a channel that stands still | [`stuck`] |
 //! | samples that repeat the one before | [`repeats`](mod@repeats) |
 //! | coarse resolution | [`quantisation`](mod@quantisation) |
@@ -21,6 +21,7 @@ pub mod clipping;
 pub mod copies;
 pub mod finite;
 pub mod mains;
+pub mod pile_up;
 pub mod quantisation;
 pub mod rate;
 pub mod repeats;

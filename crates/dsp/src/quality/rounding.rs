@@ -15,6 +15,27 @@ pub struct Rounded {
     pub farthest_s: f64,
 }
 
+impl Rounded {
+    /// Least and largest step in s that stamps over a span in s allow: `b (1 ± q/span)` where no two steps bound them.
+    ///
+    /// ```
+    /// use torqcomp_dsp::quality::rounding::rounded;
+    /// // 10 Hz for two seconds, in whole seconds: 0 ten times, then 1 ten times; any step up to 2 s/19 fits.
+    /// let stamps: Vec<f64> = (0..20).map(|i| f64::from(i / 10)).collect();
+    /// let [least, largest] = rounded(&stamps).unwrap().steps_over(1.0);
+    /// assert!(least <= 0.0 && largest > 2.0 / 20.0);
+    /// ```
+    #[must_use]
+    pub fn steps_over(&self, span_s: f64) -> [f64; 2] {
+        let [low, high] = self.steps_s;
+        if low < high {
+            return [low, high];
+        }
+        let part = self.quantum_s / span_s;
+        [self.step_s * (1.0 - part), self.step_s * (1.0 + part)]
+    }
+}
+
 /// Fewest stamps that a line is laid through.
 const FEWEST: usize = 8;
 /// Least quantum, as a part of the step, that is worth saying: below it, steps stay within 1 %.

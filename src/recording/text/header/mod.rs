@@ -59,7 +59,10 @@ pub fn read(head: &Head, table: &Table, used: &[bool]) -> Header {
         .map(|(line, content)| Row {
             line,
             text: &content.text,
-            cells: split(&content.text, table, used),
+            cells: match lone_heading(head, table, line) {
+                Some(heading) => vec![heading],
+                None => split(&content.text, table, used),
+            },
         })
         .collect();
     let entries = |without: &[usize]| -> Vec<Entry> {
@@ -126,6 +129,28 @@ fn is_about_axis(key: &str) -> bool {
         keys::topic(key),
         Some(Rate | Interval | Start | Date | Count)
     )
+}
+
+/// Longest heading of a lone column, in words.
+const WORDS: usize = 4;
+
+/// The heading of the only column of a table, if a line right above it may be that: words, none of them a number or a
+/// key. Spaces would part it, where there is nothing else to part.
+fn lone_heading(head: &Head, table: &Table, line: usize) -> Option<String> {
+    let is_alone = table.width == 1 && table.dialect.delimiter == Delimiter::Spaces;
+    let between = &head.lines[line + 1..table.first];
+    if !is_alone || between.iter().any(|line| !line.text.trim().is_empty()) {
+        return None;
+    }
+    let text = uncommented(&head.lines[line].text).trim();
+    let words: Vec<&str> = text.split_whitespace().collect();
+    let is_word =
+        |word: &&str| !word.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c));
+    let is_heading = (2..=WORDS).contains(&words.len())
+        && words.iter().all(is_word)
+        && !text.contains(['=', ':', '\t'])
+        && keys::topic(text).is_none();
+    is_heading.then(|| text.to_owned())
 }
 
 /// Splits a line above the table as the table is split, or, if that does not give a cell for each

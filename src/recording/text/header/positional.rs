@@ -2,9 +2,9 @@
 
 use std::collections::HashSet;
 
-use super::Row;
 use super::field::Field;
 use super::keyed::{is_key_block, is_key_with_values, is_list_of_quantities, repeats_a_key};
+use super::{Row, WORDS};
 use crate::recording::text::cell::Cell;
 use crate::recording::text::head::Table;
 use crate::recording::text::units;
@@ -12,8 +12,6 @@ use crate::unit::NamedUnit;
 
 /// Lines above a table among which its headings are looked for.
 const LINES_FOR_HEADINGS: usize = 10;
-/// Longest heading of a lone column, in words.
-const WORDS: usize = 4;
 
 /// Columns named by the rows nearest above the data, and which lines those are.
 pub(super) struct Positional {

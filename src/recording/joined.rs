@@ -1,0 +1,127 @@
+//! Breaks in time stamps whose rate the user gave: the samples before and behind them are joined.
+
+use super::axis::{SampleStep, rounding, step_of};
+use super::stamps::{IrregularStep, StampGrid, is_gap};
+use super::{Channel, RateFrom, TimeAxis};
+use crate::io::{Reading, digits};
+use crate::print::plural;
+use crate::warning::Warning;
+
+/// Usual steps from which on a step is a break, whole or not.
+const LONG: f64 = 10.0;
+
+/// Breaks in the stamps of samples that are placed by a given rate, as they pass.
+#[derive(Debug, Default)]
+pub(super) struct JoinedBreaks {
+    /// Steps that leave out samples, and the first of them.
+    gaps: usize,
+    first_gap: Option<IrregularStep>,
+    /// Time that is left out, in the unit of the stamps.
+    missing: f64,
+    /// Steps backwards, and the first of them.
+    backwards: usize,
+    first_backwards: Option<IrregularStep>,
+}
+
+impl StampGrid {
+    /// The grid that stamps would lie on by themselves, where a rate is given in their place; `None` if they have no
+    /// usual step, so that nothing can be said of them.
+    pub(super) fn beside_given_rate(self, stamps: &[f64]) -> Option<Self> {
+        let origin = self.origin_ns as f64 * 1e-9 / self.seconds_per_unit;
+        let SampleStep { step, .. } = step_of(stamps, origin)?;
+        let mut parts = stamps.chunk_by(|a, b| !is_gap((b - a) / step, 0.0) && b >= a);
+        let quantum =
+            parts.find_map(|part| rounding(part, step, origin).map(|line| line.quantum_s));
+        Some(Self {
+            step,
+            quantum: quantum.unwrap_or(0.0),
+            ..self
+        })
+    }
+}
+
+impl JoinedBreaks {
+    /// Looks at the next stamps; `last` is the one before them.
+    pub(super) fn look(&mut self, grid: &StampGrid, last: Option<f64>, stamps: &[f64]) {
+        let slack = grid.quantum / grid.step;
+        let before = last.into_iter().chain(stamps.iter().copied());
+        let behind = stamps.iter().copied().skip(usize::from(last.is_none()));
+        for (row, (before, after)) in before.zip(behind).enumerate() {
+            let found = IrregularStep { row, before, after };
+            let length = (after - before) / grid.step;
+            if length < 0.0 {
+                self.backwards += 1;
+                self.first_backwards.get_or_insert(found);
+            } else if is_gap(length, slack) || length > LONG + slack {
+                self.gaps += 1;
+                self.missing += after - before - grid.step;
+                self.first_gap.get_or_insert(found);
+            }
+        }
+    }
+
+    /// What is said of them.
+    pub(super) fn warning(&self, source: &str, grid: &StampGrid) -> Option<Warning> {
+        let time = |stamp: f64| grid.time_text(stamp);
+        let gaps = self.first_gap.map(|gap| {
+            format!(
+                "leave out {} s in {} (about {}), first from {} to {}",
+                digits::text(self.missing * grid.seconds_per_unit, 4),
+                plural(self.gaps, "gap"),
+                plural((self.missing / grid.step).round() as usize, "sample"),
+                time(gap.before),
+                time(gap.after)
+            )
+        });
+        let backwards = self.first_backwards.map(|step| {
+            format!(
+                "run backwards {}, first from {} to {}",
+                plural(self.backwards, "time"),
+                time(step.before),
+                time(step.after)
+            )
+        });
+        let said: Vec<String> = gaps.into_iter().chain(backwards).collect();
+        (!said.is_empty()).then(|| {
+            Warning::new(
+                "rate-joins-gaps",
+                format!(
+                    "{source}: the time stamps {}; with --rate the samples on both sides are joined, and all times after \
+                     that are wrong by it. If the stamps are right, leave out --rate, and bridge gaps with --fill linear or \
+                     leave them out with --range",
+                    said.join(" and ")
+                ),
+            )
+        })
+    }
+}
+
+impl Channel {
+    /// What is said of breaks in its stamps where a rate is given in their place.
+    pub(super) fn joined_breaks(&self, source: &str, reading: &Reading) -> Option<Warning> {
+        reading.rate_hz.filter(|_| !reading.resample)?;
+        let stamps_s = self.axis.stamps_s.as_ref()?;
+        let grid = StampGrid {
+            origin_ns: self.axis.origin_ns,
+            ..StampGrid::of_seconds()
+        };
+        let grid = grid.beside_given_rate(stamps_s)?;
+        let mut breaks = JoinedBreaks::default();
+        breaks.look(&grid, None, stamps_s);
+        breaks.warning(source, &grid)
+    }
+}
+
+impl TimeAxis {
+    /// The axis of samples at a rate that the user gave, the first of them at time 0; `beside` is the grid of stamps that
+    /// they have besides.
+    pub(super) fn given(rate_hz: f64, beside: Option<StampGrid>) -> Self {
+        Self {
+            rate_hz: Some(rate_hz),
+            rate_from: RateFrom::Given,
+            start: Some(super::moment::Moment::default()),
+            beside,
+            ..Self::default()
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! Rates that stamps leave open, and gaps that a given rate passes over.
+
+use crate::util::{COMPENSATE, Folder, assert_close, column};
+
+/// Volts of sample `i`.
+fn volts(i: usize) -> f64 {
+    1e-3 * (0.0628 * i as f64).cos()
+}
+
+fn record(stamp: impl Fn(usize) -> String, samples: impl Iterator<Item = usize>) -> String {
+    let rows: String = samples
+        .map(|i| format!("{},{:.9}\n", stamp(i), volts(i)))
+        .collect();
+    format!("Time [s],bridge [V]\n{rows}")
+}
+
+fn compensate(folder: &Folder, more: &[&str]) -> crate::util::Ran {
+    folder.run(&[&COMPENSATE[..], &["--force"], more].concat())
+}
+
+/// 1 kHz for two seconds, the milliseconds dropped: two stamps, which any rate above 1999 samples in 3 s explains.
+#[test]
+fn stamps_in_whole_seconds_do_not_give_a_rate_for_a_resonance() {
+    let folder = Folder::new();
+    let clock = |i: usize| format!("10:00:0{}", i / 1000);
+    folder.write("in.csv", record(clock, 0..2000).replace("Time [s]", "Time"));
+    let asks = ["rounded to 1 s", "any rate from", "Hz on", "--rate HZ"];
+    compensate(&folder, &[]).says(1, &asks);
+    let response = ["--stand", "stand.toml"];
+    let runs: [&[&str]; 3] = [
+        &["harmonics", "in.csv", "--fundamental", "10"],
+        &[
+            "simulate",
+            "in.csv",
+            "--applied",
+            "bridge",
+            "--unit",
+            "N m",
+            "-o",
+            "s.csv",
+        ],
+        &["compensate", "-", "-o", "out.csv", "--force"],
+    ];
+    for run in runs {
+        folder
+            .pipe(&[run, &response].concat(), folder.read("in.csv").as_bytes())
+            .says(1, &asks);
+    }
+    compensate(&folder, &["--rate", "1000"]).says(0, &["2000 samples at 1000 Hz"]);
+    assert_close(
+        *column(&folder.read("out.csv"), "time_s").last().unwrap(),
+        1.999,
+        1e-9,
+    );
+    let inspected = folder.run(&["inspect", "in.csv"]);
+    assert!(
+        inspected.code == 0 && inspected.stdout.contains("any rate from"),
+        "{}",
+        inspected.stdout
+    );
+}
+
+/// 800 Hz in whole milliseconds: steps of 1 and 2 ms. Over 12.5 s they leave less than 0.01 % open.
+#[test]
+fn stamps_rounded_a_little_give_the_rate() {
+    let folder = Folder::new();
+    let stamp = |i: usize| format!("{:.3}", (i as f64 * 1.25).floor() * 1e-3);
+    folder.write("in.csv", record(stamp, 0..10_000));
+    compensate(&folder, &[]).says(0, &["at 800 Hz", "rounded-time-stamps"]);
+    let given = compensate(&folder, &["--rate", "800"]);
+    assert!(
+        given.code == 0 && !given.stderr.contains("rate-joins-gaps"),
+        "{}",
+        given.stderr
+    );
+}
+
+/// Twenty samples are missing after 0.499 s: a given rate joins the ends, and says so.
+#[test]
+fn a_given_rate_does_not_hide_a_gap() {
+    let folder = Folder::new();
+    let stamp = |i: usize| format!("{:.3}", 1e-3 * i as f64);
+    folder.write("in.csv", record(stamp, (0..500).chain(520..2000)));
+    let refused = compensate(&folder, &[]);
+    refused.says(1, &["21 times the usual one", "--fill linear", "--range"]);
+    assert!(!refused.stderr.contains("--rate"), "{}", refused.stderr);
+    let said = [
+        "[rate-joins-gaps]",
+        "leave out 0.02 s in 1 gap (about 20 samples)",
+        "from 0.499 s to 0.52 s",
+    ];
+    compensate(&folder, &["--rate", "1000"]).says(0, &said);
+    compensate(&folder, &["--rate", "1000", "--range", "0.1..1.9"]).says(0, &said);
+    compensate(&folder, &["--rate", "1000", "--strict"]).says(3, &said);
+    folder
+        .run(&[
+            "harmonics",
+            "in.csv",
+            "--stand",
+            "stand.toml",
+            "--fundamental",
+            "10",
+            "--rate",
+            "1000",
+        ])
+        .says(0, &said);
+    folder
+        .run(&["identify", "decay", "in.csv", "--rate", "1000"])
+        .stderr
+        .contains("rate-joins-gaps")
+        .then_some(())
+        .expect("identify says it too");
+    // Set back by a quarter of a second.
+    let back = |i: usize| format!("{:.3}", 1e-3 * i as f64 - if i < 500 { 0.0 } else { 0.25 });
+    folder.write("in.csv", record(back, 0..2000));
+    let said = [
+        "[rate-joins-gaps]",
+        "run backwards 1 time, first from 0.499 s to 0.25 s",
+    ];
+    compensate(&folder, &["--rate", "1000"]).says(0, &said);
+    // Uniform stamps, and stamps that are no times of samples, are nothing to speak of.
+    for stamp in [
+        |i: usize| format!("{:.3}", 1e-3 * i as f64),
+        |_: usize| "0.5".to_owned(),
+    ] {
+        folder.write("in.csv", record(stamp, 0..2000));
+        let ran = compensate(&folder, &["--rate", "1000", "--time-column", "1"]);
+        assert!(!ran.stderr.contains("rate-joins-gaps"), "{}", ran.stderr);
+    }
+}
