@@ -102,7 +102,8 @@ fn numbers_that_mark_missing_values_are_none() {
         assert!(
             report
                 .stdout
-                .contains("instruments mark no value or over range"),
+                .replace("\n      ", " ")
+                .contains("instruments for no value or over range"),
             "{}",
             report.stdout
         );

@@ -145,7 +145,7 @@ fn non_finite_cells(name: &str, found: &NonFinite, axis: &TimeAxis, holes: &[Hol
         (HoleKind::NonFinite, "NaN or infinite"),
         (
             HoleKind::InstrumentsMark,
-            "9.91e37 or \u{b1}9.9e37, with which instruments mark no value or over range",
+            "with 9.91e37 or \u{b1}9.9e37, the mark of instruments for no value or over range",
         ),
         (HoleKind::Text, "text"),
     ];

@@ -105,10 +105,6 @@ impl AlignedChannels {
         let is_text = recording.format != "mcap";
         for (i, choice) in choices.iter().enumerate() {
             let place = if is_text { recording.place(choice)? } else { i };
-            let joined = recording.channels[place].joined_breaks(&recording.source, reading);
-            let is_new = |warning: &Warning| !recording.warnings.contains(warning);
-            let joined = joined.filter(is_new);
-            recording.warnings.extend(joined);
             recording.fill(place, reading)?;
         }
         let mut warnings = recording.all_warnings();

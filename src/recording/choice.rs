@@ -236,7 +236,11 @@ impl Recording {
         choice: &ChannelChoice,
         reading: &Reading,
     ) -> Result<Selection<'_>, Failure> {
-        self.select_at(self.place(choice)?, choice, reading)
+        let selection = self.select_at(self.place(choice)?, choice, reading)?;
+        if reading.rate_hz.is_none() && !reading.resample && !reading.any_steps {
+            selection.channel.check_rounding(selection.rate_hz)?;
+        }
+        Ok(selection)
     }
 
     /// The same, where the place of the channel is known.

@@ -28,11 +28,15 @@ pub struct FilledSpan {
 }
 
 impl Recording {
-    /// Fills in what is missing of a channel, by its place, if that is asked for.
+    /// Fills in what is missing of a channel, by its place, if that is asked for. Says which gaps a given rate passes over.
     ///
     /// # Errors
     /// If a gap is too long to be filled.
     pub(crate) fn fill(&mut self, place: usize, reading: &Reading) -> Result<(), Failure> {
+        let joined = self.channels[place].joined_breaks(&self.source, reading);
+        let is_new = |warning: &Warning| !self.warnings.contains(warning);
+        let joined = joined.filter(is_new);
+        self.warnings.extend(joined);
         let fill = match reading.fill {
             None | Some(Fill::Refuse) => return Ok(()),
             Some(fill) => fill,

@@ -26,14 +26,11 @@ impl ChannelStream {
         reading: &Reading,
     ) -> Result<Self, Failure> {
         let source = recording.source.clone();
-        let place = recording.place(choice).map_err(|f| f.at(&source))?;
-        let joined = recording.channels[place].joined_breaks(&source, reading);
-        recording.fill(place, reading).map_err(|f| f.at(&source))?;
-        let selection = recording
-            .select_at(place, choice, reading)
-            .map_err(|f| f.at(&source))?;
+        let place = recording.place(choice)?;
+        recording.fill(place, reading)?;
+        let selection = recording.select_at(place, choice, reading)?;
         let channel = selection.channel;
-        check_cells(channel, reading).map_err(|failure| failure.at(&source))?;
+        check_cells(channel, reading)?;
         let stamps = used_stamps(channel, reading);
         let time = match &stamps {
             Some(stamps) => {
@@ -52,12 +49,10 @@ impl ChannelStream {
             },
         };
         if !reading.any_steps {
-            time.check_rounding()
-                .map_err(|failure| failure.at(&source))?;
+            time.check_rounding()?;
         }
         let mut warnings = recording.warnings.clone();
         warnings.extend(selection.warnings.iter().cloned());
-        warnings.extend(joined);
         Ok(Self {
             dialect: recording.dialect.clone(),
             is_compensated: channel.is_compensated,

@@ -74,7 +74,7 @@ impl ChannelStream {
         let name = input.name();
         if reading.is_partial() {
             let recording = Recording::read(input, std::slice::from_ref(choice), reading)?;
-            return Self::of_recording(recording, choice, reading);
+            return Self::of_recording(recording, choice, reading).map_err(|f| f.at(&name));
         }
         let mut bytes = progress::open(input)?;
         let unreadable = |error| Failure::failed(format_args!("{name}: cannot be read: {error}"));
@@ -91,7 +91,7 @@ impl ChannelStream {
         let file = TextFile::open(&name, bytes, reading).map_err(|f| f.at(&name))?;
         if file.held_whole.is_some() {
             let recording = file.read().map_err(|f| f.at(&name))?;
-            return Self::of_recording(recording, choice, reading);
+            return Self::of_recording(recording, choice, reading).map_err(|f| f.at(&name));
         }
         Self::of_text(input, file, choice, reading).map_err(|f| f.at(&name))
     }

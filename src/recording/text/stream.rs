@@ -207,7 +207,7 @@ impl ChannelPlan {
             ),
             Some(text) => format!(
                 "column {column} (\"{name}\") reads \"{}\", expected a number{}; correct or remove \
-                 the line",
+                 the line, or bridge it with --fill linear",
                 shortened(text),
                 other_mark(text, decimal)
             ),
