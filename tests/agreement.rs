@@ -65,6 +65,7 @@ const REASONS: [(&str, &[&str]); 5] = [
             "the sampling rate is unknown",
             "the sampling rate of",
             "gives no unit",
+            "allow any rate",
             "does not say its unit",
             "none is known to be the time",
         ],
