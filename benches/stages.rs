@@ -10,7 +10,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use num_complex::Complex64;
 use torqcomp::io::Reading;
 use torqcomp::io::digits::{self, Digits};
-use torqcomp::recording::text::{ChannelRows, TextFile};
+use torqcomp::recording::text::{ChannelRows, StampUse, TextFile};
 use torqcomp_dsp::band::Band;
 use torqcomp_dsp::bridge::{ArmLaw, Bridge, BridgeLayout, Supply};
 use torqcomp_dsp::compensate::{BlockConvolver, InverseFilter, whole_record};
@@ -44,7 +44,7 @@ fn filter() -> InverseFilter {
 fn parse(c: &mut Criterion) {
     let head = Cursor::new(format!("time_s,bridge_V\n{}", text(100)));
     let file = TextFile::open("bench", Box::new(head), &Reading::default()).expect("a table");
-    let plan = file.stream(0, true).plan;
+    let plan = file.stream(0, StampUse::Placing).plan;
     let mut group = c.benchmark_group("parse");
     for (name, count) in SIZES {
         let text = text(count);

@@ -64,9 +64,6 @@ impl ChannelStream {
         let heading = messages::clock(&chosen.time);
         let time = blocks.axis(&heading, &later, reading);
         let time = time.map_err(|failure| failure.at(&name))?;
-        if !reading.any_steps {
-            time.check_rounding().map_err(|failure| failure.at(&name))?;
-        }
         Ok(Self {
             source: name,
             dialect: format!("MCAP, {}", messages::describe(&chosen)),
@@ -140,7 +137,11 @@ impl MessageBlocks {
             let beside = grid.beside_given_rate(&self.relative()?);
             return Ok(TimeAxis::given(rate_hz, beside));
         }
-        TimeAxis::of_stream(heading, grid, &self.relative()?, later, reading)
+        let axis = TimeAxis::of_stream(heading, grid, &self.relative()?, later, reading)?;
+        if !reading.any_steps {
+            axis.check_rounding()?;
+        }
+        Ok(axis)
     }
 
     fn relative(&self) -> Result<Vec<f64>, Failure> {

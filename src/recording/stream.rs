@@ -124,15 +124,11 @@ impl ChannelStream {
             behind_first_rows,
         } = file.stream(place, stamp_use(&selection, reading));
         let later = checkpoints::of_text(input, behind_first_rows, &plan)?;
-        let is_given = reading.rate_hz.is_some() && !reading.resample;
-        let time = match stamps {
-            Some(stamps) if is_given => {
-                let beside = grid_of(&stamps).beside_given_rate(&stamps.first);
-                TimeAxis::given(selection.rate_hz, beside)
-            }
-            Some(stamps) => axis_of_stamps(of_first_rows, &stamps, &later, reading)?,
-            None if is_given => TimeAxis::given(selection.rate_hz, None),
-            None => TimeAxis {
+        let given_hz = reading.rate_hz.filter(|_| !reading.resample);
+        let time = match (stamps, given_hz) {
+            (stamps, Some(rate_hz)) => TimeAxis::given(rate_hz, stamps.and_then(beside_given_rate)),
+            (Some(stamps), None) => axis_of_stamps(of_first_rows, &stamps, &later, reading)?,
+            (None, None) => TimeAxis {
                 stamps_s: None,
                 start: Some(selection.start),
                 ..of_first_rows.clone()
@@ -207,6 +203,11 @@ fn grid_of(stamps: &StampColumn) -> StampGrid {
         origin_ns: stamps.origin_ns,
         ..StampGrid::of_seconds()
     }
+}
+
+/// The grid that stamps lie on by themselves.
+fn beside_given_rate(stamps: StampColumn) -> Option<StampGrid> {
+    grid_of(&stamps).beside_given_rate(&stamps.first)
 }
 
 /// The axis of a column of stamps of which more will be read; a rate in the head is better than that of rounded stamps.

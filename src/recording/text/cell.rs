@@ -85,6 +85,14 @@ fn with_plain_minus(text: &str) -> Option<String> {
     (plain != text).then_some(plain)
 }
 
+/// Whether some number may have a minus sign of typesetters, which no result may take over.
+#[must_use]
+pub fn has_typeset_minus(text: &[u8]) -> bool {
+    let spellings = [&b"\xE2\x88\x92"[..], b"\xE2\x80\x93", b"\x96"];
+    let mut spellings = spellings.into_iter();
+    spellings.any(|minus| memchr::memmem::find(text, minus).is_some())
+}
+
 /// Whether a cell says that there is no number: NaN, infinity and their Windows spellings.
 fn is_not_a_number(cell: &str) -> bool {
     const WORDS: [&str; 6] = ["nan", "inf", "infinity", "1.#qnan", "1.#ind", "1.#inf"];

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use super::axes::{AxisPlan, Role, Sources, StampRule};
 use super::blocks::{self, TableEnd};
-use super::cell::Cell;
+use super::cell::{Cell, has_typeset_minus};
 use super::chunks::{Chunks, Piece};
 use super::head::{self, Head, Table};
 use super::header::{self, Field, Header};
@@ -173,14 +173,9 @@ impl Layout {
         self.keep_offsets_of_time(&mut rows);
         let is_time = |role: &Role| *role == Role::Time;
         self.plan.stamps = self.axes.roles.iter().position(is_time);
-        if has_typeset_minus(text)
-            && self
-                .plan
-                .stamps
-                .is_some_and(|place| begins_below_zero(&rows.columns[place]))
-        {
-            self.held_whole =
-                Some("its time stamps have a minus sign that numbers elsewhere do not have");
+        let stamps = self.plan.stamps.map(|place| &rows.columns[place].values);
+        if stamps.is_some_and(|stamps| stamps.iter().any(|t| *t < 0.0)) && has_typeset_minus(text) {
+            self.held_whole = Some("its time stamps have a typeset minus");
         }
         if !blocks::restarts(&rows, &self.plan.kinds, &self.axes.roles).is_empty() {
             self.held_whole = Some("time begins anew within it");
@@ -389,17 +384,6 @@ impl ReadTable {
         let channels = self.blocks.iter().flatten();
         channels.map(|channel| channel.samples.len()).sum()
     }
-}
-
-/// Whether some number may have a minus sign of typesetters, which no result may take over.
-fn has_typeset_minus(text: &[u8]) -> bool {
-    let spellings = [&b"\xE2\x88\x92"[..], b"\xE2\x80\x93", b"\x96"];
-    let mut spellings = spellings.into_iter();
-    spellings.any(|minus| memchr::memmem::find(text, minus).is_some())
-}
-
-fn begins_below_zero(stamps: &Column) -> bool {
-    stamps.values.iter().any(|stamp| *stamp < 0.0)
 }
 
 /// A channel out of a column.
