@@ -5,6 +5,7 @@ mod help;
 pub mod identify;
 pub mod init;
 pub(crate) mod many;
+mod pages;
 pub mod simulate;
 mod values;
 
@@ -19,11 +20,23 @@ use crate::io::output::{Output, Policy};
 use crate::io::{ChannelChoice, Reading, frequency, positive_frequency};
 
 pub use diagnose::Diagnose;
+pub(crate) use help::command;
 pub use help::parse;
 pub use many::BatchOptions;
+pub use pages::{Completions, Man};
 pub use simulate::Simulate;
 pub use values::{BandOption, Orders};
 use values::{band, digits, orders, percent, range, svg_file, warning_code};
+
+/// Version, commit and target of this build.
+const BUILD: &str = concat!(
+    env!("CARGO_PKG_VERSION"),
+    " (",
+    env!("TORQCOMP_ORIGIN"),
+    ", ",
+    env!("TORQCOMP_TARGET"),
+    ")"
+);
 
 /// True torque from the records of a reaction-torque stand.
 ///
@@ -33,7 +46,7 @@ use values::{band, digits, orders, percent, range, svg_file, warning_code};
 /// Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but data were lost (or --strict turned a
 /// warning into a failure).
 #[derive(Debug, Parser)]
-#[command(name = "torqcomp", version, arg_required_else_help = true)]
+#[command(name = "torqcomp", version, long_version = BUILD, arg_required_else_help = true)]
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
@@ -66,6 +79,10 @@ pub enum Verb {
     Simulate(Simulate),
     /// Find the effects that a stand model lacks, with the error before and after
     Diagnose(Diagnose),
+    /// Print the script that completes the command line in a shell
+    Completions(Completions),
+    /// Print the manual page of the program or of a verb
+    Man(Man),
 }
 
 impl Verb {
@@ -90,7 +107,11 @@ impl Verb {
             Self::Identify(args) => Some(args.test.reading()),
             Self::Simulate(args) => Some(&args.reading),
             Self::Diagnose(args) => Some(&args.reading),
-            Self::Init(_) | Self::Table(_) | Self::Predict(_) => None,
+            Self::Init(_)
+            | Self::Table(_)
+            | Self::Predict(_)
+            | Self::Completions(_)
+            | Self::Man(_) => None,
         }
     }
 }

@@ -28,6 +28,7 @@ mod mutations;
 mod noise;
 mod once;
 mod output;
+mod pages;
 mod predict;
 mod rates;
 mod recordings;

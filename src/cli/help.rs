@@ -294,6 +294,20 @@ const EXAMPLES: &[(&str, [&str; 2])] = &[
             "torqcomp diagnose --stand stand.toml --train a.csv --applied 1 --measured 2 -o refined.toml",
         ],
     ),
+    (
+        "completions",
+        [
+            "torqcomp completions bash -o ~/.local/share/bash-completion/completions/torqcomp",
+            "torqcomp completions powershell",
+        ],
+    ),
+    (
+        "man",
+        [
+            "torqcomp man identify decay -o torqcomp-identify-decay.1",
+            "torqcomp man -o ~/.local/share/man/man1/",
+        ],
+    ),
 ];
 
 /// The command line with its help as people read it.

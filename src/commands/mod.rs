@@ -1,12 +1,14 @@
 //! The verbs, each a page: what it was asked, what it plans, what it computes, what it reports.
 
 mod compensate;
+mod completions;
 mod diagnose;
 mod extract;
 mod harmonics;
 mod identify;
 mod init;
 mod inspect;
+mod man;
 mod many;
 mod predict;
 mod rows;
@@ -43,6 +45,8 @@ pub fn run(cli: Cli) -> Result<Outcome, Failure> {
         Verb::Identify(args) => identify::run(&args),
         Verb::Simulate(args) => many::run(&args, &cli.options),
         Verb::Diagnose(args) => diagnose::run(&args),
+        Verb::Completions(args) => completions::run(&args),
+        Verb::Man(args) => man::run(&args),
     }
 }
 
