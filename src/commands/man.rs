@@ -137,9 +137,8 @@ mod tests {
     /// A page as a person reads it, without the marks of roff.
     fn plain(page: &[u8]) -> String {
         let text = String::from_utf8(page.to_vec()).unwrap();
-        text.replace("\\-", "-")
-            .replace("\\fR", "")
-            .replace("\\fB", "")
+        let text = text.replace("\\-", "-").replace("\\*(Aq", "'");
+        text.replace("\\fR", "").replace("\\fB", "")
     }
 
     fn check(command: &Command) {
@@ -150,11 +149,7 @@ mod tests {
             assert!(text.contains(&format!("--{option}")), "{name}: {option}");
         }
         for verb in command.get_subcommands() {
-            let about = verb
-                .get_about()
-                .unwrap()
-                .to_string()
-                .replace('\'', "\\*(Aq");
+            let about = verb.get_about().unwrap().to_string();
             assert!(text.contains(&about), "{name}: {about}\n{text}");
             assert_eq!(
                 find(&super::command(), &words(verb)).unwrap().get_name(),
