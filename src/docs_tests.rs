@@ -231,6 +231,9 @@ torque_per_volt = "1 N m/V"
 [diagnosed]
 "#;
 
+/// A mode beside it.
+const MODE: &str = "[[modes]]\nnatural_frequency = \"590 Hz\"\ndamping_ratio = 0.07\n";
+
 /// The other form of its calibration.
 const POINTS: &str = r#"[[calibration.points]]
 reading = "1 V"
@@ -264,6 +267,7 @@ fn asked(title: &str) -> Vec<String> {
         let whole = COMPLETE.replace("BEAM", beam).replace("PART", part);
         for text in [whole.clone(), whole.replace(modal.0, modal.1)] {
             let text = match title {
+                "[[modes]]" => text + MODE,
                 "[[calibration.points]]" => text.replace("torque_per_volt = \"1 N m/V\"", POINTS),
                 _ => text,
             };

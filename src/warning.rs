@@ -45,6 +45,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["signal-above-band", "much of the signal lies above the band and is left out", "choose a higher --band"],
     ]),
     ("Stand file", &[
+        ["residues-do-not-add-up", "the residues of [[modes]] leave much of the response at rest to modes above the band", "residues are parts of 1: check them"],
         ["scale-in-heading", "the heading of the channel names a scale such as x10, which was not applied", "say the unit with the scale, or rename the column"],
         ["calibration-not-used", "a record in strain was taken through the beam's drawing although a calibration is given", "record in the unit of the calibration"],
         ["damping-above-one", "the damping ratio is above 1", "write 7 % as 0.07"],
@@ -79,6 +80,8 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["noise-before-resonance", "the residual follows the resonance: the stand is driven by something else too, or the input is recorded with noise, which makes the gain too small", "reduce the noise of --applied, or excite more"],
         ["noisy-motion", "noise is a notable part of a regressor; it was corrected for", "use a longer window or a better sensor"],
         ["nonlinear", "the response has power at frequencies that were not applied: the stand is nonlinear", "look for the cause with diagnose"],
+        ["undamped-left-out", "a mode without damping was not written into the stand file", "choose fewer --modes, or record for longer"],
+        ["residues-unknown", "a decay shows several modes, but not their parts in the response to a torque", "add the residues, or use identify response"],
         ["not-anchored", "only ratios of the constants are determined", "declare the inertia or the stiffness"],
         ["not-converged", "the fit stopped before its minimum", "check the result, or choose another start"],
         ["not-viscous", "another law of damping fits the envelope better than viscous damping", "look for the cause with diagnose"],

@@ -9,6 +9,8 @@ mod closing;
 mod inspect;
 #[path = "measured/mcap_files.rs"]
 mod mcap_files;
+#[path = "measured/modes.rs"]
+mod modes;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -62,6 +64,8 @@ fn main() {
             closing::order_or_mains,
         ),
         test("hammer_modes_are_found", hammer),
+        test("hammer_hit_follows_from_modes", modes::hammer),
+        test("f16_levels_by_modes", modes::f16),
         test("frequencies_of_ringing_beams_are_found", ringing),
         test("recordings_hold_what_was_counted", recordings::all),
         test("recordings_have_segments", recordings::segments),

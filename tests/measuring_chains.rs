@@ -582,7 +582,7 @@ fn the_examples_of_the_stand_file_read_what_they_say() {
         );
         examples += 1;
     }
-    assert_eq!(examples, 11);
+    assert_eq!(examples, 12);
 }
 
 /// What `init` writes is a stand file that converts a record: 25 N m at 1 mV/V from papers and weights, 22.2 N m from the

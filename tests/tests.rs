@@ -24,6 +24,7 @@ mod measuring_chains;
 #[cfg(target_os = "linux")] // the system tells how much memory a process had at most
 mod memory;
 mod messages;
+mod modes;
 mod mutations;
 mod noise;
 mod once;

@@ -15,6 +15,7 @@ use std::path::Path;
 
 use torqcomp_dsp::compensate::InverseFilter;
 use torqcomp_dsp::noise::NoiseGain;
+use torqcomp_model::Mode;
 
 use self::band::{BandReport, Wanted};
 use self::report::{CompensateReport, NoiseAt, NoiseReport};
@@ -22,6 +23,7 @@ use self::sink::Sink;
 use super::{judged, unit_text, warned};
 use crate::cli::{self, OneChannel};
 use crate::failure::Failure;
+use crate::identify::Motion;
 use crate::inverse::ChainInverse;
 use crate::io::{Input, already_compensated};
 use crate::outcome::Made;
@@ -113,10 +115,23 @@ pub fn work(args: &cli::Compensate) -> Result<Made, Failure> {
     })
 }
 
+/// A record of speed or acceleration holds no constant torque, and what is slow drowns in its drift.
+fn refuse_derivative(stand: &Stand) -> Result<(), Failure> {
+    match stand.mechanics()?.measures {
+        Motion::Displacement => Ok(()),
+        other => Err(Failure::failed(format_args!(
+            "{}: [mechanics] measures says {}, which holds no constant torque, so that no torque over time comes out of it; \
+             use harmonics for the torques at single frequencies, or record displacement, strain or torque",
+            stand.file,
+            other.name()
+        ))),
+    }
+}
+
 impl Opened {
     fn new(args: &cli::Compensate) -> Result<Self, Failure> {
         let stand = stand::read(&args.stand)?;
-        stand.mechanics()?;
+        refuse_derivative(&stand)?;
         let OneChannel {
             choice, reading, ..
         } = &args.record;
@@ -214,16 +229,20 @@ impl Plan {
 
     /// A warning if the stand rings above half the sampling rate, and nothing before the recorder keeps that out.
     fn folded_ringing(&self) -> Option<Warning> {
-        let response = &self.stand.mechanics.as_ref()?.response;
         let limit_hz = 0.5 * self.stream.rate_hz;
-        let resonance_hz = response.natural_frequency_hz();
+        let modes = self.stand.modes().ok()?;
+        let above = modes.parts().iter().map(|part| part.mode);
+        let above = above.filter(|mode| mode.natural_frequency_hz() > limit_hz);
+        let first = |a: &Mode, b: &Mode| a.omega_rad_s.total_cmp(&b.omega_rad_s);
+        let mode = above.min_by(first)?;
+        let resonance_hz = mode.natural_frequency_hz();
         let is_kept_out = self
             .stand
             .recorder
             .low_pass
             .is_some_and(|low_pass| low_pass.cutoff_hz <= limit_hz);
-        let is_near = resonance_hz > limit_hz && resonance_hz < FAR_ABOVE * limit_hz;
-        (is_near && !is_kept_out && response.damping_ratio() < 0.5).then(|| {
+        let is_near = resonance_hz < FAR_ABOVE * limit_hz;
+        (is_near && !is_kept_out && mode.damping_ratio < 0.5).then(|| {
             Warning::new(
                 "resonance-above-nyquist",
                 format!(

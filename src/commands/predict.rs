@@ -362,12 +362,13 @@ impl Measured {
             Given::Modal {
                 natural_frequency,
                 damping_ratio,
-                ..
             } => Ok(Self {
                 natural_frequency: Some(natural_frequency.clone()),
                 damping_ratio: Some(damping_ratio.clone()),
                 ..Self::default()
             }),
+            // Constants of one inertia on one spring have no counterpart among several modes.
+            Given::Modes(_) => Ok(Self::default()),
         }
     }
 }

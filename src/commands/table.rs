@@ -7,6 +7,7 @@ use torqcomp_dsp::compensate::Inverse;
 use super::{Outcome, conclude, publish};
 use crate::cli::{self, Strictness};
 use crate::failure::Failure;
+use crate::identify::Motion;
 use crate::print::{Report, rounded};
 use crate::stand::{self, Mechanics, Stand};
 
@@ -52,7 +53,7 @@ pub fn run(args: &cli::Table) -> Result<Outcome, Failure> {
             "a table of {steps} rows is too long; choose a larger --step"
         )));
     }
-    let refined = match stand.effects.is_empty() {
+    let refined = match stand.effects.is_empty() && mechanics.measures == Motion::Displacement {
         true => None,
         false => Some(stand.inverse()?),
     };

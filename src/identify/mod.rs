@@ -180,6 +180,15 @@ fn correlations(names: &[&str], covariance: &Covariance) -> Vec<Correlation> {
     pairs.filter_map(strong).collect()
 }
 
+/// What each mode has in the response of a stand, as a stand file takes it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ModalShares {
+    /// Natural frequency, damping ratio, residue and quadrature of each mode.
+    pub modes: Vec<NamedEstimates>,
+    /// Measured per applied quantity at rest; of the displacement, if a derivative was measured.
+    pub gain: Estimate,
+}
+
 /// The result of an identification; serialises to the JSON document.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Identification {
@@ -220,6 +229,9 @@ pub struct Identification {
     /// The modes (`decay`: by falling energy; `response`: by rising frequency).
     #[serde(skip)]
     pub modes: Vec<ModalPole>,
+    /// What each mode has in the response, by rising frequency (`response` with several modes for a stand file).
+    #[serde(skip)]
+    pub(crate) shares: Option<ModalShares>,
 }
 
 impl Identification {

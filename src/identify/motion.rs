@@ -15,6 +15,18 @@ pub enum Motion {
 }
 
 impl Motion {
+    /// All of them.
+    pub(crate) const ALL: [Self; 3] = [Self::Displacement, Self::Speed, Self::Acceleration];
+
+    /// Its name in stand files.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Displacement => "displacement",
+            Self::Speed => "speed",
+            Self::Acceleration => "acceleration",
+        }
+    }
+
     /// Order of the derivative of displacement.
     pub(crate) fn order(self) -> i32 {
         match self {
@@ -26,8 +38,7 @@ impl Motion {
 
     /// The motion with a unit of this dimension, and whether it is a rotation.
     pub(crate) fn of(dimension: Dimension) -> Option<(Self, bool)> {
-        let all = [Self::Displacement, Self::Speed, Self::Acceleration];
-        let found = all
+        let found = Self::ALL
             .into_iter()
             .flat_map(|motion| [(motion, true), (motion, false)]);
         found.into_iter().find(|(motion, is_rotation)| {

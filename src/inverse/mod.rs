@@ -185,8 +185,8 @@ impl ChainInverse {
 /// The linear part of the way back, without factors whose inverse has no end in time.
 fn regular_inverse(chain: Arc<Chain>) -> Inverse {
     Arc::new(move |hz| {
-        let regular = |link: &Link| link.dies_out(&chain.mode);
-        chain.mode.inverse(TAU * hz) / chain.response_of(hz, regular)
+        let regular = |link: &Link| link.dies_out(&chain.stand);
+        chain.stand.inverse(TAU * hz) / chain.response_of(hz, regular)
     })
 }
 
@@ -286,8 +286,8 @@ impl Pass<'_> {
 
     /// Where a link blocks constants, takes off the slope that its inverse brings in.
     fn level(&mut self, links: &[&Link], before: &[f64]) {
-        let mode = self.inverse.chain.mode;
-        if links.iter().any(|link| link.blocks_constants(&mode)) {
+        let stand = &self.inverse.chain.stand;
+        if links.iter().any(|link| link.blocks_constants(stand)) {
             effects::level(before, &mut self.samples);
         }
     }
@@ -348,7 +348,7 @@ impl Pass<'_> {
         let rate_hz = self.rate_hz();
         let band = self.wide(&|_| Complex64::ONE);
         let chain = &self.inverse.chain;
-        let natural_hz = chain.mode.natural_frequency_hz();
+        let natural_hz = chain.stand.highest_hz();
         let gage_path = torques.iter().filter(|(_, in_path)| *in_path);
         let gage_path = gage_path.map(|(torque, _)| *torque).collect();
         let view = motion::View {
@@ -391,14 +391,14 @@ impl Pass<'_> {
         let band = self.inverse.band();
         let stand = |hz: f64| {
             let omega = TAU * hz;
-            held(&inverse, band, hz) * chain.mode.inverse(omega)
+            held(&inverse, band, hz) * chain.stand.inverse(omega)
         };
         let mut spectrum = self
             .extension
             .times(self.extension.spectrum(&self.samples), stand);
         if let Some(torque) = torque {
             let torque = self.extension.spectrum(torque);
-            let in_band = |hz: f64| Complex64::from(band.gain(hz));
+            let in_band = |hz: f64| held(&|hz| chain.torque_as_applied(hz), band, hz);
             spectrum = spectrum + self.extension.times(torque, in_band);
         }
         let applied = self.extension.samples(&spectrum);

@@ -8,7 +8,7 @@ use torqcomp_dsp::band::Band;
 
 use super::ChainInverse;
 use crate::failure::Failure;
-use crate::stand::{ConstantStd, Given, Stand, VariedConstant, combined};
+use crate::stand::{ConstantStd, Stand, VariedConstant, combined};
 
 /// Part of a constant's contribution by which the result may bend over its standard uncertainty.
 const STRAIGHT: f64 = 0.3;
@@ -147,14 +147,8 @@ impl Spread<'_> {
     fn name(&self, constant: VariedConstant) -> String {
         match constant {
             VariedConstant::OfMechanics(place) => {
-                match self.stand.mechanics.as_ref().map(|m| &m.given) {
-                    Some(Given::Constants { .. }) | None => {
-                        ["inertia", "damping", "stiffness"][place].to_owned()
-                    }
-                    Some(Given::Modal { .. }) => {
-                        ["natural frequency", "damping ratio", "stiffness"][place].to_owned()
-                    }
-                }
+                let mechanics = self.stand.mechanics.as_ref();
+                mechanics.map_or_else(String::new, |mechanics| mechanics.name(place))
             }
             VariedConstant::OfEffect(place, k) => {
                 let effect = &self.stand.effects[place];

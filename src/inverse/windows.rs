@@ -57,11 +57,11 @@ impl ChainInverse {
     /// whole: for lines and courses that are fitted to all of it, for what depends on its time or has memory of its own, for
     /// a coupling past the stand, and for links whose inverse does not die out.
     pub(crate) fn margin(&self) -> Option<usize> {
-        let mode = &self.chain.mode;
+        let stand = &self.chain.stand;
         let is_local = self.links().iter().all(|link| match &link.action {
             Action::Lines(_) | Action::Course(_) | Action::Feedthrough(_) => false,
             Action::Distortion(distortion) => distortion.is_pointwise(),
-            _ => link.dies_out(mode) && !link.blocks_constants(mode),
+            _ => link.dies_out(stand) && !link.blocks_constants(stand),
         });
         Some(self.lead()).filter(|lead| is_local && *lead <= OWN)
     }

@@ -4,7 +4,7 @@ use torqcomp_dsp::conversion::Conversion;
 use torqcomp_model::{Dimension, Estimate, Kind, RatioOf, Unit, UnitSystem};
 
 use super::static_law::StaticLaw;
-use super::{ConstantStd, Given, Stand, TransducerSignal};
+use super::{ConstantStd, Stand, TransducerSignal};
 use crate::failure::Failure;
 use crate::print::{rounded, short};
 use crate::unit::{NamedUnit, RecordedChannel};
@@ -226,10 +226,7 @@ impl Stand {
 
     /// Recorded over applied quantity at rest, if the stand file gives it.
     pub(crate) fn static_gain(&self) -> Option<&super::StaticGain> {
-        match &self.mechanics.as_ref()?.given {
-            Given::Modal { static_gain, .. } => static_gain.as_ref(),
-            Given::Constants { .. } => None,
-        }
+        self.mechanics.as_ref()?.static_gain.as_ref()
     }
 
     fn by_static_gain(

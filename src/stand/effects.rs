@@ -2,13 +2,15 @@
 
 use std::sync::Arc;
 
+use num_complex::Complex64;
 use torqcomp_dsp::compensate::Inverse;
-use torqcomp_model::effects::{EFFECTS, Effect, EffectParameter, Fixed, Form, Unit};
-use torqcomp_model::{Chain, Link, Mode, Unit as TextUnit};
+use torqcomp_model::effects::{Action, EFFECTS, Effect, EffectParameter, Fixed, Form, Stage, Unit};
+use torqcomp_model::{Chain, Link, ModalResponse, Unit as TextUnit};
 
 use super::Stand;
 use super::section::Section;
 use crate::failure::Failure;
+use crate::identify::Motion;
 
 /// An effect that the stand file declares.
 #[derive(Debug, Clone)]
@@ -26,6 +28,19 @@ pub struct DeclaredEffect {
 impl DeclaredEffect {
     fn link(&self) -> Link {
         Link::of(self.effect, self.form, &self.values)
+    }
+}
+
+/// What makes speed or acceleration of the displacement: `(jω)^m`.
+fn derivative(measures: Motion) -> Link {
+    let order = measures.order();
+    Link {
+        effect: measures.name(),
+        form: "",
+        stage: Stage::Gage,
+        action: Action::Factor(Box::new(move |_, omega| {
+            Complex64::new(0.0, omega).powi(order)
+        })),
     }
 }
 
@@ -105,16 +120,12 @@ impl Stand {
             .map_or("N m", |gain| gain.recorded_unit.as_str())
     }
 
-    /// The linear mode of the mechanics.
+    /// The modes of the mechanics.
     ///
     /// # Errors
     /// If the stand file gives no mechanics.
-    pub fn mode(&self) -> Result<Mode, Failure> {
-        let response = self.mechanics()?.response;
-        Ok(Mode {
-            omega_rad_s: std::f64::consts::TAU * response.natural_frequency_hz(),
-            damping_ratio: response.damping_ratio(),
-        })
+    pub fn modes(&self) -> Result<ModalResponse, Failure> {
+        Ok(self.mechanics()?.response.modal())
     }
 
     /// Recorded per applied quantity at rest, in SI units; 1 for a stand that records torque.
@@ -131,10 +142,28 @@ impl Stand {
         let recorder = self.recorder.recorder.clone();
         let is_ideal = recorder.is_ideal();
         let response: Fixed = Arc::new(move |frequency_hz| recorder.response(frequency_hz));
-        Ok(Chain::new(self.mode()?, self.gain())
+        let modes = self.modes()?;
+        self.refuse_unknown_shapes(&modes)?;
+        let measures = self.mechanics()?.measures;
+        let derivative = (measures != Motion::Displacement).then(|| derivative(measures));
+        Ok(Chain::new(modes, self.gain())
             .with_shift(self.diagnosed.shift)
             .with_recorder(Some(response), is_ideal)
+            .with_links(derivative)
             .with_links(self.effects.iter().map(DeclaredEffect::link)))
+    }
+
+    /// Torques push the gage by its own parts of the modes, which residues of both signs do not tell.
+    fn refuse_unknown_shapes(&self, modes: &ModalResponse) -> Result<(), Failure> {
+        let torque = self.effects.iter().find(|e| e.form.stage == Stage::Stand);
+        match (torque, modes.at_gage()) {
+            (Some(torque), None) => Err(Failure::failed(format_args!(
+                "{}: the effect \"{}\" acts at the gage, and how far it moves each mode there does not follow from residues of \
+                 both signs; give shape_at_load and shape_at_gage of [[modes]] in place of residue, or leave the effect out",
+                self.file, torque.effect.name
+            ))),
+            _ => Ok(()),
+        }
     }
 
     /// What a compensation multiplies by: the inverse response of the chain.
@@ -142,7 +171,7 @@ impl Stand {
     /// # Errors
     /// If the stand file gives no mechanics, or an effect that no division takes out.
     pub fn inverse(&self) -> Result<Inverse, Failure> {
-        let plain = self.mechanics()?.response;
+        let plain = self.mechanics()?.response.clone();
         let chain = self.chain()?;
         if let Some(link) = chain.links().iter().find(|link| !link.is_linear()) {
             return Err(Failure::failed(format_args!(

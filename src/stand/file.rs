@@ -3,15 +3,15 @@
 use std::path::Path;
 
 use toml_edit::Document;
-use torqcomp_model::{Estimate, Kind, ParameterStd, SecondOrder, Unit};
+use torqcomp_model::Unit;
 
 use super::drawing::{beam, friction, part, unusual_modulus};
 use super::effects::effect;
 use super::measured::calibration;
 use super::measuring::{bridge, gage, recorder};
+use super::mechanics::mechanics;
 use super::section::{Section, SourceText};
-use super::update::CORRELATIONS;
-use super::{Diagnosed, Given, Mechanics, Stand, StaticGain, TransducerSignal};
+use super::{Diagnosed, Mechanics, Stand, TransducerSignal};
 use crate::failure::Failure;
 use crate::io::storage;
 use crate::print::short;
@@ -61,7 +61,7 @@ pub fn parse(name: &str, text: &str) -> Result<Stand, Failure> {
     let mut stand = Stand {
         name: top.text("name")?.unwrap_or("unnamed stand").to_owned(),
         file: name.to_owned(),
-        mechanics: one(&top, "mechanics", mechanics)?,
+        mechanics: mechanics(&top)?,
         calibration: one(&top, "calibration", calibration)?,
         beam: one(&top, "beam", beam)?,
         parts: top
@@ -114,8 +114,8 @@ fn check_schema(top: &Section) -> Result<(), Failure> {
 
 /// What can hardly be meant.
 fn oddities(stand: &Stand) -> Vec<Warning> {
-    let ratio = stand.mechanics.as_ref().map(|m| m.response.damping_ratio());
-    let overdamped = ratio.filter(|ratio| *ratio > 1.0).map(|ratio| {
+    let modes = stand.mechanics.iter().flat_map(Mechanics::damping_ratios);
+    let overdamped = modes.filter(|ratio| *ratio > 1.0).map(|ratio| {
         Warning::new(
             "damping-above-one",
             format!(
@@ -126,7 +126,11 @@ fn oddities(stand: &Stand) -> Vec<Warning> {
         )
     });
     let modulus = stand.beam.as_ref().and_then(unusual_modulus);
-    overdamped.into_iter().chain(modulus).collect()
+    let left = stand
+        .mechanics
+        .as_ref()
+        .and_then(|m| m.much_left(&stand.file));
+    overdamped.chain(modulus).chain(left).collect()
 }
 
 /// What would convert the record twice, or give its zero twice.
@@ -148,190 +152,6 @@ fn one_calibration(top: &Section, stand: &Stand) -> Result<(), Failure> {
         ));
     }
     Ok(())
-}
-
-fn mechanics(section: &Section) -> Result<Mechanics, Failure> {
-    let modal = section.has("natural_frequency") || section.has("damping_ratio");
-    let constants = ["inertia", "damping", "stiffness"];
-    if modal && let Some(key) = constants.iter().find(|key| section.has(key)) {
-        return Err(section.fail(
-            key,
-            "give either inertia, damping and stiffness, or natural_frequency and damping_ratio",
-        ));
-    }
-    let mechanics = if modal {
-        modal_mechanics(section)?
-    } else {
-        let inertia = section.positive("inertia", Kind::Inertia)?;
-        let damping = section.not_negative("damping", Kind::AngularDamping)?;
-        let stiffness = section.positive("stiffness", Kind::AngularStiffness)?;
-        let common = common_std(section)?;
-        let correlations = correlations(section)?;
-        if common > 0.0 && correlations != [0.0; 3] {
-            return Err(section.fail(
-                "common_std",
-                "the correlations include what the three constants share; keep one of them",
-            ));
-        }
-        let own = |estimate: &Estimate| own_std(section, estimate, common);
-        let response = SecondOrder::new(inertia.value(), damping.value(), stiffness.value())
-            .map_err(|error| section.fail("", error))?;
-        // So that the message about an unknown key lists those of both forms.
-        let _ = (
-            section.raw("natural_frequency"),
-            section.raw("damping_ratio"),
-        );
-        Mechanics {
-            response,
-            std: ParameterStd {
-                inertia_kg_m2: own(&inertia)?,
-                damping_n_m_s_per_rad: own(&damping)?,
-                stiffness_n_m_per_rad: own(&stiffness)?,
-                static_gain_relative: None,
-                correlations,
-            },
-            given: Given::Constants {
-                inertia,
-                damping,
-                stiffness,
-            },
-        }
-    };
-    section.finish()?;
-    Ok(mechanics)
-}
-
-/// Relative standard uncertainty that inertia, damping and stiffness share, since two of them follow from the third.
-fn common_std(section: &Section) -> Result<f64, Failure> {
-    let Some(common) = section.quantity("common_std", Kind::Ratio)? else {
-        return Ok(0.0);
-    };
-    if common.value() >= 0.0 {
-        return Ok(common.value());
-    }
-    Err(section.fail("common_std", "expected a ratio of zero or more"))
-}
-
-/// Correlation coefficients of inertia and damping, inertia and stiffness, damping and stiffness.
-fn correlations(section: &Section) -> Result<[f64; 3], Failure> {
-    let mut found = [0.0; 3];
-    for (key, value) in CORRELATIONS.into_iter().zip(&mut found) {
-        if let Some(given) = section.quantity(key, Kind::Ratio)? {
-            *value = given.value();
-        }
-        if value.abs() > 1.0 {
-            return Err(section.fail(key, "expected a correlation from -1 to 1"));
-        }
-    }
-    Ok(found)
-}
-
-/// Largest part by which the common uncertainty may exceed the whole one: both are rounded.
-const ROUNDED: f64 = 1e-6;
-
-/// What is left of a standard uncertainty without the common part, which cancels in every ratio of the constants: the
-/// stand's response follows from these alone.
-fn own_std(section: &Section, estimate: &Estimate, common: f64) -> Result<Option<f64>, Failure> {
-    let Some(std) = estimate.std_uncertainty() else {
-        return Ok(None);
-    };
-    let shared = common * estimate.value();
-    if shared > std * (1.0 + ROUNDED) {
-        return Err(section.fail(
-            "common_std",
-            "expected no more than the relative std of inertia, damping and stiffness, which hold it",
-        ));
-    }
-    Ok(Some((std * std - shared * shared).max(0.0).sqrt()))
-}
-
-/// Asks for a natural frequency in 1/s, which is one in Hz to some and an angular one to others.
-fn refuse_bare_rate(section: &Section) -> Result<(), Failure> {
-    let Some(text) = section.raw("natural_frequency")? else {
-        return Ok(());
-    };
-    let (number, unit) = text.trim().split_once(' ').unwrap_or_default();
-    match unit.replace([' ', '{', '}'], "").as_str() {
-        "1/s" | "/s" | "s^-1" | "s-1" | "s⁻¹" => Err(section.fail(
-            "natural_frequency",
-            format_args!(
-                "\"{text}\" can be read as cycles or as radians a second; write \"{number} Hz\" or \"{number} rad/s\""
-            ),
-        )),
-        _ => Ok(()),
-    }
-}
-
-fn modal_mechanics(section: &Section) -> Result<Mechanics, Failure> {
-    refuse_bare_rate(section)?;
-    let natural_frequency = section.positive("natural_frequency", Kind::Frequency)?;
-    let damping_ratio = section.not_negative("damping_ratio", Kind::Ratio)?;
-    let static_gain = static_gain(section)?;
-    let response =
-        SecondOrder::from_natural_frequency(natural_frequency.value(), damping_ratio.value())
-            .map_err(|error| section.fail("", error))?;
-    // With the stiffness fixed, J = 1/ω² and f = 2ζ/ω: u(J)/J = 2 u(ω)/ω, u(f)/f ≈ u(ζ)/ζ.
-    let frequency_part = natural_frequency
-        .std_uncertainty()
-        .map(|std| std / natural_frequency.value());
-    let std = ParameterStd {
-        inertia_kg_m2: frequency_part.map(|part| 2.0 * part * response.inertia_kg_m2()),
-        damping_n_m_s_per_rad: damping_ratio.std_uncertainty().map(|std| {
-            2.0 * std * response.stiffness_n_m_per_rad()
-                / (std::f64::consts::TAU * natural_frequency.value())
-        }),
-        ..ParameterStd::default()
-    };
-    Ok(Mechanics {
-        response,
-        std,
-        given: Given::Modal {
-            natural_frequency,
-            damping_ratio,
-            static_gain,
-        },
-    })
-}
-
-/// `"1 V/V"`: recorded over applied, each in its own unit.
-fn static_gain(section: &Section) -> Result<Option<StaticGain>, Failure> {
-    let Some((text, std)) = section.raw_with_std("static_gain")? else {
-        return Ok(None);
-    };
-    let (value, recorded_unit, applied_unit) = gain(section, &text)?;
-    if value == 0.0 || !value.is_finite() {
-        return Err(section.fail(
-            "static_gain",
-            "the gain must be a finite number other than zero",
-        ));
-    }
-    let std = std.map(|std| gain(section, &std)).transpose()?;
-    if std.as_ref().is_some_and(|(std, ..)| *std < 0.0) {
-        return Err(section.fail("static_gain", "std must be zero or more"));
-    }
-    Ok(Some(StaticGain {
-        value,
-        recorded_unit,
-        applied_unit,
-        relative_std: std.map(|(std, ..)| std / value.abs()),
-    }))
-}
-
-/// A gain in SI units, and the units of record and applied quantity as written.
-fn gain(section: &Section, text: &str) -> Result<(f64, String, String), Failure> {
-    let expected = "expected recorded over applied unit, as in \"1 V/V\" or \"2.5 mV/N\"";
-    let wrong = || section.fail("static_gain", format_args!("\"{text}\": {expected}"));
-    let (number, units) = text.trim().split_once(' ').ok_or_else(wrong)?;
-    let value: f64 = number.parse().map_err(|_| wrong())?;
-    let (recorded, applied) = units.split_once('/').ok_or_else(wrong)?;
-    let applied = applied.trim().trim_start_matches('(').trim_end_matches(')');
-    let factor = |unit: &str| {
-        Unit::parse(unit)
-            .map(|unit| unit.factor())
-            .map_err(|error| section.fail("static_gain", error))
-    };
-    let value = value * factor(recorded)? / factor(applied)?;
-    Ok((value, recorded.trim().to_owned(), applied.to_owned()))
 }
 
 /// What a diagnosis wrote about itself; what is not used is for people.

@@ -7,6 +7,8 @@ mod file;
 pub(crate) mod keys;
 mod measured;
 mod measuring;
+mod mechanics;
+mod modes;
 mod refine;
 mod section;
 mod signal;
@@ -14,16 +16,20 @@ mod static_law;
 mod uncertainty;
 pub mod update;
 
+use num_complex::Complex64;
+use std::f64::consts::TAU;
 use torqcomp_dsp::bridge::{BridgeLayout, Leads, Supply};
 use torqcomp_dsp::recorder::{LowPass, Recorder};
-use torqcomp_model::{Estimate, ParameterStd, SecondOrder};
+use torqcomp_model::{Estimate, ModalResponse, Mode, ParameterStd, SecondOrder};
 
+use crate::identify::Motion;
 use crate::warning::Warning;
 
 pub use calibration::{Applied, Calibration, applied_by_unit, beyond_rated};
 pub use effects::DeclaredEffect;
 pub use file::{parse, read, text};
 pub use measured::{CalibrationLaw, MeasuredCalibration};
+pub use modes::{DeclaredMode, MODE_CORRELATIONS};
 pub use refine::{Refined, refine, si_unit};
 pub use signal::TransducerSignal;
 pub use uncertainty::{ConstantStd, TorqueStd};
@@ -75,9 +81,13 @@ pub struct Diagnosed {
 #[derive(Debug, Clone)]
 pub struct Mechanics {
     /// The response, its static gain being 1.
-    pub response: SecondOrder,
-    /// Uncertainties of its constants.
+    pub response: StandResponse,
+    /// Uncertainties of its constants, if it is given by them.
     pub std: ParameterStd,
+    /// Record per applied quantity at rest, if it is not a torque stand.
+    pub static_gain: Option<StaticGain>,
+    /// What is recorded: the displacement (or the torque of the beam), or a derivative of it.
+    pub measures: Motion,
     /// How it was given.
     pub given: Given,
 }
@@ -100,9 +110,39 @@ pub enum Given {
         natural_frequency: Estimate,
         /// Damping ratio.
         damping_ratio: Estimate,
-        /// Record per applied quantity at rest, if it is not a torque stand.
-        static_gain: Option<StaticGain>,
     },
+    /// As several modes.
+    Modes(Vec<DeclaredMode>),
+}
+
+/// The linear response of a stand as its file gives it.
+#[derive(Debug, Clone)]
+pub enum StandResponse {
+    /// By the constants of its one mode.
+    Constants(SecondOrder),
+    /// By its modes.
+    Modes(ModalResponse),
+}
+
+impl StandResponse {
+    /// Applied over recorded quantity, relative to that at rest.
+    pub(crate) fn inverse(&self, frequency_hz: f64) -> Complex64 {
+        match self {
+            Self::Constants(constants) => constants.inverse(frequency_hz),
+            Self::Modes(modes) => modes.inverse(TAU * frequency_hz),
+        }
+    }
+
+    /// As a sum of modes.
+    pub(crate) fn modal(&self) -> ModalResponse {
+        match self {
+            Self::Constants(constants) => ModalResponse::from(Mode {
+                omega_rad_s: TAU * constants.natural_frequency_hz(),
+                damping_ratio: constants.damping_ratio(),
+            }),
+            Self::Modes(modes) => modes.clone(),
+        }
+    }
 }
 
 /// Recorded quantity per applied quantity at zero frequency, in any units.

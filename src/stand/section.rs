@@ -342,6 +342,16 @@ impl<'a> Section<'a> {
         Ok(Some((text, std)))
     }
 
+    /// A correlation coefficient; 0 if it is not there.
+    pub fn correlation(&self, key: &'static str) -> Result<f64, Failure> {
+        let given = self.quantity(key, Kind::Ratio)?;
+        let value = given.map_or(0.0, |given| given.value());
+        match value.abs() <= 1.0 {
+            true => Ok(value),
+            false => Err(self.fail(key, "expected a correlation from -1 to 1")),
+        }
+    }
+
     /// Refuses the keys that nobody asked for.
     pub fn finish(&self) -> Result<(), Failure> {
         let asked = self.asked.borrow();

@@ -3,9 +3,9 @@
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
-use torqcomp_model::{InverseUncertainty, SecondOrder};
+use torqcomp_model::{InverseUncertainty, ModalResponse, ParameterStd, SecondOrder};
 
-use super::{Mechanics, Stand};
+use super::{DeclaredMode, Given, Mechanics, Stand, StandResponse};
 
 /// Relative standard uncertainty of the constant that makes torque of a record at rest.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -77,7 +77,7 @@ impl Stand {
     /// count as exact. `None` if no uncertainty is known, or if an effect that is no response over frequency has one.
     #[must_use]
     pub fn inverse_uncertainty(&self, frequency_hz: f64) -> Option<InverseUncertainty> {
-        let of_stand = match self.effects.is_empty() {
+        let of_stand = match self.effects.is_empty() && self.constants().is_some() {
             true => self.of_mechanics(frequency_hz),
             false => self.of_mechanics_and_effects(frequency_hz)?,
         };
@@ -93,11 +93,18 @@ impl Stand {
     }
 
     fn of_mechanics(&self, frequency_hz: f64) -> Option<InverseUncertainty> {
-        let mechanics = self.mechanics.as_ref()?;
-        let found = mechanics
-            .response
-            .inverse_uncertainty(frequency_hz, &mechanics.std);
+        let (constants, std) = self.constants()?;
+        let found = constants.inverse_uncertainty(frequency_hz, std);
         found.ok().flatten()
+    }
+
+    /// Inertia, damping and stiffness, if the response is given by them.
+    fn constants(&self) -> Option<(&SecondOrder, &ParameterStd)> {
+        let mechanics = self.mechanics.as_ref()?;
+        match &mechanics.response {
+            StandResponse::Constants(constants) => Some((constants, &mechanics.std)),
+            StandResponse::Modes(_) => None,
+        }
     }
 
     /// By the slopes over each parameter, from central differences; `None` if the stand with its effects has
@@ -127,7 +134,7 @@ impl Stand {
     pub(crate) fn varied(&self) -> Vec<VariedConstant> {
         let of_mechanics = self.mechanics.iter().flat_map(|mechanics| {
             let stds = mechanics.stds();
-            (0..3).filter(move |place| stds[*place].is_some())
+            (0..stds.len()).filter(move |place| stds[*place].is_some())
         });
         let mut all: Vec<VariedConstant> = of_mechanics.map(VariedConstant::OfMechanics).collect();
         for (place, effect) in self.effects.iter().enumerate() {
@@ -154,14 +161,11 @@ impl Stand {
 
     /// Correlation coefficients of the errors of such constants.
     pub(crate) fn correlations(&self, of: &[VariedConstant]) -> Vec<Vec<f64>> {
-        let [jf, jk, fk] = self
-            .mechanics
-            .as_ref()
-            .map_or([0.0; 3], |m| m.std.correlations);
         let one = |a: &VariedConstant, b: &VariedConstant| match (a, b) {
             _ if a == b => 1.0,
             (VariedConstant::OfMechanics(i), VariedConstant::OfMechanics(k)) => {
-                [jf, jk, fk][i + k - 1]
+                let mechanics = self.mechanics.as_ref();
+                mechanics.map_or(0.0, |m| m.correlation(*i, *k))
             }
             _ => 0.0,
         };
@@ -201,7 +205,7 @@ impl Stand {
 /// A constant of the stand file that has a standard uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum VariedConstant {
-    /// Inertia, damping or stiffness, from 0.
+    /// Inertia, damping or stiffness, from 0; of several modes the numbers of each, one after the other.
     OfMechanics(usize),
     /// An effect's parameter: the effect's place, and its own.
     OfEffect(usize, usize),
@@ -218,19 +222,56 @@ pub(crate) fn combined(correlations: &[Vec<f64>], terms: &[f64]) -> f64 {
 }
 
 impl Mechanics {
-    /// Standard uncertainties of inertia, damping and stiffness.
-    fn stds(&self) -> [Option<f64>; 3] {
+    /// Standard uncertainties of inertia, damping and stiffness, or of the numbers of several modes.
+    fn stds(&self) -> Vec<Option<f64>> {
+        if let Given::Modes(modes) = &self.given {
+            return modes.iter().flat_map(DeclaredMode::stds).collect();
+        }
         let std = &self.std;
-        [
+        vec![
             std.inertia_kg_m2,
             std.damping_n_m_s_per_rad,
             std.stiffness_n_m_per_rad,
         ]
     }
 
+    /// Correlation coefficient of two of them.
+    fn correlation(&self, i: usize, k: usize) -> f64 {
+        let Given::Modes(modes) = &self.given else {
+            return self.std.correlations[i + k - 1];
+        };
+        let [(mode, i), (other, k)] = [i, k].map(DeclaredMode::place);
+        match mode == other {
+            true => modes[mode].correlation(i, k),
+            false => 0.0,
+        }
+    }
+
+    /// The name of one of them.
+    pub(crate) fn name(&self, place: usize) -> String {
+        match &self.given {
+            Given::Constants { .. } => ["inertia", "damping", "stiffness"][place].to_owned(),
+            Given::Modal { .. } => {
+                ["natural frequency", "damping ratio", "stiffness"][place].to_owned()
+            }
+            Given::Modes(_) => {
+                let (mode, number) = DeclaredMode::place(place);
+                format!(
+                    "{} of mode {}",
+                    DeclaredMode::NUMBERS[number].replace('_', " "),
+                    mode + 1
+                )
+            }
+        }
+    }
+
     /// The mechanics with one constant moved by its standard uncertainty; `None` if it has none, or if no stand has that value.
     fn moved(&self, place: usize, side: f64) -> Option<Self> {
-        let of = &self.response;
+        let of = match (&self.response, &self.given) {
+            (StandResponse::Constants(of), _) => of,
+            (_, Given::Modes(modes)) => return self.with_modes(modes, place, side),
+            _ => return None,
+        };
         let mut values = [
             of.inertia_kg_m2(),
             of.damping_n_m_s_per_rad(),
@@ -238,8 +279,24 @@ impl Mechanics {
         ];
         values[place] += side * self.stds()[place]?;
         let response = SecondOrder::new(values[0], values[1], values[2]).ok()?;
+        let response = StandResponse::Constants(response);
         Some(Self {
             response,
+            ..self.clone()
+        })
+    }
+}
+
+impl Mechanics {
+    /// The mechanics with one number of their modes moved.
+    fn with_modes(&self, modes: &[DeclaredMode], place: usize, side: f64) -> Option<Self> {
+        let (mode, number) = DeclaredMode::place(place);
+        let mut modes = modes.to_vec();
+        modes[mode] = modes[mode].moved(number, side)?;
+        let parts = modes.iter().map(DeclaredMode::part).collect();
+        Some(Self {
+            response: StandResponse::Modes(ModalResponse::new(parts).ok()?),
+            given: Given::Modes(modes),
             ..self.clone()
         })
     }

@@ -1,6 +1,6 @@
 //! Writing what was found into a stand file, leaving the rest of it as it is.
 
-use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, Value, value};
+use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value, value};
 use torqcomp_model::{Estimate, Kind};
 
 use crate::failure::Failure;
@@ -25,6 +25,21 @@ impl Entry {
         estimate: &Estimate,
         source: &str,
     ) -> Self {
+        Self::with_source(section, key, estimate, Some(source))
+    }
+
+    /// The same where the section says where its numbers come from.
+    #[must_use]
+    pub fn measured(section: &'static str, key: &'static str, estimate: &Estimate) -> Self {
+        Self::with_source(section, key, estimate, None)
+    }
+
+    fn with_source(
+        section: &'static str,
+        key: &'static str,
+        estimate: &Estimate,
+        source: Option<&str>,
+    ) -> Self {
         let unit = estimate.unit();
         let text = |number: f64| format!("{} {unit}", number_text(number)).trim().to_owned();
         let mut table = InlineTable::new();
@@ -32,12 +47,49 @@ impl Entry {
         if let Some(std) = estimate.std_uncertainty() {
             table.insert("std", text(std).into());
         }
-        table.insert("source", source.into());
+        if let Some(source) = source {
+            table.insert("source", source.into());
+        }
         let content = Value::InlineTable(table);
         Self {
             section,
             key,
             content,
+        }
+    }
+
+    /// A bare number, to three digits.
+    #[must_use]
+    pub fn number(section: &'static str, key: &'static str, number: f64) -> Self {
+        Self::text(section, key, &crate::io::digits::text(number, 3))
+    }
+
+    /// A text.
+    #[must_use]
+    pub fn text(section: &'static str, key: &'static str, text: &str) -> Self {
+        let content = text.into();
+        Self {
+            section,
+            key,
+            content,
+        }
+    }
+
+    /// `[[modes]]`, from the entries of each mode.
+    #[must_use]
+    pub fn modes(modes: Vec<Vec<Self>>) -> Self {
+        let mut array = Array::new();
+        for entries in modes {
+            let mut table = InlineTable::new();
+            for entry in entries {
+                table.insert(entry.key, entry.content);
+            }
+            array.push(table);
+        }
+        Self {
+            section: MODES,
+            key: "",
+            content: Value::Array(array),
         }
     }
 
@@ -86,6 +138,10 @@ pub const CORRELATIONS: [&str; 3] = [
     "correlation_inertia_stiffness",
     "correlation_damping_stiffness",
 ];
+/// Section of several modes.
+const MODES: &str = "modes";
+/// Keys of a mode that a decay does not tell.
+const SHARES: [&str; 4] = ["residue", "quadrature", "shape_at_load", "shape_at_gage"];
 const MODAL: [&str; 2] = ["natural_frequency", "damping_ratio"];
 
 /// The text of a stand file with the entries put in; `existing` is its text so far, if there is one.
@@ -173,7 +229,61 @@ fn make_room(name: &str, document: &mut DocumentMut, entries: &[Entry]) -> Resul
     Ok(())
 }
 
+/// Puts `[[modes]]` in the place of those that are there. Where the new ones are as many, and only frequency and damping of
+/// them are known, what the others have in the response stays.
+fn put_modes(name: &str, document: &mut DocumentMut, entry: &Entry) -> Result<(), Failure> {
+    let mechanics = document.get("mechanics").and_then(Item::as_table_like);
+    let mut single = CONSTANTS.iter().chain(&MODAL);
+    if let Some(key) = single.find(|key| mechanics.is_some_and(|table| table.contains_key(key))) {
+        return Err(Failure::failed(format_args!(
+            "{name}: [mechanics] has {key}, so that [[modes]] cannot be written beside it; remove it, or write to another file"
+        )));
+    }
+    let tables = entry.content.as_array().into_iter().flatten();
+    let inline = tables.filter_map(Value::as_inline_table);
+    let mut modes: Vec<Table> = inline.map(|table| table.clone().into_table()).collect();
+    let known = by_frequency(document.get(MODES).and_then(Item::as_array_of_tables));
+    if known.len() == modes.len() {
+        for (mode, known) in modes.iter_mut().zip(&known) {
+            let kept = SHARES.iter().filter(|_| !mode.contains_key(SHARES[0]));
+            let kept: Vec<_> = kept
+                .filter_map(|key| Some((key, known.get(key)?.clone())))
+                .collect();
+            for (key, item) in kept {
+                mode.insert(key, item);
+            }
+        }
+    }
+    document[MODES] = Item::ArrayOfTables(modes.into_iter().collect::<ArrayOfTables>());
+    Ok(())
+}
+
+/// Modes of a stand file by rising frequency; none if one has none that can be read.
+fn by_frequency(tables: Option<&ArrayOfTables>) -> Vec<&Table> {
+    let hertz = |table: &Table| {
+        let item = table.get(MODAL[0])?;
+        let text = item.as_str().or_else(|| item.get("value")?.as_str())?;
+        Kind::Frequency.parse(text).ok()
+    };
+    let read = tables.into_iter().flat_map(ArrayOfTables::iter);
+    let read: Option<Vec<(f64, &Table)>> = read.map(|table| Some((hertz(table)?, table))).collect();
+    let mut read = read.unwrap_or_default();
+    read.sort_by(|a, b| a.0.total_cmp(&b.0));
+    read.into_iter().map(|(_, table)| table).collect()
+}
+
 fn put(name: &str, document: &mut DocumentMut, entry: &Entry) -> Result<(), Failure> {
+    if entry.section == MODES {
+        return put_modes(name, document, entry);
+    }
+    let is_single = CONSTANTS.contains(&entry.key) || MODAL.contains(&entry.key);
+    if is_single && document.contains_key(MODES) {
+        return Err(Failure::failed(format_args!(
+            "{name}: it has [[modes]], so that {} of a single mode cannot be written beside them; remove them, or write to \
+             another file",
+            entry.key
+        )));
+    }
     let section = document
         .entry(entry.section)
         .or_insert_with(|| Item::Table(Table::new()));
@@ -223,10 +333,16 @@ pub fn is_calibrated(text: &str) -> bool {
         return true;
     };
     let gain = document.get("mechanics").and_then(|m| m.get("static_gain"));
-    gain.is_some()
-        || ["calibration", "beam"]
-            .iter()
-            .any(|key| document.contains_key(key))
+    gain.is_some() || converts(text)
+}
+
+/// Whether a calibration or a drawing makes torque of its record.
+pub fn converts(text: &str) -> bool {
+    let document = text.parse::<DocumentMut>();
+    document.is_ok_and(|document| {
+        let mut sections = ["calibration", "beam"].iter();
+        sections.any(|key| document.contains_key(key))
+    })
 }
 
 /// A quantity of `[mechanics]` in SI units and its standard uncertainty, from the text of a stand file

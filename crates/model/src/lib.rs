@@ -42,7 +42,7 @@
 //! | [`beam`] | stiffness of the beam and strain on its surface |
 //! | [`inertia`] | mass moments of inertia of simple bodies |
 //! | [`damping`] | viscous coefficient, free decay |
-//! | [`response`] | transfer function and its inverse |
+//! | [`response`] | transfer function and its inverse; [`ModalResponse`] is that of several modes |
 //! | [`effects`] | what a plain stand can lack |
 //! | [`chain`] | the links from the applied torque to the record, both ways |
 //! | [`simulate`] | the motion under an input, integrated in time |
@@ -60,6 +60,7 @@ pub mod effects;
 pub mod error;
 pub mod fit;
 pub mod inertia;
+mod modal;
 mod mode;
 pub mod quantity;
 pub mod response;
@@ -72,6 +73,7 @@ pub use chain::{Chain, Link};
 pub use damping::FreeDecay;
 pub use error::ModelError;
 pub use inertia::Part;
+pub use modal::{ModalPart, ModalResponse};
 pub use mode::Mode;
 pub use quantity::{
     Covariance, Dimension, Estimate, Estimates, Kind, Measure, QuantityError, RatioOf, Unit,

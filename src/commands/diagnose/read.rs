@@ -16,7 +16,7 @@ use crate::failure::Failure;
 use crate::io::{ChannelChoice, Input};
 use crate::print::short;
 use crate::recording::AlignedChannels;
-use crate::stand::{Calibration, DeclaredEffect, Given, Stand, TransducerSignal, si_unit};
+use crate::stand::{Calibration, DeclaredEffect, Stand, TransducerSignal, si_unit};
 use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
 
@@ -211,10 +211,7 @@ fn refuse_same_samples(train: &[Pair], holdout: &[Pair]) -> Result<(), Failure> 
 
 /// The static gain that a stand file gives in place of constants in units of torque.
 fn static_gain(stand: Option<&Stand>) -> Option<f64> {
-    match &stand?.mechanics.as_ref()?.given {
-        Given::Modal { static_gain, .. } => static_gain.as_ref().map(|gain| gain.value),
-        _ => None,
-    }
+    stand?.static_gain().map(|gain| gain.value)
 }
 
 /// Units of the channels, and whether the stand's calibration converts the measured one to torque.
@@ -266,7 +263,13 @@ fn declared_gain(stand: Option<&Stand>, units: &ChannelUnits) -> Option<f64> {
 }
 
 fn declared(stand: &Stand, gain: f64) -> Result<PlainStand, Failure> {
-    let mode = stand.mode()?;
+    let mode = stand.modes()?.only().ok_or_else(|| {
+        Failure::failed(format_args!(
+            "{}: it has several modes, and diagnose finds what one mode lacks; leave --stand out, and the further modes count \
+             as the effect second-mode, or refit the modes with identify response",
+            stand.file
+        ))
+    })?;
     Ok(PlainStand {
         natural_hz: mode.omega_rad_s / std::f64::consts::TAU,
         damping_ratio: mode.damping_ratio,

@@ -3,12 +3,12 @@
 use std::borrow::Cow;
 
 use super::constants::{Ratios, from_ratios};
-use super::{ONE_MODE, Recorded, deliver};
+use super::{Recorded, deliver};
 use crate::cli::identify::Decay;
 use crate::commands::Outcome;
 use crate::failure::Failure;
-use crate::identify::Identification;
 use crate::identify::decay::{DecayOptions, Ringing, identify};
+use crate::identify::{Identification, ModalPole};
 use crate::io::{Input, Reading, already_compensated};
 use crate::recording::{AlignedChannels, Recording, check_cells, is_uniform};
 use crate::stand::update::Entry;
@@ -136,10 +136,35 @@ fn resampled(input: &str, mut aligned: AlignedChannels, recorded: &mut Recorded)
 
 /// Adds the constants that follow from the strongest mode; returns the entries of the stand file.
 fn entries(args: &Decay, result: &mut Identification) -> Result<Vec<Entry>, Failure> {
-    if result.modes.len() > 1 && args.findings.result.output.is_some() {
-        return Err(Failure::failed(ONE_MODE));
-    }
+    let several = result.modes.len() > 1 && args.findings.result.output.is_some();
     let mode = (&result.modes[0].clone(), Ratios::OverInertia);
     let source = format!("identify decay: {}", args.inputs.join(", "));
-    from_ratios(&args.anchors, &args.findings, mode, &source, result)
+    let of_one = from_ratios(&args.anchors, &args.findings, mode, &source, result)?;
+    match several {
+        true => Ok(vec![modes(result, &source)]),
+        false => Ok(of_one),
+    }
 }
+
+/// Frequency and damping of several modes, by rising frequency, for a stand file.
+fn modes(result: &mut Identification, source: &str) -> Entry {
+    result.warn("residues-unknown", NO_RESIDUES);
+    let mut all = result.modes.clone();
+    let omega = |mode: &ModalPole| mode.pole().omega_rad_per_s;
+    all.sort_by(|a, b| omega(a).total_cmp(&omega(b)));
+    let entries = |mode: &ModalPole| {
+        let names = ["natural_frequency", "damping_ratio"];
+        let constants = mode.modal_constants().of_mode((0, 1), &names);
+        let both = names.into_iter().zip(&constants.list);
+        let numbers = both.map(|(key, constant)| Entry::measured("modes", key, &constant.estimate));
+        numbers
+            .chain([Entry::text("modes", "source", source)])
+            .collect()
+    };
+    Entry::modes(all.iter().map(entries).collect())
+}
+
+/// Said of several modes of a decay.
+const NO_RESIDUES: &str = "a decay tells frequency and damping of each mode, but not what part it has in the response to a torque; \
+                           residues that the stand file has for as many modes stay; else add residue to each of [[modes]], or \
+                           use identify response with a known torque or force";

@@ -2,6 +2,7 @@
 
 mod constants;
 mod decay;
+mod modes;
 mod response;
 mod runup;
 mod static_load;
@@ -37,9 +38,6 @@ pub fn run(args: &Identify) -> Result<Outcome, Failure> {
         Test::Response(args) => response::run(args),
     }
 }
-
-const ONE_MODE: &str = "a stand file describes one mode, and several were found; choose one with --band and --modes 1, or \
-                        omit -o to see them";
 
 /// What was read, for the result.
 #[derive(Default)]

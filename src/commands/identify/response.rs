@@ -3,7 +3,8 @@
 use torqcomp_model::{Estimate, Kind};
 
 use super::constants::{Ratios, from_ratios, from_residue};
-use super::{FORCE, ONE_MODE, Recorded, TORQUE, deliver, entry, quantity, stand_text, unit_or};
+use super::modes;
+use super::{FORCE, Recorded, TORQUE, deliver, entry, quantity, stand_text, unit_or};
 use crate::cli::identify::Response;
 use crate::commands::Outcome;
 use crate::failure::Failure;
@@ -51,16 +52,7 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
     let by_unit = unit.and_then(|u| Motion::of(u.unit.dimension()));
     let motion = by_unit.map_or(Motion::Displacement, |(motion, _)| motion);
     let motion = args.measured_as.unwrap_or(motion);
-    let options = ResponseOptions {
-        excitation: args.excitation,
-        band_hz: args.band,
-        modes: args.modes.map(usize::from),
-        period: args.period,
-        segment: args.segment,
-        order: motion.order(),
-        with_delay: args.delay,
-    };
-    let mut result = identify(&records, &options)?;
+    let mut result = identify(&records, &options(args, motion))?;
     if let (Some(fit), Some(unit)) = (&mut result.fit, unit) {
         fit.unit.clone_from(&unit.text);
     }
@@ -70,10 +62,36 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
         let unit = format!("({})/({})", measured.text, applied.text);
         result.label_charts(RATIO, &unit);
     }
-    let mut entries = entries(args, rad_per_n_m(args, &loaded, motion)?, &mut result)?;
+    let written = modes::Written {
+        source: format!("identify response: {}", args.inputs.join(", ")),
+        motion,
+        units,
+    };
+    let mut entries = match result.shares.take() {
+        Some(shares) => written.entries(&shares, &args.findings, &result)?,
+        None => entries(args, rad_per_n_m(args, &loaded, motion)?, &mut result)?,
+    };
     entries.extend(calibration(args, units, &mut result)?);
     deliver(result, recorded, &args.findings, &entries)
 }
+
+/// How the response is evaluated.
+fn options(args: &Response, motion: Motion) -> ResponseOptions {
+    ResponseOptions {
+        excitation: args.excitation,
+        band_hz: args.band,
+        modes: args.modes.map(usize::from),
+        period: args.period,
+        segment: args.segment,
+        order: motion.order(),
+        with_delay: args.delay,
+        grounded: args.findings.result.output.is_some(),
+    }
+}
+
+/// Said where no mode moves at rest.
+const NOT_AT_REST: &str = "the response at rest of these modes is zero, which a stand file measures all of them by; choose another \
+                           --band";
 
 /// Makes a torque of a force that acts at a radius.
 fn to_torque(force: &mut AlignedChannel, radius: &str) -> Result<(), Failure> {
@@ -186,7 +204,7 @@ fn entries(
 ) -> Result<Vec<Entry>, Failure> {
     let mode = match &result.modes[..] {
         [mode] => mode.clone(),
-        _ if args.findings.result.output.is_some() => return Err(Failure::failed(ONE_MODE)),
+        _ if args.findings.result.output.is_some() => return Err(Failure::failed(NOT_AT_REST)),
         _ => return Ok(Vec::new()),
     };
     let source = format!("identify response: {}", args.inputs.join(", "));

@@ -85,5 +85,6 @@ pub(super) fn data(powers: &Powers, set: &Set, lines: &Lines, options: &Response
         order: options.order,
         added_rate: set.added_rate,
         with_delay: options.with_delay,
+        below: !(options.grounded && options.modes.is_some_and(|modes| modes > 1)),
     }
 }

@@ -8,6 +8,7 @@ mod modal;
 mod order;
 mod present;
 mod scatter;
+mod shares;
 mod whole;
 
 use clap::ValueEnum;
@@ -64,6 +65,8 @@ pub struct ResponseOptions {
     pub order: i32,
     /// Whether a delay is fitted.
     pub with_delay: bool,
+    /// Whether several modes are those of a stand on its spring, which does not move freely below them.
+    pub grounded: bool,
 }
 
 /// Evaluates records of one stand.
@@ -86,11 +89,24 @@ pub fn identify(records: &[Driven], options: &ResponseOptions) -> Result<Identif
         true => Failure::failed(check::LEADS),
         false => failure,
     })?;
+    let is_grounded = options.grounded && coarse.poles.len() > 1;
+    let data = Data {
+        below: !is_grounded,
+        ..data
+    };
+    let coarse = match is_grounded {
+        true => without_undamped(&data, coarse, &mut result)?,
+        false => coarse,
+    };
     let fitted = final_fit(whole, &set, &lines, &data, &coarse, &mut result)?;
     if leads && check::is_out_of_reach(&set, &fitted.modal) {
         return Err(Failure::failed(check::LEADS));
     }
     present::add_modes(&mut result, &fitted);
+    if is_grounded {
+        result.shares = shares::of(&fitted, options.order);
+        present::add_shares(&mut result);
+    }
     check::doubts(
         &mut result,
         fitted.relative,
@@ -151,6 +167,31 @@ impl FinalFit {
     }
 }
 
+/// The fit without modes that these records give no damping: noise and nonlinearity make them, and in a stand file they would
+/// ring on for ever.
+fn without_undamped(
+    data: &Data,
+    coarse: Modal,
+    result: &mut Identification,
+) -> Result<Modal, Failure> {
+    let mut starts = coarse.poles;
+    loop {
+        let fitted = data.fit(&starts, Effort::Fine)?;
+        let at_bound = |k: usize| fitted.fit.as_ref().is_some_and(|fit| fit.at_bound[2 * k]);
+        let Some(undamped) = (0..starts.len()).find(|k| at_bound(*k)) else {
+            return Ok(fitted);
+        };
+        if starts.len() == 1 {
+            return Err(Failure::failed(
+                "no mode has a damping that these records show; record for longer, or choose another --band",
+            ));
+        }
+        present::left_out(result, fitted.poles[undamped]);
+        starts = fitted.poles;
+        starts.remove(undamped);
+    }
+}
+
 /// The final fit: of the whole records without a window where windows have leakage, or of the averaged response.
 fn final_fit(
     whole: Option<whole::Whole>,
@@ -172,8 +213,13 @@ fn final_fit(
     let searched = modal.fit.as_ref().map_or(0, |fit| fit.values.len());
     let all = scatter::of_all(set, lines, data, &modal)?;
     Ok(FinalFit {
-        static_gain_std: all.and_then(|all| static_gain_std(&modal, &all, searched)),
-        covariance: scatter::of_poles(set, lines, data, &modal)?,
+        static_gain_std: all
+            .as_ref()
+            .and_then(|all| static_gain_std(&modal, all, searched)),
+        covariance: match all.filter(|_| !data.below) {
+            Some(all) => all,
+            None => scatter::of_poles(set, lines, data, &modal)?,
+        },
         linear: searched,
         relative: set.error(&modal.response, lines),
         gain_error: 0.0,

@@ -31,6 +31,8 @@ pub(super) struct Data {
     pub added_rate: f64,
     /// Whether a delay is fitted.
     pub with_delay: bool,
+    /// Whether c₂ is fitted: a stand that rests on its spring moves nowhere freely.
+    pub below: bool,
 }
 
 /// Precision of a fit.
@@ -49,7 +51,7 @@ pub(super) struct Modal {
     pub poles: Vec<Pole>,
     /// τ in s.
     pub delay_s: f64,
-    /// Linear parameters: real and imaginary part of each residue, then c₁ and c₂.
+    /// Linear parameters: real and imaginary part of each residue, then c₁ and, if it was fitted, c₂.
     linear: Vec<f64>,
     /// Standard uncertainty of τ in s, if it was fitted and is identifiable.
     pub delay_std_s: Option<f64>,
@@ -72,6 +74,11 @@ impl Data {
         (self.omega[0], self.omega[self.omega.len() - 1])
     }
 
+    /// Number of linear parameters for modes outside the band.
+    pub(super) fn outside(&self) -> usize {
+        1 + usize::from(self.below)
+    }
+
     /// The columns at a frequency; `all` is overwritten.
     fn columns(&self, omega: f64, poles: &[Pole], delay_s: f64, all: &mut Vec<Complex64>) {
         let scale = self.scale();
@@ -83,7 +90,9 @@ impl Data {
             all.push(front * Complex64::I * (near - far));
         }
         all.push(front);
-        all.push(front / (s * s));
+        if self.below {
+            all.push(front / (s * s));
+        }
     }
 
     /// The factor of the sum, and s.
@@ -109,7 +118,7 @@ impl Data {
 
     /// Linear parameters for given poles, and weighted residuals, real and imaginary parts alternating.
     fn solve(&self, poles: &[Pole], delay_s: f64) -> Result<linear::LinearFit, FitError> {
-        let count = 2 * poles.len() + 2;
+        let count = 2 * poles.len() + self.outside();
         let lines = self.omega.len();
         let mut design = DMatrix::zeros(2 * lines, count);
         let mut right = vec![0.0; 2 * lines];
@@ -391,7 +400,7 @@ impl PoleSearch<'_> {
 }
 
 impl Modal {
-    /// Real and imaginary part of each residue, then c₁ and c₂.
+    /// Real and imaginary part of each residue, then c₁ and, if it was fitted, c₂.
     pub(super) fn linear(&self) -> &[f64] {
         &self.linear
     }
@@ -404,7 +413,7 @@ impl Modal {
     }
 
     /// A pole and its residue, in the units of the linear parameters.
-    fn pole_and_residue(&self, k: usize) -> (Complex64, Complex64) {
+    pub(super) fn pole_and_residue(&self, k: usize) -> (Complex64, Complex64) {
         let pole = self.poles[k];
         let p = Complex64::new(-pole.rate_per_s, pole.omega_rad_per_s) / self.scale;
         (
@@ -423,8 +432,14 @@ impl Modal {
             of_poles.extend([-2.0 * of_pole.re, -2.0 * of_pole.im]);
             of_linear.extend([-2.0 * p.inv().re, 2.0 * p.inv().im]);
         }
-        of_linear.extend([1.0, 0.0]);
+        of_linear.push(1.0);
+        of_linear.resize(self.linear.len(), 0.0);
         (of_poles, of_linear)
+    }
+
+    /// Scale of s in them, in rad/s.
+    pub(super) fn scale(&self) -> f64 {
+        self.scale
     }
 
     /// Static response per applied unit, from the modes and c₁; for displacement without free motion.
@@ -434,7 +449,7 @@ impl Modal {
             2.0 * (-residue / p).re
         };
         let modes: f64 = (0..self.poles.len()).map(one).sum();
-        modes + self.linear[self.linear.len() - 2]
+        modes + self.linear[2 * self.poles.len()]
     }
 }
 
@@ -463,6 +478,7 @@ mod tests {
                 order,
                 added_rate: 0.0,
                 with_delay: false,
+                below: true,
             };
             let fitted = data.fit(&[pole], Effort::Fine).unwrap();
             let (residue, _) = fitted.residue(0);

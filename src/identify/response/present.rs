@@ -8,7 +8,7 @@ use super::lines::Lines;
 use super::order::folds;
 use super::{FinalFit, Modal, ResponseOptions};
 use crate::chart::{Chart, Series};
-use crate::identify::{Comparison, Identification, NamedEstimate};
+use crate::identify::{Comparison, Identification, NamedEstimate, Pole};
 use crate::print::{plural, rounded, short};
 
 /// Adds every mode with its natural frequency and damping ratio, by rising frequency.
@@ -35,6 +35,29 @@ pub(super) fn add_modes(result: &mut Identification, fitted: &FinalFit) {
     }
 }
 
+/// Says that a mode without damping is not written.
+pub(super) fn left_out(result: &mut Identification, pole: Pole) {
+    result.warn(
+        "undamped-left-out",
+        format!(
+            "the mode at {} Hz has no damping that these data show and was left out: noise or a nonlinear stand makes such modes; \
+             choose fewer --modes, or record at one level and for longer",
+            rounded(pole.frequency_hz(), 5)
+        ),
+    );
+}
+
+/// Adds what each mode has in the response.
+pub(super) fn add_shares(result: &mut Identification) {
+    let Some(shares) = result.shares.clone() else {
+        return;
+    };
+    let count = shares.modes.len();
+    for (place, mode) in shares.modes.into_iter().enumerate() {
+        result.add(mode.of_mode((place, count), &["residue", "quadrature"]));
+    }
+}
+
 /// Says what was fitted.
 pub(super) fn method(
     result: &mut Identification,
@@ -44,12 +67,16 @@ pub(super) fn method(
     fitted: &Modal,
 ) {
     result.method.push(format!(
-        "{} fitted to {} lines from {} to {} Hz, H1 over {}, residual terms for modes outside the band{}",
+        "{} fitted to {} lines from {} to {} Hz, H1 over {}, {}{}",
         plural(fitted.poles.len(), "mode"),
         lines.len(),
         short(lines.start as f64 * set.step_hz),
         short((lines.end - 1) as f64 * set.step_hz),
         plural(set.blocks.len(), "block"),
+        match fitted.linear().len() > 2 * fitted.poles.len() + 1 {
+            true => "residual terms for modes outside the band",
+            false => "a residual compliance for modes above the band",
+        },
         if options.with_delay { ", a delay" } else { "" }
     ));
 }

@@ -1,4 +1,7 @@
+use torqcomp_model::SecondOrder;
+
 use super::*;
+use crate::stand::{Given, StandResponse};
 
 const MECHANICS: &str = "schema = \"torqcomp.stand/1\"\n[mechanics]\ninertia = \"5.85e-3 slug ft^2\"\n\
     damping = \"3.07 ft lbf s/rad\"\nstiffness = { value = \"8.1e4 ft lbf/rad\", std = \"0.2e4 ft lbf/rad\", \
@@ -12,13 +15,14 @@ fn message(text: &str) -> String {
 fn constants_come_out_in_si() {
     let stand = parse("stand.toml", MECHANICS).unwrap();
     let mechanics = stand.mechanics.unwrap();
+    let constants: SecondOrder = match mechanics.response {
+        StandResponse::Constants(constants) => constants,
+        StandResponse::Modes(_) => panic!(),
+    };
     // 1 ft lbf = 1.3558179483314 N m; 1 slug ft² = 1.3558179483314 kg m².
+    assert!((constants.inertia_kg_m2() / (5.85e-3 * 1.355_817_948_331_4) - 1.0).abs() < 1e-12);
     assert!(
-        (mechanics.response.inertia_kg_m2() / (5.85e-3 * 1.355_817_948_331_4) - 1.0).abs() < 1e-12
-    );
-    assert!(
-        (mechanics.response.stiffness_n_m_per_rad() / (8.1e4 * 1.355_817_948_331_4) - 1.0).abs()
-            < 1e-12
+        (constants.stiffness_n_m_per_rad() / (8.1e4 * 1.355_817_948_331_4) - 1.0).abs() < 1e-12
     );
     assert!(
         (mechanics.std.stiffness_n_m_per_rad.unwrap() / (0.2e4 * 1.355_817_948_331_4) - 1.0).abs()
@@ -38,13 +42,7 @@ fn other_units_and_modal_form() {
          static_gain = \"2.5 mV/N\"\n",
     )
     .unwrap();
-    let Given::Modal {
-        static_gain: Some(gain),
-        ..
-    } = stand.mechanics.unwrap().given
-    else {
-        panic!()
-    };
+    let gain = stand.mechanics.unwrap().static_gain.unwrap();
     assert!((gain.value - 2.5e-3).abs() < 1e-15);
     assert_eq!(
         (gain.recorded_unit.as_str(), gain.applied_unit.as_str()),

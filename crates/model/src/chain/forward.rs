@@ -6,7 +6,9 @@ use num_complex::Complex64;
 
 use super::{Chain, Link};
 use crate::effects::{Action, SampleClock, Stage};
-use crate::simulate::{Excitation, MotionProgress, MotionState, Torques, free_motion, integrate};
+use crate::simulate::{
+    Excitation, MotionProgress, MotionState, Torques, free_motion, integrate, integrate_modes,
+};
 
 /// A record on its way through the chain, in the domain that the last link left it in.
 enum Signal {
@@ -62,7 +64,7 @@ impl Chain {
     /// Records of the free motion from a unit displacement and from a unit speed over `ω₀`.
     #[must_use]
     pub fn free_motion(&self, rate_hz: f64, count: usize) -> [Vec<f64>; 2] {
-        free_motion(&self.mode, rate_hz, count)
+        free_motion(&self.stand.first(), rate_hz, count)
     }
 
     /// Displacement and speed at the first sample, in the steady state of what continues the record
@@ -109,7 +111,7 @@ impl Chain {
 
     /// A motion that begins.
     pub(crate) fn begin(&self, start: MotionState) -> MotionProgress {
-        MotionProgress::begin(&self.torques(), start, self.shift)
+        MotionProgress::begin(&self.torques(), (&self.stand, start), self.shift)
     }
 
     /// What the gage shows of the motion at some samples of the input, see [`integrate`].
@@ -119,8 +121,12 @@ impl Chain {
         range: Range<usize>,
         progress: &mut MotionProgress,
     ) -> Vec<f64> {
-        let stand = (&self.mode, self.gain, self.shift);
-        integrate(stand, &self.torques(), input, range, progress)
+        let torques = self.torques();
+        let (gain, shift) = (self.gain, self.shift);
+        match self.stand.only() {
+            Some(mode) => integrate((&mode, gain, shift), &torques, input, range, progress),
+            None => integrate_modes((&self.stand, gain, shift), &torques, input, range, progress),
+        }
     }
 
     /// What the links after the stand make of what the gage shows.
@@ -134,7 +140,7 @@ impl Chain {
 
     fn respond(&self, input: &Excitation) -> Signal {
         let line =
-            |(k, u): (usize, &Complex64)| u * self.gain * self.mode.response(input.omega_rad_s(k));
+            |(k, u): (usize, &Complex64)| u * self.gain * self.stand.response(input.omega_rad_s(k));
         Signal::Spectrum(input.spectrum().iter().enumerate().map(line).collect())
     }
 
@@ -148,11 +154,11 @@ impl Chain {
 
     fn apply(&self, action: &Action, signal: Signal, input: &Excitation) -> Signal {
         match action {
-            Action::Factor(factor) => multiply(signal, input, |omega| factor(&self.mode, omega)),
+            Action::Factor(factor) => multiply(signal, input, |omega| factor(&self.stand, omega)),
             Action::Feedthrough(term) => {
                 let mut spectrum = signal.into_spectrum(input);
                 for (k, (y, u)) in spectrum.iter_mut().zip(input.spectrum()).enumerate() {
-                    *y += u * self.gain * term(&self.mode, input.omega_rad_s(k));
+                    *y += u * self.gain * term(&self.stand, input.omega_rad_s(k));
                 }
                 Signal::Spectrum(spectrum)
             }

@@ -18,7 +18,7 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 
 use crate::effects::{Action, Effect, Fixed, Form, Stage, Torque};
-use crate::mode::Mode;
+use crate::modal::ModalResponse;
 
 pub use gage_path::{GagePath, GageState};
 
@@ -45,8 +45,8 @@ pub struct Link {
 /// A stand with its effects and its recorder, from the applied quantity to the record.
 #[derive(Debug)]
 pub struct Chain {
-    /// The linear mode.
-    pub mode: Mode,
+    /// The linear stand.
+    pub stand: ModalResponse,
     /// Recorded per applied quantity, at rest.
     pub gain: f64,
     /// Displacement, in units of the record, by a load that does not change and is not in the input: torques of
@@ -109,12 +109,12 @@ impl Link {
     /// Whether the impulse response of its inverse dies out: a factor goes over into a constant at rest that is not
     /// zero, without a step.
     #[must_use]
-    pub fn dies_out(&self, mode: &Mode) -> bool {
+    pub fn dies_out(&self, stand: &ModalResponse) -> bool {
         let Action::Factor(factor) = &self.action else {
             return true;
         };
-        let at_rest = factor(mode, 0.0);
-        let near = factor(mode, NEAR_REST * mode.omega_rad_s);
+        let at_rest = factor(stand, 0.0);
+        let near = factor(stand, NEAR_REST * stand.first().omega_rad_s);
         // Of both signs of frequency the constant is the same only if it is real.
         let step = (near - at_rest).norm().max(near.im.abs());
         at_rest.norm() > 0.0 && step < LARGEST_STEP * at_rest.norm()
@@ -122,19 +122,20 @@ impl Link {
 
     /// Whether it passes no constant.
     #[must_use]
-    pub fn blocks_constants(&self, mode: &Mode) -> bool {
+    pub fn blocks_constants(&self, stand: &ModalResponse) -> bool {
         let Action::Factor(factor) = &self.action else {
             return false;
         };
-        factor(mode, 0.0).norm() < NONE_AT_REST * factor(mode, mode.omega_rad_s).norm()
+        let at_resonance = factor(stand, stand.first().omega_rad_s);
+        factor(stand, 0.0).norm() < NONE_AT_REST * at_resonance.norm()
     }
 
     /// Its factor at a frequency; `before` is the response of the chain before it.
-    fn factor(&self, before: Complex64, mode: &Mode, frequency_hz: f64) -> Complex64 {
+    fn factor(&self, before: Complex64, stand: &ModalResponse, frequency_hz: f64) -> Complex64 {
         let omega = TAU * frequency_hz;
         match &self.action {
-            Action::Factor(factor) => factor(mode, omega),
-            Action::Feedthrough(term) => 1.0 + term(mode, omega) / before,
+            Action::Factor(factor) => factor(stand, omega),
+            Action::Feedthrough(term) => 1.0 + term(stand, omega) / before,
             Action::Recorder { response, .. } => response(frequency_hz),
             _ => Complex64::ONE,
         }
@@ -144,9 +145,9 @@ impl Link {
 impl Chain {
     /// A plain stand without a recorder.
     #[must_use]
-    pub fn new(mode: Mode, gain: f64) -> Self {
+    pub fn new(stand: impl Into<ModalResponse>, gain: f64) -> Self {
         Self {
-            mode,
+            stand: stand.into(),
             gain,
             shift: 0.0,
             links: Vec::new(),
@@ -192,7 +193,7 @@ impl Chain {
     /// Whether a response over frequency describes it, down to rest.
     #[must_use]
     pub fn is_a_response(&self) -> bool {
-        let regular = |link: &Link| link.is_linear() && link.dies_out(&self.mode);
+        let regular = |link: &Link| link.is_linear() && link.dies_out(&self.stand);
         self.links.iter().all(regular)
     }
 
@@ -217,10 +218,10 @@ impl Chain {
     /// What some of the linear links make of what comes to them, at a frequency.
     #[must_use]
     pub fn response_of(&self, frequency_hz: f64, some: impl Fn(&Link) -> bool) -> Complex64 {
-        let mut through = self.mode.response(TAU * frequency_hz);
+        let mut through = self.stand.response(TAU * frequency_hz);
         let mut product = Complex64::ONE;
         for link in self.links.iter().filter(|link| link.is_linear()) {
-            let factor = link.factor(through, &self.mode, frequency_hz);
+            let factor = link.factor(through, &self.stand, frequency_hz);
             through *= factor;
             if some(link) {
                 product *= factor;
@@ -245,15 +246,26 @@ impl Chain {
     #[must_use]
     pub fn divide_out(&self, plain: Complex64, frequency_hz: f64) -> Complex64 {
         let linear = || self.links.iter().filter(|link| link.is_linear());
-        let factor = |link: &Link| link.factor(Complex64::ONE, &self.mode, frequency_hz);
+        let factor = |link: &Link| link.factor(Complex64::ONE, &self.stand, frequency_hz);
         if linear().all(|link| matches!(link.action, Action::Recorder { .. })) {
             return linear().fold(plain, |inverse, link| inverse / factor(link));
         }
         let along = |through: Complex64, link: &Link| match &link.action {
-            Action::Feedthrough(term) => through + term(&self.mode, TAU * frequency_hz),
+            Action::Feedthrough(term) => through + term(&self.stand, TAU * frequency_hz),
             _ => through * factor(link),
         };
         linear().fold(plain.inv(), along).inv()
+    }
+
+    /// What a torque of one at the gage has the effect of, as an applied quantity over the gain, at a frequency: 1 in a stand
+    /// with one mode, where both act on the same inertia.
+    #[must_use]
+    pub fn torque_as_applied(&self, frequency_hz: f64) -> Complex64 {
+        let omega = TAU * frequency_hz;
+        match (self.stand.only(), self.stand.at_gage()) {
+            (None, Some(at_gage)) => at_gage.response(omega) * self.stand.inverse(omega),
+            _ => Complex64::ONE,
+        }
     }
 
     /// What torques of the stand add to the record through couplings past it, at a frequency, if there are any among
@@ -262,9 +274,10 @@ impl Chain {
     pub fn coupling<'a>(&'a self, some: &'a [&Link]) -> Option<impl Fn(f64) -> Complex64 + 'a> {
         let any = some.iter().any(|link| link.is_feedthrough());
         any.then_some(move |frequency_hz| {
+            let acts_as = self.torque_as_applied(frequency_hz);
             let add = |sum: Complex64, link: &&Link| match &link.action {
-                Action::Feedthrough(term) => sum + term(&self.mode, TAU * frequency_hz),
-                _ => sum * link.factor(Complex64::ONE, &self.mode, frequency_hz),
+                Action::Feedthrough(term) => sum + acts_as * term(&self.stand, TAU * frequency_hz),
+                _ => sum * link.factor(Complex64::ONE, &self.stand, frequency_hz),
             };
             some.iter().fold(Complex64::ZERO, add)
         })

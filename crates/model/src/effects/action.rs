@@ -5,10 +5,10 @@ use std::sync::Arc;
 use num_complex::Complex64;
 
 use super::lines::SpectralLine;
-use crate::mode::Mode;
+use crate::modal::ModalResponse;
 
-/// A function of the plain mode and the angular frequency in rad/s.
-pub type Frequency = Box<dyn Fn(&Mode, f64) -> Complex64 + Send + Sync>;
+/// A function of the plain stand and the angular frequency in rad/s.
+pub type Frequency = Box<dyn Fn(&ModalResponse, f64) -> Complex64 + Send + Sync>;
 
 /// A response that is known and not fitted, such as that of the recorder: of the frequency in Hz.
 pub type Fixed = Arc<dyn Fn(f64) -> Complex64 + Send + Sync>;

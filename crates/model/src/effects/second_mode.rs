@@ -6,6 +6,7 @@
 //! above the excitation.
 
 use super::{Action, Effect, EffectParameter, Form, Mode, Stage};
+use crate::modal::ModalResponse;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
@@ -103,7 +104,7 @@ pub(super) static EFFECT: Effect = Effect {
                 let (second, ratio) = (mode(p[0], p[1]), p[2]);
                 factor(move |first, omega| {
                     // J₂ hangs on J₁: (s² + …)₁ x + μ s² (2ζ₂ω₂ s + ω₂²)/(s² + …)₂ x = ω₁² u.
-                    let w1 = omega / first.omega_rad_s;
+                    let w1 = omega / first.first().omega_rad_s;
                     let hung = second.inverse(omega) + (omega / second.omega_rad_s).powi(2);
                     let load = -ratio * w1 * w1 * hung * second.response(omega);
                     let plain = first.inverse(omega);
@@ -141,6 +142,6 @@ fn mode(frequency_hz: f64, damping_ratio: f64) -> Mode {
     }
 }
 
-fn factor(f: impl Fn(&Mode, f64) -> Complex64 + Send + Sync + 'static) -> Action {
+fn factor(f: impl Fn(&ModalResponse, f64) -> Complex64 + Send + Sync + 'static) -> Action {
     Action::Factor(Box::new(f))
 }

@@ -5,7 +5,7 @@
 //! before its cause (`springpot`, `K (jω/ω₀)^α`, does not; A. Gemant, Physics 7 (1936), 311), which shows in the first moments of a transient only. Mistaken for viscous damping where
 //! only the resonance is excited, `coulomb-friction` at one level.
 
-use super::{Action, Effect, EffectParameter, Form, Stage};
+use super::{Action, Effect, EffectParameter, Form, Mode, Stage};
 use num_complex::Complex64;
 
 pub(super) static EFFECT: Effect = Effect {
@@ -27,13 +27,10 @@ pub(super) static EFFECT: Effect = Effect {
             starts: &[&[0.02]],
             build: |p| {
                 let eta = p[0];
-                Action::Factor(Box::new(move |mode, omega| {
-                    if omega == 0.0 {
-                        return Complex64::ONE;
-                    }
-                    let plain = mode.inverse(omega);
-                    plain / (plain + Complex64::new(0.0, eta.copysign(omega)))
-                }))
+                factor(move |_, omega, plain| match omega == 0.0 {
+                    true => plain,
+                    false => plain + Complex64::new(0.0, eta.copysign(omega)),
+                })
             },
         },
         Form {
@@ -44,13 +41,12 @@ pub(super) static EFFECT: Effect = Effect {
             starts: &[&[0.02]],
             build: |p| {
                 let order = p[0];
-                Action::Factor(Box::new(move |mode, omega| {
+                factor(move |mode, omega, plain| {
                     // At rest the stiffness of a springpot is zero: far below the band it is held.
                     let w = (omega / mode.omega_rad_s).abs().max(1e-4);
-                    let plain = mode.inverse(omega);
                     let turn = (0.5 * std::f64::consts::PI * order).copysign(omega);
-                    plain / (plain - 1.0 + Complex64::from_polar(w.powf(order), turn))
-                }))
+                    plain - 1.0 + Complex64::from_polar(w.powf(order), turn)
+                })
             },
         },
         Form {
@@ -64,13 +60,19 @@ pub(super) static EFFECT: Effect = Effect {
             starts: &[&[0.02, 1.0]],
             build: |p| {
                 let (order, ratio) = (p[0], p[1]);
-                Action::Factor(Box::new(move |mode, omega| {
+                factor(move |mode, omega, plain| {
                     let w = (omega / mode.omega_rad_s).abs().max(1e-4);
-                    let plain = mode.inverse(omega);
                     let turn = (0.5 * std::f64::consts::PI * order).copysign(omega);
-                    plain / (plain - 1.0 + Complex64::from_polar(ratio * w.powf(order), turn))
-                }))
+                    plain - 1.0 + Complex64::from_polar(ratio * w.powf(order), turn)
+                })
             },
         },
     ],
 };
+
+/// The factor that changes the `1 − (ω/ω₀)² + 2jζ ω/ω₀` of every mode of the stand.
+fn factor(change: impl Fn(&Mode, f64, Complex64) -> Complex64 + Send + Sync + 'static) -> Action {
+    Action::Factor(Box::new(move |stand, omega| {
+        stand.inverse(omega) / stand.inverse_with(omega, |mode, plain| change(mode, omega, plain))
+    }))
+}

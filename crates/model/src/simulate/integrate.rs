@@ -1,7 +1,7 @@
 //! Integration of `x'' + 2ζω₀ x' + ω₀² (x + n(x, x', z)) = ω₀² G u` in time.
 //!
 //! The linear part is exact: from node to node by the matrix exponential, the input between nodes as the cubic
-//! through four of them. The torques `n` act at the nodes (`run`), for the time of a whole step (Strang's
+//! through four of them. The torques `n` act at the nodes (`run`; `modes` for several modes), for the time of a whole step (Strang's
 //! splitting, SIAM J. Numer. Anal. 5 (1968), 506): second order in the step, stable for any size of the
 //! linear terms, and a torque that switches is switched by its own exact flow.
 

@@ -10,6 +10,7 @@
 mod between;
 mod input;
 mod integrate;
+mod modes;
 mod pieces;
 mod run;
 
@@ -17,6 +18,7 @@ pub use between::Between;
 pub use input::Excitation;
 pub(crate) use integrate::free_motion;
 pub use integrate::{MotionState, substeps};
+pub(crate) use modes::integrate_modes;
 pub use pieces::{Diverges, Pieces};
 pub(crate) use run::{MotionProgress, Torques, integrate};
 

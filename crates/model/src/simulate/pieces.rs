@@ -80,7 +80,7 @@ impl<'a> Pieces<'a> {
     pub fn new(chain: &'a Chain, rate_hz: f64, between: Between) -> Self {
         Self {
             cut: is_local(chain, rate_hz, SIDE).then_some([PIECE, SIDE]),
-            steps: substeps(chain.mode.natural_frequency_hz(), rate_hz),
+            steps: substeps(chain.stand.highest_hz(), rate_hz),
             progress: chain.begin(MotionState::default()),
             finest: 0,
             chain,
@@ -194,7 +194,7 @@ fn is_local(chain: &Chain, rate_hz: f64, side: usize) -> bool {
     for (k, bin) in spectrum.iter_mut().enumerate() {
         let hz = k as f64 * rate_hz / size as f64;
         // The motion that comes to them has little above the natural frequency.
-        let motion = 1.0 + (hz / chain.mode.natural_frequency_hz()).powi(2);
+        let motion = 1.0 + (hz / chain.stand.highest_hz()).powi(2);
         *bin = chain.response_of(hz, |link| link.stage > Stage::Stand) / motion;
     }
     spectrum[0].im = 0.0;
@@ -213,6 +213,7 @@ mod tests {
     use super::*;
     use crate::chain::Link;
     use crate::effects::{Effect, Mode};
+    use crate::modal::{ModalPart, ModalResponse};
 
     const RATE_HZ: f64 = 20_000.0;
     const MODE: Mode = Mode {
@@ -226,6 +227,23 @@ mod tests {
             Link::of(effect, effect.form(Some(form)).unwrap(), values)
         };
         Chain::new(MODE, 1.0).with_links(effects.iter().map(link))
+    }
+
+    /// Two modes with dry friction at the gage.
+    fn several() -> Chain {
+        let part = |hz: f64, residue| ModalPart {
+            mode: Mode {
+                omega_rad_s: TAU * hz,
+                damping_ratio: 0.05,
+            },
+            residue,
+            quadrature: 0.02,
+            at_gage: Some(residue),
+        };
+        let modes = ModalResponse::new(vec![part(590.0, 0.8), part(900.0, 0.2)]);
+        let friction = Effect::named("coulomb-friction").unwrap();
+        let friction = Link::of(friction, friction.form(Some("sharp")).unwrap(), &[0.3]);
+        Chain::new(modes.unwrap(), 1.0).with_links([friction])
     }
 
     /// Two tones and noise of a tenth.
@@ -263,6 +281,7 @@ mod tests {
                 ("backlash", "gap-beside", &[0.2]),
                 ("gage-nonlinearity", "both", &[0.02, 0.003]),
             ]),
+            several(),
         ];
         for (i, chain) in chains.iter().enumerate() {
             let mut pieces = Pieces::new(chain, RATE_HZ, Between::BandLimited);

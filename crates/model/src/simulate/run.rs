@@ -4,7 +4,9 @@ use std::ops::Range;
 
 use super::input::Excitation;
 use super::integrate::{LinearStep, MotionState, free};
+use super::modes::{self, ModeMotion};
 use crate::effects::{Memory, Mode, Torque};
+use crate::modal::ModalResponse;
 
 /// Torques in the stand, each with whether the gage shows it.
 pub(crate) type Torques<'a> = Vec<(&'a dyn Torque, bool)>;
@@ -30,14 +32,20 @@ struct Integrator<'a> {
 #[derive(Debug, Clone)]
 pub(crate) struct MotionProgress {
     state: MotionState,
-    memories: Vec<Memory>,
+    pub(super) memories: Vec<Memory>,
     direction: f64,
+    /// Where each mode stands, if there are several.
+    pub(super) modes: Vec<ModeMotion>,
 }
 
 impl MotionProgress {
     /// A motion that begins. A load that does not change, and so is not in the input, shifts the displacement that the
     /// torques see.
-    pub(crate) fn begin(torques: &Torques<'_>, start: MotionState, shift: f64) -> Self {
+    pub(crate) fn begin(
+        torques: &Torques<'_>,
+        (stand, start): (&ModalResponse, MotionState),
+        shift: f64,
+    ) -> Self {
         Self {
             state: start,
             memories: acting(torques)
@@ -47,12 +55,13 @@ impl MotionProgress {
                 true => 0.0,
                 false => start.speed.signum(),
             },
+            modes: modes::begin(stand, start),
         }
     }
 }
 
 /// All torques but sharp dry friction.
-fn acting<'a>(torques: &Torques<'a>) -> impl Iterator<Item = (&'a dyn Torque, bool)> {
+pub(super) fn acting<'a>(torques: &Torques<'a>) -> impl Iterator<Item = (&'a dyn Torque, bool)> {
     let acting = torques.iter().filter(|(torque, _)| torque.dry().is_none());
     acting.copied()
 }
@@ -101,6 +110,7 @@ pub(crate) fn integrate(
         state,
         memories: run.acting.iter().map(|(_, memory)| *memory).collect(),
         direction: run.direction,
+        modes: Vec::new(),
     };
     samples
 }

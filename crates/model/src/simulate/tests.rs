@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use super::{Between, Excitation, MotionState};
 use crate::chain::{Chain, Link};
 use crate::effects::{Action, Effect, Mode, RIVALS, Stage};
+use crate::modal::{ModalPart, ModalResponse};
 
 const RATE_HZ: f64 = 20_000.0;
 const COUNT: usize = 2000;
@@ -103,6 +104,32 @@ fn both_ways_of_the_linear_stand_agree_with_the_oracle() {
         .map(|(a, b)| a - b);
     let error = rms(difference) / rms(truth[late..].iter().copied());
     assert!(error < 1e-6, "{error:e}");
+}
+
+/// Two modes with residues out of phase, and compliance above them: in time as through the spectrum.
+#[test]
+fn several_modes_in_time_are_their_response() {
+    let part = |hz: f64, residue, quadrature| ModalPart {
+        mode: Mode {
+            omega_rad_s: TAU * hz,
+            damping_ratio: 0.05,
+        },
+        residue,
+        quadrature,
+        at_gage: None,
+    };
+    let modes = ModalResponse::new(vec![part(590.0, 1.1, 0.05), part(1300.0, -0.2, 0.1)]);
+    let chain = Chain::new(modes.unwrap(), 1.3);
+    assert!((chain.stand.residual() - 0.1).abs() < 1e-12);
+    let in_time = chain.simulate_from(&input(4), MotionState::default());
+    let through_spectrum = chain.simulate(&input(4), MotionState::default());
+    let late = COUNT / 2..COUNT - 1;
+    let pairs = in_time[late.clone()]
+        .iter()
+        .zip(&through_spectrum[late.clone()]);
+    let error = rms(pairs.map(|(a, b)| a - b)) / rms(in_time[late].iter().copied());
+    println!("{error:e}");
+    assert!(error < 1e-4, "{error:e}");
 }
 
 /// The input as it goes from sample to sample in other ways, put to the oracle as it is.

@@ -39,7 +39,7 @@ impl ParameterValues {
         Self {
             poles: modal.poles.clone(),
             delay_s: modal.delay_s,
-            linear: modal.linear().to_vec(),
+            linear: modal.linear()[..2 * layout.modes + layout.shape.outside()].to_vec(),
             transients: vec![vec![0.0; layout.own()]; records],
         }
     }
@@ -67,7 +67,7 @@ impl<'a> Parameters<'a> {
 
     /// Number of shared parameters.
     pub fn shared(&self) -> usize {
-        self.searched() + 2 * self.modes + 2
+        self.searched() + 2 * self.modes + self.shape.outside()
     }
 
     /// Number of parameters of a record, shared ones included.
@@ -111,7 +111,8 @@ impl<'a> Parameters<'a> {
     pub fn response(&self, omega: f64, state: &ParameterValues) -> Complex64 {
         let (front, s) = self.shape.front(omega, state.delay_s, self.shape.scale());
         let far = 2 * self.modes;
-        let outside = state.linear[far] + state.linear[far + 1] / (s * s);
+        let below = state.linear.get(far + 1).map(|c| c / (s * s));
+        let outside = state.linear[far] + below.unwrap_or_default();
         front * (self.resonances(s, &state.linear, state) + outside)
     }
 
@@ -142,7 +143,10 @@ impl<'a> Parameters<'a> {
         let (n, searched) = (2 * self.modes, self.own());
         let from = searched + self.searched();
         let far = front / (s * s);
-        let mut driven = front * linear[n] + far * linear[n + 1];
+        let mut driven = front * linear[n];
+        if let Some(below) = linear.get(n + 1) {
+            driven += far * below;
+        }
         let mut transient = Complex64::ZERO;
         for (j, pole) in state.poles.iter().enumerate() {
             let (near, mirrored) = self.shape.fractions(s, *pole, scale);
@@ -168,7 +172,10 @@ impl<'a> Parameters<'a> {
         if self.shape.with_delay {
             out[searched + n] = Complex64::new(0.0, -omega) * driven;
         }
-        (out[from + n], out[from + n + 1]) = (front, far);
+        out[from + n] = front;
+        if self.shape.below {
+            out[from + n + 1] = far;
+        }
         out[self.columns()] = spectra.measured[k] - driven - transient;
     }
 }
@@ -224,6 +231,7 @@ mod tests {
             order,
             added_rate: 0.0,
             with_delay: true,
+            below: true,
         }
     }
 

@@ -1,0 +1,241 @@
+//! The motion of a stand with several modes, node by node.
+//!
+//! ```text
+//! x = Σ (r_k y_k + q_k y_k'/ω_k) + c G u + Σ z_k
+//! y_k'' + 2ζ_k ω_k y_k' + ω_k² y_k = ω_k² G u,   z_k'' + 2ζ_k ω_k z_k' + ω_k² z_k = −ω_k² g_k n(x, x')
+//! ```
+//!
+//! `y_k` is what the input drives and `z_k` what the torques `n` at the gage push; both are exact from node to node. A torque
+//! changes the speed of the gage at a node, and that of each `z_k` by its part `ω_k² g_k` in it. Sharp dry friction is
+//! constant over a step: as much as stops the gage at its end, and no more than its size (J. J. Moreau, *Numerical aspects
+//! of the sweeping process*, Comput. Methods Appl. Mech. Eng. 177 (1999), 329).
+
+use std::ops::Range;
+
+use super::input::Excitation;
+use super::integrate::{LinearStep, MotionState, free};
+use super::run::{MotionProgress, Torques, acting};
+use crate::effects::{Memory, Torque};
+use crate::modal::{ModalPart, ModalResponse};
+
+/// Where a mode stands.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct ModeMotion {
+    /// `y`.
+    driven: MotionState,
+    /// `z`.
+    pushed: MotionState,
+}
+
+/// Where the modes of a stand begin: all of the motion is that of the one with the largest part at rest. A stand with one
+/// mode needs none.
+pub(super) fn begin(stand: &ModalResponse, start: MotionState) -> Vec<ModeMotion> {
+    if stand.only().is_some() {
+        return Vec::new();
+    }
+    let mut modes = vec![ModeMotion::default(); stand.parts().len()];
+    let parts = stand.parts().iter().enumerate();
+    let largest = parts.max_by(|a, b| a.1.residue.abs().total_cmp(&b.1.residue.abs()));
+    if let Some((place, part)) = largest.filter(|(_, part)| part.residue != 0.0) {
+        modes[place].driven = MotionState {
+            x: start.x / part.residue,
+            speed: start.speed / part.residue,
+        };
+    }
+    modes
+}
+
+/// A mode with its steps.
+struct SteppedMode {
+    part: ModalPart,
+    step: LinearStep,
+    free: [f64; 4],
+    /// `g`; 0 where no torque acts.
+    at_gage: f64,
+    motion: ModeMotion,
+}
+
+impl SteppedMode {
+    /// Goes on by a step; its part of displacement and speed of the gage then, `driving` being `G u` there.
+    fn advance(&mut self, window: &[f64], driving: f64) -> MotionState {
+        self.motion.driven = self.step.advance(self.motion.driven, window);
+        let MotionState { x, speed } = self.motion.pushed;
+        let [a, b, c, d] = self.free;
+        self.motion.pushed = MotionState {
+            x: a * x + b * speed,
+            speed: c * x + d * speed,
+        };
+        self.at(driving)
+    }
+
+    /// Its part of displacement and speed of the gage.
+    fn at(&self, driving: f64) -> MotionState {
+        let ModeMotion { driven, pushed } = self.motion;
+        let (omega, ratio) = (self.part.mode.omega_rad_s, self.part.mode.damping_ratio);
+        let turned = self.part.quadrature / omega;
+        let rate = omega * omega * (driving - driven.x) - 2.0 * ratio * omega * driven.speed;
+        MotionState {
+            x: self.part.residue * driven.x + turned * driven.speed + pushed.x,
+            speed: self.part.residue * driven.speed + turned * rate + pushed.speed,
+        }
+    }
+
+    /// `ω² g`: what a torque of one at the gage accelerates it by.
+    fn pushed_by(&self) -> f64 {
+        self.part.mode.omega_rad_s * self.part.mode.omega_rad_s * self.at_gage
+    }
+}
+
+/// The stand on its way through a record.
+struct ModalIntegrator<'a> {
+    modes: Vec<SteppedMode>,
+    /// `c G`.
+    direct: f64,
+    gain: f64,
+    shift: f64,
+    step_s: f64,
+    /// What a torque of one changes the speed of the gage by at a node.
+    impulse: f64,
+    acting: Vec<((&'a dyn Torque, bool), Memory)>,
+    /// Sharp dry friction.
+    dry: f64,
+}
+
+/// What the gage shows at some samples of the input, as [`integrate`](super::integrate) does for one mode.
+pub(crate) fn integrate_modes(
+    (stand, gain, shift): (&ModalResponse, f64, f64),
+    torques: &Torques<'_>,
+    input: &Excitation,
+    range: Range<usize>,
+    progress: &mut MotionProgress,
+) -> Vec<f64> {
+    let substeps = input.substeps();
+    let step_s = 1.0 / (input.rate_hz() * substeps as f64);
+    let stepped = |(part, motion): (&ModalPart, &ModeMotion)| SteppedMode {
+        part: *part,
+        step: LinearStep::new(&part.mode, gain, step_s),
+        free: free(&part.mode, step_s),
+        at_gage: part.at_gage.unwrap_or(0.0),
+        motion: *motion,
+    };
+    let modes: Vec<SteppedMode> = stand
+        .parts()
+        .iter()
+        .zip(&progress.modes)
+        .map(stepped)
+        .collect();
+    let memories = progress.memories.iter().copied();
+    let mut run = ModalIntegrator {
+        impulse: step_s * modes.iter().map(SteppedMode::pushed_by).sum::<f64>(),
+        modes,
+        direct: stand.residual() * gain,
+        gain,
+        shift,
+        step_s,
+        acting: acting(torques).zip(memories).collect(),
+        dry: torques.iter().filter_map(|(t, _)| t.dry()).sum(),
+    };
+    let mut samples = Vec::with_capacity(range.len());
+    let nodes = input.fine().windows(4).skip(range.start * substeps);
+    let mut state = None;
+    for (node, window) in nodes.take(range.len() * substeps).enumerate() {
+        let now = state.unwrap_or_else(|| run.begin(window));
+        if node % substeps == 0 {
+            if !now.x.is_finite() {
+                break;
+            }
+            samples.push(now.x + run.shown(now));
+        }
+        state = Some(run.advance(now, window));
+    }
+    samples.resize(range.len(), f64::NAN);
+    progress.modes = run.modes.iter().map(|mode| mode.motion).collect();
+    progress.memories = run.acting.iter().map(|(_, memory)| *memory).collect();
+    samples
+}
+
+impl ModalIntegrator<'_> {
+    /// Displacement and speed of the gage at the node that the run begins with.
+    fn begin(&self, window: &[f64]) -> MotionState {
+        let parts = self.modes.iter().map(|mode| mode.at(self.gain * window[1]));
+        self.whole(
+            parts,
+            window[1],
+            (window[2] - window[0]) / (2.0 * self.step_s),
+        )
+    }
+
+    /// Those of all modes with what is above the band.
+    fn whole(&self, parts: impl Iterator<Item = MotionState>, u: f64, slope: f64) -> MotionState {
+        let direct = MotionState {
+            x: self.direct * u,
+            speed: self.direct * slope,
+        };
+        parts.fold(direct, |sum, part| MotionState {
+            x: sum.x + part.x,
+            speed: sum.speed + part.speed,
+        })
+    }
+
+    /// A step, and what the torques do at its end.
+    fn advance(&mut self, state: MotionState, window: &[f64]) -> MotionState {
+        let driving = self.gain * window[2];
+        let mut parts = std::mem::take(&mut self.modes);
+        let advanced = parts.iter_mut().map(|mode| mode.advance(window, driving));
+        let moved = self.whole(
+            advanced,
+            window[2],
+            (window[3] - window[1]) / (2.0 * self.step_s),
+        );
+        self.modes = parts;
+        let kicked = self.kick(moved, moved.speed - state.speed);
+        self.rub(kicked)
+    }
+
+    fn kick(&mut self, moved: MotionState, change: f64) -> MotionState {
+        let mut speed = moved.speed;
+        for ((torque, _), memory) in &mut self.acting {
+            speed = torque.kick(memory, moved.x + self.shift, speed, change, self.impulse);
+        }
+        if speed != moved.speed {
+            let each = (speed - moved.speed) * self.step_s / self.impulse;
+            for mode in &mut self.modes {
+                mode.motion.pushed.speed += each * mode.pushed_by();
+            }
+        }
+        MotionState { x: moved.x, speed }
+    }
+
+    /// Dry friction over the step.
+    fn rub(&mut self, mut moved: MotionState) -> MotionState {
+        if self.dry == 0.0 {
+            return moved;
+        }
+        let stops: f64 = self
+            .modes
+            .iter()
+            .map(|mode| -mode.at_gage * mode.free[2])
+            .sum();
+        let friction = (moved.speed / stops).clamp(-self.dry, self.dry);
+        for mode in &mut self.modes {
+            let [a, _, c, _] = mode.free;
+            let (x, speed) = (
+                -mode.at_gage * friction * (1.0 - a),
+                mode.at_gage * friction * c,
+            );
+            mode.motion.pushed.x += x;
+            mode.motion.pushed.speed += speed;
+            moved.x += x;
+            moved.speed += speed;
+        }
+        moved
+    }
+
+    /// Torques that the gage shows beside the displacement.
+    fn shown(&mut self, state: MotionState) -> f64 {
+        let shown = self.acting.iter_mut().filter(|((_, shown), _)| *shown);
+        shown
+            .map(|((torque, _), memory)| torque.value(memory, state.x + self.shift, state.speed))
+            .sum()
+    }
+}

@@ -1,0 +1,100 @@
+//! Several modes of a response, as a stand file takes them.
+
+use torqcomp_model::Estimate;
+
+use super::{TORQUE, entry, stand_text};
+use crate::cli::identify::Findings;
+use crate::failure::Failure;
+use crate::identify::{Identification, ModalShares, Motion, NamedEstimates};
+use crate::stand::update::{self, Entry};
+use crate::stand::{MODE_CORRELATIONS, TransducerSignal};
+use crate::unit::NamedUnit;
+
+/// Smallest correlation that is written.
+const WORTH_WRITING: f64 = 0.01;
+
+/// What is known of the records beside the modes.
+pub(super) struct Written<'a> {
+    pub source: String,
+    pub motion: Motion,
+    /// Units of the measured and of the applied channel.
+    pub units: [Option<&'a NamedUnit>; 2],
+}
+
+impl Written<'_> {
+    /// Entries of the stand file.
+    ///
+    /// # Errors
+    /// If the stand file that is updated cannot be read.
+    pub(super) fn entries(
+        &self,
+        shares: &ModalShares,
+        findings: &Findings,
+        result: &Identification,
+    ) -> Result<Vec<Entry>, Failure> {
+        let mut all = Vec::new();
+        if self.motion != Motion::Displacement {
+            all.push(Entry::text("mechanics", "measures", self.motion.name()));
+        }
+        let stand = stand_text(findings)?;
+        let is_torque = self.is_torque() || stand.is_some_and(|(_, text)| update::converts(&text));
+        if !is_torque {
+            all.push(Entry::quantity(
+                "mechanics",
+                "static_gain",
+                &self.gain(&shares.gain),
+                &self.source,
+            ));
+        }
+        if let Some(delay) = result.get("delay").filter(|delay| delay.value() > 0.0) {
+            all.push(entry("recorder", "delay", delay, &self.source));
+        }
+        let mode = |mode: &NamedEstimates| self.mode(mode);
+        all.push(Entry::modes(shares.modes.iter().map(mode).collect()));
+        Ok(all)
+    }
+
+    /// Whether torque acts, and the record is one or becomes one by a calibration.
+    fn is_torque(&self) -> bool {
+        let [Some(measured), Some(applied)] = self.units else {
+            return false;
+        };
+        let is_signal = TransducerSignal::of(&measured.unit).is_some();
+        applied.unit.dimension() == TORQUE && (measured.unit.dimension() == TORQUE || is_signal)
+    }
+
+    /// The response at rest in the units of the channels; 1 stands for an unknown one.
+    fn gain(&self, gain: &Estimate) -> Estimate {
+        let texts = self
+            .units
+            .map(|unit| unit.map_or("1", |unit| unit.text.as_str()));
+        let [measured, applied] = texts.map(|text| match text.contains([' ', '/']) {
+            true => format!("({text})"),
+            false => text.to_owned(),
+        });
+        Estimate::of(
+            format!("{measured}/{applied}"),
+            gain.value(),
+            gain.std_uncertainty(),
+        )
+    }
+
+    fn mode(&self, mode: &NamedEstimates) -> Vec<Entry> {
+        let keys = [
+            "natural_frequency",
+            "damping_ratio",
+            "residue",
+            "quadrature",
+        ];
+        let numbers = keys.into_iter().zip(&mode.list);
+        let mut all: Vec<Entry> = numbers
+            .map(|(key, number)| Entry::measured("modes", key, &number.estimate))
+            .collect();
+        for (key, [i, k]) in MODE_CORRELATIONS {
+            let found = mode.correlation(i, k).filter(|c| c.abs() >= WORTH_WRITING);
+            all.extend(found.map(|c| Entry::number("modes", key, c)));
+        }
+        all.push(Entry::text("modes", "source", &self.source));
+        all
+    }
+}

@@ -1,0 +1,311 @@
+//! `[[modes]]`: the response of the stand as a sum of modes.
+
+use std::f64::consts::TAU;
+
+use torqcomp_model::{Estimate, Kind, ModalPart, Mode};
+
+use super::mechanics::refuse_bare_rate;
+use super::section::Section;
+use crate::failure::Failure;
+
+/// Keys of the correlation coefficients of a mode's numbers, and the places of both in its list of keys.
+pub const MODE_CORRELATIONS: [(&str, [usize; 2]); 6] = [
+    ("correlation_frequency_damping", [0, 1]),
+    ("correlation_frequency_residue", [0, 2]),
+    ("correlation_damping_residue", [1, 2]),
+    ("correlation_frequency_quadrature", [0, 3]),
+    ("correlation_damping_quadrature", [1, 3]),
+    ("correlation_residue_quadrature", [2, 3]),
+];
+
+/// A mode as the stand file gives it.
+#[derive(Debug, Clone)]
+pub struct DeclaredMode {
+    /// Natural frequency in Hz, damping ratio, residue and quadrature.
+    values: [f64; 4],
+    stds: [Option<f64>; 4],
+    /// In the order of [`MODE_CORRELATIONS`].
+    correlations: [f64; 6],
+    /// Its part in what a torque at the gage moves the gage by, if that is known.
+    at_gage: Option<f64>,
+}
+
+/// A mode as it is read, before its part of the whole is known.
+struct ReadMode<'a> {
+    section: &'a Section<'a>,
+    mode: DeclaredMode,
+    /// Its shape at the load and at the gage, in place of a residue.
+    shape: Option<[Estimate; 2]>,
+}
+
+/// Reads all modes.
+pub(super) fn declared_modes(sections: &[Section]) -> Result<Vec<DeclaredMode>, Failure> {
+    let mut read: Vec<ReadMode> = sections
+        .iter()
+        .map(ReadMode::of)
+        .collect::<Result<_, _>>()?;
+    let with_shape = read.iter().filter(|mode| mode.shape.is_some()).count();
+    if with_shape > 0 {
+        if let Some(other) = read.iter().find(|mode| mode.shape.is_none()) {
+            return Err(other.section.fail(
+                "residue",
+                "other modes have shape_at_load and shape_at_gage; give all modes in the same way, as residues are parts of \
+                 the response at rest and shapes have a scale of their own",
+            ));
+        }
+        by_shapes(&mut read)?;
+    } else {
+        by_residues(&mut read);
+    }
+    Ok(read.into_iter().map(|read| read.mode).collect())
+}
+
+/// `r_k = φ_k(load) φ_k(gage)/ω_k²` and `g_k = φ_k(gage)²/ω_k²`, each over the sum over all modes.
+fn by_shapes(read: &mut [ReadMode]) -> Result<(), Failure> {
+    let mut parts = Vec::new();
+    for mode in &*read {
+        let [load, gage] = mode
+            .shape
+            .as_ref()
+            .map_or([0.0; 2], |s| [s[0].value(), s[1].value()]);
+        let square = mode.mode.values[0].powi(2);
+        parts.push([load * gage / square, gage * gage / square]);
+    }
+    let [residues, at_gage] = [0, 1].map(|k| parts.iter().map(|part| part[k]).sum::<f64>());
+    if residues == 0.0 || !residues.is_finite() {
+        return Err(read[0].section.fail(
+            "shape_at_load",
+            "with these shapes a torque at rest does not reach the gage (the sum of shape_at_load × shape_at_gage over the \
+             square of the frequency is zero)",
+        ));
+    }
+    for (mode, part) in read.iter_mut().zip(parts) {
+        mode.mode.values[2] = part[0] / residues;
+        mode.mode.at_gage = Some(part[1] / at_gage);
+        let relative = mode
+            .shape
+            .iter()
+            .flatten()
+            .filter_map(Estimate::relative_std);
+        let relative = relative.reduce(f64::hypot);
+        mode.mode.stds[2] = relative.map(|std| (std * mode.mode.values[2]).abs());
+    }
+    Ok(())
+}
+
+/// Where no residue is negative, load and gage count as one place; a gage elsewhere needs shapes.
+fn by_residues(read: &mut [ReadMode]) {
+    let sum: f64 = read.iter().map(|mode| mode.mode.values[2]).sum();
+    if sum > 0.0 && read.iter().all(|mode| mode.mode.values[2] >= 0.0) {
+        for mode in read {
+            mode.mode.at_gage = Some(mode.mode.values[2] / sum);
+        }
+    }
+}
+
+impl<'a> ReadMode<'a> {
+    fn of(section: &'a Section) -> Result<Self, Failure> {
+        refuse_bare_rate(section)?;
+        let frequency = section.positive("natural_frequency", Kind::Frequency)?;
+        let damping = section.not_negative("damping_ratio", Kind::Ratio)?;
+        let residue = section.quantity("residue", Kind::Ratio)?;
+        let quadrature = section.quantity("quadrature", Kind::Ratio)?;
+        let shape = [
+            section.quantity("shape_at_load", Kind::Ratio)?,
+            section.quantity("shape_at_gage", Kind::Ratio)?,
+        ];
+        let mut correlations = [0.0; 6];
+        for ((key, _), value) in MODE_CORRELATIONS.into_iter().zip(&mut correlations) {
+            *value = section.correlation(key)?;
+        }
+        // Where the numbers come from is for people.
+        let _ = section.text("source")?;
+        section.finish()?;
+        let shape = match (residue.is_some(), shape) {
+            (true, [None, None]) => None,
+            (false, [Some(load), Some(gage)]) => Some([load, gage]),
+            (true, _) => {
+                return Err(section.fail(
+                    "residue",
+                    "shape_at_load and shape_at_gage give the residue, too; keep one of them",
+                ));
+            }
+            (false, _) => return Err(section.fail("", NO_RESIDUE)),
+        };
+        let number = |estimate: &Option<Estimate>| estimate.as_ref().map_or(0.0, Estimate::value);
+        let std =
+            |estimate: &Option<Estimate>| estimate.as_ref().and_then(Estimate::std_uncertainty);
+        let mode = DeclaredMode {
+            values: [
+                frequency.value(),
+                damping.value(),
+                number(&residue),
+                number(&quadrature),
+            ],
+            stds: [
+                frequency.std_uncertainty(),
+                damping.std_uncertainty(),
+                std(&residue),
+                std(&quadrature),
+            ],
+            correlations,
+            at_gage: None,
+        };
+        Ok(Self {
+            section,
+            mode,
+            shape,
+        })
+    }
+}
+
+/// What a mode is asked for that has a frequency and damping only.
+const NO_RESIDUE: &str = "residue is missing: the part that this mode has in the response at rest, as in residue = 0.9; a decay does \
+                          not tell it: measure it by identify response with a known torque or force, or give shape_at_load and \
+                          shape_at_gage of all modes";
+
+impl DeclaredMode {
+    /// Keys of its numbers.
+    pub(crate) const NUMBERS: [&str; 4] = [
+        "natural_frequency",
+        "damping_ratio",
+        "residue",
+        "quadrature",
+    ];
+
+    /// The mode, and the place of one of its numbers, for a place among the numbers of all modes.
+    pub(super) fn place(of_all: usize) -> (usize, usize) {
+        (of_all / Self::NUMBERS.len(), of_all % Self::NUMBERS.len())
+    }
+
+    /// Its part of the response.
+    pub(super) fn part(&self) -> ModalPart {
+        let [frequency_hz, damping_ratio, residue, quadrature] = self.values;
+        ModalPart {
+            mode: Mode {
+                omega_rad_s: TAU * frequency_hz,
+                damping_ratio,
+            },
+            residue,
+            quadrature,
+            at_gage: self.at_gage,
+        }
+    }
+
+    /// Standard uncertainties of its numbers.
+    pub(super) fn stds(&self) -> [Option<f64>; 4] {
+        self.stds
+    }
+
+    /// Correlation coefficient of the errors of two of its numbers.
+    pub(super) fn correlation(&self, i: usize, k: usize) -> f64 {
+        let both = MODE_CORRELATIONS.iter().zip(self.correlations);
+        let found = both.filter(|((_, pair), _)| *pair == [i.min(k), i.max(k)]);
+        found.map(|(_, value)| value).sum()
+    }
+
+    /// The same with one number moved by so many of its standard uncertainties.
+    pub(super) fn moved(&self, number: usize, by: f64) -> Option<Self> {
+        let mut moved = self.clone();
+        moved.values[number] += by * self.stds[number]?;
+        Some(moved)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::stand::{Stand, parse};
+
+    fn read(modes: &str) -> Result<Stand, String> {
+        let text = format!("schema = \"torqcomp.stand/1\"\n{modes}");
+        parse("s.toml", &text).map_err(|failure| failure.to_string())
+    }
+
+    /// A mode at 100 Hz and one at 200 Hz, with more lines.
+    fn two(first: &str, second: &str) -> String {
+        let mode = |hz, more| {
+            format!("[[modes]]\nnatural_frequency = \"{hz} Hz\"\ndamping_ratio = 0.01\n{more}\n")
+        };
+        mode(100, first) + &mode(200, second)
+    }
+
+    #[test]
+    fn residues_are_parts_of_the_response_at_rest() {
+        let stand = read(&two("residue = 0.9", "residue = 0.06")).unwrap();
+        let modes = stand.modes().unwrap();
+        assert!((modes.residual() - 0.04).abs() < 1e-15);
+        // Load and gage in one place: 0.9 of 0.96.
+        assert!((modes.parts()[0].at_gage.unwrap() - 0.9375).abs() < 1e-15);
+        assert!(stand.warnings.is_empty());
+    }
+
+    /// φ φ/f²: 2·1/1 and −2·2/4 are 2 and −1, of 1; at the gage 1/1 and 4/4.
+    #[test]
+    fn shapes_give_residues_and_what_a_torque_at_the_gage_does() {
+        let text = two(
+            "shape_at_load = 2\nshape_at_gage = 1",
+            "shape_at_load = -2\nshape_at_gage = 2",
+        );
+        let modes = read(&text).unwrap().modes().unwrap();
+        let got: Vec<_> = modes
+            .parts()
+            .iter()
+            .map(|p| (p.residue, p.at_gage))
+            .collect();
+        assert_eq!(got, [(2.0, Some(0.5)), (-1.0, Some(0.5))]);
+    }
+
+    #[test]
+    fn mistakes_are_named_with_their_place() {
+        let refused = |text: &str, parts: &[&str]| {
+            let message = read(text).unwrap_err();
+            let missing = parts.iter().find(|part| !message.contains(**part));
+            assert!(missing.is_none(), "{message}: {missing:?}");
+        };
+        refused(
+            &two("residue = 0.9", ""),
+            &["line 6", "residue is missing", "identify response"],
+        );
+        refused(
+            &two("residue = 0.9", "shape_at_load = 1\nshape_at_gage = 1"),
+            &["line 5", "same way"],
+        );
+        refused(
+            &two("residue = 0.9\nshape_at_load = 1", "residue = 1"),
+            &["line 5", "keep one"],
+        );
+        refused(
+            &two("residue = 0.9", "residu = 0.1"),
+            &["line 9", "did you mean"],
+        );
+        refused(
+            &two(
+                "residue = 0.9\ncorrelation_damping_residue = 2",
+                "residue = 0.1",
+            ),
+            &["line 6", "-1 to 1"],
+        );
+        let beside = format!(
+            "[mechanics]\nstiffness = \"1 N m/rad\"\n{}",
+            two("residue = 1", "residue = 0")
+        );
+        refused(&beside, &["line 3", "[[modes]]"]);
+    }
+
+    #[test]
+    fn residues_that_hardly_are_parts_of_one_are_told() {
+        let stand = read(&two("residue = 3e-5", "residue = 1e-6")).unwrap();
+        assert_eq!(stand.warnings[0].code, "residues-do-not-add-up");
+    }
+
+    #[test]
+    fn torques_need_the_shapes_where_residues_have_both_signs() {
+        let effect =
+            "[[effects]]\nkind = \"coulomb-friction\"\nform = \"sharp\"\ntorque = \"5 N m\"\n";
+        let mixed = two("residue = 1.2", "residue = -0.2") + effect;
+        let message = read(&mixed).unwrap().chain().unwrap_err().to_string();
+        assert!(message.contains("shape_at_gage"), "{message}");
+        let same = two("residue = 0.8", "residue = 0.2") + effect;
+        assert!(read(&same).unwrap().chain().is_ok());
+    }
+}
