@@ -63,6 +63,10 @@ pub fn remove_when_interrupted() -> io::Result<()> {
     Ok(())
 }
 
+/// Has incomplete outputs removed when the run is told to end; the exit code is 130.
+///
+/// # Errors
+/// If the system does not let that be handled.
 #[cfg(not(unix))]
 pub fn remove_when_interrupted() -> io::Result<()> {
     ctrlc::set_handler(|| remove_open_and_exit(130)).map_err(io::Error::other)
