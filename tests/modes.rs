@@ -546,3 +546,61 @@ fn a_decay_tells_modes_but_not_their_residues() {
     );
     folder.run(&table).says(0, &[]);
 }
+
+/// One mode whose acceleration is recorded: the second derivative of the displacement, in every verb that takes it.
+#[test]
+fn a_record_of_acceleration_is_the_second_derivative() {
+    let folder = Folder::new();
+    let stand = "schema = \"torqcomp.stand/1\"\n[mechanics]\nmeasures = \"acceleration\"\n\
+                 static_gain = \"2e-6 (m/s^2)/N\"\n[[modes]]\nnatural_frequency = \"400 Hz\"\ndamping_ratio = 0.5\nresidue = 1\n";
+    folder.write("stand.toml", stand);
+    let args = [
+        "table",
+        "--stand",
+        "stand.toml",
+        "--from",
+        "0",
+        "--to",
+        "400",
+        "--step",
+        "200",
+    ];
+    let ran = folder.run(&args);
+    let lines: Vec<&str> = ran.stdout.lines().collect();
+    assert_eq!(lines[1], "0,,", "no acceleration shows a constant force");
+    let (_, rows) = table(&[lines[0], lines[2], lines[3]].join("\n"));
+    for row in rows {
+        let w = row[0] / 400.0;
+        // 1 − w² + jw, over −ω².
+        let want = Complex64::new(1.0 - w * w, w) / -(TAU * row[0]).powi(2);
+        assert_close(row[1], want.norm(), 1e-9);
+        assert!((Complex64::cis(row[2].to_radians()) - want / want.norm()).norm() < 1e-8);
+    }
+    let (hz, count) = (200.0, 8000);
+    let mut text = String::from("time_s,force_n\n");
+    for i in 0..count {
+        let time_s = i as f64 / RATE_HZ;
+        let _ = writeln!(text, "{time_s:.6},{:.9}", (TAU * hz * time_s).sin());
+    }
+    folder.write("force.csv", text);
+    let args = [
+        "simulate",
+        "force.csv",
+        "--stand",
+        "stand.toml",
+        "--applied",
+        "force_n",
+        "--unit",
+        "N",
+        "-o",
+        "-",
+    ];
+    let found = column(&folder.run(&args).stdout, "measured");
+    let turn = TAU * hz;
+    let response = 2e-6 * -turn * turn / Complex64::new(0.75, 0.5);
+    let want: Vec<f64> = (0..count)
+        .map(|i| (response * Complex64::cis(turn * i as f64 / RATE_HZ)).im)
+        .collect();
+    let error = relative(&found, &want);
+    assert!(error < 1e-4, "{error:e}");
+}
