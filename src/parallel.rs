@@ -10,7 +10,18 @@ const MOST_THREADS: usize = 8;
 /// Threads that the machine has for one job.
 #[must_use]
 pub fn threads() -> usize {
-    std::thread::available_parallelism().map_or(1, |n| n.get().min(MOST_THREADS))
+    cores().min(MOST_THREADS)
+}
+
+/// Cores that this process may use: as many as Slurm gives the task, and no more than the system (its cgroup included) has.
+#[must_use]
+pub fn cores() -> usize {
+    let system = std::thread::available_parallelism().map_or(1, usize::from);
+    let slurm = std::env::var("SLURM_CPUS_PER_TASK").ok();
+    let slurm = slurm.and_then(|text| text.parse::<usize>().ok());
+    slurm
+        .filter(|count| *count > 0)
+        .map_or(system, |count| count.min(system))
 }
 
 /// Runs a job for each part of so many things, at most `most` of them together; results in their order.

@@ -1,6 +1,6 @@
 //! Bad input gets an error that names the place and the remedy, and leaves nothing behind.
 
-use crate::util::{COMPENSATE, Folder, Ran, record, steady};
+use crate::util::{COMPENSATE, Folder, HARMONICS, Ran, record, steady};
 
 /// A small good record.
 fn good() -> String {
@@ -343,14 +343,7 @@ fn stand_files() {
         let folder = Folder::new();
         folder.write("in.csv", good());
         folder.write("stand.toml", crate::util::HERTEL.replace(from, to));
-        let ran = folder.run(&[
-            "compensate",
-            "in.csv",
-            "--stand",
-            "stand.toml",
-            "-o",
-            "out.csv",
-        ]);
+        let ran = folder.run(&COMPENSATE);
         ran.says(1, parts);
         assert_eq!(folder.names(), ["in.csv", "stand.toml"]);
     };
@@ -405,16 +398,7 @@ fn wrong_usage_ends_with_2() {
         &["compensat", "in.csv"],
         &["compensate", "in.csv", "--stand", "stand.toml", "--json"],
         &["harmonics", "in.csv", "--stand", "stand.toml"],
-        &[
-            "harmonics",
-            "in.csv",
-            "--stand",
-            "stand.toml",
-            "--fundamental",
-            "60",
-            "--orders",
-            "5-1",
-        ],
+        &[&HARMONICS[..], &["60", "--orders", "5-1"]].concat(),
         &[
             "table",
             "--stand",

@@ -7,7 +7,7 @@ use std::process::Stdio;
 use serde_json::Value;
 
 use crate::golden::workplace;
-use crate::util::{Folder, HERTEL, command, record, steady};
+use crate::util::{Folder, HERTEL, command, record, signal, steady};
 
 /// Recordings in a tree, with spaces and umlauts in their names.
 const LOGS: [&str; 4] = [
@@ -370,11 +370,7 @@ fn an_interrupted_run_leaves_no_temporary_file() {
     while results(&folder).len() < 3 {
         std::thread::sleep(std::time::Duration::from_millis(2));
     }
-    let killed = std::process::Command::new("kill")
-        .args(["-TERM", &child.id().to_string()])
-        .status()
-        .expect("kill");
-    assert!(killed.success());
+    signal("TERM", &child);
     assert_eq!(child.wait().expect("the binary ends").code(), Some(143));
     let left = results(&folder);
     assert!(

@@ -1,7 +1,7 @@
 //! `harmonics` against a record whose components are known.
 
 use crate::noise::Noise;
-use crate::util::{Folder, hertel_response, record, steady};
+use crate::util::{Folder, HARMONICS, hertel_response, record, steady};
 
 const PARTS: [(f64, f64, f64); 4] = [
     (0.8, 0.0, 0.0),
@@ -24,18 +24,13 @@ fn folder() -> Folder {
 
 #[test]
 fn components_come_back_with_factor_and_uncertainty() {
-    let report = folder().json(&[
-        "harmonics",
-        "in.csv",
-        "--stand",
-        "stand.toml",
-        "--fundamental",
-        "60",
-        "--refine",
-        "--orders",
-        "1,2,10",
-        "--json",
-    ]);
+    let report = folder().json(
+        &[
+            &HARMONICS[..],
+            &["60", "--refine", "--orders", "1,2,10", "--json"],
+        ]
+        .concat(),
+    );
     assert_eq!(report["schema"], "torqcomp.harmonics/1");
     let fundamental = report["fundamental_hz"].as_f64().unwrap();
     let std = report["fundamental_std_hz"].as_f64().unwrap();
@@ -75,18 +70,13 @@ fn components_come_back_with_factor_and_uncertainty() {
 
 #[test]
 fn a_table_for_people() {
-    let ran = folder().run(&[
-        "harmonics",
-        "in.csv",
-        "--stand",
-        "stand.toml",
-        "--fundamental",
-        "59.87",
-        "--orders",
-        "1-9",
-        "--units",
-        "us",
-    ]);
+    let ran = folder().run(
+        &[
+            &HARMONICS[..],
+            &["59.87", "--orders", "1-9", "--units", "us"],
+        ]
+        .concat(),
+    );
     ran.says(0, &["components-lost-in-noise"]);
     assert!(
         ran.stdout.contains("torque ft lbf") && ran.stdout.contains("± noise"),
@@ -103,46 +93,15 @@ fn a_table_for_people() {
 #[test]
 fn orders_that_cannot_be_seen_are_said() {
     let folder = folder();
-    let ran = folder.run(&[
-        "harmonics",
-        "in.csv",
-        "--stand",
-        "stand.toml",
-        "--fundamental",
-        "4000",
-    ]);
+    let ran = folder.run(&[&HARMONICS[..], &["4000"]].concat());
     ran.says(0, &["orders-above-nyquist", "orders 3 to 20"]);
     folder
-        .run(&[
-            "harmonics",
-            "in.csv",
-            "--stand",
-            "stand.toml",
-            "--fundamental",
-            "12 kHz",
-        ])
+        .run(&[&HARMONICS[..], &["12 kHz"]].concat())
         .says(1, &["half the sampling rate"]);
     folder
-        .run(&[
-            "harmonics",
-            "in.csv",
-            "--stand",
-            "stand.toml",
-            "--fundamental",
-            "0.05",
-        ])
+        .run(&[&HARMONICS[..], &["0.05"]].concat())
         .says(1, &["in.csv", "cannot be told apart", "record at least"]);
     folder
-        .run(&[
-            "harmonics",
-            "in.csv",
-            "--stand",
-            "stand.toml",
-            "--fundamental",
-            "55",
-            "--refine",
-            "--orders",
-            "1",
-        ])
+        .run(&[&HARMONICS[..], &["55", "--refine", "--orders", "1"]].concat())
         .says(1, &["could not be refined"]);
 }

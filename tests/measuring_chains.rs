@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use serde_json::Value;
 
-use crate::util::{Folder, sampled};
+use crate::util::{Folder, HARMONICS, sampled};
 
 /// Samples per second, and of a record: 20 periods of 10 Hz.
 const RATE_HZ: f64 = 1000.0;
@@ -56,18 +56,9 @@ fn record(heading: &str, unit_row: Option<&str>, signal: impl Fn(f64) -> f64) ->
     }
 }
 
-const HARMONICS: [&str; 6] = [
-    "harmonics",
-    "in.csv",
-    "--stand",
-    "stand.toml",
-    "--fundamental",
-    "10",
-];
-
 /// Recorded amplitude of the 10 Hz in N m, before the stand is divided out, and the whole report.
 fn amplitude(folder: &Folder, more: &[&str]) -> (f64, serde_json::Value) {
-    let report = folder.json(&[&HARMONICS[..], &["--orders", "1", "--json"], more].concat());
+    let report = folder.json(&[&HARMONICS[..], &["10", "--orders", "1", "--json"], more].concat());
     (
         report["components"][0]["recorded"].as_f64().unwrap(),
         report,
@@ -75,7 +66,7 @@ fn amplitude(folder: &Folder, more: &[&str]) -> (f64, serde_json::Value) {
 }
 
 fn refusal(folder: &Folder, more: &[&str]) -> String {
-    let ran = folder.run(&[&HARMONICS[..], more].concat());
+    let ran = folder.run(&[&HARMONICS[..], &["10"], more].concat());
     assert!(ran.code != 0, "{}", ran.stdout);
     ran.stderr
 }

@@ -4,7 +4,7 @@ use std::io::Read;
 use std::process::Stdio;
 
 use crate::noise::Noise;
-use crate::util::{Folder, command, record, sampled, steady};
+use crate::util::{Folder, command, record, sampled, signal, steady};
 
 fn folder() -> Folder {
     let folder = Folder::new();
@@ -164,11 +164,7 @@ fn an_interrupted_run_leaves_nothing() {
         std::thread::sleep(std::time::Duration::from_millis(10));
     }
     assert!(part(), "{:?}", folder.names());
-    let killed = std::process::Command::new("kill")
-        .args(["-TERM", &child.id().to_string()])
-        .status()
-        .expect("kill");
-    assert!(killed.success());
+    signal("TERM", &child);
     assert_eq!(child.wait().expect("the binary ends").code(), Some(143));
     drop(pipe);
     assert_eq!(folder.names(), ["in.csv", "stand.toml"]);
@@ -484,14 +480,7 @@ fn signals_leave_nothing_or_are_ignored() {
             while !folder.names().iter().any(|name| name.ends_with(".part")) {
                 std::thread::sleep(std::time::Duration::from_millis(10));
             }
-            let send = ["-s", signal, &child.id().to_string()].map(str::to_owned);
-            assert!(
-                std::process::Command::new("kill")
-                    .args(send)
-                    .status()
-                    .unwrap()
-                    .success()
-            );
+            crate::util::signal(signal, &child);
             if !ignored {
                 let code = child.wait().expect("it ends").code();
                 assert_eq!(code, Some(128 + number), "{signal}");

@@ -1,6 +1,6 @@
 //! Rates that stamps leave open, and gaps that a given rate passes over.
 
-use crate::util::{COMPENSATE, Folder, assert_close, column};
+use crate::util::{COMPENSATE, Folder, HARMONICS, assert_close, column};
 
 /// Volts of sample `i`.
 fn volts(i: usize) -> f64 {
@@ -93,16 +93,7 @@ fn a_given_rate_does_not_hide_a_gap() {
     compensate(&folder, &["--rate", "1000", "--range", "0.1..1.9"]).says(0, &said);
     compensate(&folder, &["--rate", "1000", "--strict"]).says(3, &said);
     folder
-        .run(&[
-            "harmonics",
-            "in.csv",
-            "--stand",
-            "stand.toml",
-            "--fundamental",
-            "10",
-            "--rate",
-            "1000",
-        ])
+        .run(&[&HARMONICS[..], &["10", "--rate", "1000"]].concat())
         .says(0, &said);
     let decay = |i: usize| {
         let t = 1e-3 * (i as f64 - 100.0);

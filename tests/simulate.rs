@@ -10,6 +10,16 @@ use crate::util::{Folder, table};
 const RATE_HZ: f64 = 20_000.0;
 const STAND: &str = "schema = \"torqcomp.stand/1\"\n[mechanics]\nnatural_frequency = \"600 Hz\"\ndamping_ratio = 0.08\n";
 
+/// Simulates `record.csv`.
+const SIMULATE: [&str; 6] = [
+    "simulate",
+    "record.csv",
+    "--stand",
+    "stand.toml",
+    "--applied",
+    "applied_n_m",
+];
+
 /// A sum of sines that repeats every 2000 samples.
 fn input(seed: u32, count: usize) -> Vec<f64> {
     let line = |k: u32, i: usize| {
@@ -55,18 +65,10 @@ fn held_samples_are_simulated_as_they_are() {
     let truth = held(&applied);
     folder.write("record.csv", record(&applied, &truth));
     let args = [
-        "simulate",
-        "record.csv",
-        "--stand",
-        "stand.toml",
-        "--applied",
-        "applied_n_m",
-        "--between",
-        "held",
-        "-o",
-        "answer.csv",
-        "--json",
-    ];
+        &SIMULATE[..],
+        &["--between", "held", "-o", "answer.csv", "--json"],
+    ]
+    .concat();
     let report = folder.json(&args);
     assert_eq!(report["schema"], "torqcomp.simulate/1");
     assert_eq!(report["measured_unit"], "N m");
@@ -189,18 +191,7 @@ fn resampling_says_what_it_bridged() {
         })
         .collect();
     folder.write("record.csv", rows.join("\n") + "\n");
-    let args = [
-        "simulate",
-        "record.csv",
-        "--stand",
-        "stand.toml",
-        "--applied",
-        "applied_n_m",
-        "--resample",
-        "-o",
-        "out.csv",
-        "--json",
-    ];
+    let args = [&SIMULATE[..], &["--resample", "-o", "out.csv", "--json"]].concat();
     let report = folder.json(&args);
     let warnings = report["warnings"].as_array().expect("a list");
     let told = warnings.iter().find(|w| w["code"] == "resampled");

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use serde_json::Value;
 
-use crate::util::{COMPENSATE, Folder, assert_close};
+use crate::util::{COMPENSATE, Folder, HARMONICS, assert_close};
 
 const MECHANICS: &str = "schema = \"torqcomp.stand/1\"\n[mechanics]\n\
     natural_frequency = { value = \"590 Hz\", std = \"2 Hz\" }\ndamping_ratio = \"0.02\"\n";
@@ -29,22 +29,17 @@ fn folder(heading: &str, more: &str) -> Folder {
     folder
 }
 
-const HARMONICS: [&str; 8] = [
-    "harmonics",
-    "in.csv",
-    "--stand",
-    "stand.toml",
-    "--fundamental",
-    "20",
-    "--orders",
-    "1",
-];
+/// The arguments of both verbs.
+fn verbs() -> [Vec<&'static str>; 2] {
+    let harmonics = [&HARMONICS[..], &["20", "--orders", "1"]].concat();
+    [COMPENSATE.to_vec(), harmonics]
+}
 
 fn both(folder: &Folder) -> [Value; 2] {
-    [&COMPENSATE[..], &HARMONICS[..]].map(|args| {
+    verbs().map(|args| {
         folder.json(
             &[
-                args,
+                &args[..],
                 &["--json", "--force"][..1 + usize::from(args.len() == 6)],
             ]
             .concat(),
@@ -76,8 +71,8 @@ fn a_calibration_without_std_makes_the_uncertainty_unknown() {
     assert!(first["std_stand"].is_null() && harmonics["calibration_relative_std"].is_null());
     let relative = first["std_response"].as_f64().unwrap() / first["torque"].as_f64().unwrap();
     assert_close(relative, of_response(20.0), 1e-2);
-    for args in [&COMPENSATE[..], &HARMONICS[..]] {
-        let ran = folder.run(&[args, &["--force"][..usize::from(args.len() == 6)]].concat());
+    for args in verbs() {
+        let ran = folder.run(&[&args[..], &["--force"][..usize::from(args.len() == 6)]].concat());
         let said = ran.stdout + &ran.stderr;
         assert!(
             said.contains("unknown, since the calibration has no std"),

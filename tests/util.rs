@@ -26,6 +26,23 @@ pub const COMPENSATE: [&str; 6] = [
     "out.csv",
 ];
 
+/// Components of `in.csv`, of the fundamental that follows.
+pub const HARMONICS: [&str; 5] = [
+    "harmonics",
+    "in.csv",
+    "--stand",
+    "stand.toml",
+    "--fundamental",
+];
+
+/// Sends a process a signal.
+pub fn signal(name: &str, child: &std::process::Child) {
+    let sent = std::process::Command::new("kill")
+        .args(["-s", name, &child.id().to_string()])
+        .status();
+    assert!(sent.expect("kill is there").success(), "{name}");
+}
+
 /// A folder that is removed with its files.
 pub struct Folder(tempfile::TempDir);
 

@@ -4,12 +4,11 @@ use std::io::Read;
 use std::path::Path;
 
 use super::{manifest, summary};
+use crate::io::MCAP_START;
 use crate::io::storage::Stored;
 
 /// Bytes that are looked at.
 const HEAD: u64 = 1 << 16;
-/// Beginning of an MCAP file.
-const MCAP: &[u8] = b"\x89MCAP";
 /// Marks of text in two bytes a letter.
 const WIDE_TEXT: [&[u8]; 2] = [b"\xff\xfe", b"\xfe\xff"];
 /// Beginning of a stand file's first key.
@@ -21,7 +20,7 @@ pub(super) fn is_recording(path: &Path) -> bool {
     let mut head = Vec::new();
     let read = Stored::open(path).and_then(|file| file.take(HEAD).read_to_end(&mut head));
     if read.is_err()
-        || head.starts_with(MCAP)
+        || head.starts_with(MCAP_START)
         || WIDE_TEXT.iter().any(|mark| head.starts_with(mark))
     {
         return true;
@@ -31,7 +30,7 @@ pub(super) fn is_recording(path: &Path) -> bool {
     }
     let text = String::from_utf8_lossy(&head);
     let is_ours = text.starts_with(manifest::BEGINNING)
-        || text.starts_with(summary::BEGINNING)
+        || text.starts_with(&summary::beginning())
         || text.lines().any(|line| line.starts_with(STAND));
     !is_ours && text.lines().any(is_row)
 }

@@ -17,6 +17,7 @@ use std::time::Instant;
 
 use self::list::Listing;
 use self::manifest::{MadeFrom, Manifest, ManifestEntry, NotedWarning, OutputSum};
+pub(crate) use self::plan::NEED_FOLDER;
 use self::plan::{BatchFile, BatchPlan};
 use self::progress::{Amount, BatchProgress};
 use self::summary::{BatchResult, Treated};

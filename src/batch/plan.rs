@@ -8,6 +8,11 @@ use super::list::{FoundFile, Listing};
 use super::manifest::{self, History, MadeBy, MadeFrom, ManifestEntry, RunBegin};
 use crate::failure::Failure;
 use crate::io::output::end_of_links;
+use crate::parallel::cores;
+
+/// What is asked where several recordings have no folder for their results.
+pub(crate) const NEED_FOLDER: &str =
+    "the results of several recordings need a folder; give -o FOLDER/";
 
 /// All that is settled before the first recording is read.
 pub(super) struct BatchPlan<'a> {
@@ -228,21 +233,10 @@ impl<'a> BatchPlan<'a> {
     }
 }
 
-/// Cores that this process may use: as many as Slurm gives the task, and no more than the system (its cgroup included) has.
-fn cores() -> usize {
-    let system = std::thread::available_parallelism().map_or(1, usize::from);
-    let slurm = std::env::var("SLURM_CPUS_PER_TASK").ok();
-    let slurm = slurm.and_then(|text| text.parse::<usize>().ok());
-    slurm
-        .filter(|count| *count > 0)
-        .map_or(system, |count| count.min(system))
-}
-
 /// The folder of the results.
 fn folder(task: &BatchTask) -> Result<PathBuf, Failure> {
-    let missing = "the results of several recordings need a folder; give -o FOLDER/";
     let Some(text) = task.result.output.as_deref().filter(|text| *text != "-") else {
-        return Err(Failure::usage(missing));
+        return Err(Failure::usage(NEED_FOLDER));
     };
     let path = Path::new(text);
     let is_file = match std::fs::metadata(path) {
@@ -251,7 +245,7 @@ fn folder(task: &BatchTask) -> Result<PathBuf, Failure> {
     };
     match is_file {
         true => Err(Failure::usage(format_args!(
-            "{missing} ({text} names a file)"
+            "{NEED_FOLDER} ({text} names a file)"
         ))),
         false => Ok(path.to_owned()),
     }

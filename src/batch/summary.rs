@@ -30,8 +30,6 @@ const HEADINGS: [&str; 12] = [
     "codes",
     "error",
 ];
-/// How such a file begins.
-pub(super) const BEGINNING: &str = "file,exit,samples,rate_hz,band_hz,unit,rms,peak,noise_rms,";
 /// Significant digits in it.
 const DIGITS: u32 = 12;
 /// Files that are no recordings whose names are said.
@@ -55,12 +53,18 @@ impl Treated {
     }
 }
 
+/// How the table of a run begins.
+pub(super) fn beginning() -> String {
+    HEADINGS.join(",")
+}
+
 /// Whether a file is the table of a run.
 pub(super) fn is_one(path: &Path) -> bool {
+    let beginning = beginning();
     let mut head = Vec::new();
     let read = Stored::open(path)
-        .and_then(|file| file.take(BEGINNING.len() as u64).read_to_end(&mut head));
-    read.is_ok() && head == BEGINNING.as_bytes()
+        .and_then(|file| file.take(beginning.len() as u64).read_to_end(&mut head));
+    read.is_ok() && head == beginning.as_bytes()
 }
 
 /// What became of all recordings.

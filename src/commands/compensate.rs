@@ -15,7 +15,6 @@ use std::path::Path;
 
 use torqcomp_dsp::compensate::InverseFilter;
 use torqcomp_dsp::noise::NoiseGain;
-use torqcomp_model::Mode;
 
 use self::band::{BandReport, Wanted};
 use self::report::{CompensateReport, NoiseAt, NoiseReport};
@@ -27,15 +26,12 @@ use crate::identify::Motion;
 use crate::inverse::ChainInverse;
 use crate::io::{Input, already_compensated};
 use crate::outcome::Made;
-use crate::print::{Report, rounded, short};
+use crate::print::Report;
 use crate::recording::{ChannelStream, StreamSummary};
 use crate::stand::{self, Calibration, Stand, TorqueStd};
-use crate::warning::Warning;
 
 /// Frequencies at which the report gives the gain, as fractions of the band.
 const GAIN_POINTS: usize = 9;
-/// How far above half the sampling rate a resonance is hardly excited any more, times that.
-const FAR_ABOVE: f64 = 4.0;
 
 /// What is read before anything is written.
 struct Opened {
@@ -220,41 +216,11 @@ impl Plan {
             warnings: [
                 self.stand.warnings.as_slice(),
                 &chain.warnings,
-                self.folded_ringing().as_slice(),
+                warnings::of_ringing(&self.stand, self.stream.rate_hz).as_slice(),
             ]
             .concat(),
             ..CompensateReport::default()
         }
-    }
-
-    /// A warning if the stand rings above half the sampling rate, and nothing before the recorder keeps that out.
-    fn folded_ringing(&self) -> Option<Warning> {
-        let limit_hz = 0.5 * self.stream.rate_hz;
-        let modes = self.stand.modes().ok()?;
-        let above = modes.parts().iter().map(|part| part.mode);
-        let above = above.filter(|mode| mode.natural_frequency_hz() > limit_hz);
-        let first = |a: &Mode, b: &Mode| a.omega_rad_s.total_cmp(&b.omega_rad_s);
-        let mode = above.min_by(first)?;
-        let resonance_hz = mode.natural_frequency_hz();
-        let is_kept_out = self
-            .stand
-            .recorder
-            .low_pass
-            .is_some_and(|low_pass| low_pass.cutoff_hz <= limit_hz);
-        let is_near = resonance_hz < FAR_ABOVE * limit_hz;
-        (is_near && !is_kept_out && mode.damping_ratio < 0.5).then(|| {
-            Warning::new(
-                "resonance-above-nyquist",
-                format!(
-                    "the stand resonates at {} Hz, above half the sampling rate of {} Hz: steps and shocks make it ring, and the \
-                     ringing folds into the record, where nothing can take it out; record at {} Hz or more, or behind a \
-                     low-pass (say so with [recorder] low_pass)",
-                    rounded(resonance_hz, 4),
-                    short(self.stream.rate_hz),
-                    rounded(5.0 * resonance_hz, 2)
-                ),
-            )
-        })
     }
 
     /// Standard uncertainty at a frequency; none where no filter describes the stand.

@@ -230,15 +230,10 @@ fn fit(
         .iter()
         .map(|c| component(c, printed, way))
         .collect();
-    warnings.extend(beyond_rated(
-        largest(samples, &components, printed)?,
-        chain.rated_n_m.map(|rated| rated * printed),
-        &chain.applied.unit,
-    ));
-    if !args.refine {
-        warnings.extend(speed::off(record, fundamental.frequency_hz, &orders));
-    }
-    warnings.extend(speed::warning(record, fundamental.frequency_hz, &orders));
+    let rated = chain.rated_n_m.map(|rated| rated * printed);
+    let largest = largest(samples, &components, printed)?;
+    warnings.extend(beyond_rated(largest, rated, &chain.applied.unit));
+    warnings.extend(of_speed(record, &fundamental, &orders));
     warnings.extend(lost_warning(&components));
     warnings.extend(mains_warning(&components, duration_s));
     warnings.extend(of_quality(record, channel, chain)?);
@@ -266,6 +261,19 @@ fn fit(
         residual_rms: found.residual_rms * printed,
         warnings,
     })
+}
+
+/// Whether the speed stays, and is the one that was given.
+fn of_speed(
+    record: &UniformRecord<Spool>,
+    fundamental: &Fundamental,
+    orders: &[f64],
+) -> Vec<Warning> {
+    let hz = fundamental.frequency_hz;
+    let is_given = fundamental.std_hz.is_none();
+    let off = is_given.then(|| speed::off(record, hz, orders)).flatten();
+    let changing = speed::warning(record, hz, orders);
+    off.into_iter().chain(changing).collect()
 }
 
 /// What the samples themselves show.

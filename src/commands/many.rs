@@ -1,11 +1,11 @@
 //! Verbs that read one recording at a time, and so take many.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::{Outcome, compensate, extract, harmonics, inspect};
 use crate::batch::{self, BatchTask, OneRun};
 use crate::cli::{
-    BatchOptions, Compensate, Extract, Format, Harmonics, Inspect, OneChannel, OutputArgs, Simulate,
+    BatchOptions, Compensate, Extract, Format, Harmonics, Inspect, OutputArgs, Simulate,
 };
 use crate::failure::Failure;
 use crate::outcome::Made;
@@ -16,11 +16,40 @@ pub(super) trait OneByOne: Clone + Sync {
     /// What is asked for, of many recordings.
     fn task(&self) -> BatchTask<'_>;
 
+    /// What one of them has for itself.
+    fn own(&mut self) -> Own<'_>;
+
     /// The same of one of them.
-    fn of_one(&self, one: &OneRun) -> Self;
+    fn of_one(&self, one: &OneRun) -> Self {
+        let mut args = self.clone();
+        let own = args.own();
+        *own.inputs = vec![one.input.to_owned()];
+        *own.many = BatchOptions::default();
+        own.result.force = one.replace;
+        let output = one.outputs.first();
+        own.result.output = output.map(|path| path.display().to_string());
+        for (asked, path) in own.beside.into_iter().zip(one.outputs.iter().skip(1)) {
+            asked.clone_from(path);
+        }
+        if let Some(threads) = own.threads {
+            *threads = threads.or(u16::try_from(one.threads).ok());
+        }
+        args
+    }
 
     /// Does the work on one recording.
     fn work(&self) -> Result<Made, Failure>;
+}
+
+/// The arguments that differ from recording to recording.
+pub(super) struct Own<'a> {
+    inputs: &'a mut Vec<String>,
+    many: &'a mut BatchOptions,
+    result: &'a mut OutputArgs,
+    /// Where what is written beside the result goes, in the order of [`BatchTask::beside`].
+    beside: Vec<&'a mut PathBuf>,
+    /// Of a verb that shares its work on one recording among threads.
+    threads: Option<&'a mut Option<u16>>,
 }
 
 /// Whether these arguments ask for many recordings, each by itself.
@@ -37,7 +66,8 @@ pub(super) fn run(args: &impl OneByOne, options: &[String]) -> Result<Outcome, F
     }
     if let ([folder], true, false) = (task.inputs, task.result.is_stdout(), are_asked(args)) {
         return Err(Failure::failed(format_args!(
-            "{folder}: the results of several recordings need a folder; give -o FOLDER/"
+            "{folder}: {}",
+            batch::NEED_FOLDER
         )));
     }
     // A fault of the stand file would be said for each recording.
@@ -46,24 +76,6 @@ pub(super) fn run(args: &impl OneByOne, options: &[String]) -> Result<Outcome, F
     }
     print::hide_progress();
     batch::run(&task, options, &|one| args.of_one(one).work())
-}
-
-/// Arguments of a channel for one recording.
-fn channel(record: &OneChannel, one: &OneRun) -> OneChannel {
-    OneChannel {
-        inputs: vec![one.input.to_owned()],
-        many: BatchOptions::default(),
-        ..record.clone()
-    }
-}
-
-/// Arguments of the result for one recording.
-fn result(result: &OutputArgs, one: &OneRun) -> OutputArgs {
-    OutputArgs {
-        output: one.outputs.first().map(|path| path.display().to_string()),
-        force: one.replace,
-        ..result.clone()
-    }
 }
 
 /// Names and values of the options that are given.
@@ -98,15 +110,17 @@ impl OneByOne for Compensate {
         }
     }
 
-    fn of_one(&self, one: &OneRun) -> Self {
-        let mut args = self.clone();
-        args.record = channel(&self.record, one);
-        args.result = result(&self.result, one);
-        let mut beside = one.outputs.iter().skip(1).cloned();
-        args.plot = self.plot.as_ref().and_then(|_| beside.next());
-        args.html = self.html.as_ref().and_then(|_| beside.next());
-        args.work.threads = self.work.threads.or(u16::try_from(one.threads).ok());
-        args
+    fn own(&mut self) -> Own<'_> {
+        Own {
+            inputs: &mut self.record.inputs,
+            many: &mut self.record.many,
+            result: &mut self.result,
+            beside: [self.plot.as_mut(), self.html.as_mut()]
+                .into_iter()
+                .flatten()
+                .collect(),
+            threads: Some(&mut self.work.threads),
+        }
     }
 
     fn work(&self) -> Result<Made, Failure> {
@@ -130,11 +144,13 @@ impl OneByOne for Extract {
         }
     }
 
-    fn of_one(&self, one: &OneRun) -> Self {
-        Self {
-            record: channel(&self.record, one),
-            result: result(&self.result, one),
-            ..self.clone()
+    fn own(&mut self) -> Own<'_> {
+        Own {
+            inputs: &mut self.record.inputs,
+            many: &mut self.record.many,
+            result: &mut self.result,
+            beside: Vec::new(),
+            threads: None,
         }
     }
 
@@ -162,11 +178,13 @@ impl OneByOne for Harmonics {
         }
     }
 
-    fn of_one(&self, one: &OneRun) -> Self {
-        Self {
-            record: channel(&self.record, one),
-            result: result(&self.result, one),
-            ..self.clone()
+    fn own(&mut self) -> Own<'_> {
+        Own {
+            inputs: &mut self.record.inputs,
+            many: &mut self.record.many,
+            result: &mut self.result,
+            beside: Vec::new(),
+            threads: None,
         }
     }
 
@@ -194,13 +212,13 @@ impl OneByOne for Inspect {
         }
     }
 
-    fn of_one(&self, one: &OneRun) -> Self {
-        Self {
-            files: vec![one.input.to_owned()],
-            many: BatchOptions::default(),
-            result: result(&self.result, one),
-            plot: self.plot.as_ref().and(one.outputs.get(1)).cloned(),
-            ..self.clone()
+    fn own(&mut self) -> Own<'_> {
+        Own {
+            inputs: &mut self.files,
+            many: &mut self.many,
+            result: &mut self.result,
+            beside: self.plot.as_mut().into_iter().collect(),
+            threads: None,
         }
     }
 
@@ -225,12 +243,13 @@ impl OneByOne for Simulate {
         }
     }
 
-    fn of_one(&self, one: &OneRun) -> Self {
-        Self {
-            inputs: vec![one.input.to_owned()],
-            many: BatchOptions::default(),
-            result: result(&self.result, one),
-            ..self.clone()
+    fn own(&mut self) -> Own<'_> {
+        Own {
+            inputs: &mut self.inputs,
+            many: &mut self.many,
+            result: &mut self.result,
+            beside: Vec::new(),
+            threads: None,
         }
     }
 

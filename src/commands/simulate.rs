@@ -7,6 +7,7 @@ use torqcomp_model::{Unit, UnitSystem};
 use super::{judged, rows, warned};
 use crate::cli;
 use crate::failure::Failure;
+use crate::io::output::Output;
 use crate::io::{ChannelChoice, Flags, Input};
 use crate::outcome::{Made, RecordFigures};
 use crate::print::{Report, short};
@@ -87,22 +88,27 @@ pub fn work(args: &cli::Simulate) -> Result<Made, Failure> {
         effects: stand.effects.iter().map(|e| e.effect.name).collect(),
         warnings: [applied.warnings, stand.warnings.clone(), of_channel].concat(),
     };
+    Ok(made(args, report, output, is_lossy))
+}
+
+/// The record that was written, and what is said of it.
+fn made(args: &cli::Simulate, report: SimulateReport, output: Output, is_lossy: bool) -> Made {
     let text = match args.quiet || args.json {
         true => String::new(),
         false => report.text(),
     };
-    Ok(Made {
+    Made {
         outputs: vec![output],
         document: args.json.then(|| report.document(true)),
         talk: text + &warned(&report.warnings),
         outcome: judged(&report.warnings, is_lossy, &args.strictness),
         figures: RecordFigures {
-            samples: Some(written),
-            rate_hz: Some(axis.0),
+            samples: Some(report.samples),
+            rate_hz: Some(report.rate_hz),
             ..RecordFigures::default()
         },
         warnings: report.warnings,
-    })
+    }
 }
 
 /// Sends the applied quantity through the stand piece by piece; steps of integration from sample to sample.

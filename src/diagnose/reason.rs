@@ -117,10 +117,7 @@ impl Reason {
                     percent(*change)
                 )
             }
-            Self::SmallShare { share } => format!(
-                "explains only {} % of the residual power: too little to distinguish from other model errors",
-                rounded(100.0 * share, 2)
-            ),
+            Self::SmallShare { share } => small_share(100.0 * share),
             Self::ZeroParameter { name } => {
                 format!("its {name} is not significantly different from zero")
             }
@@ -155,16 +152,28 @@ impl Reason {
                 "improves the fit, but explains only {:.0} % of the error above the noise: the main cause is something else",
                 100.0 * explained.max(0.0)
             ),
-            Self::NotConfirmed { change } => format!(
-                "reduces the error of the training records, but that of the held-out ones changes by {} only: not confirmed",
-                percent(*change)
-            ),
+            Self::NotConfirmed { change } => not_confirmed(&percent(*change)),
             Self::Diverges => {
                 "the motion that it gives diverges on the held-out records".to_owned()
             }
             Self::NoneAccepted => "no effect is accepted".to_owned(),
         }
     }
+}
+
+/// An effect that explains so many percent of the residual power only.
+fn small_share(percent: f64) -> String {
+    format!(
+        "explains only {} % of the residual power: too little to distinguish from other model errors",
+        rounded(percent, 2)
+    )
+}
+
+/// An effect that the held-out records do not bear out.
+fn not_confirmed(change: &str) -> String {
+    format!(
+        "reduces the error of the training records, but that of the held-out ones changes by {change} only: not confirmed"
+    )
 }
 
 /// A further effect that explains too little, with the least parts in percent.

@@ -6,6 +6,9 @@ use std::path::{Path, PathBuf};
 use super::storage::Stored;
 use crate::failure::Failure;
 
+/// The first bytes of an MCAP file that do not tell its version.
+pub(crate) const MCAP_START: &[u8] = b"\x89MCAP";
+
 /// Where bytes come from.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Input {
@@ -40,18 +43,16 @@ impl Input {
     /// # Errors
     /// If it cannot be opened.
     pub fn is_mcap(&self) -> Result<bool, Failure> {
-        /// The first bytes of such a file that do not tell its version.
-        const START: &[u8] = b"\x89MCAP";
         if *self == Self::Stdin {
             let mut stdin = std::io::stdin().lock();
-            return Ok(stdin.fill_buf().unwrap_or_default().starts_with(START));
+            return Ok(stdin.fill_buf().unwrap_or_default().starts_with(MCAP_START));
         }
         let mut first = Vec::new();
-        let mut start = self.open()?.take(START.len() as u64);
+        let mut start = self.open()?.take(MCAP_START.len() as u64);
         start
             .read_to_end(&mut first)
             .map_err(|error| self.unreadable(&error))?;
-        Ok(first == START)
+        Ok(first == MCAP_START)
     }
 
     /// The failure to read it.

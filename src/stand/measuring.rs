@@ -143,17 +143,7 @@ pub(super) fn recorder(section: Option<&Section>) -> Result<RecorderData, Failur
             .positive_if_any(key, kind)
             .map(|e| e.map(|e| e.value()))
     };
-    // An amplifier may invert.
-    let given = section.quantity("gain", Kind::Gain)?;
-    let gain = given.as_ref().map_or(1.0, Estimate::value);
-    if gain.abs() < LEAST_GAIN {
-        return Err(section.fail(
-            "gain",
-            "an amplifier between bridge and record has a gain of 10 to 10000, and this one is below 0.01; the gain is recorded \
-             volts per volt of the bridge: an amplifier that gives 10 V at 2 mV/V with a supply of 5 V has 10 V/(2 mV/V x 5 V) \
-             = 1000",
-        ));
-    }
+    let given = gain(section)?;
     let cutoff = section.positive_if_any("low_pass", Kind::Frequency)?;
     let order = section.whole("low_pass_order")?;
     if order.is_some() && cutoff.is_none() {
@@ -170,8 +160,12 @@ pub(super) fn recorder(section: Option<&Section>) -> Result<RecorderData, Failur
         cutoff_hz: cutoff.value(),
         order,
     });
-    let recorder =
-        Recorder::new(gain, low_pass, delay_s).map_err(|error| section.fail("", error))?;
+    let recorder = Recorder::new(
+        given.as_ref().map_or(1.0, Estimate::value),
+        low_pass,
+        delay_s,
+    )
+    .map_err(|error| section.fail("", error))?;
     let input_resistance_ohm = optional("input_resistance", Kind::Resistance)?;
     let zero = TransducerSignal::read(section, "zero")?;
     section.finish()?;
@@ -185,4 +179,18 @@ pub(super) fn recorder(section: Option<&Section>) -> Result<RecorderData, Failur
         input_resistance_ohm,
         zero,
     })
+}
+
+/// The amplifier's gain, below zero if it inverts.
+fn gain(section: &Section) -> Result<Option<Estimate>, Failure> {
+    let given = section.quantity("gain", Kind::Gain)?;
+    match &given {
+        Some(gain) if gain.value().abs() < LEAST_GAIN => Err(section.fail(
+            "gain",
+            "an amplifier between bridge and record has a gain of 10 to 10000, and this one is below 0.01; the gain is recorded \
+             volts per volt of the bridge: an amplifier that gives 10 V at 2 mV/V with a supply of 5 V has 10 V/(2 mV/V x 5 V) \
+             = 1000",
+        )),
+        _ => Ok(given),
+    }
 }

@@ -2,13 +2,14 @@
 
 use torqcomp_dsp::noise::RecordNoise;
 use torqcomp_dsp::resample::Resampled;
+use torqcomp_model::Mode;
 
 use super::Seen;
 use super::plot::Traces;
 use super::report::CompensateReport;
 use crate::print::{plural, rounded, short};
 use crate::quality::excerpt;
-use crate::stand::beyond_rated;
+use crate::stand::{Stand, beyond_rated};
 use crate::warning::Warning;
 
 /// Gain from which a record of unknown noise is worth a warning.
@@ -17,6 +18,8 @@ const LARGE_GAIN: f64 = 10.0;
 const ABOVE_BAND: f64 = 0.1;
 /// Part of the result that may be noise before it is worth a warning.
 const NOISY_FRACTION: f64 = 0.5;
+/// How far above half the sampling rate a resonance is hardly excited any more, times that.
+const FAR_ABOVE: f64 = 4.0;
 
 /// Adds the warnings to a report that is complete otherwise.
 pub(super) fn add(report: &mut CompensateReport, seen: &Seen, traces: Option<&Traces>) {
@@ -35,6 +38,33 @@ pub(super) fn add(report: &mut CompensateReport, seen: &Seen, traces: Option<&Tr
     more.extend(report.resampled.as_ref().and_then(of_gaps));
     more.extend(of_length(report));
     report.warnings.extend(more);
+}
+
+/// A warning if the stand rings above half the sampling rate, and nothing before the recorder keeps that out.
+pub(super) fn of_ringing(stand: &Stand, rate_hz: f64) -> Option<Warning> {
+    let limit_hz = 0.5 * rate_hz;
+    let modes = stand.modes().ok()?;
+    let above = modes.parts().iter().map(|part| part.mode);
+    let above = above.filter(|mode| mode.natural_frequency_hz() > limit_hz);
+    let first = |a: &Mode, b: &Mode| a.omega_rad_s.total_cmp(&b.omega_rad_s);
+    let mode = above.min_by(first)?;
+    let resonance_hz = mode.natural_frequency_hz();
+    let low_pass = stand.recorder.low_pass;
+    let is_kept_out = low_pass.is_some_and(|low_pass| low_pass.cutoff_hz <= limit_hz);
+    let is_near = resonance_hz < FAR_ABOVE * limit_hz;
+    (is_near && !is_kept_out && mode.damping_ratio < 0.5).then(|| {
+        Warning::new(
+            "resonance-above-nyquist",
+            format!(
+                "the stand resonates at {} Hz, above half the sampling rate of {} Hz: steps and shocks make it ring, and the \
+                 ringing folds into the record, where nothing can take it out; record at {} Hz or more, or behind a \
+                 low-pass (say so with [recorder] low_pass)",
+                rounded(resonance_hz, 4),
+                short(rate_hz),
+                rounded(5.0 * resonance_hz, 2)
+            ),
+        )
+    })
 }
 
 fn of_unknown_noise(report: &CompensateReport) -> Option<Warning> {

@@ -1,6 +1,6 @@
 //! Whether the speed is the one given and stays it, without which a fit of fixed frequencies is wrong.
 
-use torqcomp_dsp::harmonics::{Fundamental, Harmonics, fit, refine_fundamental};
+use torqcomp_dsp::harmonics::{Component, Fundamental, Harmonics, fit, refine_fundamental};
 use torqcomp_dsp::store::SampleStore;
 
 use crate::print::rounded;
@@ -17,13 +17,13 @@ const FEWEST: f64 = 8.0;
 const SPAN: f64 = 0.05;
 /// Difference of two speeds, in their standard uncertainties, that is none by chance.
 const SIGNIFICANT: f64 = 5.0;
-/// Turns that the highest order gains or loses over the record by a change that is worth saying.
+/// Turns that the highest order gains or loses over the record by a difference of speed that is worth saying.
 const TURNS: f64 = 0.2;
 
 /// Most samples from which the speed is found.
 const FIRST: usize = 1 << 17;
 /// Part of the components' power that a wrong speed loses before it is worth saying.
-const LOST: f64 = 0.02;
+const LOST: f64 = 0.05;
 /// Amplitude over its uncertainty from which a component is surely there.
 const THERE: f64 = 10.0;
 
@@ -40,25 +40,31 @@ pub(super) fn off(
     }
     let samples = record.samples.part(0..length).ok()?;
     let rate_hz = record.rate_hz;
-    let found = refine_fundamental(&samples[..], rate_hz, fundamental_hz, SPAN, orders).ok()?;
     let of = |fundamental| fit(&samples[..], rate_hz, 0.0, fundamental, orders).ok();
+    let power = |fitted: &Harmonics| {
+        let of_each = |c: &Component| 0.5 * c.phasor.norm_sqr();
+        fitted.components.iter().map(of_each).sum::<f64>()
+    };
     let given: Harmonics = of(Fundamental::given(fundamental_hz))?;
+    if given.residual_rms.powi(2) <= LOST * power(&given) {
+        return None;
+    }
+    let found = refine_fundamental(&samples[..], rate_hz, fundamental_hz, SPAN, orders).ok()?;
     let better = of(Fundamental::given(found.frequency_hz))?;
-    let power = |c: &torqcomp_dsp::harmonics::Component| 0.5 * c.phasor.norm_sqr();
-    let there = better.components.iter();
-    let is_there = there
-        .clone()
-        .any(|c| c.phasor.norm() > THERE * c.std_amplitude);
+    let is_sure = |c: &Component| c.phasor.norm() > THERE * c.std_amplitude;
+    let is_there = better.components.iter().any(is_sure);
     let lost = given.residual_rms.powi(2) - better.residual_rms.powi(2);
     let shift_hz = (found.frequency_hz - fundamental_hz).abs();
-    let matters = lost > LOST * there.map(power).sum::<f64>();
+    let highest = orders.iter().copied().fold(0.0, f64::max);
+    let turns = shift_hz * highest * length as f64 / rate_hz;
+    let matters = lost > LOST * power(&better) && turns > TURNS;
     (is_there && matters && shift_hz > SIGNIFICANT * found.std_hz?).then(|| {
         let digits = rounded(found.frequency_hz, 7);
         Warning::new(
             "fundamental-off",
             format!(
-                "the record fits a fundamental of {digits} Hz better than {} Hz, at which components come out too small and \
-                 their noise too: add --refine, or give --fundamental {digits}",
+                "the record fits a fundamental of {digits} Hz better than {} Hz, at which components come out too \
+                 small: add --refine, or give --fundamental {digits}",
                 rounded(fundamental_hz, 7)
             ),
         )

@@ -94,21 +94,20 @@ pub(super) fn learn(
     };
     let mut colours: Vec<NoiseColour> = each().map(|g| NoiseColour::first(g, size)).collect();
     let mut middle = gathered(&colours);
-    for _ in 0..if wanted > 0 { REFINEMENTS } else { 0 } {
+    let refinements = if wanted > 0 { REFINEMENTS } else { 0 };
+    for _ in 0..refinements {
         let pairs = colours.iter().zip(each());
         colours = pairs.map(|(c, g)| c.refined(g, size, &middle)).collect();
         middle = gathered(&colours);
     }
-    let variance_of = |i: usize| -> f64 {
-        let row: Vec<f64> = inverse.row(i).iter().copied().collect();
-        let pairs = colours.iter().zip(each());
-        pairs
-            .map(|(c, g)| c.variance_of_variance(g, size, &row))
-            .sum()
-    };
+    let rows = inverse.rows(0, wanted.min(sizes.len())).into_owned();
+    let none = DVector::zeros(rows.nrows());
+    let variances = colours.iter().zip(each()).fold(none, |sum, (c, g)| {
+        sum + c.variances_of_variances(g, size, &rows)
+    });
     let mut covariance = &inverse * middle * inverse.transpose();
     let enlarged = |i: usize| match i < wanted {
-        true => student((2.0 * covariance[(i, i)].powi(2) / variance_of(i)).max(LEAST_FREEDOM)),
+        true => student((2.0 * covariance[(i, i)].powi(2) / variances[i]).max(LEAST_FREEDOM)),
         false => 1.0,
     };
     let factors: Vec<f64> = (0..sizes.len()).map(|i| enlarged(i) / sizes[i]).collect();
@@ -327,30 +326,42 @@ impl NoiseColour {
         (0..=size / 2).map(of_bin).collect()
     }
 
-    /// var(u) of the variance u that the noise gives the sum of the columns times these factors.
-    fn variance_of_variance(&self, stretches: &[Transformed], size: usize, factors: &[f64]) -> f64 {
-        let mut variance = 0.0;
-        let mut slopes = DVector::zeros(self.coefficients.len());
+    /// var(u) of the variances u that the noise gives the sums of the columns times the factors in each of these rows.
+    fn variances_of_variances(
+        &self,
+        stretches: &[Transformed],
+        size: usize,
+        rows: &DMatrix<f64>,
+    ) -> DVector<f64> {
+        let order = self.coefficients.len();
+        let mut variances = DVector::zeros(rows.nrows());
+        let mut slopes = DMatrix::zeros(order, rows.nrows());
         for (k, density) in self.densities(size).into_iter().enumerate() {
-            let of_stretch = |stretch: &Transformed| {
-                let parts = stretch.columns.iter().zip(factors);
-                parts.map(|(c, f)| c[k] * f).sum::<Complex64>().norm_sqr()
-            };
-            let part = density * stretches.iter().map(of_stretch).sum::<f64>();
-            variance += part;
             let angle = TAU * k as f64 / size as f64;
             let whitener = self.whitener(angle);
-            for (m, slope) in slopes.iter_mut().enumerate() {
-                let turned = Complex64::cis(-angle * (m + 1) as f64);
-                *slope += 2.0 * part * (turned / whitener).re;
+            let along = DVector::from_fn(order, |m, _| {
+                2.0 * (Complex64::cis(-angle * (m + 1) as f64) / whitener).re
+            });
+            for (i, factors) in rows.row_iter().enumerate() {
+                let of_stretch = |stretch: &Transformed| {
+                    let parts = stretch.columns.iter().zip(factors.iter());
+                    parts.map(|(c, f)| c[k] * f).sum::<Complex64>().norm_sqr()
+                };
+                let part = density * stretches.iter().map(of_stretch).sum::<f64>();
+                variances[i] += part;
+                slopes.column_mut(i).axpy(part, &along, 1.0);
             }
         }
-        let order = slopes.len();
         let lags = DMatrix::from_fn(order, order, |i, j| self.covariances[i.abs_diff(j)]);
-        let along = lags
-            .cholesky()
-            .map_or(0.0, |c| slopes.dot(&c.solve(&slopes)));
-        (2.0 * variance * variance + self.innovation * along) / self.count as f64
+        let inverse = lags.cholesky();
+        let of_row = |i: usize, variance: f64| {
+            let slope = slopes.column(i);
+            let along = inverse
+                .as_ref()
+                .map_or(0.0, |c| slope.dot(&c.solve(&slope)));
+            (2.0 * variance * variance + self.innovation * along) / self.count as f64
+        };
+        DVector::from_fn(rows.nrows(), |i, _| of_row(i, variances[i]))
     }
 
     /// Qᵀ Ω Q.

@@ -172,7 +172,9 @@ const DIGITS: (i32, i32) = (-12, 6);
 const OF_DIGIT: f64 = 1e-4;
 
 /// The last digit of readings: the largest power of 10 that all are multiples of; `None` if they have more digits than
-/// their display could show.
+/// their display could show. The steps of a converter are another thing (`torqcomp_dsp::quality::quantisation`): any
+/// number, about any offset, seen in hundreds of samples, where a display counts in powers of 10 from zero and is read
+/// five times.
 fn resolution(readings: &[f64]) -> Option<f64> {
     let is_multiple = |digit: f64| {
         readings.iter().all(|r| {

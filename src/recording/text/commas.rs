@@ -81,16 +81,13 @@ fn are_fractions(rows: &[Vec<String>]) -> bool {
     let Some(first) = rows.first() else {
         return false;
     };
-    let is_fraction = |place: usize| {
-        let begins = |row: &Vec<String>| row[place].len() > 1 && row[place].starts_with('0');
-        rows.iter()
-            .all(|row| row[place].len() == first[place].len())
-            && first[place].len() > 1
-            || rows.iter().any(begins)
-    };
     let has_zeros = |place: usize| {
-        rows.iter()
-            .any(|row| row[place].len() > 1 && row[place].starts_with('0'))
+        let begins = |row: &Vec<String>| row[place].len() > 1 && row[place].starts_with('0');
+        rows.iter().any(begins)
+    };
+    let is_fraction = |place: usize| {
+        let digits = first[place].len();
+        digits > 1 && rows.iter().all(|row| row[place].len() == digits) || has_zeros(place)
     };
     let mut places = (1..first.len()).step_by(2);
     places.clone().all(is_fraction) && places.any(has_zeros)
