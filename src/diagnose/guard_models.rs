@@ -34,21 +34,24 @@ const LEAST_REDUCTION: f64 = 20.0;
 const LEFT: f64 = 0.5;
 
 impl GuardModel {
-    /// The guard model that explains most, if it passes as an effect would and leaves significantly less than the accepted
-    /// effect, if any.
-    pub fn best(
-        base: &BaseModel,
-        accepted: Option<&ScoredModel>,
-        noise_rms: f64,
-        records: &Records,
-        workers: Workers,
-    ) -> Option<Self> {
+    /// All of them beside a base model.
+    pub fn fits(base: &BaseModel, records: &Records, workers: Workers) -> Vec<ScoredModel> {
         let forms = EffectForm::all(RIVALS.iter().copied());
         let workers = workers.silent();
-        let fits = fit_all(base, &forms, &[], base.effort(), records, workers).into_iter();
-        let passing = fits
-            .flatten()
-            .filter(|model| refusal(model, &base.scored).is_none());
+        let fits = fit_all(base, &forms, &[], base.effort(), records, workers);
+        fits.into_iter().flatten().collect()
+    }
+
+    /// The one that explains most, if it passes as an effect would and leaves significantly less than the accepted
+    /// effect, if any.
+    pub fn best(
+        fits: Vec<ScoredModel>,
+        base: &ScoredModel,
+        accepted: Option<&ScoredModel>,
+        noise_rms: f64,
+    ) -> Option<Self> {
+        let fits = fits.into_iter();
+        let passing = fits.filter(|model| refusal(model, base).is_none());
         let model = passing.min_by(|a, b| a.criterion().total_cmp(&b.criterion()))?;
         if accepted.is_some_and(|accepted| !outdoes(&model, accepted, noise_rms)) {
             return None;

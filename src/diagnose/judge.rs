@@ -34,13 +34,18 @@ impl SearchState {
         });
         self.noise_floor = NoiseFloor::of(&self.before.compared, &self.before.fitted.mode());
         self.tests_before = super::tests(&self.before);
+        let without = std::mem::take(&mut self.without);
+        self.without = parallel(without.len(), threads, |k| {
+            self.held_out(without[k].as_ref()?)
+        });
         match self.held_out(&self.after) {
             Some(after) => self.after = after,
             None => self.drop_all(&Reason::Diverges),
         }
         self.tests = super::tests(&self.after);
         self.lower_noise_floor();
-        let without = self.confirm(threads);
+        self.confirm(threads);
+        let without = std::mem::take(&mut self.without);
         self.ladder = Ladder::of(&self.after, &self.before, without, &self.records, threads);
         Ok(())
     }
@@ -63,14 +68,13 @@ impl SearchState {
         }
     }
 
-    /// Takes out the effects that the held-out records do not show; the model without each of the others.
-    fn confirm(&mut self, threads: usize) -> Vec<Option<ScoredModel>> {
-        let without = self.eliminate(threads);
+    /// Takes out the effects that the held-out records do not show.
+    fn confirm(&mut self, threads: usize) {
+        self.eliminate(threads);
         if self.after.effect_names().len() == 1 && no_gain(&self.after, &self.before).is_some() {
             let change = self.after.compared_rms() / self.before.compared_rms() - 1.0;
             self.drop_all(&Reason::NotConfirmed { change });
         }
-        without
     }
 
     /// Goes back to the plain stand.
@@ -83,6 +87,7 @@ impl SearchState {
             }
         }
         self.is_refuted = true;
+        self.without.clear();
         self.after = self.before.clone();
         self.tests = self.tests_before.clone();
     }

@@ -92,6 +92,10 @@ struct SearchState {
     before: ScoredModel,
     /// The same with the accepted effects.
     after: ScoredModel,
+    /// The same without each of its effects, once that is settled.
+    without: Vec<Option<ScoredModel>>,
+    /// The laws beside the list beside the plain stand, with so many steps of integration.
+    rivals: Option<(usize, Vec<ScoredModel>)>,
     /// The candidates; one list for each effect that was looked for.
     rounds: Vec<Vec<CandidateFit>>,
     /// The models with effects on the way.
@@ -198,6 +202,8 @@ impl SearchState {
             noise_floor: NoiseFloor::of(&before.compared, &before.fitted.mode()),
             after: before.clone(),
             before,
+            without: Vec::new(),
+            rivals: None,
             rounds: Vec::new(),
             path: Vec::new(),
             ladder: Ladder::default(),

@@ -68,29 +68,43 @@ impl SearchState {
             // What only resembled an effect is gone: what it hid may show now.
             while self.has_room() && self.add_another(coarse, workers) {}
         }
-        let without = self.eliminate(workers.threads);
-        self.ask_guards(&base, &without, workers);
+        self.eliminate(workers.threads);
+        self.ask_guards(&base, workers);
     }
 
     /// A law beside the list that leaves nothing but noise, or far less than the best effect: several effects in its place
     /// would only imitate it.
     fn only_law(
-        &self,
+        &mut self,
         base: &BaseModel,
         best: Option<&ScoredModel>,
         workers: Workers,
     ) -> Option<GuardModel> {
-        let leaves = |model: &ScoredModel| self.is_worthwhile(model, &super::tests(model));
-        let rival = best.unwrap_or(&self.before);
-        if !leaves(rival) {
+        let rival = best.unwrap_or(&self.before).clone();
+        if !self.is_worthwhile(&rival, &super::tests(&rival)) {
             return None;
         }
         let noise_rms = noise_rms(self.noise_floor);
-        let guard = GuardModel::best(base, best, noise_rms, &self.records, workers);
+        let fits = self.rivals(base, workers);
+        let guard = GuardModel::best(fits, &base.scored, best, noise_rms);
         guard.filter(|guard| {
             let left = guard.model.excess_power(noise_rms);
-            left <= FAR_LESS * rival.excess_power(noise_rms) || !leaves(&guard.model)
+            left <= FAR_LESS * rival.excess_power(noise_rms)
+                || !self.is_worthwhile(&guard.model, &super::tests(&guard.model))
         })
+    }
+
+    /// The laws beside the list beside the plain stand, fitted anew only with other steps of integration.
+    fn rivals(&mut self, base: &BaseModel, workers: Workers) -> Vec<ScoredModel> {
+        let steps = self.records.substeps();
+        if self.rivals.as_ref().is_none_or(|(of, _)| *of != steps) {
+            self.rivals = Some((steps, GuardModel::fits(base, &self.records, workers)));
+        }
+        self.rivals
+            .iter()
+            .flat_map(|(_, fits)| fits)
+            .cloned()
+            .collect()
     }
 
     /// Where ways begin: with the best effect, with the best pair if that explains more; that first if the best effect is in no
@@ -186,15 +200,18 @@ impl SearchState {
         remains(model, tests, floor) || !is_noise && !is_at_floor
     }
 
-    /// Takes out again what is not needed; the model without each of the effects that are left.
-    pub(super) fn eliminate(&mut self, threads: usize) -> Vec<Option<ScoredModel>> {
+    /// Takes out again what is not needed. What is known of the model without each of its effects is not fitted again.
+    pub(super) fn eliminate(&mut self, threads: usize) {
         while self.after.effect_names().len() > 1 {
-            let mut without = self.after.without_each(&self.records, threads);
-            let Some(k) = self.needless(&without) else {
-                return without;
+            if self.without.is_empty() {
+                self.without = self.after.without_each(&self.records, threads);
+            }
+            let Some(k) = self.needless(&self.without) else {
+                return;
             };
             let names = self.after.effect_names();
-            let Some(less) = without.swap_remove(k) else {
+            let without = std::mem::take(&mut self.without).into_iter().nth(k);
+            let Some(less) = without.flatten() else {
                 break;
             };
             let others = less.effect_names().join(" + ");
@@ -208,7 +225,6 @@ impl SearchState {
             self.tests = super::tests(&less);
             self.after = less;
         }
-        Vec::new()
     }
 
     /// The effect that is missed least, if its absence does not show.
@@ -227,35 +243,34 @@ impl SearchState {
     }
 
     /// Asks laws beside the list whether they explain more: than all effects, than each of several, and beside all.
-    /// `without` is the model without each of its effects.
-    fn ask_guards(&mut self, base: &BaseModel, without: &[Option<ScoredModel>], workers: Workers) {
+    fn ask_guards(&mut self, base: &BaseModel, workers: Workers) {
         let noise_rms = noise_rms(self.noise_floor);
         let count = self.after.effect_names().len();
         let is_left = remains(&self.after, &self.tests, self.noise_floor);
-        let records = &self.records;
-        let ask = |base: &BaseModel, against: Option<&ScoredModel>| {
-            GuardModel::best(base, against, noise_rms, records, workers)
-        };
-        let instead = match count {
-            0 if !is_left => None,
-            0 => ask(base, None),
-            _ => ask(base, Some(&self.after)),
-        };
-        if let Some(guard) = instead {
+        if count == 0 && !is_left {
+            return;
+        }
+        let against = (count > 0).then_some(self.after.clone());
+        let fits = self.rivals(base, workers);
+        if let Some(guard) = GuardModel::best(fits, &base.scored, against.as_ref(), noise_rms) {
             self.withdraw(guard, self.before.clone());
             return;
         }
-        if count > 1 && is_left {
-            for less in without.iter().flatten() {
-                let beside = BaseModel::of(less.clone(), records);
-                if let Some(guard) = ask(&beside, Some(&self.after)) {
-                    self.withdraw(guard, less.clone());
-                    return;
-                }
-            }
+        if count == 0 || !is_left {
+            return;
         }
-        if count > 0 && is_left {
-            self.suspected = ask(&BaseModel::of(self.after.clone(), records), None);
+        let records = &self.records;
+        let beside = |model: &ScoredModel, against: Option<&ScoredModel>| {
+            let base = BaseModel::of(model.clone(), records);
+            let fits = GuardModel::fits(&base, records, workers);
+            GuardModel::best(fits, model, against, noise_rms)
+        };
+        let fewer = || self.without.iter().flatten();
+        let instead =
+            fewer().find_map(|less| Some((beside(less, against.as_ref())?, less.clone())));
+        match instead {
+            Some((guard, less)) => self.withdraw(guard, less),
+            None => self.suspected = beside(&self.after, None),
         }
     }
 
@@ -270,6 +285,7 @@ impl SearchState {
         }
         self.tests = super::tests(&less);
         self.after = less;
+        self.without.clear();
         self.suspected = Some(guard);
     }
 
