@@ -1,5 +1,7 @@
 //! `diagnose` and `simulate` through the binary, on blind records made by other code (see [`crate::blind`]).
 
+use std::f64::consts::TAU;
+
 use crate::blind::record::{Case, make};
 use crate::blind::write;
 use crate::util::{Folder, HERTEL, table};
@@ -265,6 +267,56 @@ fn an_effect_that_the_held_out_record_lacks_is_not_named() {
 }
 
 /// Two effects of the generator in one stand are both found, and no third; the ladder of errors falls from step to step.
+/// Slow excitation of a lightly damped stand, recorded from the middle on: the motion at the start is not that of the plain
+/// stand whose stiffness makes up for the wrong scale.
+#[test]
+fn a_wrong_scale_in_the_middle_of_a_run_is_a_gain_error() {
+    let (natural_hz, damping_ratio) = (60.0, 0.02);
+    for (scale, seed) in [(1.0 / 0.9, 3), (1.0 / 1.1, 3), (1.0 / 1.1, 11)] {
+        let mut noise = crate::noise::Noise(seed);
+        let lines: Vec<(f64, f64)> = (0..40)
+            .map(|k| (2.0 + 0.7 * f64::from(k), TAU * noise.uniform()))
+            .collect();
+        let sum = |t: f64, answers: bool| {
+            let line = |(hz, phase): &(f64, f64)| {
+                let r = hz / natural_hz;
+                let (re, im) = (1.0 - r * r, 2.0 * damping_ratio * r);
+                let (gain, lag) = match answers {
+                    true => (scale / re.hypot(im), im.atan2(re)),
+                    false => (1.0, 0.0),
+                };
+                0.2 * gain * (TAU * hz * t + phase - lag).cos()
+            };
+            lines.iter().map(line).sum::<f64>()
+        };
+        let row = |i: u32| {
+            let t = f64::from(i) * 1e-3;
+            let measured = sum(t, true) + 0.005 * noise.normal();
+            format!("{t:.3},{:.9},{measured:.9}\n", sum(t, false))
+        };
+        let rows: String = (0..4000).map(row).collect();
+        let folder = Folder::new();
+        folder.write(
+            "run.csv",
+            format!("time_s,applied_n_m,measured_n_m\n{rows}"),
+        );
+        let args = [
+            &["diagnose", "--train", "run.csv"],
+            &COLUMNS[..],
+            &["--json"],
+        ]
+        .concat();
+        let report = folder.json(&args);
+        assert_eq!(report["verdict"], "explained", "{scale} {seed}");
+        assert_eq!(report["effects"], serde_json::json!(["gain-error"]));
+        let error = report["candidates"][0]["parameters"][0]["value"].as_f64();
+        assert!(
+            (error.expect("a number") + 1.0 - scale).abs() < 2e-3,
+            "{report}"
+        );
+    }
+}
+
 #[test]
 fn two_effects_are_found_together() {
     let case = make(1, "two", 2).expect("the catalogue has it");

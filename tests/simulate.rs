@@ -81,22 +81,31 @@ fn held_samples_are_simulated_as_they_are() {
     assert!(relative < 1e-3, "{relative:e}");
 }
 
-#[test]
-fn an_input_that_is_held_is_no_effect() {
+/// A diagnosis of held inputs whose answers are recorded too large by a factor.
+fn diagnosed_as_held(factor: f64) -> serde_json::Value {
     let folder = Folder::new();
     folder.write("stand.toml", STAND);
     let mut noise = Noise(11);
     for (name, seed) in [("train.csv", 5), ("holdout.csv", 8)] {
         let applied = input(seed, 8000);
         let answer = held(&applied);
-        let measured: Vec<f64> = answer.iter().map(|y| y + 0.005 * noise.normal()).collect();
-        folder.write(name, record(&applied, &measured));
+        let measured = answer.iter().map(|y| factor * y + 0.005 * noise.normal());
+        folder.write(name, record(&applied, &measured.collect::<Vec<f64>>()));
     }
     let report = folder.json(&diagnose(&["--json"]));
     assert_eq!(report["input_between_samples"], "held");
-    assert_eq!(report["verdict"], "nothing-missing");
     let after = report["error"]["after"]["holdout_rms"].as_f64().unwrap();
     assert!((after / 0.005 - 1.0).abs() < 0.05, "{after}");
+    report
+}
+
+#[test]
+fn an_input_that_is_held_is_no_effect() {
+    assert_eq!(diagnosed_as_held(1.0)["verdict"], "nothing-missing");
+    // Nor does it hide one: a delay of half a sample would do for the rest.
+    let report = diagnosed_as_held(1.1);
+    assert_eq!(report["verdict"], "explained");
+    assert_eq!(report["effects"], serde_json::json!(["gain-error"]));
 }
 
 /// A drift begins with the record, also where its stamps are seconds of 1970.

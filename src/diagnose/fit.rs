@@ -24,6 +24,8 @@ pub struct FittedModel {
     pub train_sum: f64,
     /// Initial state of each training record.
     pub initial: Vec<InitialState>,
+    /// The mode of the free motion that is removed from the residuals.
+    pub free: Mode,
 }
 
 /// What a model leaves of a record.
@@ -87,55 +89,65 @@ pub fn fit(
     effort: FitEffort,
 ) -> Result<FittedModel, FitError> {
     let mut records = records.to_vec();
-    let mut found = minimize(&structure, start, &mut records, effort)?;
-    if effort.corrects_start
-        && structure.model(start).0.has_torques()
-        && correct_starts(&structure, &found.values, &mut records)
-    {
+    let mut free = structure.free_mode(start);
+    let mut found = minimize(&structure, start, &mut records, Some(&free), effort)?;
+    if effort.corrects_start {
+        let has_moved = moves_on(&structure, &found.values, &records, &free);
+        let integrates = structure.model(start).0.has_torques();
+        let is_corrected =
+            integrates && correct_starts(&structure, &found.values, &mut records, &free);
         let values = &found.values[..start.len()];
-        found = minimize(&structure, values, &mut records, effort)?;
+        if has_moved {
+            found = minimize(&structure, values, &mut records, None, effort)?;
+            free = structure.free_mode(&found.values);
+        } else if is_corrected {
+            found = minimize(&structure, values, &mut records, Some(&free), effort)?;
+        }
     }
     let count = structure.bounds().len();
     let mut values = found.values;
     values.truncate(count);
     Ok(FittedModel {
-        amplitudes: line_amplitudes(&structure, &values, &records),
+        amplitudes: line_amplitudes(&structure, &values, &records, &free),
         structure,
         std: found.std[..count].to_vec(),
         train_sum: found.sum_of_squares,
         converged: found.stop.converged(),
         initial: records.iter().map(|r| r.initial).collect(),
         values,
+        free,
     })
 }
 
+/// Minimises the residual without what belongs to the records; the free motion in it is in a given mode, which is faster, or
+/// in that of the parameters.
 fn minimize(
     structure: &Structure,
     start: &[f64],
     records: &mut [StandRecord],
+    free: Option<&Mode>,
     effort: FitEffort,
 ) -> Result<Fit, FitError> {
     let size = structure.context.scales.rms;
-    let reference = structure.context.plain.mode();
     let own = structure.bounds().len();
     let has_preload = structure.model(start).0.has_zero();
     let parameters = parameters(structure, start, records, has_preload);
-    // Without lines, the nuisance terms do not depend on the parameters.
-    let fixed: Vec<Nuisance> = records
-        .iter()
-        .map(|r| r.nuisance(&reference, &NuisanceTerms::NONE, None))
-        .collect();
+    // Without lines, the nuisance terms depend on the parameters by their mode alone.
+    let fixed: Option<Vec<Nuisance>> = free.map(|free| {
+        let of = |r: &StandRecord| r.nuisance(free, &NuisanceTerms::NONE, None);
+        records.iter().map(of).collect()
+    });
     let problem = |values: &[f64], out: &mut Vec<f64>| {
         let (mut model, terms) = structure.model(&values[..own]);
-        for (k, (record, fixed)) in records.iter().zip(&fixed).enumerate() {
+        let free = free.copied();
+        let free = free.unwrap_or_else(|| structure.free_mode(&values[..own]));
+        for (k, record) in records.iter().enumerate() {
             let preload = values.get(own + k).map(|s| s * size);
             model.shift = preload.unwrap_or(record.initial.preload);
             let mut residual = raw_residual(&model, record)?;
-            if terms.is_empty() {
-                fixed.clear(&mut residual);
-            } else {
-                let nuisance = record.nuisance(&reference, &terms, None);
-                nuisance.clear(&mut residual);
+            match &fixed {
+                Some(fixed) if terms.is_empty() => fixed[k].clear(&mut residual),
+                _ => record.nuisance(&free, &terms, None).clear(&mut residual),
             }
             out.append(&mut residual);
         }
@@ -192,42 +204,72 @@ pub fn raw_residual(model: &Chain, record: &StandRecord) -> Result<Vec<f64>, Fit
 
 /// Mean square of the raw residual of a record, and the nuisance terms in it.
 fn nuisance_of(
-    structure: &Structure,
     (model, terms): &mut (Chain, NuisanceTerms),
     record: &StandRecord,
+    free: &Mode,
 ) -> Option<(f64, NuisanceFit)> {
     model.shift = record.initial.preload;
     let mut residual = raw_residual(model, record).ok()?;
     let mean_square = dot(&residual, &residual) / residual.len() as f64;
-    let nuisance = record.nuisance(&structure.context.plain.mode(), terms, None);
+    let nuisance = record.nuisance(free, terms, None);
     Some((mean_square, nuisance.fit(&mut residual)))
 }
 
 /// Corrects the motion at the start of each record by what the residual shows of it; whether any correction matters.
-fn correct_starts(structure: &Structure, values: &[f64], records: &mut [StandRecord]) -> bool {
+fn correct_starts(
+    structure: &Structure,
+    values: &[f64],
+    records: &mut [StandRecord],
+    free: &Mode,
+) -> bool {
     let mut model = structure.model(values);
     let mut matters = false;
     for record in records {
-        let Some((mean_square, found)) = nuisance_of(structure, &mut model, record) else {
+        let Some((mean_square, found)) = nuisance_of(&mut model, record, free) else {
             continue;
         };
         if let Some([x, speed]) = found.motion {
-            record.initial.correct([x, speed], &structure.context.plain);
+            record.initial.correct([x, speed], free);
             matters |= x.hypot(speed) > START_MATTERS * mean_square.sqrt();
         }
     }
     matters
 }
 
+/// Whether the free motion after the start of a record differs by more than the residual allows from one in the mode that
+/// the parameters have by now: ten thousand turns in the plain stand's mode are not those in a mode 1 % beside it.
+fn moves_on(structure: &Structure, values: &[f64], records: &[StandRecord], free: &Mode) -> bool {
+    let now = structure.free_mode(values);
+    let fade = |mode: &Mode| mode.damping_ratio * mode.omega_rad_s;
+    let apart = (now.omega_rad_s - free.omega_rad_s).hypot(fade(&now) - fade(free));
+    let mut model = structure.model(values);
+    records.iter().any(|record| {
+        let Some((mean_square, found)) = nuisance_of(&mut model, record, free) else {
+            return false;
+        };
+        let Some([x, speed]) = found.motion else {
+            return false;
+        };
+        let duration_s = record.range.end as f64 / record.rate_hz();
+        let turned = (apart * duration_s.min(1.0 / fade(&now).min(fade(free)))).min(1.0);
+        turned * x.hypot(speed) > START_MATTERS * mean_square.sqrt()
+    })
+}
+
 /// Mean amplitude of each line over the records.
-fn line_amplitudes(structure: &Structure, values: &[f64], records: &[StandRecord]) -> Vec<f64> {
+fn line_amplitudes(
+    structure: &Structure,
+    values: &[f64],
+    records: &[StandRecord],
+    free: &Mode,
+) -> Vec<f64> {
     let mut model = structure.model(values);
     let mut sums = vec![0.0; model.1.lines_hz.len()];
     if sums.is_empty() {
         return sums;
     }
     for record in records {
-        let Some((_, found)) = nuisance_of(structure, &mut model, record) else {
+        let Some((_, found)) = nuisance_of(&mut model, record, free) else {
             continue;
         };
         for (sum, [c, s]) in sums.iter_mut().zip(&found.lines) {
@@ -238,10 +280,10 @@ fn line_amplitudes(structure: &Structure, values: &[f64], records: &[StandRecord
 }
 
 impl InitialState {
-    /// Adds a displacement, and a speed over `ω₀`, to the motion at the first sample.
-    fn correct(&mut self, [x, speed]: [f64; 2], plain: &PlainStand) {
+    /// Adds a displacement, and a speed over the free motion's `ω₀`, to the motion at the first sample.
+    fn correct(&mut self, [x, speed]: [f64; 2], free: &Mode) {
         self.motion.x += x;
-        self.motion.speed += speed * plain.mode().omega_rad_s;
+        self.motion.speed += speed * free.omega_rad_s;
     }
 }
 
@@ -288,7 +330,7 @@ impl FittedModel {
         for _ in 1..iterations {
             let mut record = found.record;
             let motion = found.nuisance.motion.unwrap_or_default();
-            record.initial.correct(motion, &context.plain);
+            record.initial.correct(motion, &self.free);
             let preload = record.initial.preload + found.nuisance.preload.unwrap_or(0.0);
             record.initial.preload = preload.clamp(-limit, limit);
             found = self.evaluate(&mut model, &terms, record)?;
@@ -317,7 +359,7 @@ impl FittedModel {
         }
         let pairs = record.measured_in_range().iter().zip(&samples);
         let modelled = pairs.map(|(y, r)| y - r).collect();
-        let nuisance = record.nuisance(&context.plain.mode(), terms, preload);
+        let nuisance = record.nuisance(&self.free, terms, preload);
         let nuisance = nuisance.fit(&mut samples);
         Some(RecordResidual {
             record,

@@ -119,6 +119,9 @@ struct SearchState {
 const PROMINENT: f64 = 30.0;
 const MOST_LINES: usize = 5;
 
+/// Single effects beside which another course of the input is tried.
+const MOST_ALONE: usize = 8;
+
 /// Scales of the parameters for training records, without the natural frequency.
 fn scales(train: &[StandRecord]) -> RecordScales {
     let (mut sum, mut count, mut peak) = (0.0, 0_usize, 0.0_f64);
@@ -185,8 +188,10 @@ impl SearchState {
         plain::set_starts(&plain, &mut records.train);
         plain.initial = records.train.iter().map(|r| r.initial).collect();
         let declared = declared.and_then(|declared| {
+            let values = declared.values(&plain.structure.context);
             let declared = FittedModel {
-                values: declared.values(&plain.structure.context),
+                free: plain.structure.free_mode(&values),
+                values,
                 amplitudes: declared.amplitudes(),
                 ..plain.clone()
             };
@@ -239,11 +244,22 @@ impl SearchState {
         if !has_effects && !remains(&self.before, &self.tests_before, floor) {
             return None;
         }
-        let mut models = vec![&self.before];
-        // If nothing is left, only a course in place of all effects could say more.
-        if remains(&self.after, &self.tests, floor) {
-            models.extend(&self.path);
-        }
+        let mut alone: Vec<&ScoredModel> = self
+            .rounds
+            .first()
+            .into_iter()
+            .flatten()
+            .filter_map(|c| c.model.as_ref())
+            .collect();
+        alone.sort_by(|a, b| a.criterion().total_cmp(&b.criterion()));
+        // If nothing is left, only a course in place of effects could say more.
+        let is_left = remains(&self.after, &self.tests, floor);
+        let count = self.after.effect_names().len();
+        let on_the_way = self.path.iter().chain(self.without.iter().flatten());
+        let on_the_way = on_the_way.chain(alone.into_iter().take(MOST_ALONE));
+        let models: Vec<&ScoredModel> = std::iter::once(&self.before)
+            .chain(on_the_way.filter(|model| is_left || model.effect_names().len() < count))
+            .collect();
         let noise_rms = noise_rms(floor);
         intersample::better_course(&models, &self.after, noise_rms, &self.records, threads)
     }

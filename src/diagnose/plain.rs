@@ -140,7 +140,6 @@ fn try_start(
 /// Sets the motion at the start of each record to that of the plain stand.
 pub fn set_starts(plain: &FittedModel, records: &mut [StandRecord]) {
     let (model, _) = plain.structure.model(&plain.values);
-    let reference = plain.structure.context.plain.mode();
     for record in records {
         let Some(found) = plain.residual(record) else {
             continue;
@@ -149,7 +148,7 @@ pub fn set_starts(plain: &FittedModel, records: &mut [StandRecord]) {
         let [dx, dspeed] = found.nuisance.motion.unwrap_or_default();
         record.initial.motion = MotionState {
             x: x + dx,
-            speed: speed + dspeed * reference.omega_rad_s,
+            speed: speed + dspeed * plain.free.omega_rad_s,
         };
     }
 }

@@ -295,8 +295,7 @@ impl BaseModel {
 
 /// Derivatives of a record's residual with respect to the parameters, and the nuisance terms removed from it.
 fn slopes(fitted: &FittedModel, record: &StandRecord) -> (Columns, Nuisance) {
-    let reference = fitted.structure.context.plain.mode();
-    let nuisance = record.nuisance(&reference, &NuisanceTerms::NONE, None);
+    let nuisance = record.nuisance(&fitted.free, &NuisanceTerms::NONE, None);
     let at = |values: &[f64]| {
         let (model, _) = fitted.structure.model(values);
         let mut residual = raw_residual(&model, record).ok()?;

@@ -251,8 +251,8 @@ pub fn fit_all(
         .max(WORTHWHILE * base.scored.train_rms().powi(2));
     parallel(forms.len(), workers.threads, |k| {
         let fit = second[k].as_ref().filter(|f| gain(f) > 0.0)?;
-        let is_done = fit.converged && !fit.integrates() || gain(fit) < least;
-        let full = (!is_done).then(|| fit.refit(&records.train, FULL_FIT));
+        let is_promising = gain(fit) >= least;
+        let full = is_promising.then(|| fit.refit(&records.train, FULL_FIT));
         let full = full.and_then(Result::ok);
         ScoredModel::of(full.unwrap_or_else(|| fit.clone()), records)
     })

@@ -102,14 +102,13 @@ fn evaluate(
     training: &[StandRecord],
 ) -> Option<Start> {
     let (model, terms) = structure.model(&values);
-    let reference = structure.context.plain.mode();
     let (mut left, mut along, mut size) = (0.0, 0.0, 0.0);
     let residuals = training.iter().zip(base.scored.train.iter());
     let slopes = base.slopes.iter().zip(&base.nuisance);
     for ((record, before), (slopes, nuisance)) in residuals.zip(slopes) {
         if terms.disturb() {
             let mut residual = before.samples.clone();
-            let nuisance = record.nuisance(&reference, &terms, None);
+            let nuisance = record.nuisance(&base.scored.fitted.free, &terms, None);
             nuisance.clear(&mut residual);
             left += dot(&residual, &residual);
             continue;
