@@ -36,6 +36,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["noise-unknown", "the noise of the record cannot be determined", "choose a lower --band if the result looks noisy"],
         ["not-recovered", "samples do not determine the torque, as at the limit of the recorder or within a gap", "take the torque near them as unknown"],
         ["order-or-mains", "an order of the shaft coincides with a line of the mains", "record at another speed"],
+        ["orders-beyond-band", "orders lie where a compensated record was filtered", "compensate with a higher --band, or give the recorded channel and --stand"],
         ["orders-above-nyquist", "orders above half the sampling rate were left out", "record at a higher rate"],
         ["speed-changes", "the speed changes over the record, so that the components are averages", "take a part of constant speed with --range"],
         ["phase-hidden", "the signal at the frequency of a line hides the line's phase, so that part of the line is left", "record without excitation at this frequency"],

@@ -181,3 +181,30 @@ fn a_fundamental_beside_the_line_is_said() {
         assert!(!codes(&report).contains(&"fundamental-off"), "{report}");
     }
 }
+
+/// Components of a steady speed under a load step are no change of speed; a speed that rises from 25 to 35 Hz is one.
+#[test]
+fn a_changing_speed_is_said_and_a_load_step_is_none() {
+    let folder = Folder::new();
+    folder.write("stand.toml", stand(""));
+    let mut noise = crate::noise::Noise(5);
+    let noise: Vec<f64> = (0..10_000).map(|_| 0.05 * noise.normal()).collect();
+    let changes = |load: &dyn Fn(f64) -> f64, turns: &dyn Fn(f64) -> f64| {
+        let torque = |t: f64| {
+            let order = |n: f64, size: f64| size * (TAU * n * turns(t) + n).cos();
+            load(t) + order(1.0, 1.0) + order(2.0, 0.5) + noise[(t * 1000.0).round() as usize]
+        };
+        folder.write("in.csv", over_time("T [N m]", 1000.0, 10_000, torque));
+        let report = folder.json(&[&HARMONICS[..], &["30", "--orders", "1,2", "--json"]].concat());
+        codes(&report).contains(&"speed-changes")
+    };
+    let steady = |t: f64| 30.0 * t;
+    for at_s in [1.1, 4.7, 7.3] {
+        for size in [5.0, -20.0] {
+            let step = |t: f64| if t < at_s { 1.0 } else { size };
+            assert!(!changes(&step, &steady), "{size} N m at {at_s} s");
+        }
+    }
+    assert!(changes(&|_| 5.0, &|t| 25.0 * t + 0.5 * t * t));
+    assert!(changes(&|_| 5.0, &|t| 30.0 * t + 0.005 * t * t));
+}

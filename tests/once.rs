@@ -1,10 +1,35 @@
 //! The stand's response is divided out once: results of `compensate` are marked, refused by `compensate`, and taken
 //! as they are by `harmonics`.
 
+use crate::noise::Noise;
 use crate::util::{Folder, assert_close, record, steady};
 
 /// 0.30 N m at 590 Hz, where the stand of the thesis shows 7 times as much.
 const PARTS: [(f64, f64, f64); 2] = [(0.5, 0.0, 0.0), (0.30, 590.0, 0.4)];
+
+/// Orders of 100 Hz in a record with noise: those above the band of the compensation are said to be filtered, and no others.
+#[test]
+fn orders_above_the_band_of_a_compensated_record_are_said() {
+    let parts: Vec<(f64, f64, f64)> = (1..=9).map(|n| (0.3, 100.0 * f64::from(n), 0.4)).collect();
+    let (mut shown, _) = steady(&parts, 20_000.0, 40_000);
+    let mut noise = Noise(7);
+    shown.iter_mut().for_each(|v| *v += 0.01 * noise.normal());
+    let folder = Folder::new();
+    folder.write("in.csv", record(&shown, 20_000.0));
+    for (band, said) in [
+        ("300", Some("orders 4, 5, 6, 7, 8, 9 lie above")),
+        ("510", Some("orders 6, 7, 8, 9 lie above")),
+        ("1000", None),
+    ] {
+        let compensate = ["compensate", "in.csv", "--stand", "stand.toml", "-q"];
+        let torque = folder.run(&[&compensate[..], &["--band", band]].concat());
+        let orders = ["harmonics", "-", "--fundamental", "100", "--orders", "1-9"];
+        let ran = folder.pipe(&orders, torque.stdout.as_bytes());
+        ran.says(0, said.as_slice());
+        let is_said = ran.stderr.contains("orders-beyond-band");
+        assert_eq!(is_said, said.is_some(), "{band}: {}", ran.stderr);
+    }
+}
 
 const HARMONICS: [&str; 7] = [
     "--fundamental",

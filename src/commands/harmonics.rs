@@ -1,5 +1,6 @@
 //! `harmonics`: component torques at a fundamental and its orders.
 
+mod filtered;
 mod speed;
 mod text;
 
@@ -234,6 +235,10 @@ fn fit(
     let largest = largest(samples, &components, printed)?;
     warnings.extend(beyond_rated(largest, rated, &chain.applied.unit));
     warnings.extend(of_speed(record, &fundamental, &orders));
+    if way.stand.is_none() {
+        let of_band = filtered::warning(record, fundamental.frequency_hz, &orders);
+        warnings.extend(of_band);
+    }
     warnings.extend(lost_warning(&components));
     warnings.extend(mains_warning(&components, duration_s));
     warnings.extend(of_quality(record, channel, chain)?);

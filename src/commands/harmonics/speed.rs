@@ -13,8 +13,9 @@ const PARTS: usize = 4;
 const MOST: usize = 1 << 15;
 /// Fewest periods of the fundamental in a part.
 const FEWEST: f64 = 8.0;
-/// How far from the fundamental it is looked for, relative to it.
+/// How far from the fundamental it is looked for, relative to it, and where it is not there.
 const SPAN: f64 = 0.05;
+const WIDE_SPAN: f64 = 0.3;
 /// Difference of two speeds, in their standard uncertainties, that is none by chance.
 const SIGNIFICANT: f64 = 5.0;
 /// Turns that the highest order gains or loses over the record by a difference of speed that is worth saying.
@@ -72,7 +73,8 @@ pub(super) fn off(
 }
 
 /// A warning if the fundamental differs between the parts of a record by more than its uncertainty there, and by so much
-/// that the highest order loses its phase.
+/// that the highest order loses its phase. It is found from differences over a quarter of the shortest period, in which a
+/// load step is a short pulse.
 pub(super) fn warning(
     record: &UniformRecord<Spool>,
     fundamental_hz: f64,
@@ -83,12 +85,19 @@ pub(super) fn warning(
     if (length as f64) * fundamental_hz < FEWEST * record.rate_hz {
         return None;
     }
-    let part = |place: usize| {
+    let highest = orders.iter().copied().fold(0.0, f64::max);
+    let lag = record.rate_hz / (4.0 * highest * fundamental_hz);
+    let lag = (lag as usize).clamp(1, length / 4);
+    let part = |place: usize, span: f64| {
         let start = place * (count - length) / (PARTS - 1);
         let samples = record.samples.part(start..start + length).ok()?;
-        refine_fundamental(&samples, record.rate_hz, fundamental_hz, SPAN, orders).ok()
+        let pairs = samples.iter().zip(&samples[lag..]);
+        let changes: Vec<f64> = pairs.map(|(before, after)| after - before).collect();
+        let fundamental_hz = fundamental_hz.min(0.5 * record.rate_hz / highest / (1.0 + span));
+        refine_fundamental(&changes, record.rate_hz, fundamental_hz, span, orders).ok()
     };
-    let found: Vec<Fundamental> = (0..PARTS).map(part).collect::<Option<_>>()?;
+    let with = |span| (0..PARTS).map(|place| part(place, span)).collect();
+    let found: Vec<Fundamental> = with(SPAN).or_else(|| with(WIDE_SPAN))?;
     let by_speed = |a: &&Fundamental, b: &&Fundamental| a.frequency_hz.total_cmp(&b.frequency_hz);
     let (slowest, fastest) = (
         found.iter().min_by(by_speed)?,
@@ -97,7 +106,6 @@ pub(super) fn warning(
     let change_hz = fastest.frequency_hz - slowest.frequency_hz;
     let std_hz = slowest.std_hz?.hypot(fastest.std_hz?);
     let duration_s = count as f64 / record.rate_hz;
-    let highest = orders.iter().copied().fold(0.0, f64::max);
     let matters = change_hz > SIGNIFICANT * std_hz && change_hz * highest * duration_s > TURNS;
     matters.then(|| {
         Warning::new(
