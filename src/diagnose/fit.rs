@@ -92,8 +92,9 @@ pub fn fit(
     let mut free = structure.free_mode(start);
     let mut found = minimize(&structure, start, &mut records, Some(&free), effort)?;
     if effort.corrects_start {
-        let has_moved = moves_on(&structure, &found.values, &records, &free);
+        // Where the motion is integrated, its start is corrected instead.
         let integrates = structure.model(start).0.has_torques();
+        let has_moved = !integrates && moves_on(&structure, &found.values, &records, &free);
         let is_corrected =
             integrates && correct_starts(&structure, &found.values, &mut records, &free);
         let values = &found.values[..start.len()];

@@ -96,8 +96,9 @@ pub(super) fn warning(
         let fundamental_hz = fundamental_hz.min(0.5 * record.rate_hz / highest / (1.0 + span));
         refine_fundamental(&changes, record.rate_hz, fundamental_hz, span, orders).ok()
     };
-    let with = |span| (0..PARTS).map(|place| part(place, span)).collect();
-    let found: Vec<Fundamental> = with(SPAN).or_else(|| with(WIDE_SPAN))?;
+    let with =
+        |span| -> Option<Vec<Fundamental>> { (0..PARTS).map(|place| part(place, span)).collect() };
+    let found = with(SPAN).or_else(|| with(WIDE_SPAN))?;
     let by_speed = |a: &&Fundamental, b: &&Fundamental| a.frequency_hz.total_cmp(&b.frequency_hz);
     let (slowest, fastest) = (
         found.iter().min_by(by_speed)?,
