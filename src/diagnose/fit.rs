@@ -92,9 +92,10 @@ pub fn fit(
     let mut free = structure.free_mode(start);
     let mut found = minimize(&structure, start, &mut records, Some(&free), effort)?;
     if effort.corrects_start {
-        // Where the motion is integrated, its start is corrected instead.
+        // Where the motion is integrated, its start is corrected instead; a plain stand starts near its own mode.
         let integrates = structure.model(start).0.has_torques();
-        let has_moved = !integrates && moves_on(&structure, &found.values, &records, &free);
+        let may_move = !integrates && !structure.effects.is_empty();
+        let has_moved = may_move && moves_on(&structure, &found.values, &records, &free);
         let is_corrected =
             integrates && correct_starts(&structure, &found.values, &mut records, &free);
         let values = &found.values[..start.len()];

@@ -17,6 +17,8 @@ const BINS: usize = 5;
 const EDGE: f64 = 1.2;
 /// Ratio of the frequencies that are tried.
 const STEP: f64 = 1.02;
+/// Frequencies over the top that was found up to which an order counts as within the band: the edge begins gently.
+const NEAR: f64 = 1.04;
 /// Density behind the end over that before the edge: no recorder's low-pass falls so far within one edge.
 const FALL: f64 = 1e-4;
 
@@ -32,7 +34,10 @@ pub(super) fn warning(
     let density = welch_steep(&samples, record.rate_hz, block).ok()?;
     let top_hz = top(&density, 0.5 * record.rate_hz)?;
     let beyond: Vec<f64> = orders.iter().map(|order| order * fundamental_hz).collect();
-    let beyond = orders.iter().zip(beyond).filter(|(_, hz)| *hz > top_hz);
+    let beyond = orders
+        .iter()
+        .zip(beyond)
+        .filter(|(_, hz)| *hz > NEAR * top_hz);
     let names: Vec<String> = beyond.clone().map(|(order, _)| short(*order)).collect();
     let highest_hz = beyond.map(|(_, hz)| hz).fold(0.0, f64::max);
     (!names.is_empty()).then(|| {

@@ -88,7 +88,7 @@ pub(super) fn warning(
     let highest = orders.iter().copied().fold(0.0, f64::max);
     let lag = record.rate_hz / (4.0 * highest * fundamental_hz);
     let lag = (lag as usize).clamp(1, length / 4);
-    let part = |place: usize, span: f64| {
+    let part = |place: usize, span: f64, length: usize| {
         let start = place * (count - length) / (PARTS - 1);
         let samples = record.samples.part(start..start + length).ok()?;
         let pairs = samples.iter().zip(&samples[lag..]);
@@ -96,9 +96,13 @@ pub(super) fn warning(
         let fundamental_hz = fundamental_hz.min(0.5 * record.rate_hz / highest / (1.0 + span));
         refine_fundamental(&changes, record.rate_hz, fundamental_hz, span, orders).ok()
     };
-    let with =
-        |span| -> Option<Vec<Fundamental>> { (0..PARTS).map(|place| part(place, span)).collect() };
-    let found = with(SPAN).or_else(|| with(WIDE_SPAN))?;
+    let with = |span, length| -> Option<Vec<Fundamental>> {
+        let parts = 0..PARTS;
+        parts.map(|place| part(place, span, length)).collect()
+    };
+    // A speed that is not there may change so fast that a line is one over a few periods only.
+    let few = (FEWEST * record.rate_hz / fundamental_hz) as usize;
+    let found = with(SPAN, length).or_else(|| with(WIDE_SPAN, few))?;
     let by_speed = |a: &&Fundamental, b: &&Fundamental| a.frequency_hz.total_cmp(&b.frequency_hz);
     let (slowest, fastest) = (
         found.iter().min_by(by_speed)?,
