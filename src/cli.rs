@@ -22,7 +22,7 @@ use crate::io::{ChannelChoice, Reading, frequency, positive_frequency};
 pub use diagnose::Diagnose;
 pub(crate) use help::command;
 pub use help::parse;
-pub use many::BatchOptions;
+pub use many::{BatchOptions, Merge};
 pub use pages::{Completions, Man};
 pub use simulate::Simulate;
 pub use values::{BandOption, Orders};
@@ -79,6 +79,8 @@ pub enum Verb {
     Simulate(Simulate),
     /// Find the effects that a stand model lacks, with the error before and after
     Diagnose(Diagnose),
+    /// Join the manifests of several runs over many recordings into one table
+    Merge(Merge),
     /// Print the script that completes the command line in a shell
     Completions(Completions),
     /// Print the manual page of the program or of a verb
@@ -92,6 +94,7 @@ impl Verb {
             Self::Compensate(args) => args.work.quiet,
             Self::Diagnose(args) => args.work.quiet,
             Self::Extract(args) => args.quiet,
+            Self::Merge(args) => args.quiet,
             Self::Simulate(args) => args.quiet,
             _ => false,
         }
@@ -110,6 +113,7 @@ impl Verb {
             Self::Init(_)
             | Self::Table(_)
             | Self::Predict(_)
+            | Self::Merge(_)
             | Self::Completions(_)
             | Self::Man(_) => None,
         }

@@ -27,7 +27,7 @@ const RESULTS: [&str; 4] = [
 
 const MANY: [&str; 6] = ["compensate", "logs", "--stand", "stand.toml", "-o", "out/"];
 
-fn log(i: usize) -> String {
+pub fn log(i: usize) -> String {
     let (shown, _) = steady(
         &[(1.0 + i as f64, 60.0, 0.0), (0.3, 1200.0, 1.0)],
         20_000.0,
@@ -45,7 +45,7 @@ fn folder() -> Folder {
 }
 
 /// Writes a file and the folders that it is in.
-fn put(folder: &Folder, name: &str, content: impl AsRef<[u8]>) {
+pub fn put(folder: &Folder, name: &str, content: impl AsRef<[u8]>) {
     let path = folder.path(name);
     std::fs::create_dir_all(path.parent().unwrap()).unwrap();
     std::fs::write(path, content).unwrap();
@@ -88,7 +88,7 @@ fn manifest(folder: &Folder) -> Vec<Value> {
     lines.filter(|line| line.get("exit").is_some()).collect()
 }
 
-fn with<'a>(args: &[&'a str], more: &[&'a str]) -> Vec<&'a str> {
+pub fn with<'a>(args: &[&'a str], more: &[&'a str]) -> Vec<&'a str> {
     [args, more].concat()
 }
 

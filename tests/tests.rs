@@ -23,6 +23,7 @@ mod mcap_file;
 mod measuring_chains;
 #[cfg(target_os = "linux")] // the system tells how much memory a process had at most
 mod memory;
+mod merge;
 mod messages;
 mod modes;
 mod mutations;

@@ -56,8 +56,40 @@ pub(crate) struct RunBegin {
     pub(super) made_by: MadeBy,
     /// Which part of the recordings, as `3/8`; `None` if all.
     pub(super) shard: Option<String>,
-    /// The recordings, by their paths below their roots.
+    /// All recordings of which it is a part.
+    pub(super) all: WholeList,
+    /// Its recordings, by their paths below their roots.
     pub(super) files: Vec<String>,
+}
+
+/// All recordings of a job, without their names: the same of all its parts, if they saw the same recordings.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct WholeList {
+    pub(super) recordings: usize,
+    /// SHA-256 of their paths below their roots, sorted, a zero byte behind each.
+    pub(super) sha256: String,
+}
+
+impl WholeList {
+    pub(super) fn of<'a>(files: impl Iterator<Item = &'a str>) -> Self {
+        let mut files: Vec<&str> = files.collect();
+        files.sort_unstable();
+        let text: String = files.iter().flat_map(|file| [*file, "\0"]).collect();
+        Self {
+            recordings: files.len(),
+            sha256: sum::of_bytes(text.as_bytes()),
+        }
+    }
+}
+
+/// That a run has come to its end: the line after those of its recordings.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct RunEnd {
+    pub(super) schema: String,
+    /// That of torqcomp.
+    pub(super) version: String,
+    /// The recordings whose results were there; their lines are those of a run before.
+    pub(super) skipped: Vec<String>,
 }
 
 /// A line of a manifest.
@@ -66,6 +98,7 @@ pub(crate) struct RunBegin {
 pub(super) enum ManifestLine {
     Entry(Box<ManifestEntry>),
     Begin(RunBegin),
+    End(RunEnd),
 }
 
 impl ManifestLine {
@@ -75,6 +108,7 @@ impl ManifestLine {
         let schema = match &line {
             Self::Entry(entry) => &entry.schema,
             Self::Begin(run) => &run.schema,
+            Self::End(run) => &run.schema,
         };
         (schema == SCHEMA).then_some(line)
     }
@@ -159,6 +193,23 @@ impl ManifestEntry {
         }
     }
 
+    /// In what another result of the same recording differs, if it does.
+    pub(super) fn difference(&self, other: &Self) -> Option<&'static str> {
+        let differs = [
+            (
+                !self.made_from.is_same(&other.made_from),
+                "recording or stand",
+            ),
+            (self.exit != other.exit, "exit code"),
+            (self.error != other.error, "reason of the failure"),
+            (self.outputs != other.outputs, "result"),
+            (self.warnings != other.warnings, "warnings"),
+            (self.figures != other.figures, "figures"),
+        ];
+        let first = differs.into_iter().find(|(differs, _)| *differs);
+        first.map(|(_, what)| what)
+    }
+
     fn key(&self) -> (String, String) {
         (self.made_by.verb.clone(), self.file.clone())
     }
@@ -170,13 +221,29 @@ impl ManifestEntry {
 }
 
 impl RunBegin {
-    pub(super) fn new(made_by: MadeBy, shard: Option<String>, files: Vec<String>) -> Self {
+    pub(super) fn new(
+        made_by: MadeBy,
+        shard: Option<String>,
+        all: WholeList,
+        files: Vec<String>,
+    ) -> Self {
         Self {
             schema: SCHEMA.to_owned(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
             made_by,
             shard,
+            all,
             files,
+        }
+    }
+}
+
+impl RunEnd {
+    pub(super) fn new(skipped: Vec<String>) -> Self {
+        Self {
+            schema: SCHEMA.to_owned(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            skipped,
         }
     }
 }
@@ -215,7 +282,7 @@ impl History {
     fn take(&mut self, line: &[u8]) {
         let entry = match ManifestLine::read(line) {
             Some(ManifestLine::Entry(entry)) => entry,
-            Some(ManifestLine::Begin(_)) => return,
+            Some(ManifestLine::Begin(_) | ManifestLine::End(_)) => return,
             None => {
                 self.unread += usize::from(!line.is_empty());
                 return;

@@ -4,26 +4,31 @@
 //! their SHA-256 on the disk: a run that is killed goes on where it was, and nothing is there that no line explains.
 
 mod content;
+mod last_run;
 mod list;
 mod manifest;
+mod merge;
 mod plan;
 mod progress;
 mod summary;
 
+use std::collections::HashSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
+pub(crate) use self::merge::Merged;
+
 use self::list::Listing;
-use self::manifest::{MadeFrom, Manifest, ManifestEntry, NotedWarning, OutputSum};
+use self::manifest::{MadeFrom, Manifest, ManifestEntry, NotedWarning, OutputSum, RunEnd};
 pub(crate) use self::plan::NEED_FOLDER;
 use self::plan::{BatchFile, BatchPlan};
 use self::progress::{Amount, BatchProgress};
 use self::summary::{BatchResult, Treated};
 use crate::cli::{BatchOptions, OutputArgs};
 use crate::failure::Failure;
-use crate::io::output::{self, Output};
+use crate::io::output::{self, Output, end_of_links};
 use crate::outcome::{Made, Outcome};
 use crate::{parallel, print};
 
@@ -90,6 +95,33 @@ pub(crate) fn expand(inputs: &[String]) -> Result<Vec<String>, Failure> {
     Ok(paths)
 }
 
+/// Paths of manifests: those of a folder or pattern in its place, each once.
+///
+/// # Errors
+/// If a folder or pattern has none.
+pub(crate) fn manifests(paths: &[String]) -> Result<Vec<PathBuf>, Failure> {
+    let mut found = Vec::new();
+    for text in paths {
+        let path = PathBuf::from(text);
+        if !path.is_dir() {
+            let matching = expand(std::slice::from_ref(text))?;
+            found.extend(matching.into_iter().map(PathBuf::from));
+            continue;
+        }
+        let inside = manifest::in_folder(&path);
+        if inside.is_empty() {
+            return Err(Failure::failed(format_args!(
+                "{}: no manifest in this folder; name the manifests, or the folder of the results",
+                path.display()
+            )));
+        }
+        found.extend(inside);
+    }
+    let mut seen = HashSet::new();
+    found.retain(|path| seen.insert(end_of_links(path)));
+    Ok(found)
+}
+
 /// Runs a verb over many recordings; `options` are those that its results may depend on.
 ///
 /// # Errors
@@ -126,10 +158,7 @@ pub(crate) fn run(
     };
     let treat = |i: usize| running.treat(&plan.files[i]);
     let treated = parallel::parallel(plan.files.len(), plan.workers(), treat);
-    running.lock().progress.end();
-    if let Some(failure) = running.lock().broken.take() {
-        return Err(failure);
-    }
+    running.end(&treated)?;
     BatchResult {
         plan: &plan,
         treated,
@@ -190,6 +219,23 @@ impl Running<'_> {
         let shared = self.lock();
         let most = self.plan.task.many.most_failures();
         shared.broken.is_some() || most.is_some_and(|most| shared.failures >= most)
+    }
+
+    /// Says in the manifest that no recording is under way any more.
+    fn end(&self, treated: &[Option<Treated>]) -> Result<(), Failure> {
+        let mut shared = self.lock();
+        shared.progress.end();
+        if let Some(failure) = shared.broken.take() {
+            return Err(failure);
+        }
+        let skipped = treated
+            .iter()
+            .flatten()
+            .filter_map(|treated| match treated {
+                Treated::Skipped(entry) => Some(entry.file.clone()),
+                Treated::Made(_) => None,
+            });
+        shared.manifest.append(&RunEnd::new(skipped.collect()))
     }
 
     /// Does what is to be done with a recording; `None` if it is not begun.

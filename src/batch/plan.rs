@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::BatchTask;
 use super::list::{FoundFile, Listing};
-use super::manifest::{self, History, MadeBy, MadeFrom, ManifestEntry, RunBegin};
+use super::manifest::{self, History, MadeBy, MadeFrom, ManifestEntry, RunBegin, WholeList};
 use crate::failure::Failure;
 use crate::io::output::end_of_links;
 use crate::parallel::cores;
@@ -22,6 +22,8 @@ pub(super) struct BatchPlan<'a> {
     pub(super) manifest: PathBuf,
     pub(super) history: History,
     pub(super) made_by: MadeBy,
+    /// All recordings, of which `files` may be a part.
+    pub(super) all: WholeList,
     pub(super) files: Vec<BatchFile>,
     /// Files of folders that are no recordings by their content.
     pub(super) left_out: Vec<String>,
@@ -61,6 +63,7 @@ impl<'a> BatchPlan<'a> {
                     .cloned()
                     .collect(),
             },
+            all: WholeList::of(std::iter::empty()),
             files: Vec::new(),
             left_out: Vec::new(),
         };
@@ -71,6 +74,7 @@ impl<'a> BatchPlan<'a> {
             .map(|found| plan.assign(found))
             .collect::<Result<_, Failure>>()?;
         plan.check_names()?;
+        plan.all = WholeList::of(plan.files.iter().map(|file| file.found.relative.as_str()));
         if let Some(shard) = task.many.shard {
             plan.files.retain(|file| shard.takes(&file.found.relative));
         }
@@ -162,7 +166,12 @@ impl<'a> BatchPlan<'a> {
     pub(super) fn begin(&self) -> RunBegin {
         let files = self.files.iter().map(|file| file.found.relative.clone());
         let shard = self.task.many.shard.map(|shard| shard.to_string());
-        RunBegin::new(self.made_by.clone(), shard, files.collect())
+        RunBegin::new(
+            self.made_by.clone(),
+            shard,
+            self.all.clone(),
+            files.collect(),
+        )
     }
 
     /// What is known of a recording beforehand.

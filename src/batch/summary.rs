@@ -32,7 +32,7 @@ const HEADINGS: [&str; 12] = [
 ];
 /// Significant digits in it.
 const DIGITS: u32 = 12;
-/// Files that are no recordings whose names are said.
+/// Most files of one kind whose names are said.
 const LISTED: usize = 10;
 
 /// What became of a recording.
@@ -111,31 +111,11 @@ impl BatchResult<'_> {
         } else if !task.is_quiet {
             print::say(&self.text());
         }
-        print::say(&self.failures());
-        let failed = self.failed();
-        if failed > 0 {
-            return Err(Failure::failed(format_args!(
-                "{} of {} failed{}",
-                failed,
-                plural(self.treated.len() as u64, "recording"),
-                match self.not_begun() {
-                    0 => "; the others are done".to_owned(),
-                    count => format!(", {count} were not begun"),
-                }
-            )));
-        }
-        match self.entries().any(|entry| entry.exit != 0) {
-            true => Ok(Outcome::WithLoss),
-            false => Ok(Outcome::Done),
-        }
+        ended(self.entries(), self.not_begun())
     }
 
-    fn entries(&self) -> impl Iterator<Item = &ManifestEntry> {
+    fn entries(&self) -> impl Iterator<Item = &ManifestEntry> + Clone {
         self.treated.iter().flatten().map(Treated::entry)
-    }
-
-    fn failed(&self) -> usize {
-        self.entries().filter(|entry| entry.has_failed()).count()
     }
 
     fn skipped(&self) -> usize {
@@ -152,7 +132,8 @@ impl BatchResult<'_> {
 
     fn report(&self) -> BatchReport<'_> {
         let count = self.treated.len();
-        let (skipped, failed, not_begun) = (self.skipped(), self.failed(), self.not_begun());
+        let (skipped, failed, not_begun) =
+            (self.skipped(), failed(self.entries()), self.not_begun());
         BatchReport {
             schema: "torqcomp.batch/1",
             version: env!("CARGO_PKG_VERSION"),
@@ -180,15 +161,11 @@ impl BatchResult<'_> {
         rows.extend(self.treated.iter().flatten().map(row));
         let mut text = print::columns(&rows);
         text += &self.totals();
-        text += &self.codes();
+        text += &warnings(self.entries(), &self.plan.manifest.display().to_string());
         let left_out = &self.plan.left_out;
         if !left_out.is_empty() {
-            let more = match left_out.len().saturating_sub(LISTED) {
-                0 => String::new(),
-                more => format!(" and {more} more"),
-            };
-            let names = left_out[..left_out.len().min(LISTED)].join(", ");
-            text += &format!("no recordings by their content, left out: {names}{more}\n");
+            let names = some_of(left_out);
+            text += &format!("no recordings by their content, left out: {names}\n");
         }
         if self.plan.history.unread > 0 {
             let lines = plural(self.plan.history.unread as u64, "line");
@@ -227,43 +204,86 @@ impl BatchResult<'_> {
             rate(amount, self.seconds.max(1e-3))
         )
     }
+}
 
-    /// How many recordings each warning concerns.
-    fn codes(&self) -> String {
-        let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
-        for entry in self.entries() {
-            for code in codes(&entry.warnings) {
-                *counts.entry(code).or_default() += 1;
-            }
-        }
-        if counts.is_empty() {
-            return String::new();
-        }
-        let each = counts
-            .iter()
-            .map(|(code, count)| format!("{code} in {count}"));
-        let each: Vec<String> = each.collect();
-        format!(
-            "warnings: {} (their words are in {})\n",
-            each.join(", "),
-            self.plan.manifest.display()
-        )
-    }
+/// How many of them failed.
+pub(super) fn failed<'a>(entries: impl Iterator<Item = &'a ManifestEntry>) -> usize {
+    entries.filter(|entry| entry.has_failed()).count()
+}
 
-    /// The recordings that failed or lost data, and why.
-    fn failures(&self) -> String {
-        let line = |entry: &ManifestEntry| {
-            let (word, input) = (word(entry.exit), &entry.input);
-            let why = entry.error.as_deref();
-            let why = why.unwrap_or("data were lost, or --strict made a warning count");
-            match why.starts_with(input) {
-                true => format!("torqcomp: {word}: {why}\n"),
-                false => format!("torqcomp: {word}: {input}: {why}\n"),
+/// Says which recordings failed or lost data, and how a run with these ends.
+///
+/// # Errors
+/// If one failed.
+pub(super) fn ended<'a>(
+    entries: impl Iterator<Item = &'a ManifestEntry> + Clone,
+    not_begun: usize,
+) -> Result<Outcome, Failure> {
+    print::say(&failures(entries.clone()));
+    let failed = failed(entries.clone());
+    if failed > 0 {
+        let count = entries.count() + not_begun;
+        return Err(Failure::failed(format_args!(
+            "{} of {} failed{}",
+            failed,
+            plural(count as u64, "recording"),
+            match not_begun {
+                0 => "; the others are done".to_owned(),
+                count => format!(", {count} were not begun"),
             }
-        };
-        let bad = self.entries().filter(|entry| entry.exit != 0);
-        bad.map(line).collect()
+        )));
     }
+    match entries.into_iter().any(|entry| entry.exit != 0) {
+        true => Ok(Outcome::WithLoss),
+        false => Ok(Outcome::Done),
+    }
+}
+
+/// How many recordings each warning concerns; `place` is where their words are.
+pub(super) fn warnings<'a>(
+    entries: impl Iterator<Item = &'a ManifestEntry>,
+    place: &str,
+) -> String {
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    for entry in entries {
+        for code in codes(&entry.warnings) {
+            *counts.entry(code).or_default() += 1;
+        }
+    }
+    if counts.is_empty() {
+        return String::new();
+    }
+    let each = counts
+        .iter()
+        .map(|(code, count)| format!("{code} in {count}"));
+    let each: Vec<String> = each.collect();
+    format!(
+        "warnings: {} (their words are in {place})\n",
+        each.join(", ")
+    )
+}
+
+/// The recordings that failed or lost data, and why.
+fn failures<'a>(entries: impl Iterator<Item = &'a ManifestEntry>) -> String {
+    let line = |entry: &ManifestEntry| {
+        let (word, input) = (word(entry.exit), &entry.input);
+        let why = entry.error.as_deref();
+        let why = why.unwrap_or("data were lost, or --strict made a warning count");
+        match why.starts_with(input) {
+            true => format!("torqcomp: {word}: {why}\n"),
+            false => format!("torqcomp: {word}: {input}: {why}\n"),
+        }
+    };
+    entries.filter(|entry| entry.exit != 0).map(line).collect()
+}
+
+/// The first of some names, and how many more there are.
+pub(super) fn some_of(names: &[String]) -> String {
+    let more = match names.len().saturating_sub(LISTED) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    format!("{}{more}", names[..names.len().min(LISTED)].join(", "))
 }
 
 /// How a recording ended.
@@ -322,7 +342,11 @@ pub(super) fn csv<'a>(entries: impl Iterator<Item = &'a ManifestEntry>) -> Vec<u
     rows.write_record(HEADINGS).expect(written);
     for entry in entries {
         let figures = &entry.figures;
-        let text = |value: Option<f64>| value.map_or_else(String::new, |v| rounded(v, DIGITS));
+        // As in a manifest, what is not finite is unknown.
+        let text = |value: Option<f64>| {
+            let value = value.filter(|v| v.is_finite());
+            value.map_or_else(String::new, |v| rounded(v, DIGITS))
+        };
         let cells = [
             entry.file.clone(),
             entry.exit.to_string(),

@@ -295,6 +295,13 @@ const EXAMPLES: &[(&str, [&str; 2])] = &[
         ],
     ),
     (
+        "merge",
+        [
+            "torqcomp merge out/ -o table.csv",
+            "torqcomp merge 'out/torqcomp-manifest.*-of-8.jsonl' -o table.csv --json",
+        ],
+    ),
+    (
         "completions",
         [
             "torqcomp completions bash -o ~/.local/share/bash-completion/completions/torqcomp",

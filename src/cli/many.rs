@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::OutputArgs;
 use crate::io::sum;
 
 /// Many recordings, each read by itself.
@@ -71,6 +72,26 @@ impl BatchOptions {
             false => self.max_failures,
         }
     }
+}
+
+/// Arguments of `merge`.
+///
+/// The last run of each manifest counts. The table is written only if the runs are one job (same verb, options, stand and
+/// version) with nothing missing; a recording in several manifests must have the same result in each.
+#[derive(Debug, Args)]
+pub struct Merge {
+    /// Manifests of the runs, folders with manifests, or patterns such as 'out/*.jsonl'
+    #[arg(value_name = "MANIFEST", required = true)]
+    pub manifests: Vec<String>,
+    /// The table.
+    #[command(flatten)]
+    pub result: OutputArgs,
+    /// Print a report as JSON (the table then needs -o FILE)
+    #[arg(long)]
+    pub json: bool,
+    /// Print only problems and failures to standard error
+    #[arg(short, long)]
+    pub quiet: bool,
 }
 
 /// A part of many recordings.

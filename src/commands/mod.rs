@@ -10,6 +10,7 @@ mod init;
 mod inspect;
 mod man;
 mod many;
+mod merge;
 mod predict;
 mod rows;
 mod simulate;
@@ -45,6 +46,7 @@ pub fn run(cli: Cli) -> Result<Outcome, Failure> {
         Verb::Identify(args) => identify::run(&args),
         Verb::Simulate(args) => many::run(&args, &cli.options),
         Verb::Diagnose(args) => diagnose::run(&args),
+        Verb::Merge(args) => merge::run(&args),
         Verb::Completions(args) => completions::run(&args),
         Verb::Man(args) => man::run(&args),
     }
