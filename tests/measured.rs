@@ -393,21 +393,23 @@ fn emps(folder: &Path) -> Result<(), Failed> {
     check(relative(&split) <= 0.032, format!("{}", relative(&split)))
 }
 
+/// Channels and band of the hits.
+const HAMMER: [&str; 8] = [
+    "--applied",
+    "Force (Trigger)",
+    "--measured",
+    "Acceleration (Trigger)",
+    "--measured-as",
+    "acceleration",
+    "--band",
+    "60..1000",
+];
+
 /// The eight modes, and one hit from the two others.
 fn hammer(folder: &Path) -> Result<(), Failed> {
     let hits = [1, 2, 3].map(|k| folder.join(format!("hammer/hit{k}.lvm")));
     let paths = hits.each_ref().map(|p| p.to_str().unwrap_or_default());
-    let args = [
-        "--applied",
-        "Force (Trigger)",
-        "--measured",
-        "Acceleration (Trigger)",
-        "--measured-as",
-        "acceleration",
-        "--band",
-        "60..1000",
-    ];
-    let report = identified(&[&["response"], &paths[..], &args[..]].concat())?;
+    let report = identified(&[&["response"], &paths[..], &HAMMER[..]].concat())?;
     let error = number(&report, "held_out_error")?;
     check(error <= 10.0, format!("{error} %"))?;
     let all = report["parameters"].as_array().ok_or("no parameters")?;

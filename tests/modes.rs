@@ -6,7 +6,7 @@ use std::fmt::Write;
 use num_complex::Complex64;
 
 use crate::noise::Noise;
-use crate::util::{Folder, assert_close, column, table};
+use crate::util::{Folder, SIMULATE, assert_close, column, table};
 
 const RATE_HZ: f64 = 20_000.0;
 const COUNT: usize = 8000;
@@ -149,6 +149,14 @@ fn folder(load: usize, effects: &str, measured: &[f64]) -> Folder {
     folder
 }
 
+/// The table of `stand.toml` from one frequency to another in steps.
+fn table_of([from, to, step]: [&str; 3]) -> [&str; 9] {
+    let stand = "stand.toml";
+    [
+        "table", "--stand", stand, "--from", from, "--to", to, "--step", step,
+    ]
+}
+
 /// Rms of a difference over that of the whole, without the ends.
 fn relative(got: &[f64], want: &[f64]) -> f64 {
     assert_eq!(got.len(), want.len());
@@ -159,17 +167,7 @@ fn relative(got: &[f64], want: &[f64]) -> f64 {
 
 /// What `simulate` makes of the applied torque, and `compensate` of the record; each with its relative error.
 fn both_ways(folder: &Folder, measured: &[f64], more: &[&str]) -> [f64; 2] {
-    let simulate = [
-        "simulate",
-        "record.csv",
-        "--stand",
-        "stand.toml",
-        "--applied",
-        "applied_n_m",
-        "-o",
-        "answer.csv",
-        "--force",
-    ];
+    let simulate = [&SIMULATE[..], &["-o", "answer.csv", "--force"]].concat();
     folder.run(&simulate).says(0, &[]);
     let compensate = [
         &[
@@ -235,14 +233,7 @@ fn sharp_friction_holds_the_gage_while_other_parts_move() {
         "[[effects]]\nkind = \"coulomb-friction\"\nform = \"sharp\"\ntorque = \"1.5 N m\"\n";
     let measured = row_in_steps(200, 3, |_, speed| 1.5 * (speed / 2.0).tanh());
     let folder = folder(3, effect, &measured);
-    let args = [
-        "simulate",
-        "record.csv",
-        "--stand",
-        "stand.toml",
-        "--applied",
-        "applied_n_m",
-    ];
+    let args = SIMULATE;
     let ran = folder.run(&args);
     let found = column(&ran.stdout, "measured");
     let error = relative(&found, &measured);
@@ -254,17 +245,7 @@ fn sharp_friction_holds_the_gage_while_other_parts_move() {
 fn a_table_is_that_of_the_row() {
     for load in [1, 3] {
         let folder = folder(load, "", &[0.0; 2]);
-        let args = [
-            "table",
-            "--stand",
-            "stand.toml",
-            "--from",
-            "0",
-            "--to",
-            "900",
-            "--step",
-            "37",
-        ];
+        let args = table_of(["0", "900", "37"]);
         let (_, rows) = table(&folder.run(&args).stdout);
         assert_eq!(rows.len(), 25);
         for row in rows {
@@ -289,18 +270,7 @@ fn an_uncertain_residue_is_propagated() {
         + &mode(100.0, "{ value = \"0.8\", std = \"0.01\" }")
         + &mode(300.0, "0.15");
     folder.write("stand.toml", text);
-    let args = [
-        "table",
-        "--stand",
-        "stand.toml",
-        "--from",
-        "80",
-        "--to",
-        "400",
-        "--step",
-        "80",
-        "--uncertainty",
-    ];
+    let args = [&table_of(["80", "400", "80"])[..], &["--uncertainty"]].concat();
     let (heads, rows) = table(&folder.run(&args).stdout);
     assert_eq!(heads[3], "magnitude_relative_std");
     for row in &rows {
@@ -554,17 +524,7 @@ fn a_record_of_acceleration_is_the_second_derivative() {
     let stand = "schema = \"torqcomp.stand/1\"\n[mechanics]\nmeasures = \"acceleration\"\n\
                  static_gain = \"2e-6 (m/s^2)/N\"\n[[modes]]\nnatural_frequency = \"400 Hz\"\ndamping_ratio = 0.5\nresidue = 1\n";
     folder.write("stand.toml", stand);
-    let args = [
-        "table",
-        "--stand",
-        "stand.toml",
-        "--from",
-        "0",
-        "--to",
-        "400",
-        "--step",
-        "200",
-    ];
+    let args = table_of(["0", "400", "200"]);
     let ran = folder.run(&args);
     let lines: Vec<&str> = ran.stdout.lines().collect();
     assert_eq!(lines[1], "0,,", "no acceleration shows a constant force");

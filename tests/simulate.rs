@@ -5,20 +5,10 @@ use std::fmt::Write;
 
 use crate::diagnose::diagnose;
 use crate::noise::Noise;
-use crate::util::{Folder, table};
+use crate::util::{Folder, SIMULATE, table};
 
 const RATE_HZ: f64 = 20_000.0;
 const STAND: &str = "schema = \"torqcomp.stand/1\"\n[mechanics]\nnatural_frequency = \"600 Hz\"\ndamping_ratio = 0.08\n";
-
-/// Simulates `record.csv`.
-const SIMULATE: [&str; 6] = [
-    "simulate",
-    "record.csv",
-    "--stand",
-    "stand.toml",
-    "--applied",
-    "applied_n_m",
-];
 
 /// A sum of sines that repeats every 2000 samples.
 fn input(seed: u32, count: usize) -> Vec<f64> {

@@ -35,6 +35,16 @@ pub const HARMONICS: [&str; 5] = [
     "--fundamental",
 ];
 
+/// Simulates `record.csv`.
+pub const SIMULATE: [&str; 6] = [
+    "simulate",
+    "record.csv",
+    "--stand",
+    "stand.toml",
+    "--applied",
+    "applied_n_m",
+];
+
 /// Sends a process a signal.
 pub fn signal(name: &str, child: &std::process::Child) {
     let sent = std::process::Command::new("kill")

@@ -23,7 +23,7 @@ pub(super) struct LastRun {
 
 /// The lines of a manifest as they are read.
 #[derive(Default)]
-struct Lines {
+struct ManifestLines {
     /// The last entry of each verb and recording.
     last: HashMap<(String, String), ManifestEntry>,
     begin: Option<RunBegin>,
@@ -39,7 +39,7 @@ impl LastRun {
     /// If it cannot be read.
     pub(super) fn read(path: &Path) -> Result<Option<Self>, Failure> {
         let bytes = storage::read(path).map_err(|error| Failure::reading(path, &error))?;
-        let mut lines = Lines::default();
+        let mut lines = ManifestLines::default();
         for line in bytes.split(|byte| *byte == b'\n') {
             lines.take(line);
         }
@@ -55,7 +55,7 @@ impl LastRun {
     }
 }
 
-impl Lines {
+impl ManifestLines {
     fn take(&mut self, line: &[u8]) {
         match ManifestLine::read(line) {
             Some(ManifestLine::Entry(entry)) => {

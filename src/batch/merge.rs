@@ -9,12 +9,11 @@ use serde::Serialize;
 use super::last_run::LastRun;
 use super::manifest::{MadeFrom, ManifestEntry};
 use super::summary;
+use crate::cli::many::Shard;
 use crate::failure::Failure;
 use crate::outcome::Outcome;
 use crate::print::{Report, plural};
 
-/// Most missing parts whose numbers are said.
-const LISTED: usize = 10;
 /// Digits of a SHA-256 that people compare.
 const SUM_DIGITS: usize = 12;
 
@@ -161,7 +160,7 @@ fn unfinished(run: &LastRun) -> Option<MergeProblem> {
     let missing = run.not_done.len();
     let which = match missing {
         0 => String::new(),
-        _ => format!(" ({})", summary::some_of(&run.not_done)),
+        _ => format!(" ({})", summary::some_of(&run.not_done, missing)),
     };
     let all = plural(run.begin.files.len() as u64, "recording");
     if !run.has_ended {
@@ -275,19 +274,15 @@ fn missing_parts(runs: &[LastRun]) -> Option<MergeProblem> {
         return None;
     }
     let missing = (1..=of).filter(|index| !present.contains_key(index));
-    let names: Vec<String> = missing.take(LISTED).map(|i| format!("{i}/{of}")).collect();
-    let more = match parts - names.len() {
-        0 => String::new(),
-        more => format!(" and {more} more"),
-    };
+    let mut missing = missing.map(|index| Shard { index, of }).peekable();
+    let next = missing.peek().copied()?;
     Some(MergeProblem {
         code: "missing-parts",
         manifest: None,
         message: format!(
-            "no manifest of {}{more}, with {recordings} of {}; run them (--shard {}), or give their manifests too",
-            names.join(", "),
-            plural(all as u64, "recording"),
-            names[0]
+            "no manifest of {}, with {recordings} of {}; run them (--shard {next}), or give their manifests too",
+            summary::some_of(missing, parts),
+            plural(all as u64, "recording")
         ),
     })
 }
@@ -348,7 +343,7 @@ fn differing_results([first, other]: [&String; 2], files: &[String]) -> MergePro
             "{other}: other results than in {first} of {}: {}; leave out the manifest that is out of date, or run these \
              recordings again",
             plural(files.len() as u64, "recording"),
-            summary::some_of(files)
+            summary::some_of(files, files.len())
         ),
     }
 }

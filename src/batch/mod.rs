@@ -137,7 +137,7 @@ pub(crate) fn run(
         output::print(&print::visible(dry_run(&plan)))?;
         return Ok(Outcome::Done);
     }
-    make_folder(&plan.folder)?;
+    output::make_folder(&plan.folder)?;
     let summary = open_summary(task)?;
     let bytes = plan.files.iter().map(|file| file.bytes).sum();
     let all = Amount {
@@ -175,11 +175,6 @@ fn dry_run(plan: &BatchPlan) -> String {
         format!("{}: {} -> {to}\n", plan.intent(file), file.found.path)
     };
     plan.files.iter().map(line).collect()
-}
-
-fn make_folder(folder: &Path) -> Result<(), Failure> {
-    std::fs::create_dir_all(folder)
-        .map_err(|error| Failure::writing(&folder.display().to_string(), &error))
 }
 
 /// Opens the table of all recordings. With `--skip-existing`, that of a run before is replaced.
@@ -285,7 +280,7 @@ impl Running<'_> {
         outputs
             .iter()
             .filter_map(|path| path.parent())
-            .try_for_each(make_folder)?;
+            .try_for_each(output::make_folder)?;
         let one = OneRun {
             input: &file.found.path,
             outputs: &outputs,

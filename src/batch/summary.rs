@@ -164,7 +164,7 @@ impl BatchResult<'_> {
         text += &warnings(self.entries(), &self.plan.manifest.display().to_string());
         let left_out = &self.plan.left_out;
         if !left_out.is_empty() {
-            let names = some_of(left_out);
+            let names = some_of(left_out, left_out.len());
             text += &format!("no recordings by their content, left out: {names}\n");
         }
         if self.plan.history.unread > 0 {
@@ -277,13 +277,15 @@ fn failures<'a>(entries: impl Iterator<Item = &'a ManifestEntry>) -> String {
     entries.filter(|entry| entry.exit != 0).map(line).collect()
 }
 
-/// The first of some names, and how many more there are.
-pub(super) fn some_of(names: &[String]) -> String {
-    let more = match names.len().saturating_sub(LISTED) {
+/// The first of so many names, and how many more there are.
+pub(super) fn some_of<T: ToString>(names: impl IntoIterator<Item = T>, count: usize) -> String {
+    let more = match count.saturating_sub(LISTED) {
         0 => String::new(),
         more => format!(" and {more} more"),
     };
-    format!("{}{more}", names[..names.len().min(LISTED)].join(", "))
+    let first = names.into_iter().take(LISTED);
+    let first: Vec<String> = first.map(|name| name.to_string()).collect();
+    format!("{}{more}", first.join(", "))
 }
 
 /// How a recording ended.

@@ -234,11 +234,7 @@ fn fit(
     let rated = chain.rated_n_m.map(|rated| rated * printed);
     let largest = largest(samples, &components, printed)?;
     warnings.extend(beyond_rated(largest, rated, &chain.applied.unit));
-    warnings.extend(of_speed(record, &fundamental, &orders));
-    if way.stand.is_none() {
-        let of_band = filtered::warning(record, fundamental.frequency_hz, &orders);
-        warnings.extend(of_band);
-    }
+    warnings.extend(of_orders(way, record, &fundamental, &orders));
     warnings.extend(lost_warning(&components));
     warnings.extend(mains_warning(&components, duration_s));
     warnings.extend(of_quality(record, channel, chain)?);
@@ -268,8 +264,9 @@ fn fit(
     })
 }
 
-/// Whether the speed stays, and is the one that was given.
-fn of_speed(
+/// Whether the speed stays, and is the one that was given, and whether all orders are in the band of a compensated record.
+fn of_orders(
+    way: &WayBack,
     record: &UniformRecord<Spool>,
     fundamental: &Fundamental,
     orders: &[f64],
@@ -278,7 +275,10 @@ fn of_speed(
     let is_given = fundamental.std_hz.is_none();
     let off = is_given.then(|| speed::off(record, hz, orders)).flatten();
     let changing = speed::warning(record, hz, orders);
-    off.into_iter().chain(changing).collect()
+    let is_compensated = way.stand.is_none();
+    let beyond = is_compensated.then(|| filtered::warning(record, hz, orders));
+    let all = [off, changing, beyond.flatten()];
+    all.into_iter().flatten().collect()
 }
 
 /// What the samples themselves show.

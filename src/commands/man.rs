@@ -81,8 +81,7 @@ fn collect(command: &Command, pages: &mut Vec<(String, Vec<u8>)>) {
 }
 
 fn write_all(args: &Man, folder: &Path, pages: &[(String, Vec<u8>)]) -> Result<(), Failure> {
-    std::fs::create_dir_all(folder)
-        .map_err(|error| Failure::writing(&folder.display().to_string(), &error))?;
+    output::make_folder(folder)?;
     let mut outputs = Vec::new();
     for (name, text) in pages {
         let mut output = Output::open(Some(&folder.join(name)), args.result.policy(), &[])?;

@@ -52,6 +52,23 @@ pub(super) struct Own<'a> {
     threads: Option<&'a mut Option<u16>>,
 }
 
+impl<'a> Own<'a> {
+    /// Of a verb with one result, on one thread.
+    fn of(
+        inputs: &'a mut Vec<String>,
+        many: &'a mut BatchOptions,
+        result: &'a mut OutputArgs,
+    ) -> Self {
+        Self {
+            inputs,
+            many,
+            result,
+            beside: Vec::new(),
+            threads: None,
+        }
+    }
+}
+
 /// Whether these arguments ask for many recordings, each by itself.
 pub(super) fn are_asked(args: &impl OneByOne) -> bool {
     let task = args.task();
@@ -111,15 +128,12 @@ impl OneByOne for Compensate {
     }
 
     fn own(&mut self) -> Own<'_> {
+        let record = &mut self.record;
+        let beside = [self.plot.as_mut(), self.html.as_mut()];
         Own {
-            inputs: &mut self.record.inputs,
-            many: &mut self.record.many,
-            result: &mut self.result,
-            beside: [self.plot.as_mut(), self.html.as_mut()]
-                .into_iter()
-                .flatten()
-                .collect(),
+            beside: beside.into_iter().flatten().collect(),
             threads: Some(&mut self.work.threads),
+            ..Own::of(&mut record.inputs, &mut record.many, &mut self.result)
         }
     }
 
@@ -145,13 +159,8 @@ impl OneByOne for Extract {
     }
 
     fn own(&mut self) -> Own<'_> {
-        Own {
-            inputs: &mut self.record.inputs,
-            many: &mut self.record.many,
-            result: &mut self.result,
-            beside: Vec::new(),
-            threads: None,
-        }
+        let record = &mut self.record;
+        Own::of(&mut record.inputs, &mut record.many, &mut self.result)
     }
 
     fn work(&self) -> Result<Made, Failure> {
@@ -179,13 +188,8 @@ impl OneByOne for Harmonics {
     }
 
     fn own(&mut self) -> Own<'_> {
-        Own {
-            inputs: &mut self.record.inputs,
-            many: &mut self.record.many,
-            result: &mut self.result,
-            beside: Vec::new(),
-            threads: None,
-        }
+        let record = &mut self.record;
+        Own::of(&mut record.inputs, &mut record.many, &mut self.result)
     }
 
     fn work(&self) -> Result<Made, Failure> {
@@ -214,11 +218,8 @@ impl OneByOne for Inspect {
 
     fn own(&mut self) -> Own<'_> {
         Own {
-            inputs: &mut self.files,
-            many: &mut self.many,
-            result: &mut self.result,
             beside: self.plot.as_mut().into_iter().collect(),
-            threads: None,
+            ..Own::of(&mut self.files, &mut self.many, &mut self.result)
         }
     }
 
@@ -244,13 +245,7 @@ impl OneByOne for Simulate {
     }
 
     fn own(&mut self) -> Own<'_> {
-        Own {
-            inputs: &mut self.inputs,
-            many: &mut self.many,
-            result: &mut self.result,
-            beside: Vec::new(),
-            threads: None,
-        }
+        Own::of(&mut self.inputs, &mut self.many, &mut self.result)
     }
 
     fn work(&self) -> Result<Made, Failure> {

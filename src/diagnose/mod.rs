@@ -257,9 +257,16 @@ impl SearchState {
         let count = self.after.effect_names().len();
         let on_the_way = self.path.iter().chain(self.without.iter().flatten());
         let on_the_way = on_the_way.chain(alone.into_iter().take(MOST_ALONE));
-        let models: Vec<&ScoredModel> = std::iter::once(&self.before)
-            .chain(on_the_way.filter(|model| is_left || model.effect_names().len() < count))
-            .collect();
+        let mut models = vec![&self.before];
+        for model in on_the_way.filter(|model| is_left || model.effect_names().len() < count) {
+            let structure = &model.fitted.structure;
+            if !models
+                .iter()
+                .any(|m| m.fitted.structure.has_effects_of(structure))
+            {
+                models.push(model);
+            }
+        }
         let noise_rms = noise_rms(floor);
         intersample::better_course(&models, &self.after, noise_rms, &self.records, threads)
     }

@@ -141,6 +141,17 @@ impl Structure {
         &self.effects[self.declared..]
     }
 
+    /// Whether it has the effects of another, each in the same form.
+    pub fn has_effects_of(&self, other: &Self) -> bool {
+        let forms = |s: &Self| {
+            s.effects
+                .iter()
+                .map(|e| (e.effect.name, e.form.name))
+                .collect::<Vec<_>>()
+        };
+        forms(self) == forms(other)
+    }
+
     /// Names of all effects.
     pub fn names(&self) -> impl Iterator<Item = &'static str> {
         self.effects.iter().map(|e| e.effect.name)

@@ -180,10 +180,18 @@ fn correlations(names: &[&str], covariance: &Covariance) -> Vec<Correlation> {
     pairs.filter_map(strong).collect()
 }
 
+/// Numbers of a mode among several, in stand files and reports.
+pub(crate) const MODE_NUMBERS: [&str; 4] = [
+    "natural_frequency",
+    "damping_ratio",
+    "residue",
+    "quadrature",
+];
+
 /// What each mode has in the response of a stand, as a stand file takes it.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ModalShares {
-    /// Natural frequency, damping ratio, residue and quadrature of each mode.
+    /// [`MODE_NUMBERS`] of each mode.
     pub modes: Vec<NamedEstimates>,
     /// Measured per applied quantity at rest; of the displacement, if a derivative was measured.
     pub gain: Estimate,

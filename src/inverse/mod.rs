@@ -398,7 +398,8 @@ impl Pass<'_> {
             .times(self.extension.spectrum(&self.samples), stand);
         if let Some(torque) = torque {
             let torque = self.extension.spectrum(torque);
-            let in_band = |hz: f64| held(&|hz| chain.torque_as_applied(hz), band, hz);
+            let as_applied = chain.torque_as_applied();
+            let in_band = |hz: f64| held(&as_applied, band, hz);
             spectrum = spectrum + self.extension.times(torque, in_band);
         }
         let applied = self.extension.samples(&spectrum);

@@ -159,6 +159,15 @@ impl Write for Output {
     }
 }
 
+/// Makes a folder for outputs, with those above it.
+///
+/// # Errors
+/// If the system refuses.
+pub(crate) fn make_folder(folder: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(folder)
+        .map_err(|error| Failure::writing(&folder.display().to_string(), &error))
+}
+
 /// Completes the outputs of one run: all files get their names, or none does.
 ///
 /// # Errors

@@ -4,7 +4,7 @@ use torqcomp_model::{Estimate, Kind, ModalResponse, ParameterStd, SecondOrder, U
 
 use super::modes::{DeclaredMode, declared_modes};
 use super::section::Section;
-use super::update::CORRELATIONS;
+use super::update::{CONSTANTS, CORRELATIONS, MODAL};
 use super::{Given, Mechanics, StandResponse, StaticGain};
 use crate::failure::Failure;
 use crate::identify::Motion;
@@ -33,14 +33,8 @@ fn several_modes(
 ) -> Result<Mechanics, Failure> {
     let (mut found_gain, mut measured) = (None, Motion::Displacement);
     if let Some(section) = section {
-        let keys = [
-            "inertia",
-            "damping",
-            "stiffness",
-            "natural_frequency",
-            "damping_ratio",
-        ];
-        if let Some(key) = keys.iter().find(|key| section.has(key)) {
+        let mut single = CONSTANTS.iter().chain(&MODAL);
+        if let Some(key) = single.find(|key| section.has(key)) {
             return Err(section.fail(
                 key,
                 "[[modes]] give the response of the stand, too; keep one of them",
@@ -105,9 +99,8 @@ impl Mechanics {
 
 /// `[mechanics]` alone.
 fn one_mode(section: &Section) -> Result<Mechanics, Failure> {
-    let modal = section.has("natural_frequency") || section.has("damping_ratio");
-    let constants = ["inertia", "damping", "stiffness"];
-    if modal && let Some(key) = constants.iter().find(|key| section.has(key)) {
+    let modal = MODAL.iter().any(|key| section.has(key));
+    if modal && let Some(key) = CONSTANTS.iter().find(|key| section.has(key)) {
         return Err(section.fail(
             key,
             "give either inertia, damping and stiffness, or natural_frequency and damping_ratio",
@@ -131,10 +124,7 @@ fn one_mode(section: &Section) -> Result<Mechanics, Failure> {
         let response = SecondOrder::new(inertia.value(), damping.value(), stiffness.value())
             .map_err(|error| section.fail("", error))?;
         // So that the message about an unknown key lists those of both forms.
-        let _ = (
-            section.raw("natural_frequency"),
-            section.raw("damping_ratio"),
-        );
+        let _ = MODAL.map(|key| section.raw(key));
         Mechanics {
             response: StandResponse::Constants(response),
             static_gain: None,

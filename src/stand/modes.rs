@@ -7,6 +7,7 @@ use torqcomp_model::{Estimate, Kind, ModalPart, Mode};
 use super::mechanics::refuse_bare_rate;
 use super::section::Section;
 use crate::failure::Failure;
+use crate::identify::MODE_NUMBERS;
 
 /// Keys of the correlation coefficients of a mode's numbers, and the places of both in its list of keys.
 pub const MODE_CORRELATIONS: [(&str, [usize; 2]); 6] = [
@@ -21,7 +22,7 @@ pub const MODE_CORRELATIONS: [(&str, [usize; 2]); 6] = [
 /// A mode as the stand file gives it.
 #[derive(Debug, Clone)]
 pub struct DeclaredMode {
-    /// Natural frequency in Hz, damping ratio, residue and quadrature.
+    /// Those of [`MODE_NUMBERS`], the frequency in Hz.
     values: [f64; 4],
     stds: [Option<f64>; 4],
     /// In the order of [`MODE_CORRELATIONS`].
@@ -165,17 +166,9 @@ const NO_RESIDUE: &str = "residue is missing: the part that this mode has in the
                           shape_at_gage of all modes";
 
 impl DeclaredMode {
-    /// Keys of its numbers.
-    pub(crate) const NUMBERS: [&str; 4] = [
-        "natural_frequency",
-        "damping_ratio",
-        "residue",
-        "quadrature",
-    ];
-
     /// The mode, and the place of one of its numbers, for a place among the numbers of all modes.
     pub(super) fn place(of_all: usize) -> (usize, usize) {
-        (of_all / Self::NUMBERS.len(), of_all % Self::NUMBERS.len())
+        (of_all / MODE_NUMBERS.len(), of_all % MODE_NUMBERS.len())
     }
 
     /// Its part of the response.

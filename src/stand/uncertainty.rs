@@ -6,6 +6,7 @@ use num_complex::Complex64;
 use torqcomp_model::{InverseUncertainty, ModalResponse, ParameterStd, SecondOrder};
 
 use super::{DeclaredMode, Given, Mechanics, Stand, StandResponse};
+use crate::identify::MODE_NUMBERS;
 
 /// Relative standard uncertainty of the constant that makes torque of a record at rest.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -258,7 +259,7 @@ impl Mechanics {
                 let (mode, number) = DeclaredMode::place(place);
                 format!(
                     "{} of mode {}",
-                    DeclaredMode::NUMBERS[number].replace('_', " "),
+                    MODE_NUMBERS[number].replace('_', " "),
                     mode + 1
                 )
             }

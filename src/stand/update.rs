@@ -129,7 +129,7 @@ impl Entry {
 
 const SCHEMA: &str = "torqcomp.stand/1";
 /// Keys of `[mechanics]` that exclude each other.
-const CONSTANTS: [&str; 3] = ["inertia", "damping", "stiffness"];
+pub const CONSTANTS: [&str; 3] = ["inertia", "damping", "stiffness"];
 /// Relative standard uncertainty that these three share.
 pub const COMMON: &str = "common_std";
 /// Correlation coefficients of these three, in pairs.
@@ -142,7 +142,8 @@ pub const CORRELATIONS: [&str; 3] = [
 const MODES: &str = "modes";
 /// Keys of a mode that a decay does not tell.
 const SHARES: [&str; 4] = ["residue", "quadrature", "shape_at_load", "shape_at_gage"];
-const MODAL: [&str; 2] = ["natural_frequency", "damping_ratio"];
+/// Keys that exclude those in turn.
+pub const MODAL: [&str; 2] = ["natural_frequency", "damping_ratio"];
 
 /// The text of a stand file with the entries put in; `existing` is its text so far, if there is one.
 /// Comments, order and all other entries stay.
@@ -333,16 +334,18 @@ pub fn is_calibrated(text: &str) -> bool {
         return true;
     };
     let gain = document.get("mechanics").and_then(|m| m.get("static_gain"));
-    gain.is_some() || converts(text)
+    gain.is_some() || has_conversion(&document)
 }
 
 /// Whether a calibration or a drawing makes torque of its record.
 pub fn converts(text: &str) -> bool {
     let document = text.parse::<DocumentMut>();
-    document.is_ok_and(|document| {
-        let mut sections = ["calibration", "beam"].iter();
-        sections.any(|key| document.contains_key(key))
-    })
+    document.is_ok_and(|document| has_conversion(&document))
+}
+
+fn has_conversion(document: &DocumentMut) -> bool {
+    let mut sections = ["calibration", "beam"].iter();
+    sections.any(|key| document.contains_key(key))
 }
 
 /// A quantity of `[mechanics]` in SI units and its standard uncertainty, from the text of a stand file

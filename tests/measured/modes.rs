@@ -6,7 +6,7 @@ use std::path::Path;
 use libtest_mimic::Failed;
 use torqcomp_dsp::frf::{self, Block, Estimator, Frf, Window};
 
-use super::{check, rows};
+use super::{HAMMER, check, rows};
 
 /// A folder for stand files.
 struct Bench {
@@ -81,19 +81,9 @@ pub fn hammer(folder: &Path) -> Result<(), Failed> {
     let lines = 60..1001;
     let raw = Frf::between(blocks[..2].iter(), Estimator::H1, lines.clone()).response;
     let floor = frf::prediction_error(&raw, &blocks[2], lines.clone());
-    let options = [
-        "--applied",
-        "Force (Trigger)",
-        "--measured",
-        "Acceleration (Trigger)",
-        "--measured-as",
-        "acceleration",
-        "--band",
-        "60..1000",
-    ];
     for (modes, most) in [("8", 0.08), ("18", 0.055)] {
-        bench.fit(&paths[..2], &options, modes)?;
-        let got = bench.simulated(&options, paths[2])?;
+        bench.fit(&paths[..2], &HAMMER, modes)?;
+        let got = bench.simulated(&HAMMER, paths[2])?;
         let error = apart(&got, &blocks[2], window, lines.clone());
         println!("{modes} modes: {error:.4}, the response itself: {floor:.4}");
         check(error < most, format!("{modes} modes: {error}, {floor}"))?;

@@ -1,8 +1,10 @@
 //! Where a compensated record ends: what lies above its band was filtered out of it.
 
+use torqcomp_dsp::quality::median;
 use torqcomp_dsp::spectrum::{Density, welch_steep};
 use torqcomp_dsp::store::SampleStore;
 
+use super::speed::highest;
 use crate::print::{rounded, short};
 use crate::recording::{Spool, UniformRecord};
 use crate::warning::Warning;
@@ -33,13 +35,11 @@ pub(super) fn warning(
     let samples = record.samples.part(0..count).ok()?;
     let density = welch_steep(&samples, record.rate_hz, block).ok()?;
     let top_hz = top(&density, 0.5 * record.rate_hz)?;
-    let beyond: Vec<f64> = orders.iter().map(|order| order * fundamental_hz).collect();
-    let beyond = orders
-        .iter()
-        .zip(beyond)
-        .filter(|(_, hz)| *hz > NEAR * top_hz);
-    let names: Vec<String> = beyond.clone().map(|(order, _)| short(*order)).collect();
-    let highest_hz = beyond.map(|(_, hz)| hz).fold(0.0, f64::max);
+    let is_beyond = |order: &&f64| *order * fundamental_hz > NEAR * top_hz;
+    let beyond = orders.iter().filter(is_beyond);
+    let beyond: Vec<f64> = beyond.copied().collect();
+    let names: Vec<String> = beyond.iter().map(|order| short(*order)).collect();
+    let highest_hz = fundamental_hz * highest(&beyond);
     (!names.is_empty()).then(|| {
         Warning::new(
             "orders-beyond-band",
@@ -56,16 +56,15 @@ pub(super) fn warning(
 
 /// The top of the band, if the spectrum ends somewhere as if cut off.
 fn top(density: &Density, nyquist_hz: f64) -> Option<f64> {
-    let median = |from_hz: f64, to_hz: f64| {
+    let level = |from_hz: f64, to_hz: f64| {
         let mut values: Vec<f64> = density.between(from_hz, to_hz).map(|(_, v)| v).collect();
-        let middle = values.len() / 2;
-        (values.len() >= BINS).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+        median(&mut values).filter(|_| values.len() >= BINS)
     };
     let count = ((nyquist_hz / density.step_hz).ln() / STEP.ln()) as i32;
     let mut ends = (0..=count).map(|k| density.step_hz * STEP.powi(k));
     let is_end = |end_hz: &f64| {
         let top_hz = end_hz / EDGE;
-        let before = median(top_hz / EDGE, top_hz);
+        let before = level(top_hz / EDGE, top_hz);
         let behind = density.between(*end_hz, (EDGE * end_hz).min(nyquist_hz));
         let behind: Vec<f64> = behind.map(|(_, v)| v).collect();
         let is_low = |before: f64| behind.iter().all(|v| *v < FALL * before);

@@ -56,8 +56,7 @@ pub(super) fn off(
     let is_there = better.components.iter().any(is_sure);
     let lost = given.residual_rms.powi(2) - better.residual_rms.powi(2);
     let shift_hz = (found.frequency_hz - fundamental_hz).abs();
-    let highest = orders.iter().copied().fold(0.0, f64::max);
-    let turns = shift_hz * highest * length as f64 / rate_hz;
+    let turns = shift_hz * highest(orders) * length as f64 / rate_hz;
     let matters = lost > LOST * power(&better) && turns > TURNS;
     (is_there && matters && shift_hz > SIGNIFICANT * found.std_hz?).then(|| {
         let digits = rounded(found.frequency_hz, 7);
@@ -85,7 +84,7 @@ pub(super) fn warning(
     if (length as f64) * fundamental_hz < FEWEST * record.rate_hz {
         return None;
     }
-    let highest = orders.iter().copied().fold(0.0, f64::max);
+    let highest = highest(orders);
     let lag = record.rate_hz / (4.0 * highest * fundamental_hz);
     let lag = (lag as usize).clamp(1, length / 4);
     let part = |place: usize, span: f64, length: usize| {
@@ -93,6 +92,7 @@ pub(super) fn warning(
         let samples = record.samples.part(start..start + length).ok()?;
         let pairs = samples.iter().zip(&samples[lag..]);
         let changes: Vec<f64> = pairs.map(|(before, after)| after - before).collect();
+        // The span ends where the highest order leaves the spectrum.
         let fundamental_hz = fundamental_hz.min(0.5 * record.rate_hz / highest / (1.0 + span));
         refine_fundamental(&changes, record.rate_hz, fundamental_hz, span, orders).ok()
     };
@@ -123,4 +123,8 @@ pub(super) fn warning(
             ),
         )
     })
+}
+
+pub(super) fn highest(orders: &[f64]) -> f64 {
+    orders.iter().copied().fold(0.0, f64::max)
 }

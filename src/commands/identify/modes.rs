@@ -5,7 +5,7 @@ use torqcomp_model::Estimate;
 use super::{TORQUE, entry, stand_text};
 use crate::cli::identify::Findings;
 use crate::failure::Failure;
-use crate::identify::{Identification, ModalShares, Motion, NamedEstimates};
+use crate::identify::{Identification, MODE_NUMBERS, ModalShares, Motion, NamedEstimates};
 use crate::stand::update::{self, Entry};
 use crate::stand::{MODE_CORRELATIONS, TransducerSignal};
 use crate::unit::NamedUnit;
@@ -14,14 +14,14 @@ use crate::unit::NamedUnit;
 const WORTH_WRITING: f64 = 0.01;
 
 /// What is known of the records beside the modes.
-pub(super) struct Written<'a> {
+pub(super) struct WrittenModes<'a> {
     pub source: String,
     pub motion: Motion,
     /// Units of the measured and of the applied channel.
     pub units: [Option<&'a NamedUnit>; 2],
 }
 
-impl Written<'_> {
+impl WrittenModes<'_> {
     /// Entries of the stand file.
     ///
     /// # Errors
@@ -80,13 +80,7 @@ impl Written<'_> {
     }
 
     fn mode(&self, mode: &NamedEstimates) -> Vec<Entry> {
-        let keys = [
-            "natural_frequency",
-            "damping_ratio",
-            "residue",
-            "quadrature",
-        ];
-        let numbers = keys.into_iter().zip(&mode.list);
+        let numbers = MODE_NUMBERS.into_iter().zip(&mode.list);
         let mut all: Vec<Entry> = numbers
             .map(|(key, number)| Entry::measured("modes", key, &number.estimate))
             .collect();

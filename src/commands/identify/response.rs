@@ -62,7 +62,7 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
         let unit = format!("({})/({})", measured.text, applied.text);
         result.label_charts(RATIO, &unit);
     }
-    let written = modes::Written {
+    let written = modes::WrittenModes {
         source: format!("identify response: {}", args.inputs.join(", ")),
         motion,
         units,

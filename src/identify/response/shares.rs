@@ -11,15 +11,10 @@ use std::f64::consts::TAU;
 use torqcomp_model::{Estimate, Estimates};
 
 use super::FinalFit;
-use crate::identify::{ModalShares, NamedEstimates};
+use crate::identify::{MODE_NUMBERS, ModalShares, NamedEstimates};
 
-/// Name and unit of each number of a mode.
-const NUMBERS: [(&str, &str); 4] = [
-    ("natural_frequency", "Hz"),
-    ("damping_ratio", ""),
-    ("residue", ""),
-    ("quadrature", ""),
-];
+/// Unit of each number of a mode.
+const UNITS: [&str; 4] = ["Hz", "", "", ""];
 
 /// The shares of all modes, by rising frequency; `None` if the response at rest is zero.
 pub(super) fn of(found: &FinalFit, order: i32) -> Option<ModalShares> {
@@ -38,9 +33,10 @@ pub(super) fn of(found: &FinalFit, order: i32) -> Option<ModalShares> {
     let mut places: Vec<usize> = (0..modal.poles.len()).collect();
     let omega = |k: &usize| modal.poles[*k].omega_rad_per_s;
     places.sort_by(|a, b| omega(a).total_cmp(&omega(b)));
+    let named: Vec<(&str, &str)> = MODE_NUMBERS.into_iter().zip(UNITS).collect();
     let mode = |k: usize| {
         let (values, gradients) = of_mode(found, k, numbers.values().len());
-        NamedEstimates::new(&NUMBERS, &numbers.derive_by(values.to_vec(), &gradients))
+        NamedEstimates::new(&named, &numbers.derive_by(values.to_vec(), &gradients))
     };
     let scale = modal.scale().powi(-order);
     Some(ModalShares {

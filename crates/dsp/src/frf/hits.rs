@@ -3,6 +3,8 @@
 use std::fmt;
 use std::ops::Range;
 
+use crate::quality;
+
 /// A hit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hit {
@@ -223,12 +225,7 @@ fn spread(samples: &[f64], rest: f64) -> f64 {
 }
 
 fn median(samples: &[f64]) -> f64 {
-    let mut sorted = samples.to_vec();
-    let middle = sorted.len() / 2;
-    if sorted.is_empty() {
-        return 0.0;
-    }
-    *sorted.select_nth_unstable_by(middle, f64::total_cmp).1
+    quality::median(&mut samples.to_vec()).unwrap_or(0.0)
 }
 
 #[cfg(test)]

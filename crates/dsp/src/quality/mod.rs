@@ -92,7 +92,12 @@ fn excerpts(samples: &[f64]) -> Vec<&[f64]> {
 }
 
 /// Middle value of a set (the upper one of two); `None` if it is empty.
-fn median(values: &mut [f64]) -> Option<f64> {
+///
+/// ```
+/// assert_eq!(torqcomp_dsp::quality::median(&mut [3.0, 1.0, 9.0, 2.0]), Some(3.0));
+/// assert_eq!(torqcomp_dsp::quality::median(&mut []), None);
+/// ```
+pub fn median(values: &mut [f64]) -> Option<f64> {
     let middle = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }

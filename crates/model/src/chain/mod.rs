@@ -257,14 +257,17 @@ impl Chain {
         linear().fold(plain.inv(), along).inv()
     }
 
-    /// What a torque of one at the gage has the effect of, as an applied quantity over the gain, at a frequency: 1 in a stand
-    /// with one mode, where both act on the same inertia.
-    #[must_use]
-    pub fn torque_as_applied(&self, frequency_hz: f64) -> Complex64 {
-        let omega = TAU * frequency_hz;
-        match (self.stand.only(), self.stand.at_gage()) {
-            (None, Some(at_gage)) => at_gage.response(omega) * self.stand.inverse(omega),
-            _ => Complex64::ONE,
+    /// What a torque of one at the gage has the effect of, as an applied quantity over the gain, by frequency in Hz: 1 in a
+    /// stand with one mode, where both act on the same inertia.
+    pub fn torque_as_applied(&self) -> impl Fn(f64) -> Complex64 + '_ {
+        let at_gage = match self.stand.only() {
+            Some(_) => None,
+            None => self.stand.at_gage(),
+        };
+        move |frequency_hz| {
+            let omega = TAU * frequency_hz;
+            let of_several = |g: &ModalResponse| g.response(omega) * self.stand.inverse(omega);
+            at_gage.as_ref().map_or(Complex64::ONE, of_several)
         }
     }
 
@@ -273,8 +276,9 @@ impl Chain {
     #[must_use]
     pub fn coupling<'a>(&'a self, some: &'a [&Link]) -> Option<impl Fn(f64) -> Complex64 + 'a> {
         let any = some.iter().any(|link| link.is_feedthrough());
+        let torque_as_applied = self.torque_as_applied();
         any.then_some(move |frequency_hz| {
-            let acts_as = self.torque_as_applied(frequency_hz);
+            let acts_as = torque_as_applied(frequency_hz);
             let add = |sum: Complex64, link: &&Link| match &link.action {
                 Action::Feedthrough(term) => sum + acts_as * term(&self.stand, TAU * frequency_hz),
                 _ => sum * link.factor(Complex64::ONE, &self.stand, frequency_hz),

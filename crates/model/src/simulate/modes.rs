@@ -14,8 +14,7 @@ use std::ops::Range;
 
 use super::input::Excitation;
 use super::integrate::{LinearStep, MotionState, free};
-use super::run::{MotionProgress, Torques, acting};
-use crate::effects::{Memory, Torque};
+use super::run::{Acting, MotionProgress, Torques, acting, kicked, shown};
 use crate::modal::{ModalPart, ModalResponse};
 
 /// Where a mode stands.
@@ -96,7 +95,7 @@ struct ModalIntegrator<'a> {
     step_s: f64,
     /// What a torque of one changes the speed of the gage by at a node.
     impulse: f64,
-    acting: Vec<((&'a dyn Torque, bool), Memory)>,
+    acting: Acting<'a>,
     /// Sharp dry friction.
     dry: f64,
 }
@@ -144,7 +143,7 @@ pub(crate) fn integrate_modes(
             if !now.x.is_finite() {
                 break;
             }
-            samples.push(now.x + run.shown(now));
+            samples.push(now.x + shown(&mut run.acting, now, shift));
         }
         state = Some(run.advance(now, window));
     }
@@ -193,17 +192,14 @@ impl ModalIntegrator<'_> {
     }
 
     fn kick(&mut self, moved: MotionState, change: f64) -> MotionState {
-        let mut speed = moved.speed;
-        for ((torque, _), memory) in &mut self.acting {
-            speed = torque.kick(memory, moved.x + self.shift, speed, change, self.impulse);
-        }
-        if speed != moved.speed {
-            let each = (speed - moved.speed) * self.step_s / self.impulse;
+        let kicked = kicked(&mut self.acting, moved, self.shift, change, self.impulse);
+        if kicked.speed != moved.speed {
+            let each = (kicked.speed - moved.speed) * self.step_s / self.impulse;
             for mode in &mut self.modes {
                 mode.motion.pushed.speed += each * mode.pushed_by();
             }
         }
-        MotionState { x: moved.x, speed }
+        kicked
     }
 
     /// Dry friction over the step.
@@ -229,13 +225,5 @@ impl ModalIntegrator<'_> {
             moved.speed += speed;
         }
         moved
-    }
-
-    /// Torques that the gage shows beside the displacement.
-    fn shown(&mut self, state: MotionState) -> f64 {
-        let shown = self.acting.iter_mut().filter(|((_, shown), _)| *shown);
-        shown
-            .map(|((torque, _), memory)| torque.value(memory, state.x + self.shift, state.speed))
-            .sum()
     }
 }

@@ -20,7 +20,7 @@ struct Integrator<'a> {
     /// What a torque of one changes the speed by at a node.
     impulse: f64,
     /// Torques that act at the nodes, with what they remember: all but sharp dry friction.
-    acting: Vec<((&'a dyn Torque, bool), Memory)>,
+    acting: Acting<'a>,
     /// Displacement by a constant load.
     shift: f64,
     /// Sharp dry friction, and the direction that the stand slides in: 0 while it sticks.
@@ -64,6 +64,34 @@ impl MotionProgress {
 pub(super) fn acting<'a>(torques: &Torques<'a>) -> impl Iterator<Item = (&'a dyn Torque, bool)> {
     let acting = torques.iter().filter(|(torque, _)| torque.dry().is_none());
     acting.copied()
+}
+
+/// The torques that act, whether the gage shows them, and what they remember.
+pub(super) type Acting<'a> = Vec<((&'a dyn Torque, bool), Memory)>;
+
+/// A motion at a node after what the torques do there: each changes the speed, of which `change` came with the step, by itself
+/// times `impulse`.
+#[inline]
+pub(super) fn kicked(
+    acting: &mut Acting<'_>,
+    moved: MotionState,
+    shift: f64,
+    change: f64,
+    impulse: f64,
+) -> MotionState {
+    let mut speed = moved.speed;
+    for ((torque, _), memory) in acting {
+        speed = torque.kick(memory, moved.x + shift, speed, change, impulse);
+    }
+    MotionState { x: moved.x, speed }
+}
+
+/// Torques that the gage shows beside the displacement.
+pub(super) fn shown(acting: &mut Acting<'_>, state: MotionState, shift: f64) -> f64 {
+    let shown = acting.iter_mut().filter(|((_, shown), _)| *shown);
+    shown
+        .map(|((torque, _), memory)| torque.value(memory, state.x + shift, state.speed))
+        .sum()
 }
 
 /// What the gage shows at some samples of the input; `progress` is that at the first of them, and afterwards that at the
@@ -126,11 +154,7 @@ impl Integrator<'_> {
     /// What the torques do at a node.
     #[inline]
     fn kick(&mut self, moved: MotionState, change: f64) -> MotionState {
-        let mut speed = moved.speed;
-        for ((torque, _), memory) in &mut self.acting {
-            speed = torque.kick(memory, moved.x + self.shift, speed, change, self.impulse);
-        }
-        MotionState { x: moved.x, speed }
+        kicked(&mut self.acting, moved, self.shift, change, self.impulse)
     }
 
     /// Sum of the torques, dry friction left out, at rest.
@@ -196,10 +220,6 @@ impl Integrator<'_> {
 
     /// Torques that the gage shows beside the displacement.
     fn shown(&mut self, state: MotionState) -> f64 {
-        self.acting
-            .iter_mut()
-            .filter(|((_, shown), _)| *shown)
-            .map(|((torque, _), memory)| torque.value(memory, state.x + self.shift, state.speed))
-            .sum()
+        shown(&mut self.acting, state, self.shift)
     }
 }
