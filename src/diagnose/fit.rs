@@ -89,11 +89,12 @@ pub fn fit(
     effort: FitEffort,
 ) -> Result<FittedModel, FitError> {
     let mut records = records.to_vec();
-    let mut free = structure.free_mode(start);
+    let start_model = structure.model(start).0;
+    let mut free = start_model.free_mode();
     let mut found = minimize(&structure, start, &mut records, Some(&free), effort)?;
     if effort.corrects_start {
         // Where the motion is integrated, its start is corrected instead; a plain stand starts near its own mode.
-        let integrates = structure.model(start).0.has_torques();
+        let integrates = start_model.has_torques();
         let may_move = !integrates && !structure.effects.is_empty();
         let has_moved = may_move && moves_on(&structure, &found.values, &records, &free);
         let is_corrected =
@@ -101,7 +102,7 @@ pub fn fit(
         let values = &found.values[..start.len()];
         if has_moved {
             found = minimize(&structure, values, &mut records, None, effort)?;
-            free = structure.free_mode(&found.values);
+            free = structure.model(&found.values).0.free_mode();
         } else if is_corrected {
             found = minimize(&structure, values, &mut records, Some(&free), effort)?;
         }
@@ -141,8 +142,7 @@ fn minimize(
     });
     let problem = |values: &[f64], out: &mut Vec<f64>| {
         let (mut model, terms) = structure.model(&values[..own]);
-        let free = free.copied();
-        let free = free.unwrap_or_else(|| structure.free_mode(&values[..own]));
+        let free = free.copied().unwrap_or_else(|| model.free_mode());
         for (k, record) in records.iter().enumerate() {
             let preload = values.get(own + k).map(|s| s * size);
             model.shift = preload.unwrap_or(record.initial.preload);
@@ -241,10 +241,10 @@ fn correct_starts(
 /// Whether the free motion after the start of a record differs by more than the residual allows from one in the mode that
 /// the parameters have by now: ten thousand turns in the plain stand's mode are not those in a mode 1 % beside it.
 fn moves_on(structure: &Structure, values: &[f64], records: &[StandRecord], free: &Mode) -> bool {
-    let now = structure.free_mode(values);
+    let mut model = structure.model(values);
+    let now = model.0.free_mode();
     let fade = |mode: &Mode| mode.damping_ratio * mode.omega_rad_s;
     let apart = (now.omega_rad_s - free.omega_rad_s).hypot(fade(&now) - fade(free));
-    let mut model = structure.model(values);
     records.iter().any(|record| {
         let Some((mean_square, found)) = nuisance_of(&mut model, record, free) else {
             return false;

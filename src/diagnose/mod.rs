@@ -190,7 +190,7 @@ impl SearchState {
         let declared = declared.and_then(|declared| {
             let values = declared.values(&plain.structure.context);
             let declared = FittedModel {
-                free: plain.structure.free_mode(&values),
+                free: plain.structure.model(&values).0.free_mode(),
                 values,
                 amplitudes: declared.amplitudes(),
                 ..plain.clone()

@@ -187,21 +187,6 @@ impl Structure {
         (mode, gain)
     }
 
-    /// The mode in which the stand moves freely in small motions, with the stiffness that effects add.
-    pub fn free_mode(&self, values: &[f64]) -> Mode {
-        let (mode, _) = self.mode(values);
-        let stiffer = (1.0 + self.model(values).0.added_stiffness())
-            .max(0.0)
-            .sqrt();
-        if stiffer == 0.0 {
-            return mode;
-        }
-        Mode {
-            omega_rad_s: mode.omega_rad_s * stiffer,
-            damping_ratio: mode.damping_ratio / stiffer,
-        }
-    }
-
     /// The plain stand of parameter values.
     pub fn stand(&self, values: &[f64]) -> PlainStand {
         let (mode, gain) = self.mode(values);

@@ -6,6 +6,7 @@ use num_complex::Complex64;
 
 use super::{Chain, Link};
 use crate::effects::{Action, SampleClock, Stage};
+use crate::mode::Mode;
 use crate::simulate::{
     Excitation, MotionProgress, MotionState, Torques, free_motion, integrate, integrate_modes,
 };
@@ -86,6 +87,32 @@ impl Chain {
     #[must_use]
     pub fn has_torques(&self) -> bool {
         !self.torques().is_empty()
+    }
+
+    /// The mode in which the stand moves freely in small motions, with the stiffness `k` that torques add, relative to its
+    /// own: `ω √(1 + k)` and `ζ/√(1 + k)`; of several modes the first.
+    ///
+    /// ```
+    /// use torqcomp_model::{Chain, Link, Mode, effects::Effect};
+    /// let effect = Effect::named("bouc-wen-hysteresis").unwrap();
+    /// let torque = Link::of(effect, effect.form(Some("exponent")).unwrap(), &[0.21, 1.0, 0.5, 1.0]);
+    /// let mode = Mode { omega_rad_s: 100.0, damping_ratio: 0.055 };
+    /// // √1.21 = 1.1.
+    /// let free = Chain::new(mode, 1.0).with_links([torque]).free_mode();
+    /// assert!((free.omega_rad_s - 110.0).abs() < 1e-12);
+    /// assert!((free.damping_ratio - 0.05).abs() < 1e-15);
+    /// ```
+    #[must_use]
+    pub fn free_mode(&self) -> Mode {
+        let plain = self.stand.first();
+        let stiffer = (1.0 + self.added_stiffness()).max(0.0).sqrt();
+        if stiffer == 0.0 {
+            return plain;
+        }
+        Mode {
+            omega_rad_s: plain.omega_rad_s * stiffer,
+            damping_ratio: plain.damping_ratio / stiffer,
+        }
     }
 
     /// Stiffness that the torques add at small displacements, relative to that of the plain stand.
