@@ -8,6 +8,7 @@ pub(crate) mod many;
 mod pages;
 pub mod simulate;
 mod values;
+mod wrong;
 
 use std::path::{Path, PathBuf};
 
@@ -21,12 +22,13 @@ use crate::io::{ChannelChoice, Reading, frequency, positive_frequency};
 
 pub use diagnose::Diagnose;
 pub(crate) use help::command;
-pub use help::parse;
+pub(crate) use help::parse;
 pub use many::{BatchOptions, Merge};
-pub use pages::{Completions, Man};
+pub use pages::{Completions, Man, Schema};
 pub use simulate::Simulate;
 pub use values::{BandOption, Orders};
 use values::{band, digits, orders, percent, range, svg_file, warning_code};
+pub(crate) use wrong::{is_json_asked, wrong_usage};
 
 /// Version, commit and target of this build.
 const BUILD: &str = concat!(
@@ -85,6 +87,8 @@ pub enum Verb {
     Completions(Completions),
     /// Print the manual page of the program or of a verb
     Man(Man),
+    /// Print the JSON Schema of a document that --json prints
+    Schema(Schema),
 }
 
 impl Verb {
@@ -115,7 +119,8 @@ impl Verb {
             | Self::Predict(_)
             | Self::Merge(_)
             | Self::Completions(_)
-            | Self::Man(_) => None,
+            | Self::Man(_)
+            | Self::Schema(_) => None,
         }
     }
 }
@@ -331,6 +336,9 @@ pub struct Extract {
     pub quiet: bool,
 }
 
+/// How far around the given fundamental `harmonics --refine` searches, in percent.
+pub const REFINE_SPAN: f64 = 2.0;
+
 /// Arguments of `harmonics`.
 #[derive(Debug, Clone, Args)]
 pub struct Harmonics {
@@ -353,7 +361,7 @@ pub struct Harmonics {
     #[arg(long)]
     pub refine: bool,
     /// Search range around the given fundamental, in percent
-    #[arg(long, value_name = "PERCENT", default_value = "2", requires = "refine", allow_negative_numbers = true, value_parser = percent)]
+    #[arg(long, value_name = "PERCENT", default_value_t = REFINE_SPAN, requires = "refine", allow_negative_numbers = true, value_parser = percent)]
     pub refine_span: f64,
     /// Units of the result
     #[arg(long, value_enum, default_value = "si")]

@@ -3,11 +3,14 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
+use serde_json::Value;
 use torqcomp_model::UnitSystem;
 use torqcomp_model::effects::{
     EFFECTS, Effect, EffectParameter, Form, ParameterScale, Stage, Unit,
 };
 
+use crate::commands::schema::{DOCUMENTS, types};
+use crate::failure::ErrorCode;
 use crate::stand::keys::{SECTIONS, Takes};
 use crate::warning::CODES;
 
@@ -357,4 +360,93 @@ fn every_warning_is_listed_and_every_code_is_used() {
             "{code} is missing in CODES (src/warning.rs)"
         );
     }
+}
+
+#[test]
+fn the_list_of_documents_is_that_of_the_code() {
+    let mut page = format!(
+        "# JSON documents\n\n{WRITTEN}\n\
+         What `--json` prints. Each document names its form in `schema`; `torqcomp schema` lists the forms, and \
+         `torqcomp schema NAME` prints the JSON Schema (2020-12) of one. Keys may be added to a form; what is there stays. A \
+         number that is unknown is `null`. Below, `[]` stands for the items of a list.\n\n\
+         If a command fails, `--json` prints [`torqcomp.error/1`](#error) in the place of the report, unless a report is \
+         out already; the exit code is the same as without it.\n"
+    );
+    for (document, text) in DOCUMENTS.iter().zip(types::texts()) {
+        let own = format!("../src/commands/schema/{}.json", document.name);
+        compare(&own, &text);
+        let schema: Value = serde_json::from_str(&text).unwrap();
+        write!(
+            page,
+            "\n## {}\n\n`{}`: {}\n\n| key | type | meaning |\n|---|---|---|\n",
+            document.name,
+            document.schema,
+            schema["description"].as_str().unwrap()
+        )
+        .unwrap();
+        let mut rows = Vec::new();
+        keys(&schema, "", &mut rows);
+        rows.iter().for_each(|row| writeln!(page, "{row}").unwrap());
+    }
+    page += "\n## Codes of failures\n\n| code | meaning |\n|---|---|\n";
+    let schema = schemars::schema_for!(ErrorCode).to_value();
+    for code in schema["oneOf"].as_array().unwrap() {
+        let text = |key: &str| code[key].as_str().unwrap().replace('\n', " ");
+        writeln!(page, "| `{}` | {} |", text("const"), text("description")).unwrap();
+    }
+    compare("json.md", &page);
+}
+
+/// Rows of a table of the keys of a schema, each once.
+fn keys(schema: &Value, place: &str, rows: &mut Vec<String>) {
+    let properties = schema["properties"].as_object();
+    for (name, property) in properties.into_iter().flatten() {
+        let place = format!("{place}{name}");
+        let meaning = property["description"].as_str().unwrap_or_default();
+        let row = format!(
+            "| `{place}` | {} | {} |",
+            types(property),
+            meaning.replace('|', "\\|")
+        );
+        if !rows.contains(&row) {
+            rows.push(row);
+        }
+        keys(property, &format!("{place}."), rows);
+    }
+    for keyword in ["anyOf", "oneOf", "allOf"] {
+        for part in schema[keyword].as_array().into_iter().flatten() {
+            keys(part, place, rows);
+        }
+    }
+    if schema["items"].is_object() {
+        let place = place.strip_suffix('.').unwrap_or(place);
+        keys(&schema["items"], &format!("{place}[]."), rows);
+    }
+}
+
+/// Types that a value may have.
+fn types(schema: &Value) -> String {
+    if let Some(name) = schema["const"].as_str() {
+        return format!("`{name}`");
+    }
+    if let Some(names) = schema["enum"].as_array() {
+        let names: Vec<String> = names
+            .iter()
+            .map(|name| format!("`{}`", name.as_str().unwrap_or("null")))
+            .collect();
+        return names.join(", ");
+    }
+    let list: Vec<&str> = match &schema["type"] {
+        Value::String(one) => vec![one],
+        Value::Array(several) => several.iter().filter_map(Value::as_str).collect(),
+        _ => {
+            let parts = ["anyOf", "oneOf"]
+                .iter()
+                .filter_map(|keyword| schema[*keyword].as_array());
+            let mut names: Vec<String> = parts.flatten().map(types).collect();
+            names.dedup();
+            return names.join(" or ");
+        }
+    };
+    list.join(" or ").replace("array", "list")
 }

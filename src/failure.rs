@@ -1,54 +1,155 @@
 //! How a command can end badly, and the exit code that goes with it.
 
+mod code;
+
 use std::fmt;
 use std::io;
 use std::path::Path;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+pub use code::ErrorCode;
 
 /// Why a command did not do its work.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Failure {
     /// The command line asks for something that cannot be: exit code 2.
-    Usage(String),
+    Usage(Box<Fault>),
     /// The work failed: exit code 1.
-    Failed(String),
+    Failed(Box<Fault>),
     /// Nobody reads the output any more: exit code 0.
     ClosedPipe,
 }
 
+/// What went wrong, and where.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fault {
+    code: ErrorCode,
+    place: ErrorPlace,
+    /// What is wrong; behind the first semicolon, what to do.
+    message: String,
+}
+
+/// What the rows of a record are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RowKind {
+    /// Lines of a text.
+    Line,
+    /// Samples without lines.
+    Sample,
+    /// Messages of a topic.
+    Message,
+}
+
+/// Where a failure is, as far as that is known. Numbers count from 1, bytes from 0.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
+pub struct ErrorPlace {
+    /// Name of the file, as given.
+    pub file: Option<String>,
+    /// Line of the file.
+    pub line: Option<usize>,
+    /// Column of a table, or character of a line of a stand file.
+    pub column: Option<usize>,
+    /// Byte of the file.
+    pub byte: Option<u64>,
+    /// Sample of the channel.
+    pub sample: Option<usize>,
+    /// Message of the topic.
+    pub message: Option<usize>,
+    /// Time on the axis of the record, in s.
+    pub time_s: Option<f64>,
+}
+
+impl ErrorPlace {
+    /// RowKind `number`, from 1, of a file.
+    #[must_use]
+    pub fn of_row(file: &str, row: RowKind, number: usize) -> Self {
+        let mut place = Self {
+            file: Some(file.to_owned()),
+            ..Self::default()
+        };
+        match row {
+            RowKind::Line => place.line = Some(number),
+            RowKind::Sample => place.sample = Some(number),
+            RowKind::Message => place.message = Some(number),
+        }
+        place
+    }
+
+    fn is_known(&self) -> bool {
+        *self != Self::default()
+    }
+}
+
+impl fmt::Display for ErrorPlace {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let rows = [
+            ("line", self.line),
+            ("sample", self.sample),
+            ("message", self.message),
+        ];
+        let rows = rows
+            .iter()
+            .filter_map(|(name, number)| Some(format!("{name} {}", (*number)?)));
+        let parts: Vec<String> = self.file.clone().into_iter().chain(rows).collect();
+        f.write_str(&parts.join(", "))
+    }
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.place.to_string() {
+            place if place.is_empty() => f.write_str(&self.message),
+            place => write!(f, "{place}: {}", self.message),
+        }
+    }
+}
+
 impl Failure {
     /// A failure of the work.
-    pub fn failed(message: impl fmt::Display) -> Self {
-        Self::Failed(message.to_string())
+    pub fn failed(code: ErrorCode, message: impl fmt::Display) -> Self {
+        Self::Failed(Fault::new(code, message))
+    }
+
+    /// A failure of the work that another error explains.
+    pub fn of<E: fmt::Display>(code: ErrorCode) -> impl Fn(E) -> Self {
+        move |error| Self::failed(code, error)
     }
 
     /// A wrong command line.
-    pub fn usage(message: impl fmt::Display) -> Self {
-        Self::Usage(message.to_string())
+    pub fn usage(code: ErrorCode, message: impl fmt::Display) -> Self {
+        Self::Usage(Fault::new(code, message))
     }
 
     /// A failure to write to `place`.
     pub fn writing(place: &str, error: &io::Error) -> Self {
         match error.kind() {
             io::ErrorKind::BrokenPipe => Self::ClosedPipe,
-            io::ErrorKind::StorageFull => Self::failed(format_args!(
-                "{place}: no space left on the disk; free some space or write elsewhere with -o"
-            )),
-            _ => Self::failed(format_args!("{place}: cannot be written: {error}")),
+            io::ErrorKind::StorageFull => Self::failed(
+                ErrorCode::DiskFull,
+                "no space left on the disk; free some space or write elsewhere with -o",
+            )
+            .at(place),
+            _ => Self::failed(
+                ErrorCode::CannotWrite,
+                format_args!("cannot be written: {error}"),
+            )
+            .at(place),
         }
     }
 
     /// A failure to read a file.
     pub fn reading(path: &Path, error: &io::Error) -> Self {
-        let hint = match error.kind() {
-            io::ErrorKind::NotFound => "; check the path",
-            io::ErrorKind::PermissionDenied => "; check its permissions",
-            io::ErrorKind::IsADirectory => ": it is a folder; name a file in it",
-            _ => "",
+        let (code, hint) = match error.kind() {
+            io::ErrorKind::NotFound => (ErrorCode::NotFound, "; check the path"),
+            io::ErrorKind::PermissionDenied => (ErrorCode::CannotRead, "; check its permissions"),
+            io::ErrorKind::IsADirectory => {
+                (ErrorCode::CannotRead, ": it is a folder; name a file in it")
+            }
+            _ => (ErrorCode::CannotRead, ""),
         };
-        Self::failed(format_args!(
-            "{}: cannot be read: {error}{hint}",
-            path.display()
-        ))
+        Self::failed(code, format_args!("cannot be read: {error}{hint}")).at(path.display())
     }
 
     /// The exit code.
@@ -61,21 +162,112 @@ impl Failure {
         }
     }
 
-    /// The same failure with a place put before its message.
+    /// The same failure in a file, unless it is known to be in another one.
     #[must_use]
-    pub fn at(self, place: impl fmt::Display) -> Self {
+    pub fn at(self, file: impl fmt::Display) -> Self {
+        self.with(|place| {
+            place.file.get_or_insert_with(|| file.to_string());
+        })
+    }
+
+    /// The same failure in a line.
+    #[must_use]
+    pub fn line(self, line: usize) -> Self {
+        self.with(|place| place.line = Some(line))
+    }
+
+    /// The same failure at a sample.
+    #[must_use]
+    pub fn sample(self, sample: usize) -> Self {
+        self.with(|place| place.sample = Some(sample))
+    }
+
+    /// The same failure with more known of its place.
+    #[must_use]
+    pub(crate) fn with(mut self, change: impl FnOnce(&mut ErrorPlace)) -> Self {
+        if let Self::Usage(fault) | Self::Failed(fault) = &mut self {
+            change(&mut fault.place);
+        }
+        self
+    }
+
+    /// The JSON document of the failure; `None` of a closed pipe.
+    #[must_use]
+    pub fn document(&self) -> Option<ErrorDocument<'_>> {
         match self {
-            Self::Usage(message) => Self::Usage(format!("{place}: {message}")),
-            Self::Failed(message) => Self::Failed(format!("{place}: {message}")),
-            Self::ClosedPipe => Self::ClosedPipe,
+            Self::Usage(fault) | Self::Failed(fault) => Some(fault.document()),
+            Self::ClosedPipe => None,
         }
     }
+}
+
+impl Fault {
+    fn new(code: ErrorCode, message: impl fmt::Display) -> Box<Self> {
+        Box::new(Self {
+            code,
+            place: ErrorPlace::default(),
+            message: message.to_string(),
+        })
+    }
+
+    fn document(&self) -> ErrorDocument<'_> {
+        let (message, hint) = what_and_hint(&self.message);
+        ErrorDocument {
+            error: ErrorReport {
+                code: self.code,
+                message,
+                place: self.place.is_known().then_some(&self.place),
+                hint,
+            },
+        }
+    }
+}
+
+/// Name and version of the document of a failure.
+pub const SCHEMA: &str = "torqcomp.error/1";
+
+/// A failure, printed in the place of a report.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct ErrorDocument<'a> {
+    /// Why the command failed.
+    error: ErrorReport<'a>,
+}
+
+/// Why a command failed.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct ErrorReport<'a> {
+    /// Kind of the failure.
+    code: ErrorCode,
+    /// What is wrong, in words that may change.
+    message: &'a str,
+    /// Where the failure is; `null` if that is no single place.
+    #[serde(rename = "where")]
+    place: Option<&'a ErrorPlace>,
+    /// What was expected, or what to do; `null` if the message says it all.
+    hint: Option<&'a str>,
+}
+
+/// What is wrong, and what to do: the two sides of the first semicolon outside quotation marks and parentheses.
+fn what_and_hint(message: &str) -> (&str, Option<&str>) {
+    let (mut is_quoted, mut depth) = (false, 0_usize);
+    for (i, c) in message.char_indices() {
+        match c {
+            '"' => is_quoted = !is_quoted,
+            '(' if !is_quoted => depth += 1,
+            ')' if !is_quoted => depth = depth.saturating_sub(1),
+            ';' if !is_quoted && depth == 0 && message[i..].starts_with("; ") => {
+                return (&message[..i], Some(&message[i + 2..]));
+            }
+            _ => {}
+        }
+    }
+    (message, None)
 }
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Usage(message) | Self::Failed(message) => f.write_str(message),
+            Self::Usage(fault) | Self::Failed(fault) => fault.fmt(f),
             Self::ClosedPipe => f.write_str("the reader of the output went away"),
         }
     }
@@ -85,13 +277,13 @@ impl std::error::Error for Failure {}
 
 impl From<torqcomp_dsp::Error> for Failure {
     fn from(error: torqcomp_dsp::Error) -> Self {
-        Self::failed(error)
+        Self::failed(ErrorCode::UnsuitableRecord, error)
     }
 }
 
 impl From<torqcomp_model::fit::FitError> for Failure {
     fn from(error: torqcomp_model::fit::FitError) -> Self {
-        Self::failed(error)
+        Self::failed(ErrorCode::NotIdentifiable, error)
     }
 }
 
@@ -107,4 +299,31 @@ pub fn did_you_mean<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str>) -
         .map_or_else(String::new, |(_, name)| {
             format!(" (did you mean \"{name}\"?)")
         })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_place_stands_before_the_message_and_the_hint_behind_it() {
+        let failure = Failure::failed(
+            ErrorCode::InvalidSample,
+            "the cell reads \"a; b\" (or c; d); correct it; or cut the record there",
+        );
+        let failure = failure.line(3).at("a.csv").at("b.csv");
+        assert_eq!(
+            failure.to_string(),
+            "a.csv, line 3: the cell reads \"a; b\" (or c; d); correct it; or cut the record there"
+        );
+        let document = serde_json::to_value(failure.document()).unwrap();
+        let error = &document["error"];
+        assert_eq!(error["code"], "invalid-sample");
+        assert_eq!(error["message"], "the cell reads \"a; b\" (or c; d)");
+        assert_eq!(error["hint"], "correct it; or cut the record there");
+        assert_eq!(error["where"]["file"], "a.csv");
+        assert_eq!(error["where"]["line"], 3);
+        assert!(error["where"]["byte"].is_null());
+        assert!(Failure::ClosedPipe.document().is_none());
+    }
 }

@@ -31,8 +31,10 @@ pub fn run() -> ExitCode {
         let message = "interrupting this run may leave a temporary file behind";
         print::say(&format!("torqcomp: {message}: {error}\n"));
     }
-    // clap itself exits with code 2 for wrong usage, and with 0 for help.
-    let cli = cli::parse();
+    let cli = match cli::parse() {
+        Ok(cli) => cli,
+        Err(stopped) => return stopped_by(&stopped),
+    };
     let reading = cli.verb.reading();
     if let Some(mebibytes) = reading.and_then(|reading| reading.longest_metadata) {
         io::mcap::limit_metadata(mebibytes << 20);
@@ -44,7 +46,32 @@ pub fn run() -> ExitCode {
             if code != 0 {
                 print::say(&format!("torqcomp: {failure}\n"));
             }
+            print_document(&failure);
             ExitCode::from(code)
         }
+    }
+}
+
+/// Says what clap has to say, and how that ends: help and version with 0, wrong usage with 2.
+fn stopped_by(stopped: &clap::Error) -> ExitCode {
+    // Nobody may be there to read it.
+    let _ = stopped.print();
+    match cli::wrong_usage(stopped) {
+        Some(failure) => {
+            print_document(&failure);
+            ExitCode::from(failure.exit_code())
+        }
+        None => ExitCode::SUCCESS,
+    }
+}
+
+/// Prints a failure as a JSON document where a report was asked for as one and did not appear.
+fn print_document(failure: &failure::Failure) {
+    if let Some(document) = failure.document()
+        && cli::is_json_asked()
+        && !io::output::is_stdout_used()
+    {
+        // The failure itself is the one that the exit code tells of.
+        let _ = io::output::print(&print::document(failure::SCHEMA, &document));
     }
 }

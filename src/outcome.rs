@@ -1,5 +1,6 @@
 //! How a run of a verb ended well, and what it made.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::failure::Failure;
@@ -28,18 +29,21 @@ impl Outcome {
 }
 
 /// Figures of a record and its result. `None` is unknown, or nothing that the verb determines.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema, Deserialize)]
 pub(crate) struct RecordFigures {
+    /// Number of samples; `null` if unknown.
     pub(crate) samples: Option<usize>,
+    /// Sampling rate, in Hz; `null` if unknown.
     pub(crate) rate_hz: Option<f64>,
-    /// End of the part of the spectrum that is compensated in full.
+    /// End of the part of the spectrum that is compensated in full, in Hz; `null` if the verb determines none.
     pub(crate) band_hz: Option<f64>,
     /// Unit of `rms`, `peak` and `noise_rms`.
     pub(crate) unit: Option<String>,
-    /// Root mean square about the mean.
+    /// Root mean square about the mean, in `unit`; `null` if unknown.
     pub(crate) rms: Option<f64>,
-    /// Largest magnitude.
+    /// Largest magnitude, in `unit`; `null` if unknown.
     pub(crate) peak: Option<f64>,
+    /// Rms of the noise, in `unit`; `null` if unknown.
     pub(crate) noise_rms: Option<f64>,
 }
 

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use unicode_width::UnicodeWidthStr;
 
@@ -28,22 +29,30 @@ pub(crate) trait Report: Serialize + Sized {
     /// The report for people.
     fn text(&self) -> String;
 
-    /// The report in the form asked for; the document begins with its schema and the version of torqcomp.
+    /// The report in the form asked for.
     fn document(&self, as_json: bool) -> String {
         match as_json {
-            true => json(&Document {
-                schema: Self::SCHEMA,
-                version: env!("CARGO_PKG_VERSION"),
-                report: self,
-            }),
+            true => document(Self::SCHEMA, self),
             false => visible(self.text()),
         }
     }
 }
 
-#[derive(Serialize)]
-struct Document<'a, R> {
+/// A JSON document, which begins with its schema and the version of torqcomp.
+pub(crate) fn document<R: Serialize>(schema: &'static str, report: &R) -> String {
+    json(&Document {
+        schema,
+        version: env!("CARGO_PKG_VERSION"),
+        report,
+    })
+}
+
+/// How every JSON document begins.
+#[derive(Serialize, JsonSchema)]
+pub(crate) struct Document<'a, R> {
+    /// Name and version of the form of this document.
     schema: &'static str,
+    /// Version of torqcomp.
     version: &'static str,
     #[serde(flatten)]
     report: &'a R,
@@ -199,11 +208,16 @@ pub fn plural<N: fmt::Display + PartialEq + From<u8>>(count: N, noun: &str) -> S
 
 /// `a, b or c`.
 pub(crate) fn list(items: impl IntoIterator<Item = String>) -> String {
-    let items: Vec<String> = items.into_iter().collect();
+    enumeration(&items.into_iter().collect::<Vec<_>>(), "or")
+}
+
+/// `a, b and c`, with that word before the last.
+pub(crate) fn enumeration<T: AsRef<str>>(items: &[T], word: &str) -> String {
+    let items: Vec<&str> = items.iter().map(T::as_ref).collect();
     match items.as_slice() {
         [] => "none".to_owned(),
-        [one] => one.clone(),
-        [first @ .., last] => format!("{} or {last}", first.join(", ")),
+        [one] => (*one).to_owned(),
+        [first @ .., last] => format!("{} {word} {last}", first.join(", ")),
     }
 }
 

@@ -4,7 +4,7 @@ use std::io;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use crate::chart::Page;
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::{Input, sum};
 use crate::recording::moment::utc;
 
@@ -81,7 +81,10 @@ fn date() -> Result<String, Failure> {
         Err(_) => None,
     };
     let seconds = seconds.ok_or_else(|| {
-        Failure::usage("the environment variable SOURCE_DATE_EPOCH is no time; expected whole seconds since 1970")
+        Failure::usage(
+            ErrorCode::InvalidValue,
+            "the environment variable SOURCE_DATE_EPOCH is no time; expected whole seconds since 1970",
+        )
     })?;
     Ok(format!("{}Z", utc(seconds)))
 }

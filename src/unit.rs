@@ -2,7 +2,7 @@
 
 use torqcomp_model::{Dimension, Unit};
 
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 
 /// A unit and how the file writes it.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,7 +40,10 @@ impl NamedUnit {
                 text: text.to_owned(),
                 unit,
             }),
-            Err(error) => Err(Failure::usage(format_args!("{flag} {text}: {error}"))),
+            Err(error) => Err(Failure::usage(
+                ErrorCode::InvalidValue,
+                format_args!("{flag} {text}: {error}"),
+            )),
         }
     }
 

@@ -1,13 +1,14 @@
 //! What a user should know about a result.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// Something that a user should know, with a code that scripts can rely on.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Warning {
-    /// Stable code, one of `CODES` (a test compares them with the sources).
+    /// Stable code of the warning.
     pub code: &'static str,
-    /// For people.
+    /// The warning for people.
     pub message: String,
 }
 
@@ -32,6 +33,8 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["direction-unknown", "the speed is not significantly different from zero over part of the record, where a friction depends on its sign", "take the torque there as known to the size of the friction only"],
         ["empty-plot", "no sample lies within --plot-range", "choose a range within the record"],
         ["fundamental-off", "another fundamental near the given one fits the record better", "add --refine"],
+        ["lines-decide-band", "the band reaches as far as it does only because of a few narrow lines, which may be picked up", "give the --band that is named if they are no torque"],
+        ["mostly-amplified", "the result is more than 10 times as large as the record", "check the mechanics of the stand, the sampling rate and --band"],
         ["mostly-noise", "most of the result is noise", "choose a lower --band, or record with less noise"],
         ["noise-unknown", "the noise of the record cannot be determined", "choose a lower --band if the result looks noisy"],
         ["not-recovered", "samples do not determine the torque, as at the limit of the recorder or within a gap", "take the torque near them as unknown"],
@@ -53,9 +56,11 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["zero-not-used", "the record at no load is given in another quantity than the record's, and was not subtracted", "give it in the record's unit"],
         ["gain-not-used", "a calibration of recorded volts does not need the gain that is given", "leave the gain out, or divide the calibration by it"],
         ["gain-assumed", "the gain between bridge and record is not given; 1 was assumed", "add [recorder] gain"],
+        ["gage-factor-unusual", "the gage factor is that of no usual gage", "check it: metal foil has about 2"],
         ["modulus-unusual", "the elastic modulus is that of no usual beam", "check its unit: steel has 200 GPa"],
     ]),
     ("Simulate and diagnose", &[
+        ["free-body", "the body has no spring: it and the model are both held to the measured motion by a known one, and the errors are those of what acts", "read constants and effects as they are; to have the motion predicted, add the spring that the stand will have"],
         ["no-record-held-out", "no hold-out record was given; the last 30 % of each training record are held out instead", "give --holdout"],
         ["records-apart", "no one stand fits both training and hold-out records", "use records of one stand and one setting"],
         ["resampled", "channels with other time stamps were interpolated to one grid", "record them with one clock"],
@@ -63,12 +68,15 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["unit-assumed", "a column without a unit was taken in the unit that the stand takes", "give --unit"],
     ]),
     ("Identify", &[
+        ["ac-coupled-or-drift", "a channel of a response drifts or is AC coupled, which looks like a slow mode", "record with DC coupling"],
         ["amplitude-dependent", "frequency or damping changes with the amplitude", "quote it with its amplitude, or look for the cause with diagnose"],
         ["anchor-not-needed", "torque and motion determine all three constants; the declared one was not used", "leave out --inertia or --stiffness"],
         ["anchor-without-std", "the declared constant has no standard uncertainty, so that those of the others leave it out", "declare it with std"],
         ["at-bound", "a parameter lies at its bound: it is not identifiable from these data", "leave it out, or record data that determine it"],
+        ["channels-shifted", "one channel is late against the other; the shift was fitted", "record both with one recorder and the same filters"],
         ["close-lines", "a line close to the mode is left in the residual", "try --modes"],
         ["curve", "the readings follow a curve, so that the constants hold at no load only", "use the curve at large loads"],
+        ["decays-apart", "decays ring at different frequencies: the stand was changed, or there are two", "identify them one by one"],
         ["decays-left-out", "there are more decays than are used", "choose them with --range"],
         ["dry-friction-by-direction", "a friction that differs by direction cannot be told from an offset of the torque", "check the zero of the torque"],
         ["hit-left-out", "a hit of the hammer was left out", "repeat the hit"],
@@ -76,12 +84,14 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["leads", "the measured signal leads the applied one, which is impossible", "check --applied and --measured"],
         ["leakage", "the segments are too short for a narrow mode, whose damping is too large", "choose a longer --segment"],
         ["level-dependent", "the response differs between levels", "look for the cause with diagnose"],
-        ["mains-taken-off", "steady lines of the mains were fitted beside the decay and taken off", "record for longer if one of them is the stand's own"],
+        ["mains-taken-off", "steady lines of the mains were fitted beside what rings and taken off", "record for longer if one of them is the stand's own"],
+        ["not-linear", "the readings are farther off the curve than their repeatability explains: it bends, or the amplifier is at its limit", "leave out the loads beyond the limit, or use --degree 3"],
         ["no-unloading", "there are no readings while unloading, so that the hysteresis is unknown", "unload in steps, too"],
         ["noise-before-resonance", "the residual follows the resonance: the stand is driven by something else too, or the input is recorded with noise, which makes the gain too small", "reduce the noise of --applied, or excite more"],
         ["noisy-motion", "noise is a notable part of a regressor; it was corrected for", "use a longer window or a better sensor"],
         ["nonlinear", "the response has power at frequencies that were not applied: the stand is nonlinear", "look for the cause with diagnose"],
-        ["undamped-left-out", "a mode without damping was not written into the stand file", "choose fewer --modes, or record for longer"],
+        ["mode-out-of-reach", "a fitted mode lies above all frequencies of the records and was left out", "check for a shift between the channels, or choose fewer --modes"],
+        ["undamped-left-out", "a mode without a damping that the records show was left out", "choose fewer --modes, or record for longer"],
         ["residues-unknown", "a decay shows several modes, but not their parts in the response to a torque", "add the residues, or use identify response"],
         ["not-anchored", "only ratios of the constants are determined", "declare the inertia or the stiffness"],
         ["not-converged", "the fit stopped before its minimum", "check the result, or choose another start"],
@@ -90,8 +100,12 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["one-series", "the loads were applied once, so that the repeatability is unknown", "repeat the series"],
         ["one-weight", "one load beside no load shows no curve", "apply other loads as well"],
         ["poor-fit", "the model leaves much of the data unexplained", "check the columns; choose another range, band or degree"],
+        ["restart-in-decay", "the ringing starts again within a decay", "hit once, and check for lost samples and overload"],
         ["second-stroke", "the hammer struck twice; the recorded force includes both strokes", "repeat the hit if the coherence is low"],
+        ["short-pulse", "pulses of the hammer are so short for the rate that frequencies above half of it fold into their spectrum", "record faster, or hit with a softer tip"],
         ["speed-unknown", "the speed is known but for a constant, so that the offset includes friction", "record position or speed"],
+        ["tone-taken-off", "steady lines were fitted beside what rings and taken off", "switch off what runs; record for longer if one of them is the stand's own"],
+        ["std-contradicted", "the scatter of the readings contradicts the standard uncertainties that are given", "check their unit"],
         ["turned", "the phase of the mode differs from that of the plain equation", "check for a delay or another mode"],
     ]),
     ("Time axis", &[

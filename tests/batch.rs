@@ -246,6 +246,10 @@ fn failures_end_the_run_where_asked() {
     fast.says(1, &["1 of 6 recordings failed, 5 were not begun"]);
     let two = folder.run(&with(&MANY, &["--jobs", "1", "--max-failures", "2"]));
     two.says(1, &["2 of 6 recordings failed, 4 were not begun"]);
+    // The report says which failed: a document of the failure beside it could not be parsed.
+    let report = folder.run(&with(&MANY, &["--jobs", "1", "--fail-fast", "--json"]));
+    let report: Value = serde_json::from_str(&report.stdout).expect("one JSON document");
+    assert_eq!(report["schema"], "torqcomp.batch/1");
     let all = folder.run(&with(&MANY, &["--jobs", "1", "--max-failures", "4"]));
     all.says(1, &["3 of 6 recordings failed; the others are done"]);
     assert_eq!(results(&folder).len(), 3);
@@ -297,7 +301,11 @@ fn files_that_no_manifest_knows_are_kept() {
         let ran = folder.run(&with(&MANY, more));
         ran.says(
             1,
-            &["failed: logs/a.csv", "out/a.torque.csv exists", "--force"],
+            &[
+                "failed: logs/a.csv",
+                "out/a.torque.csv: the output exists",
+                "--force",
+            ],
         );
         assert_eq!(folder.read("out/a.torque.csv"), "precious\n");
     }
@@ -314,7 +322,9 @@ fn files_that_no_manifest_knows_are_kept() {
         "out/",
         "--skip-existing",
     ];
-    folder.run(&other).says(1, &["out/a.torque.csv exists"]);
+    folder
+        .run(&other)
+        .says(1, &["out/a.torque.csv: the output exists"]);
 }
 
 #[cfg(unix)]

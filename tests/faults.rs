@@ -17,7 +17,7 @@ use crate::golden::{words, workplace};
 use crate::util::{Folder, HERTEL};
 
 /// Whatever writes, with what it may read and write at once: names that begin with `out` are its outputs.
-const RUNS: [&str; 21] = [
+const RUNS: [&str; 22] = [
     "compensate made/short.csv --channel bridge --stand stands/declared.toml -o out.csv --plot out.svg --html out.html --json",
     "compensate made/short.csv --channel bridge --stand stands/cubic.toml -o out.csv --no-sync",
     "compensate made/short.csv --channel bridge --stand stands/declared.toml --with-recorded",
@@ -38,10 +38,11 @@ const RUNS: [&str; 21] = [
     "init --from unknown -o out.toml",
     "man compensate -o out.1",
     "completions bash -o out.sh",
+    "schema table -o out.json",
     "merge logs/torqcomp-manifest.jsonl -o out.csv",
 ];
 /// Verbs that read no file.
-const WITHOUT_INPUT: [&str; 3] = ["init", "man", "completions"];
+const WITHOUT_INPUT: [&str; 4] = ["init", "man", "completions", "schema"];
 /// What makes the manifest that is merged.
 const BEFORE_MERGE: [&str; 6] = [
     "extract",

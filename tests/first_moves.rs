@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use serde_json::Value;
 
-use crate::util::{COMPENSATE, Folder, HARMONICS, assert_close, sampled};
+use crate::util::{COMPENSATE, Folder, HARMONICS, assert_close, sampled, steady};
 
 /// A stand of 60 Hz with a calibration and what else its file says.
 fn stand(more: &str) -> String {
@@ -33,6 +33,14 @@ fn codes(report: &Value) -> Vec<&str> {
     warnings.iter().filter_map(|w| w["code"].as_str()).collect()
 }
 
+/// The value of a constant that `identify` found.
+fn constant(report: &Value, name: &str) -> f64 {
+    let all = report["parameters"].as_array().expect("parameters");
+    let found = all.iter().find(|p| p["name"] == name);
+    let found = found.unwrap_or_else(|| panic!("{name} in {report}"));
+    found["value"].as_f64().expect("a number")
+}
+
 #[test]
 fn the_uncertainty_of_the_zero_is_stated() {
     let calibration =
@@ -43,7 +51,7 @@ fn the_uncertainty_of_the_zero_is_stated() {
     assert_close(report["zero_std"].as_f64().expect("a number"), 2.5, 1e-9);
     folder
         .run(&[&COMPENSATE[..], &["--force"]].concat())
-        .says(0, &["the zero adds 2.5 N m to every value"]);
+        .says(0, &["the zero adds 2.5 N m, the same for every sample"]);
 }
 
 #[test]
@@ -133,15 +141,8 @@ fn hum_is_not_taken_for_the_stand() {
         };
         folder.write("tap.csv", over_time("bridge_V", 5000.0, count, sample));
         let report = folder.json(&["identify", "decay", "tap.csv", "--json"]);
-        let of = |name: &str| {
-            let all = report["parameters"].as_array().expect("parameters");
-            let found = all.iter().find(|p| p["name"] == name);
-            found.unwrap_or_else(|| panic!("{name} in {report}"))["value"]
-                .as_f64()
-                .expect("a number")
-        };
-        assert_close(of("natural_frequency"), 180.0, 1e-3);
-        assert_close(of("damping_ratio"), 0.02, 0.03);
+        assert_close(constant(&report, "natural_frequency"), 180.0, 1e-3);
+        assert_close(constant(&report, "damping_ratio"), 0.02, 0.03);
         assert!(codes(&report).contains(&"mains-taken-off"), "{report}");
         let hum = |t: f64| sample(t) - tap(t);
         folder.write("hum.csv", over_time("bridge_V", 5000.0, count, hum));
@@ -176,6 +177,18 @@ fn a_fundamental_beside_the_line_is_said() {
         );
         assert!(warnings.contains("--refine"), "{warnings}");
     }
+    // Beyond the default span of --refine, the advice is one that works.
+    let report = run(29.1, 2.0);
+    let advice = "--refine --refine-span 5";
+    assert!(report["warnings"].to_string().contains(advice), "{report}");
+    let refine = |more: &str| {
+        let orders = ["30", "--orders", "1,2"].iter().copied();
+        let all = orders.chain(more.split(' ')).collect::<Vec<_>>();
+        folder.run(&[&HARMONICS[..], &all].concat())
+    };
+    refine("--refine").says(1, &["--refine-span searches further than 2 %"]);
+    let refined = refine(advice);
+    assert!(refined.stdout.contains("29.1"), "{}", refined.stdout);
     for seconds in [2.0, 10.0] {
         let report = run(30.0, seconds);
         assert!(!codes(&report).contains(&"fundamental-off"), "{report}");
@@ -207,4 +220,152 @@ fn a_changing_speed_is_said_and_a_load_step_is_none() {
     }
     assert!(changes(&|_| 5.0, &|t| 25.0 * t + 0.5 * t * t));
     assert!(changes(&|_| 5.0, &|t| 30.0 * t + 0.005 * t * t));
+}
+
+/// The first cycles of a decay are beyond the recorder's range: the rest has the frequency and the damping, with noise and
+/// without, where the digits of the file are all that is left.
+#[test]
+fn a_clipped_decay_is_fitted_behind_its_last_clipped_sample() {
+    let folder = Folder::new();
+    let omega = TAU * 590.0;
+    let decay = |t: f64| match t {
+        t if t < 0.2 => 0.0,
+        t => {
+            (-0.01 * omega * (t - 0.2)).exp() * (omega * (1.0_f64 - 1e-4).sqrt() * (t - 0.2)).sin()
+        }
+    };
+    for size in [5e-3, 0.0] {
+        let mut noise = crate::noise::Noise(7);
+        let rows = (0..16_000).map(|i| {
+            let value = decay(f64::from(i) / 8000.0) + size * noise.normal();
+            format!("{},{:.5e}\n", f64::from(i) / 8000.0, value.clamp(-0.5, 0.5))
+        });
+        let rows: String = rows.collect();
+        folder.write("tap.csv", format!("time_s,bridge_V\n{rows}"));
+        let report = folder.json(&["identify", "decay", "tap.csv", "--json"]);
+        assert!(codes(&report).contains(&"clipped"), "{report}");
+        // Several modes would be numbered.
+        assert_close(constant(&report, "natural_frequency"), 590.0, 1e-4);
+        assert_close(constant(&report, "damping_ratio"), 0.01, 0.01);
+    }
+}
+
+/// A torque that is upside down, or in mN m under a heading in N m, is no effect of the stand.
+#[test]
+fn a_wrong_sign_or_unit_is_no_effect() {
+    let folder = Folder::new();
+    folder.write(
+        "stand.toml",
+        "schema = \"torqcomp.stand/1\"\n[mechanics]\nnatural_frequency = \"590 Hz\"\ndamping_ratio = 0.07\n",
+    );
+    let parts: Vec<(f64, f64, f64)> = (1..150)
+        .map(|k| (0.05, 7.0 * f64::from(k), f64::from(k * k)))
+        .collect();
+    let (shown, acted) = steady(&parts, 8000.0, 8000);
+    let mut noise = crate::noise::Noise(9);
+    let noise: Vec<f64> = shown.iter().map(|_| 2e-3 * noise.normal()).collect();
+    let diagnose = |factor: f64| {
+        let pair = |i: usize| format!("{},{}", acted[i], factor * (shown[i] + noise[i]));
+        let rows: String = (0..8000)
+            .map(|i| format!("{},{}\n", i as f64 / 8000.0, pair(i)))
+            .collect();
+        folder.write("in.csv", format!("time_s,T [N m],M [N m]\n{rows}"));
+        let stand = ["diagnose", "--stand", "stand.toml", "--train", "in.csv"];
+        folder.run(&[&stand[..], &["--applied", "T", "--measured", "M"]].concat())
+    };
+    diagnose(-1.0).says(1, &["of the opposite sign", "change the sign"]);
+    diagnose(1000.0).says(1, &["is 1000 times", "check the unit"]);
+    diagnose(1e-3).says(1, &["is 0.001 times", "check the unit"]);
+    assert!(diagnose(1.0).stdout.starts_with("verdict: nothing-missing"));
+}
+
+/// A data sheet says 0.5 % of 12.5 N m/V; 2 % beside a damping ratio of 0.02 can be two things.
+#[test]
+fn uncertainties_in_percent_are_of_the_value() {
+    let folder = Folder::new();
+    let std_of = |std: &str| {
+        let more = format!(
+            "[calibration]\ntorque_per_volt = {{ value = \"12.5 N m/V\", std = \"{std}\" }}\n"
+        );
+        folder.write("stand.toml", stand(&more));
+        folder.write(
+            "in.csv",
+            over_time("bridge_V", 1000.0, 2000, |t| (TAU * t).sin()),
+        );
+        let report = folder.json(&[&COMPENSATE[..], &["--force", "--json"]].concat());
+        report["calibration_relative_std"]
+            .as_f64()
+            .expect("a number")
+    };
+    assert_close(std_of("0.5 %"), 0.005, 1e-12);
+    assert_close(std_of("0.0625 N m/V"), 0.005, 1e-12);
+    let ambiguous = "damping_ratio = { value = 0.02, std = \"2 %\" }";
+    folder.write(
+        "stand.toml",
+        stand("").replace("damping_ratio = 0.02", ambiguous),
+    );
+    folder
+        .run(&["table", "--stand", "stand.toml"])
+        .says(1, &["line 4", "write \"0.0004\"", "or \"0.02\""]);
+}
+
+/// A ripple of 2 mV at 1600 Hz on a stand of 60 Hz would be 710 times as much torque at rest: torque or a converter's pick-up?
+#[test]
+fn a_line_that_alone_decides_the_band_is_asked_about() {
+    let folder = Folder::new();
+    let calibration = "[calibration]\ntorque_per_volt = \"12.5 N m/V\"\n";
+    folder.write("stand.toml", stand(calibration));
+    let run = |ripple: f64, more: &[&str]| {
+        let mut noise = crate::noise::Noise(13);
+        let noise: Vec<f64> = (0..15_000).map(|_| 2e-4 * noise.normal()).collect();
+        let volts = |t: f64| {
+            let slow = 0.8 + 0.2 * (TAU * 7.0 * t).sin() + 0.05 * (TAU * 21.0 * t).cos();
+            slow + ripple * (TAU * 1600.0 * t).sin() + noise[(t * 5000.0).round() as usize]
+        };
+        folder.write("in.csv", over_time("bridge_V", 5000.0, 15_000, volts));
+        folder.json(&[&COMPENSATE[..], &["--force", "--json"], more].concat())
+    };
+    let message = |report: &Value| report["warnings"].to_string();
+    let asked = run(2e-3, &[]);
+    assert!(codes(&asked).contains(&"lines-decide-band"), "{asked}");
+    // 2 mV · 12.5 N m/V/√2 · (1600² / 60² − 1).
+    let torque = 2e-3 * 12.5 / 2.0_f64.sqrt() * ((1600.0_f64 / 60.0).powi(2) - 1.0);
+    let result = asked["result"]["rms"].as_f64().expect("a number");
+    assert_close(result, torque, 0.05);
+    let text = message(&asked);
+    let (_, band) = text.split_once("give --band ").expect("a band");
+    let digits = band.chars().take_while(|c| c.is_ascii_digit() || *c == '.');
+    let band: String = digits.collect();
+    // As the answer says: nothing of the ripple is left.
+    let without = run(2e-3, &["--band", &band]);
+    assert!(codes(&without).is_empty(), "{without}");
+    let slow = 12.5 * 0.5_f64.sqrt() * 0.2_f64.hypot(0.05);
+    assert_close(
+        without["result"]["rms"].as_f64().expect("a number"),
+        slow,
+        0.02,
+    );
+    // Far more than that is most likely a mistake.
+    assert!(codes(&run(0.1, &[])).contains(&"mostly-amplified"));
+    let plain = run(0.0, &[]);
+    assert!(codes(&plain).is_empty(), "{plain}");
+}
+
+/// The load comes after a second, and clips the record: 5000 samples in.
+#[test]
+fn what_happens_later_in_a_record_is_seen() {
+    let folder = Folder::new();
+    folder.write(
+        "stand.toml",
+        stand("[calibration]\ntorque_per_volt = \"12.5 N m/V\"\n"),
+    );
+    let load = |t: f64| if t < 1.0 { 0.1 } else { 1.0 };
+    let volts = |t: f64| (load(t) * (TAU * 7.0 * t).sin()).min(0.7);
+    folder.write("in.csv", over_time("bridge_V", 5000.0, 15_000, volts));
+    let report = folder.json(&[&COMPENSATE[..], &["--json"]].concat());
+    assert!(codes(&report).contains(&"clipped"), "{report}");
+    assert_eq!(report["looked_at"], 15_000);
+    folder.write("in.csv", over_time("bridge_V", 5000.0, 70_000, volts));
+    let ran = folder.run(&[&COMPENSATE[..], &["--force"]].concat());
+    ran.says(0, &["in the first 65536 samples"]);
 }

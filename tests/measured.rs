@@ -57,7 +57,7 @@ fn main() {
         test("silverbox_lacks_a_cubic_spring", closing::silverbox),
         test("boucwen_lacks_hysteresis", closing::bouc_wen),
         test("f16_depends_on_amplitude", closing::f16),
-        test("emps_is_sent_to_runup", closing::emps),
+        test("emps_lacks_dry_friction", closing::emps),
         test("swapped_channels_are_refused", closing::swapped),
         test(
             "torque_transducer_order_60_may_be_mains",

@@ -675,22 +675,19 @@ fn init_takes_the_uncertainties_that_are_given() {
         "stand.toml",
         "--force",
     ];
-    let stds = [
-        "--std",
-        "sensitivity=0.004 mV/V",
-        "--std",
-        "natural_frequency=2 Hz",
-    ];
     folder.write("in.csv", record("U [mV/V]", None, |c| c));
-    let ran = folder.run(&[&args[..], &stds].concat());
-    assert_eq!(ran.code, 0, "{}", ran.stderr);
-    let part = amplitude(&folder, &[]).1["components"][0].clone();
-    let stated = part["std_stand"].as_f64().unwrap() / part["torque"].as_f64().unwrap();
-    let response = part["std_response"].as_f64().unwrap() / part["torque"].as_f64().unwrap();
-    assert!(
-        (stated - 0.002_f64.hypot(response)).abs() < 1e-9 && response > 0.0,
-        "{stated} {response}"
-    );
+    for sensitivity in ["sensitivity=0.004 mV/V", "sensitivity=0.2 %"] {
+        let stds = ["--std", sensitivity, "--std", "natural_frequency=2 Hz"];
+        let ran = folder.run(&[&args[..], &stds].concat());
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        let part = amplitude(&folder, &[]).1["components"][0].clone();
+        let relative = |of: &str| part[of].as_f64().unwrap() / part["torque"].as_f64().unwrap();
+        let (stated, response) = (relative("std_stand"), relative("std_response"));
+        assert!(
+            (stated - 0.002_f64.hypot(response)).abs() < 1e-9 && response > 0.0,
+            "{sensitivity}: {stated} {response}"
+        );
+    }
     folder.run(&args);
     let text = folder.read("stand.toml");
     let lines = text.lines().filter(|line| !line.starts_with('#'));
@@ -701,7 +698,7 @@ fn init_takes_the_uncertainties_that_are_given() {
         ("sensitivty=1 mV/V", "--sensitivty is not given"),
         ("gain=1", "--gain is not given"),
         ("rated-torque=1 V", "torque"),
-        ("sensitivity=0.1 %", "sensitivity"),
+        ("sensitivity=0.1 V", "ratio"),
         ("sensitivity", "FLAG=QUANTITY"),
     ] {
         let ran = folder.run(&[&args[..], &["--std", std]].concat());

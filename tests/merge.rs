@@ -91,7 +91,9 @@ fn parts_merged_are_the_table_of_one_run_byte_for_byte() {
     assert!(!pattern.stderr.contains("10 recordings of"));
     // That of the one run is complete by itself.
     assert_eq!(folder.run(&["merge", "one"]).stdout, table);
-    folder.run(&MERGE).says(1, &["merged.csv exists"]);
+    folder
+        .run(&MERGE)
+        .says(1, &["merged.csv: the output exists"]);
 }
 
 #[test]

@@ -17,8 +17,8 @@ fn orders_above_the_band_of_a_compensated_record_are_said() {
     let folder = Folder::new();
     folder.write("in.csv", record(&shown, 20_000.0));
     for (band, said) in [
-        ("300", Some("orders 4, 5, 6, 7, 8, 9 lie above")),
-        ("510", Some("orders 6, 7, 8, 9 lie above")),
+        ("300", Some("left of orders 4, 5, 6, 7, 8 and 9")),
+        ("510", Some("left of orders 6, 7, 8 and 9")),
         ("1000", None),
     ] {
         let compensate = ["compensate", "in.csv", "--stand", "stand.toml", "-q"];

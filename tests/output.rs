@@ -20,7 +20,9 @@ fn an_existing_output_is_kept_without_force() {
     let folder = folder();
     folder.write("out.csv", "precious\n");
     let args = [&COMPENSATE[..], &["-o", "out.csv"]].concat();
-    folder.run(&args).says(1, &["out.csv exists", "--force"]);
+    folder
+        .run(&args)
+        .says(1, &["out.csv: the output exists", "--force"]);
     assert_eq!(folder.read("out.csv"), "precious\n");
     let forced = [&args[..], &["--force"]].concat();
     assert_eq!(folder.run(&forced).code, 0);
@@ -319,7 +321,7 @@ fn a_link_to_nothing_stays_one() {
     std::fs::create_dir(folder.path("sub")).unwrap();
     std::os::unix::fs::symlink("sub/new.csv", folder.path("link.csv")).unwrap();
     let args = [&COMPENSATE[..], &["-o", "link.csv"]].concat();
-    folder.run(&args).says(1, &["link.csv exists"]);
+    folder.run(&args).says(1, &["link.csv: the output exists"]);
     let forced = [&args[..], &["--force"]].concat();
     assert_eq!(folder.run(&forced).code, 0);
     assert!(folder.path("link.csv").is_symlink());

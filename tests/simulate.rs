@@ -71,6 +71,39 @@ fn held_samples_are_simulated_as_they_are() {
     assert!(relative < 1e-3, "{relative:e}");
 }
 
+/// One period of a sum of sines from phase 0 on: the steady answer has each line by the response of the stand, in closed
+/// form, from the first sample to the last.
+#[test]
+fn a_period_that_is_repeated_has_its_steady_answer() {
+    let folder = Folder::new();
+    folder.write("stand.toml", STAND);
+    let applied = input(5, 2000);
+    folder.write("record.csv", record(&applied, &applied));
+    let args = [&SIMULATE[..], &["--periodic", "-o", "answer.csv", "--json"]].concat();
+    let report = folder.json(&args);
+    assert_eq!(report["is_steady"], true);
+    let (_, rows) = table(&folder.read("answer.csv"));
+    assert_eq!(rows.len(), 2000);
+    let answer = |i: usize| {
+        let line = |k: u32| {
+            let turns = f64::from(4 * k) / 2000.0;
+            let ratio = turns * RATE_HZ / 600.0;
+            let (re, im) = (1.0 - ratio * ratio, 2.0 * 0.08 * ratio);
+            let phase = f64::from(k * k * 5 % 97) - im.atan2(re);
+            (TAU * turns * i as f64 + phase).cos() / re.hypot(im)
+        };
+        (1..=36).map(line).sum::<f64>() / 6.0
+    };
+    for (i, row) in rows.iter().enumerate() {
+        assert!(
+            (row[1] - answer(i)).abs() < 1e-4,
+            "{i}: {} {}",
+            row[1],
+            answer(i)
+        );
+    }
+}
+
 /// A diagnosis of held inputs whose answers are recorded too large by a factor.
 fn diagnosed_as_held(factor: f64) -> serde_json::Value {
     let folder = Folder::new();

@@ -15,6 +15,7 @@ mod diagnose;
 #[cfg(debug_assertions)] // optimised builds have no faults on purpose
 mod faults;
 mod first_moves;
+mod free_body;
 mod golden;
 mod harmonics;
 mod identify;
@@ -36,6 +37,7 @@ mod rates;
 mod recordings;
 mod refined;
 mod reports;
+mod schema;
 mod simulate;
 mod stated_std;
 mod table;

@@ -5,7 +5,7 @@ use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
 use super::content;
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::Input;
 
 /// A recording to read.
@@ -52,7 +52,9 @@ impl Listing {
     ) -> Result<(), Failure> {
         if input == "-" {
             return Err(Failure::usage(
-                "standard input is one recording and has no name; name files, or give --files-from - for a list of paths",
+                ErrorCode::MissingArgument,
+                "standard input is one recording and has no name; name files, or give --files-from - for a list of \
+                 paths",
             ));
         }
         let path = Path::new(input);
@@ -87,11 +89,11 @@ impl Listing {
                 false => line.strip_suffix(b"\r").unwrap_or(line),
             };
             let path = std::str::from_utf8(line).map_err(|_| {
-                Failure::failed(format_args!(
-                    "{}: path {} is not UTF-8; rename the file",
-                    input.name(),
-                    i + 1
-                ))
+                Failure::failed(
+                    ErrorCode::CannotRead,
+                    format_args!("path {} is not UTF-8; rename the file", i + 1),
+                )
+                .at(input.name())
             })?;
             if path.is_empty() {
                 continue;
@@ -129,9 +131,11 @@ impl Listing {
                 "none of its files ({count}) begins as a table of numbers or an MCAP file does"
             ),
         };
-        Failure::failed(format_args!(
-            "{folder}: no recordings found: {rest}; check the path"
-        ))
+        Failure::failed(
+            ErrorCode::NotFound,
+            format_args!("no recordings found: {rest}; check the path"),
+        )
+        .at(folder)
     }
 
     /// Adds the files that a pattern matches; hidden ones only if it names their point.
@@ -141,8 +145,9 @@ impl Listing {
             require_literal_separator: true,
             require_literal_leading_dot: true,
         };
-        let matches = glob::glob_with(pattern, options)
-            .map_err(|error| Failure::usage(format_args!("{pattern}: no pattern: {error}")))?;
+        let matches = glob::glob_with(pattern, options).map_err(|error| {
+            Failure::usage(ErrorCode::InvalidValue, format_args!("no pattern: {error}")).at(pattern)
+        })?;
         let is_fixed = |part: &Component| !part.as_os_str().to_string_lossy().contains(PATTERN);
         let root: PathBuf = Path::new(pattern)
             .components()
@@ -159,9 +164,10 @@ impl Listing {
             }
         }
         match self.files.len() == before {
-            true => Err(Failure::failed(format_args!(
-                "{pattern}: matches no file; check the pattern"
-            ))),
+            true => Err(
+                Failure::failed(ErrorCode::NotFound, "matches no file; check the pattern")
+                    .at(pattern),
+            ),
             false => Ok(()),
         }
     }
@@ -227,10 +233,11 @@ impl Listing {
             (Some(text), Some(parts)) => self.push(text, parts.join("/")),
             _ => self.add_problem(
                 path,
-                Failure::failed(format_args!(
-                    "{}: the name is not UTF-8; rename the file",
-                    path.display()
-                )),
+                Failure::failed(
+                    ErrorCode::CannotRead,
+                    "the name is not UTF-8; rename the file",
+                )
+                .at(path.display()),
             ),
         }
     }

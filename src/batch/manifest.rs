@@ -5,6 +5,7 @@ use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::cli::many::Shard;
@@ -14,59 +15,64 @@ use crate::outcome::RecordFigures;
 use crate::warning::Warning;
 
 /// Name and version of a line.
-const SCHEMA: &str = "torqcomp.manifest/1";
+pub(crate) const SCHEMA: &str = "torqcomp.manifest/1";
 /// How every manifest begins.
 pub(super) const BEGINNING: &str = "{\"schema\":\"torqcomp.manifest/";
 /// Beginning and end of the name of a manifest in the folder of results.
 const NAME: [&str; 2] = ["torqcomp-manifest", ".jsonl"];
 
 /// What one recording became.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema, Deserialize)]
 pub(crate) struct ManifestEntry {
+    /// Name and version of the form of this line.
     pub(super) schema: String,
-    /// That of torqcomp.
+    /// Version of torqcomp.
     pub(super) version: String,
     #[serde(flatten)]
     pub(super) made_by: MadeBy,
     /// Path of the recording below its root, the folders separated by `/`.
     pub(super) file: String,
-    /// Its path as given.
+    /// Path of the recording as given.
     pub(super) input: String,
     #[serde(flatten)]
     pub(super) made_from: MadeFrom,
+    /// The results.
     pub(super) outputs: Vec<OutputSum>,
     /// Exit code that a run over this recording alone has.
     pub(super) exit: u8,
-    /// Why it failed, if it did.
+    /// Why the recording failed; `null` if it did not.
     pub(super) error: Option<String>,
+    /// Warnings, each with a stable code.
     pub(super) warnings: Vec<NotedWarning>,
     #[serde(flatten)]
     pub(super) figures: RecordFigures,
-    /// Time that it took.
+    /// Time that the recording took, in s.
     pub(super) seconds: f64,
 }
 
 /// What a run over many recordings is about to do: the line before those of its recordings.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema, Deserialize)]
 pub(crate) struct RunBegin {
+    /// Name and version of the form of this line.
     pub(super) schema: String,
-    /// That of torqcomp.
+    /// Version of torqcomp.
     pub(super) version: String,
     #[serde(flatten)]
     pub(super) made_by: MadeBy,
     /// Which part of the recordings, as `3/8`; `None` if all.
     pub(super) shard: Option<String>,
-    /// All recordings of which it is a part.
+    /// All recordings of the job.
     pub(super) all: WholeList,
-    /// Its recordings, by their paths below their roots.
+    /// Recordings of this run, by their paths below their roots.
     pub(super) files: Vec<String>,
 }
 
 /// All recordings of a job, without their names: the same of all its parts, if they saw the same recordings.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema, Deserialize)]
 pub(crate) struct WholeList {
+    /// Number of recordings.
     pub(super) recordings: usize,
-    /// SHA-256 of their paths below their roots, sorted, a zero byte behind each.
+    /// SHA-256 of the paths of the recordings below their roots, sorted, a zero byte behind each.
     pub(super) sha256: String,
 }
 
@@ -83,19 +89,20 @@ impl WholeList {
 }
 
 /// That a run has come to its end: the line after those of its recordings.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema, Deserialize)]
 pub(crate) struct RunEnd {
+    /// Name and version of the form of this line.
     pub(super) schema: String,
-    /// That of torqcomp.
+    /// Version of torqcomp.
     pub(super) version: String,
-    /// The recordings whose results were there; their lines are those of a run before.
+    /// Recordings whose results were there, by their paths; their lines are those of an earlier run.
     pub(super) skipped: Vec<String>,
 }
 
 /// A line of a manifest.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(untagged)]
-pub(super) enum ManifestLine {
+pub(crate) enum ManifestLine {
     Entry(Box<ManifestEntry>),
     Begin(RunBegin),
     End(RunEnd),
@@ -115,33 +122,40 @@ impl ManifestLine {
 }
 
 /// A verb and its options.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema, Deserialize)]
 pub(crate) struct MadeBy {
+    /// The verb.
     pub(super) verb: String,
-    /// Those given that a result may depend on.
+    /// The options given that a result may depend on.
     pub(super) options: Vec<String>,
 }
 
 /// The content that a result was made from; `None` where it could not be read, or where no stand is needed.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema, Deserialize)]
 pub(crate) struct MadeFrom {
+    /// SHA-256 of the recording; `null` if it could not be read.
     pub(super) input_sha256: Option<String>,
+    /// Path of the stand file; `null` without one.
     pub(super) stand: Option<String>,
+    /// SHA-256 of the stand file; `null` without one.
     pub(super) stand_sha256: Option<String>,
 }
 
 /// A result.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema, Deserialize)]
 pub(crate) struct OutputSum {
-    /// Its path below the folder of the results.
+    /// Path of the result below the folder of the results.
     pub(super) file: String,
+    /// SHA-256 of the result.
     pub(super) sha256: String,
 }
 
 /// A warning as it was said.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema, Deserialize)]
 pub(crate) struct NotedWarning {
+    /// Stable code of the warning.
     pub(super) code: String,
+    /// The warning for people.
     pub(super) message: String,
 }
 

@@ -4,13 +4,14 @@ use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::PathBuf;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::last_run::LastRun;
 use super::manifest::{MadeFrom, ManifestEntry};
 use super::summary;
 use crate::cli::many::Shard;
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::outcome::Outcome;
 use crate::print::{Report, plural};
 
@@ -18,26 +19,32 @@ use crate::print::{Report, plural};
 const SUM_DIGITS: usize = 12;
 
 /// What several runs of one job made, together.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub(crate) struct Merged {
-    /// The verb of the job; `None` without a run.
+    /// The verb of the job; `null` without a run.
     verb: Option<String>,
+    /// Paths of the manifests.
     manifests: Vec<String>,
+    /// Number of recordings.
     recordings: usize,
+    /// Recordings that failed.
     failed: usize,
-    /// Recordings that are in two manifests with the same result.
+    /// Recordings that are in several manifests with the same result, counted once.
     repeated: usize,
+    /// What keeps the runs from being one finished job.
     problems: Vec<MergeProblem>,
-    /// In the order of folders and names.
+    /// Lines of the recordings, in the order of folders and names.
     files: Vec<ManifestEntry>,
 }
 
 /// Why the runs are not one job that is done.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct MergeProblem {
+    /// Stable code of the problem.
     code: &'static str,
-    /// The manifest that it is about; `None` if it is about all.
+    /// Path of the manifest that the problem is about; `null` if it is about all.
     manifest: Option<String>,
+    /// The problem for people.
     message: String,
 }
 
@@ -95,10 +102,13 @@ impl Merged {
     pub(crate) fn table(&self) -> Result<Vec<u8>, Failure> {
         match self.problems.len() {
             0 => Ok(summary::csv(self.files.iter())),
-            count => Err(Failure::failed(format_args!(
-                "the manifests are not one finished job ({}, listed above); no table was written",
-                plural(count as u64, "problem")
-            ))),
+            count => Err(Failure::failed(
+                ErrorCode::ManifestsDiffer,
+                format_args!(
+                    "the manifests are not one finished job ({}, listed above); no table was written",
+                    plural(count as u64, "problem")
+                ),
+            )),
         }
     }
 

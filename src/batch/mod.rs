@@ -18,7 +18,13 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
+#[cfg(test)]
+pub(crate) use self::manifest::ManifestLine;
+pub(crate) use self::manifest::SCHEMA as MANIFEST_SCHEMA;
 pub(crate) use self::merge::Merged;
+#[cfg(test)]
+pub(crate) use self::summary::BatchReport;
+pub(crate) use self::summary::SCHEMA as BATCH_SCHEMA;
 
 use self::list::Listing;
 use self::manifest::{MadeFrom, Manifest, ManifestEntry, NotedWarning, OutputSum, RunEnd};
@@ -27,7 +33,7 @@ use self::plan::{BatchFile, BatchPlan};
 use self::progress::{Amount, BatchProgress};
 use self::summary::{BatchResult, Treated};
 use crate::cli::{BatchOptions, OutputArgs};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::output::{self, Output, end_of_links};
 use crate::outcome::{Made, Outcome};
 use crate::{parallel, print};
@@ -110,10 +116,11 @@ pub(crate) fn manifests(paths: &[String]) -> Result<Vec<PathBuf>, Failure> {
         }
         let inside = manifest::in_folder(&path);
         if inside.is_empty() {
-            return Err(Failure::failed(format_args!(
-                "{}: no manifest in this folder; name the manifests, or the folder of the results",
-                path.display()
-            )));
+            return Err(Failure::failed(
+                ErrorCode::NotFound,
+                "no manifest in this folder; name the manifests, or the folder of the results",
+            )
+            .at(path.display()));
         }
         found.extend(inside);
     }
@@ -330,7 +337,9 @@ fn sums(outputs: &[Output], folder: &Path) -> Result<Vec<OutputSum>, Failure> {
 }
 
 fn internal_error(input: &str) -> Failure {
-    Failure::failed(format_args!(
-        "{input}: internal error, as said above; please report it with this recording"
-    ))
+    Failure::failed(
+        ErrorCode::InternalError,
+        "internal error, as said above; please report it with this recording",
+    )
+    .at(input)
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::BatchTask;
 use super::list::{FoundFile, Listing};
 use super::manifest::{self, History, MadeBy, MadeFrom, ManifestEntry, RunBegin, WholeList};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::output::end_of_links;
 use crate::parallel::cores;
 
@@ -114,10 +114,13 @@ impl<'a> BatchPlan<'a> {
         let beside = task.beside.iter().map(|(option, path)| {
             let text = path.to_str().unwrap_or_default();
             crate::cli::many::template(text).map_err(|expected| {
-                Failure::usage(format_args!(
-                    "{option} {}: of many recordings each has its own, in the folder of -o: {expected}",
-                    path.display()
-                ))
+                Failure::usage(
+                    ErrorCode::ConflictingArguments,
+                    format_args!(
+                        "{option} {}: of many recordings each has its own, in the folder of -o: {expected}",
+                        path.display()
+                    ),
+                )
             })
         });
         let beside = beside.collect::<Result<Vec<String>, Failure>>()?;
@@ -146,16 +149,22 @@ impl<'a> BatchPlan<'a> {
             for output in &file.outputs {
                 let path = &file.found.path;
                 if let Some(other) = owners.insert(output, path) {
-                    return Err(Failure::usage(format_args!(
-                        "{other} and {path} would both become {output}; give --name '{{name}}…' if they differ in their \
-                         endings, or one folder that holds both, so that its tree is kept"
-                    )));
+                    return Err(Failure::usage(
+                        ErrorCode::ConflictingArguments,
+                        format_args!(
+                            "{other} and {path} would both become {output}; give --name '{{name}}…' if they differ \
+                             in their endings, or one folder that holds both, so that its tree is kept"
+                        ),
+                    ));
                 }
                 if let Some(input) = inputs.get(&end_of_links(&self.folder.join(output))) {
-                    return Err(Failure::usage(format_args!(
-                        "the result of {path} would take the place of the recording {input}; give another --name, or \
-                         another folder with -o"
-                    )));
+                    return Err(Failure::usage(
+                        ErrorCode::ConflictingArguments,
+                        format_args!(
+                            "the result of {path} would take the place of the recording {input}; give another \
+                             --name, or another folder with -o"
+                        ),
+                    ));
                 }
             }
         }
@@ -245,7 +254,7 @@ impl<'a> BatchPlan<'a> {
 /// The folder of the results.
 fn folder(task: &BatchTask) -> Result<PathBuf, Failure> {
     let Some(text) = task.result.output.as_deref().filter(|text| *text != "-") else {
-        return Err(Failure::usage(NEED_FOLDER));
+        return Err(Failure::usage(ErrorCode::MissingArgument, NEED_FOLDER));
     };
     let path = Path::new(text);
     let is_file = match std::fs::metadata(path) {
@@ -253,9 +262,10 @@ fn folder(task: &BatchTask) -> Result<PathBuf, Failure> {
         Err(_) => !text.ends_with(std::path::is_separator) && path.extension().is_some(),
     };
     match is_file {
-        true => Err(Failure::usage(format_args!(
-            "{NEED_FOLDER} ({text} names a file)"
-        ))),
+        true => Err(Failure::usage(
+            ErrorCode::MissingArgument,
+            format_args!("{NEED_FOLDER} ({text} names a file)"),
+        )),
         false => Ok(path.to_owned()),
     }
 }

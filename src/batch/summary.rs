@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::Path;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::manifest::{ManifestEntry, NotedWarning};
 use super::plan::BatchPlan;
 use super::progress::{Amount, rate};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::output::{self, Output};
 use crate::io::storage::Stored;
 use crate::outcome::Outcome;
@@ -35,14 +36,37 @@ const DIGITS: u32 = 12;
 /// Most files of one kind whose names are said.
 const LISTED: usize = 10;
 
+/// Name and version of the document of a run.
+pub(crate) const SCHEMA: &str = "torqcomp.batch/1";
+
 /// What became of a recording.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[serde(tag = "status", rename_all = "lowercase")]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[serde(into = "TreatedEntry")]
+#[schemars(from = "TreatedEntry")]
 pub(super) enum Treated {
     /// It was worked on, well or not.
     Made(ManifestEntry),
     /// Its results were there.
     Skipped(ManifestEntry),
+}
+
+/// A recording in the document of a run.
+#[derive(Serialize, JsonSchema)]
+struct TreatedEntry {
+    /// `made` (worked on, well or not), or `skipped`: the results were there.
+    status: &'static str,
+    #[serde(flatten)]
+    entry: ManifestEntry,
+}
+
+impl From<Treated> for TreatedEntry {
+    fn from(treated: Treated) -> Self {
+        let (status, entry) = match treated {
+            Treated::Made(entry) => ("made", entry),
+            Treated::Skipped(entry) => ("skipped", entry),
+        };
+        Self { status, entry }
+    }
 }
 
 impl Treated {
@@ -75,23 +99,30 @@ pub(super) struct BatchResult<'a> {
     pub(super) seconds: f64,
 }
 
-/// The document of a run.
-#[derive(Serialize)]
-struct BatchReport<'a> {
-    schema: &'static str,
-    version: &'static str,
+/// A run over many recordings.
+#[derive(Serialize, JsonSchema)]
+pub(crate) struct BatchReport<'a> {
+    /// The verb.
     verb: &'a str,
     /// Folder of the results.
     output: String,
+    /// Path of the manifest.
     manifest: String,
+    /// Number of recordings.
     recordings: usize,
+    /// Recordings that were worked on with success.
     made: usize,
+    /// Recordings whose results were there.
     skipped: usize,
+    /// Recordings that failed.
     failed: usize,
+    /// Recordings that were not begun, after failures.
     not_begun: usize,
+    /// Time that the run took, in s.
     seconds: f64,
     /// Files of folders that are no recordings by their content.
     left_out: &'a [String],
+    /// Lines of the recordings that were begun, with what became of each.
     files: Vec<&'a Treated>,
 }
 
@@ -107,7 +138,7 @@ impl BatchResult<'_> {
         }
         let task = self.plan.task;
         if task.as_json {
-            output::print(&print::json(&self.report()))?;
+            output::print(&print::document(SCHEMA, &self.report()))?;
         } else if !task.is_quiet {
             print::say(&self.text());
         }
@@ -135,8 +166,6 @@ impl BatchResult<'_> {
         let (skipped, failed, not_begun) =
             (self.skipped(), failed(self.entries()), self.not_begun());
         BatchReport {
-            schema: "torqcomp.batch/1",
-            version: env!("CARGO_PKG_VERSION"),
             verb: self.plan.task.verb,
             output: self.plan.folder.display().to_string(),
             manifest: self.plan.manifest.display().to_string(),
@@ -223,15 +252,18 @@ pub(super) fn ended<'a>(
     let failed = failed(entries.clone());
     if failed > 0 {
         let count = entries.count() + not_begun;
-        return Err(Failure::failed(format_args!(
-            "{} of {} failed{}",
-            failed,
-            plural(count as u64, "recording"),
-            match not_begun {
-                0 => "; the others are done".to_owned(),
-                count => format!(", {count} were not begun"),
-            }
-        )));
+        return Err(Failure::failed(
+            ErrorCode::RecordingsFailed,
+            format_args!(
+                "{} of {} failed{}",
+                failed,
+                plural(count as u64, "recording"),
+                match not_begun {
+                    0 => "; the others are done".to_owned(),
+                    count => format!(", {count} were not begun"),
+                }
+            ),
+        ));
     }
     match entries.into_iter().any(|entry| entry.exit != 0) {
         true => Ok(Outcome::WithLoss),

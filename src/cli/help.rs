@@ -88,6 +88,7 @@ const GROUPS: [(&str, &[&str]); 7] = [
             "modes",
             "orders",
             "period",
+            "periodic",
             "refine",
             "refine-span",
             "segment",
@@ -315,6 +316,13 @@ const EXAMPLES: &[(&str, [&str; 2])] = &[
             "torqcomp man -o ~/.local/share/man/man1/",
         ],
     ),
+    (
+        "schema",
+        [
+            "torqcomp schema harmonics",
+            "torqcomp schema error -o error.schema.json",
+        ],
+    ),
 ];
 
 /// The command line with its help as people read it.
@@ -323,14 +331,16 @@ pub fn command() -> Command {
     grouped("", Cli::command())
 }
 
-/// Reads the command line of the process; help, version and mistakes end it.
-#[must_use]
-pub fn parse() -> Cli {
+/// Reads the command line of the process.
+///
+/// # Errors
+/// For help, version and mistakes.
+pub(crate) fn parse() -> Result<Cli, clap::Error> {
     let command = command();
-    let matches = command.clone().get_matches();
-    let mut cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    let matches = command.clone().try_get_matches()?;
+    let mut cli = Cli::from_arg_matches(&matches)?;
     cli.options = options(&command, &matches);
-    cli
+    Ok(cli)
 }
 
 /// The options given that a result may depend on, in the order of their names.

@@ -29,3 +29,16 @@ pub struct Man {
     #[command(flatten)]
     pub result: OutputArgs,
 }
+
+/// Arguments of `schema`.
+///
+/// Without a document, the list of them.
+#[derive(Debug, Args)]
+pub struct Schema {
+    /// Verb, or batch (many recordings), error or manifest
+    #[arg(value_name = "DOCUMENT")]
+    pub document: Option<String>,
+    /// The schema.
+    #[command(flatten)]
+    pub result: OutputArgs,
+}

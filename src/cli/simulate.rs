@@ -29,6 +29,10 @@ pub struct Simulate {
     /// Course of the applied quantity between its samples
     #[arg(long, value_enum, default_value = "band-limited")]
     pub between: Between,
+    /// The recording is one period of the applied quantity, or a whole number of them: give the answer to it once it
+    /// has been repeated until the motion is steady
+    #[arg(long)]
+    pub periodic: bool,
     /// Unit of the applied quantity, if its heading does not say
     #[arg(long, value_name = "UNIT")]
     pub unit: Option<String>,

@@ -17,11 +17,12 @@ use torqcomp_dsp::compensate::InverseFilter;
 use torqcomp_dsp::noise::NoiseGain;
 
 use self::band::{BandReport, Wanted};
-use self::report::{CompensateReport, NoiseAt, NoiseReport};
+pub(super) use self::report::CompensateReport;
+use self::report::{NoiseAt, NoiseReport};
 use self::sink::Sink;
 use super::{judged, unit_text, warned};
 use crate::cli::{self, OneChannel};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::identify::Motion;
 use crate::inverse::ChainInverse;
 use crate::io::{Input, already_compensated};
@@ -66,6 +67,7 @@ struct Seen {
 pub fn work(args: &cli::Compensate) -> Result<Made, Failure> {
     if args.json && args.result.is_stdout() {
         return Err(Failure::usage(
+            ErrorCode::ConflictingArguments,
             "--json and the samples both go to standard output; give the samples a file with -o",
         ));
     }
@@ -115,12 +117,16 @@ pub fn work(args: &cli::Compensate) -> Result<Made, Failure> {
 fn refuse_derivative(stand: &Stand) -> Result<(), Failure> {
     match stand.mechanics()?.measures {
         Motion::Displacement => Ok(()),
-        other => Err(Failure::failed(format_args!(
-            "{}: [mechanics] measures says {}, which holds no constant torque, so that no torque over time comes out of it; \
-             use harmonics for the torques at single frequencies, or record displacement, strain or torque",
-            stand.file,
-            other.name()
-        ))),
+        other => Err(Failure::failed(
+            ErrorCode::NotInvertible,
+            format_args!(
+                "[mechanics] measures says {}, which holds no constant torque, so that no torque over time comes out \
+                 of it; use harmonics for the torques at single frequencies, or record displacement, strain or \
+                 torque",
+                other.name()
+            ),
+        )
+        .at(&stand.file)),
     }
 }
 

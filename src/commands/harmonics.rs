@@ -7,7 +7,9 @@ mod text;
 use std::path::Path;
 
 use num_complex::Complex64;
+use schemars::JsonSchema;
 use serde::Serialize;
+use torqcomp_dsp::Error;
 use torqcomp_dsp::compensate::Inverse;
 use torqcomp_dsp::harmonics::{self, Fundamental, refine_fundamental};
 use torqcomp_dsp::store::SampleStore;
@@ -15,10 +17,10 @@ use torqcomp_model::{InverseUncertainty, UnitSystem};
 
 use super::{judged, unit_text, warned};
 use crate::cli::{self, OneChannel};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::{COMPENSATED, Input};
 use crate::outcome::{Made, RecordFigures};
-use crate::print::{Report, short};
+use crate::print::{Report, enumeration, short};
 use crate::quality::excerpt;
 use crate::recording::moment::Moment;
 use crate::recording::{ChannelStream, Spool, UniformRecord};
@@ -32,70 +34,81 @@ const FAR_FROM_ZERO: f64 = 10.0;
 /// Orders of the mains that are looked at.
 const MAINS_LINES: f64 = 5.0;
 
-/// Report of a fit.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct HarmonicsReport {
+/// Component torques at a fundamental and its orders.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub(super) struct HarmonicsReport {
+    /// Path of the recording.
     input: String,
+    /// Name of the channel.
     channel: String,
-    /// Its unit in the file.
+    /// Unit of the channel in the recording.
     channel_unit: String,
     /// `recorded` where the stand's response is divided out, `compensated` where that was done before.
     taken_as: &'static str,
-    /// `null` for a compensated record.
+    /// Path of the stand file; `null` for a compensated record.
     stand: Option<String>,
     /// How the record became torque at rest.
     calibration: String,
-    /// Relative standard uncertainty of the constant of that; `null` if unknown, or if there is none.
+    /// Relative standard uncertainty of the constant of the calibration; `null` if unknown, or if there is none.
     calibration_relative_std: Option<f64>,
     /// Unit of `mean`, `recorded`, `torque`, `std` and `residual_rms`.
     unit: String,
+    /// Number of samples.
     samples: usize,
+    /// Sampling rate, in Hz.
     rate_hz: f64,
-    /// Its standard uncertainty by the stamps; `null` if it does not come from stamps.
+    /// Standard uncertainty of the rate by the time stamps, in Hz; `null` if the rate does not come from stamps.
     rate_std_hz: Option<f64>,
+    /// Length of the record, in s.
     duration_s: f64,
+    /// Fundamental frequency, in Hz.
     fundamental_hz: f64,
-    /// Its standard uncertainty, if it was found from the data.
+    /// Standard uncertainty of the fundamental, in Hz; `null` if it was given.
     fundamental_std_hz: Option<f64>,
-    /// Time that phases refer to, on the time axis of the record.
+    /// Time that phases refer to, on the time axis of the record, in s.
     phase_reference_s: f64,
-    /// The same with all its digits.
+    /// Time that phases refer to, with all its digits.
     phase_reference: String,
     /// Time of the first sample.
     #[serde(flatten)]
     start: Moment,
-    /// The constant part of the torque.
+    /// Constant part of the torque, in `unit`.
     mean: f64,
+    /// The component torques, by order.
     components: Vec<ComponentTorque>,
-    /// What the fit leaves over, rms, as recorded.
+    /// Rms of what the fit leaves of the record, in `unit`.
     residual_rms: f64,
+    /// Warnings, each with a stable code.
     warnings: Vec<Warning>,
     #[serde(skip)]
     constant: ConstantStd,
 }
 
 /// A component torque `A cos(2πft + φ)`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 struct ComponentTorque {
     /// Frequency over the fundamental.
     order: f64,
+    /// Frequency, in Hz.
     frequency_hz: f64,
+    /// Recorded amplitude, in `unit`.
     recorded: f64,
+    /// Phase of the recorded component, in degrees.
     recorded_phase_deg: f64,
-    /// Amplitude that acted over the recorded one.
+    /// Amplitude that acted over the recorded amplitude.
     factor: f64,
-    /// Amplitude of the torque that acted.
+    /// Amplitude of the torque that acted, in `unit`.
     torque: f64,
-    /// Phase of the torque that acted.
+    /// Phase of the torque that acted, in degrees.
     phase_deg: f64,
-    /// Standard uncertainty of `torque` from the noise of the record.
+    /// Standard uncertainty of `torque` from the noise of the record, in `unit`.
     std: f64,
     /// Standard uncertainty of `phase_deg` from the noise; `null` if the component is lost in it.
     phase_std_deg: Option<f64>,
     /// Standard uncertainty of `torque` from the stand's constants and the calibration; `null` if that of one of them is
     /// unknown.
     std_stand: Option<f64>,
-    /// The same from the response that is divided out alone; `null` if its constants have none.
+    /// Part of `std_stand` from the response that is divided out; `null` if its constants have no uncertainties.
     std_response: Option<f64>,
     /// Standard uncertainty of `phase_deg` from the stand's constants; `null` if they have none.
     phase_std_stand_deg: Option<f64>,
@@ -156,11 +169,15 @@ impl WayBack {
             return Ok(Self { chain, stand: None });
         }
         let stand = stand.ok_or_else(|| {
-            Failure::usage(format_args!(
-                "{}: \"{}\" is taken as recorded, with the stand's response in it; give --stand FILE (only a \
-                 channel marked \"{COMPENSATED}\", a result of compensate, needs none)",
-                stream.source, stream.name
-            ))
+            Failure::usage(
+                ErrorCode::MissingArgument,
+                format_args!(
+                    "\"{}\" is taken as recorded, with the stand's response in it; give --stand FILE (only a channel \
+                     marked \"{COMPENSATED}\", a result of compensate, needs none)",
+                    stream.name
+                ),
+            )
+            .at(&stream.source)
         })?;
         stand.mechanics()?;
         let chain = stand.calibration(stream.channel(), units)?;
@@ -204,6 +221,26 @@ fn phase_reference(start: Moment, duration_s: f64) -> (Moment, f64) {
     }
 }
 
+/// The fundamental that fits the record best, near the given one.
+fn refined(
+    args: &cli::Harmonics,
+    record: &UniformRecord<Spool>,
+    orders: &[f64],
+) -> Result<Fundamental, Failure> {
+    let (given_hz, span) = (args.fundamental, 0.01 * args.refine_span);
+    let found = refine_fundamental(&record.samples, record.rate_hz, given_hz, span, orders);
+    found.map_err(|error| match error {
+        Error::NotRefined { .. } => Failure::failed(
+            ErrorCode::NotIdentifiable,
+            format_args!(
+                "{error}; --refine-span searches further than {} % around it",
+                short(args.refine_span)
+            ),
+        ),
+        other => other.into(),
+    })
+}
+
 fn fit(
     args: &cli::Harmonics,
     way: &WayBack,
@@ -215,11 +252,9 @@ fn fit(
     let duration_s = samples.count() as f64 / record.rate_hz;
     let mut warnings = of_inputs(way, record);
     let orders = visible_orders(args, record.rate_hz, &mut warnings)?;
-    let fundamental = if args.refine {
-        let span = 0.01 * args.refine_span;
-        refine_fundamental(samples, record.rate_hz, args.fundamental, span, &orders)?
-    } else {
-        Fundamental::given(args.fundamental)
+    let fundamental = match args.refine {
+        true => refined(args, record, &orders)?,
+        false => Fundamental::given(args.fundamental),
     };
     let (reference, start_s) = phase_reference(record.start, duration_s);
     let found = harmonics::fit(samples, record.rate_hz, start_s, fundamental, &orders)?;
@@ -323,21 +358,26 @@ fn visible_orders(
         .iter()
         .partition(|order| **order < limit * (1.0 - 1e-9));
     if seen.is_empty() {
-        return Err(Failure::failed(format_args!(
-            "no order of {} Hz lies below half the sampling rate of {} Hz; ask for lower orders or \
+        return Err(Failure::failed(
+            ErrorCode::UnsuitableRecord,
+            format_args!(
+                "no order of {} Hz lies below half the sampling rate of {} Hz; ask for lower orders or \
              record faster",
-            short(args.fundamental),
-            short(rate_hz)
-        )));
+                short(args.fundamental),
+                short(rate_hz)
+            ),
+        ));
     }
     if let (Some(first), Some(last)) = (unseen.first(), unseen.last()) {
         warnings.push(Warning::new(
             "orders-above-nyquist",
             format!(
-                "orders {} to {} are omitted: they lie above half the sampling rate of {} Hz",
-                short(*first),
-                short(*last),
-                short(rate_hz)
+                "above half the sampling rate of {} Hz, and omitted: {}",
+                short(rate_hz),
+                match first == last {
+                    true => format!("order {}", short(*first)),
+                    false => format!("orders {} to {}", short(*first), short(*last)),
+                }
             ),
         ));
     }
@@ -390,12 +430,18 @@ fn mains_warning(components: &[ComponentTorque], duration_s: f64) -> Option<Warn
         Warning::new(
             "order-or-mains",
             format!(
-                "orders {} coincide with mains lines and cannot be separated from them at one speed: record at another \
-                 speed, where the orders move and the mains lines stay",
-                doubtful.join(", ")
+                "mains lines coincide with {} and cannot be separated at one speed: record at another speed, where orders \
+                 move and mains lines stay",
+                named(&doubtful)
             ),
         )
     })
+}
+
+/// `order 3` or `orders 2, 3 and 5`.
+fn named(orders: &[String]) -> String {
+    let word = if orders.len() == 1 { "order" } else { "orders" };
+    format!("{word} {}", enumeration(orders, "and"))
 }
 
 fn lost_warning(components: &[ComponentTorque]) -> Option<Warning> {
@@ -408,8 +454,8 @@ fn lost_warning(components: &[ComponentTorque]) -> Option<Warning> {
         Warning::new(
             "components-lost-in-noise",
             format!(
-                "orders {} are below twice their own uncertainty: they may be zero",
-                lost.join(", ")
+                "below twice their own uncertainty, so that they may be zero: {}",
+                named(&lost)
             ),
         )
     })

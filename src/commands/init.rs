@@ -9,7 +9,10 @@ use self::questions::{BRIDGE, DRAWING, MECHANICS, Question, TRANSDUCER};
 use super::{Outcome, conclude};
 use crate::cli::Strictness;
 use crate::cli::init::{Init, InitFrom};
-use crate::failure::Failure;
+use torqcomp_model::Kind;
+
+use crate::failure::{ErrorCode, Failure};
+use crate::print::rounded;
 use crate::stand;
 
 /// Sections as the file has them, each with the line above it.
@@ -41,7 +44,7 @@ pub fn run(args: &Init) -> Result<Outcome, Failure> {
         None => compose(args, None::<&mut Dialogue<std::io::Empty, std::io::Sink>>)?,
     };
     let stand = stand::parse("the new stand file", &text)
-        .map_err(|failure| Failure::usage(failure.to_string()))?;
+        .map_err(|failure| Failure::usage(ErrorCode::InvalidValue, failure.to_string()))?;
     let mut output = args.result.open(&[])?;
     output.write(text.as_bytes())?;
     output.finish()?;
@@ -61,13 +64,16 @@ impl<R: BufRead, W: Write> Dialogue<R, W> {
         question: &str,
         check: impl Fn(&str) -> Result<(), String>,
     ) -> Result<String, Failure> {
-        let broken = |error: std::io::Error| Failure::failed(format_args!("no answer: {error}"));
+        let broken = |error: std::io::Error| {
+            Failure::failed(ErrorCode::CannotRead, format_args!("no answer: {error}"))
+        };
         loop {
             write!(self.output, "{question}: ").map_err(broken)?;
             self.output.flush().map_err(broken)?;
             let mut line = String::new();
             if self.input.read_line(&mut line).map_err(broken)? == 0 {
                 return Err(Failure::failed(
+                    ErrorCode::MissingArgument,
                     "the answers ended before the last question",
                 ));
             }
@@ -91,10 +97,11 @@ fn compose<R: BufRead, W: Write>(
             let question = "What do you have: a transducer with its papers, a bridge that was calibrated with weights, \
                             the drawing of the beam, or is it unknown? (transducer, bridge, drawing, unknown)";
             let known = |text: &str| source(text).map(|_| ());
-            source(&dialogue.ask(question, known)?).map_err(Failure::failed)?
+            source(&dialogue.ask(question, known)?).map_err(Failure::of(ErrorCode::InvalidValue))?
         }
         (None, None) => {
             return Err(Failure::usage(
+                ErrorCode::MissingArgument,
                 "give --from transducer, bridge, drawing or unknown; without a terminal nothing is asked",
             ));
         }
@@ -117,7 +124,7 @@ fn compose<R: BufRead, W: Write>(
             (None, None) => None,
         };
         let Some(value) = answer else { continue };
-        let std = std_of(args, question, dialogue.as_deref_mut())?;
+        let std = std_of(args, (question, &value), dialogue.as_deref_mut())?;
         answers.push(Answer {
             question,
             value,
@@ -126,31 +133,74 @@ fn compose<R: BufRead, W: Write>(
     }
     args.check_stds(&answers)?;
     if let Some(flag) = args.given_beside(from) {
-        return Err(Failure::usage(format_args!(
-            "--{flag} does not belong to --from {}",
-            word(from)
-        )));
+        return Err(Failure::usage(
+            ErrorCode::ConflictingArguments,
+            format_args!("--{flag} does not belong to --from {}", word(from)),
+        ));
     }
     if !missing.is_empty() {
-        return Err(Failure::usage(format_args!(
-            "--from {} needs also {}",
-            word(from),
-            missing.join(", ")
-        )));
+        return Err(Failure::usage(
+            ErrorCode::MissingArgument,
+            format_args!("--from {} needs also {}", word(from), missing.join(", ")),
+        ));
     }
+    beyond_loop(&answers)?;
     Ok(page(args, from, &answers))
+}
+
+/// Outputs that reach no farther, with a little room: what they are called, their kind, and the largest value.
+const LOOPS: [(&str, Kind, f64); 2] = [
+    ("4 to 20 mA", Kind::Current, 0.021),
+    ("0 to 10 V", Kind::Voltage, 10.5),
+];
+
+/// Refuses an output at rated torque that is written in the place of its change.
+fn beyond_loop(answers: &[Answer]) -> Result<(), Failure> {
+    let text = |key: &str| {
+        let found = answers.iter().find(|a| a.question.key == key);
+        found.map(|a| a.value.as_str())
+    };
+    let (Some(output), Some(zero)) = (text("sensitivity"), text("zero")) else {
+        return Ok(());
+    };
+    for (name, kind, largest) in LOOPS {
+        let both = [output, zero].map(|text| kind.parse(text));
+        let [Ok(change), Ok(offset)] = both else {
+            continue;
+        };
+        if offset != 0.0 && change.abs() <= largest && (offset + change).abs() > largest {
+            let unit = if kind == Kind::Current {
+                ("mA", 1e3)
+            } else {
+                ("V", 1.0)
+            };
+            let [at_rated, right] =
+                [change + offset, change - offset].map(|v| rounded(v * unit.1, 6));
+            return Err(Failure::usage(
+                ErrorCode::InvalidValue,
+                format_args!(
+                    "--sensitivity {output} beside --zero {zero}: at rated torque the output would be {at_rated} {}, which none of \
+                     {name} reaches; the sensitivity is the change from no load to rated torque: write \"{right} {}\" if {output} is \
+                     the output at rated torque",
+                    unit.0, unit.0
+                ),
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// The standard uncertainty of an answer: given by a flag, or asked for.
 fn std_of<R: BufRead, W: Write>(
     args: &Init,
-    question: &Question,
+    (question, value): (&Question, &str),
     dialogue: Option<&mut Dialogue<R, W>>,
 ) -> Result<Option<String>, Failure> {
     Ok(match (args.given_std(question.flag), dialogue) {
         (Some(given), _) => Some(given.to_owned()),
         (None, Some(dialogue)) if question.has_std() => {
-            let asked = dialogue.ask(&question.std_text(), |text| question.check_std(text))?;
+            let check = |text: &str| question.check_std(text, value);
+            let asked = dialogue.ask(&question.std_text(), check)?;
             Some(asked).filter(|std| !std.is_empty())
         }
         (None, _) => None,
@@ -277,12 +327,20 @@ impl Init {
         for (flag, std) in &self.std {
             let answer = answers.iter().find(|a| a.question.flag == flag);
             let Some(answer) = answer.filter(|a| a.question.has_std()) else {
-                return Err(Failure::usage(format_args!(
-                    "--std {flag}={std}: --{flag} is not given, or takes no uncertainty"
-                )));
+                return Err(Failure::usage(
+                    ErrorCode::ConflictingArguments,
+                    format_args!(
+                        "--std {flag}={std}: --{flag} is not given, or takes no uncertainty"
+                    ),
+                ));
             };
-            let checked = answer.question.check_std(std);
-            checked.map_err(|why| Failure::usage(format_args!("--std {flag}={std}: {why}")))?;
+            let checked = answer.question.check_std(std, &answer.value);
+            checked.map_err(|why| {
+                Failure::usage(
+                    ErrorCode::InvalidValue,
+                    format_args!("--std {flag}={std}: {why}"),
+                )
+            })?;
         }
         Ok(())
     }

@@ -8,7 +8,7 @@ use clap_mangen::roff::{Roff, bold, roman};
 
 use super::Outcome;
 use crate::cli::Man;
-use crate::failure::{Failure, did_you_mean};
+use crate::failure::{ErrorCode, Failure, did_you_mean};
 use crate::io::output::{self, Output};
 
 /// Runs the verb.
@@ -23,11 +23,14 @@ pub fn run(args: &Man) -> Result<Outcome, Failure> {
             write_all(args, folder, &pages)?;
         }
         (Some(folder), false) => {
-            return Err(Failure::usage(format_args!(
-                "{} is a folder, for all pages; leave {} out, or name a file",
-                folder.display(),
-                args.verb.join(" ")
-            )));
+            return Err(Failure::usage(
+                ErrorCode::ConflictingArguments,
+                format_args!(
+                    "{} is a folder, for all pages; leave {} out, or name a file",
+                    folder.display(),
+                    args.verb.join(" ")
+                ),
+            ));
         }
         (None, _) => {
             let mut output = args.result.open(&[])?;
@@ -63,9 +66,10 @@ fn find<'a>(program: &'a Command, words: &[String]) -> Result<&'a Command, Failu
                 true => format!("{} has no further verbs", found.get_name()),
                 false => format!("expected one of {}", known.join(", ")),
             };
-            return Err(Failure::usage(format_args!(
-                "no page on \"{word}\"{meant}; {names}"
-            )));
+            return Err(Failure::usage(
+                ErrorCode::InvalidValue,
+                format_args!("no page on \"{word}\"{meant}; {names}"),
+            ));
         };
         found = verb;
     }

@@ -7,7 +7,7 @@ use crate::batch::{self, BatchTask, OneRun};
 use crate::cli::{
     BatchOptions, Compensate, Extract, Format, Harmonics, Inspect, OutputArgs, Simulate,
 };
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::outcome::Made;
 use crate::{print, stand};
 
@@ -82,10 +82,11 @@ pub(super) fn run(args: &impl OneByOne, options: &[String]) -> Result<Outcome, F
         return args.work()?.publish();
     }
     if let ([folder], true, false) = (task.inputs, task.result.is_stdout(), are_asked(args)) {
-        return Err(Failure::failed(format_args!(
-            "{folder}: {}",
-            batch::NEED_FOLDER
-        )));
+        return Err(Failure::failed(
+            ErrorCode::MissingArgument,
+            format_args!("{}", batch::NEED_FOLDER),
+        )
+        .at(folder));
     }
     // A fault of the stand file would be said for each recording.
     if let Some(path) = task.stand {

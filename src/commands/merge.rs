@@ -5,7 +5,7 @@ use std::path::Path;
 use super::Outcome;
 use crate::batch::{self, Merged};
 use crate::cli::Merge;
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::output;
 use crate::print::{self, Report};
 
@@ -13,6 +13,7 @@ use crate::print::{self, Report};
 pub fn run(args: &Merge) -> Result<Outcome, Failure> {
     if args.json && args.result.is_stdout() {
         return Err(Failure::usage(
+            ErrorCode::ConflictingArguments,
             "--json and the table both go to standard output; give the table a file with -o",
         ));
     }

@@ -13,6 +13,7 @@ mod many;
 mod merge;
 mod predict;
 mod rows;
+pub(crate) mod schema;
 mod simulate;
 mod table;
 
@@ -49,6 +50,7 @@ pub fn run(cli: Cli) -> Result<Outcome, Failure> {
         Verb::Merge(args) => merge::run(&args),
         Verb::Completions(args) => completions::run(&args),
         Verb::Man(args) => man::run(&args),
+        Verb::Schema(args) => schema::run(&args),
     }
 }
 

@@ -8,10 +8,11 @@ use torqcomp_dsp::conversion::Conversion;
 use torqcomp_model::damping::viscous_from_friction_slope_n_m_s_per_rad;
 use torqcomp_model::{Estimate, Kind, SecondOrder, UnitSystem};
 
-use self::report::{PredictReport, PredictedConstant, Refinement, residual_percent};
+pub(super) use self::report::PredictReport;
+use self::report::{PredictedConstant, Refinement, residual_percent};
 use super::{Outcome, conclude, publish};
 use crate::cli::{Predict, Strictness};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::print::rounded;
 use crate::stand::{self, BeamDrawing, BridgeData, Given, Stand, TransducerSignal};
 
@@ -28,11 +29,12 @@ pub fn run(args: &Predict) -> Result<Outcome, Failure> {
     let drawing = Drawing::of(&stand)?;
     let constants = drawing.constants(args.units.into())?;
     if constants.iter().all(|c| c.predicted.is_none()) {
-        return Err(Failure::failed(format_args!(
-            "{}: there is no drawing to calculate constants from; add [beam], [[parts]], \
+        return Err(Failure::failed(
+            ErrorCode::IncompleteStand,
+            "there is no drawing to calculate constants from; add [beam], [[parts]], \
              [friction], or [gage] and [bridge]",
-            stand.file
-        )));
+        )
+        .at(&stand.file));
     }
     let output = args.result.open(&[args.stand.as_path()])?;
     let report = PredictReport {
@@ -71,7 +73,7 @@ struct Stiffness {
 impl<'a> Drawing<'a> {
     fn of(stand: &'a Stand) -> Result<Self, Failure> {
         let wrong = |error: &dyn std::fmt::Display| {
-            Failure::failed(format_args!("{}: {error}", stand.file))
+            Failure::failed(ErrorCode::InvalidStand, error).at(&stand.file)
         };
         let parts: Vec<&Estimate> = stand.parts.iter().map(|p| &p.inertia).collect();
         let inertia = if parts.is_empty() {
@@ -189,7 +191,7 @@ impl<'a> Drawing<'a> {
         };
         Estimate::derive(kind, "drawing", &inputs, f)
             .map(Some)
-            .map_err(|error| Failure::failed(format_args!("{}: {error}", self.stand.file)))
+            .map_err(|error| Failure::failed(ErrorCode::InvalidStand, error).at(&self.stand.file))
     }
 
     /// Adds what each effect of the drawing makes of a constant that follows from the stiffness.
@@ -238,11 +240,11 @@ impl<'a> Drawing<'a> {
             let layout = bridge.layout();
             let gain = stand.recorder.recorder.gain();
             let conversion = Conversion::bridge(bridge, gain, 0.0, torque_per_strain)
-                .map_err(Failure::failed)?;
+                .map_err(Failure::of(ErrorCode::InvalidStand))?;
             let gain = conversion.small_signal_gain();
             note = self.torque_per_volt_note(gain, layout, loading);
             let made = Estimate::new(Kind::TorquePerVolt, gain, None, "drawing");
-            predicted = Some(made.map_err(Failure::failed)?);
+            predicted = Some(made.map_err(Failure::of(ErrorCode::InvalidStand))?);
         }
         // Of a calibration in mV/V through gain and supply.
         let by_ratio = || {
@@ -346,7 +348,9 @@ impl Measured {
                     Estimate::derive(kind, "inertia, damping and stiffness", &inputs, |x| {
                         SecondOrder::new(x[0], x[1], x[2]).map_or(f64::NAN, |stand| f(&stand))
                     })
-                    .map_err(|error| Failure::failed(format_args!("{}: {error}", stand.file)))
+                    .map_err(|error| {
+                        Failure::failed(ErrorCode::InvalidStand, error).at(&stand.file)
+                    })
                 };
                 Ok(Self {
                     inertia: Some(inertia.clone()),

@@ -1,12 +1,13 @@
 //! `simulate`: the stand's answer to a given input.
 
+use schemars::JsonSchema;
 use serde::Serialize;
-use torqcomp_model::simulate::Pieces;
-use torqcomp_model::{Unit, UnitSystem};
+use torqcomp_model::simulate::{Between, Pieces, steady_answer};
+use torqcomp_model::{Chain, Unit, UnitSystem};
 
 use super::{judged, rows, warned};
 use crate::cli;
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::output::Output;
 use crate::io::{ChannelChoice, Flags, Input};
 use crate::outcome::{Made, RecordFigures};
@@ -17,25 +18,36 @@ use crate::stand::{self, Calibration, Stand, TransducerSignal};
 use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
 
-/// A simulated record.
-#[derive(Debug, Serialize)]
-struct SimulateReport {
+/// The simulated response of a stand to a recorded input.
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct SimulateReport {
+    /// Path of the recording with the input.
     input: String,
+    /// Path of the stand file.
     stand: String,
+    /// Name of the channel with the input.
     applied: String,
+    /// Unit of the input.
     applied_unit: String,
+    /// Unit of the simulated record.
     measured_unit: String,
-    /// Course of the input between its samples.
+    /// Course that the input takes between samples.
     input_between_samples: &'static str,
+    /// Whether the record is the steady answer to an input that repeats.
+    is_steady: bool,
+    /// Number of samples.
     samples: usize,
+    /// Sampling rate, in Hz.
     rate_hz: f64,
-    /// Its standard uncertainty by the stamps; `null` if it does not come from stamps.
+    /// Standard uncertainty of the rate by the time stamps, in Hz; `null` if the rate does not come from stamps.
     rate_std_hz: Option<f64>,
     #[serde(flatten)]
     start: Moment,
     /// Steps of integration from sample to sample.
     steps_per_sample: usize,
+    /// Names of the effects of the stand.
     effects: Vec<&'static str>,
+    /// Warnings, each with a stable code.
     warnings: Vec<Warning>,
 }
 
@@ -47,6 +59,7 @@ pub fn work(args: &cli::Simulate) -> Result<Made, Failure> {
     let stand = stand::read(&args.stand)?;
     if args.json && args.result.is_stdout() {
         return Err(Failure::usage(
+            ErrorCode::ConflictingArguments,
             "the record and the JSON document cannot both go to standard output; give the record a file with -o",
         ));
     }
@@ -67,8 +80,13 @@ pub fn work(args: &cli::Simulate) -> Result<Made, Failure> {
         simulated.clear();
         Ok::<(), Failure>(())
     };
-    let pieces = Pieces::new(&chain, axis.0, between);
-    let steps = simulate(&mut applied, units.applied, pieces, &mut deliver)?;
+    let steps = match args.periodic {
+        true => simulate_steady(&mut applied, units.applied, &chain, between, &mut deliver)?,
+        false => {
+            let pieces = Pieces::new(&chain, axis.0, between);
+            simulate(&mut applied, units.applied, pieces, &mut deliver)?
+        }
+    };
     if written < 2 {
         return Err(too_short());
     }
@@ -80,6 +98,7 @@ pub fn work(args: &cli::Simulate) -> Result<Made, Failure> {
         applied_unit: units.applied_text,
         measured_unit: units.measured_text,
         input_between_samples: between.name(),
+        is_steady: args.periodic,
         samples: written,
         rate_hz: axis.0,
         rate_std_hz: applied.rate_std_hz,
@@ -111,6 +130,26 @@ fn made(args: &cli::Simulate, report: SimulateReport, output: Output, is_lossy: 
     }
 }
 
+/// Gives the steady answer to the applied quantity, repeated; steps of integration from sample to sample.
+fn simulate_steady(
+    applied: &mut AppliedInput,
+    factor: f64,
+    chain: &Chain,
+    between: Between,
+    deliver: &mut dyn FnMut(&mut Vec<f64>) -> Result<(), Failure>,
+) -> Result<usize, Failure> {
+    let mut samples = Vec::new();
+    while applied.next(&mut samples)? {}
+    if samples.len() < 2 {
+        return Err(too_short());
+    }
+    samples.iter_mut().for_each(|u| *u *= factor);
+    let steady = steady_answer(chain, samples, applied.axis().0, between);
+    let (mut record, steps) = steady.map_err(Failure::of(ErrorCode::InvalidStand))?;
+    deliver(&mut record)?;
+    Ok(steps)
+}
+
 /// Sends the applied quantity through the stand piece by piece; steps of integration from sample to sample.
 fn simulate(
     applied: &mut AppliedInput,
@@ -124,14 +163,16 @@ fn simulate(
         samples.iter_mut().for_each(|u| *u *= factor);
         pieces
             .push(&samples, &mut simulated)
-            .map_err(Failure::failed)?;
+            .map_err(Failure::of(ErrorCode::InvalidStand))?;
         deliver(&mut simulated)?;
         samples.clear();
         if is_end {
             break;
         }
     }
-    let steps = pieces.finish(&mut simulated).map_err(Failure::failed)?;
+    let steps = pieces
+        .finish(&mut simulated)
+        .map_err(Failure::of(ErrorCode::InvalidStand))?;
     deliver(&mut simulated)?;
     Ok(steps)
 }
@@ -234,7 +275,10 @@ impl AppliedInput {
 }
 
 fn too_short() -> Failure {
-    Failure::failed("the record has fewer than two samples; nothing can be simulated")
+    Failure::failed(
+        ErrorCode::TooFewSamples,
+        "the record has fewer than two samples; nothing can be simulated",
+    )
 }
 
 impl Report for SimulateReport {
@@ -245,9 +289,13 @@ impl Report for SimulateReport {
             [] => "no effects".to_owned(),
             some => some.join(", "),
         };
+        let answer = match self.is_steady {
+            true => ", the steady answer to them repeated",
+            false => "",
+        };
         format!(
-            "simulated {} samples at {} Hz, {} steps a sample, with {effects}; applied {} in {}, {} between samples; \
-             measured in {}\n",
+            "simulated {} samples at {} Hz, {} steps a sample, with {effects}{answer}; applied {} in {}, {} between \
+             samples; measured in {}\n",
             self.samples,
             short(self.rate_hz),
             self.steps_per_sample,
@@ -286,7 +334,7 @@ impl ChannelUnits {
             (None, Some(gain)) => gain.recorded_unit.clone(),
             (None, None) => applied.text.clone(),
         };
-        let unit = Unit::parse(&text).map_err(Failure::failed)?;
+        let unit = Unit::parse(&text).map_err(Failure::of(ErrorCode::UnitUnclear))?;
         // A record of another unit than torque is what the calibration makes torque of.
         let is_signal = gain.is_none() && TransducerSignal::of(&unit).is_some();
         let named = NamedUnit {
@@ -319,7 +367,7 @@ impl ChannelUnits {
                 Some(calibration) => calibration
                     .conversion
                     .record(torque)
-                    .map_err(Failure::failed)?,
+                    .map_err(Failure::of(ErrorCode::InvalidStand))?,
                 None => torque,
             };
             *value = recorded / self.measured;
@@ -336,20 +384,27 @@ fn applied_unit(
 ) -> Result<NamedUnit, Failure> {
     let wanted = NamedUnit {
         text: expected.to_owned(),
-        unit: Unit::parse(expected).map_err(Failure::failed)?,
+        unit: Unit::parse(expected).map_err(Failure::of(ErrorCode::UnitUnclear))?,
     };
     match chosen.unit {
         Some(given) if given.unit.dimension() == wanted.unit.dimension() => Ok(given.clone()),
-        Some(given) => Err(Failure::failed(format_args!(
-            "the channel \"{}\" is in {}, and what acts on this stand is in {expected}; choose another column with \
+        Some(given) => Err(Failure::failed(
+            ErrorCode::UnitUnsuitable,
+            format_args!(
+                "the channel \"{}\" is in {}, and what acts on this stand is in {expected}; choose another column with \
              --applied, or give the right unit with --unit",
-            chosen.name, given.text
-        ))),
-        None if chosen.unit_text.is_some() => Err(Failure::failed(format_args!(
-            "the unit \"{}\" of the channel \"{}\" is unknown; this stand takes {expected}; give the right unit with --unit",
-            chosen.unit_text.unwrap_or_default(),
-            chosen.name
-        ))),
+                chosen.name, given.text
+            ),
+        )),
+        None if chosen.unit_text.is_some() => Err(Failure::failed(
+            ErrorCode::UnitUnclear,
+            format_args!(
+                "the unit \"{}\" of the channel \"{}\" is unknown; this stand takes {expected}; give the right unit \
+                 with --unit",
+                chosen.unit_text.unwrap_or_default(),
+                chosen.name
+            ),
+        )),
         None => {
             warnings.push(Warning::new(
                 "unit-assumed",

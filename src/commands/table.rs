@@ -1,12 +1,13 @@
 //! `table`: the inverse transfer function over frequency, Appendix D of the thesis for any stand.
 
 use num_complex::Complex64;
+use schemars::JsonSchema;
 use serde::Serialize;
 use torqcomp_dsp::compensate::Inverse;
 
 use super::{Outcome, conclude, publish};
 use crate::cli::{self, Strictness};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::identify::Motion;
 use crate::print::{Report, rounded};
 use crate::stand::{self, Mechanics, Stand};
@@ -16,10 +17,12 @@ const MOST_ROWS: f64 = 1e7;
 /// Significant digits of the table.
 const DIGITS: u32 = 10;
 
-/// The inverse transfer function.
-#[derive(Debug, Serialize)]
-struct TableReport {
+/// The inverse transfer function of a stand over frequency.
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct TableReport {
+    /// Path of the stand file.
     stand: String,
+    /// The inverse transfer function, by frequency.
     rows: Vec<TableRow>,
     /// Whether the text has columns of uncertainties.
     #[serde(skip)]
@@ -27,13 +30,17 @@ struct TableReport {
 }
 
 /// Applied over recorded torque at one frequency.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 struct TableRow {
+    /// Frequency, in Hz.
     frequency_hz: f64,
+    /// Applied over recorded torque.
     magnitude: f64,
+    /// Phase of the applied torque before the recorded one, in degrees.
     phase_deg: f64,
     /// Relative standard uncertainty of the magnitude; `null` if unknown.
     magnitude_relative_std: Option<f64>,
+    /// Standard uncertainty of the phase, in degrees; `null` if unknown.
     phase_std_deg: Option<f64>,
 }
 
@@ -42,16 +49,17 @@ pub fn run(args: &cli::Table) -> Result<Outcome, Failure> {
     let stand = stand::read(&args.stand)?;
     let mechanics = stand.mechanics()?;
     if args.to < args.from {
-        return Err(Failure::usage(format_args!(
-            "--to {} lies below --from {}",
-            args.to, args.from
-        )));
+        return Err(Failure::usage(
+            ErrorCode::InvalidValue,
+            format_args!("--to {} lies below --from {}", args.to, args.from),
+        ));
     }
     let steps = ((args.to - args.from) / args.step * (1.0 + 1e-12)).floor();
     if steps >= MOST_ROWS {
-        return Err(Failure::usage(format_args!(
-            "a table of {steps} rows is too long; choose a larger --step"
-        )));
+        return Err(Failure::usage(
+            ErrorCode::InvalidValue,
+            format_args!("a table of {steps} rows is too long; choose a larger --step"),
+        ));
     }
     let refined = match stand.effects.is_empty() && mechanics.measures == Motion::Displacement {
         true => None,

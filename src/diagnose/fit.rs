@@ -402,6 +402,7 @@ impl RecordResidual {
             range: 0..measured.len(),
             measured: std::sync::Arc::new(measured.clone()),
             initial: InitialState::default(),
+            is_held: false,
         };
         Self {
             record,

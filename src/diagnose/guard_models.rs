@@ -1,5 +1,6 @@
 //! Guard models: laws that are not offered as effects. An effect is not named where one of them explains what it leaves.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use torqcomp_model::effects::{Effect, RIVALS};
 
@@ -10,10 +11,13 @@ use super::search::{CandidateFit, Workers, fit_all, refusal};
 use super::structure::EffectForm;
 
 /// A law that is not offered as an effect, fitted.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct GuardModel {
+    /// Name of the law.
     #[serde(rename = "law", serialize_with = "super::search::name_of")]
+    #[schemars(with = "String")]
     pub effect: &'static Effect,
+    /// Equation of the law.
     pub equation: &'static str,
     /// The effects that were in the model already.
     pub with: Vec<&'static str>,
@@ -21,6 +25,7 @@ pub struct GuardModel {
     pub errors: RmsErrors,
     /// Unit of both errors.
     pub unit: String,
+    /// Parameters of the law.
     pub parameters: Vec<EffectParameter>,
     #[serde(skip)]
     pub model: ScoredModel,

@@ -8,7 +8,7 @@ use super::reason::Reason;
 use super::records::Records;
 use super::score::ScoredModel;
 use super::search::{CandidateFit, no_gain, reject_all};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::parallel::parallel;
 
 impl SearchState {
@@ -23,7 +23,10 @@ impl SearchState {
         set_starts(&self.before.fitted, &mut self.records.train);
         set_starts(&self.before.fitted, &mut self.records.holdout);
         self.before = self.held_out(&self.before).ok_or_else(|| {
-            Failure::failed("the plain stand cannot be run on the held-out records")
+            Failure::failed(
+                ErrorCode::NotIdentifiable,
+                "the plain stand cannot be run on the held-out records",
+            )
         })?;
         self.declared = self.declared.as_ref().and_then(|m| self.held_out(m));
         self.judge_candidates(threads);
@@ -38,7 +41,12 @@ impl SearchState {
         self.without = parallel(without.len(), threads, |k| {
             self.held_out(without[k].as_ref()?)
         });
-        match self.held_out(&self.after) {
+        let finished = self.after.finished(&self.records, threads);
+        let judged = match finished {
+            Some((last, fine)) => last.compared_on_holdout(&fine),
+            None => self.held_out(&self.after),
+        };
+        match judged {
             Some(after) => self.after = after,
             None => self.drop_all(&Reason::Diverges),
         }

@@ -1,5 +1,6 @@
 //! Effects taken out again: which ones a model needs, what each explains, and the errors with none, with one, with two.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::fit::{FitEffort, FittedModel, fit};
@@ -12,8 +13,9 @@ use crate::parallel::parallel;
 const REPEATED: FitEffort = FitEffort::full(6);
 
 /// A number of effects, and the error that they leave.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct LadderStep {
+    /// Names of the effects.
     pub effects: Vec<&'static str>,
     #[serde(flatten)]
     pub errors: RmsErrors,
@@ -22,26 +24,32 @@ pub struct LadderStep {
 }
 
 /// What one of several effects explains.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct EffectShare {
+    /// Name of the effect.
     pub effect: &'static str,
-    /// Power that is left without it and not with it, over that which all effects explain; on the held-out records.
+    /// Power of the hold-out records that is left without this effect and not with it, over the power that all effects
+    /// explain.
     pub share: f64,
 }
 
 /// How alike two effects change the held-out records.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct EffectCorrelation {
+    /// Names of the two effects.
     pub effects: [&'static str; 2],
-    /// Of what each of them alone explains.
+    /// Correlation of what each of them alone explains.
     pub correlation: f64,
 }
 
 /// What several effects explain, each and together.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct Ladder {
+    /// Hold-out errors with ever more effects.
     pub ladder: Vec<LadderStep>,
+    /// What each of several effects explains.
     pub shares: Vec<EffectShare>,
+    /// How alike pairs of effects change the hold-out records.
     pub correlations: Vec<EffectCorrelation>,
 }
 

@@ -9,8 +9,10 @@ mod columns;
 mod declared;
 mod describe;
 mod exchange;
+mod finish;
 mod fit;
 mod guard_models;
+mod held;
 mod intersample;
 mod judge;
 mod ladder;
@@ -39,7 +41,7 @@ mod verdict;
 use torqcomp_model::effects::{Fixed, RecordScales};
 use torqcomp_model::simulate::Between;
 
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::warning::Warning;
 use declared::DeclaredStand;
 use fit::FittedModel;
@@ -52,6 +54,7 @@ use verdict::{noise_rms, remains};
 pub use declared::DeclaredForm;
 pub use fit::RecordResidual;
 pub use guard_models::GuardModel;
+pub use held::HeldBody;
 pub use noise_floor::NoiseFloorSource;
 pub use plot_series::{MotionAxis, autocorrelation, binned, density, response};
 pub use reason::Status;
@@ -158,8 +161,14 @@ pub fn run(mut case: Case, workers: Workers) -> Result<Diagnosis, Failure> {
         gain_is_free: !case.gain_is_declared,
         recorder: case.recorder.clone(),
         units: case.units.clone(),
+        held: None,
     };
-    let context = plain::find_plain(&unscaled, case.declared, &case.records.train)?;
+    let mut context = plain::find_plain(&unscaled, case.declared, &case.records.train)?;
+    if refuse::is_short(&case, &context)
+        && let Some(held) = held::hold(&case, &unscaled)?
+    {
+        (case, context) = held;
+    }
     refuse::check(&case, &context)?;
     case.records.prepare_for(&context.plain);
     let declared = case.declared.map(|plain| DeclaredStand {
@@ -198,7 +207,10 @@ impl SearchState {
             ScoredModel::of(declared, &records)
         });
         let before = ScoredModel::of(plain, &records).ok_or_else(|| {
-            Failure::failed("the plain stand cannot be run on the training records")
+            Failure::failed(
+                ErrorCode::NotIdentifiable,
+                "the plain stand cannot be run on the training records",
+            )
         })?;
         let tests = tests(&before);
         let mut found = Self {

@@ -1,5 +1,6 @@
 //! The noise floor, estimated without any model of the stand.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use torqcomp_model::Mode;
 
@@ -15,7 +16,7 @@ pub struct NoiseFloor {
     pub from: NoiseFloorSource,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum NoiseFloorSource {
     /// Differences between periods of the record.

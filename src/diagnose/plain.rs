@@ -10,7 +10,7 @@ use super::fit::{FitEffort, FittedModel, fit};
 use super::record::{StandRecord, dot};
 use super::residual_tests::without_mean;
 use super::structure::{FitContext, PlainStand, Structure};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 
 /// Natural frequencies tried per decade where none is declared.
 const PER_DECADE: f64 = 24.0;
@@ -41,7 +41,10 @@ pub fn find_plain(
     });
     let best = fits.min_by(|a, b| a.train_sum.total_cmp(&b.train_sum));
     let best = best.ok_or_else(|| {
-        Failure::failed("the plain stand could not be fitted to the training records")
+        Failure::failed(
+            ErrorCode::NotIdentifiable,
+            "the plain stand could not be fitted to the training records",
+        )
     })?;
     Ok(context.at(best.stand()))
 }
@@ -61,7 +64,8 @@ pub fn refine_plain(
     let Some(declared) = declared else {
         let values = context.plain_values(&context.plain);
         let structure = Structure::plain(context);
-        return fit(structure, &values, train, REFINEMENT).map_err(Failure::failed);
+        return fit(structure, &values, train, REFINEMENT)
+            .map_err(Failure::of(ErrorCode::NotIdentifiable));
     };
     // The declared constants belong to the effects; those of a plain stand without effects may be nearer.
     let fitted = DeclaredStand {
@@ -76,7 +80,7 @@ pub fn refine_plain(
     match (declared, fitted) {
         (Ok(declared), Ok(fitted)) if fitted.train_sum < declared.train_sum => Ok(fitted),
         (Ok(declared), _) => Ok(declared),
-        (Err(_), fitted) => fitted.map_err(Failure::failed),
+        (Err(_), fitted) => fitted.map_err(Failure::of(ErrorCode::NotIdentifiable)),
     }
 }
 

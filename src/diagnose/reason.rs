@@ -1,10 +1,12 @@
 //! Status of a candidate effect and the reason for it: both come from one [`Reason`].
 
-use serde::ser::{Serialize, SerializeStruct, Serializer};
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use crate::print::rounded;
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum Status {
     /// Added to the model.
     Accepted,
@@ -25,7 +27,9 @@ impl Status {
 }
 
 /// Why a candidate has its status.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[serde(into = "StatedReason")]
+#[schemars(from = "StatedReason")]
 pub enum Reason {
     /// No fit came about.
     NotFitted,
@@ -124,8 +128,8 @@ impl Reason {
             Self::CriterionNotLower => "too small a gain for its extra parameters (BIC)".to_owned(),
             Self::Best => "largest significant reduction of the training error".to_owned(),
             Self::Worse { ratio, best } => format!(
-                "improves the fit, but its training error is {} times that of {best}",
-                rounded(*ratio, 3)
+                "improves the fit, but its training error is {} that of {best}",
+                times(*ratio)
             ),
             Self::MoreParameters { best } => {
                 format!("no better than {best}, with more parameters")
@@ -187,10 +191,18 @@ fn too_little([least, least_of_rest, rest]: [f64; 3]) -> String {
 /// An effect behind a law that is not in the list.
 fn beside_the_list(ratio: f64, law: &str, equation: &str) -> String {
     format!(
-        "improves the fit, but its training error is {} times that of {law} ({equation}), a law that is not in the list of \
+        "improves the fit, but its training error is {} that of {law} ({equation}), a law that is not in the list of \
          effects",
-        rounded(ratio, 3)
+        times(ratio)
     )
+}
+
+/// A ratio of errors in words.
+fn times(ratio: f64) -> String {
+    match rounded(ratio, 3).as_str() {
+        "1" => "slightly more than".to_owned(),
+        ratio => format!("{ratio} times"),
+    }
 }
 
 /// A relative change in percent, with its sign.
@@ -203,11 +215,20 @@ fn percent(change: f64) -> String {
     }
 }
 
-impl Serialize for Reason {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut fields = serializer.serialize_struct("Reason", 2)?;
-        fields.serialize_field("status", self.status().name())?;
-        fields.serialize_field("why", &self.text())?;
-        fields.end()
+/// A reason in a document.
+#[derive(Serialize, JsonSchema)]
+struct StatedReason {
+    /// Whether the effect is added to the model.
+    status: Status,
+    /// Why the effect is added, or is not.
+    why: String,
+}
+
+impl From<Reason> for StatedReason {
+    fn from(reason: Reason) -> Self {
+        Self {
+            status: reason.status(),
+            why: reason.text(),
+        }
     }
 }

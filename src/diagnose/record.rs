@@ -30,6 +30,8 @@ pub struct StandRecord {
     /// The samples that count.
     pub range: Range<usize>,
     pub initial: InitialState,
+    /// Whether the applied quantity contains the measured one, by a spring that holds a free body.
+    pub is_held: bool,
 }
 
 /// What a model adds to a record whose phase or size belongs to the record, not to the stand.
@@ -93,6 +95,16 @@ impl StandRecord {
     /// The applied quantity over the range.
     pub fn applied_in_range(&self) -> &[f64] {
         &self.input.samples()[self.range.clone()]
+    }
+
+    /// What acts over the range, without a spring that holds a free body.
+    pub fn acting_in_range(&self) -> Vec<f64> {
+        let applied = self.applied_in_range();
+        if !self.is_held {
+            return applied.to_vec();
+        }
+        let both = applied.iter().zip(self.measured_in_range());
+        both.map(|(whole, spring)| whole - spring).collect()
     }
 
     /// The measured quantity over the range.

@@ -79,6 +79,25 @@ impl Records {
         self.train[0].input.between()
     }
 
+    /// Changes applied and measured quantity; records that share them go on sharing them.
+    pub fn change_records(&mut self, change: impl Fn(&StandRecord) -> StandRecord) {
+        let mut made: Vec<(Arc<Excitation>, StandRecord)> = Vec::new();
+        for record in self.all() {
+            let known = made.iter().find(|(old, _)| Arc::ptr_eq(old, &record.input));
+            let new = match known {
+                Some((_, new)) => new.clone(),
+                None => {
+                    let new = change(record);
+                    made.push((record.input.clone(), new.clone()));
+                    new
+                }
+            };
+            record.input = new.input;
+            record.measured = new.measured;
+            record.is_held = new.is_held;
+        }
+    }
+
     /// Changes the inputs; records that share an input go on sharing it.
     fn change_inputs(&mut self, change: impl Fn(&Excitation) -> Excitation) {
         let mut made: Vec<(Arc<Excitation>, Arc<Excitation>)> = Vec::new();

@@ -1,5 +1,6 @@
 //! Records that cannot be diagnosed.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use torqcomp_model::simulate::{Excitation, MotionState};
@@ -10,7 +11,8 @@ use super::residual_tests::without_mean;
 use super::score::ScoredModel;
 use super::structure::{FitContext, PlainStand, Structure};
 use super::{Case, scales};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
+use crate::print::rounded;
 
 /// Minimum number of periods of the natural frequency in the longest training record.
 const FEWEST_PERIODS: f64 = 10.0;
@@ -18,17 +20,25 @@ const FEWEST_PERIODS: f64 = 10.0;
 const LARGE_ERROR: f64 = 0.3;
 /// Error the other way round, over that as given, below which the channels count as swapped.
 const SWAPPED: f64 = 0.5;
+/// Error with the gain left free, over that with the declared one, below which the declared one belongs to another unit.
+const ANOTHER_UNIT: f64 = 0.5;
+/// Ratios of the gain to the declared one that the effect `gain-error` describes.
+const GAIN_ERRORS: Range<f64> = 0.1..11.0;
 /// Error of a plain stand fitted to the held-out records alone, over that of the one from training, below which the records
 /// may be of two stands.
 const APART: f64 = 0.5;
 
-/// Refuses records that have their channels swapped or are too short.
+/// Refuses records that have the wrong sign or unit, have their channels swapped or are too short.
 ///
 /// # Errors
 /// If they are.
 pub fn check(case: &Case, context: &FitContext) -> Result<(), Failure> {
-    // Swapped channels fit any frequency, which may make them look too short.
-    refuse_swapped(case, context)?;
+    let as_given = relative_error(context, &case.records.train);
+    if as_given >= LARGE_ERROR {
+        refuse_sign_or_unit(case, context, as_given)?;
+        // Swapped channels fit any frequency, which may make them look too short.
+        refuse_swapped(case, context, as_given)?;
+    }
     let train = &case.records.train;
     let Some((record, duration_s)) = longest(train) else {
         return Ok(());
@@ -38,12 +48,21 @@ pub fn check(case: &Case, context: &FitContext) -> Result<(), Failure> {
     if periods >= FEWEST_PERIODS {
         return Ok(());
     }
-    Err(Failure::failed(format_args!(
-        "{}: {duration_s:.4} s are only {periods:.1} periods of the fitted natural frequency ({natural_hz:.4} Hz); at \
-         least one training record must have {FEWEST_PERIODS} periods. Record for longer, or, for a stand that turns \
-         freely, use \"identify runup\"",
-        record.source
-    )))
+    Err(Failure::failed(
+        ErrorCode::TooFewSamples,
+        format_args!(
+            "{duration_s:.4} s are only {periods:.1} periods of the fitted natural frequency ({natural_hz:.4} Hz); \
+             at least one training record must have {FEWEST_PERIODS} periods. Record for longer, or, for a stand \
+             that turns freely, use \"identify runup\""
+        ),
+    )
+    .at(&record.source))
+}
+
+/// Whether no training record has enough periods of the fitted natural frequency.
+pub fn is_short(case: &Case, context: &FitContext) -> bool {
+    let longest = longest(&case.records.train);
+    longest.is_some_and(|(_, duration_s)| duration_s * context.plain.natural_hz < FEWEST_PERIODS)
 }
 
 /// The longest training record and its duration in s.
@@ -52,12 +71,55 @@ fn longest(train: &[StandRecord]) -> Option<(&StandRecord, f64)> {
     Some((longest, longest.count() as f64 / longest.rate_hz()))
 }
 
-fn refuse_swapped(case: &Case, context: &FitContext) -> Result<(), Failure> {
-    let train = &case.records.train;
-    let as_given = relative_error(context, train);
-    if as_given < LARGE_ERROR {
+/// Refuses a measured channel that a declared gain turns upside down or makes many times too large or too small.
+fn refuse_sign_or_unit(case: &Case, context: &FitContext, as_given: f64) -> Result<(), Failure> {
+    if context.gain_is_free {
         return Ok(());
     }
+    let train = &case.records.train;
+    let free = FitContext {
+        gain_is_free: true,
+        ..context.clone()
+    };
+    let Ok(free) = find_plain(&free, case.declared, train) else {
+        return Ok(());
+    };
+    let ratio = free.plain.gain / context.plain.gain;
+    let scaled = relative_error(&free, train);
+    if GAIN_ERRORS.contains(&ratio) || scaled >= ANOTHER_UNIT * as_given {
+        return Ok(());
+    }
+    let (what, remedy) = if GAIN_ERRORS.contains(&-ratio) {
+        (
+            format!(
+                "is {} times what the applied torque and the stand give, of the opposite sign",
+                rounded(ratio, 4)
+            ),
+            "change the sign of one of the two channels, or of the [calibration]",
+        )
+    } else {
+        (
+            format!(
+                "is {} times what the applied torque and the stand give",
+                rounded(ratio, 4)
+            ),
+            "check the unit of both channels (mV under a heading in V?), the [calibration] and the [recorder] gain",
+        )
+    };
+    Err(Failure::failed(
+        ErrorCode::UnsuitableRecord,
+        format_args!(
+            "{}: the measured torque {what}: a stand fitted to it as it is has an error of {:.0} %, one with that factor {} %; \
+         {remedy}",
+            train[0].source,
+            100.0 * as_given,
+            rounded(100.0 * scaled, 2)
+        ),
+    ))
+}
+
+fn refuse_swapped(case: &Case, context: &FitContext, as_given: f64) -> Result<(), Failure> {
+    let train = &case.records.train;
     let swapped: Vec<StandRecord> = train.iter().map(swap).collect();
     let plain = PlainStand {
         natural_hz: 1.0,
@@ -77,13 +139,16 @@ fn refuse_swapped(case: &Case, context: &FitContext) -> Result<(), Failure> {
     if duration_s * other.plain.natural_hz < FEWEST_PERIODS || the_other_way >= SWAPPED * as_given {
         return Ok(());
     }
-    Err(Failure::failed(format_args!(
-        "{}: the channels look swapped: a stand from --applied to --measured has an error of {:.0} %, one from --measured \
-         to --applied {:.0} %; exchange the two",
-        train[0].source,
-        100.0 * as_given,
-        100.0 * the_other_way
-    )))
+    Err(Failure::failed(
+        ErrorCode::UnsuitableRecord,
+        format_args!(
+            "the channels look swapped: a stand from --applied to --measured has an error of {:.0} %, one from \
+             --measured to --applied {:.0} %; exchange the two",
+            100.0 * as_given,
+            100.0 * the_other_way
+        ),
+    )
+    .at(&train[0].source))
 }
 
 fn swap(record: &StandRecord) -> StandRecord {

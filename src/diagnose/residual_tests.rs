@@ -1,5 +1,6 @@
 //! Tests of a residual: whiteness, dependence on the input and on nonlinear functions of the motion, stationarity.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 use torqcomp_model::Mode;
@@ -30,29 +31,30 @@ const FOLLOWING: f64 = 0.08;
 const NONSTATIONARY: f64 = 6.0;
 
 /// A share of the residual's power that follows from something.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct PowerShare {
-    /// What it follows from.
+    /// What the share follows from.
     pub of: &'static str,
+    /// Share of the residual's power.
     pub share: f64,
     /// Standard deviations from zero.
     pub significance: f64,
 }
 
 /// What the tests found in the residuals of the held-out records.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ResidualTests {
-    /// Whether its autocorrelation stays within 99 % bounds.
+    /// Whether the autocorrelation stays within 99 % bounds.
     pub white: bool,
-    /// Sum of its squared autocorrelation over the 99 % bound for white noise.
+    /// Sum of the squared autocorrelation over the 99 % bound for white noise; `null` if the record is too short.
     pub whiteness_ratio: Option<f64>,
-    /// Whether its cross-correlation with the input, at positive and negative lags, stays within 99 % bounds.
+    /// Whether the cross-correlation with the input, at positive and negative lags, stays within 99 % bounds.
     pub independent_of_input: bool,
     /// Lag of the largest cross-correlation in samples; negative: the residual comes before the input.
     pub largest_lag: i64,
-    /// Part of its power in the largest hundredth of its samples.
+    /// Part of the power in the largest hundredth of the samples.
     pub in_largest_hundredth: f64,
-    /// Shares of its power that follow from the input or the motion.
+    /// Shares of the power that follow from the input or the motion.
     pub shares: Vec<PowerShare>,
     /// Share that other constants in each segment of the record remove.
     pub changing_constants: PowerShare,
@@ -60,7 +62,7 @@ pub struct ResidualTests {
     pub with_signal: PowerShare,
     /// Share proportional to the square of the signal's slope, sample by sample.
     pub with_slope: PowerShare,
-    /// Share at the lowest frequencies, above the noise there.
+    /// Share at the lowest frequencies, above the noise at these.
     pub wandering_zero: PowerShare,
 }
 
@@ -177,7 +179,7 @@ fn input_independence(residuals: &[RecordResidual]) -> (bool, i64) {
     let mut cross = vec![0.0; 2 * LAGS + 1];
     for residual in residuals {
         let r = &residual.samples;
-        let u = without_mean(residual.record.applied_in_range());
+        let u = without_mean(&residual.record.acting_in_range());
         let reach = COLOUR_LAGS.min(r.len() / COLOUR_PART);
         let (rr, uu) = (autocorrelation(r, reach), autocorrelation(&u, reach));
         let white = rr[0] * uu[0];
@@ -219,7 +221,7 @@ fn shares(residuals: &[RecordResidual]) -> Vec<PowerShare> {
     let shortest = residuals.iter().map(|r| r.samples.len()).min();
     let length = (shortest.unwrap_or(0) / 24).next_power_of_two();
     let length = length.clamp(32, 2048);
-    let input = |r: &RecordResidual| r.record.applied_in_range().to_vec();
+    let input = |r: &RecordResidual| r.record.acting_in_range();
     let mut found = vec![pooled_share(FROM_INPUT, residuals, length, input)];
     for (of, function) in MOTION_FUNCTIONS {
         found.push(pooled_share(of, residuals, length, |r| {

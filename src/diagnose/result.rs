@@ -1,9 +1,11 @@
 //! The result of a diagnosis: its JSON document, from which text and page are written as well.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::describe;
 use super::guard_models::GuardModel;
+use super::held::HeldBody;
 use super::ladder::Ladder;
 use super::noise_floor::NoiseFloorSource;
 use super::reason::Status;
@@ -18,18 +20,22 @@ use super::{Case, SearchState};
 use crate::warning::Warning;
 
 /// Files of a diagnosis.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct SourceFiles {
+    /// Path of the stand file; `null` if a plain stand was fitted.
     pub stand: Option<String>,
+    /// Paths of the training records.
     pub train: Vec<String>,
-    /// Empty if parts of the training records are held out.
+    /// Paths of the hold-out records; empty if parts of the training records are held out.
     pub holdout: Vec<String>,
 }
 
-#[derive(Serialize)]
+/// What a stand model lacks: candidate effects, the effects added, and the errors before and after.
+#[derive(Serialize, JsonSchema)]
 pub struct Diagnosis {
     #[serde(flatten)]
     pub sources: SourceFiles,
+    /// Whether effects explain what the plain stand leaves.
     pub verdict: Verdict,
     /// Names of the effects that were added.
     pub effects: Vec<&'static str>,
@@ -37,17 +43,23 @@ pub struct Diagnosis {
     pub declared_effects: Vec<&'static str>,
     /// `band-limited`, `straight-lines` or `held`.
     pub input_between_samples: &'static str,
+    /// Errors of the models, over the same samples.
     pub error: ErrorTable,
     /// The held-out error with ever more effects, and what each of them explains.
     #[serde(flatten)]
     pub explained: Ladder,
+    /// Constants of the plain stand.
     pub constants: Vec<StandConstant>,
     /// The effects that were tried: accepted ones first, then by hold-out error.
     pub candidates: Vec<CandidateFit>,
-    /// A law that is not offered as an effect and leaves less than each of them; it is named and not added.
+    /// A law that is not offered as an effect and leaves less than each of the effects; named, not added. `null` if there
+    /// is none.
     pub suspected: Option<GuardModel>,
+    /// What the last model leaves of the hold-out records.
     pub residual: ResidualReport,
+    /// What to record to tell the remaining candidates apart; `null` if nothing is needed.
     pub next_experiment: Option<String>,
+    /// Warnings, each with a stable code.
     pub warnings: Vec<Warning>,
     /// Whether the text lists all candidates.
     #[serde(skip)]
@@ -61,64 +73,78 @@ pub struct Diagnosis {
 }
 
 /// The three errors.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 pub struct ErrorTable {
+    /// Unit of the rms errors.
     pub unit: String,
-    /// Of the stand file as it is.
+    /// Errors of the stand file as it is; `null` without one.
     pub declared: Option<ModelErrors>,
-    /// Of the plain stand, refitted.
+    /// Errors of the plain stand, refitted.
     pub before: ModelErrors,
-    /// With the accepted effects.
+    /// Errors with the accepted effects.
     pub after: ModelErrors,
     /// Relative reduction of the hold-out rms from before to after, 95 % interval.
     pub improvement_ci95: Option<[f64; 2]>,
-    /// Rms of the noise of the held-out records, estimated without a model.
+    /// Rms of the noise of the hold-out records, estimated without a model, in `unit`; `null` if unknown.
     pub noise_floor_rms: Option<f64>,
+    /// How the noise was estimated; `null` if unknown.
     pub noise_floor_from: Option<NoiseFloorSource>,
 }
 
-#[derive(Debug, Clone, Copy, Serialize)]
+#[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
 pub struct ModelErrors {
     #[serde(flatten)]
     pub rms: RmsErrors,
-    /// Hold-out rms over the rms of the held-out records about their mean.
+    /// Hold-out rms over the rms of the held-out records about their mean; of a free body over that of what acts.
     pub holdout_relative: f64,
 }
 
 /// A constant of the plain stand.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 pub struct StandConstant {
+    /// Name of the constant.
     pub name: &'static str,
+    /// Unit of the values.
     pub unit: String,
+    /// Value in the stand file; `null` if not given.
     pub declared: Option<f64>,
+    /// Value in the plain stand, refitted.
     pub before: f64,
+    /// Standard uncertainty of `before`; `null` if unknown.
     pub before_std: Option<f64>,
+    /// Value with the accepted effects.
     pub after: f64,
+    /// Standard uncertainty of `after`; `null` if unknown.
     pub after_std: Option<f64>,
 }
 
 /// What the model leaves of the held-out records.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 pub struct ResidualReport {
+    /// Whether the residual is white.
     pub white: bool,
-    /// At positive and negative lags.
+    /// Whether the residual is independent of the input at positive and negative lags.
     pub independent_of_input: bool,
+    /// Tests of the residual.
     pub tests: ResidualTests,
-    /// Lines in its spectrum.
+    /// Lines in the spectrum of the residual.
     pub lines: Vec<SpectralLine>,
+    /// Levels of excitation.
     pub levels: ExcitationLevels,
-    /// In words.
+    /// The residual in words.
     pub described: String,
 }
 
 /// Levels of excitation, and the relative error of the plain stand at each.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 pub struct ExcitationLevels {
-    /// Rms of the applied quantity in SI units, training.
+    /// Rms of the applied quantity in SI units, training records.
     pub train_applied_rms: f64,
-    /// The same, held out.
+    /// Rms of the applied quantity in SI units, hold-out records.
     pub holdout_applied_rms: f64,
+    /// Relative error of the plain stand on the training records.
     pub train_relative: f64,
+    /// Relative error of the plain stand on the hold-out records.
     pub holdout_relative: f64,
 }
 
@@ -193,7 +219,10 @@ impl ErrorTable {
     fn of(found: &SearchState) -> Self {
         let (before, after) = (&found.before, &found.after);
         let units = &after.fitted.structure.context.units;
-        let size = holdout_rms(before);
+        let size = match &after.fitted.structure.context.held {
+            Some(_) => HeldBody::acting_rms(before.compared.iter().map(|r| &r.record)),
+            None => holdout_rms(before),
+        };
         let errors = |model: &ScoredModel| ModelErrors {
             rms: model.errors(),
             holdout_relative: model.compared_rms() / size,
@@ -227,7 +256,11 @@ fn holdout_rms(before: &ScoredModel) -> f64 {
 impl ExcitationLevels {
     fn of(found: &SearchState, before: &ModelErrors) -> Self {
         let context = &found.before.fitted.structure.context;
-        let train_size = context.scales.rms / context.units.per_printed;
+        let rms = match &context.held {
+            Some(_) => HeldBody::acting_rms(found.records.train.iter()),
+            None => context.scales.rms,
+        };
+        let train_size = rms / context.units.per_printed;
         Self {
             train_applied_rms: applied_rms(&found.records.train),
             holdout_applied_rms: applied_rms(&found.records.holdout),
@@ -239,7 +272,7 @@ impl ExcitationLevels {
 
 fn applied_rms(records: &[StandRecord]) -> f64 {
     let count: usize = records.iter().map(StandRecord::count).sum();
-    let all = records.iter().flat_map(StandRecord::applied_in_range);
+    let all = records.iter().flat_map(StandRecord::acting_in_range);
     (all.map(|u| u * u).sum::<f64>() / count as f64).sqrt()
 }
 
@@ -254,6 +287,23 @@ fn constants(declared: Option<PlainStand>, found: &SearchState) -> Vec<StandCons
     ];
     let declared = declared.map(|d| [d.natural_hz, d.damping_ratio, d.gain]);
     let (before, after) = (found.before.constants(), found.after.constants());
+    if let Some(held) = &context.held {
+        let [before, after] = [before, after].map(|[hz, ratio, _]| held.constants([&hz, &ratio]));
+        let all = ["inertia", "damping"]
+            .into_iter()
+            .zip(before.into_iter().zip(after));
+        return all
+            .map(|(name, (before, after))| StandConstant {
+                name,
+                unit: after.unit().to_owned(),
+                declared: None,
+                before: before.value(),
+                before_std: before.std_uncertainty(),
+                after: after.value(),
+                after_std: after.std_uncertainty(),
+            })
+            .collect();
+    }
     let all = named.into_iter().zip(before).zip(after).enumerate();
     let all = all.map(
         |(k, (((name, unit, scale), before), after))| StandConstant {

@@ -3,6 +3,7 @@
 
 use std::sync::Arc;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use torqcomp_model::Estimate;
 
@@ -24,20 +25,23 @@ pub struct ScoredModel {
 }
 
 /// A parameter of an effect, as it is reported.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct EffectParameter {
     /// Name of the effect.
     #[serde(skip)]
     pub effect: &'static str,
+    /// Name of the parameter.
     pub name: &'static str,
     #[serde(flatten)]
     pub estimate: Estimate,
 }
 
 /// Errors on training and held-out records, in the printed unit.
-#[derive(Debug, Clone, Copy, Serialize)]
+#[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
 pub struct RmsErrors {
+    /// Rms error on the training records.
     pub train_rms: f64,
+    /// Rms error on the hold-out records.
     pub holdout_rms: f64,
 }
 
@@ -244,7 +248,7 @@ fn rms(residuals: &[RecordResidual]) -> f64 {
 
 impl FittedModel {
     /// Rms by which a training record changes with half the step of integration.
-    fn step_change(&self, first: &StandRecord) -> Option<f64> {
+    pub fn step_change(&self, first: &StandRecord) -> Option<f64> {
         let (mut model, _) = self.structure.model(&self.values);
         let mut record = first.starting_from(*self.initial.first()?);
         model.shift = record.initial.preload;

@@ -2,6 +2,7 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 use torqcomp_model::effects::{EFFECTS, Effect};
 
@@ -16,17 +17,23 @@ use super::structure::EffectForm;
 use crate::parallel::parallel;
 
 /// An effect that was tried, in its best form.
-#[derive(Clone, Serialize)]
+#[derive(Clone, Serialize, JsonSchema)]
 pub struct CandidateFit {
+    /// Name of the effect.
     #[serde(serialize_with = "name_of")]
+    #[schemars(with = "String")]
     pub effect: &'static Effect,
+    /// Best form of the effect; `null` if none could be fitted.
     pub form: Option<&'static str>,
-    /// The effects that were in the model already.
+    /// Names of the effects that were in the model already.
     pub with: Vec<&'static str>,
+    /// Error on the training records, in the unit of `error`; `null` without a fit.
     pub train_rms: Option<f64>,
+    /// Error on the hold-out records, in the unit of `error`; `null` without a fit.
     pub holdout_rms: Option<f64>,
-    /// Probability of its gain by chance, for the number of effects tried beside it.
+    /// Probability of such a gain by chance, for the number of effects tried beside this one; `null` without a fit.
     pub p_value: Option<f64>,
+    /// Parameters of the effect.
     pub parameters: Vec<EffectParameter>,
     #[serde(flatten)]
     pub reason: Reason,
@@ -135,10 +142,12 @@ pub fn try_effects(
     workers: Workers,
 ) -> Round {
     let present: Vec<&str> = base.scored.fitted.structure.names().collect();
-    let gain_is_free = base.scored.fitted.structure.context.gain_is_free;
+    let context = &base.scored.fitted.structure.context;
     let effects = EFFECTS.iter().copied().filter(|effect| {
-        let is_free = gain_is_free && effect.name == "gain-error";
-        !present.contains(&effect.name) && !is_free && among(effect)
+        let is_free = context.gain_is_free && effect.name == "gain-error";
+        let mut forms = EffectForm::all([*effect]).into_iter();
+        let is_allowed = forms.any(|form| context.allows(&form));
+        !present.contains(&effect.name) && !is_free && is_allowed && among(effect)
     });
     let forms = EffectForm::all(effects.clone());
     let lines = residual_lines(base, records);
@@ -280,6 +289,9 @@ fn first_fits(
     let structure = &base.scored.fitted.structure;
     let training = base.scored.fitted.with_initial_states(&records.train);
     let starts = parallel(forms.len(), workers.threads, |k| {
+        if !structure.context.allows(&forms[k]) {
+            return Vec::new();
+        }
         best_starts(base, &structure.with(forms[k]), lines, &training)
     });
     let left = |k: usize| {

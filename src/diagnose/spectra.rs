@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::fit::RecordResidual;
@@ -85,9 +86,11 @@ pub fn coherent_share(input: &[f64], output: &[f64], length: usize) -> (f64, f64
 }
 
 /// A line in a spectrum.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct SpectralLine {
+    /// Frequency, in Hz.
     pub frequency_hz: f64,
+    /// Amplitude, in the unit of `error`.
     pub amplitude: f64,
     /// Its power over the median power around it.
     #[serde(skip)]

@@ -7,6 +7,7 @@ use torqcomp_model::Mode;
 use torqcomp_model::effects::{Action, Effect, Fixed, Form, RecordScales, Stage, Unit};
 use torqcomp_model::{Chain, Link};
 
+use super::held::HeldBody;
 use super::record::NuisanceTerms;
 use super::units::ChannelUnits;
 
@@ -40,6 +41,8 @@ pub struct FitContext {
     /// The recorder, as declared in the stand file.
     pub recorder: Option<Fixed>,
     pub units: ChannelUnits,
+    /// Of a body without a spring: what holds it.
+    pub held: Option<HeldBody>,
 }
 
 impl FitContext {
@@ -54,6 +57,11 @@ impl FitContext {
             plain,
             ..self.clone()
         }
+    }
+
+    /// Whether an effect in that form is looked for: beside a spring that only holds a free body, not all mean something.
+    pub fn allows(&self, effect: &EffectForm) -> bool {
+        self.held.is_none() || effect.needs_no_spring()
     }
 
     /// Number of parameters of the plain stand.

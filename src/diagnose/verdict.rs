@@ -9,7 +9,7 @@ use super::score::ScoredModel;
 use super::search::reject_all;
 
 /// How a diagnosis ends.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// What was missing is found, nothing above the noise remains.
@@ -48,6 +48,10 @@ const SECOND: f64 = 0.02;
 /// The same for one that explains more than half of what is left above the noise.
 const SECOND_OF_REST: f64 = 0.01;
 const MOST_OF_REST: f64 = 0.5;
+/// Error power, in that of the noise, from which on a further effect is named however little of the initial excess it explains,
+/// if it explains this part of what is left: beside an effect that describes its cause exactly, little may be left of much.
+const FAR_ABOVE_NOISE: f64 = 10.0;
+const GREAT_PART_OF_REST: f64 = 1.0 / 3.0;
 
 /// What the plain stand leaves, and the noise in it.
 #[derive(Clone, Copy)]
@@ -73,6 +77,12 @@ impl PlainExcess<'_> {
     pub fn is_too_small(&self, after: &ScoredModel, next: &ScoredModel) -> bool {
         let left = after.excess_power(noise_rms(self.noise_floor));
         let gain = after.compared_rms().powi(2) - next.compared_rms().powi(2);
+        let noise = self.noise_floor.map(|floor| floor.rms.powi(2));
+        if noise.is_some_and(|noise| gain >= FAR_ABOVE_NOISE * noise)
+            && gain >= GREAT_PART_OF_REST * left
+        {
+            return false;
+        }
         let least = match gain < MOST_OF_REST * left {
             true => SECOND,
             false => SECOND_OF_REST,

@@ -1,6 +1,7 @@
 //! Constants of a stand from records of it: signals from `dsp`, fits from `model`, joined here.
 
 pub mod decay;
+mod hum;
 mod mode;
 mod motion;
 mod present;
@@ -8,6 +9,7 @@ pub mod response;
 pub mod runup;
 pub mod static_load;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use torqcomp_model::{Covariance, Estimate, Estimates, Kind, Measure, UnitSystem};
@@ -18,9 +20,9 @@ pub use mode::{KnownConstant, ModalPole, Pole};
 pub use motion::Motion;
 
 /// A number with a stable name, such as `inertia`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct NamedEstimate {
-    /// The name.
+    /// Name of the parameter.
     pub name: String,
     /// Value, standard uncertainty and unit.
     #[serde(flatten)]
@@ -131,33 +133,33 @@ impl NamedEstimates {
 }
 
 /// How well a model follows the data.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct FitQuality {
-    /// Root mean square of the residual, in the unit.
+    /// Root mean square of the residual, in `unit`.
     pub rms: f64,
-    /// The unit.
+    /// Unit of `rms`.
     pub unit: String,
     /// `rms` over the root mean square of the data.
     pub relative: f64,
 }
 
 /// Result of another method on the same record.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Comparison {
-    /// The method.
+    /// Name of the method.
     pub method: String,
-    /// Its results.
+    /// Parameters by this method.
     pub parameters: Vec<NamedEstimate>,
-    /// How well it follows the data, if it predicts them.
+    /// How well this method follows the data; `null` if it does not predict them.
     pub fit: Option<FitQuality>,
 }
 
 /// Two parameters that these data hardly separate.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Correlation {
-    /// Name of the one.
+    /// Name of one parameter.
     pub first: String,
-    /// Name of the other.
+    /// Name of the other parameter.
     pub second: String,
     /// Correlation coefficient.
     pub coefficient: f64,
@@ -197,8 +199,8 @@ pub(crate) struct ModalShares {
     pub gain: Estimate,
 }
 
-/// The result of an identification; serialises to the JSON document.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+/// Stand constants identified from records.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
 pub struct Identification {
     /// `decay`, `response`, `runup` or `static`.
     pub test: &'static str,
@@ -206,13 +208,13 @@ pub struct Identification {
     pub inputs: Vec<String>,
     /// Samples read.
     pub samples: usize,
-    /// Sampling rate; `None` for a table of loads.
+    /// Sampling rate, in Hz; `null` for a table of loads.
     pub rate_hz: Option<f64>,
-    /// Its standard uncertainty by the stamps; `None` if it does not come from stamps.
+    /// Standard uncertainty of the rate by the time stamps, in Hz; `null` if the rate does not come from stamps.
     pub rate_std_hz: Option<f64>,
-    /// The constants, the main ones first.
+    /// The identified constants, the main ones first.
     pub parameters: Vec<NamedEstimate>,
-    /// How well the model follows the data.
+    /// How well the model follows the data; `null` if it does not predict them.
     pub fit: Option<FitQuality>,
     /// Results of other methods.
     pub comparisons: Vec<Comparison>,
@@ -225,11 +227,12 @@ pub struct Identification {
     /// Mean readings at each load (`static`), for a calibration curve.
     #[serde(skip)]
     pub steps: Vec<static_load::CalibrationStep>,
-    /// Relative hold-out error with 0, 1, 2, … modes (`response`); NaN, which becomes `null`, where it was not tried.
+    /// Relative hold-out error with 0, 1, 2, … modes (`response`); `null` where it was not tried.
+    #[schemars(with = "Vec<Option<f64>>")]
     pub held_out_errors: Vec<f64>,
     /// The method, a sentence each.
     pub method: Vec<String>,
-    /// The warnings.
+    /// Warnings, each with a stable code.
     pub warnings: Vec<Warning>,
     /// Data, fit and residual, for the HTML page.
     #[serde(skip)]

@@ -20,7 +20,7 @@ use torqcomp_model::effects::{
     self, Action, FoundLine, SampleClock, SpectralLine, Stage, Torque, Unrecovered,
 };
 
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::stand::Stand;
 
 pub(crate) use motion::Carried;
@@ -172,6 +172,7 @@ impl ChainInverse {
             }
         }
         Err(Failure::failed(
+            ErrorCode::NotInvertible,
             "the capacitive coupling past the stand and the torques in it do not converge: one of them is too large to \
              be taken back beside the other; leave one of the effects out of the stand file",
         ))
@@ -197,11 +198,16 @@ fn refuse_bent_coupling(stand: &Stand, chain: &Chain) -> Result<(), Failure> {
         |link: &&Link| link.stage < Stage::Chain && matches!(link.action, Action::Distortion(_));
     let coupled = links.iter().find(|link| link.is_feedthrough());
     match (coupled, links.iter().find(is_bent)) {
-        (Some(coupled), Some(curve)) => Err(Failure::failed(format_args!(
-            "{}: \"{}\" reaches the record past the stand, and \"{}\" bends what comes through it; the two cannot \
-             be taken back together; leave the smaller one out",
-            stand.file, coupled.effect, curve.effect
-        ))),
+        (Some(coupled), Some(curve)) => Err(Failure::failed(
+            ErrorCode::NotInvertible,
+            format_args!(
+                "\"{}\" reaches the record past the stand, and \"{}\" bends what comes through it; the two cannot be \
+                 taken back together; leave the smaller one out",
+                coupled.effect,
+                curve.effect
+            ),
+        )
+        .at(&stand.file)),
         _ => Ok(()),
     }
 }

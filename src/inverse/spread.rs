@@ -3,6 +3,7 @@
 //! No response over frequency describes such a stand, so that each constant is moved by its standard uncertainty to either
 //! side, and the record is taken back with both: half the difference is what this constant contributes, sample by sample.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use torqcomp_dsp::band::Band;
 
@@ -14,15 +15,16 @@ use crate::stand::{ConstantStd, Stand, VariedConstant, combined};
 const STRAIGHT: f64 = 0.3;
 
 /// Standard uncertainty of a result, in its unit.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub(crate) struct ResultStd {
-    /// That of stand, effects and calibration together, rms over the record; `null` if one of them is unknown.
+    /// Standard uncertainty from stand, effects and calibration together, rms over the record; `null` if one of them is
+    /// unknown.
     pub rms: Option<f64>,
-    /// Its largest value.
+    /// Largest standard uncertainty in the record; `null` if unknown.
     pub largest: Option<f64>,
-    /// That of mechanics and effects alone, rms; `null` if none of them has a `std`.
+    /// Standard uncertainty from mechanics and effects alone, rms; `null` if none of them has a `std`.
     pub of_response_rms: Option<f64>,
-    /// Samples from the start over which these were determined.
+    /// Samples from the start of the record over which the uncertainties were determined.
     pub samples: usize,
     /// Constants over whose standard uncertainty the result is no straight line: their part is an estimate only.
     pub bent: Vec<String>,

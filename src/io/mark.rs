@@ -1,6 +1,6 @@
 //! The mark of a result of `compensate`: the stand's response is no longer in it, and no verb divides it out again.
 
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 
 /// Beginning of the heading of a result of `compensate`.
 pub(crate) const COMPENSATED: &str = "compensated_";
@@ -13,11 +13,15 @@ pub(crate) fn names_compensated(name: &str) -> bool {
 
 /// The refusal of a result of `compensate` where a recorded signal is wanted.
 pub(crate) fn already_compensated(source: &str, name: &str) -> Failure {
-    Failure::failed(format_args!(
-        "{source}: \"{name}\" is marked as compensated: the stand's response is already divided out of it; take the recorded \
-         channel instead, or, if this one is a recorded signal, rename it without \"{COMPENSATED}\" (harmonics takes it as \
-         it is, without --stand)"
-    ))
+    Failure::failed(
+        ErrorCode::AlreadyCompensated,
+        format_args!(
+            "\"{name}\" is marked as compensated: the stand's response is already divided out of it; take the \
+             recorded channel instead, or, if this one is a recorded signal, rename it without \"{COMPENSATED}\" \
+             (harmonics takes it as it is, without --stand)"
+        ),
+    )
+    .at(source)
 }
 
 #[cfg(test)]

@@ -3,11 +3,15 @@
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use tempfile::NamedTempFile;
 
 use super::{parts, storage, sum};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
+
+/// Whether anything was written to standard output.
+static IS_STDOUT_USED: AtomicBool = AtomicBool::new(false);
 
 /// Most links that lead to one file.
 const LINKS: usize = 40;
@@ -63,26 +67,32 @@ impl Output {
                 input if input == Path::new("-") => "standard input".to_owned(),
                 file => file.display().to_string(),
             };
-            return Err(Failure::usage(format_args!(
-                "the output {name} is {other} as well; write to another file"
-            )));
+            return Err(Failure::usage(
+                ErrorCode::ConflictingArguments,
+                format_args!("the output is {other} as well; write to another file"),
+            )
+            .at(&name));
         }
         // A link is followed, so that it stays one; also one that leads nowhere counts as existing.
         let exists = std::fs::symlink_metadata(path).is_ok();
         let kind = match std::fs::metadata(path) {
             Ok(meta) if meta.is_dir() => {
-                return Err(Failure::usage(format_args!(
-                    "the output {name} is a folder; name a file in it"
-                )));
+                return Err(Failure::usage(
+                    ErrorCode::InvalidValue,
+                    "the output is a folder; name a file in it",
+                )
+                .at(&name));
             }
             Ok(meta) if !meta.is_file() => {
                 let file = storage::open_for_writing(path);
                 Kind::Device(file.map_err(|e| Failure::writing(&name, &e))?)
             }
             _ if exists && !policy.replace => {
-                return Err(Failure::failed(format_args!(
-                    "the output {name} exists; give --force to replace it, or another name"
-                )));
+                return Err(Failure::failed(
+                    ErrorCode::OutputExists,
+                    "the output exists; give --force to replace it, or another name",
+                )
+                .at(&name));
             }
             found => {
                 let path = end_of_links(path);
@@ -144,7 +154,10 @@ impl Output {
 impl Write for Output {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         match &mut self.kind {
-            Kind::Stdout(out) => storage::write(out, bytes),
+            Kind::Stdout(out) => {
+                IS_STDOUT_USED.store(true, Ordering::Relaxed);
+                storage::write(out, bytes)
+            }
             Kind::Device(file) => storage::write(file, bytes),
             Kind::File { part, .. } => storage::write(part.as_file_mut(), bytes),
         }
@@ -242,11 +255,14 @@ impl Renamed {
             false => Ok(()),
         };
         synced.map_err(|error| {
-            Failure::failed(format_args!(
-                "{}: written and in its place, but its folder cannot be synced: {error}; after a power cut the old \
-                 content may be back",
-                self.path.display()
-            ))
+            Failure::failed(
+                ErrorCode::CannotWrite,
+                format_args!(
+                    "written and in its place, but its folder cannot be synced: {error}; after a power cut the old \
+                     content may be back"
+                ),
+            )
+            .at(self.path.display())
         })
     }
 }
@@ -261,17 +277,23 @@ fn second_name(path: &Path) -> Option<tempfile::TempPath> {
 fn folder_failure(path: &Path, error: &io::Error) -> Failure {
     let folder = folder_of(path);
     if folder.is_dir() {
-        Failure::failed(format_args!(
-            "{}: cannot be created: {}; check the permissions of its folder",
-            path.display(),
-            error.kind()
-        ))
+        Failure::failed(
+            ErrorCode::CannotWrite,
+            format_args!(
+                "cannot be created: {}; check the permissions of its folder",
+                error.kind()
+            ),
+        )
+        .at(path.display())
     } else {
-        Failure::failed(format_args!(
-            "{}: the folder {} does not exist; make it first",
-            path.display(),
-            folder.display()
-        ))
+        Failure::failed(
+            ErrorCode::CannotWrite,
+            format_args!(
+                "the folder {} does not exist; make it first",
+                folder.display()
+            ),
+        )
+        .at(path.display())
     }
 }
 
@@ -320,6 +342,11 @@ fn is_stdin(path: &Path) -> bool {
 #[cfg(not(unix))]
 fn is_stdin(_: &Path) -> bool {
     false
+}
+
+/// Whether anything was written to standard output: a second JSON document there could not be parsed.
+pub(crate) fn is_stdout_used() -> bool {
+    IS_STDOUT_USED.load(Ordering::Relaxed)
 }
 
 /// Writes a text to standard output.

@@ -4,12 +4,8 @@ use crate::recording::TimeAxis;
 use crate::recording::moment::Moment;
 use crate::warning::Warning;
 
-/// Samples that are kept of a record that goes by as a stream.
-pub const OF_STREAM: usize = 1 << 15;
-/// Samples that are looked at of any stream.
-const FEWEST: usize = 1 << 12;
-/// Samples of a longer stream of which one is looked at.
-const SHARE: usize = 1 << 10;
+/// Samples that are kept of a record that goes by as a stream, and looked at.
+pub const OF_STREAM: usize = 1 << 16;
 /// Samples that are looked at of a record that is gone through several times.
 pub const OF_PASSES: usize = 1 << 18;
 
@@ -30,20 +26,6 @@ pub struct Of<'a> {
     pub samples: usize,
 }
 
-/// The part of what was kept of a stream that is looked at. To look at a sample takes about six times as
-/// long as all else that is done with it, so that of a long stream it is one in a thousand.
-///
-/// ```
-/// use torqcomp::quality::excerpt::{OF_STREAM, of_stream};
-/// let kept = vec![0.0; OF_STREAM];
-/// assert_eq!(of_stream(&kept, 100_000).len(), 4096);
-/// assert_eq!(of_stream(&kept, 10_240_000).len(), 10_000);
-/// ```
-#[must_use]
-pub fn of_stream(kept: &[f64], samples: usize) -> &[f64] {
-    &kept[..kept.len().min((samples / SHARE).clamp(FEWEST, OF_STREAM))]
-}
-
 /// The warnings of [`super::warnings`] about the first samples of a record; that it has more is said.
 ///
 /// ```
@@ -58,10 +40,7 @@ pub fn of_stream(kept: &[f64], samples: usize) -> &[f64] {
 #[must_use]
 pub fn warnings(samples: &[f64], of: Of) -> Vec<Warning> {
     let scaled: Vec<f64> = samples.iter().map(|sample| sample * of.scale).collect();
-    let axis = TimeAxis {
-        start: Some(of.start),
-        ..TimeAxis::of_header("rate", of.rate_hz, None)
-    };
+    let axis = TimeAxis::uniform(of.rate_hz, of.start);
     let mut found = super::warnings(of.name, of.unit, &scaled, &axis);
     if samples.len() < of.samples {
         let rest = format!(

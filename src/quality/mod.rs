@@ -10,10 +10,13 @@ pub mod time;
 
 use std::collections::HashMap;
 
-use crate::recording::{Channel, TimeAxis};
+use torqcomp_dsp::quality::clipping::Clipping;
+use torqcomp_dsp::quality::mains::MainsLine;
+
+use crate::recording::{AlignedChannel, AlignedChannels, Channel, TimeAxis};
 use crate::warning::Warning;
 
-pub use samples::Findings;
+pub use samples::{Findings, clipped_ends};
 pub use time::TimeFindings;
 
 /// The warnings about samples that a verb is going to use, and about their time axis.
@@ -31,11 +34,28 @@ pub use time::TimeFindings;
 #[must_use]
 pub fn warnings(name: &str, unit: &str, samples: &[f64], axis: &TimeAxis) -> Vec<Warning> {
     let mut found = TimeFindings::of(axis).warnings(&format!("\"{name}\""), axis);
-    let findings = Findings::of(samples, axis.rate_hz);
+    let mut findings = Findings::of(samples, axis.rate_hz);
+    // Here the lines are what is measured, most likely: a machine in step with the mains makes even multiples, hum hardly any.
+    let is_odd = |line: &MainsLine| line.order % 2 == 1;
+    findings.mains = findings
+        .mains
+        .filter(|mains| mains.lines.iter().all(is_odd));
     found.extend(findings.warnings(name, unit, axis, &[]));
     found.extend(findings.dead().map(|value| constant(&[(name, value)])));
     found.extend(findings.coarse().map(|q| coarse(&[(name, unit, q)])));
     found
+}
+
+/// Where channels that were sampled together are cut off.
+pub(crate) fn clipped(aligned: &AlignedChannels) -> Vec<Warning> {
+    let axis = TimeAxis::uniform(aligned.rate_hz, aligned.start);
+    let of_channel = |channel: &AlignedChannel| {
+        let unit = channel.unit.as_ref().map_or("", |unit| &unit.text);
+        let found = Clipping::of(&channel.samples)?;
+        Some(clipped_ends(&channel.name, unit, &found, &axis))
+    };
+    let channels = aligned.channels.iter();
+    channels.filter_map(of_channel).flatten().collect()
 }
 
 /// The warning about channels that have one value only.

@@ -1,9 +1,8 @@
 //! The samples of a channel: what they show.
 
-use torqcomp_dsp::quality::clipping::{Clipping, Rail, clipping};
+use torqcomp_dsp::quality::clipping::{Clipping, Rail};
 use torqcomp_dsp::quality::finite::{NonFinite, non_finite};
 use torqcomp_dsp::quality::mains::{Mains, mains};
-use torqcomp_dsp::quality::pile_up::pile_up;
 use torqcomp_dsp::quality::quantisation::{Quantisation, quantisation};
 use torqcomp_dsp::quality::repeats::{Repeats, repeats};
 use torqcomp_dsp::quality::stuck::{constant, standstills};
@@ -59,7 +58,7 @@ impl Findings {
     #[must_use]
     pub fn of(samples: &[f64], rate_hz: Option<f64>) -> Self {
         let (mean, std) = mean_and_std(samples).unzip();
-        let clipping = clipping(samples).or_else(|| pile_up(samples));
+        let clipping = Clipping::of(samples);
         let rails = clipping.map(|c| [c.low, c.high]).unwrap_or_default();
         let at_rail = |run: &Run| rails.iter().flatten().any(|rail| rail.value == run.value);
         let mut standstills = standstills(samples);
@@ -110,13 +109,8 @@ impl Findings {
             self.non_finite
                 .map(|f| non_finite_cells(name, &f, axis, holes)),
         );
-        for (rail, end) in self
-            .clipping
-            .iter()
-            .flat_map(|c| [(c.low, "lowest"), (c.high, "highest")])
-        {
-            found.extend(rail.map(|rail| clipped(name, unit, end, &rail, axis)));
-        }
+        let clipping = self.clipping.iter();
+        found.extend(clipping.flat_map(|c| clipped_ends(name, unit, c, axis)));
         found.extend(stuck(name, unit, &self.standstills, axis));
         found.extend(
             self.repeats
@@ -173,6 +167,13 @@ fn non_finite_cells(name: &str, found: &NonFinite, axis: &TimeAxis, holes: &[Hol
             found.longest
         ),
     )
+}
+
+/// The warnings about a channel that is cut off.
+pub fn clipped_ends(name: &str, unit: &str, found: &Clipping, axis: &TimeAxis) -> Vec<Warning> {
+    let ends = [(found.low, "lowest"), (found.high, "highest")].into_iter();
+    let warning = |(rail, end): (Option<Rail>, _)| Some(clipped(name, unit, end, &rail?, axis));
+    ends.filter_map(warning).collect()
 }
 
 fn clipped(name: &str, unit: &str, end: &str, rail: &Rail, axis: &TimeAxis) -> Warning {

@@ -8,7 +8,7 @@ use super::memory_stream::check_cells;
 use super::moment::Moment;
 use super::stamps::check_resampled;
 use super::{Recording, Selection, typical_step};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::{ChannelChoice, Input, Reading, already_compensated};
 use crate::print;
 use crate::unit::{NamedUnit, RecordedChannel};
@@ -115,19 +115,17 @@ impl AlignedChannels {
             let selection = recording.select_at(place, choice, reading)?;
             check_cells(selection.channel, reading)?;
             check_finite(&selection)?;
-            let new = |w: &Warning| !warnings.contains(w);
-            let more: Vec<Warning> = selection
-                .warnings
-                .iter()
-                .filter(|w| new(w))
-                .cloned()
-                .collect();
-            warnings.extend(more);
+            let of_channel = selection.warnings.iter();
+            let more = of_channel.filter(|w| !warnings.contains(w)).cloned();
+            warnings.extend(more.collect::<Vec<Warning>>());
             chosen.push((place, selection));
         }
         let (places, chosen): (Vec<usize>, Vec<Selection>) = chosen.into_iter().unzip();
         let Some(first) = chosen.first() else {
-            return Err(Failure::usage("no channel was asked for"));
+            return Err(Failure::usage(
+                ErrorCode::MissingArgument,
+                "no channel was asked for",
+            ));
         };
         let mut aligned = Self {
             source: recording.source.clone(),
@@ -171,20 +169,19 @@ impl AlignedChannels {
         if stamps.len() < chosen.len() {
             return Err(differ(chosen));
         }
-        let start_s = stamps
-            .iter()
-            .map(|t| t[0])
-            .fold(f64::NEG_INFINITY, f64::max);
-        let end_s = stamps
-            .iter()
-            .map(|t| t[t.len() - 1])
-            .fold(f64::INFINITY, f64::min);
+        let starts = stamps.iter().map(|t| t[0]);
+        let start_s = starts.fold(f64::NEG_INFINITY, f64::max);
+        let ends = stamps.iter().map(|t| t[t.len() - 1]);
+        let end_s = ends.fold(f64::INFINITY, f64::min);
         let count = ((end_s - start_s) * self.rate_hz + 1e-6).floor() + 1.0;
         if count.is_nan() || count < 2.0 {
-            return Err(Failure::failed(format_args!(
-                "{} were not recorded at the same time; choose channels of one record",
-                names(chosen)
-            )));
+            return Err(Failure::failed(
+                ErrorCode::RecordsDiffer,
+                format_args!(
+                    "{} were not recorded at the same time; choose channels of one record",
+                    names(chosen)
+                ),
+            ));
         }
         let recorded = typical_step(&stamps[0]).map(|step| 1.0 / step);
         check_resampled(self.rate_hz, recorded.unwrap_or(self.rate_hz))?;
@@ -199,15 +196,10 @@ impl AlignedChannels {
             samples.truncate(count as usize);
             self.channels.push(aligned_channel(c, samples));
         }
-        let shortest = self
-            .channels
-            .iter()
-            .map(|t| t.samples.len())
-            .min()
-            .unwrap_or(0);
-        self.channels
-            .iter_mut()
-            .for_each(|t| t.samples.truncate(shortest));
+        let lengths = self.channels.iter().map(|t| t.samples.len());
+        let shortest = lengths.min().unwrap_or(0);
+        let channels = self.channels.iter_mut();
+        channels.for_each(|t| t.samples.truncate(shortest));
         self.start = chosen[0].channel.axis.moment(start_s);
         let whats = match chosen.len() > 1 {
             true => ["were", "are not uniform or not the same"],
@@ -292,11 +284,14 @@ fn check_finite(selection: &Selection) -> Result<(), Failure> {
     let channel = selection.channel;
     match channel.samples.iter().position(|v| !v.is_finite()) {
         None => Ok(()),
-        Some(place) => Err(Failure::failed(format_args!(
-            "sample {} of \"{}\" is no finite number; repair it or cut the record there",
-            place + 1,
-            channel.name
-        ))),
+        Some(place) => Err(Failure::failed(
+            ErrorCode::InvalidSample,
+            format_args!(
+                "sample {} of \"{}\" is no finite number; repair it or cut the record there",
+                place + 1,
+                channel.name
+            ),
+        )),
     }
 }
 
@@ -355,11 +350,14 @@ fn differ(chosen: &[Selection]) -> Failure {
         )
     };
     let all: Vec<String> = chosen.iter().map(one).collect();
-    Failure::failed(format_args!(
-        "the channels do not lie on one time axis: {}; record them at one rate, or bring one to the rate \
+    Failure::failed(
+        ErrorCode::RecordsDiffer,
+        format_args!(
+            "the channels do not lie on one time axis: {}; record them at one rate, or bring one to the rate \
          of the other with torqcomp extract --resample --rate HZ first",
-        all.join(", ")
-    ))
+            all.join(", ")
+        ),
+    )
 }
 
 #[cfg(test)]

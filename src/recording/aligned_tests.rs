@@ -175,7 +175,7 @@ fn rounded_stamps_of_a_text_are_not_interpolated() {
     );
     let refused = both(&record).unwrap_err().to_string();
     assert!(
-        refused.contains("sample 201 of \"a\"") && refused.contains("21 times the usual one"),
+        refused.contains("sample 201: \"a\"") && refused.contains("21 times the usual one"),
         "{refused}"
     );
 }

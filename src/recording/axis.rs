@@ -312,6 +312,15 @@ impl TimeAxis {
         }
     }
 
+    /// The axis of samples that were brought to uniform steps.
+    #[must_use]
+    pub fn uniform(rate_hz: f64, start: Moment) -> Self {
+        Self {
+            start: Some(start),
+            ..Self::of_header("rate", rate_hz, None)
+        }
+    }
+
     /// An axis of a rate out of the head of a file; `words` gave it.
     #[must_use]
     pub fn of_header(words: &str, rate_hz: f64, start_s: Option<f64>) -> Self {

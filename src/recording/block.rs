@@ -2,7 +2,7 @@
 
 use super::stamps::{IrregularStep, StampGrid};
 use super::text::{ChannelPlan, ChannelRows, Chunks, LastLine, Piece, RowPlan, last_line};
-use crate::failure::Failure;
+use crate::failure::{Failure, RowKind};
 use crate::warning::Warning;
 
 /// What gives the blocks of a channel, in order.
@@ -22,7 +22,7 @@ pub(crate) trait BlockSource: Send {
     }
 
     /// What a sample is called in a message, as in `message 12`.
-    fn row_name(&self) -> &'static str;
+    fn row_kind(&self) -> RowKind;
 }
 
 /// Some samples of a channel and their stamps, out of a text with the text itself.
@@ -103,7 +103,7 @@ impl BlockSource for TextBlocks {
         Ok(piece != Piece::End)
     }
 
-    fn row_name(&self) -> &'static str {
-        "line"
+    fn row_kind(&self) -> RowKind {
+        RowKind::Line
     }
 }

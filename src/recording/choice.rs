@@ -5,7 +5,7 @@ use torqcomp_dsp::quality::rate::{Contradiction, contradiction};
 use super::axis::UNIFORM;
 use super::moment::Moment;
 use super::{Channel, RateFrom, Recording, TimeAxis, typical_step};
-use crate::failure::{Failure, did_you_mean};
+use crate::failure::{ErrorCode, Failure, did_you_mean};
 use crate::io::{ChannelChoice, Reading, digits};
 use crate::print::{list, plural};
 use crate::unit::NamedUnit;
@@ -30,11 +30,14 @@ pub(in crate::recording) fn transposed(columns: usize, rows: Option<usize>) -> O
     let is_short = rows.is_none_or(|rows| 10 * rows < columns);
     (columns >= WIDE && is_short).then(|| {
         let rows = rows.map_or_else(String::new, |rows| format!("{} and ", plural(rows, "row")));
-        Failure::failed(format_args!(
-            "the table has {rows}{columns} columns: are the samples of a channel in one row? Each channel must be a column; \
-             transpose the table (in a spreadsheet: paste special, transpose), or choose a column with --channel if each is a \
-             channel"
-        ))
+        Failure::failed(
+            ErrorCode::NotARecording,
+            format_args!(
+                "the table has {rows}{columns} columns: are the samples of a channel in one row? Each channel must \
+                 be a column; transpose the table (in a spreadsheet: paste special, transpose), or choose a column \
+                 with --channel if each is a channel"
+            ),
+        )
     })
 }
 
@@ -49,13 +52,19 @@ pub(crate) fn choose(
     let Some(wanted) = wanted else {
         return match channels {
             [_] => Ok(0),
-            [] => Err(Failure::failed("there is no channel with numbers in it")),
+            [] => Err(Failure::failed(
+                ErrorCode::NotARecording,
+                "there is no channel with numbers in it",
+            )),
             several => Err(transposed(several.len(), None).unwrap_or_else(|| {
-                Failure::failed(format_args!(
-                    "{} channels could be the signal; choose one with {flag} {}",
-                    several.len(),
-                    names(channels)
-                ))
+                Failure::failed(
+                    ErrorCode::ChannelUnclear,
+                    format_args!(
+                        "{} channels could be the signal; choose one with {flag} {}",
+                        several.len(),
+                        names(channels)
+                    ),
+                )
             })),
         };
     };
@@ -71,11 +80,14 @@ pub(crate) fn choose(
         return Ok(place);
     }
     let known = channels.iter().map(|c| c.name);
-    Err(Failure::failed(format_args!(
-        "there is no channel \"{wanted}\"{}; the channels are {}",
-        did_you_mean(wanted, known),
-        names(channels)
-    )))
+    Err(Failure::failed(
+        ErrorCode::ChannelNotFound,
+        format_args!(
+            "there is no channel \"{wanted}\"{}; the channels are {}",
+            did_you_mean(wanted, known),
+            names(channels)
+        ),
+    ))
 }
 
 /// The place of the channel with such a heading or name, in any case.
@@ -94,11 +106,14 @@ pub(super) fn by_name(
             [] => {}
             [one] => return Ok(Some(*one)),
             several => {
-                return Err(Failure::failed(format_args!(
-                    "{} channels are called \"{wanted}\"; give the number of the one you mean, {flag} {}",
-                    several.len(),
-                    list(several.iter().map(|i| (i + 1).to_string()))
-                )));
+                return Err(Failure::failed(
+                    ErrorCode::ChannelUnclear,
+                    format_args!(
+                        "{} channels are called \"{wanted}\"; give the number of the one you mean, {flag} {}",
+                        several.len(),
+                        list(several.iter().map(|i| (i + 1).to_string()))
+                    ),
+                ));
             }
         }
     }
@@ -112,15 +127,18 @@ pub(super) fn by_part(channels: &[Label], wanted: &str) -> Result<Option<usize>,
     match *(0..channels.len()).filter(has_part).collect::<Vec<_>>() {
         [] => Ok(None),
         [one] => Ok(Some(one)),
-        ref several => Err(Failure::failed(format_args!(
-            "\"{wanted}\" is a part of the names of {} channels: {}; give more of it",
-            several.len(),
-            named(
-                several
-                    .iter()
-                    .map(|place| format!("\"{}\"", channels[*place].name))
-            )
-        ))),
+        ref several => Err(Failure::failed(
+            ErrorCode::ChannelUnclear,
+            format_args!(
+                "\"{wanted}\" is a part of the names of {} channels: {}; give more of it",
+                several.len(),
+                named(
+                    several
+                        .iter()
+                        .map(|place| format!("\"{}\"", channels[*place].name))
+                )
+            ),
+        )),
     }
 }
 
@@ -265,9 +283,12 @@ impl Recording {
             let number = heading
                 .strip_prefix("column ")
                 .map_or_else(String::new, |number| format!(" {number}"));
-            return Err(Failure::failed(format_args!(
-                "{assumed}; confirm it with --time-column{number} and --time-unit, or give --rate HZ"
-            )));
+            return Err(Failure::failed(
+                ErrorCode::TimeUnknown,
+                format_args!(
+                    "{assumed}; confirm it with --time-column{number} and --time-unit, or give --rate HZ"
+                ),
+            ));
         }
         let stamps = axis.stamps_s.as_ref();
         let name = axis.stamps_in.as_deref().unwrap_or("time");
@@ -320,9 +341,12 @@ fn without_rate(channel: &Channel) -> Failure {
         Some(_) => "its time stamps have no usual step",
         None => "the file has neither time stamps nor a rate",
     };
-    Failure::failed(format_args!(
-        "the sampling rate of \"{}\" is unknown, because {why}; give it with --rate HZ, or \
+    Failure::failed(
+        ErrorCode::TimeUnknown,
+        format_args!(
+            "the sampling rate of \"{}\" is unknown, because {why}; give it with --rate HZ, or \
          name the column of stamps with --time-column",
-        channel.name
-    ))
+            channel.name
+        ),
+    )
 }

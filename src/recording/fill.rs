@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::memory_stream::used_stamps;
 use super::{Hole, HoleKind, Recording};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::{Fill, Reading};
 use crate::print::plural;
 use crate::warning::Warning;
@@ -17,7 +18,7 @@ const SAID: usize = 5;
 const LONGEST: f64 = 10_000.0;
 
 /// A stretch of samples that were filled in.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct FilledSpan {
     /// Time of the sample before it, in s.
     pub from_s: f64,
@@ -101,10 +102,13 @@ impl Filled {
         if let (Some(&before_s), Some(&before)) = (self.stamps_s.last(), self.samples.last()) {
             let steps = ((time_s - before_s) * rate_hz).round();
             if steps > LONGEST {
-                return Err(Failure::failed(format_args!(
-                    "{steps} samples are missing at one place, more than --fill bridges ({LONGEST}); cut the record \
-                     there with --range"
-                )));
+                return Err(Failure::failed(
+                    ErrorCode::IrregularTime,
+                    format_args!(
+                        "{steps} samples are missing at one place, more than --fill bridges ({LONGEST}); cut the \
+                         record there with --range"
+                    ),
+                ));
             }
             for step in 1..steps.max(1.0) as usize {
                 let part = step as f64 / steps;

@@ -2,7 +2,7 @@
 
 use super::block::{Block, BlockSource};
 use super::stream::ChannelStream;
-use crate::failure::Failure;
+use crate::failure::{Failure, RowKind};
 use crate::warning::Warning;
 
 /// The first samples of a stream.
@@ -77,8 +77,8 @@ impl BlockSource for HeldBlocks {
         self.rest.finish()
     }
 
-    fn row_name(&self) -> &'static str {
-        self.rest.row_name()
+    fn row_kind(&self) -> RowKind {
+        self.rest.row_kind()
     }
 }
 
@@ -90,7 +90,7 @@ impl BlockSource for Nothing {
         Ok(false)
     }
 
-    fn row_name(&self) -> &'static str {
-        "sample"
+    fn row_kind(&self) -> RowKind {
+        RowKind::Sample
     }
 }

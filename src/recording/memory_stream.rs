@@ -7,7 +7,7 @@ use super::stamps::StampGrid;
 use super::stream::ChannelStream;
 use super::text::BRIDGE;
 use super::{Channel, HoleKind, RateFrom, Recording, TimeAxis};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure, RowKind};
 use crate::io::{ChannelChoice, Reading};
 use crate::print::plural;
 use crate::warning::Warning;
@@ -120,11 +120,14 @@ fn refuse_holes(channel: &Channel, by_stamps: bool) -> Result<(), Failure> {
         }
         HoleKind::Text => "is a text, expected a number",
     };
-    Err(Failure::failed(format_args!(
-        "line {}: the value of \"{name}\" {what} ({} in all); {BRIDGE}",
-        hole.line,
-        plural(count, "such cell"),
-    )))
+    Err(Failure::failed(
+        ErrorCode::InvalidSample,
+        format_args!(
+            "the value of \"{name}\" {what} ({} in all); {BRIDGE}",
+            plural(count, "such cell")
+        ),
+    )
+    .line(hole.line))
 }
 
 /// Samples that are in memory.
@@ -155,7 +158,7 @@ impl BlockSource for MemoryBlocks {
         (self.lost.take(), Vec::new())
     }
 
-    fn row_name(&self) -> &'static str {
-        "sample"
+    fn row_kind(&self) -> RowKind {
+        RowKind::Sample
     }
 }

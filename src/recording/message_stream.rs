@@ -6,7 +6,7 @@ use super::block::{Block, BlockSource};
 use super::stamps::StampGrid;
 use super::stream::ChannelStream;
 use super::{TimeAxis, choice, messages};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure, RowKind};
 use crate::io::mcap::SignalReader;
 use crate::io::mcap::decode::Encoding;
 use crate::io::{ChannelChoice, Input, Reading};
@@ -109,10 +109,11 @@ fn nothing_usable(name: &str, source: SignalReader) -> Failure {
         .into_iter()
         .map(|warning| warning.message)
         .collect();
-    Failure::failed(format_args!(
-        "{name}: no message of {topic} could be used: {}",
-        said.join("; ")
-    ))
+    Failure::failed(
+        ErrorCode::DamagedFile,
+        format_args!("no message of {topic} could be used: {}", said.join("; ")),
+    )
+    .at(name)
 }
 
 /// Messages on their way; times are given from the first one.
@@ -147,11 +148,14 @@ impl MessageBlocks {
     fn relative(&self) -> Result<Vec<f64>, Failure> {
         let one = |time_ns: &i64| match time_ns.checked_sub(self.origin_ns) {
             Some(ns) if ns.abs() < EXACT_NS => Ok(ns as f64),
-            _ => Err(Failure::failed(format_args!(
-                "a message at {time_ns} ns is more than 104 days from the first one at {} ns: the \
+            _ => Err(Failure::failed(
+                ErrorCode::IrregularTime,
+                format_args!(
+                    "a message at {time_ns} ns is more than 104 days from the first one at {} ns: the \
                  clock jumped; choose another one with --time log, publish or header",
-                self.origin_ns
-            ))),
+                    self.origin_ns
+                ),
+            )),
         };
         self.times_ns.iter().map(one).collect()
     }
@@ -179,7 +183,7 @@ impl BlockSource for MessageBlocks {
         messages::losses(source.finish())
     }
 
-    fn row_name(&self) -> &'static str {
-        "message"
+    fn row_kind(&self) -> RowKind {
+        RowKind::Message
     }
 }

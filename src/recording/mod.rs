@@ -26,9 +26,10 @@ pub mod text;
 mod uniform;
 mod validator;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::{ChannelChoice, Input, Reading};
 use crate::unit::NamedUnit;
 use crate::warning::Warning;
@@ -88,11 +89,11 @@ impl Recording {
 }
 
 /// A part of a file that was recorded on its own: after a trigger, or after a pause.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Segment {
-    /// Its name, for people: `segment 2`.
+    /// Name for people: `segment 2`.
     pub name: String,
-    /// Its start after that of the first segment, in seconds, if the file says.
+    /// Start after the first segment, in s; `null` if the file does not say.
     pub start_s: Option<f64>,
     /// Its date and time as written.
     #[serde(rename = "start_time")]
@@ -249,7 +250,10 @@ pub(crate) fn refuse_for_text(choice: &ChannelChoice, reading: &Reading) -> Resu
 
 fn refuse(given: &[(&str, bool)], why: &str) -> Result<(), Failure> {
     match given.iter().find(|(_, is_given)| *is_given) {
-        Some((flag, _)) => Err(Failure::usage(format_args!("{flag} does not apply: {why}"))),
+        Some((flag, _)) => Err(Failure::usage(
+            ErrorCode::ConflictingArguments,
+            format_args!("{flag} does not apply: {why}"),
+        )),
         None => Ok(()),
     }
 }

@@ -1,7 +1,7 @@
 //! Moments: times of a record for people, to the nanosecond, and as dates.
 
-use serde::ser::SerializeMap;
-use serde::{Serialize, Serializer};
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use crate::io::digits;
 
@@ -10,7 +10,9 @@ const SECOND: i64 = 1_000_000_000;
 
 /// A time of a record: seconds after an origin in nanoseconds, since those since 1970 would cost an `f64` its last
 /// digits.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, JsonSchema)]
+#[serde(into = "StartMoment")]
+#[schemars(from = "StartMoment")]
 pub struct Moment {
     /// Nanoseconds at which the clock was at the origin; 0 for a clock that begins with the record.
     pub origin_ns: i64,
@@ -90,15 +92,24 @@ impl Moment {
     }
 }
 
-/// Beside the seconds, which lose the last digits of a date, the nanoseconds and the date, if there is one.
-impl Serialize for Moment {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut map = serializer.serialize_map(Some(3))?;
-        map.serialize_entry("start_s", &self.seconds())?;
-        let ns = (self.origin_ns != 0).then(|| self.nanoseconds());
-        map.serialize_entry("start_ns", &ns)?;
-        map.serialize_entry("start_time", &self.date())?;
-        map.end()
+/// A moment in a document: beside the seconds, which lose the last digits of a date, the nanoseconds and the date.
+#[derive(Serialize, JsonSchema)]
+struct StartMoment {
+    /// Time of the first sample on the time axis of the record, in s.
+    start_s: f64,
+    /// The same in ns, if the clock does not begin with the record.
+    start_ns: Option<i64>,
+    /// Its date and time in UTC, if the clock counts from 1970.
+    start_time: Option<String>,
+}
+
+impl From<Moment> for StartMoment {
+    fn from(moment: Moment) -> Self {
+        Self {
+            start_s: moment.seconds(),
+            start_ns: (moment.origin_ns != 0).then(|| moment.nanoseconds()),
+            start_time: moment.date(),
+        }
     }
 }
 

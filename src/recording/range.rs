@@ -3,7 +3,7 @@
 use super::moment::Moment;
 use super::text::Clock;
 use super::{Channel, Recording, TimeAxis};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::TimeRange;
 
 /// Seconds from which on a number is a time since 1970: 1973.
@@ -23,10 +23,13 @@ enum TimeBound {
 impl TimeBound {
     fn parse(text: &str) -> Result<Self, Failure> {
         Self::read(text).ok_or_else(|| {
-            Failure::usage(format_args!(
-                "--range: \"{text}\" is no time; expected seconds, as 0.5, a time of day, as 14:30:00, or a date with a \
-                 time, as 2024-03-12T13:26:40"
-            ))
+            Failure::usage(
+                ErrorCode::InvalidValue,
+                format_args!(
+                    "--range: \"{text}\" is no time; expected seconds, as 0.5, a time of day, as 14:30:00, or a date \
+                     with a time, as 2024-03-12T13:26:40"
+                ),
+            )
         })
     }
 
@@ -57,6 +60,7 @@ impl TimeBound {
             Self::Clock(clock) => {
                 let zero_ns = axis.clock_ns.ok_or_else(|| {
                     Failure::failed(
+                        ErrorCode::RangeEmpty,
                         "the record has no dates or times of day; give --range in seconds, as 0.5..2",
                     )
                 })?;
@@ -93,9 +97,10 @@ impl Recording {
             let ends = whole.flatten().map_or_else(String::new, |[from, to]| {
                 format!("; the record runs from {} to {}", from.text(), to.text())
             });
-            return Err(Failure::failed(format_args!(
-                "no sample lies within --range{ends}"
-            )));
+            return Err(Failure::failed(
+                ErrorCode::RangeEmpty,
+                format_args!("no sample lies within --range{ends}"),
+            ));
         }
         Ok(())
     }
@@ -127,7 +132,10 @@ impl Channel {
         let from_s = end(&range.from, f64::NEG_INFINITY)?;
         let to_s = end(&range.to, f64::INFINITY)?;
         if from_s >= to_s {
-            return Err(Failure::usage("--range FROM..TO: FROM must be before TO"));
+            return Err(Failure::usage(
+                ErrorCode::InvalidValue,
+                "--range FROM..TO: FROM must be before TO",
+            ));
         }
         // A time that is not exact is that of the sample nearby.
         let slack_s = self.axis.rate_hz.map_or(0.0, |hz| 1e-6 / hz);

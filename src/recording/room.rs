@@ -1,7 +1,7 @@
 //! Whether the numbers of a text have room in memory.
 
 use super::text::TextFile;
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::Input;
 use crate::print;
 
@@ -49,12 +49,16 @@ impl Room {
         let usual = USUAL.saturating_mul(numbers);
         let gb = |bytes: u64| print::rounded(bytes as f64 * 1e-9, 2);
         if let Some(allowed) = self.allowed.filter(|allowed| least > *allowed) {
-            return Err(Failure::failed(format_args!(
-                "{name}: its numbers take at least {} GB of memory, and this process may have {} GB; raise the limit \
-                 (ulimit -v), or cut the file into parts",
-                gb(least),
-                gb(allowed)
-            )));
+            return Err(Failure::failed(
+                ErrorCode::NotEnoughRoom,
+                format_args!(
+                    "its numbers take at least {} GB of memory, and this process may have {} GB; raise the limit \
+                     (ulimit -v), or cut the file into parts",
+                    gb(least),
+                    gb(allowed)
+                ),
+            )
+            .at(name));
         }
         let is_short = |free: &u64| usual > *free;
         Ok(self.free.filter(is_short).map(|free| {

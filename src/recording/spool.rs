@@ -8,7 +8,7 @@ use torqcomp_dsp::Error;
 use torqcomp_dsp::store::SampleStore;
 
 use super::uniform::KeepSamples;
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::storage::Scratch;
 
 /// Samples that stay in memory.
@@ -35,11 +35,14 @@ impl KeepSamples for Spool {
         match more.is_empty() {
             true => Ok(()),
             false => self.write(more).map_err(|error| {
-                Failure::failed(format_args!(
-                    "{}: the samples do not fit into a scratch file there: {error}; name a folder with room for 8 bytes a \
-                     sample in TMPDIR",
-                    std::env::temp_dir().display()
-                ))
+                Failure::failed(
+                    ErrorCode::NotEnoughRoom,
+                    format_args!(
+                        "the samples do not fit into a scratch file there: {error}; name a folder with room for 8 \
+                         bytes a sample in TMPDIR"
+                    ),
+                )
+                .at(std::env::temp_dir().display())
             }),
         }
     }

@@ -4,7 +4,7 @@ use super::Channel;
 use super::axis::{RateFrom, TimeAxis, UNIFORM, rounding, step_of, without_rounding};
 use super::checkpoints::sharpened;
 use super::moment::Moment;
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::{Reading, digits};
 use crate::print::plural;
 use crate::warning::Warning;
@@ -61,8 +61,8 @@ impl TimeAxis {
         reading: &Reading,
     ) -> Result<Self, Failure> {
         let origin = grid.origin_ns as f64 * 1e-9 / grid.seconds_per_unit;
-        let typical =
-            step_of(first, origin).ok_or_else(|| Failure::failed(no_step(heading, first)))?;
+        let typical = step_of(first, origin)
+            .ok_or_else(|| Failure::failed(ErrorCode::IrregularTime, no_step(heading, first)))?;
         let typical = sharpened(typical, first, later, origin).unwrap_or(typical);
         grid.resampled = reading.resample;
         grid.step = match reading.rate_hz {
@@ -161,12 +161,15 @@ impl StampGrid {
             return Ok(());
         }
         let step_s = 1.0 / rate_hz;
-        Err(Failure::failed(format_args!(
-            "the time stamps are rounded to {} s and allow {}; a resonance cannot be divided out with that: give the \
-             recorder's rate with --rate HZ",
-            digits::text(self.quantum * self.seconds_per_unit, 3),
-            rates_of([step_s * (1.0 - part), step_s * (1.0 + part)])
-        )))
+        Err(Failure::failed(
+            ErrorCode::IrregularTime,
+            format_args!(
+                "the time stamps are rounded to {} s and allow {}; a resonance cannot be divided out with that: give \
+                 the recorder's rate with --rate HZ",
+                digits::text(self.quantum * self.seconds_per_unit, 3),
+                rates_of([step_s * (1.0 - part), step_s * (1.0 + part)])
+            ),
+        ))
     }
 
     /// A warning if stamps are rounded so coarsely that single steps mean little; `span` is the time that they cover, in
@@ -244,6 +247,11 @@ impl StampGrid {
             0 => format!("{} {}", digits::text(stamp, 12), self.unit),
             _ => self.moment(stamp).text(),
         }
+    }
+
+    /// Time of a stamp on the file's own axis.
+    pub(super) fn time_s(&self, stamp: f64) -> f64 {
+        stamp * self.seconds_per_unit + self.origin_ns as f64 * 1e-9
     }
 
     /// Says what is wrong at a break and what to do.
@@ -331,12 +339,13 @@ impl Channel {
         let stamps_s = self.axis.stamps_s.as_ref().filter(|_| by_stamps)?;
         let grid = StampGrid::at_rate(rate_hz, self.axis.origin_ns, stamps_s);
         let found = grid.first_irregular(None, stamps_s)?;
-        Some(Failure::failed(format_args!(
-            "sample {} of \"{}\": {}",
-            found.row + 1,
-            self.name,
-            grid.explain(&found)
-        )))
+        let failure = Failure::failed(
+            ErrorCode::IrregularTime,
+            format_args!("\"{}\": {}", self.name, grid.explain(&found)),
+        );
+        Some(failure.sample(found.row + 1).with(|place| {
+            place.time_s = Some(grid.time_s(found.after));
+        }))
     }
 }
 
@@ -359,12 +368,15 @@ pub(super) fn check_resampled(rate_hz: f64, recorded_hz: f64) -> Result<(), Fail
     if (low * recorded_hz..=high * recorded_hz).contains(&rate_hz) {
         return Ok(());
     }
-    Err(Failure::failed(format_args!(
-        "the stamps come at {} Hz; --resample with --rate {} would fold high frequencies down or \
+    Err(Failure::failed(
+        ErrorCode::IrregularTime,
+        format_args!(
+            "the stamps come at {} Hz; --resample with --rate {} would fold high frequencies down or \
          invent samples. Resample near the recorded rate, and limit the band with --band",
-        digits::text(recorded_hz, 6),
-        digits::text(rate_hz, 6)
-    )))
+            digits::text(recorded_hz, 6),
+            digits::text(rate_hz, 6)
+        ),
+    ))
 }
 
 fn no_step(heading: &str, times: &[f64]) -> String {

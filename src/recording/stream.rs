@@ -11,7 +11,7 @@ use super::stamps::{StampGrid, is_uniform};
 use super::text::{ChannelPlan, StampColumn, StampUse, TextFile, TextStream};
 use super::validator::{StreamValidator, TextLines};
 use super::{FilledSpan, RateFrom, Recording, TimeAxis, checkpoints, progress};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::{ChannelChoice, Input, Reading};
 use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
@@ -77,7 +77,13 @@ impl ChannelStream {
             return Self::of_recording(recording, choice, reading).map_err(|f| f.at(&name));
         }
         let mut bytes = progress::open(input)?;
-        let unreadable = |error| Failure::failed(format_args!("{name}: cannot be read: {error}"));
+        let unreadable = |error| {
+            Failure::failed(
+                ErrorCode::CannotRead,
+                format_args!("cannot be read: {error}"),
+            )
+            .at(&name)
+        };
         let mut head = Vec::new();
         let start = (&mut bytes).take(MAGIC).read_to_end(&mut head);
         start.map_err(unreadable)?;
@@ -169,7 +175,7 @@ impl ChannelStream {
         let plan = self.text.as_ref().map(|text| text.plan.clone());
         let validator = StreamValidator::new(
             self.source,
-            self.blocks.row_name(),
+            self.blocks.row_kind(),
             self.text,
             self.time,
             self.warnings,

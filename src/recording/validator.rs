@@ -5,7 +5,7 @@ use super::block::{Block, BlockSource};
 use super::joined::JoinedBreaks;
 use super::stamps::IrregularStep;
 use super::text::{ChannelPlan, Layout, LineNotes, Problem, is_end_of_data};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, ErrorPlace, Failure, RowKind};
 use crate::print::plural;
 use crate::warning::Warning;
 
@@ -19,7 +19,7 @@ const RATE_DRIFT: f64 = 1e-4;
 pub(crate) struct StreamValidator {
     source: String,
     /// What a row is called: `line`, `message`.
-    row_name: &'static str,
+    row_kind: RowKind,
     /// Of a text, how it is written.
     text: Option<TextLines>,
     time: TimeAxis,
@@ -72,7 +72,7 @@ pub(crate) struct StreamSummary {
 impl StreamValidator {
     pub(super) fn new(
         source: String,
-        row_name: &'static str,
+        row_kind: RowKind,
         text: Option<TextLines>,
         time: TimeAxis,
         warnings: Vec<Warning>,
@@ -80,7 +80,7 @@ impl StreamValidator {
     ) -> Self {
         Self {
             source,
-            row_name,
+            row_kind,
             lines: text.as_ref().map_or(0, |text| text.layout.line - 1),
             text,
             time,
@@ -113,7 +113,7 @@ impl StreamValidator {
             if self.any_steps {
                 self.say_irregular(line, &found);
             } else {
-                return Err(self.at(line, self.explain(&found)));
+                return Err(self.irregular(line, &found));
             }
         }
         if self.text.is_some() {
@@ -148,9 +148,8 @@ impl StreamValidator {
     /// Says once that the stamps are irregular.
     fn say_irregular(&mut self, line: usize, found: &IrregularStep) {
         if !self.warnings.iter().any(|w| w.code == IRREGULAR) {
-            let (source, name) = (&self.source, self.row_name);
-            let what = self.explain(found);
-            let message = format!("{source}, {name} {line}: {what}");
+            let place = ErrorPlace::of_row(&self.source, self.row_kind, line);
+            let message = format!("{place}: {}", self.explain(found));
             self.warnings.push(Warning::new(IRREGULAR, message));
         }
     }
@@ -164,7 +163,7 @@ impl StreamValidator {
         if let Some(line) = self.empty_line
             && !rows.values.is_empty()
         {
-            return Err(self.at(line, self.describe(self.value_cell(), "")));
+            return Err(self.bad_cell(line, self.value_cell(), ""));
         }
         if let Some(line) = rows.empty_at {
             self.empty_line = self.empty_line.or(Some(self.lines + line + 1));
@@ -189,6 +188,7 @@ impl StreamValidator {
         if !is_end_of_data(&line) {
             return Err(self.at(
                 self.lines + block.rows.lines + 1,
+                ErrorCode::SeveralTables,
                 "another table begins here; split the file there",
             ));
         }
@@ -204,11 +204,14 @@ impl StreamValidator {
         let (lost, warnings) = blocks.finish();
         if self.samples < 2 {
             let why = lost.map_or(String::new(), |lost| format!(": {}", lost.message));
-            return Err(Failure::failed(format_args!(
-                "{}: {} of numbers; a record has at least two{why}",
-                self.source,
-                plural(self.samples, "row")
-            )));
+            return Err(Failure::failed(
+                ErrorCode::TooFewSamples,
+                format_args!(
+                    "{} of numbers; a record has at least two{why}",
+                    plural(self.samples, "row")
+                ),
+            )
+            .at(&self.source));
         }
         self.lost = self.lost.or(lost);
         self.warnings.extend(warnings);
@@ -240,12 +243,22 @@ impl StreamValidator {
             Some(_) => block.rows.lines,
             None => block.rows.values.len(),
         };
-        self.at(self.line_of_row(block, row) - before, message)
+        self.at(
+            self.line_of_row(block, row) - before,
+            ErrorCode::InvalidSample,
+            message,
+        )
     }
 
-    fn at(&self, line: usize, message: impl std::fmt::Display) -> Failure {
-        let (source, name) = (&self.source, self.row_name);
-        Failure::failed(format_args!("{source}, {name} {line}: {message}"))
+    fn at(&self, line: usize, code: ErrorCode, message: impl std::fmt::Display) -> Failure {
+        let place = ErrorPlace::of_row(&self.source, self.row_kind, line);
+        Failure::failed(code, message).with(|known| *known = place)
+    }
+
+    fn irregular(&self, line: usize, found: &IrregularStep) -> Failure {
+        let failure = self.at(line, ErrorCode::IrregularTime, self.explain(found));
+        let grid = self.time.grid.as_ref();
+        failure.with(|place| place.time_s = grid.map(|grid| grid.time_s(found.after)))
     }
 
     /// Line, from 1, of a row of the next block.
@@ -277,7 +290,12 @@ impl StreamValidator {
     fn bad_row(&self, block: &Block, problem: Problem) -> Failure {
         let line = self.lines + problem.line + 1;
         let text = nth_line(&block.text, problem.line);
-        self.at(line, self.describe(problem.cell, &text))
+        self.bad_cell(line, problem.cell, &text)
+    }
+
+    fn bad_cell(&self, line: usize, cell: usize, text: &str) -> Failure {
+        let failure = self.at(line, ErrorCode::InvalidSample, self.describe(cell, text));
+        failure.with(|place| place.column = Some(cell + 1))
     }
 
     fn describe(&self, cell: usize, line: &str) -> String {

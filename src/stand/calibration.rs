@@ -5,7 +5,7 @@ use torqcomp_model::{Dimension, Estimate, Kind, RatioOf, Unit, UnitSystem};
 
 use super::static_law::StaticLaw;
 use super::{ConstantStd, Stand, TransducerSignal};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::print::{rounded, short};
 use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
@@ -98,7 +98,7 @@ impl Applied {
 /// # Errors
 /// If the unit is not known.
 pub fn applied_by_unit(text: &str, units: UnitSystem) -> Result<Applied, Failure> {
-    let unit = Unit::parse(text).map_err(Failure::failed)?;
+    let unit = Unit::parse(text).map_err(Failure::of(ErrorCode::UnitUnclear))?;
     Ok(match unit.dimension() {
         TORQUE => Applied::of(Kind::Torque, "torque", units),
         FORCE => Applied::of(Kind::Force, "force", units),
@@ -122,14 +122,18 @@ impl Calibration {
     pub fn of_compensated(channel: RecordedChannel, units: UnitSystem) -> Result<Self, Failure> {
         let named = channel.unit.ok_or_else(|| {
             let name = channel.name;
-            Failure::failed(format_args!(
-                "the channel \"{name}\" does not say its unit; give it with --unit \"N m\" (or \"ft lbf\", N)"
-            ))
+            Failure::failed(
+                ErrorCode::UnitUnclear,
+                format_args!(
+                    "the channel \"{name}\" does not say its unit; give it with --unit \"N m\" (or \"ft lbf\", N)"
+                ),
+            )
         })?;
         Ok(Self {
             recorded_factor: named.unit.factor(),
             signal: None,
-            conversion: Conversion::linear(1.0, 0.0).map_err(Failure::failed)?,
+            conversion: Conversion::linear(1.0, 0.0)
+                .map_err(Failure::of(ErrorCode::InvalidStand))?,
             zero: 0.0,
             zero_std: None,
             applied: applied_by_unit(&named.text, units)?,
@@ -236,14 +240,18 @@ impl Stand {
         gain: &super::StaticGain,
         units: UnitSystem,
     ) -> Result<Calibration, Failure> {
-        let expected = Unit::parse(&gain.recorded_unit).map_err(Failure::failed)?;
+        let expected =
+            Unit::parse(&gain.recorded_unit).map_err(Failure::of(ErrorCode::UnitUnclear))?;
         let is_other = expected.dimension() != named.unit.dimension();
         if is_other || expected.ratio_of() != named.unit.ratio_of() {
-            return Err(Failure::failed(format_args!(
-                "the channel \"{channel}\" is in \"{}\", but the static_gain of {} expects \"{}\"; \
+            return Err(Failure::failed(
+                ErrorCode::UnitUnsuitable,
+                format_args!(
+                    "the channel \"{channel}\" is in \"{}\", but the static_gain of {} expects \"{}\"; \
                  choose another channel, or say the unit with --unit",
-                named.text, self.file, gain.recorded_unit
-            )));
+                    named.text, self.file, gain.recorded_unit
+                ),
+            ));
         }
         // A zero in volts belongs to a record in volts.
         let zero = self.zero_as(TransducerSignal::of(&named.unit));
@@ -252,7 +260,8 @@ impl Stand {
         Ok(Calibration {
             recorded_factor: named.unit.factor(),
             signal: None,
-            conversion: Conversion::linear(slope, -slope * at_rest).map_err(Failure::failed)?,
+            conversion: Conversion::linear(slope, -slope * at_rest)
+                .map_err(Failure::of(ErrorCode::InvalidStand))?,
             zero_std: zero
                 .and_then(Estimate::std_uncertainty)
                 .map(|std| (slope * std).abs()),
@@ -287,17 +296,25 @@ fn scaled(name: &str) -> Option<Warning> {
 fn without_unit(channel: RecordedChannel) -> Failure {
     let name = channel.name;
     match channel.unit_text {
-        None => Failure::failed(format_args!(
-            "the channel \"{name}\" does not say its unit; give it with --unit V (or mV/V, mA, Hz, ustrain, \"N m\", N)"
-        )),
+        None => Failure::failed(
+            ErrorCode::UnitUnclear,
+            format_args!(
+                "the channel \"{name}\" does not say its unit; give it: --unit V for what an amplifier or recorder put out \
+                 (mV/V, mA, Hz, ustrain likewise), --unit \"N m\" (or N) for what is torque (or force) already, as from \
+                 simulate"
+            ),
+        ),
         Some(text) => {
             let why = Unit::parse(text)
                 .err()
                 .map_or_else(String::new, |error| format!(": {error}"));
-            Failure::failed(format_args!(
-                "the unit \"{text}\" of the channel \"{name}\" is unknown{why}; give a known one with --unit, such as V, \
-                 mV/V, \"N m\""
-            ))
+            Failure::failed(
+                ErrorCode::UnitUnclear,
+                format_args!(
+                    "the unit \"{text}\" of the channel \"{name}\" is unknown{why}; give a known one with --unit, \
+                     such as V, mV/V, \"N m\""
+                ),
+            )
         }
     }
 }
@@ -306,10 +323,14 @@ fn without_unit(channel: RecordedChannel) -> Failure {
 fn no_torque(channel: &str, named: &NamedUnit) -> Failure {
     let text = &named.text;
     if named.unit.ratio_of() == Some(RatioOf::Anything) {
-        return Failure::failed(format_args!(
-            "the channel \"{channel}\" is in \"{text}\", which could be the output of a bridge over its excitation, a strain, \
-             or part of a full scale; give --unit \"{text} V/V\" for the first or \"{text} strain\" for the second"
-        ));
+        return Failure::failed(
+            ErrorCode::UnitUnclear,
+            format_args!(
+                "the channel \"{channel}\" is in \"{text}\", which could be the output of a bridge over its \
+                 excitation, a strain, or part of a full scale; give --unit \"{text} V/V\" for the first or \"{text} \
+                 strain\" for the second"
+            ),
+        );
     }
     if let Some([force, mass]) = Unit::readings_of_weight(text) {
         let size = Kind::Torque.parse(&format!("1 {force}"));
@@ -320,14 +341,20 @@ fn no_torque(channel: &str, named: &NamedUnit) -> Failure {
                 format!("if it is a torque, give --unit \"{force}\" (1 {force} = {size} N m)")
             },
         );
-        return Failure::failed(format_args!(
-            "the channel \"{channel}\" is in \"{text}\", which can be read with a force or with a mass; {torque}; \"{mass}\" \
-             does not become torque"
-        ));
+        return Failure::failed(
+            ErrorCode::UnitUnclear,
+            format_args!(
+                "the channel \"{channel}\" is in \"{text}\", which can be read with a force or with a mass; \
+                 {torque}; \"{mass}\" does not become torque"
+            ),
+        );
     }
-    Failure::failed(format_args!(
-        "the channel \"{channel}\" is in \"{text}\" ({}), which does not become torque; expected volts, mV/V, mA, Hz, strain, \
-         torque or force",
-        named.unit.dimension()
-    ))
+    Failure::failed(
+        ErrorCode::UnitUnsuitable,
+        format_args!(
+            "the channel \"{channel}\" is in \"{text}\" ({}), which does not become torque; expected volts, mV/V, \
+             mA, Hz, strain, torque or force",
+            named.unit.dimension()
+        ),
+    )
 }

@@ -9,7 +9,7 @@ use torqcomp_model::{Chain, Link, ModalResponse, Unit as TextUnit};
 
 use super::Stand;
 use super::section::Section;
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::identify::Motion;
 
 /// An effect that the stand file declares.
@@ -157,11 +157,16 @@ impl Stand {
     fn refuse_unknown_shapes(&self, modes: &ModalResponse) -> Result<(), Failure> {
         let torque = self.effects.iter().find(|e| e.form.stage == Stage::Stand);
         match (torque, modes.at_gage()) {
-            (Some(torque), None) => Err(Failure::failed(format_args!(
-                "{}: the effect \"{}\" acts at the gage, and how far it moves each mode there does not follow from residues of \
-                 both signs; give shape_at_load and shape_at_gage of [[modes]] in place of residue, or leave the effect out",
-                self.file, torque.effect.name
-            ))),
+            (Some(torque), None) => Err(Failure::failed(
+                ErrorCode::NotInvertible,
+                format_args!(
+                    "the effect \"{}\" acts at the gage, and how far it moves each mode there does not follow from \
+                     residues of both signs; give shape_at_load and shape_at_gage of [[modes]] in place of residue, \
+                     or leave the effect out",
+                    torque.effect.name
+                ),
+            )
+            .at(&self.file)),
             _ => Ok(()),
         }
     }
@@ -174,11 +179,15 @@ impl Stand {
         let plain = self.mechanics()?.response.clone();
         let chain = self.chain()?;
         if let Some(link) = chain.links().iter().find(|link| !link.is_linear()) {
-            return Err(Failure::failed(format_args!(
-                "{}: the effect \"{}\" is no response over frequency; leave it out to use the plain \
-                 stand, or take it out of the record with compensate",
-                self.file, link.effect
-            )));
+            return Err(Failure::failed(
+                ErrorCode::NotInvertible,
+                format_args!(
+                    "the effect \"{}\" is no response over frequency; leave it out to use the plain stand, or take \
+                     it out of the record with compensate",
+                    link.effect
+                ),
+            )
+            .at(&self.file));
         }
         Ok(Arc::new(move |frequency_hz| {
             chain.divide_out(plain.inverse(frequency_hz), frequency_hz)

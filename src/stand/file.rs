@@ -8,7 +8,7 @@ use torqcomp_model::Unit;
 use super::drawing::{beam, friction, part, unusual_modulus};
 use super::effects::effect;
 use super::measured::calibration;
-use super::measuring::{bridge, gage, recorder};
+use super::measuring::{bridge, gage, recorder, unusual_gage_factor};
 use super::mechanics::mechanics;
 use super::section::{Section, SourceText};
 use super::{Diagnosed, Mechanics, Stand, TransducerSignal};
@@ -130,7 +130,9 @@ fn oddities(stand: &Stand) -> Vec<Warning> {
         .mechanics
         .as_ref()
         .and_then(|m| m.much_left(&stand.file));
-    overdamped.chain(modulus).chain(left).collect()
+    let factor = stand.gage.as_ref().and_then(unusual_gage_factor);
+    let gage = modulus.into_iter().chain(factor);
+    overdamped.chain(gage).chain(left).collect()
 }
 
 /// What would convert the record twice, or give its zero twice.

@@ -9,9 +9,32 @@ use super::section::Section;
 use super::signal::TransducerSignal;
 use super::{BridgeData, GageData, RecorderData};
 use crate::failure::Failure;
+use crate::print::short;
+use crate::warning::Warning;
 
 /// Smallest gain that an amplifier has; below, another quantity is meant.
 const LEAST_GAIN: f64 = 0.01;
+
+/// Sizes of gage factors: of metal foil (2, platinum up to 6), and of semiconductors.
+const GAGE_FACTORS: [std::ops::RangeInclusive<f64>; 2] = [1.0..=6.5, 30.0..=190.0];
+
+/// A warning about a gage factor that no usual gage has.
+pub(super) fn unusual_gage_factor(gage: &GageData) -> Option<Warning> {
+    let factor = gage.gage.gage_factor();
+    let is_usual = GAGE_FACTORS
+        .iter()
+        .any(|range| range.contains(&factor.abs()));
+    (!is_usual).then(|| {
+        Warning::new(
+            "gage-factor-unusual",
+            format!(
+                "[gage] gage_factor is {}, which no usual gage has: metal foil has about 2, semiconductors 50 to 180; a torque \
+                 from this gage is as much too large or too small",
+                short(factor)
+            ),
+        )
+    })
+}
 
 pub(super) fn gage(section: &Section) -> Result<GageData, Failure> {
     let optional = |key, kind| section.quantity(key, kind).map(|e| e.map(|e| e.value()));

@@ -4,6 +4,7 @@ mod calibration;
 mod drawing;
 mod effects;
 mod file;
+mod gain;
 pub(crate) mod keys;
 mod measured;
 mod measuring;
@@ -22,6 +23,7 @@ use torqcomp_dsp::bridge::{BridgeLayout, Leads, Supply};
 use torqcomp_dsp::recorder::{LowPass, Recorder};
 use torqcomp_model::{Estimate, ModalResponse, Mode, ParameterStd, SecondOrder};
 
+use crate::failure::{ErrorCode, Failure};
 use crate::identify::Motion;
 use crate::warning::Warning;
 
@@ -251,13 +253,14 @@ impl Stand {
     ///
     /// # Errors
     /// If the stand file gives none.
-    pub fn mechanics(&self) -> Result<&Mechanics, crate::failure::Failure> {
+    pub fn mechanics(&self) -> Result<&Mechanics, Failure> {
         self.mechanics.as_ref().ok_or_else(|| {
-            crate::failure::Failure::failed(format_args!(
-                "{}: the response of the stand is not given; add [mechanics] with inertia, damping \
+            Failure::failed(
+                ErrorCode::IncompleteStand,
+                "the response of the stand is not given; add [mechanics] with inertia, damping \
                  and stiffness, or with natural_frequency and damping_ratio",
-                self.file
-            ))
+            )
+            .at(&self.file)
         })
     }
 }

@@ -6,7 +6,7 @@ use torqcomp_model::Estimate;
 
 use super::update::{COMMON, CORRELATIONS};
 use super::{Given, Stand};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::digits;
 
 /// A parameter of an effect as it is written: name, text of its value, and of its standard uncertainty.
@@ -150,7 +150,7 @@ pub fn refine(declared: Option<(&Stand, &str)>, refined: &Refined) -> Result<Str
         "schema = \"torqcomp.stand/1\"\nname = \"refined stand\"\n",
         |d| d.1,
     );
-    let mut document: DocumentMut = text.parse().map_err(Failure::failed)?;
+    let mut document: DocumentMut = text.parse().map_err(Failure::of(ErrorCode::InvalidStand))?;
     refined.write_mechanics(&mut document, declared.map(|d| d.0));
     refined.write_effects(&mut document);
     let mut diagnosed = Table::new();

@@ -6,7 +6,7 @@ use toml_edit::{Item, TableLike};
 use torqcomp_model::{Estimate, Kind};
 
 use super::keys::{self, Takes};
-use crate::failure::{Failure, did_you_mean};
+use crate::failure::{ErrorCode, Failure, did_you_mean};
 
 /// The text of a stand file and its name.
 pub struct SourceText<'a> {
@@ -19,13 +19,15 @@ pub struct SourceText<'a> {
 impl SourceText<'_> {
     /// A failure at a byte of the file.
     pub fn at(&self, offset: Option<usize>, message: impl std::fmt::Display) -> Failure {
-        match offset {
-            Some(offset) => {
-                let line = self.text[..offset].matches('\n').count() + 1;
-                Failure::failed(format_args!("{}, line {line}: {message}", self.name))
-            }
-            None => Failure::failed(format_args!("{}: {message}", self.name)),
-        }
+        Failure::failed(ErrorCode::InvalidStand, message)
+            .at(self.name)
+            .with(|place| {
+                let before = offset.map(|offset| &self.text[..offset]);
+                let line = before.map(|text| text.rsplit('\n').next().unwrap_or_default());
+                place.line = before.map(|text| text.matches('\n').count() + 1);
+                place.column = line.map(|text| text.chars().count() + 1);
+                place.byte = offset.map(|offset| offset as u64);
+            })
     }
 }
 
@@ -201,13 +203,14 @@ impl<'a> Section<'a> {
         let value = inner.item("value").ok_or_else(|| {
             inner.fail("", format_args!("expected value = \"{}\"", kind.example()))
         })?;
+        let text = inner.quantity_text("value", value)?;
         let value = kind
-            .parse(&inner.quantity_text("value", value)?)
+            .parse(&text)
             .map_err(|error| inner.fail("value", error))?;
         let std = match inner.item("std") {
             None => None,
             Some(item) => Some(
-                kind.parse_std(&inner.quantity_text("std", item)?)
+                kind.parse_std(&inner.quantity_text("std", item)?, &text)
                     .map_err(|error| inner.fail("std", error))?,
             ),
         };

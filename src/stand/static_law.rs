@@ -5,7 +5,7 @@ use torqcomp_dsp::conversion::{Conversion, ConversionError};
 use torqcomp_model::{Estimate, Kind, UnitSystem};
 
 use super::{CalibrationLaw, ConstantStd, MeasuredCalibration, Stand, TransducerSignal};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::unit::NamedUnit;
 use crate::warning::Warning;
 
@@ -29,7 +29,7 @@ pub(super) fn together(stds: &[Option<f64>]) -> Option<f64> {
 impl StaticLaw {
     pub(super) fn of(conversion: Result<Conversion, ConversionError>) -> Result<Self, Failure> {
         Ok(Self {
-            conversion: conversion.map_err(Failure::failed)?,
+            conversion: conversion.map_err(Failure::of(ErrorCode::InvalidStand))?,
             described: String::new(),
             std: ConstantStd::Unknown,
             warnings: Vec::new(),
@@ -76,14 +76,17 @@ impl Stand {
             }
             _ => format!("give the calibration in {}", signal.usual_unit().0),
         };
-        Err(Failure::failed(format_args!(
-            "the channel \"{channel}\" is a {} in \"{}\", and [calibration] of {} is in {}; choose another channel, say \
-             the unit with --unit, or {remedy}",
-            signal.kind().name(),
-            named.text,
-            self.file,
-            measured.signal.usual_unit().0
-        )))
+        Err(Failure::failed(
+            ErrorCode::UnitUnsuitable,
+            format_args!(
+                "the channel \"{channel}\" is a {} in \"{}\", and [calibration] of {} is in {}; choose another \
+                 channel, say the unit with --unit, or {remedy}",
+                signal.kind().name(),
+                named.text,
+                self.file,
+                measured.signal.usual_unit().0
+            ),
+        ))
     }
 
     /// The record at no load, if it is given for such a signal.
@@ -96,14 +99,17 @@ impl Stand {
             Some((of @ (Voltage | Ratio), zero))
                 if matches!(signal, Voltage | Ratio) && zero != 0.0 =>
             {
-                Err(Failure::failed(format_args!(
-                    "{}: [recorder] zero is in {} and the record in {}; give the zero as the record has it, as in zero = \
-                     \"0.01 {}\"",
-                    self.file,
-                    of.usual_unit().0,
-                    signal.usual_unit().0,
-                    signal.usual_unit().0
-                )))
+                Err(Failure::failed(
+                    ErrorCode::InvalidStand,
+                    format_args!(
+                        "[recorder] zero is in {} and the record in {}; give the zero as the record has it, as in \
+                         zero = \"0.01 {}\"",
+                        of.usual_unit().0,
+                        signal.usual_unit().0,
+                        signal.usual_unit().0
+                    ),
+                )
+                .at(&self.file))
             }
             _ => Ok(None),
         }
@@ -129,11 +135,12 @@ impl Stand {
     fn excitation_v(&self) -> Result<f64, Failure> {
         match self.bridge.as_ref().and_then(|bridge| bridge.supply) {
             Some(Supply::ConstantVoltage { volts }) => Ok(volts),
-            _ => Err(Failure::failed(format_args!(
-                "{}: converting between volts and mV/V needs the voltage of the bridge's supply, which is not given; add \
+            _ => Err(Failure::failed(
+                ErrorCode::IncompleteStand,
+                "converting between volts and mV/V needs the voltage of the bridge's supply, which is not given; add \
                  [bridge] excitation = \"5 V\"",
-                self.file
-            ))),
+            )
+            .at(&self.file)),
         }
     }
 
@@ -165,7 +172,12 @@ impl Stand {
             CalibrationLaw::Curve(curve) => {
                 // A zero of today moves the curve.
                 let shift = match zero {
-                    Some(zero) => curve.recorded(0.0).map_err(Failure::failed)? - scale * zero,
+                    Some(zero) => {
+                        curve
+                            .recorded(0.0)
+                            .map_err(Failure::of(ErrorCode::InvalidStand))?
+                            - scale * zero
+                    }
                     None => 0.0,
                 };
                 Conversion::curve(curve.clone(), scale, shift)
@@ -201,28 +213,19 @@ impl Stand {
                 "[recorder] zero = \"60 kHz\", or [calibration] with zero_frequency and frequency_at_rated"
             }
         };
-        Failure::failed(format_args!(
-            "{}: a current or a frequency is seldom zero at no load, and the output there is not given; add {example}",
-            self.file
-        ))
+        Failure::failed(
+            ErrorCode::IncompleteStand,
+            format_args!(
+                "a current or a frequency is seldom zero at no load, and the output there is not given; add \
+                 {example}"
+            ),
+        )
+        .at(&self.file)
     }
 
     /// Relative standard uncertainty of the bridge's supply.
     fn of_supply(&self) -> Option<f64> {
         self.bridge.as_ref()?.supply_relative_std
-    }
-
-    /// A warning if the gain between bridge and record is not given.
-    fn assumed_gain(&self) -> Option<Warning> {
-        (!self.recorder.has_gain).then(|| {
-            Warning::new(
-                "gain-assumed",
-                format!(
-                    "{} does not give the gain between bridge and record: 1 was assumed; add [recorder] gain",
-                    self.file
-                ),
-            )
-        })
     }
 
     /// Torque per signal about no load by the drawing, in SI units, with its relative standard uncertainty; `None` if the
@@ -242,22 +245,6 @@ impl Stand {
             .by_measured(measured, signal, scale, Some(0.0), UnitSystem::Si)
             .ok()?;
         Some((law.conversion.small_signal_gain(), law.std.known()))
-    }
-
-    /// A warning if a gain is given that a calibration of recorded volts does not need, and that nothing else uses.
-    fn unused_gain(&self, signal: TransducerSignal) -> Option<Warning> {
-        let gain = self.recorder.recorder.gain();
-        let is_unused = signal == TransducerSignal::Voltage && self.gage.is_none() && gain != 1.0;
-        is_unused.then(|| {
-            Warning::new(
-                "gain-not-used",
-                format!(
-                    "[calibration] of {} is torque per recorded volt, so that [recorder] gain = {gain} was not used; if it is per \
-                     volt of the bridge, divide it by the gain, and leave the gain out",
-                    self.file
-                ),
-            )
-        })
     }
 
     /// By beam, gage and bridge.
@@ -281,11 +268,14 @@ impl Stand {
             TransducerSignal::Ratio => 1.0 / self.ratio_excitation_v()?,
             TransducerSignal::Current | TransducerSignal::Frequency => {
                 let unit = signal.usual_unit().0;
-                return Err(Failure::failed(format_args!(
-                    "{}: a record in {unit} cannot be converted to torque; add [calibration] with sensitivity = \
-                     \"8 {unit}\" and rated_torque = \"50 N m\"",
-                    self.file
-                )));
+                return Err(Failure::failed(
+                    ErrorCode::IncompleteStand,
+                    format_args!(
+                        "a record in {unit} cannot be converted to torque; add [calibration] with sensitivity = \"8 \
+                         {unit}\" and rated_torque = \"50 N m\""
+                    ),
+                )
+                .at(&self.file));
             }
         };
         let bridge = self.bridge_fed_by(match signal {
@@ -337,12 +327,13 @@ impl Stand {
     fn radius(&self) -> Result<f64, Failure> {
         match &self.beam {
             Some(beam) => Ok(beam.radius.value()),
-            None => Err(Failure::failed(format_args!(
-                "{}: at which radius the recorded force acts is not given; add [calibration] lever_arm = \"0.5 m\", or, to \
-                 compensate the force itself, give [mechanics] as natural_frequency and damping_ratio with static_gain = \
-                 \"1 N/N\"",
-                self.file
-            ))),
+            None => Err(Failure::failed(
+                ErrorCode::IncompleteStand,
+                "at which radius the recorded force acts is not given; add [calibration] lever_arm = \"0.5 m\", or, \
+                 to compensate the force itself, give [mechanics] as natural_frequency and damping_ratio with \
+                 static_gain = \"1 N/N\"",
+            )
+            .at(&self.file)),
         }
     }
 
@@ -364,11 +355,12 @@ impl Stand {
         match self.bridge.as_ref().and_then(|bridge| bridge.supply) {
             None => Ok(1.0),
             Some(Supply::ConstantVoltage { volts }) => Ok(volts),
-            Some(_) => Err(Failure::failed(format_args!(
-                "{}: a ratio of voltages refers to a supply of constant voltage, and [bridge] has excitation_current; \
+            Some(_) => Err(Failure::failed(
+                ErrorCode::InvalidStand,
+                "a ratio of voltages refers to a supply of constant voltage, and [bridge] has excitation_current; \
                  give excitation = \"5 V\", or record in volts",
-                self.file
-            ))),
+            )
+            .at(&self.file)),
         }
     }
 
@@ -383,22 +375,29 @@ impl Stand {
     /// The same with another supply than that of the file.
     fn bridge_fed_by(&self, supply: Option<Supply>) -> Result<Bridge, Failure> {
         let (Some(gage), Some(bridge)) = (&self.gage, &self.bridge) else {
-            return Err(Failure::failed(format_args!(
-                "{}: the record cannot be converted to torque; add [calibration], as torque_per_volt = \"12.5 N m/V\" \
-                 or torque_per_ratio = \"25 N m/(mV/V)\", or the sections [beam], [gage] and [bridge]",
-                self.file
-            )));
+            return Err(Failure::failed(
+                ErrorCode::IncompleteStand,
+                "the record cannot be converted to torque; add [calibration], as torque_per_volt = \"12.5 N m/V\" or \
+                 torque_per_ratio = \"25 N m/(mV/V)\", or the sections [beam], [gage] and [bridge]",
+            )
+            .at(&self.file));
         };
-        let lacks =
-            |what: &str| Failure::failed(format_args!("{}: [bridge] lacks {what}", self.file));
+        let lacks = |what: &str| {
+            Failure::failed(
+                ErrorCode::IncompleteStand,
+                format_args!("[bridge] lacks {what}"),
+            )
+            .at(&self.file)
+        };
         let layout = bridge.layout.ok_or_else(|| {
             lacks("its layout; write layout = \"quarter\", \"half\", \"half-opposite\", \"half-poisson\", \"full\" or \"full-poisson\"")
         })?;
         let supply = supply.or(bridge.supply).ok_or_else(|| {
             lacks("its supply; write excitation = \"5 V\" or excitation_current = \"2 mA\"")
         })?;
-        let wrong =
-            |error: &dyn std::fmt::Display| Failure::failed(format_args!("{}: {error}", self.file));
+        let wrong = |error: &dyn std::fmt::Display| {
+            Failure::failed(ErrorCode::InvalidStand, error).at(&self.file)
+        };
         let unbonded = gage.gage.unbonded_resistance_ohm();
         let bonded = gage
             .gage
@@ -426,14 +425,15 @@ impl Stand {
         let beam = self.beam.as_ref();
         let placed = beam.and_then(|b| b.gage_position.as_ref().map(|p| (b, p)));
         let Some((beam, position)) = placed else {
-            return Err(Failure::failed(format_args!(
-                "{}: strain cannot be converted to torque; add [beam] with gage_position, or \
+            return Err(Failure::failed(
+                ErrorCode::IncompleteStand,
+                "strain cannot be converted to torque; add [beam] with gage_position, or \
                  [calibration] with torque_per_volt or torque_per_ratio",
-                self.file
-            )));
+            )
+            .at(&self.file));
         };
         beam.full
             .torque_per_strain_n_m(beam.radius.value(), position.value())
-            .map_err(|error| Failure::failed(format_args!("{}: {error}", self.file)))
+            .map_err(|error| Failure::failed(ErrorCode::InvalidStand, error).at(&self.file))
     }
 }

@@ -3,7 +3,7 @@
 use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value, value};
 use torqcomp_model::{Estimate, Kind};
 
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 
 /// One entry of a stand file.
 #[derive(Debug, Clone)]
@@ -153,10 +153,14 @@ pub const MODAL: [&str; 2] = ["natural_frequency", "damping_ratio"];
 pub fn update(name: &str, existing: Option<&str>, entries: &[Entry]) -> Result<String, Failure> {
     let mut document = match existing {
         Some(text) => text.parse::<DocumentMut>().map_err(|error| {
-            Failure::failed(format_args!(
-                "{name}: cannot be updated: {}; correct it, or write to another file",
-                error.message().replace('\n', ", ")
-            ))
+            Failure::failed(
+                ErrorCode::InvalidStand,
+                format_args!(
+                    "cannot be updated: {}; correct it, or write to another file",
+                    error.message().replace('\n', ", ")
+                ),
+            )
+            .at(name)
         })?,
         None => DocumentMut::new(),
     };
@@ -166,10 +170,14 @@ pub fn update(name: &str, existing: Option<&str>, entries: &[Entry]) -> Result<S
             document["schema"] = value(SCHEMA);
         }
         _ => {
-            return Err(Failure::failed(format_args!(
-                "{name}: this is not a stand file (schema = \"{SCHEMA}\" is missing); write to another \
+            return Err(Failure::failed(
+                ErrorCode::InvalidStand,
+                format_args!(
+                    "this is not a stand file (schema = \"{SCHEMA}\" is missing); write to another \
                  file"
-            )));
+                ),
+            )
+            .at(name));
         }
     }
     make_room(name, &mut document, entries)?;
@@ -203,9 +211,11 @@ fn make_room(name: &str, document: &mut DocumentMut, entries: &[Entry]) -> Resul
     }
     let gain = document.get("mechanics").and_then(|m| m.get("static_gain"));
     if gain.is_some() {
-        return Err(Failure::failed(format_args!(
-            "{name}: [mechanics] has static_gain, which converts the record already; remove it, or write to another file"
-        )));
+        return Err(Failure::failed(
+            ErrorCode::InvalidStand,
+            "[mechanics] has static_gain, which converts the record already; remove it, or write to another file",
+        )
+        .at(name));
     }
     if let Some(table) = document
         .get_mut("calibration")
@@ -236,9 +246,14 @@ fn put_modes(name: &str, document: &mut DocumentMut, entry: &Entry) -> Result<()
     let mechanics = document.get("mechanics").and_then(Item::as_table_like);
     let mut single = CONSTANTS.iter().chain(&MODAL);
     if let Some(key) = single.find(|key| mechanics.is_some_and(|table| table.contains_key(key))) {
-        return Err(Failure::failed(format_args!(
-            "{name}: [mechanics] has {key}, so that [[modes]] cannot be written beside it; remove it, or write to another file"
-        )));
+        return Err(Failure::failed(
+            ErrorCode::InvalidStand,
+            format_args!(
+                "[mechanics] has {key}, so that [[modes]] cannot be written beside it; remove it, or write to \
+                 another file"
+            ),
+        )
+        .at(name));
     }
     let tables = entry.content.as_array().into_iter().flatten();
     let inline = tables.filter_map(Value::as_inline_table);
@@ -279,20 +294,25 @@ fn put(name: &str, document: &mut DocumentMut, entry: &Entry) -> Result<(), Fail
     }
     let is_single = CONSTANTS.contains(&entry.key) || MODAL.contains(&entry.key);
     if is_single && document.contains_key(MODES) {
-        return Err(Failure::failed(format_args!(
-            "{name}: it has [[modes]], so that {} of a single mode cannot be written beside them; remove them, or write to \
-             another file",
-            entry.key
-        )));
+        return Err(Failure::failed(
+            ErrorCode::InvalidStand,
+            format_args!(
+                "it has [[modes]], so that {} of a single mode cannot be written beside them; remove them, or write \
+                 to another file",
+                entry.key
+            ),
+        )
+        .at(name));
     }
     let section = document
         .entry(entry.section)
         .or_insert_with(|| Item::Table(Table::new()));
     let Some(table) = section.as_table_like_mut() else {
-        return Err(Failure::failed(format_args!(
-            "{name}: [{}] is not a table; correct it",
-            entry.section
-        )));
+        return Err(Failure::failed(
+            ErrorCode::InvalidStand,
+            format_args!("[{}] is not a table; correct it", entry.section),
+        )
+        .at(name));
     };
     let others: &[&str] = match entry.key {
         key if CONSTANTS.contains(&key) => &MODAL,
@@ -300,11 +320,15 @@ fn put(name: &str, document: &mut DocumentMut, entry: &Entry) -> Result<(), Fail
         _ => &[],
     };
     if let Some(other) = others.iter().find(|other| table.contains_key(other)) {
-        return Err(Failure::failed(format_args!(
-            "{name}: [{}] has {other}, so that {} cannot be written beside it; remove it, or write to \
+        return Err(Failure::failed(
+            ErrorCode::InvalidStand,
+            format_args!(
+                "[{}] has {other}, so that {} cannot be written beside it; remove it, or write to \
              another file",
-            entry.section, entry.key
-        )));
+                entry.section, entry.key
+            ),
+        )
+        .at(name));
     }
     match table.get_mut(entry.key) {
         Some(item) => {
@@ -360,7 +384,11 @@ pub fn declared(
     kind: Kind,
 ) -> Result<Option<(f64, Option<f64>)>, Failure> {
     let wrong = |error: &dyn std::fmt::Display| {
-        Failure::failed(format_args!("{name}: [mechanics] {key}: {error}"))
+        Failure::failed(
+            ErrorCode::InvalidStand,
+            format_args!("[mechanics] {key}: {error}"),
+        )
+        .at(name)
     };
     let document = text
         .parse::<DocumentMut>()
@@ -372,11 +400,13 @@ pub fn declared(
         return Ok(None);
     };
     let part = |key: &str| item.get(key).and_then(Item::as_str);
-    let Some(text) = item.as_str().or_else(|| part("value")) else {
+    let Some(value_text) = item.as_str().or_else(|| part("value")) else {
         return Err(wrong(&"expected a text with a unit"));
     };
-    let value = kind.parse(text).map_err(|error| wrong(&error))?;
-    let std = part("std").map(|text| kind.parse_std(text)).transpose();
+    let value = kind.parse(value_text).map_err(|error| wrong(&error))?;
+    let std = part("std")
+        .map(|text| kind.parse_std(text, value_text))
+        .transpose();
     Ok(Some((value, std.map_err(|error| wrong(&error))?)))
 }
 

@@ -39,8 +39,8 @@ macro_rules! verbs {
 }
 
 verbs!(
-    compensate, diagnose, dialects, extract, general, harmonics, identify, inspect, predict,
-    simulate, table
+    compensate, diagnose, dialects, extract, failures, general, harmonics, identify, inspect,
+    predict, simulate, table
 );
 
 /// A folder of cases without a test would not be noticed.

@@ -138,7 +138,9 @@ fn the_page_is_complete_in_itself() {
     ] {
         assert!(!page.contains(outside), "{outside}");
     }
-    folder.run(&args).says(1, &["page.html exists", "--force"]);
+    folder
+        .run(&args)
+        .says(1, &["page.html: the output exists", "--force"]);
     let again = folder.run(&[
         "identify",
         "decay",

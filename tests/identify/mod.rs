@@ -6,6 +6,7 @@ mod files;
 mod response;
 mod runup;
 mod static_load;
+mod traps;
 mod trials;
 
 use serde_json::Value;

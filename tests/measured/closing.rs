@@ -1,5 +1,6 @@
 //! `diagnose` on recordings made by others: which effect is named, and what is said where none can be.
 
+use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -45,6 +46,33 @@ impl Bench {
         ))
     }
 
+    /// The error of the refined stand's answer to a force, over the rms of what it should be.
+    fn answered(&self, rows: &[[f64; 2]], options: &[&str]) -> Result<f64, Failed> {
+        let mut text = String::from("time_s,force_in_N\n");
+        for (i, [force, _]) in rows.iter().enumerate() {
+            writeln!(text, "{},{force:e}", i as f64 / 750.0)?;
+        }
+        std::fs::write(self.folder.path().join("force.csv"), text)?;
+        let args = [
+            "simulate",
+            "force.csv",
+            "--stand",
+            "refined.toml",
+            "--applied",
+            "force_in_N",
+        ];
+        let (code, out, err) = self.run(&[&args[..], options].concat())?;
+        check(code == 0, err)?;
+        let answer = super::rows(&out);
+        check(answer.len() == rows.len(), answer.len())?;
+        let left = answer
+            .iter()
+            .zip(rows)
+            .map(|(got, [_, y])| (got[1] - y).powi(2));
+        let whole = rows.iter().map(|[_, y]| y * y);
+        Ok((left.sum::<f64>() / whole.sum::<f64>()).sqrt())
+    }
+
     fn diagnose(&self, applied: &str, measured: &str) -> Result<Value, Failed> {
         let (code, out, err) = self.run(&[
             "diagnose",
@@ -70,19 +98,26 @@ fn held_out(report: &Value, which: &str, unit: &str) -> f64 {
     error.as_f64().unwrap_or(f64::NAN)
 }
 
-/// Nothing but the cubic spring of the circuit, and 7 mV before it is known.
+/// The cubic spring of the circuit explains nearly all of 7 mV. What it leaves is named in part, and no cause of all of it.
 pub fn silverbox(folder: &Path) -> Result<(), Failed> {
     let file = folder.join("silverbox/estimation.csv");
     let bench = Bench::new()?;
     bench.cut(&file, 0..12_000, "train.csv")?;
-    bench.cut(&file, 40_000..48_000, "holdout.csv")?;
+    bench.cut(&file, 43_100..52_100, "holdout.csv")?;
     let report = bench.diagnose("v1_in_V", "v2_out_V")?;
+    let first = &report["ladder"][1];
     check(
-        report["effects"] == serde_json::json!(["cubic-stiffness"]),
-        &report["effects"],
+        first["effects"] == serde_json::json!(["cubic-stiffness"]),
+        &report["ladder"],
     )?;
+    let alone = first["holdout_rms"].as_f64().unwrap_or(f64::NAN);
+    check(alone < 0.31e-3, alone)?;
+    check(report["verdict"] == "partly-explained", &report["verdict"])?;
     let [before, after] = ["before", "after"].map(|w| held_out(&report, w, "rms"));
-    check(before > 5e-3 && after < 0.4e-3, format!("{before} {after}"))?;
+    check(
+        before > 5e-3 && after < 0.25e-3,
+        format!("{before} {after}"),
+    )?;
 
     // The refined stand on its own, on what it has not seen.
     let (code, out, err) = bench.run(&[
@@ -96,14 +131,33 @@ pub fn silverbox(folder: &Path) -> Result<(), Failed> {
     check(code == 0, err)?;
     let truth = std::fs::read_to_string(bench.folder.path().join("holdout.csv"))?;
     let (simulated, truth) = (rows(&out), rows(&truth));
-    let settled = 500..simulated.len() - 20;
-    let count = settled.len() as f64;
-    let squares = settled.map(|i| (simulated[i][1] - truth[i][2]).powi(2));
-    let rms = (squares.sum::<f64>() / count).sqrt();
-    check(rms < 0.45e-3, format!("{rms} V are left of the record"))
+    let left: Vec<f64> = simulated
+        .iter()
+        .zip(&truth)
+        .map(|(found, truth)| truth[2] - found[1])
+        .collect();
+    let rms = |values: &[f64]| {
+        let squares = values.iter().map(|x| x * x).sum::<f64>();
+        (squares / values.len() as f64).sqrt()
+    };
+    let settled = rms(&left[500..left.len() - 20]);
+    check(
+        settled < 0.25e-3,
+        format!("{settled} V are left of the record"),
+    )?;
+
+    // A period of odd lines only, after the gap before it: what its halves have in common does not follow from it.
+    let (first, second) = left[570..570 + 8192].split_at(4096);
+    let halves = |sign: f64| -> Vec<f64> {
+        let pairs = first.iter().zip(second);
+        pairs.map(|(a, b)| 0.5 * (a + sign * b)).collect()
+    };
+    let [noise, both] = [1.0, -1.0].map(|sign| rms(&halves(sign)));
+    let is_mostly_noise = (0.11e-3..0.15e-3).contains(&noise) && both < 0.2e-3;
+    check(is_mostly_noise, format!("{noise} V, {both} V"))
 }
 
-/// Hysteresis, named and simulated to a hundredth of the record.
+/// Hysteresis, named; the stand that comes out answers inputs that it was not fitted to as the published equations do.
 pub fn bouc_wen(folder: &Path) -> Result<(), Failed> {
     let file = folder.join("boucwen/estimation.csv");
     let bench = Bench::new()?;
@@ -115,7 +169,49 @@ pub fn bouc_wen(folder: &Path) -> Result<(), Failed> {
         &report["effects"],
     )?;
     let [before, after] = ["before", "after"].map(|w| held_out(&report, w, "relative"));
-    check(before > 0.2 && after < 0.013, format!("{before} {after}"))
+    check(before > 0.2 && after < 0.012, format!("{before} {after}"))?;
+
+    // A sweep through the resonance from rest, and a period of the steady answer to ten lines; without noise.
+    let sweep = bouc_wen_answer(30_000, |t| 40.0 * (TAU * (20.0 + 0.375 * t) * t).sin());
+    let error = bench.answered(&sweep, &[])?;
+    check(error < 1.5e-3, format!("sweep: {error}"))?;
+    let lines = |t: f64| {
+        let line = |k: u32| (TAU * (5.0 + 3.0 * f64::from(k)) * t + f64::from(k * k)).sin();
+        (0..10).map(line).sum::<f64>() * 20.0
+    };
+    let steady = bouc_wen_answer(3000, lines).split_off(3000 - 750);
+    let error = bench.answered(&steady, &["--periodic"])?;
+    check(error < 1.5e-3, format!("steady lines: {error}"))
+}
+
+/// What acts and the displacement at 750 Hz, from rest, of `2 y'' + 10 y' + 5e4 y + z = u`,
+/// `z' = 5e4 y' − 1e3 (0.8 |y'| z − 1.1 y' |z|)`, by Newmark's rule of constant mean acceleration at 15 kHz: J. P. Noel,
+/// M. Schoukens, *Hysteretic benchmark with a dynamic nonlinearity* (2016).
+fn bouc_wen_answer(count: u32, input: impl Fn(f64) -> f64) -> Vec<[f64; 2]> {
+    const STEPS: u32 = 20;
+    let h = 1.0 / (750.0 * f64::from(STEPS));
+    let drift = |v: f64, z: f64| 5e4 * v - 1e3 * (0.8 * v.abs() * z - 1.1 * v * z.abs());
+    let (mut y, mut v, mut z) = (0.0, 0.0, 0.0);
+    let mut a = 0.5 * input(0.0);
+    let mut rows = Vec::new();
+    for step in 0..count * STEPS {
+        let t = h * f64::from(step);
+        if step % STEPS == 0 {
+            rows.push([input(t), y]);
+        }
+        let (mut next, mut rate) = ([y, v, z, a], drift(v, z));
+        let before = rate;
+        for _ in 0..8 {
+            let moved = v + 0.5 * h * (a + next[3]);
+            let place = y + h * v + 0.25 * h * h * (a + next[3]);
+            let held = z + 0.5 * h * (before + rate);
+            let pushed = 0.5 * (input(t + h) - 10.0 * moved - 5e4 * place - held);
+            next = [place, moved, held, pushed];
+            rate = drift(moved, held);
+        }
+        [y, v, z, a] = next;
+    }
+    rows
 }
 
 /// The error depends on the level, and no effect of the list explains it all.
@@ -135,24 +231,28 @@ pub fn f16(folder: &Path) -> Result<(), Failed> {
     check(described.contains("depends on amplitude"), described)
 }
 
-/// No spring: sent to the verb that takes a body which moves freely.
+/// No spring: mass and dry friction as published, and the force of motions that were not fitted to 4 %.
 pub fn emps(folder: &Path) -> Result<(), Failed> {
     let file = folder.join("emps/estimation.csv");
     let bench = Bench::new()?;
-    let path = file.to_str().unwrap_or_default();
-    let columns = [
-        "--applied",
-        "control_V",
-        "--measured",
-        "measured_position_m",
-    ];
-    let args = [&["diagnose", "--train", path][..], &columns].concat();
-    let (code, out, err) = bench.run(&args)?;
-    check(code == 1 && out.is_empty(), &out)?;
+    bench.cut(&file, 0..17_000, "train.csv")?;
+    bench.cut(&file, 17_000..24_841, "holdout.csv")?;
+    let report = bench.diagnose("control_V", "measured_position_m")?;
     check(
-        err.contains("periods") && err.contains("identify runup"),
-        &err,
-    )
+        report["effects"] == serde_json::json!(["coulomb-friction"]),
+        &report["effects"],
+    )?;
+    let [before, after] = ["before", "after"].map(|w| held_out(&report, w, "relative"));
+    check(before > 0.15 && after < 0.04, format!("{before} {after}"))?;
+    // Newton per volt; published: 95.11 kg, 203.5 N s/m, 20.39 N.
+    let newton = |value: &Value| 35.150_651_88 * value.as_f64().unwrap_or(f64::NAN);
+    let found = [
+        newton(&report["constants"][0]["after"]) / 95.11,
+        newton(&report["constants"][1]["after"]) / 203.5,
+        newton(&report["candidates"][0]["parameters"][0]["value"]) / 20.39,
+    ];
+    let is_near = found.iter().all(|ratio| (ratio - 1.0).abs() < 0.1);
+    check(is_near, format!("{found:?}"))
 }
 
 /// Channels the wrong way round.

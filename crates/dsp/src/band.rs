@@ -7,10 +7,12 @@
 //! I₀-sinh window function", ISCAS 1974).
 
 mod choice;
+mod lines;
 
 use crate::Error;
 
 pub use choice::{BandChoice, BandSearch, band_of_stand};
+pub use lines::DecidingLines;
 
 /// Shape of the Kaiser window behind the edge: `e^{-26} ≈ 5·10⁻¹²` is left in the filter's tail.
 const EDGE_BETA: f64 = 26.0;

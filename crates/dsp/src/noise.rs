@@ -5,6 +5,7 @@
 //! leaves a filter with taps `g` with `σ √Σg²`; noise of density `S(f)` leaves it with density
 //! `S(f) |W(f) H⁻¹(f)|²`.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::compensate::InverseFilter;
@@ -65,7 +66,7 @@ impl NoiseGain {
 }
 
 /// Noise of one record, before and after compensation.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct RecordNoise {
     /// Root of the recorder's noise density, unit/√Hz, one-sided: the median above the band.
     pub floor_per_root_hz: f64,
@@ -73,11 +74,11 @@ pub struct RecordNoise {
     pub floor_band_hz: [f64; 2],
     /// Noise within the band as recorded, rms: `√(S₀ ∫W² df)`.
     pub recorded_rms: f64,
-    /// The same noise after compensation, rms: `√(S₀ ∫|W H⁻¹|² df)`.
+    /// Rms of the noise after compensation: `√(S₀ ∫|W H⁻¹|² df)`.
     pub compensated_rms: f64,
-    /// What the record holds within the band, rms without its mean, noise included.
+    /// Rms of the record within the band, without its mean, noise included.
     pub in_band_rms: f64,
-    /// What the record holds above the band beside its noise, rms.
+    /// Rms of what the record has above the band beside its noise.
     pub above_band_rms: f64,
     /// Ranges within the band where the record does not rise 3 dB above the floor, in Hz.
     pub lost_hz: Vec<[f64; 2]>,

@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::Error;
@@ -20,7 +21,7 @@ const MOST_NOTED: usize = 10_000;
 const COINCIDENT: f64 = 1e-6;
 
 /// What a resampling did.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
 pub struct Resampled {
     /// Samples taken in.
     pub samples_in: usize,

@@ -146,7 +146,7 @@ fn text_in_us_units_converts_value_and_uncertainty() {
     assert_eq!(temperature.text(UnitSystem::Us), "(80.3 ± 9.0) degF");
     let stiffness = Kind::AngularStiffness.parse("8.1e4 ft lbf/rad").unwrap();
     let std = Kind::AngularStiffness
-        .parse_std("0.2e4 ft lbf/rad")
+        .parse_std("0.2e4 ft lbf/rad", "8.1e4 ft lbf/rad")
         .unwrap();
     let stiffness = estimate(Kind::AngularStiffness, stiffness, Some(std));
     assert_eq!(stiffness.text(UnitSystem::Us), "(81000 ± 2000) ft lbf/rad");

@@ -368,7 +368,7 @@ fn print_units_read_back_as_themselves() {
                 .parse(&text)
                 .unwrap_or_else(|error| panic!("{text}: {error}"));
             assert_close(kind.to(system, si), 350.5, 1e-14);
-            let difference = kind.parse_std(&text).unwrap();
+            let difference = kind.parse_std(&text, &text).unwrap();
             assert_close(kind.difference_to(system, difference), 350.5, 1e-14);
         }
         // SI print units are the unit of the number inside.
@@ -386,14 +386,16 @@ fn print_units_read_back_as_themselves() {
 
 #[test]
 fn uncertainties_are_not_negative() {
-    let got = Kind::Force.parse_std("-1 N");
+    let got = Kind::Force.parse_std("-1 N", "5 N");
     assert!(matches!(
         got,
         Err(QuantityError::NegativeUncertainty { .. })
     ));
-    assert_eq!(Kind::Force.parse_std("0 N"), Ok(0.0));
+    assert_eq!(Kind::Force.parse_std("0 N", "5 N"), Ok(0.0));
     assert_close(
-        Kind::TemperatureAbsolute.parse_std("1.8 degF").unwrap(),
+        Kind::TemperatureAbsolute
+            .parse_std("1.8 degF", "80 degF")
+            .unwrap(),
         1.0,
         1e-15,
     );

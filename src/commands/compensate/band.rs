@@ -1,16 +1,18 @@
 //! The band of a compensation: as given, or chosen from the record and the stand.
 
+use schemars::JsonSchema;
 use serde::Serialize;
-use torqcomp_dsp::band::{Band, BandSearch, band_of_stand};
+use torqcomp_dsp::band::{Band, BandSearch, DecidingLines, band_of_stand};
 use torqcomp_dsp::compensate::Inverse;
 use torqcomp_dsp::quality::repeats::repeats;
 
 use crate::cli::BandOption;
 use crate::commands::convert;
-use crate::failure::Failure;
-use crate::print::rounded;
+use crate::failure::{ErrorCode, Failure};
+use crate::print::{rounded, short};
 use crate::recording::ChannelStream;
 use crate::stand::Calibration;
+use crate::warning::Warning;
 
 /// The band of `--band rated`, as far as the rate allows: that of the thesis.
 const RATED_BAND_HZ: f64 = 2400.0;
@@ -19,20 +21,26 @@ const HELD: f64 = 0.2;
 /// Samples that a band is chosen from, at least, if there are so many.
 const FIRST_SAMPLES: usize = 1 << 17;
 
+/// Part of the result from which a line is asked about.
+const MATTERS: f64 = 0.02;
+
 /// The band of a compensation and where it comes from.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
 pub(super) struct BandReport {
     /// End of the part that is compensated in full.
     pub(super) top_hz: f64,
     /// Frequency from which on nothing is passed.
     pub(super) end_hz: f64,
     pub(super) chosen_from: BandSource,
-    /// Length of the part of the record that it was chosen from; `null` if it was not.
+    /// Length of the part of the record that the band was chosen from, in s; `null` if it was not chosen.
     pub(super) seconds: Option<f64>,
+    /// Lines without which it would end far below.
+    #[serde(skip)]
+    pub(super) lines: Option<DecidingLines>,
 }
 
 /// Where a band comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum BandSource {
     /// The whole record.
@@ -61,6 +69,7 @@ impl Wanted<'_> {
     /// The band for a stream, whose first samples are looked at if no band is given.
     pub(super) fn choose(&self, stream: &mut ChannelStream) -> Result<(Band, BandReport), Failure> {
         let rate_hz = stream.rate_hz;
+        let mut lines = None;
         let (band, chosen_from, seconds) = match self.option {
             Some(BandOption::Hz(top_hz)) => (Band::new(rate_hz, top_hz), BandSource::Option, None),
             Some(BandOption::Rated) => (
@@ -80,7 +89,8 @@ impl Wanted<'_> {
                     true => BandSource::Record,
                     false => BandSource::FirstSeconds,
                 };
-                let (top_hz, from) = match search.and_then(|search| search.best()) {
+                let best = search.as_ref().and_then(BandSearch::best);
+                let (top_hz, from) = match best {
                     Some(best) => (best.top_hz, from),
                     None => (band_of_stand(rate_hz, self.inverse), BandSource::Stand),
                 };
@@ -88,15 +98,19 @@ impl Wanted<'_> {
                     Some(held_hz) if held_hz < top_hz => (held_hz, BandSource::HeldSamples),
                     _ => (top_hz, from),
                 };
+                lines = search.and_then(|search| search.deciding_lines(top_hz));
                 (Band::new(rate_hz, top_hz), from, Some(seconds))
             }
         };
-        let band = band.map_err(|error| Failure::failed(error).at(&stream.source))?;
+        let band = band.map_err(|error| {
+            Failure::failed(ErrorCode::UnsuitableRecord, error).at(&stream.source)
+        })?;
         let report = BandReport {
             top_hz: band.top_hz(),
             end_hz: band.end_hz(),
             chosen_from,
             seconds,
+            lines,
         };
         Ok((band, report))
     }
@@ -131,6 +145,31 @@ impl BandReport {
                 length(self.seconds)
             ),
         }
+    }
+
+    /// A warning if a few lines alone decide it, which may be no torque, and matter in a result of that rms. `scale` is
+    /// printed units per unit of the lines.
+    pub(super) fn question(&self, unit: &str, scale: f64, rms: f64) -> Option<Warning> {
+        let lines = self.lines?;
+        let of_lines = lines.result_rms * scale.abs();
+        if of_lines < MATTERS * rms {
+            return None;
+        }
+        let which = match lines.count {
+            1 => "the line".to_owned(),
+            count => format!("{count} lines, the strongest"),
+        };
+        Some(Warning::new(
+            "lines-decide-band",
+            format!(
+                "the band reaches {} Hz only because of {which} at {} Hz: {} {unit} rms of the result. If that is picked up \
+                 (a converter that switches, say) and no torque, give --band {}",
+                short(self.top_hz),
+                rounded(lines.frequency_hz, 4),
+                rounded(of_lines, 3),
+                short(lines.without_hz)
+            ),
+        ))
     }
 
     /// Whether it was asked for by `--band`.

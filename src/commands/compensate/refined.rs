@@ -4,7 +4,7 @@ use torqcomp_dsp::store::SampleStore;
 use torqcomp_model::effects::{Action, FoundLine, Unrecovered};
 
 use super::report::{CompensateReport, LostSpan, RemovedLine, UndoneEffect};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::inverse::{Carried, ChainInverse, InverseResult, RecordWindow, Spread};
 use crate::print::rounded;
 use crate::recording::{Spool, UniformRecord};
@@ -90,15 +90,19 @@ fn check(record: &UniformRecord<Spool>, undo: &ChainInverse) -> Result<(), Failu
     let count = record.samples.count();
     if count < 2 {
         return Err(Failure::failed(
+            ErrorCode::TooFewSamples,
             "the record has fewer than two samples; nothing can be compensated",
         ));
     }
     if count > MOST_SAMPLES && undo.margin().is_none() {
-        return Err(Failure::failed(format_args!(
-            "the record has {count} samples; the effects of this stand are removed in memory, from at most \
+        return Err(Failure::failed(
+            ErrorCode::TooManySamples,
+            format_args!(
+                "the record has {count} samples; the effects of this stand are removed in memory, from at most \
              {MOST_SAMPLES}; cut the record into parts of {} s",
-            rounded(MOST_SAMPLES as f64 / record.rate_hz, 3)
-        )));
+                rounded(MOST_SAMPLES as f64 / record.rate_hz, 3)
+            ),
+        ));
     }
     Ok(())
 }

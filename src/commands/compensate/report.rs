@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use torqcomp_dsp::noise::RecordNoise;
 use torqcomp_dsp::resample::Resampled;
@@ -20,60 +21,79 @@ use crate::warning::Warning;
 const LISTED: usize = 20;
 
 /// Report of a compensation.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub(super) struct CompensateReport {
+#[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
+pub(in crate::commands) struct CompensateReport {
+    /// Path of the recording.
     pub(super) input: String,
+    /// How the recording is written.
     pub(super) dialect: String,
+    /// Name of the channel.
     pub(super) channel: String,
+    /// Unit of the channel in the recording.
     pub(super) channel_unit: String,
     /// `recorded`: the stand's response is in the channel and is divided out.
     pub(super) taken_as: &'static str,
+    /// Path of the stand file.
     pub(super) stand: String,
+    /// Path of the result.
     pub(super) output: String,
     /// Topic and field of the result in a file of messages.
     pub(super) output_signal: Option<String>,
+    /// Unit of the result: of `result`, `noise.record`, `rated_torque`, `zero_std`, `result_std` and `lines`.
     pub(super) unit: String,
     /// How the record became torque at rest.
     pub(super) calibration: String,
-    /// Relative standard uncertainty of the constant of that; `null` if unknown, or if there is none.
+    /// Relative standard uncertainty of the constant of the calibration; `null` if unknown, or if there is none.
     pub(super) calibration_relative_std: Option<f64>,
-    /// Standard uncertainty that the given record at no load brings to every value; `null` if it has none.
+    /// Standard uncertainty that the given record at no load brings to every value, in `unit`; `null` if it has none.
     pub(super) zero_std: Option<f64>,
-    /// Torque that the transducer is made for, if the stand file gives it.
+    /// Torque that the transducer is made for, in `unit`; `null` if the stand file does not give it.
     pub(super) rated_torque: Option<f64>,
+    /// Number of samples.
     pub(super) samples: usize,
+    /// Number of samples, from the first on, in which clipping, dropouts and hum were looked for.
+    pub(super) looked_at: usize,
+    /// Sampling rate, in Hz.
     pub(super) rate_hz: f64,
-    /// Its standard uncertainty by the stamps; `null` if it does not come from stamps.
+    /// Standard uncertainty of the rate by the time stamps, in Hz; `null` if the rate does not come from stamps.
     pub(super) rate_std_hz: Option<f64>,
+    /// Where the rate comes from.
     pub(super) rate_from: String,
     /// First time of the result.
     #[serde(flatten)]
     pub(super) start: Moment,
     /// Stretches of samples that `--fill` or `--resample` filled in.
     pub(super) filled: Vec<FilledSpan>,
-    /// Time on both sides of a sample in which the result depends on it: 99 % of the filter's weight.
+    /// Time on both sides of a sample in which the result depends on it, in s: 99 % of the weight of the filter.
     pub(super) reach_s: f64,
     /// `stream`, `whole-record`, or `refined` for a stand with effects that no filter describes.
     pub(super) method: &'static str,
     /// Effects of the stand that were taken out, the last link of the chain first.
     pub(super) effects: Vec<UndoneEffect>,
-    /// Highest frequency of the record at which nonlinear curves and torques of the stand were evaluated.
+    /// Highest frequency of the record at which nonlinear curves and torques of the stand were evaluated, in Hz; `null`
+    /// if there are none.
     pub(super) seen_to_hz: Option<f64>,
     /// Times at which the torque cannot be recovered from the record.
     pub(super) lost: Vec<LostSpan>,
+    /// Lines that were taken off, in `unit` as a record at rest has it.
     pub(super) lines: Vec<RemovedLine>,
+    /// The band, and where it comes from.
     pub(super) band: BandReport,
-    /// End of the part that is compensated in full.
+    /// End of the part of the spectrum that is compensated in full, in Hz.
     pub(super) band_hz: f64,
-    /// Frequency from which on nothing is passed.
+    /// Frequency from which on nothing is passed, in Hz.
     pub(super) band_end_hz: f64,
-    /// Time from either end within which the result depends on extrapolation beyond the record.
+    /// Time from either end within which the result depends on extrapolation beyond the record, in s.
     pub(super) edge_s: f64,
+    /// The result in figures.
     pub(super) result: Statistics,
     /// Standard uncertainty of the result, for a stand with effects that no filter describes.
     pub(super) result_std: Option<ResultStd>,
+    /// What `--resample` did; `null` without it.
     pub(super) resampled: Option<Resampled>,
+    /// What the compensation does to noise.
     pub(super) noise: NoiseReport,
+    /// Warnings, each with a stable code.
     pub(super) warnings: Vec<Warning>,
     /// Printed units per SI unit.
     #[serde(skip)]
@@ -87,9 +107,11 @@ pub(super) struct CompensateReport {
 }
 
 /// An effect that was taken out.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub(super) struct UndoneEffect {
+    /// Name of the effect.
     pub(super) effect: &'static str,
+    /// Form of the effect in the stand file.
     pub(super) form: &'static str,
     /// `divided out`, `inverted`, `subtracted`, `integrated` (with memory, along the motion), or `marked` where it
     /// cannot be taken out.
@@ -97,51 +119,57 @@ pub(super) struct UndoneEffect {
 }
 
 /// A line that was taken off, in the unit of the result as a record at rest has it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub(super) struct RemovedLine {
+    /// Frequency of the line, in Hz.
     pub(super) frequency_hz: f64,
-    /// Its amplitude in the stand file.
+    /// Amplitude of the line in the stand file.
     pub(super) amplitude: f64,
-    /// What the record has at this frequency, signal included.
+    /// Amplitude of the record at this frequency, signal included.
     pub(super) recorded: f64,
-    /// Phase of its sine at the first sample.
+    /// Phase of the line's sine at the first sample, in rad.
     pub(super) phase_rad: f64,
     /// Part of the amplitude that was taken off: less than 1 where the signal hides the phase.
     pub(super) share: f64,
 }
 
 /// A time in which the torque cannot be recovered from the record.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub(super) struct LostSpan {
-    /// The effect that hides it.
+    /// The effect that hides the torque.
     pub(super) effect: &'static str,
+    /// Start of the span, in s.
     pub(super) from_s: f64,
+    /// End of the span, in s.
     pub(super) to_s: f64,
 }
 
 /// What a compensation does to noise.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
 pub(super) struct NoiseReport {
-    /// Rms out over rms in for white noise.
+    /// Rms after compensation over rms before it, for white noise.
     pub(super) white_gain: f64,
+    /// Largest gain within the band.
     pub(super) largest_gain: f64,
-    /// Frequency of the largest gain.
+    /// Frequency of the largest gain, in Hz.
     pub(super) largest_gain_at_hz: f64,
+    /// Gain at some frequencies.
     pub(super) gain: Vec<NoiseAt>,
-    /// Noise of this record, in the unit of the result.
+    /// Noise of this record, in the unit of the result; `null` if it was not determined.
     pub(super) record: Option<RecordNoise>,
 }
 
 /// Gain of the compensation at a frequency.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub(super) struct NoiseAt {
+    /// Frequency, in Hz.
     pub(super) frequency_hz: f64,
     /// `|torque / recorded torque|`.
     pub(super) gain: f64,
     /// Relative standard uncertainty of the torque, from the stand's constants and the calibration; `null` if that of one
     /// of them is unknown.
     pub(super) relative_std: Option<f64>,
-    /// The same from the response that is divided out alone.
+    /// Part of `relative_std` from the response that is divided out; `null` if unknown.
     pub(super) response_relative_std: Option<f64>,
 }
 
@@ -220,8 +248,15 @@ impl CompensateReport {
             fact("uncertainty", self.uncertainty_text()),
             fact("noise", self.noise.record_text(&self.unit)),
             fact("result", self.result_text()),
-            fact("output", self.output.clone()),
         ]);
+        if self.looked_at < self.samples {
+            let looked_at = format!(
+                "clipping, dropouts and hum were looked for in the first {} samples; inspect looks at more",
+                self.looked_at
+            );
+            facts.push(fact("quality", looked_at));
+        }
+        facts.push(fact("output", self.output.clone()));
         facts
     }
 
@@ -241,11 +276,14 @@ impl CompensateReport {
 
     fn band_text(&self) -> String {
         format!(
-            "compensated up to {} Hz, zero from {} Hz, {}; the first and last {} ms depend on extrapolation beyond the record",
+            "compensated up to {} Hz, zero from {} Hz, {}; the first and last {} depend on extrapolation beyond the record",
             short(self.band_hz),
             short(self.band_end_hz),
             self.band.text(),
-            rounded(1e3 * self.edge_s, 3)
+            match self.edge_s < 1.0 {
+                true => format!("{} ms", rounded(1e3 * self.edge_s, 3)),
+                false => format!("{} s", rounded(self.edge_s, 3)),
+            }
         )
     }
 
@@ -303,7 +341,7 @@ impl CompensateReport {
         let text = self.of_stand_text();
         match self.zero_std {
             Some(std) => format!(
-                "{text}; that of the zero adds {} {} to every value",
+                "{text}; the zero adds {} {}, the same for every sample",
                 rounded(std, 2),
                 self.unit
             ),

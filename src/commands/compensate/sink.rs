@@ -9,7 +9,7 @@ use super::plot::Traces;
 use super::report::CompensateReport;
 use crate::cli::{Compensate, Format};
 use crate::commands::rows::Rows;
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::mcap::Writer;
 use crate::io::mcap::writer::{self, Added};
 use crate::io::output::Output;
@@ -133,7 +133,10 @@ impl Messages {
             .unwrap_or(writer::TOPIC)
             .to_owned();
         let encoding = origin.encoding.ok_or_else(|| {
-            Failure::failed("the messages have an encoding that torqcomp does not write")
+            Failure::failed(
+                ErrorCode::UnsuitableRecord,
+                "the messages have an encoding that torqcomp does not write",
+            )
         })?;
         let added = Added {
             topic: topic.clone(),
@@ -182,25 +185,31 @@ fn format(args: &Compensate) -> Format {
 fn origin(args: &Compensate, plan: &Plan) -> Result<MessageOrigin, Failure> {
     let Some(origin) = &plan.stream.origin else {
         return Err(Failure::usage(
+            ErrorCode::ConflictingArguments,
             "an MCAP result is a copy of an MCAP input with one channel more, but the input is text; \
              use --format csv",
         ));
     };
     if args.record.input() == "-" {
         return Err(Failure::usage(
+            ErrorCode::ConflictingArguments,
             "an MCAP result needs its input twice, and standard input can be read once only; name the file",
         ));
     }
     if args.with_recorded {
         return Err(Failure::usage(
+            ErrorCode::ConflictingArguments,
             "--with-recorded adds a column of text; an MCAP result keeps the recorded channel anyway",
         ));
     }
     if plan.chain.applied.name != "torque" {
-        return Err(Failure::failed(format_args!(
-            "an MCAP result holds torque in N m, but this record becomes a {} in {}; use --format csv",
-            plan.chain.applied.name, plan.chain.applied.unit
-        )));
+        return Err(Failure::failed(
+            ErrorCode::UnitUnsuitable,
+            format_args!(
+                "an MCAP result holds torque in N m, but this record becomes a {} in {}; use --format csv",
+                plan.chain.applied.name, plan.chain.applied.unit
+            ),
+        ));
     }
     Ok(origin.clone())
 }

@@ -1,14 +1,18 @@
 //! Mean, rms and range of a result.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// A result in figures, in its unit.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub(super) struct Statistics {
+    /// Mean, in the unit of the result.
     pub(super) mean: f64,
-    /// Root mean square about the mean.
+    /// Root mean square about the mean, in the unit of the result.
     pub(super) rms: f64,
+    /// Smallest value, in the unit of the result.
     pub(super) smallest: f64,
+    /// Largest value, in the unit of the result.
     pub(super) largest: f64,
 }
 

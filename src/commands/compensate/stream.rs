@@ -147,9 +147,8 @@ impl Gathered<'_> {
         if let Some(part) = &job.sums {
             self.sums.join(part);
         }
-        if self.first.len() < excerpt::OF_STREAM {
-            self.first.extend_from_slice(recorded);
-        }
+        let missing = excerpt::OF_STREAM - self.first.len();
+        self.first.extend(recorded.iter().take(missing));
         Ok(())
     }
 

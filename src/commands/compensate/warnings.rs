@@ -16,10 +16,10 @@ use crate::warning::Warning;
 const LARGE_GAIN: f64 = 10.0;
 /// Rms above the band over that within it, from which it is worth a warning.
 const ABOVE_BAND: f64 = 0.1;
+/// Rms of the result over that of the record, from which it is worth a warning.
+const AMPLIFIED: f64 = 10.0;
 /// Part of the result that may be noise before it is worth a warning.
 const NOISY_FRACTION: f64 = 0.5;
-/// How far above half the sampling rate a resonance is hardly excited any more, times that.
-const FAR_ABOVE: f64 = 4.0;
 
 /// Adds the warnings to a report that is complete otherwise.
 pub(super) fn add(report: &mut CompensateReport, seen: &Seen, traces: Option<&Traces>) {
@@ -29,6 +29,12 @@ pub(super) fn add(report: &mut CompensateReport, seen: &Seen, traces: Option<&Tr
         Some(noise) => more.extend(of_noise(noise, report)),
         None => more.extend(of_unknown_noise(report)),
     }
+    more.extend(
+        report
+            .band
+            .question(&report.unit, report.scale, report.result.rms),
+    );
+    report.looked_at = seen.excerpt.len();
     more.extend(of_quality(report, seen));
     let largest = report.result.largest.max(-report.result.smallest);
     more.extend(beyond_rated(largest, report.rated_torque, &report.unit));
@@ -51,8 +57,7 @@ pub(super) fn of_ringing(stand: &Stand, rate_hz: f64) -> Option<Warning> {
     let resonance_hz = mode.natural_frequency_hz();
     let low_pass = stand.recorder.low_pass;
     let is_kept_out = low_pass.is_some_and(|low_pass| low_pass.cutoff_hz <= limit_hz);
-    let is_near = resonance_hz < FAR_ABOVE * limit_hz;
-    (is_near && !is_kept_out && mode.damping_ratio < 0.5).then(|| {
+    (!is_kept_out && mode.damping_ratio < 0.5).then(|| {
         Warning::new(
             "resonance-above-nyquist",
             format!(
@@ -90,11 +95,7 @@ fn of_quality(report: &CompensateReport, seen: &Seen) -> Vec<Warning> {
         start: report.start,
         samples: report.samples,
     };
-    let samples = match report.method {
-        "stream" => excerpt::of_stream(&seen.excerpt, report.samples),
-        _ => &seen.excerpt,
-    };
-    excerpt::warnings(samples, of)
+    excerpt::warnings(&seen.excerpt, of)
 }
 
 fn empty_plot(report: &CompensateReport) -> Warning {
@@ -122,6 +123,26 @@ fn of_length(report: &CompensateReport) -> Option<Warning> {
                 report.samples,
                 needed as usize,
                 short(report.band_hz)
+            ),
+        )
+    })
+}
+
+/// A warning if the result is many times as large as the record.
+fn of_amplification(noise: &RecordNoise, report: &CompensateReport) -> Option<Warning> {
+    let (unit, rms) = (&report.unit, report.result.rms);
+    (rms > AMPLIFIED * noise.in_band_rms).then(|| {
+        Warning::new(
+            "mostly-amplified",
+            format!(
+                "the result is {} times as large as the record, {} instead of {} {unit} rms: nearly all of it is what \
+                 the record holds far above the resonance, multiplied by up to {}. Check the mechanics of the stand, the \
+                 sampling rate of {} Hz, and --band",
+                rounded(rms / noise.in_band_rms, 3),
+                rounded(rms, 3),
+                rounded(noise.in_band_rms, 3),
+                rounded(report.noise.largest_gain, 3),
+                short(report.rate_hz)
             ),
         )
     })
@@ -160,6 +181,7 @@ fn of_noise(noise: &RecordNoise, report: &CompensateReport) -> Vec<Warning> {
             ),
         ));
     }
+    warnings.extend(of_amplification(noise, report));
     if rms > 0.0 && noise.compensated_rms > NOISY_FRACTION * rms {
         warnings.push(Warning::new(
             "mostly-noise",

@@ -12,7 +12,7 @@ use crate::diagnose::{
     Case, ChannelUnits, DeclaredForm, EffectForm, InitialState, PlainStand, Records, SourceFiles,
     StandRecord,
 };
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::{ChannelChoice, Input};
 use crate::print::short;
 use crate::recording::AlignedChannels;
@@ -133,6 +133,7 @@ fn declared_effects(stand: Option<&Stand>) -> Vec<DeclaredForm> {
 fn pair(args: &Diagnose, file: &str) -> Result<Pair, Failure> {
     if args.applied == args.measured {
         return Err(Failure::usage(
+            ErrorCode::ConflictingArguments,
             "--applied and --measured name the same column",
         ));
     }
@@ -143,18 +144,20 @@ fn pair(args: &Diagnose, file: &str) -> Result<Pair, Failure> {
     let read = AlignedChannels::read(&Input::of(file), &choices, &args.reading)?;
     let mut channels = read.channels.into_iter();
     let (Some(applied), Some(measured)) = (channels.next(), channels.next()) else {
-        return Err(Failure::failed(format_args!(
-            "{}: two channels are needed",
-            read.source
-        )));
+        return Err(
+            Failure::failed(ErrorCode::ChannelNotFound, "two channels are needed").at(&read.source),
+        );
     };
     measured.must_be_as_recorded(&read.source)?;
     let count = applied.samples.len();
     if count < FEWEST {
-        return Err(Failure::failed(format_args!(
-            "{}: {count} samples are too few; a diagnosis needs at least {FEWEST}, and ten periods of the stand",
-            read.source
-        )));
+        return Err(Failure::failed(
+            ErrorCode::TooFewSamples,
+            format_args!(
+                "{count} samples are too few; a diagnosis needs at least {FEWEST}, and ten periods of the stand"
+            ),
+        )
+        .at(&read.source));
     }
     Ok(Pair {
         source: read.source,
@@ -172,23 +175,31 @@ fn pair(args: &Diagnose, file: &str) -> Result<Pair, Failure> {
 /// Refuses records at different rates or in different units.
 fn check_same_kind(first: &Pair, other: &Pair) -> Result<(), Failure> {
     if (first.rate_hz / other.rate_hz - 1.0).abs() > 1e-4 {
-        return Err(Failure::failed(format_args!(
-            "{} has {} Hz, {} has {} Hz: all records of a diagnosis must have the same sampling rate; resample one of them",
-            first.source,
-            short(first.rate_hz),
-            other.source,
-            short(other.rate_hz)
-        )));
+        return Err(Failure::failed(
+            ErrorCode::RecordsDiffer,
+            format_args!(
+                "{} has {} Hz, {} has {} Hz: all records of a diagnosis must have the same sampling rate; resample \
+                 one of them",
+                first.source,
+                short(first.rate_hz),
+                other.source,
+                short(other.rate_hz)
+            ),
+        ));
     }
     let differ = |of: fn(&Pair) -> &Option<NamedUnit>| {
         let [first, other] = [first, other].map(|p| of(p).as_ref().map(|u| u.unit.factor()));
         first != other
     };
     if differ(|p| &p.applied_unit) || differ(|p| &p.measured_unit) {
-        return Err(Failure::failed(format_args!(
-            "{} and {} have their channels in different units; give --applied-unit and --measured-unit, or convert one of them",
-            first.source, other.source
-        )));
+        return Err(Failure::failed(
+            ErrorCode::RecordsDiffer,
+            format_args!(
+                "{} and {} have their channels in different units; give --applied-unit and --measured-unit, or \
+                 convert one of them",
+                first.source, other.source
+            ),
+        ));
     }
     Ok(())
 }
@@ -201,11 +212,14 @@ fn refuse_same_samples(train: &[Pair], holdout: &[Pair]) -> Result<(), Failure> 
         .flat_map(|h| train.iter().map(move |t| (h, t)));
     match pairs.find(|(h, t)| is_same(h, t)) {
         None => Ok(()),
-        Some((h, t)) => Err(Failure::failed(format_args!(
-            "{} has the same samples as the training record {}; give another hold-out record, or omit --holdout to hold out \
-             the last 30 % of each training record",
-            h.source, t.source
-        ))),
+        Some((h, t)) => Err(Failure::failed(
+            ErrorCode::RecordsDiffer,
+            format_args!(
+                "{} has the same samples as the training record {}; give another hold-out record, or omit --holdout \
+                 to hold out the last 30 % of each training record",
+                h.source, t.source
+            ),
+        )),
     }
 }
 
@@ -264,11 +278,12 @@ fn declared_gain(stand: Option<&Stand>, units: &ChannelUnits) -> Option<f64> {
 
 fn declared(stand: &Stand, gain: f64) -> Result<PlainStand, Failure> {
     let mode = stand.modes()?.only().ok_or_else(|| {
-        Failure::failed(format_args!(
-            "{}: it has several modes, and diagnose finds what one mode lacks; leave --stand out, and the further modes count \
-             as the effect second-mode, or refit the modes with identify response",
-            stand.file
-        ))
+        Failure::failed(
+            ErrorCode::InvalidStand,
+            "it has several modes, and diagnose finds what one mode lacks; leave --stand out, and the further modes \
+             count as the effect second-mode, or refit the modes with identify response",
+        )
+        .at(&stand.file)
     })?;
     Ok(PlainStand {
         natural_hz: mode.omega_rad_s / std::f64::consts::TAU,
@@ -296,7 +311,9 @@ fn record(
             };
             let mut values = pair.measured;
             convert(&chain, &mut values).map_err(|(row, why)| {
-                Failure::failed(format_args!("{}: sample {}: {why}", pair.source, row + 1))
+                Failure::failed(ErrorCode::InvalidSample, why)
+                    .sample(row + 1)
+                    .at(&pair.source)
             })?;
             values
         }
@@ -311,6 +328,7 @@ fn record(
         measured: Arc::new(measured),
         range: EXCLUDED.min(count / 10)..count,
         initial: InitialState::default(),
+        is_held: false,
     })
 }
 
@@ -320,8 +338,12 @@ fn refuse_constant(source: &str, which: &str, values: &[f64]) -> Result<(), Fail
     if spread > 1e-12 * mean.abs() {
         return Ok(());
     }
-    Err(Failure::failed(format_args!(
-        "{source}: the {which} channel is constant ({}): a diagnosis needs excitation; check the column",
-        short(mean)
-    )))
+    Err(Failure::failed(
+        ErrorCode::UnsuitableRecord,
+        format_args!(
+            "the {which} channel is constant ({}): a diagnosis needs excitation; check the column",
+            short(mean)
+        ),
+    )
+    .at(source))
 }

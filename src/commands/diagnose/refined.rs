@@ -1,6 +1,9 @@
 //! From a diagnosis to the refined stand file.
 
-use crate::diagnose::{Diagnosis, EffectParameter, RecordResidual};
+use torqcomp_model::Estimate;
+use torqcomp_model::effects::Unit;
+
+use crate::diagnose::{Diagnosis, EffectForm, EffectParameter, HeldBody, RecordResidual};
 use crate::failure::Failure;
 use crate::io::digits;
 use crate::stand::{self, Refined, Stand};
@@ -16,31 +19,69 @@ pub fn stand_file(
     let model = &diagnosis.after;
     let context = diagnosis.context();
     let effects = model.fitted.structure.effects.iter();
+    let held = context.held.as_ref();
     let effects = effects.zip(model.parameters()).map(|(effect, own)| {
+        let own = match held {
+            Some(held) => weakly_held(held, effect, own),
+            None => own,
+        };
         let texts = own.iter().map(written).collect();
         (effect.effect.name, effect.form.name, texts)
     });
-    let [natural_hz, damping_ratio, gain] = model.constants();
-    let both = |estimate: torqcomp_model::Estimate| (estimate.value(), estimate.std_uncertainty());
-    let units = &context.units;
+    let mut plain = model.constants();
+    if let Some(held) = held {
+        plain = held.weakly_held(plain);
+    }
+    let [natural_hz, damping_ratio, gain] = plain;
+    let both = |estimate: Estimate| (estimate.value(), estimate.std_uncertainty());
+    let units = held.map_or(&context.units, |held| &held.recorded);
+    let constant = |of: fn(&RecordResidual) -> f64| match held {
+        // Where a free body began says nothing of another record.
+        Some(_) => 0.0,
+        None => mean(&model.train, of),
+    };
     let refined = Refined {
         natural_hz: both(natural_hz),
         damping_ratio: both(damping_ratio),
-        gain: context.gain_is_free.then_some(gain.value()),
+        gain: (context.gain_is_free || held.is_some()).then_some(gain.value()),
         units: (&units.diagnosed, &stand::si_unit(&units.applied)),
         measured_unit: match units.measured.as_str() {
             "" => "1",
             unit => unit,
         },
         constants: [
-            mean(&model.train, |r| r.nuisance.offset),
-            mean(&model.train, |r| r.record.initial.preload),
+            constant(|r| r.nuisance.offset),
+            constant(|r| r.record.initial.preload),
         ],
         effects: effects.collect(),
         source: format!("diagnosed: {}", diagnosis.sources.train.join(", ")),
         verdict: diagnosis.verdict.name(),
     };
     stand::refine(declared, &refined)
+}
+
+/// The parameters of an effect on a free body beside the weak spring of its stand file.
+fn weakly_held(
+    held: &HeldBody,
+    effect: &EffectForm,
+    own: Vec<EffectParameter>,
+) -> Vec<EffectParameter> {
+    let unit_of_record = &held.recorded.diagnosed;
+    let parameters = effect.form.parameters.iter().zip(own).enumerate();
+    let converted = parameters.map(|(k, (parameter, own))| {
+        let power = match parameter.unit {
+            Unit::Powers { recorded, .. } => recorded,
+            Unit::Number | Unit::Hertz => 0,
+        };
+        let factor = held.weakly(power, k == 0);
+        let std = own.estimate.std_uncertainty().map(|std| std * factor);
+        let unit = parameter.unit.text(unit_of_record);
+        EffectParameter {
+            estimate: Estimate::of(unit, own.estimate.value() * factor, std),
+            ..own
+        }
+    });
+    converted.collect()
 }
 
 /// A parameter as it is written: its name, and the texts of its value and of its standard uncertainty.

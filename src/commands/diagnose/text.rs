@@ -4,7 +4,7 @@ use torqcomp_model::Estimate;
 use torqcomp_model::effects::Effect;
 
 use crate::diagnose::{CandidateFit, Diagnosis, GuardModel, NoiseFloorSource, Status, Verdict};
-use crate::print::{Report, columns, plural, rounded, unit_or_as_recorded, with_std};
+use crate::print::{Report, columns, enumeration, plural, rounded, unit_or_as_recorded, with_std};
 
 /// Candidates that are listed unless all are asked for.
 const FIRST: usize = 5;
@@ -47,13 +47,17 @@ impl Report for Diagnosis {
 
 /// What was found and what to do about it: the verdict, each effect with its equation, the next record.
 pub fn answer(diagnosis: &Diagnosis) -> Vec<String> {
-    let names = diagnosis.effects.join(" and ");
+    let names = enumeration(&diagnosis.effects, "and");
+    let reduce = match diagnosis.effects.len() {
+        1 => "reduces",
+        _ => "reduce",
+    };
     let verdict = match diagnosis.verdict {
         Verdict::Explained => {
             format!("Explained: with {names}, the error on the held-out records is at the noise.")
         }
         Verdict::PartlyExplained => format!(
-            "Partly explained: {names} reduces the error on the held-out records, but structure above the noise remains."
+            "Partly explained: {names} {reduce} the error on the held-out records, but structure above the noise remains."
         ),
         Verdict::NothingMissing => {
             "Nothing missing: the plain stand explains the held-out records down to the noise."
@@ -190,11 +194,11 @@ pub fn error_sentences(diagnosis: &Diagnosis) -> Vec<String> {
     let error = &diagnosis.error;
     let unit = unit_or_as_recorded(&error.unit);
     let improvement = error.improvement_ci95.map(|[low, high]| {
-        format!(
-            "The hold-out error decreases by {:.1} % to {:.1} % (95 % interval).",
-            100.0 * low,
-            100.0 * high
-        )
+        let [low, high] = [low, high].map(|part| format!("{:.1} %", 100.0 * part));
+        match low == high {
+            true => format!("The hold-out error decreases by {low} (95 % interval)."),
+            false => format!("The hold-out error decreases by {low} to {high} (95 % interval)."),
+        }
     });
     let from = match error.noise_floor_from {
         Some(NoiseFloorSource::Periods) => "differences between periods of the record",

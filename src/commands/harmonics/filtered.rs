@@ -44,10 +44,10 @@ pub(super) fn warning(
         Warning::new(
             "orders-beyond-band",
             format!(
-                "orders {} lie above about {} Hz, where the record was filtered: they come out too small, or not at all; \
-                 compensate again with --band {} or more, or give harmonics the recorded channel and --stand",
-                names.join(", "),
+                "above about {} Hz the record was filtered, so that little or nothing is left of {}; compensate again with \
+                 --band {} or more, or give harmonics the recorded channel and --stand",
                 rounded(top_hz, 2),
+                super::named(&names),
                 rounded(1.05 * highest_hz, 3)
             ),
         )

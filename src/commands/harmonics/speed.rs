@@ -3,6 +3,7 @@
 use torqcomp_dsp::harmonics::{Component, Fundamental, Harmonics, fit, refine_fundamental};
 use torqcomp_dsp::store::SampleStore;
 
+use crate::cli::REFINE_SPAN;
 use crate::print::rounded;
 use crate::recording::{Spool, UniformRecord};
 use crate::warning::Warning;
@@ -60,11 +61,15 @@ pub(super) fn off(
     let matters = lost > LOST * power(&better) && turns > TURNS;
     (is_there && matters && shift_hz > SIGNIFICANT * found.std_hz?).then(|| {
         let digits = rounded(found.frequency_hz, 7);
+        let refine = match shift_hz < 0.01 * REFINE_SPAN * fundamental_hz {
+            true => "--refine".to_owned(),
+            false => format!("--refine --refine-span {}", 100.0 * SPAN),
+        };
         Warning::new(
             "fundamental-off",
             format!(
                 "the record fits a fundamental of {digits} Hz better than {} Hz, at which components come out too \
-                 small: add --refine, or give --fundamental {digits}",
+                 small: add {refine}, or give --fundamental {digits}",
                 rounded(fundamental_hz, 7)
             ),
         )

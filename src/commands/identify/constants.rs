@@ -4,7 +4,7 @@ use torqcomp_model::{Estimate, Kind};
 
 use super::{declared, entry, quantity, stand_text};
 use crate::cli::identify::{Anchors, Findings};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::identify::{Identification, KnownConstant, ModalPole, NamedEstimate};
 use crate::print::{rounded, short};
 use crate::stand::update::{COMMON, CORRELATIONS, Entry};
@@ -128,9 +128,10 @@ fn positive(flag: &str, text: &str, kind: Kind) -> Result<f64, Failure> {
     if value > 0.0 {
         Ok(value)
     } else {
-        Err(Failure::usage(format_args!(
-            "{flag} {text}: it must be greater than 0"
-        )))
+        Err(Failure::usage(
+            ErrorCode::InvalidValue,
+            format_args!("{flag} {text}: it must be greater than 0"),
+        ))
     }
 }
 
@@ -152,7 +153,7 @@ pub(super) fn from_residue(
             short(inertia_kg_m2)
         );
         if findings.result.output.is_some() {
-            return Err(Failure::failed(text));
+            return Err(Failure::failed(ErrorCode::NotIdentifiable, text));
         }
         result.warn("impossible", text);
         return Ok(Vec::new());

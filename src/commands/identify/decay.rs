@@ -2,6 +2,8 @@
 
 use std::borrow::Cow;
 
+use torqcomp_dsp::quality::clipping::Clipping;
+
 use super::constants::{Ratios, from_ratios};
 use super::{Recorded, deliver};
 use crate::cli::identify::Decay;
@@ -10,6 +12,7 @@ use crate::failure::Failure;
 use crate::identify::decay::{DecayOptions, Ringing, identify};
 use crate::identify::{Identification, ModalPole};
 use crate::io::{Input, Reading, already_compensated};
+use crate::quality;
 use crate::recording::{AlignedChannels, Recording, check_cells, is_uniform};
 use crate::stand::update::Entry;
 
@@ -89,33 +92,40 @@ fn load(args: &Decay, input: &str, recorded: &mut Recorded) -> Result<Loaded, Fa
     };
     let is_whole = selection.channel.holes.is_empty();
     let rate_hz = (is_whole && is_uniform(&stamps, selection.rate_hz)).then_some(selection.rate_hz);
-    let mut last = f64::NEG_INFINITY;
-    let (times_s, values) = stamps
-        .iter()
-        .copied()
-        .zip(samples.iter().copied())
-        .filter(|(t, v)| {
-            let later = *t > last && v.is_finite();
-            last = if later { *t } else { last };
-            later
-        })
-        .unzip();
-    let values: Vec<f64> = values;
+    let (times_s, values) = rising(&stamps, samples);
     let rate = rate_hz.map(|hz| (hz, selection.rate_std_hz));
     recorded.add(input, values.len(), rate);
-    let warnings = [recording.all_warnings(), selection.warnings].concat();
+    let unit = selection.unit.map_or_else(String::new, |u| u.text);
+    let axis = &selection.channel.axis;
+    let clipped = Clipping::of(samples)
+        .map(|found| quality::clipped_ends(&selection.channel.name, &unit, &found, axis));
+    let clipped = clipped.unwrap_or_default();
+    let warnings = [recording.all_warnings(), selection.warnings, clipped].concat();
     recorded.warn(warnings, recording.lost.is_some());
     Ok(Loaded {
         name: input.to_owned(),
         times_s,
         rate_hz,
         values,
-        unit: selection.unit.map_or_else(String::new, |u| u.text),
+        unit,
     })
+}
+
+/// The samples that are numbers and later than all before them, with their times.
+fn rising(stamps: &[f64], samples: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let mut last = f64::NEG_INFINITY;
+    let pairs = stamps.iter().copied().zip(samples.iter().copied());
+    let later = pairs.filter(|(t, v)| {
+        let later = *t > last && v.is_finite();
+        last = if later { *t } else { last };
+        later
+    });
+    later.unzip()
 }
 
 /// A recording that was interpolated to a uniform step.
 fn resampled(input: &str, mut aligned: AlignedChannels, recorded: &mut Recorded) -> Loaded {
+    let clipped = [aligned.warnings.clone(), quality::clipped(&aligned)].concat();
     let channel = aligned.channels.swap_remove(0);
     let (start_s, rate_hz) = (aligned.start.after_s, aligned.rate_hz);
     let time_s = |i: usize| start_s + i as f64 / rate_hz;
@@ -124,7 +134,7 @@ fn resampled(input: &str, mut aligned: AlignedChannels, recorded: &mut Recorded)
         channel.samples.len(),
         Some((rate_hz, aligned.rate_std_hz)),
     );
-    recorded.warn(aligned.warnings, aligned.is_lossy);
+    recorded.warn(clipped, aligned.is_lossy);
     Loaded {
         name: input.to_owned(),
         times_s: (0..channel.samples.len()).map(time_s).collect(),

@@ -13,7 +13,7 @@ use torqcomp_model::{Dimension, Kind, UnitSystem};
 
 use super::{Outcome, conclude};
 use crate::cli::identify::{Findings, Identify, Test};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::identify::{Identification, NamedEstimate};
 use crate::io::output::{self, Output, Policy};
 use crate::print::Report;
@@ -151,6 +151,7 @@ impl Targets {
         let result = &findings.result;
         if result.output.as_deref() == Some("-") && findings.json {
             return Err(Failure::usage(
+                ErrorCode::ConflictingArguments,
                 "the stand file and the JSON document cannot both go to standard output; give -o FILE",
             ));
         }
@@ -186,18 +187,28 @@ fn unit_or(channel: RecordedChannel, flag: &str) -> Result<NamedUnit, Failure> {
     channel.unit.cloned().ok_or_else(|| {
         let name = channel.name;
         match channel.unit_text {
-            None => Failure::failed(format_args!(
-                "channel \"{name}\" has no unit; give it with {flag}"
-            )),
-            Some(text) => Failure::failed(format_args!(
-                "the unit \"{text}\" of channel \"{name}\" is unknown; give a known one with {flag}"
-            )),
+            None => Failure::failed(
+                ErrorCode::UnitUnclear,
+                format_args!(
+                    "channel \"{name}\" has no unit; give it with {flag}"
+                ),
+            ),
+            Some(text) => Failure::failed(
+                ErrorCode::UnitUnclear,
+                format_args!(
+                    "the unit \"{text}\" of channel \"{name}\" is unknown; give a known one with {flag}"
+                ),
+            ),
         }
     })
 }
 
 /// Reads a quantity of the command line.
 fn quantity(flag: &str, text: &str, kind: Kind) -> Result<f64, Failure> {
-    kind.parse(text)
-        .map_err(|error| Failure::usage(format_args!("{flag} {text}: {error}")))
+    kind.parse(text).map_err(|error| {
+        Failure::usage(
+            ErrorCode::InvalidValue,
+            format_args!("{flag} {text}: {error}"),
+        )
+    })
 }

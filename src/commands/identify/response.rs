@@ -7,10 +7,11 @@ use super::modes;
 use super::{FORCE, Recorded, TORQUE, deliver, entry, quantity, stand_text, unit_or};
 use crate::cli::identify::Response;
 use crate::commands::Outcome;
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::identify::response::{Driven, RATIO, ResponseOptions, identify};
 use crate::identify::{Identification, Motion, NamedEstimate};
 use crate::io::{ChannelChoice, Input};
+use crate::quality;
 use crate::recording::{AlignedChannel, AlignedChannels};
 use crate::stand::TransducerSignal;
 use crate::stand::update::{self, Entry};
@@ -33,6 +34,7 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
             Some((read.rate_hz, read.rate_std_hz)),
         );
         recorded.warn(read.warnings.clone(), read.is_lossy);
+        recorded.warn(quality::clipped(&read), false);
         if let Some(radius) = &args.radius {
             to_torque(&mut read.channels[0], radius)?;
         }
@@ -97,16 +99,20 @@ const NOT_AT_REST: &str = "the response at rest of these modes is zero, which a 
 fn to_torque(force: &mut AlignedChannel, radius: &str) -> Result<(), Failure> {
     let radius_m = quantity("--radius", radius, Kind::Length)?;
     if radius_m <= 0.0 {
-        return Err(Failure::usage(format_args!(
-            "--radius {radius}: it must be greater than 0"
-        )));
+        return Err(Failure::usage(
+            ErrorCode::InvalidValue,
+            format_args!("--radius {radius}: it must be greater than 0"),
+        ));
     }
     let unit = unit_or(force.channel(), "--applied-unit")?;
     if unit.unit.dimension() != FORCE {
-        return Err(Failure::usage(format_args!(
-            "--radius goes with a force; --applied \"{}\" is in {}",
-            force.name, unit.text
-        )));
+        return Err(Failure::usage(
+            ErrorCode::ConflictingArguments,
+            format_args!(
+                "--radius goes with a force; --applied \"{}\" is in {}",
+                force.name, unit.text
+            ),
+        ));
     }
     let factor = unit.unit.factor() * radius_m;
     force.samples.iter_mut().for_each(|v| *v *= factor);
@@ -144,6 +150,10 @@ fn calibration(
     let source = format!("identify response: {}", args.inputs.join(", "));
     let written = entry("calibration", key, &constant, &source);
     result.parameters.push(constant);
+    if std.is_none() {
+        // These records do not tell how far it may be off.
+        return Ok(Vec::new());
+    }
     // Weights on the stand are more exact than what a hammer says of a load at rest.
     let stand = stand_text(&args.findings)?;
     Ok(
@@ -189,10 +199,13 @@ fn rad_per_n_m(
     let first = of(&loaded[0]);
     match loaded.iter().position(|l| of(l) != first) {
         None => Ok(first),
-        Some(other) => Err(Failure::failed(format_args!(
-            "{} and {} have different units; records of one response need the same",
-            args.inputs[0], args.inputs[other]
-        ))),
+        Some(other) => Err(Failure::failed(
+            ErrorCode::RecordsDiffer,
+            format_args!(
+                "{} and {} have different units; records of one response need the same",
+                args.inputs[0], args.inputs[other]
+            ),
+        )),
     }
 }
 
@@ -204,7 +217,9 @@ fn entries(
 ) -> Result<Vec<Entry>, Failure> {
     let mode = match &result.modes[..] {
         [mode] => mode.clone(),
-        _ if args.findings.result.output.is_some() => return Err(Failure::failed(NOT_AT_REST)),
+        _ if args.findings.result.output.is_some() => {
+            return Err(Failure::failed(ErrorCode::UnsuitableRecord, NOT_AT_REST));
+        }
         _ => return Ok(Vec::new()),
     };
     let source = format!("identify response: {}", args.inputs.join(", "));

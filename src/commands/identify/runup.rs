@@ -5,11 +5,12 @@ use torqcomp_model::{Dimension, Kind, Unit};
 use super::{FORCE, Recorded, TORQUE, deliver, entry, quantity, unit_or};
 use crate::cli::identify::Runup;
 use crate::commands::Outcome;
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::identify::runup::{Body, FreeRun, RunupOptions, identify};
 use crate::identify::{Identification, Motion};
 use crate::io::{ChannelChoice, Input};
 use crate::print::short;
+use crate::quality;
 use crate::recording::{AlignedChannel, AlignedChannels};
 use crate::stand::update::Entry;
 
@@ -24,10 +25,15 @@ pub fn run(args: &Runup) -> Result<Outcome, Failure> {
     let (motion, torque) = (&read.channels[0], &read.channels[1]);
     let motion_unit = unit_or(motion.channel(), "--motion-unit")?;
     let (kind, turning) = Motion::of(motion_unit.unit.dimension()).ok_or_else(|| {
-        Failure::failed(format_args!(
-            "the unit of the motion \"{}\" is \"{}\"; expected an angle, a length, or their first or second derivative",
-            motion.name, motion_unit.text
-        ))
+        Failure::failed(
+            ErrorCode::UnitUnsuitable,
+            format_args!(
+                "the unit of the motion \"{}\" is \"{}\"; expected an angle, a length, or their first or second \
+                 derivative",
+                motion.name,
+                motion_unit.text
+            ),
+        )
     })?;
     let scaled =
         |samples: &[f64], factor: f64| samples.iter().map(|v| v * factor).collect::<Vec<f64>>();
@@ -56,6 +62,7 @@ pub fn run(args: &Runup) -> Result<Outcome, Failure> {
         positions.len(),
         Some((read.rate_hz, read.rate_std_hz)),
     );
+    recorded.warn(quality::clipped(&read), false);
     recorded.warn(read.warnings, read.is_lossy);
     deliver(result, recorded, &args.findings, &entries)
 }
@@ -65,16 +72,18 @@ fn entries(args: &Runup, result: &Identification) -> Result<Vec<Entry>, Failure>
     let is_written = args.findings.result.output.is_some();
     let source = format!("identify runup: {}", args.input);
     match result.get("inertia") {
-        Some(inertia) if inertia.value() <= 0.0 && is_written => {
-            Err(Failure::failed(format_args!(
+        Some(inertia) if inertia.value() <= 0.0 && is_written => Err(Failure::failed(
+            ErrorCode::NotIdentifiable,
+            format_args!(
                 "the fitted inertia is negative ({} kg m²) and is not written: check the sign of \"{}\" and \"{}\"",
                 short(inertia.value()),
                 args.motion,
                 args.torque
-            )))
-        }
+            ),
+        )),
         Some(inertia) => Ok(vec![entry("mechanics", "inertia", inertia, &source)]),
         None if is_written => Err(Failure::failed(
+            ErrorCode::ConflictingArguments,
             "a stand file has no place for a mass; omit -o, or record an angle and a torque",
         )),
         None => Ok(Vec::new()),
@@ -98,23 +107,30 @@ fn effort_factor(args: &Runup, torque: &AlignedChannel, turning: bool) -> Result
         (true, TORQUE, None) | (false, FORCE, None) => Ok(factor),
         (true, FORCE, Some(radius)) => Ok(factor * radius),
         (true, FORCE, None) => Err(Failure::failed(
+            ErrorCode::MissingArgument,
             "a force on a rotating body needs a radius; give it with --radius",
         )),
-        (_, other, _) => Err(Failure::failed(format_args!(
-            "channel \"{}\" is not a {} ({other}); give --torque-factor, such as \"35.15 N/V\"",
-            torque.name,
-            if turning { "torque" } else { "force" }
-        ))),
+        (_, other, _) => Err(Failure::failed(
+            ErrorCode::UnitUnsuitable,
+            format_args!(
+                "channel \"{}\" is not a {} ({other}); give --torque-factor, such as \"35.15 N/V\"",
+                torque.name,
+                if turning { "torque" } else { "force" }
+            ),
+        )),
     }
 }
 
 /// `"35.15 N/V"`: SI units of torque or force per unit of the channel, and their dimension.
 fn factor_of(text: &str) -> Result<(f64, Dimension), Failure> {
     let wrong = || {
-        Failure::usage(format_args!(
-            "--torque-factor {text}: expected a number, a unit of torque or force, and \"/\" the unit of \
+        Failure::usage(
+            ErrorCode::InvalidValue,
+            format_args!(
+                "--torque-factor {text}: expected a number, a unit of torque or force, and \"/\" the unit of \
              the channel, such as \"35.15 N/V\""
-        ))
+            ),
+        )
     };
     let (number, units) = text.trim().split_once(' ').ok_or_else(wrong)?;
     let number: f64 = number.parse().map_err(|_| wrong())?;

@@ -5,7 +5,7 @@ use torqcomp_model::{Dimension, Estimate, Kind, RatioOf, Unit};
 use super::{FORCE, Recorded, TORQUE, deliver, entry, quantity, unit_or};
 use crate::cli::identify::Static;
 use crate::commands::Outcome;
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::identify::Identification;
 use crate::identify::static_load::{CalibrationStep, LoadUnits, Point, identify, series_of};
 use crate::io::{ChannelChoice, Flags, Input, Reading, digits};
@@ -16,10 +16,14 @@ use crate::unit::{NamedUnit, RecordedChannel};
 
 const MASS: Dimension = Dimension::new([1, 0, 0, 0, 0, 0]);
 
+/// Gravity on the ground, mountains included, in m/s².
+const ON_EARTH: std::ops::RangeInclusive<f64> = 9.76..=9.84;
+
 /// Runs the test.
 pub fn run(args: &Static) -> Result<Outcome, Failure> {
     if args.table.resample {
         return Err(Failure::usage(
+            ErrorCode::ConflictingArguments,
             "--resample does not apply: a table of loads has no time axis",
         ));
     }
@@ -35,8 +39,9 @@ pub fn run(args: &Static) -> Result<Outcome, Failure> {
     let entries = entries(args, &result, &units);
     if entries.is_empty() && args.findings.result.output.is_some() {
         return Err(Failure::failed(
-            "a stand file takes a calibration of torque; give the load as a torque, or as a force or mass with --radius, and \
-             the reading in V, mV/V, mA, Hz, ustrain or N; or omit -o",
+            ErrorCode::UnitUnsuitable,
+            "a stand file takes a calibration of torque; give the load as a torque, or as a force or mass with \
+             --radius, and the reading in V, mV/V, mA, Hz, ustrain or N; or omit -o",
         ));
     }
     let mut recorded = Recorded::default();
@@ -96,17 +101,20 @@ fn points(
     let is_signal =
         load_unit.unit.dimension() != FORCE && TransducerSignal::of(&load_unit.unit).is_some();
     if is_signal && is_effort {
-        return Err(Failure::usage(format_args!(
-            "--load \"{}\" is in {} and --reading \"{}\" in {}; the columns are swapped",
-            args.load, load_unit.text, args.reading, unit.text
-        )));
+        return Err(Failure::usage(
+            ErrorCode::UnitUnsuitable,
+            format_args!(
+                "--load \"{}\" is in {} and --reading \"{}\" in {}; the columns are swapped",
+                args.load, load_unit.text, args.reading, unit.text
+            ),
+        ));
     }
     let (load_factor, load) = load_of(args, &load_unit)?;
     let (factor, reading) = reading_of(args, &unit)?;
     let loads: Vec<f64> = loads.iter().map(|v| v * load_factor).collect();
     let series = numbers(recording, columns.series.as_ref())?.unwrap_or_else(|| series_of(&loads));
     let positions = numbers(recording, columns.position.as_ref())?;
-    let stds = stds(args, columns, recording)?;
+    let stds = stds(args, columns, recording, (&unit, factor))?;
     let counts = [
         Some(readings.len()),
         positions.as_ref().map(Vec::len),
@@ -118,15 +126,16 @@ fn points(
         .flatten()
         .any(|count| count != loads.len())
     {
-        return Err(Failure::failed(format_args!(
-            "{}: the columns differ in length; each load needs a reading",
-            args.input
-        )));
+        return Err(Failure::failed(
+            ErrorCode::RecordsDiffer,
+            "the columns differ in length; each load needs a reading",
+        )
+        .at(&args.input));
     }
     let point = |i: usize| Point {
         load: loads[i],
         reading: readings[i] * factor,
-        std: stds.as_ref().map(|s| s[i] * factor),
+        std: stds.as_ref().map(|s| s[i]),
         series: series[i],
         position: positions.as_ref().map_or(0, |p| p[i]),
     };
@@ -134,23 +143,52 @@ fn points(
     Ok((points, LoadUnits { load, reading }))
 }
 
-/// Standard uncertainties of the readings, in the unit of their column.
+/// Standard uncertainties of the readings, as these are evaluated: in the unit of their column, or without one in that of the
+/// readings.
 fn stds(
     args: &Static,
     columns: &Columns,
     recording: &Recording,
+    (reading_unit, factor): (&NamedUnit, f64),
 ) -> Result<Option<Vec<f64>>, Failure> {
     let Some(choice) = &columns.std else {
         return Ok(None);
     };
-    let stds = recording.channel(choice)?.samples.clone();
-    match stds.iter().position(|s| s.is_nan() || *s <= 0.0) {
-        Some(i) => Err(Failure::failed(format_args!(
-            "row {} of {}: the standard uncertainty must be greater than 0",
-            i + 1,
-            args.input
-        ))),
-        None => Ok(Some(stds)),
+    let channel = recording.channel(choice)?;
+    let (unit, _) = unit_of(choice, &channel.heading, channel.unit.as_ref())?;
+    let refused = |text: &str| {
+        Failure::usage(
+            ErrorCode::UnitUnsuitable,
+            format_args!(
+                "--std \"{}\" is in \"{text}\" and --reading \"{}\" in {}; write the standard uncertainty of each reading in the \
+                 unit of the readings (0.1 % of 2 V is 0.002 V; one of the load, times the sensitivity)",
+                channel.name, args.reading, reading_unit.text
+            ),
+        )
+    };
+    let factor = match (&unit, channel.unit_text.as_deref()) {
+        (None, _) if channel.name.contains('%') => return Err(refused("%")),
+        (None, None | Some("")) => factor,
+        (None, Some(text)) => return Err(refused(text)),
+        (Some(unit), _) => {
+            let (own, name) = reading_of(args, unit).map_err(|_| refused(&unit.text))?;
+            let (_, of_readings) = reading_of(args, reading_unit)?;
+            match name == of_readings {
+                true => own,
+                false => return Err(refused(&unit.text)),
+            }
+        }
+    };
+    match channel.samples.iter().position(|s| s.is_nan() || *s <= 0.0) {
+        Some(i) => Err(Failure::failed(
+            ErrorCode::InvalidSample,
+            format_args!(
+                "row {} of {}: the standard uncertainty must be greater than 0",
+                i + 1,
+                args.input
+            ),
+        )),
+        None => Ok(Some(channel.samples.iter().map(|s| s * factor).collect())),
     }
 }
 
@@ -179,6 +217,22 @@ fn column(recording: &Recording, choice: &ChannelChoice) -> Result<(Vec<f64>, Na
     Ok((channel.samples.clone(), unit))
 }
 
+/// Refuses a gravity of no place on Earth.
+fn on_earth(gravity: Option<f64>, text: Option<&str>) -> Result<(), Failure> {
+    match (gravity, text) {
+        (Some(value), Some(text)) if !ON_EARTH.contains(&value) => Err(Failure::usage(
+            ErrorCode::InvalidValue,
+            format_args!(
+                "--gravity {text}: gravity on the ground is between {} and {} m/s^2 (9.780 at the equator, 9.832 at the poles); \
+                 give the local one, as --gravity \"9.81 m/s^2\"",
+                ON_EARTH.start(),
+                ON_EARTH.end()
+            ),
+        )),
+        _ => Ok(()),
+    }
+}
+
 /// SI units per unit of the load, and their name.
 fn load_of(args: &Static, unit: &NamedUnit) -> Result<(f64, String), Failure> {
     let factor = unit.unit.factor();
@@ -188,39 +242,52 @@ fn load_of(args: &Static, unit: &NamedUnit) -> Result<(f64, String), Failure> {
     };
     let radius = of("--radius", &args.radius, Kind::Length)?;
     let gravity = of("--gravity", &args.gravity, Kind::Acceleration)?;
+    on_earth(gravity, args.gravity.as_deref())?;
     let is_mass = unit.unit.dimension() == MASS;
     if unit.unit.has_bare_weight()
         && let Some([force, mass]) = Unit::readings_of_weight(&unit.text)
     {
-        return Err(Failure::usage(format_args!(
-            "--load \"{}\" is in \"{}\", which can be read with a force or with a mass; give --load-unit \"{force}\" or \
-             --load-unit \"{mass}\"",
-            args.load, unit.text
-        )));
+        return Err(Failure::usage(
+            ErrorCode::UnitUnclear,
+            format_args!(
+                "--load \"{}\" is in \"{}\", which can be read with a force or with a mass; give --load-unit \
+                 \"{force}\" or --load-unit \"{mass}\"",
+                args.load, unit.text
+            ),
+        ));
     }
     if gravity.is_some() && !is_mass {
-        return Err(Failure::usage(format_args!(
-            "--gravity goes with a load that is a mass; \"{}\" is in {}",
-            args.load, unit.text
-        )));
+        return Err(Failure::usage(
+            ErrorCode::ConflictingArguments,
+            format_args!(
+                "--gravity goes with a load that is a mass; \"{}\" is in {}",
+                args.load, unit.text
+            ),
+        ));
     }
     match (unit.unit.dimension(), radius) {
         (TORQUE, None) => Ok((factor, "N m".to_owned())),
         (FORCE, Some(radius)) => Ok((factor * radius, "N m".to_owned())),
         (FORCE, None) => Ok((factor, "N".to_owned())),
         (_, radius) if is_mass => match (gravity, radius) {
-            (None, _) => Err(Failure::usage(format_args!(
-                "--load \"{}\" is in {}, a mass; give the local gravity, as --gravity \"9.81 m/s^2\" (9.780 m/s^2 at the \
-                 equator, 9.832 at the poles)",
-                args.load, unit.text
-            ))),
+            (None, _) => Err(Failure::usage(
+                ErrorCode::MissingArgument,
+                format_args!(
+                    "--load \"{}\" is in {}, a mass; give the local gravity, as --gravity \"9.81 m/s^2\" (9.780 \
+                     m/s^2 at the equator, 9.832 at the poles)",
+                    args.load, unit.text
+                ),
+            )),
             (Some(gravity), Some(radius)) => Ok((factor * gravity * radius, "N m".to_owned())),
             (Some(gravity), None) => Ok((factor * gravity, "N".to_owned())),
         },
-        (_, Some(_)) => Err(Failure::usage(format_args!(
-            "--radius goes with a load that is a force or a mass; \"{}\" is in {}",
-            args.load, unit.text
-        ))),
+        (_, Some(_)) => Err(Failure::usage(
+            ErrorCode::ConflictingArguments,
+            format_args!(
+                "--radius goes with a load that is a force or a mass; \"{}\" is in {}",
+                args.load, unit.text
+            ),
+        )),
         (_, None) => Ok((1.0, unit.text.clone())),
     }
 }
@@ -233,11 +300,14 @@ fn reading_of(args: &Static, unit: &NamedUnit) -> Result<(f64, String), Failure>
     }
     if unit.unit.ratio_of() == Some(RatioOf::Anything) {
         let text = &unit.text;
-        return Err(Failure::usage(format_args!(
-            "--reading \"{}\" is in \"{text}\", which could be a ratio of voltages or a strain; give --reading-unit \"{text} \
-             V/V\" or \"{text} strain\"",
-            args.reading
-        )));
+        return Err(Failure::usage(
+            ErrorCode::UnitUnclear,
+            format_args!(
+                "--reading \"{}\" is in \"{text}\", which could be a ratio of voltages or a strain; give \
+                 --reading-unit \"{text} V/V\" or \"{text} strain\"",
+                args.reading
+            ),
+        ));
     }
     Ok((1.0, unit.text.clone()))
 }

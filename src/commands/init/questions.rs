@@ -179,16 +179,17 @@ impl Question {
 
     pub(super) fn std_text(&self) -> String {
         format!(
-            "standard uncertainty of the {} in its unit (a limit divided by 1.73); Enter if unknown",
+            "standard uncertainty of the {} in its unit or in % of it (a limit divided by 1.73); Enter if unknown",
             self.key.replace('_', " ")
         )
     }
 
-    pub(super) fn check_std(&self, answer: &str) -> Result<(), String> {
+    /// Checks a standard uncertainty of the value that was given.
+    pub(super) fn check_std(&self, answer: &str, value: &str) -> Result<(), String> {
         match (answer, self.kind) {
             ("", _) | (_, None) => Ok(()),
             (text, Some(kind)) => kind
-                .parse_std(text)
+                .parse_std(text, value)
                 .map(|_| ())
                 .map_err(|error| error.to_string()),
         }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::content::Content;
 use super::report::InspectedChannel;
 use super::whole::{self, Kept, Stamps};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::mcap::inventory::{ChannelReport, LeafReport};
 use crate::io::mcap::{self, FieldChoice, Inventory, SelectedSignal};
 use crate::io::{Input, Reading};
@@ -131,10 +131,11 @@ impl<'a> Numbers<'a> {
 fn keep_topic(inventory: &mut Inventory, wanted: &str) -> Result<(), Failure> {
     inventory.channels.retain(|channel| channel.topic == wanted);
     if inventory.channels.is_empty() {
-        return Err(Failure::failed(format_args!(
-            "{}: there is no topic {wanted}; leave --topic out to see all",
-            inventory.file
-        )));
+        return Err(Failure::failed(
+            ErrorCode::ChannelNotFound,
+            format_args!("there is no topic {wanted}; leave --topic out to see all"),
+        )
+        .at(&inventory.file));
     }
     Ok(())
 }

@@ -12,11 +12,12 @@ mod whole;
 use std::path::Path;
 
 use self::content::Content;
-use self::report::{ChannelWarning, InspectReport, Inspected};
+pub(super) use self::report::InspectReport;
+use self::report::{ChannelWarning, Inspected};
 use super::{Outcome, judged, many};
 use crate::batch;
 use crate::cli::Inspect;
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::Input;
 use crate::io::output::Output;
 use crate::outcome::Made;
@@ -85,11 +86,13 @@ fn compare(args: &Inspect) -> Result<(Made, Vec<Failure>), Failure> {
 fn check(args: &Inspect) -> Result<(), Failure> {
     if args.files.iter().filter(|file| *file == "-").count() > 1 {
         return Err(Failure::usage(
+            ErrorCode::ConflictingArguments,
             "standard input can be read once only; name files",
         ));
     }
     if args.reading.resample {
         return Err(Failure::usage(
+            ErrorCode::ConflictingArguments,
             "--resample does not apply: inspect shows recordings as they are",
         ));
     }

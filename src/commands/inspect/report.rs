@@ -1,6 +1,7 @@
 //! What files hold and what is wrong with them.
 
-use serde::{Serialize, Serializer};
+use schemars::JsonSchema;
+use serde::Serialize;
 use torqcomp_dsp::quality::mains::MainsLine;
 use torqcomp_dsp::quality::steps::Event;
 
@@ -8,9 +9,11 @@ use crate::io::mcap::Inventory;
 use crate::outcome::RecordFigures;
 use crate::recording::Segment;
 
-/// Everything that was found in the files.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct InspectReport {
+/// What recordings hold and what is wrong with them: one file itself, several in `files`.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[serde(into = "InspectDocument")]
+#[schemars(from = "InspectDocument")]
+pub(in crate::commands) struct InspectReport {
     /// One entry for each file, in the order given.
     pub(super) files: Vec<Inspected>,
     /// What comparing the files with each other shows.
@@ -18,28 +21,35 @@ pub(super) struct InspectReport {
 }
 
 /// A file, or why it could not be read.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub(super) enum Inspected {
     Read(Box<InspectedFile>),
-    Failed { file: String, error: String },
+    /// A file that cannot be read.
+    Failed {
+        /// Path of the recording.
+        file: String,
+        /// Why it cannot be read.
+        error: String,
+    },
 }
 
 /// A file.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub(super) struct InspectedFile {
+    /// Path of the recording.
     pub(super) file: String,
     /// `csv` for any text, `mcap`.
     pub(super) format: &'static str,
-    /// How it is written.
+    /// How the recording is written.
     pub(super) dialect: String,
-    /// What its head says besides.
+    /// What else the head of the recording says.
     pub(super) details: Vec<Detail>,
-    /// Its segments, if it has several.
+    /// Segments of the recording, if it has several.
     pub(super) segments: Vec<Segment>,
-    /// Its channels, in their order.
+    /// The channels, in their order.
     pub(super) channels: Vec<InspectedChannel>,
-    /// What is wrong with it.
+    /// What is wrong with the recording.
     pub(super) warnings: Vec<ChannelWarning>,
     /// Whether announced or begun data are missing.
     pub(super) data_lost: bool,
@@ -49,54 +59,57 @@ pub(super) struct InspectedFile {
 }
 
 /// A pair of key and value out of a file's head.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub(super) struct Detail {
+    /// Name in the head of the recording.
     pub(super) key: String,
+    /// Text beside the name.
     pub(super) value: String,
 }
 
 /// A warning and the channels that it is about.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub(super) struct ChannelWarning {
-    /// Stable code.
+    /// Stable code of the warning.
     pub(super) code: &'static str,
-    /// For people.
+    /// The warning for people.
     pub(super) message: String,
-    /// Names of the channels; none if it is about the file.
+    /// Names of the channels that the warning is about; none if it is about the file.
     pub(super) channels: Vec<String>,
 }
 
 /// A channel. `null` is what cannot be known.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
 pub(super) struct InspectedChannel {
     /// Name without the unit.
     pub(super) name: String,
     /// Heading as written.
     pub(super) heading: String,
-    /// Number of the segment, from 1, if there are several.
+    /// Number of the segment, from 1; `null` if there is only one.
     pub(super) segment: Option<usize>,
-    /// Unit as written; that of the values below.
+    /// Unit as written, also that of the values of the channel; `null` if not given.
     pub(super) unit: Option<String>,
     /// Whether torqcomp knows the unit, so that values can be converted.
     pub(super) unit_known: bool,
     /// Number of samples, missing ones included.
     pub(super) samples: usize,
+    /// Sampling rate, in Hz; `null` if unknown.
     pub(super) rate_hz: Option<f64>,
-    /// Its standard uncertainty by the stamps; `null` if it does not come from stamps.
+    /// Standard uncertainty of the rate by the time stamps, in Hz; `null` if the rate does not come from stamps.
     pub(super) rate_std_hz: Option<f64>,
     /// Where the rate comes from.
     pub(super) rate_from: String,
-    /// Rate that the head of the file gives, used or not.
+    /// Rate that the head of the file gives, used or not, in Hz.
     pub(super) header_rate_hz: Option<f64>,
     /// Time of the first sample on the file's own axis, in `start_unit`.
     pub(super) start: Option<f64>,
-    /// The same in ns, if it counts from 1970.
+    /// Time of the first sample in ns since 1970; `null` if the clock does not count from then.
     pub(super) start_ns: Option<i64>,
     /// Unit of `start`: always s.
     pub(super) start_unit: &'static str,
     /// Date and time of the first sample, as written.
     pub(super) start_time: Option<String>,
-    /// From the first sample to the last.
+    /// Time from the first sample to the last, in s.
     pub(super) duration_s: Option<f64>,
     /// Assumption about the time axis.
     pub(super) assumed: Option<String>,
@@ -104,7 +117,7 @@ pub(super) struct InspectedChannel {
     pub(super) jitter: Option<f64>,
     /// Largest deviation of such a step, over the usual step.
     pub(super) jitter_peak: Option<f64>,
-    /// Multiples that the stamps are rounded to, where that alone makes them uneven.
+    /// Multiples that the stamps are rounded to, in s, where that alone makes them uneven.
     pub(super) stamps_rounded_to_s: Option<f64>,
     /// Number of gaps in the stamps; `null` without stamps.
     pub(super) gaps: Option<usize>,
@@ -118,11 +131,13 @@ pub(super) struct InspectedChannel {
     pub(super) backwards: Option<usize>,
     /// Forward jumps of the clock; `null` without stamps.
     pub(super) clock_jumps: Option<usize>,
+    /// Smallest sample, in `unit`.
     pub(super) smallest: Option<f64>,
+    /// Largest sample, in `unit`.
     pub(super) largest: Option<f64>,
-    /// Mean of the samples.
+    /// Mean of the samples, in `unit`.
     pub(super) mean: Option<f64>,
-    /// Rms of the samples without their mean.
+    /// Rms of the samples without their mean, in `unit`.
     pub(super) rms: Option<f64>,
     /// Samples that repeat the one before, over all; 1 for a constant channel.
     pub(super) repeated: Option<f64>,
@@ -132,9 +147,9 @@ pub(super) struct InspectedChannel {
     pub(super) hold: Option<usize>,
     /// Samples at a value where the signal is cut off.
     pub(super) clipped: Option<usize>,
-    /// Lowest value, if the signal is cut off there.
+    /// Lowest value, if the signal is cut off at it, in `unit`.
     pub(super) clipped_low: Option<f64>,
-    /// Highest value, if the signal is cut off there.
+    /// Highest value, if the signal is cut off at it, in `unit`.
     pub(super) clipped_high: Option<f64>,
     /// Samples in which the channel is stuck.
     pub(super) stuck: Option<usize>,
@@ -142,7 +157,7 @@ pub(super) struct InspectedChannel {
     pub(super) constant: Option<bool>,
     /// Samples that are missing or no finite numbers.
     pub(super) non_finite: Option<usize>,
-    /// Quantisation step; `null` if it is too fine to be seen.
+    /// Quantisation step, in `unit`; `null` if too fine to be seen.
     pub(super) resolution: Option<f64>,
     /// Bits of the range in steps of `resolution`.
     pub(super) resolution_bits: Option<f64>,
@@ -150,22 +165,27 @@ pub(super) struct InspectedChannel {
     pub(super) mains: Vec<MainsLine>,
 }
 
-/// The document of several files; that of one file is the file itself.
-#[derive(Serialize)]
-struct SeveralFiles<'a> {
-    files: &'a [Inspected],
-    warnings: &'a [ChannelWarning],
+/// The document: one file itself, or several.
+#[derive(Serialize, JsonSchema)]
+#[serde(untagged)]
+enum InspectDocument {
+    One(Inspected),
+    Several {
+        /// The files, in the order given.
+        files: Vec<Inspected>,
+        /// What comparing the files with each other shows.
+        warnings: Vec<ChannelWarning>,
+    },
 }
 
-impl Serialize for InspectReport {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self.files.as_slice() {
-            [file] => file.serialize(serializer),
-            files => SeveralFiles {
-                files,
-                warnings: &self.warnings,
-            }
-            .serialize(serializer),
+impl From<InspectReport> for InspectDocument {
+    fn from(mut report: InspectReport) -> Self {
+        match report.files.len() {
+            1 => Self::One(report.files.remove(0)),
+            _ => Self::Several {
+                files: report.files,
+                warnings: report.warnings,
+            },
         }
     }
 }

@@ -1,30 +1,34 @@
 //! The constants of a drawing beside the measured ones, as they are printed.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use torqcomp_model::Estimate;
 
 use crate::print::{Report, columns, rounded, with_std};
 
-/// Constants that follow from the drawing.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct PredictReport {
+/// Constants of a stand that follow from its drawing.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub(in crate::commands) struct PredictReport {
+    /// Path of the stand file.
     pub(super) stand: String,
+    /// The constants, beside the measured ones.
     pub(super) constants: Vec<PredictedConstant>,
 }
 
 /// A constant from the drawing, beside the measured one.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub(super) struct PredictedConstant {
+    /// Name of the constant.
     pub(super) name: &'static str,
     /// Unit of the values.
     pub(super) unit: String,
     /// From the drawing, by the plain theory; `null` if the drawing does not give it.
     pub(super) predicted: Option<f64>,
-    /// Its standard uncertainty, from those of the drawing.
+    /// Standard uncertainty of `predicted`, from the uncertainties of the drawing; `null` if unknown.
     pub(super) predicted_std: Option<f64>,
     /// As measured; `null` if the stand file does not give it.
     pub(super) measured: Option<f64>,
-    /// Its standard uncertainty.
+    /// Standard uncertainty of `measured`; `null` if unknown.
     pub(super) measured_std: Option<f64>,
     /// Where the measured value comes from, as the stand file says.
     pub(super) measured_source: Option<String>,
@@ -41,11 +45,11 @@ pub(super) struct PredictedConstant {
 }
 
 /// The prediction with one more effect.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub(super) struct Refinement {
     /// The effect.
     pub(super) effect: &'static str,
-    /// The prediction with it and those before it.
+    /// The prediction with this effect and the ones before it.
     pub(super) predicted: f64,
     /// The residual that is left.
     pub(super) residual_percent: Option<f64>,

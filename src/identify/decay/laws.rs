@@ -12,14 +12,17 @@
 //! | viscous and quadratic | `A' = −σ A − β A²` |
 
 use nalgebra::DMatrix;
-use serde::{Serialize, Serializer};
+use schemars::JsonSchema;
+use serde::Serialize;
 use torqcomp_model::fit::{Fit, FitError, Options, Parameter, WithJacobian, minimize};
 
 use super::modes::Stretch;
 use crate::identify::Pole;
 
 /// A law of damping.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(into = "&'static str")]
+#[schemars(from = "&'static str")]
 pub enum Law {
     /// Proportional to speed; or structural, with a loss per cycle proportional to the square of the amplitude, which
     /// looks the same at one frequency.
@@ -68,9 +71,9 @@ impl Law {
     }
 }
 
-impl Serialize for Law {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(self.name())
+impl From<Law> for &'static str {
+    fn from(law: Law) -> Self {
+        law.name()
     }
 }
 
@@ -129,7 +132,7 @@ fn envelope_slopes([start, sigma, dry, quadratic]: [f64; 4], time_s: f64) -> (f6
 }
 
 /// One law fitted to the data.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct LawFit {
     /// The law.
     pub law: Law,

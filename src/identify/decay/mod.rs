@@ -3,14 +3,14 @@
 mod by_hand;
 mod colour;
 mod dependence;
-mod hum;
 mod laws;
 mod modes;
 mod present;
+mod restart;
 mod search;
 mod stretches;
 
-use super::{FitQuality, Identification, ModalPole, rms};
+use super::{FitQuality, Identification, ModalPole, hum, rms};
 use crate::failure::Failure;
 
 pub use laws::{Law, LawFit, envelope};
@@ -64,7 +64,7 @@ pub fn identify(
     if fit.poles.is_empty() {
         return Err(present::no_mode(&lines));
     }
-    present::lines(&mut result, &lines);
+    hum::taken_off(&mut result, &lines);
     present::fit_warnings(&mut result, &fit);
     let reported = modes::with_honest_std(&fit, &stretches)?;
     let order = fit.by_strength(stretches.len());
@@ -83,13 +83,13 @@ pub fn identify(
         result.parameters.extend(constants.list);
         result.modes.push(mode);
     }
-    let quality = quality(&fit, &stretches);
-    present::poor(&mut result, quality.relative);
-    result.fit = Some(quality);
+    result.fit = Some(quality(&fit, &stretches));
     result.method.push(present::method(&fit, stretches.len()));
     present::correlations(&mut result, &reported);
     dependence::damping_law(&mut result, &fit, &stretches)?;
     dependence::amplitude_dependence(&mut result, &fit, &stretches, order[0]);
+    present::apart(&mut result, &fit, stretches.len());
+    present::poor(&mut result, &fit, &stretches, order[0]);
     by_hand::compare(&mut result, &fit, &stretches, order[0]);
     present::draw(&mut result, &fit, &stretches);
     Ok((result, stretches))

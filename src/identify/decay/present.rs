@@ -1,9 +1,9 @@
 //! Warnings, method and charts of a decay.
 
 use super::modes::{ModesFit, Stretch};
-use super::search::SteadyLine;
 use crate::chart::{Chart, Series};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
+use crate::identify::hum::{SteadyLine, listed};
 use crate::identify::{self, Identification};
 use crate::print::{plural, rounded};
 
@@ -36,41 +36,79 @@ pub(super) fn fit_warnings(result: &mut Identification, fit: &ModesFit) {
     }
 }
 
-fn listed(lines: &[SteadyLine]) -> String {
-    let each = |line: &SteadyLine| {
-        let [frequency, amplitude] =
-            [(line.frequency_hz, 5), (line.amplitude, 2)].map(|(v, digits)| rounded(v, digits));
-        format!("{frequency} Hz (amplitude {amplitude})")
-    };
-    // What is left of a line after the first fit is the same line.
-    let is_same = |a: &SteadyLine, b: &SteadyLine| (a.frequency_hz - b.frequency_hz).abs() < 0.5;
-    let first = |(i, line): &(usize, &SteadyLine)| !lines[..*i].iter().any(|l| is_same(l, line));
-    let different = lines.iter().enumerate().filter(first);
-    let each: Vec<String> = different.map(|(_, line)| each(line)).collect();
-    each.join(", ")
-}
-
 /// Why a record has no mode.
 pub(super) fn no_mode(lines: &[SteadyLine]) -> Failure {
     let but = match lines {
         [] => String::new(),
-        _ => format!(" beside the steady lines of the mains at {}", listed(lines)),
+        _ => format!(
+            " beside the steady lines of the mains at {}; if one of them is the stand's own, record for longer, until it \
+             has decayed",
+            listed(lines)
+        ),
     };
-    Failure::failed(format_args!(
-        "no decaying sine stands out of the noise{but}; check the channel, or cut the record to the decay with --range (a \
-         stand that is damped so much that it does not swing gives no decay: use identify response)"
-    ))
+    Failure::failed(
+        ErrorCode::NotIdentifiable,
+        format_args!(
+            "no decaying sine stands out of the noise{but}; check the channel, or cut the record to the decay with \
+             --range (a stand that is damped so much that it does not swing gives no decay: use identify response)"
+        ),
+    )
 }
 
-/// Warns about lines of the mains, which were taken off.
-pub(super) fn lines(result: &mut Identification, lines: &[SteadyLine]) {
-    if !lines.is_empty() {
+/// Restarts that are named.
+const NAMED: usize = 5;
+
+/// Warns about decays that start again in their midst.
+pub(super) fn restarts(result: &mut Identification, times_s: &[f64]) {
+    if times_s.is_empty() {
+        return;
+    }
+    let named = times_s.iter().take(NAMED).map(|t| rounded(*t, 5));
+    let named: Vec<String> = named.collect();
+    let more = match times_s.len() > NAMED {
+        true => " and later",
+        false => "",
+    };
+    result.warn(
+        "restart-in-decay",
+        format!(
+            "the ringing starts again at {} s{more}: a second hit, lost samples, or the end of an overload; the parts before \
+             and after that are fitted as decays of their own; hit once and take your hand off the stand",
+            named.join(", ")
+        ),
+    );
+}
+
+/// Relative distance of modes that can be one mode of two stands.
+const NEAR: f64 = 0.25;
+/// Amplitude of a mode in a decay where another one rings instead of it, over that where it rings.
+const ABSENT: f64 = 0.1;
+
+/// Warns if decays show different modes in the place of one.
+pub(super) fn apart(result: &mut Identification, fit: &ModesFit, stretches: usize) {
+    let modes = 0..fit.poles.len();
+    let rings =
+        |k: usize, s: usize, other: usize| fit.amplitude(k, other) < ABSENT * fit.amplitude(k, s);
+    let hz = |k: usize| fit.poles[k].frequency_hz();
+    let is_apart = |(k, l): &(usize, usize)| {
+        let is_near = (hz(*k) / hz(*l) - 1.0).abs() < NEAR;
+        let decays = (0..stretches).flat_map(|s| (0..stretches).map(move |t| (s, t)));
+        is_near
+            && decays
+                .into_iter()
+                .any(|(s, t)| rings(*k, s, t) && rings(*l, t, s))
+    };
+    let mut pairs = modes
+        .clone()
+        .flat_map(|k| modes.clone().map(move |l| (k, l)));
+    if let Some((k, l)) = pairs.find(|pair| pair.0 < pair.1 && is_apart(pair)) {
         result.warn(
-            "mains-taken-off",
+            "decays-apart",
             format!(
-                "steady lines of the mains were fitted and taken off: {}; if one of them is the stand's own, record for \
-                 longer, until it has decayed",
-                listed(lines)
+                "some decays ring at {} Hz and others at {} Hz, none at both: the stand was changed between them, or these \
+                 are records of different stands; identify them one by one",
+                rounded(hz(k), 5),
+                rounded(hz(l), 5)
             ),
         );
     }
@@ -78,9 +116,22 @@ pub(super) fn lines(result: &mut Identification, lines: &[SteadyLine]) {
 
 /// Residual of a free decay, over its swing, above which the fit is poor.
 const POOR: f64 = 0.3;
+/// The same where the residual falls with the ringing, and its size in the ringing part over that behind it.
+const FALLING: (f64, f64) = (0.03, 4.0);
+/// Decay times after which ringing has ended, and a decay must last for there to be more of it.
+const RUNG: f64 = 3.0;
 
 /// Warns if the record is hardly a decay of those modes.
-pub(super) fn poor(result: &mut Identification, relative: f64) {
+pub(super) fn poor(
+    result: &mut Identification,
+    fit: &ModesFit,
+    stretches: &[Stretch],
+    main: usize,
+) {
+    let relative = result.fit.as_ref().map_or(0.0, |fit| fit.relative);
+    let told = ["not-viscous", "amplitude-dependent", "close-lines"];
+    let is_told = result.warnings.iter().any(|w| told.contains(&w.code));
+    let falls = falls(fit, stretches, main);
     if relative > POOR {
         result.warn(
             "poor-fit",
@@ -90,7 +141,33 @@ pub(super) fn poor(result: &mut Identification, relative: f64) {
                 rounded(100.0 * relative, 2)
             ),
         );
+    } else if relative > FALLING.0 && falls > FALLING.1 && !is_told {
+        result.warn(
+            "poor-fit",
+            format!(
+                "the residual, {} % of the swing, is {} times as large while the stand rings as behind that: it is no noise, \
+                 but something else that the hit sets off (an amplifier that is AC coupled or bends at its limit, a part \
+                 that rattles), and frequency and damping are less certain than their std says",
+                rounded(100.0 * relative, 2),
+                rounded(falls, 2)
+            ),
+        );
     }
+}
+
+/// Residual of the first stretch while it rings, over that behind; 0 if it ends before.
+fn falls(fit: &ModesFit, stretches: &[Stretch], main: usize) -> f64 {
+    let rung_s = RUNG / fit.poles[main].rate_per_s.max(f64::MIN_POSITIVE);
+    let ratio = |(stretch, residuals): (&Stretch, &Vec<f64>)| {
+        let rung = stretch.times_s.partition_point(|t| *t < rung_s);
+        let (early, late) = residuals.split_at(rung);
+        match late.len() > rung {
+            true => identify::rms(early) / identify::rms(late).max(f64::MIN_POSITIVE),
+            false => 0.0,
+        }
+    };
+    let pairs = stretches.iter().zip(&fit.residuals);
+    pairs.map(ratio).fold(0.0, f64::max)
 }
 
 pub(super) fn method(fit: &ModesFit, stretches: usize) -> String {

@@ -5,6 +5,7 @@ use torqcomp_model::fit::FitError;
 
 use super::modes::{ModesFit, Stretch, fit, linear_part};
 use crate::identify::Pole;
+use crate::identify::hum::SteadyLine;
 
 /// Which modes are searched for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,7 +22,11 @@ pub(super) struct ModeSearch {
 /// or damping that changes with amplitude or time looks the same.
 const CLOSE: f64 = 0.03;
 
-/// Lines of the mains that are taken off, at most.
+/// Power of what is left, over that of the decay, below which no more modes are searched for: 110 dB, more than a
+/// recorder resolves. What is left of computed decays is the rounding of their digits, which decays with them.
+const RESOLVED: f64 = 1e-11;
+
+/// Lines that are taken off, at most.
 const MOST_LINES: usize = 8;
 /// Harmonics of the mains among which a steady line is looked for.
 const HARMONICS: f64 = 10.0;
@@ -30,43 +35,99 @@ const OFF_HZ: f64 = 0.3;
 /// Part of its amplitude, as an exponent, that a steady line may seem to lose over a record.
 const STEADY: f64 = 0.3;
 
-/// A line of the mains in a decay.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct SteadyLine {
-    pub frequency_hz: f64,
-    /// Amplitude in the stretch where it is largest.
-    pub amplitude: f64,
-}
+/// Standard uncertainties by which the decay rate of a steady line may differ from zero.
+const STEADY_STD: f64 = 3.0;
 
-/// Adds modes one by one as long as the criterion falls enough, each starting at the strongest line of the residual.
-/// Lines of the mains that do not decay are no modes: they are taken off the stretches.
+/// Searches for the modes. Steady lines of the mains are no modes, and other steady lines neither, if something decays beside
+/// them: a stand that hardly decays while it is recorded is one, too.
 ///
 /// # Errors
 /// [`FitError`] if there are too few samples. Without a significant mode the fit is empty.
 pub(super) fn search(
-    stretches: &mut [Stretch],
+    stretches: &mut Vec<Stretch>,
     wanted: &ModeSearch,
 ) -> Result<(ModesFit, Vec<SteadyLine>), FitError> {
+    let recorded = stretches.clone();
+    let found = attempt(stretches, wanted, false)?;
+    if !found.has_tone {
+        return Ok((found.fit, found.lines));
+    }
+    let mut without = recorded;
+    let other = attempt(&mut without, wanted, true)?;
+    if !decays_clearly(&other.fit, &without) {
+        return Ok((found.fit, found.lines));
+    }
+    *stretches = without;
+    Ok((other.fit, other.lines))
+}
+
+/// Standard uncertainties by which the rates of what decays beside a steady line must differ from zero, and the turns that it
+/// must swing: a stand that rings for longer than it is recorded looks steady too, and a drift beside it is no mode.
+const CLEARLY: (f64, f64) = (5.0, 5.0);
+
+/// Whether there are modes, and all of them decay and swing without doubt.
+fn decays_clearly(found: &ModesFit, stretches: &[Stretch]) -> bool {
+    let length = length_s(stretches);
+    let one = |(k, pole): (usize, &Pole)| {
+        let decays = found.fit.std[2 * k].is_some_and(|std| pole.rate_per_s > CLEARLY.0 * std);
+        decays && pole.frequency_hz() * length > CLEARLY.1
+    };
+    !found.poles.is_empty() && found.poles.iter().enumerate().all(one)
+}
+
+/// What a search found.
+struct Attempt {
+    fit: ModesFit,
+    /// Lines that were taken off.
+    lines: Vec<SteadyLine>,
+    /// Whether another line than those of the mains is steady.
+    has_tone: bool,
+}
+
+/// Adds modes one by one as long as the criterion falls enough, each starting at the strongest line of the residual.
+/// Lines that do not decay are taken off the stretches: those of the mains where they are found, others from the last fit,
+/// in which the modes do not disturb them.
+fn attempt(
+    stretches: &mut [Stretch],
+    wanted: &ModeSearch,
+    takes_tones: bool,
+) -> Result<Attempt, FitError> {
     let mut lines = Vec::new();
+    let mut tones: Vec<usize> = Vec::new();
+    let mut has_tone = false;
     let mut best = fit(stretches, &[])?;
-    while best.poles.len() < wanted.count.unwrap_or(wanted.most) {
+    let resolved = RESOLVED * best.fit.sum_of_squares;
+    while best.poles.len() - tones.len() < wanted.count.unwrap_or(wanted.most) {
+        if wanted.count.is_none() && best.fit.sum_of_squares < resolved {
+            break;
+        }
         let Some(pole) = next_pole(stretches, &best, wanted.band_hz) else {
             break;
         };
         let mut starts = best.poles.clone();
         starts.push(pole);
         let next = fit(stretches, &starts)?;
-        if let Some(line) = steady(&next, stretches)
+        let last = best.poles.len();
+        let line = steady(&next, last, stretches);
+        if let Some(line) = line.filter(|line| line.is_of_mains)
             && lines.len() < MOST_LINES
         {
-            take_off(stretches, &next);
+            take_off(stretches, &next, last);
             lines.push(line);
             best = fit(stretches, &best.poles)?;
             continue;
         }
-        let pays = gain(&best, &next, stretches) > LEAST_GAIN
-            && next.fit.sum_of_squares < 0.98 * best.fit.sum_of_squares
-            && physical(&next, stretches);
+        let is_clear = gain(&best, &next, stretches) > LEAST_GAIN
+            && next.fit.sum_of_squares < 0.98 * best.fit.sum_of_squares;
+        // Beside a mode it is what its law of damping leaves.
+        let is_tone = is_clear && line.is_some() && close(&next.poles).is_none();
+        has_tone |= is_tone;
+        if is_tone && takes_tones && tones.len() < MOST_LINES {
+            tones.push(last);
+            best = next;
+            continue;
+        }
+        let pays = is_clear && physical(&next, stretches, &tones);
         if wanted.count.is_none() {
             if !pays {
                 break;
@@ -78,33 +139,75 @@ pub(super) fn search(
         }
         best = next;
     }
-    Ok((best, lines))
+    has_tone |= (0..best.poles.len()).any(|k| steady(&best, k, stretches).is_some());
+    let fit = without_tones(stretches, best, &tones, &mut lines)?;
+    Ok(Attempt {
+        fit,
+        lines,
+        has_tone,
+    })
 }
 
-/// The last mode of a fit, if it is a line of the mains that does not decay.
-fn steady(found: &ModesFit, stretches: &[Stretch]) -> Option<SteadyLine> {
-    let last = found.poles.len().checked_sub(1)?;
-    let pole = found.poles[last];
+/// The fit without the tones among its modes, which are taken off the stretches.
+fn without_tones(
+    stretches: &mut [Stretch],
+    found: ModesFit,
+    tones: &[usize],
+    lines: &mut Vec<SteadyLine>,
+) -> Result<ModesFit, FitError> {
+    if tones.is_empty() {
+        return Ok(found);
+    }
+    for k in tones {
+        lines.push(SteadyLine {
+            frequency_hz: found.poles[*k].frequency_hz(),
+            amplitude: largest(&found, *k, stretches),
+            is_of_mains: false,
+        });
+        take_off(stretches, &found, *k);
+    }
+    let modes = (0..found.poles.len()).filter(|k| !tones.contains(k));
+    let modes: Vec<Pole> = modes.map(|k| found.poles[k]).collect();
+    let close_hz = found.close_hz;
+    Ok(ModesFit {
+        close_hz,
+        ..fit(stretches, &modes)?
+    })
+}
+
+/// Amplitude of a mode in the stretch where it is largest.
+fn largest(found: &ModesFit, mode: usize, stretches: &[Stretch]) -> f64 {
+    let amplitudes = (0..stretches.len()).map(|s| found.amplitude(mode, s));
+    amplitudes.fold(0.0, f64::max)
+}
+
+/// A mode of a fit, if it is a line that does not decay.
+fn steady(found: &ModesFit, place: usize, stretches: &[Stretch]) -> Option<SteadyLine> {
+    let pole = found.poles[place];
     let frequency_hz = pole.frequency_hz();
+    let std = |k: usize| found.fit.std[2 * place + k];
     let of_grid = |grid_hz: f64| {
         let harmonic = (frequency_hz / grid_hz).round();
-        let std_hz = found.fit.std[2 * last + 1].map(|std| std / std::f64::consts::TAU);
+        let std_hz = std(1).map(|std| std / std::f64::consts::TAU);
         (1.0..=HARMONICS).contains(&harmonic)
             && (frequency_hz / harmonic - grid_hz).abs() < OFF_HZ
             && std_hz.is_some_and(|std| std < OFF_HZ * harmonic)
     };
+    let is_of_mains = [50.0, 60.0].into_iter().any(of_grid);
+    // Without an uncertainty the rate lies at its bound, zero.
+    let is_any = std(0).is_none_or(|std| pole.rate_per_s < STEADY_STD * std);
     let is_steady = pole.rate_per_s * length_s(stretches) < STEADY;
-    let amplitudes = (0..stretches.len()).map(|s| found.amplitude(last, s));
-    (is_steady && [50.0, 60.0].into_iter().any(of_grid)).then(|| SteadyLine {
+    (is_steady && (is_of_mains || is_any)).then(|| SteadyLine {
         frequency_hz,
-        amplitude: amplitudes.fold(0.0, f64::max),
+        amplitude: largest(found, place, stretches),
+        is_of_mains,
     })
 }
 
-/// Takes the last mode of a fit off the stretches.
-fn take_off(stretches: &mut [Stretch], found: &ModesFit) {
+/// Takes a mode of a fit off the stretches.
+fn take_off(stretches: &mut [Stretch], found: &ModesFit, mode: usize) {
     for s in 0..stretches.len() {
-        let line = found.part(stretches, found.poles.len() - 1, s);
+        let line = found.part(stretches, mode, s);
         let values = stretches[s].values.iter_mut();
         values.zip(line).for_each(|(value, line)| *value -= line);
     }
@@ -153,8 +256,8 @@ fn close(poles: &[Pole]) -> Option<f64> {
 /// that rings has a mode, even if the record is too short to say much of its damping.
 const DECAYS: [f64; 2] = [1.0, 2.0];
 
-/// Whether every mode decays significantly, swings more than once, and differs from the others.
-fn physical(found: &ModesFit, stretches: &[Stretch]) -> bool {
+/// Whether every mode but the tones decays significantly, swings more than once, and differs from the others.
+fn physical(found: &ModesFit, stretches: &[Stretch], tones: &[usize]) -> bool {
     let length = length_s(stretches);
     let one = |(k, pole): (usize, &Pole)| {
         let rate_std = found.fit.std[2 * k];
@@ -169,7 +272,7 @@ fn physical(found: &ModesFit, stretches: &[Stretch]) -> bool {
             let near = (other.omega_rad_per_s - pole.omega_rad_per_s).abs();
             near > 0.2 * (other.rate_per_s + pole.rate_per_s) || near * length > 3.0
         });
-        known && rings && apart
+        tones.contains(&k) || known && rings && apart
     };
     found.poles.iter().enumerate().all(one)
 }

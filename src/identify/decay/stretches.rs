@@ -3,14 +3,14 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
+use torqcomp_dsp::quality::clipping::Clipping;
 use torqcomp_dsp::{decimate, onset, peaks};
 
-use super::hum::without_mains;
 use super::modes::Stretch;
-use super::search::SteadyLine;
-use super::{DecayOptions, Ringing};
-use crate::failure::Failure;
+use super::{DecayOptions, Ringing, present, restart};
+use crate::failure::{ErrorCode, Failure};
 use crate::identify::Identification;
+use crate::identify::hum::{SteadyLine, without_mains};
 use crate::print::short;
 
 /// Most samples that are fitted, of all stretches together.
@@ -60,10 +60,10 @@ fn cut(
     options: &DecayOptions,
     (result, lines): (&mut Identification, &mut Vec<SteadyLine>),
 ) -> Result<Vec<(Stretch, Option<f64>)>, Failure> {
-    let mut cut = Vec::new();
-    let (mut found, mut left_out) = (0, 0);
+    let mut cuts = Cuts::default();
     for record in records {
         check(record)?;
+        let clipped_s = clipped_times(record);
         let (values, of_mains) = without_mains(record.values, record.rate_hz);
         lines.extend(of_mains);
         let record = &Ringing {
@@ -72,33 +72,119 @@ fn cut(
         };
         let [times, values] = prepared(record, options, result)?;
         for range in onset::decays(&values) {
-            let rings = ringing(&values, &range);
-            left_out += range.end - rings.end;
-            found += 1;
-            if found <= MOST_STRETCHES {
-                let stretch = Stretch::new(&times[rings.clone()], values[rings].to_vec());
-                cut.push((stretch, record.rate_hz));
+            cuts.add(&times, &values, range, (&clipped_s, record.rate_hz));
+        }
+    }
+    cuts.describe(result)?;
+    Ok(cuts.stretches)
+}
+
+/// The stretches that are fitted, and what is left out of the decays.
+#[derive(Default)]
+struct Cuts {
+    /// With the sampling rate of their record.
+    stretches: Vec<(Stretch, Option<f64>)>,
+    found: usize,
+    /// Samples of noise behind the ringing.
+    left_out: usize,
+    /// Samples up to the last clipped one.
+    left_clipped: usize,
+    /// Times at which a decay starts again.
+    restarts_s: Vec<f64>,
+}
+
+impl Cuts {
+    /// Adds the stretches of a decay; `clipped_s` are the times of the clipped samples of its record.
+    fn add(
+        &mut self,
+        times: &[f64],
+        values: &[f64],
+        range: Range<usize>,
+        (clipped_s, rate_hz): (&[f64], Option<f64>),
+    ) {
+        let clipped = clipped_at_start(clipped_s, &times[range.clone()]);
+        if clipped > 0 && range.len() < clipped + LEAST_SAMPLES {
+            self.left_clipped += range.len();
+            return;
+        }
+        self.left_clipped += clipped;
+        let range = range.start + clipped..range.end;
+        let rings = ringing(values, &range);
+        self.left_out += range.end - rings.end;
+        for part in parts(values, &rings, rate_hz.is_some()) {
+            if part.start > rings.start {
+                self.restarts_s.push(times[part.start]);
+            }
+            self.found += 1;
+            if self.found <= MOST_STRETCHES {
+                let stretch = Stretch::new(&times[part.clone()], values[part].to_vec());
+                self.stretches.push((stretch, rate_hz));
             }
         }
     }
-    if left_out > 0 {
-        result.method.push(format!(
-            "each decay is fitted up to twice the time after which its ringing is lost in the noise; {left_out} samples of \
-             noise behind that are left out"
-        ));
+
+    /// Says what was left out.
+    fn describe(&self, result: &mut Identification) -> Result<(), Failure> {
+        let (left_clipped, left_out, found) = (self.left_clipped, self.left_out, self.found);
+        present::restarts(result, &self.restarts_s);
+        if left_clipped > 0 {
+            result.method.push(format!(
+                "each decay is fitted from its last clipped sample on; {left_clipped} samples before that are left out"
+            ));
+        }
+        if left_out > 0 {
+            result.method.push(format!(
+                "each decay is fitted up to twice the time after which its ringing is lost in the noise; {left_out} samples \
+                 of noise behind that are left out"
+            ));
+        }
+        if self.stretches.is_empty() {
+            return Err(Failure::failed(
+                ErrorCode::NotIdentifiable,
+                if left_clipped > 0 {
+                    "no free decay is left behind the last clipped sample; record with a larger range"
+                } else {
+                    "no free decay found; try another channel or --range"
+                },
+            ));
+        }
+        if found > MOST_STRETCHES {
+            result.warn(
+                "decays-left-out",
+                format!("only the first {MOST_STRETCHES} of {found} decays are used"),
+            );
+        }
+        Ok(())
     }
-    if cut.is_empty() {
-        return Err(Failure::failed(
-            "no free decay found; try another channel or --range",
-        ));
+}
+
+/// A stretch cut where it starts again, if its samples are uniform.
+fn parts(values: &[f64], rings: &Range<usize>, is_uniform: bool) -> Vec<Range<usize>> {
+    if !is_uniform {
+        return std::iter::once(rings.clone()).collect();
     }
-    if found > MOST_STRETCHES {
-        result.warn(
-            "decays-left-out",
-            format!("only the first {MOST_STRETCHES} of {found} decays are used"),
-        );
-    }
-    Ok(cut)
+    let parts = restart::parts(&values[rings.clone()], LEAST_SAMPLES);
+    let within = |part: Range<usize>| rings.start + part.start..rings.start + part.end;
+    parts.into_iter().map(within).collect()
+}
+
+/// Times of the samples that the recorder cut off.
+fn clipped_times(record: &Ringing) -> Vec<f64> {
+    let Some(found) = Clipping::of(record.values) else {
+        return Vec::new();
+    };
+    let samples = record.times_s.iter().zip(record.values);
+    let clipped = samples.filter(|(_, value)| found.holds(**value));
+    clipped.map(|(time_s, _)| *time_s).collect()
+}
+
+/// Samples of a decay up to its last one that is cut off.
+fn clipped_at_start(clipped_s: &[f64], times_s: &[f64]) -> usize {
+    let Some(end_s) = times_s.last() else {
+        return 0;
+    };
+    let last = clipped_s[..clipped_s.partition_point(|t| t <= end_s)].last();
+    last.map_or(0, |last| times_s.partition_point(|t| t <= last))
 }
 
 /// The part of a long stretch that rings, and as much noise behind it.
@@ -113,18 +199,24 @@ fn ringing(values: &[f64], range: &Range<usize>) -> Range<usize> {
 /// Refuses a record that is too short or has holes.
 fn check(record: &Ringing) -> Result<(), Failure> {
     if let Some(i) = record.values.iter().position(|v| !v.is_finite()) {
-        return Err(Failure::failed(format_args!(
-            "{}: sample {} is not a finite number; exclude it with --range",
-            record.name,
-            i + 1
-        )));
+        return Err(Failure::failed(
+            ErrorCode::InvalidSample,
+            format_args!(
+                "sample {} is not a finite number; exclude it with --range",
+                i + 1
+            ),
+        )
+        .at(record.name));
     }
     if record.values.len() < LEAST_SAMPLES {
-        return Err(Failure::failed(format_args!(
-            "{}: {} samples are too few for a decay; at least {LEAST_SAMPLES} are needed",
-            record.name,
-            record.values.len()
-        )));
+        return Err(Failure::failed(
+            ErrorCode::TooFewSamples,
+            format_args!(
+                "{} samples are too few for a decay; at least {LEAST_SAMPLES} are needed",
+                record.values.len()
+            ),
+        )
+        .at(record.name));
     }
     Ok(())
 }

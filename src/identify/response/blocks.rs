@@ -1,12 +1,14 @@
 //! Records cut into blocks: hits, segments of noise, or periods.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use num_complex::Complex64;
 use torqcomp_dsp::frf::{self, Block, Powers, Window};
 
 use super::{Driven, Excitation, ResponseOptions, check};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
+use crate::identify::hum::{self, without_mains};
 use crate::identify::{Identification, rms};
 use crate::print::{plural, rounded, short};
 
@@ -109,6 +111,34 @@ fn mean(samples: &[f64]) -> f64 {
     samples.iter().sum::<f64>() / samples.len() as f64
 }
 
+/// Applied and measured signal of each record without the lines of the mains, which are no answer to a transient.
+struct Clean<'a>(Vec<[Cow<'a, [f64]>; 2]>);
+
+impl<'a> Clean<'a> {
+    fn of(records: &[Driven<'a>], result: &mut Identification) -> Self {
+        let mut lines = Vec::new();
+        let mut clean = |samples, rate_hz| {
+            let (left, of_mains) = without_mains(samples, Some(rate_hz));
+            lines.extend(of_mains);
+            left
+        };
+        let both = |r: &Driven<'a>| [r.applied, r.measured].map(|v| clean(v, r.rate_hz));
+        let all = records.iter().map(both).collect();
+        hum::taken_off(result, &lines);
+        Self(all)
+    }
+
+    fn records<'b>(&'b self, recorded: &[Driven<'b>]) -> Vec<Driven<'b>> {
+        let pairs = recorded.iter().zip(&self.0);
+        let of = |(record, [applied, measured]): (&Driven<'b>, &'b [Cow<'a, [f64]>; 2])| Driven {
+            applied,
+            measured,
+            ..*record
+        };
+        pairs.map(of).collect()
+    }
+}
+
 /// A transient of a record.
 struct Transient {
     record: usize,
@@ -116,8 +146,15 @@ struct Transient {
     measured: Vec<f64>,
 }
 
-fn impacts(records: &[Driven], result: &mut Identification) -> Result<Set, Failure> {
-    let good = good_hits(records, result)?;
+fn impacts(recorded: &[Driven], result: &mut Identification) -> Result<Set, Failure> {
+    // Hum hides that a limit is flat.
+    let good = good_hits(recorded, result)?;
+    let clean = Clean::of(recorded, result);
+    let records = &clean.records(recorded);
+    let folded = |(r, range): &(usize, Range<usize>)| {
+        frf::near_half_rate(&recorded[*r].applied[range.clone()])
+    };
+    check::short_pulses(result, &good.iter().map(folded).collect::<Vec<f64>>());
     let length = good.iter().map(|(_, range)| range.len()).min().unwrap_or(0);
     let of = |(r, range): &(usize, Range<usize>)| {
         let range = range.start..range.start + length;
@@ -139,7 +176,9 @@ fn impacts(records: &[Driven], result: &mut Identification) -> Result<Set, Failu
 
 /// Every record as one transient, whatever its shape. The spectra are those of the differences from sample to sample over
 /// 1 − e^(−jω), as levels may differ between start and end.
-fn whole_transients(records: &[Driven], result: &mut Identification) -> Set {
+fn whole_transients(recorded: &[Driven], result: &mut Identification) -> Set {
+    let clean = Clean::of(recorded, result);
+    let records = &clean.records(recorded);
     let length = records.iter().map(|r| r.applied.len()).min().unwrap_or(0);
     let differences = |v: &[f64]| -> Vec<f64> {
         let steps = v[..length].windows(2).map(|pair| pair[1] - pair[0]);
@@ -239,7 +278,7 @@ fn good_hits(
              any record as it is"
                 .to_owned(),
         );
-        return Err(Failure::failed(bad.join("; ")));
+        return Err(Failure::failed(ErrorCode::TooFewSamples, bad.join("; ")));
     }
     for message in bad {
         result.warn("hit-left-out", message);
@@ -287,11 +326,14 @@ fn random(
         all.extend(cut.into_iter().map(|block| (r, block)));
     }
     if all.len() < 4 {
-        return Err(Failure::failed(format_args!(
-            "only {} of {length} samples in the records, at least 4 are needed; choose a shorter --segment, or record \
-             longer",
-            plural(all.len(), "segment")
-        )));
+        return Err(Failure::failed(
+            ErrorCode::TooFewSamples,
+            format_args!(
+                "only {} of {length} samples in the records, at least 4 are needed; choose a shorter --segment, or \
+                 record longer",
+                plural(all.len(), "segment")
+            ),
+        ));
     }
     result.method.push(format!(
         "Hann-weighted segments of {length} samples, 50 % overlap"
@@ -310,9 +352,18 @@ fn periodic(
         .or_else(|| frf::find_period(records[0].applied));
     let period = period.ok_or_else(|| {
         Failure::failed(
+            ErrorCode::TooFewSamples,
             "no period found in the applied signal; give it with --period, or --excitation random",
         )
     })?;
+    if period < 2 {
+        return Err(Failure::usage(
+            ErrorCode::InvalidValue,
+            format_args!(
+                "--period {period}: a period has two samples or more; count them in one period of the excitation"
+            ),
+        ));
+    }
     let mut all = Vec::new();
     for (r, record) in records.iter().enumerate() {
         let block = |k: usize| {
@@ -331,9 +382,10 @@ fn periodic(
         all.extend(cut.into_iter().map(|block| (r, block)));
     }
     if all.is_empty() {
-        return Err(Failure::failed(format_args!(
-            "the records are shorter than one period of {period} samples"
-        )));
+        return Err(Failure::failed(
+            ErrorCode::TooFewSamples,
+            format_args!("the records are shorter than one period of {period} samples"),
+        ));
     }
     result.method.push(format!(
         "periods of {period} samples, without the first one"

@@ -1,10 +1,10 @@
 //! Refusal of records that show no response, and signs of swapped channels and poor fits.
 
 use super::Driven;
-use super::Modal;
 use super::blocks::Set;
 use super::lines::Lines;
-use crate::failure::Failure;
+use super::{FinalFit, Modal};
+use crate::failure::{ErrorCode, Failure};
 use crate::identify::Identification;
 use crate::print::{plural, rounded, short};
 use torqcomp_dsp::frf::{Estimator, Window};
@@ -13,37 +13,45 @@ use torqcomp_dsp::frf::{Estimator, Window};
 pub(super) fn records(records: &[Driven]) -> Result<(), Failure> {
     let first = records
         .first()
-        .ok_or_else(|| Failure::failed("no record given"))?;
+        .ok_or_else(|| Failure::failed(ErrorCode::MissingArgument, "no record given"))?;
     for record in records {
         if (record.rate_hz / first.rate_hz - 1.0).abs() > 1e-6 {
-            return Err(Failure::failed(format_args!(
-                "{} was sampled at {} Hz and {} at {} Hz; records of one response need the same rate",
-                first.name,
-                short(first.rate_hz),
-                record.name,
-                short(record.rate_hz)
-            )));
+            return Err(Failure::failed(
+                ErrorCode::RecordsDiffer,
+                format_args!(
+                    "{} was sampled at {} Hz and {} at {} Hz; records of one response need the same rate",
+                    first.name,
+                    short(first.rate_hz),
+                    record.name,
+                    short(record.rate_hz)
+                ),
+            ));
         }
         let mut numbers = record.applied.iter().chain(record.measured);
         if record.applied.len() != record.measured.len() || numbers.any(|v| !v.is_finite()) {
-            return Err(Failure::failed(format_args!(
-                "{}: both channels need a number in every row",
-                record.name
-            )));
+            return Err(Failure::failed(
+                ErrorCode::InvalidSample,
+                "both channels need a number in every row",
+            )
+            .at(record.name));
         }
         for (what, samples) in [("applied", record.applied), ("measured", record.measured)] {
             if samples.iter().all(|v| *v == samples[0]) {
-                return Err(Failure::failed(format_args!(
-                    "{}: the {what} channel does not change; check --{what} and whether the recorder was connected",
-                    record.name
-                )));
+                return Err(Failure::failed(
+                    ErrorCode::UnsuitableRecord,
+                    format_args!(
+                        "the {what} channel does not change; check --{what} and whether the recorder was connected"
+                    ),
+                )
+                .at(record.name));
             }
         }
         if record.applied == record.measured {
-            return Err(Failure::failed(format_args!(
-                "{}: the applied and the measured channel are the same numbers; check --applied and --measured",
-                record.name
-            )));
+            return Err(Failure::failed(
+                ErrorCode::UnsuitableRecord,
+                "the applied and the measured channel are the same numbers; check --applied and --measured",
+            )
+            .at(record.name));
         }
     }
     Ok(())
@@ -109,21 +117,45 @@ pub(super) fn leakage(result: &mut Identification, set: &Set, fitted: &Modal) {
 }
 
 /// Residual over the measured signal above which the fit is poor.
-const POOR: f64 = 0.5;
+const POOR: f64 = 0.3;
 
 /// Warns about what makes the fit doubtful.
-pub(super) fn doubts(result: &mut Identification, relative: f64, leads: bool, modes: usize) {
+pub(super) fn doubts(result: &mut Identification, found: &FinalFit, leads: bool) {
     if leads {
         result.warn("leads", LEADS);
     }
-    if relative > POOR {
+    if found.relative > POOR {
         result.warn(
             "poor-fit",
             format!(
-                "the residual of {} is {} % of the measured signal: the applied signal does not explain it; check the \
-                 coherence (--html) and choose another --band",
-                plural(modes, "mode"),
-                rounded(100.0 * relative, 2)
+                "the residual of {} is {} % of the measured signal: more modes are there, or the applied signal does not \
+                 explain it; leave out or raise --modes, check the coherence (--html), and choose another --band",
+                plural(found.modal.poles.len(), "mode"),
+                rounded(100.0 * found.relative, 2)
+            ),
+        );
+    }
+    noise_before_resonance(result, found.gain_error);
+}
+
+/// Part of the force near half the rate, over that at rest, from which there is a warning.
+const FOLDED: f64 = 0.01;
+/// Error of the gain over that part. Spectra of pulses fall with the square of the frequency at least, and at half the rate
+/// twice the level is seen: a quarter of it comes down from both sides of the rate to rest, a third of what is left of sharp
+/// edges.
+const OF_GAIN: f64 = 1.0 / 3.0;
+
+/// Warns where pulses are so short that frequencies above half the rate fold into their spectrum.
+pub(super) fn short_pulses(result: &mut Identification, parts: &[f64]) {
+    let part = parts.iter().sum::<f64>() / parts.len().max(1) as f64;
+    if part > FOLDED {
+        result.warn(
+            "short-pulse",
+            format!(
+                "the pulses of the hammer last few samples, so that frequencies above half the rate fold into their spectrum: \
+                 gains may be wrong by about {} %, which their uncertainties do not include, unless the recorder has an \
+                 anti-aliasing filter; record faster, or hit with a softer tip",
+                rounded(100.0 * OF_GAIN * part, 1)
             ),
         );
     }
@@ -133,7 +165,7 @@ pub(super) fn doubts(result: &mut Identification, relative: f64, leads: bool, mo
 const GAIN_ERROR: f64 = 1e-3;
 
 /// Warns where noise enters before the resonance.
-pub(super) fn noise_before_resonance(result: &mut Identification, gain_error: f64) {
+fn noise_before_resonance(result: &mut Identification, gain_error: f64) {
     if gain_error > GAIN_ERROR {
         result.warn(
             "noise-before-resonance",

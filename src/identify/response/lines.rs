@@ -6,7 +6,7 @@ use torqcomp_dsp::frf::{Estimator, Powers};
 
 use super::blocks::Set;
 use super::{Data, ResponseOptions};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::print::{plural, short};
 
 /// Lines of a band.
@@ -37,11 +37,14 @@ pub(super) fn band(set: &Set, options: &ResponseOptions) -> Result<Lines, Failur
     };
     let range = from.max(1)..to.min(lines - 1);
     if range.len() < 12 {
-        return Err(Failure::failed(format_args!(
-            "only {} in the band, {} Hz apart: too few to fit modes; widen --band or record longer",
-            plural(range.len(), "line"),
-            short(set.step_hz)
-        )));
+        return Err(Failure::failed(
+            ErrorCode::TooFewSamples,
+            format_args!(
+                "only {} in the band, {} Hz apart: too few to fit modes; widen --band or record longer",
+                plural(range.len(), "line"),
+                short(set.step_hz)
+            ),
+        ));
     }
     Ok(range)
 }

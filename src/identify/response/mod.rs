@@ -2,6 +2,7 @@
 
 mod blocks;
 mod check;
+mod foreign;
 mod inverse;
 mod lines;
 mod modal;
@@ -9,6 +10,7 @@ mod order;
 mod present;
 mod scatter;
 mod shares;
+mod shift;
 mod whole;
 
 use clap::ValueEnum;
@@ -16,7 +18,8 @@ use torqcomp_model::Covariance;
 
 use super::mode::all_or_none;
 use super::{FitQuality, Identification, ModalPole};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
+use crate::print::rounded;
 use blocks::Set;
 use lines::Lines;
 use modal::{Data, Effort, Modal};
@@ -86,34 +89,43 @@ pub fn identify(records: &[Driven], options: &ResponseOptions) -> Result<Identif
         (found, whole.join().expect("a transform does not panic"))
     });
     let (coarse, held_out) = found.map_err(|failure| match leads {
-        true => Failure::failed(check::LEADS),
+        true => Failure::failed(ErrorCode::UnsuitableRecord, check::LEADS),
         false => failure,
     })?;
+    let late = shift::of(&set, &lines, options, (&data, &coarse))?;
+    let options = &ResponseOptions {
+        with_delay: options.with_delay || late.is_some(),
+        ..*options
+    };
+    let (coarse, held_out) = match late {
+        Some(late) => {
+            shift::warn(&mut result, late.delay_s);
+            let held_out = order::of_given(&set, &lines, options, &late)?;
+            (late, held_out)
+        }
+        None => (coarse, held_out),
+    };
     let is_grounded = options.grounded && coarse.poles.len() > 1;
     let data = Data {
+        with_delay: options.with_delay,
         below: !is_grounded,
         ..data
     };
     let coarse = match is_grounded {
-        true => without_undamped(&data, coarse, &mut result)?,
+        true => without_undamped(&set, &data, coarse, &mut result)?,
         false => coarse,
     };
     let fitted = final_fit(whole, &set, &lines, &data, &coarse, &mut result)?;
     if leads && check::is_out_of_reach(&set, &fitted.modal) {
-        return Err(Failure::failed(check::LEADS));
+        return Err(Failure::failed(ErrorCode::UnsuitableRecord, check::LEADS));
     }
+    foreign::warn(&mut result, &fitted.modal, is_grounded)?;
     present::add_modes(&mut result, &fitted);
-    if is_grounded {
+    if is_grounded && result.modes.len() > 1 {
         result.shares = shares::of(&fitted, options.order);
         present::add_shares(&mut result);
     }
-    check::doubts(
-        &mut result,
-        fitted.relative,
-        leads,
-        fitted.modal.poles.len(),
-    );
-    check::noise_before_resonance(&mut result, fitted.gain_error);
+    check::doubts(&mut result, &fitted, leads);
     result.fit = Some(FitQuality {
         rms: present::output_rms(&set, &lines) * fitted.relative,
         unit: String::new(),
@@ -122,9 +134,7 @@ pub fn identify(records: &[Driven], options: &ResponseOptions) -> Result<Identif
     result.held_out_errors = held_out;
     present::method(&mut result, &set, &lines, options, &fitted.modal);
     present::other_constants(&mut result, &set, options, &fitted);
-    present::raw_error(&mut result, &set, &lines);
-    present::levels(&mut result, &set, &lines);
-    present::draw(&mut result, &set, &lines, &fitted.modal);
+    present::spectra(&mut result, &set, &lines, &fitted.modal);
     Ok(result)
 }
 
@@ -135,6 +145,8 @@ struct FinalFit {
     covariance: Covariance,
     /// Place of the first linear number in the covariance.
     linear: usize,
+    /// Whether the covariance has the residues of all modes.
+    has_residues: bool,
     /// Residual over the measured signal.
     relative: f64,
     /// Largest relative error of the gain by noise in the applied signal.
@@ -158,11 +170,16 @@ impl FinalFit {
     fn mode(&self, k: usize) -> ModalPole {
         let pole = self.modal.poles[k];
         let select = |places: &[usize]| all_or_none(self.covariance.select(places), places.len());
-        if self.modal.poles.len() > 1 {
+        if self.modal.of_stand().len() > 1 || !self.has_residues {
             return ModalPole::new(pole, select(&[2 * k, 2 * k + 1]));
         }
         let (residue, unit) = self.modal.residue(k);
-        let covariance = select(&[0, 1, self.linear, self.linear + 1]);
+        let covariance = select(&[
+            2 * k,
+            2 * k + 1,
+            self.linear + 2 * k,
+            self.linear + 2 * k + 1,
+        ]);
         ModalPole::with_residue(pole, residue / unit, covariance).scaled(unit)
     }
 }
@@ -170,25 +187,28 @@ impl FinalFit {
 /// The fit without modes that these records give no damping: noise and nonlinearity make them, and in a stand file they would
 /// ring on for ever.
 fn without_undamped(
+    set: &Set,
     data: &Data,
     coarse: Modal,
     result: &mut Identification,
 ) -> Result<Modal, Failure> {
     let mut starts = coarse.poles;
+    let mut left_out = Vec::new();
     loop {
         let fitted = data.fit(&starts, Effort::Fine)?;
-        let at_bound = |k: usize| fitted.fit.as_ref().is_some_and(|fit| fit.at_bound[2 * k]);
-        let Some(undamped) = (0..starts.len()).find(|k| at_bound(*k)) else {
+        let undamped = fitted
+            .poles
+            .iter()
+            .position(|pole| foreign::is_undamped(pole, set));
+        let Some(undamped) = undamped else {
+            foreign::undamped(result, &left_out);
             return Ok(fitted);
         };
         if starts.len() == 1 {
-            return Err(Failure::failed(
-                "no mode has a damping that these records show; record for longer, or choose another --band",
-            ));
+            return Err(Failure::failed(ErrorCode::NotIdentifiable, foreign::NONE));
         }
-        present::left_out(result, fitted.poles[undamped]);
         starts = fitted.poles;
-        starts.remove(undamped);
+        left_out.push(rounded(starts.remove(undamped).frequency_hz(), 5));
     }
 }
 
@@ -201,25 +221,27 @@ fn final_fit(
     coarse: &Modal,
     result: &mut Identification,
 ) -> Result<FinalFit, Failure> {
-    if let Some(fitted) = whole.and_then(|whole| whole.refine(data, coarse)) {
+    if let Some(fitted) = whole.and_then(|whole| whole.refine(data, coarse, set)) {
         result.method.push(
             "constants fitted to the whole records without a window; the transients of their ends are part of the model"
                 .to_owned(),
         );
         return Ok(fitted);
     }
-    let modal = data.fit(&coarse.poles, Effort::Fine)?;
+    let mut modal = data.fit(&coarse.poles, Effort::Fine)?;
     check::leakage(result, set, &modal);
     let searched = modal.fit.as_ref().map_or(0, |fit| fit.values.len());
     let all = scatter::of_all(set, lines, data, &modal)?;
+    let of_poles = scatter::of_poles(set, lines, data, &modal)?;
+    foreign::mark(&mut modal, &of_poles, set);
+    let is_alone = modal.of_stand().len() == 1 && modal.poles.len() > 1;
+    let static_gain_std = |all: &Covariance| static_gain_std(&modal, all, searched);
+    let static_gain_std = all.as_ref().and_then(static_gain_std);
+    let all = all.filter(|_| !data.below || is_alone);
     Ok(FinalFit {
-        static_gain_std: all
-            .as_ref()
-            .and_then(|all| static_gain_std(&modal, all, searched)),
-        covariance: match all.filter(|_| !data.below) {
-            Some(all) => all,
-            None => scatter::of_poles(set, lines, data, &modal)?,
-        },
+        static_gain_std,
+        has_residues: all.is_some() || modal.poles.len() == 1,
+        covariance: all.unwrap_or(of_poles),
         linear: searched,
         relative: set.error(&modal.response, lines),
         gain_error: 0.0,

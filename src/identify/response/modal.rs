@@ -14,6 +14,7 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 use torqcomp_model::fit::{Fit, FitError, Options, Parameter, Residuals, linear, minimize};
 
+use super::foreign::Foreign;
 use crate::identify::Pole;
 
 /// A response at lines of a band, with weights.
@@ -59,6 +60,8 @@ pub(super) struct Modal {
     pub fit: Option<Fit>,
     /// Model at each line.
     pub response: Vec<Complex64>,
+    /// Why a mode is none of the stand; `None` for those that are.
+    pub foreign: Vec<Option<Foreign>>,
     scale: f64,
     order: i32,
 }
@@ -191,6 +194,7 @@ impl Data {
             delay_std_s: delay_s.1,
             linear: linear.to_vec(),
             fit: None,
+            foreign: vec![None; poles.len()],
             scale: self.scale(),
             order: self.order,
         }
@@ -422,7 +426,18 @@ impl Modal {
         )
     }
 
-    /// Derivatives of the static response `Σ 2 Re(−R/p) + c₁` by σ and ω of each mode, and by the linear parameters.
+    /// Places of the modes of the stand, by rising frequency.
+    pub(super) fn of_stand(&self) -> Vec<usize> {
+        let mut places: Vec<usize> = (0..self.poles.len())
+            .filter(|k| self.foreign[*k].is_none())
+            .collect();
+        let omega = |k: &usize| self.poles[*k].omega_rad_per_s;
+        places.sort_by(|a, b| omega(a).total_cmp(&omega(b)));
+        places
+    }
+
+    /// Derivatives of the static response `Σ 2 Re(−R/p) + c₁` of the stand by σ and ω of each mode, and by the linear
+    /// parameters.
     pub(super) fn slopes_at_rest(&self) -> (Vec<f64>, Vec<f64>) {
         let mut of_poles = Vec::new();
         let mut of_linear = Vec::new();
@@ -431,6 +446,10 @@ impl Modal {
             let of_pole = residue / (p * p * self.scale);
             of_poles.extend([-2.0 * of_pole.re, -2.0 * of_pole.im]);
             of_linear.extend([-2.0 * p.inv().re, 2.0 * p.inv().im]);
+            if self.foreign[k].is_some() {
+                of_poles[2 * k..].fill(0.0);
+                of_linear[2 * k..].fill(0.0);
+            }
         }
         of_linear.push(1.0);
         of_linear.resize(self.linear.len(), 0.0);
@@ -442,13 +461,13 @@ impl Modal {
         self.scale
     }
 
-    /// Static response per applied unit, from the modes and c₁; for displacement without free motion.
+    /// Static response per applied unit, from the modes of the stand and c₁; for displacement without free motion.
     pub fn at_rest(&self) -> f64 {
         let one = |k: usize| {
             let (p, residue) = self.pole_and_residue(k);
             2.0 * (-residue / p).re
         };
-        let modes: f64 = (0..self.poles.len()).map(one).sum();
+        let modes: f64 = self.of_stand().into_iter().map(one).sum();
         modes + self.linear[2 * self.poles.len()]
     }
 }

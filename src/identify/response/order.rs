@@ -5,7 +5,7 @@ use torqcomp_dsp::frf::{self, Estimator, Powers};
 use super::blocks::Set;
 use super::lines::{self, Lines, MOST_LINES, data};
 use super::{Data, Effort, Modal, ResponseOptions};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::print::rounded;
 
 /// Relative distance in frequency below which no second mode is searched for, unless the number of modes is given: the
@@ -22,7 +22,11 @@ const PATIENCE: usize = 3;
 const SLACK: f64 = 1.05;
 
 /// One mode more; `None` if there is no line left to start it at.
-fn grow(data: &Data, so_far: &Modal, options: &ResponseOptions) -> Result<Option<Modal>, Failure> {
+pub(super) fn grow(
+    data: &Data,
+    so_far: &Modal,
+    options: &ResponseOptions,
+) -> Result<Option<Modal>, Failure> {
     let apart = if options.modes.is_some() { 0.0 } else { APART };
     let Some(pole) = data.next_pole(so_far, apart) else {
         return Ok(None);
@@ -53,24 +57,25 @@ pub(super) fn order(
     let folds = folds(set);
     if lines.len() > MOST_LINES {
         let (from_hz, to_hz) = lines::strongest(set, lines);
-        return Err(Failure::failed(format_args!(
-            "{} lines in the band, more than {MOST_LINES}; narrow it to where the response is strongest: \
+        return Err(Failure::failed(
+            ErrorCode::TooManySamples,
+            format_args!(
+                "{} lines in the band, more than {MOST_LINES}; narrow it to where the response is strongest: \
              --band {}..{}",
-            lines.len(),
-            rounded(from_hz, 4),
-            rounded(to_hz, 4)
-        )));
+                lines.len(),
+                rounded(from_hz, 4),
+                rounded(to_hz, 4)
+            ),
+        ));
     }
     if let Some(modes) = options.modes {
         let all = grown(data, options, modes)?;
-        let mut errors = vec![f64::NAN; all.poles.len() + 1];
-        if folds.len() > 1 {
-            errors[all.poles.len()] = of_given(set, lines, options, &folds, &all)?;
-        }
+        let errors = of_given(set, lines, options, &all)?;
         return Ok((all, errors));
     }
     if folds.len() < 2 {
         return Err(Failure::failed(
+            ErrorCode::TooFewSamples,
             "one block is not enough to choose the number of modes; give it with --modes, or record more",
         ));
     }
@@ -79,6 +84,7 @@ pub(super) fn order(
     let best = errors.iter().position(|e| *e <= SLACK * least).unwrap_or(0);
     if best == 0 {
         return Err(Failure::failed(
+            ErrorCode::NotIdentifiable,
             "no mode explains held-out data: the measured signal does not follow the applied one; check --applied, \
              --measured and --band",
         ));
@@ -111,19 +117,23 @@ fn held_out(set: &Set, lines: &Lines, folds: &[Vec<usize>], models: &[Modal]) ->
     each.sum::<f64>() / set.blocks.len() as f64
 }
 
-/// Error on held-out blocks with the number of modes of the fit to all blocks.
-fn of_given(
+/// Error on held-out blocks with the number of modes of the fit to all blocks alone.
+pub(super) fn of_given(
     set: &Set,
     lines: &Lines,
     options: &ResponseOptions,
-    folds: &[Vec<usize>],
     all: &Modal,
-) -> Result<f64, Failure> {
-    let training = training(set, lines, options, folds);
-    let models = side_by_side(&training, |data, _| {
-        Ok(data.fit(&all.poles, Effort::Coarse)?)
-    })?;
-    Ok(held_out(set, lines, folds, &models))
+) -> Result<Vec<f64>, Failure> {
+    let mut errors = vec![f64::NAN; all.poles.len() + 1];
+    let folds = folds(set);
+    if folds.len() > 1 {
+        let training = training(set, lines, options, &folds);
+        let models = side_by_side(&training, |data, _| {
+            Ok(data.fit(&all.poles, Effort::Coarse)?)
+        })?;
+        errors[all.poles.len()] = held_out(set, lines, &folds, &models);
+    }
+    Ok(errors)
 }
 
 /// Error on held-out blocks with 0, 1, 2, … modes, until more do not help.

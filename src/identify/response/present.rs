@@ -6,17 +6,15 @@ use torqcomp_dsp::frf::{self, Estimator, Frf, Window};
 use super::blocks::Set;
 use super::lines::Lines;
 use super::order::folds;
-use super::{FinalFit, Modal, ResponseOptions};
+use super::{FinalFit, Modal, ResponseOptions, foreign};
 use crate::chart::{Chart, Series};
-use crate::identify::{Comparison, Identification, NamedEstimate, Pole};
+use crate::identify::{Comparison, Identification, NamedEstimate};
 use crate::print::{plural, rounded, short};
 
-/// Adds every mode with its natural frequency and damping ratio, by rising frequency.
+/// Adds every mode of the stand with its natural frequency and damping ratio, by rising frequency.
 pub(super) fn add_modes(result: &mut Identification, fitted: &FinalFit) {
     let modal = &fitted.modal;
-    let mut order: Vec<usize> = (0..modal.poles.len()).collect();
-    let omega = |k: usize| modal.poles[k].omega_rad_per_s;
-    order.sort_by(|a, b| omega(*a).total_cmp(&omega(*b)));
+    let order = modal.of_stand();
     for (place, k) in order.iter().enumerate() {
         let mode = fitted.mode(*k);
         let names = ["natural_frequency", "damping_ratio"];
@@ -33,18 +31,6 @@ pub(super) fn add_modes(result: &mut Identification, fitted: &FinalFit) {
         result.add(constants);
         result.modes.push(mode);
     }
-}
-
-/// Says that a mode without damping is not written.
-pub(super) fn left_out(result: &mut Identification, pole: Pole) {
-    result.warn(
-        "undamped-left-out",
-        format!(
-            "the mode at {} Hz has no damping that these data show and was left out: noise or a nonlinear stand makes such modes; \
-             choose fewer --modes, or record at one level and for longer",
-            rounded(pole.frequency_hz(), 5)
-        ),
-    );
 }
 
 /// Adds what each mode has in the response.
@@ -102,7 +88,7 @@ pub(super) fn other_constants(
         let error = NamedEstimate::new("held_out_error", "%", 100.0 * error, None);
         result.parameters.push(error);
     }
-    if options.order == 0 {
+    if options.order == 0 && foreign::has_rest(fitted) {
         let gain = NamedEstimate::new("static_gain", "", fitted.at_rest(), found.static_gain_std);
         result.parameters.push(gain);
     }
@@ -128,8 +114,15 @@ pub(super) fn output_rms(set: &Set, lines: &Lines) -> f64 {
     (2.0 * power / set.blocks.len() as f64).sqrt() / length
 }
 
+/// Adds what the response itself shows: its error, its levels, its plots.
+pub(super) fn spectra(result: &mut Identification, set: &Set, lines: &Lines, fitted: &Modal) {
+    raw_error(result, set, lines);
+    levels(result, set, lines);
+    draw(result, set, lines, fitted);
+}
+
 /// Adds the hold-out error of the measured response itself, without a model.
-pub(super) fn raw_error(result: &mut Identification, set: &Set, lines: &Lines) {
+fn raw_error(result: &mut Identification, set: &Set, lines: &Lines) {
     let folds = folds(set);
     if folds.len() < 2 {
         return;
@@ -157,7 +150,7 @@ pub(super) fn raw_error(result: &mut Identification, set: &Set, lines: &Lines) {
 const DIFFERENT: f64 = 0.1;
 
 /// Compares the responses of records at different levels, which are the same for a linear stand.
-pub(super) fn levels(result: &mut Identification, set: &Set, lines: &Lines) {
+fn levels(result: &mut Identification, set: &Set, lines: &Lines) {
     let mut records = set.record.clone();
     records.dedup();
     let of = |r: usize| {
@@ -200,7 +193,7 @@ pub(super) fn levels(result: &mut Identification, set: &Set, lines: &Lines) {
 pub(crate) const RATIO: &str = "measured per applied";
 
 /// Magnitude with its bounds, phase and coherence, the model, and the error against the number of modes if that was chosen.
-pub(super) fn draw(result: &mut Identification, set: &Set, lines: &Lines, fitted: &Modal) {
+fn draw(result: &mut Identification, set: &Set, lines: &Lines, fitted: &Modal) {
     let h1 = set.powers.response(Estimator::H1);
     let hz: Vec<f64> = lines.clone().map(|k| k as f64 * set.step_hz).collect();
     let part = &h1.response[lines.clone()];

@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 
 use torqcomp_model::{Estimate, Estimates};
 
-use super::FinalFit;
+use super::{FinalFit, foreign};
 use crate::identify::{MODE_NUMBERS, ModalShares, NamedEstimates};
 
 /// Unit of each number of a mode.
@@ -20,7 +20,7 @@ const UNITS: [&str; 4] = ["Hz", "", "", ""];
 pub(super) fn of(found: &FinalFit, order: i32) -> Option<ModalShares> {
     let modal = &found.modal;
     let at_rest = modal.at_rest();
-    if at_rest == 0.0 || !at_rest.is_finite() {
+    if at_rest == 0.0 || !at_rest.is_finite() || !foreign::has_rest(modal) {
         return None;
     }
     let mut numbers = vec![0.0; found.linear + modal.linear().len()];
@@ -30,9 +30,6 @@ pub(super) fn of(found: &FinalFit, order: i32) -> Option<ModalShares> {
     }
     numbers[found.linear..].copy_from_slice(modal.linear());
     let numbers = Estimates::new(numbers, found.covariance.clone());
-    let mut places: Vec<usize> = (0..modal.poles.len()).collect();
-    let omega = |k: &usize| modal.poles[*k].omega_rad_per_s;
-    places.sort_by(|a, b| omega(a).total_cmp(&omega(b)));
     let named: Vec<(&str, &str)> = MODE_NUMBERS.into_iter().zip(UNITS).collect();
     let mode = |k: usize| {
         let (values, gradients) = of_mode(found, k, numbers.values().len());
@@ -40,7 +37,7 @@ pub(super) fn of(found: &FinalFit, order: i32) -> Option<ModalShares> {
     };
     let scale = modal.scale().powi(-order);
     Some(ModalShares {
-        modes: places.into_iter().map(mode).collect(),
+        modes: modal.of_stand().into_iter().map(mode).collect(),
         gain: Estimate::of(
             "",
             at_rest * scale,

@@ -119,6 +119,50 @@ pub(super) fn warnings(
         );
     }
     impossible(result);
+    shifted(result, fitted);
+    poor(result);
+}
+
+/// Warns about channels that are shifted in time.
+fn shifted(result: &mut Identification, fitted: &FittedRows) {
+    let Some(shift_s) = fitted.shift_s() else {
+        return;
+    };
+    let which = match shift_s > 0.0 {
+        true => ["torque", "motion"],
+        false => ["motion", "torque"],
+    };
+    result.warn(
+        "channels-shifted",
+        format!(
+            "the {} is about {} ms late against the {}, or shown by a filter, which the constants, and viscous friction most of \
+             all, do not allow for; record both channels with one recorder and the same filters",
+            which[0],
+            rounded(1e3 * shift_s.abs(), 2),
+            which[1]
+        ),
+    );
+}
+
+/// Residual over the torque above which the fit is poor.
+const POOR: f64 = 0.3;
+
+/// Warns if the motion does not explain the torque.
+fn poor(result: &mut Identification) {
+    let Some(relative) = result.fit.as_ref().map(|fit| fit.relative) else {
+        return;
+    };
+    if relative > POOR {
+        result.warn(
+            "poor-fit",
+            format!(
+                "the residual is {} % of the torque: the motion does not explain it; check that the channels are the right ones \
+                 (a speed with its sign, an angle that runs on over full turns, the torque on the same shaft), that neither is \
+                 clipped, and cut the record with --range to where the drive runs",
+                rounded(100.0 * relative, 2)
+            ),
+        );
+    }
 }
 
 /// Warns about constants that are significantly negative.

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use torqcomp_model::{Covariance, Estimates};
 
 use super::scatter;
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 
 /// Errors of the rows.
 pub(super) struct Errors<'a> {
@@ -60,10 +60,13 @@ pub(super) fn solve(
     let b = DVector::from_fn(all, |r, _| kept(r, right[r]));
     let sizes: Vec<f64> = a.column_iter().map(|c| c.norm()).collect();
     if let Some(i) = sizes.iter().position(|s| *s == 0.0 || !s.is_finite()) {
-        return Err(Failure::failed(format_args!(
-            "term {} of the equation of motion is zero in the whole record",
-            i + 1
-        )));
+        return Err(Failure::failed(
+            ErrorCode::NotIdentifiable,
+            format_args!(
+                "term {} of the equation of motion is zero in the whole record",
+                i + 1
+            ),
+        ));
     }
     let scaled = DMatrix::from_fn(all, count, |r, c| a[(r, c)] / sizes[c]);
     let part = DMatrix::from_fn(count, count, |i, j| {
@@ -95,6 +98,7 @@ pub(super) fn solve(
 
 fn not_identifiable() -> Failure {
     Failure::failed(
+        ErrorCode::NotIdentifiable,
         "the terms of the equation of motion are not separately identifiable from this record: it needs speeds and \
          accelerations that vary, and less noise",
     )

@@ -6,7 +6,7 @@ use torqcomp_dsp::weak::{Window, white_noise_variance};
 use super::directions::Directions;
 use super::regression::{Corrected, Errors, solve};
 use super::{COLOURED, FreeRun, LEAST_WINDOWS, SHORTEST_HALF};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::identify::rms;
 use crate::print::plural;
 
@@ -20,6 +20,8 @@ pub(super) struct WindowRows {
     pub columns: Vec<Vec<f64>>,
     /// Averaged torque or force.
     pub right: Vec<f64>,
+    /// Its derivative, per second.
+    slope: Vec<f64>,
     /// Whether the body moves one way throughout a window.
     pub clean: Vec<bool>,
     /// Order of the derivative of the motion that a column is, if its noise is known.
@@ -54,10 +56,13 @@ impl WindowRows {
         let count = run.motion.len();
         let centres: Vec<usize> = (half..count.saturating_sub(half)).step_by(stride).collect();
         if centres.len() < LEAST_WINDOWS {
-            return Err(Failure::failed(format_args!(
-                "the record has only {} for windows of ±{half} samples; choose a shorter --window",
-                plural(centres.len(), "place")
-            )));
+            return Err(Failure::failed(
+                ErrorCode::TooFewSamples,
+                format_args!(
+                    "the record has only {} for windows of ±{half} samples; choose a shorter --window",
+                    plural(centres.len(), "place")
+                ),
+            ));
         }
         let column = |samples: &[f64], order: usize| -> Vec<f64> {
             let average = |c: &usize| window.at(samples, *c, order);
@@ -70,6 +75,7 @@ impl WindowRows {
             stride,
             columns,
             right: column(run.effort, 0),
+            slope: column(run.effort, 1),
             clean: centres.iter().map(sure).collect(),
             orders,
             window: window.clone(),
@@ -157,6 +163,42 @@ impl WindowRows {
             overlap: 2 * self.half / self.stride,
         };
         solve(&self.columns, &self.right, used, &errors)
+    }
+}
+
+/// Standard uncertainties by which a shift must differ from zero, and what it must leave of the residual at most.
+const SHIFTED: (f64, f64) = (6.0, 0.85);
+
+impl FittedRows {
+    /// Seconds by which the torque is late against the motion, if that explains much of the residual:
+    /// `T(t + τ) ≈ T + τ T'`, so that τ is one more coefficient of the equation.
+    pub fn shift_s(&self) -> Option<f64> {
+        let rows = &self.rows;
+        let with = WindowRows {
+            columns: [&rows.columns[..], std::slice::from_ref(&rows.slope)].concat(),
+            orders: [&rows.orders[..], &[None]].concat(),
+            right: rows.right.clone(),
+            slope: Vec::new(),
+            clean: Vec::new(),
+            window: rows.window.clone(),
+            ..*rows
+        };
+        let found = with.solve(&self.used).ok()?;
+        let last = rows.columns.len();
+        let (shift_s, std_s) = (
+            -found.numbers.values()[last],
+            found.numbers.covariance().std(last)?,
+        );
+        let left = |fit: &Corrected| {
+            let used = fit
+                .residuals
+                .iter()
+                .zip(&self.used)
+                .filter(|(_, used)| **used);
+            rms(&used.map(|(r, _)| *r).collect::<Vec<f64>>())
+        };
+        let is_clear = shift_s.abs() > SHIFTED.0 * std_s;
+        (is_clear && left(&found) < SHIFTED.1 * left(&self.fit)).then_some(shift_s)
     }
 }
 

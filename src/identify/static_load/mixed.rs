@@ -50,6 +50,8 @@ pub(super) struct LoadCurve {
     pub spreads: Spreads,
     /// Last digit of the readings, if the uncertainties come from it; otherwise 0.
     pub resolution: f64,
+    /// Scatter of the readings over their known standard uncertainties, if these are given.
+    pub scatter_over_known: Option<f64>,
     /// Whether an even drift of the zero is part of the model.
     pub has_even_drift: bool,
     /// Whether a hysteresis is part of the model.
@@ -325,6 +327,8 @@ impl Mixed {
                 zero: spread(ratios[1]),
                 sensitivity: spread(ratios[2]),
             },
+            scatter_over_known: (self.is_known && self.freedom() >= LEAST_FREEDOM)
+                .then(|| solved.variance.sqrt()),
             has_even_drift: false,
             has_hysteresis: false,
         })

@@ -1,13 +1,15 @@
 //! Sensitivity and zero from known loads (Appendix C, IV), with the terms of the standards.
 
+mod linear;
 mod mixed;
 mod terms;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{FitQuality, Identification, NamedEstimate, rms};
+use super::{FitQuality, Identification, NamedEstimate, rms, student};
 use crate::chart::{Chart, Series};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::print::{plural, rounded};
 use mixed::LoadCurve;
 
@@ -47,7 +49,7 @@ pub struct CalibrationStep {
 }
 
 /// A term of a calibration standard; the formulas are those of `terms`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Term {
     /// Name, such as `repeatability`.
     pub name: &'static str,
@@ -103,20 +105,25 @@ pub fn identify(
             1 => format!(", or one load on and off ({ONE_WEIGHT} rows or more)"),
             _ => String::new(),
         };
-        return Err(Failure::failed(format_args!(
-            "{} in {} are too few for a curve of degree {degree} and its error; apply at least {}, the empty stand \
+        return Err(Failure::failed(
+            ErrorCode::TooFewSamples,
+            format_args!(
+                "{} in {} are too few for a curve of degree {degree} and its error; apply at least {}, the empty stand \
              included{or}",
-            plural(steps.len(), "different load"),
-            plural(points.len(), "row"),
-            degree + 2
-        )));
+                plural(steps.len(), "different load"),
+                plural(points.len(), "row"),
+                degree + 2
+            ),
+        ));
     }
     if points.iter().all(|p| p.reading == points[0].reading) {
         return Err(Failure::failed(
+            ErrorCode::NotIdentifiable,
             "the reading does not change with load; check --reading and the bridge supply",
         ));
     }
-    let fit = mixed::fit(points, degree, (&steps, largest))?;
+    let mut fit = mixed::fit(points, degree, (&steps, largest))?;
+    walking_zero(&mut fit, points, largest);
     follows(points, &fit, largest)?;
     let unscale = |(k, v): (usize, &f64)| v / largest.powi(k as i32);
     let curve: Vec<f64> = fit.values.iter().enumerate().map(unscale).collect();
@@ -124,12 +131,14 @@ pub fn identify(
     result.parameters = constants(&fit, largest, units);
     let quality = quality(&curve, points, units);
     poor(&mut result, quality.relative);
+    linear::warn(&mut result, points, &curve, &steps, largest);
+    contradicted(&mut result, &fit);
     result.fit = Some(quality);
     method(&mut result, &fit, points, &units.reading);
     result.terms = terms::terms(points, &steps, &curve, largest);
     result.steps = calibration_points(points, &steps, &fit, largest);
     draw(&mut result, points, &curve, units);
-    warnings(&mut result, points, degree);
+    warnings(&mut result, points, (degree, largest));
     if is_one_weight {
         result.warn(
             "one-weight",
@@ -138,6 +147,42 @@ pub fn identify(
         );
     }
     Ok(result)
+}
+
+/// Makes the uncertainty of a zero that walks from reading to reading no less than that of the mean of its readings: it is
+/// known only while it is read.
+fn walking_zero(fit: &mut LoadCurve, points: &[Point], largest: f64) {
+    let Some(std) = fit.std[0].filter(|_| fit.spreads.drift > 0.0) else {
+        return;
+    };
+    let empty = points.iter().filter(|p| p.load.abs() <= NONE * largest);
+    let readings: Vec<f64> = empty.map(|p| p.reading).collect();
+    let count = readings.len() as f64;
+    let mean = readings.iter().sum::<f64>() / count;
+    let about: Vec<f64> = readings.iter().map(|r| r - mean).collect();
+    let of_readings = match readings.len() {
+        0 | 1 => fit.spreads.drift,
+        _ => rms(&about) / (count - 1.0).sqrt() * student(count - 1.0),
+    };
+    fit.std[0] = Some(std.max(of_readings));
+}
+
+/// Scatter of the readings over their given uncertainty below, or above, which these are doubtful.
+const CONTRADICTED: (f64, f64) = (0.1, 3.0);
+
+/// Warns about uncertainties of readings that their scatter contradicts.
+fn contradicted(result: &mut Identification, fit: &LoadCurve) {
+    let doubtful = |ratio: &f64| *ratio < CONTRADICTED.0 || *ratio > CONTRADICTED.1;
+    if let Some(ratio) = fit.scatter_over_known.filter(doubtful) {
+        result.warn(
+            "std-contradicted",
+            format!(
+                "the readings scatter by {} times the standard uncertainties that --std gives: check their unit, which is that of \
+                 the readings unless the heading names another, or leave out --std",
+                rounded(ratio, 2)
+            ),
+        );
+    }
 }
 
 /// Standard uncertainties by which the sensitivity must differ from zero.
@@ -167,10 +212,13 @@ fn follows(points: &[Point], fit: &LoadCurve, largest: f64) -> Result<(), Failur
             "check that the columns are the right ones and the rows in the order in which they were taken"
         }
     };
-    Err(Failure::failed(format_args!(
-        "the reading does not follow the load: the sensitivity differs from zero by less than {FOLLOWS} standard \
+    Err(Failure::failed(
+        ErrorCode::NotIdentifiable,
+        format_args!(
+            "the reading does not follow the load: the sensitivity differs from zero by less than {FOLLOWS} standard \
          uncertainties; {why}"
-    )))
+        ),
+    ))
 }
 
 /// Correlation of loads and readings without signs above which the signs are at fault.
@@ -340,7 +388,7 @@ fn poor(result: &mut Identification, relative: f64) {
         result.warn(
             "poor-fit",
             format!(
-                "the residual is {} % of the readings' swing: check that the columns are the right ones and the rows in \
+                "the residual is {} % of the range of the readings: check that the columns are the right ones and the rows in \
                  the order in which they were taken, or use --degree 3",
                 rounded(100.0 * relative, 2)
             ),
@@ -349,11 +397,18 @@ fn poor(result: &mut Identification, relative: f64) {
 }
 
 /// Warns about terms that the record cannot show, and the validity of the constants.
-fn warnings(result: &mut Identification, points: &[Point], degree: usize) {
+fn warnings(result: &mut Identification, points: &[Point], (degree, largest): (usize, f64)) {
     if points.iter().all(|p| p.series == 0) {
+        let has_empty = points.iter().any(|p| p.load.abs() <= NONE * largest);
         result.warn(
             "one-series",
-            "the loads were applied only once: repeatability is unknown",
+            match has_empty {
+                true => "the loads were applied only once: repeatability is unknown",
+                false => {
+                    "there is no row without load, by which one series of loads is told from the next: repeatability is \
+                     unknown; add the readings without load, or a column that numbers the series (--series)"
+                }
+            },
         );
     }
     if (0..points.len()).all(|i| terms::rising(points, i)) {

@@ -32,12 +32,15 @@ pub(super) fn summary(input: &Input) -> Option<(Stored<File>, Summary)> {
         return None;
     };
     let mut file = Stored::open(path).ok()?;
+    let length = file.metadata().ok()?.len();
     let options = SummaryReaderOptions::default()
-        .with_file_size(file.metadata().ok()?.len())
+        .with_file_size(length)
         .with_record_length_limit(longest(op::CHANNEL) as usize);
     let mut reader = SummaryReader::new_with_options(options);
     while let Some(event) = reader.next_event() {
         match event.ok()? {
+            // A damaged length: no memory is taken for what the file cannot hold.
+            SummaryReadEvent::ReadRequest(count) if count as u64 > length => return None,
             SummaryReadEvent::ReadRequest(count) => {
                 let read = file.read(reader.insert(count)).ok()?;
                 reader.notify_read(read);

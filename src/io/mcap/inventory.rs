@@ -5,6 +5,7 @@ use std::io::Read;
 use std::sync::Arc;
 
 use mcap::records::{Header, Record, op};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::channels::{Channels, TopicChannel};
@@ -21,7 +22,7 @@ use super::selection::FieldRequest;
 use super::summary;
 use super::time::Stamp;
 use super::units;
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::Input;
 use crate::warning::Warning;
 
@@ -31,7 +32,7 @@ const EXAMPLES: usize = 64;
 const NOBODY: &str = "\0";
 
 /// What is in a file.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Inventory {
     /// Name of the file.
     pub file: String,
@@ -53,7 +54,7 @@ pub struct Inventory {
     pub metadata: Vec<MetadataReport>,
     /// Chunks by compression.
     pub chunks: Vec<ChunkReport>,
-    /// Whether the file has its end record.
+    /// Whether the file ends with an end record.
     pub is_closed: bool,
     /// Whether data were lost: exit code 3.
     pub is_lossy: bool,
@@ -62,17 +63,17 @@ pub struct Inventory {
 }
 
 /// A channel.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ChannelReport {
     /// Number in the file.
     pub id: u16,
     /// Topic.
     pub topic: String,
-    /// Encoding of its messages.
+    /// Encoding of the messages.
     pub message_encoding: String,
-    /// Name of its schema, if it has one.
+    /// Name of the schema; `null` without one.
     pub schema: Option<String>,
-    /// Language of its schema.
+    /// Language of the schema.
     pub schema_encoding: Option<String>,
     /// Messages.
     pub messages: u64,
@@ -84,18 +85,18 @@ pub struct ChannelReport {
     pub rate_hz: Option<f64>,
     /// Messages logged before the one in front of them.
     pub out_of_order: u64,
-    /// Why its messages cannot be read, if they cannot.
+    /// Why the messages cannot be read; `null` if they can.
     pub unreadable: Option<String>,
     /// Field of the messages' own time stamp.
     pub stamp: Option<String>,
-    /// The numbers in its messages.
+    /// Numbers in the messages.
     pub leaves: Vec<LeafReport>,
     /// Whether there are more numbers than listed.
     pub has_more_leaves: bool,
 }
 
 /// A number in a channel's messages.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct LeafReport {
     /// Path; lists with `[]`, arrays with `[3]`.
     pub path: String,
@@ -107,12 +108,12 @@ pub struct LeafReport {
     pub example: Option<f64>,
     /// Names of the items in the first message, up to 256, of a number in a list whose items have names.
     pub names: Vec<String>,
-    /// Whether it is part of a time stamp.
+    /// Whether the number is part of a time stamp.
     pub is_stamp: bool,
 }
 
 /// An attachment.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct AttachmentReport {
     /// Name.
     pub name: String,
@@ -120,12 +121,12 @@ pub struct AttachmentReport {
     pub media_type: String,
     /// Length in bytes.
     pub size: u64,
-    /// Time it was recorded at, in ns.
+    /// Time of recording, in ns.
     pub log_ns: u64,
 }
 
 /// A metadata record.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct MetadataReport {
     /// Name.
     pub name: String,
@@ -134,7 +135,7 @@ pub struct MetadataReport {
 }
 
 /// Chunks with the same compression.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ChunkReport {
     /// Compression, empty for none.
     pub compression: String,
@@ -176,6 +177,7 @@ impl Inventory {
 pub(super) fn only_topic(input: &Input) -> Result<FieldRequest, Failure> {
     if *input == Input::Stdin {
         return Err(Failure::usage(
+            ErrorCode::MissingArgument,
             "choose what to read from standard input with --topic, as --topic /joint_states \
              --field effort[0]",
         ));
@@ -222,20 +224,28 @@ fn choose_topic(file: &str, mut topics: Vec<TopicNumbers>) -> Result<FieldReques
     names.dedup();
     match names[..] {
         [topic] => Ok(FieldRequest::Topic(topic.to_owned(), Vec::new())),
-        [] => Err(Failure::failed(format_args!(
-            "{file}: there is no topic whose numbers can be read{}",
-            topics
-                .iter()
-                .filter_map(|(topic, numbers)| {
-                    let why = numbers.as_ref().err()?;
-                    Some(format!("; {topic}: {why}"))
-                })
-                .collect::<String>()
-        ))),
-        _ => Err(Failure::usage(format_args!(
-            "{file}: choose a topic with --topic; there are: {}",
-            names.join(", ")
-        ))),
+        [] => Err(Failure::failed(
+            ErrorCode::NotARecording,
+            format_args!(
+                "there is no topic whose numbers can be read{}",
+                topics
+                    .iter()
+                    .filter_map(|(topic, numbers)| {
+                        let why = numbers.as_ref().err()?;
+                        Some(format!("; {topic}: {why}"))
+                    })
+                    .collect::<String>()
+            ),
+        )
+        .at(file)),
+        _ => Err(Failure::usage(
+            ErrorCode::ChannelUnclear,
+            format_args!(
+                "choose a topic with --topic; there are: {}",
+                names.join(", ")
+            ),
+        )
+        .at(file)),
     }
 }
 

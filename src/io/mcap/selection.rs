@@ -2,7 +2,7 @@
 
 use super::channels::{Channels, TopicChannel};
 use super::path::{self, PathPart};
-use crate::failure::{Failure, did_you_mean};
+use crate::failure::{ErrorCode, Failure, did_you_mean};
 
 /// What the command line chooses.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -35,19 +35,24 @@ impl FieldChoice {
         let field = self.field.as_deref().unwrap_or("");
         match (&self.signal, &self.topic) {
             (Some(_), Some(_)) => Err(Failure::usage(
+                ErrorCode::ConflictingArguments,
                 "--signal names topic and field in one: give either --signal or --topic with \
                  --field",
             )),
             (Some(_), None) if self.field.is_some() => Err(Failure::usage(
+                ErrorCode::ConflictingArguments,
                 "--signal names topic and field in one: leave --field out",
             )),
             (Some(signal), None) => Ok(FieldRequest::Signal(signal.clone())),
             (None, Some(topic)) => {
                 let parts = path::parse(field);
-                let parts = parts.map_err(|why| Failure::usage(format_args!("--field: {why}")))?;
+                let parts = parts.map_err(|why| {
+                    Failure::usage(ErrorCode::InvalidValue, format_args!("--field: {why}"))
+                })?;
                 Ok(FieldRequest::Topic(topic.clone(), parts))
             }
             (None, None) if self.field.is_some() => Err(Failure::usage(
+                ErrorCode::MissingArgument,
                 "--field needs the topic it is in: add --topic, as --topic /joint_states",
             )),
             (None, None) => Ok(FieldRequest::Only),

@@ -14,7 +14,7 @@ use super::summary::Tally;
 use super::time::{Stamp, TimeChoice, TimeUsed};
 use super::units::{self, UnitFound};
 use super::writer;
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::names_compensated;
 
 /// Messages looked at before the time is chosen.
@@ -100,7 +100,13 @@ impl TopicSignal {
         let field = request.field_in(channel, channels)?;
         let topic = &channel.record.topic;
         let signal = Self::new(name, channel, field, message, options);
-        Some(signal.map_err(|why| Failure::failed(format_args!("{name}: topic {topic}: {why}"))))
+        Some(signal.map_err(|why| {
+            Failure::failed(
+                ErrorCode::ChannelNotFound,
+                format_args!("topic {topic}: {why}"),
+            )
+            .at(name)
+        }))
     }
 
     fn new(
@@ -233,11 +239,15 @@ impl TopicSignal {
     fn choose_time(&mut self) -> Result<(), Failure> {
         let field = self.selected.time.field.take();
         if self.options.time == Some(TimeChoice::Header) && field.is_none() {
-            return Err(Failure::failed(format_args!(
-                "{}: topic {}: its messages have no time stamp (header.stamp, stamp or timestamp); \
+            return Err(Failure::failed(
+                ErrorCode::TimeUnknown,
+                format_args!(
+                    "topic {}: its messages have no time stamp (header.stamp, stamp or timestamp); \
                  use --time log or --time publish",
-                self.name, self.selected.topic
-            )));
+                    self.selected.topic
+                ),
+            )
+            .at(&self.name));
         }
         let first = std::mem::take(&mut self.first);
         let is_set = first.iter().any(|message| {
@@ -308,15 +318,19 @@ fn is_ours(
     if channel.has_type_of(ours) {
         return Ok(Some(true));
     }
-    Err(Failure::failed(format_args!(
-        "{name}: the topic {} has channels of different types: channel {} is {} in {}, channel {} \
+    Err(Failure::failed(
+        ErrorCode::RecordsDiffer,
+        format_args!(
+            "the topic {} has channels of different types: channel {} is {} in {}, channel {} \
          is {} in {}; split the file by channel first",
-        ours.record.topic,
-        ours.record.id,
-        ours.schema_name(),
-        ours.record.message_encoding,
-        channel.record.id,
-        channel.schema_name(),
-        channel.record.message_encoding,
-    )))
+            ours.record.topic,
+            ours.record.id,
+            ours.schema_name(),
+            ours.record.message_encoding,
+            channel.record.id,
+            channel.schema_name(),
+            channel.record.message_encoding
+        ),
+    )
+    .at(name))
 }

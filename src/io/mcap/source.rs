@@ -13,7 +13,7 @@ use super::record::reader::RecordReader;
 use super::selection::{FieldChoice, FieldRequest};
 use super::signal::{SelectedSignal, TimeOptions, TopicSignal};
 use super::summary::SignalSummary;
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::Input;
 
 /// Messages read before samples are given away.
@@ -320,7 +320,7 @@ impl Pass {
         for loss in &self.records.losses().first {
             message.push_str(&format!("; {loss}"));
         }
-        Failure::failed(message)
+        Failure::failed(ErrorCode::ChannelNotFound, message)
     }
 
     fn summary(&self, signal: &TopicSignal) -> SignalSummary {

@@ -3,7 +3,7 @@
 use std::io::{self, Read};
 
 use super::last_line::{LastLine, last_line};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::warning::Warning;
 
 /// Longest line that is accepted.
@@ -11,7 +11,10 @@ pub const LONGEST_LINE: usize = 1 << 24;
 
 /// The refusal of a line beyond [`LONGEST_LINE`].
 pub fn too_long_a_line() -> Failure {
-    Failure::failed("a line is longer than 16 MiB: this is no table of numbers")
+    Failure::failed(
+        ErrorCode::NotARecording,
+        "a line is longer than 16 MiB: this is no table of numbers",
+    )
 }
 /// Bytes of a piece: large enough to be quick, small enough to stay in cache.
 const PIECE: usize = 1 << 17;
@@ -166,7 +169,10 @@ impl Chunks {
 }
 
 fn unreadable(error: io::Error) -> Failure {
-    Failure::failed(format_args!("cannot be read: {error}"))
+    Failure::failed(
+        ErrorCode::CannotRead,
+        format_args!("cannot be read: {error}"),
+    )
 }
 
 #[cfg(test)]

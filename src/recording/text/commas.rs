@@ -3,7 +3,7 @@
 use super::cell::Cell;
 use super::dialect::is_skipped;
 use super::head::{Head, Table};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::Delimiter;
 
 /// Rows that are looked at.
@@ -39,13 +39,16 @@ pub(super) fn refuse(head: &Head, table: &Table) -> Result<(), Failure> {
         return Ok(());
     }
     let shown: String = lines[0].trim().chars().take(SHOWN).collect();
-    Err(Failure::failed(format_args!(
-        "line {}: is \"{shown}\" {pairs} numbers with decimal commas? Commas part its cells as well, so that each number is \
-         in two pieces: {} cells, whole numbers and digits by turns. Export the file with decimal points, or with \
-         semicolons between the cells; if the cells are whole numbers, say so with --delimiter ,",
-        head.number(table.first),
-        table.width
-    )))
+    Err(Failure::failed(
+        ErrorCode::TextUnclear,
+        format_args!(
+            "is \"{shown}\" {pairs} numbers with decimal commas? Commas part its cells as well, so that each number \
+             is in two pieces: {} cells, whole numbers and digits by turns. Export the file with decimal points, or \
+             with semicolons between the cells; if the cells are whole numbers, say so with --delimiter ,",
+            table.width
+        ),
+    )
+    .line(head.number(table.first)))
 }
 
 /// Texts in the line right above the table, if it holds nothing else.

@@ -6,7 +6,7 @@ use std::io::{self, Read};
 use encoding_rs::{Decoder, Encoding, UTF_16BE, UTF_16LE};
 
 use super::encoding;
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::warning::Warning;
 
 /// Bytes that are decoded at a time.
@@ -213,8 +213,12 @@ fn refuse_other_formats(head: &[u8]) -> Result<(), Failure> {
         ),
     ];
     match known.iter().find(|(magic, _)| head.starts_with(magic)) {
-        Some((_, what)) => Err(Failure::failed(format_args!("the file is {what}"))),
+        Some((_, what)) => Err(Failure::failed(
+            ErrorCode::NotARecording,
+            format_args!("the file is {what}"),
+        )),
         None if is_binary(head) => Err(Failure::failed(
+            ErrorCode::NotARecording,
             "the file is binary; expected a text table (CSV, TSV or a recorder's export)",
         )),
         None => Ok(()),

@@ -8,7 +8,7 @@ use super::commas;
 use super::rows::cleaned;
 use super::table::FIRST_ROWS;
 use super::upward;
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::DialectOverride;
 use crate::recording::text::dialect::{Delimiter, Dialect, dialects, is_skipped};
 
@@ -129,7 +129,12 @@ pub fn find(
             break;
         }
     }
-    Err(failure.unwrap_or_else(|| Failure::failed("the file is empty; expected rows of numbers")))
+    Err(failure.unwrap_or_else(|| {
+        Failure::failed(
+            ErrorCode::NotARecording,
+            "the file is empty; expected rows of numbers",
+        )
+    }))
 }
 
 /// The table in a head.
@@ -156,7 +161,7 @@ fn find_in(head: &Head, marks: &DialectOverride) -> Result<Table, Failure> {
     }
     let lenient = tables(head, &all, lenient_row);
     let Some(best) = best(&lenient) else {
-        return Err(Failure::failed(no_table(head)));
+        return Err(Failure::failed(ErrorCode::NotARecording, no_table(head)));
     };
     super::listing::refuse(head, &best.table)?;
     Ok(best.table.clone())
@@ -382,10 +387,14 @@ fn unambiguous<'a>(head: &Head, found: &'a [Found], best: &'a Found) -> Result<&
         {
             return Ok(separator);
         }
-        return Err(Failure::failed(format_args!(
-            "line {line}: \"{shown}\" can be read with the comma between cells or as a decimal \
+        return Err(Failure::failed(
+            ErrorCode::TextUnclear,
+            format_args!(
+                "\"{shown}\" can be read with the comma between cells or as a decimal \
              mark; say which with --delimiter , or --decimal ,"
-        )));
+            ),
+        )
+        .line(line));
     }
     // 1,234 with a decimal comma or with a mark between thousands.
     let dialect = best.table.dialect;
@@ -395,10 +404,14 @@ fn unambiguous<'a>(head: &Head, found: &'a [Found], best: &'a Found) -> Result<&
             && f.grouped > 0
     });
     if dialect.decimal == b',' && thousands {
-        return Err(Failure::failed(format_args!(
-            "line {line}: the comma in \"{shown}\" can be a decimal mark or stand between \
+        return Err(Failure::failed(
+            ErrorCode::TextUnclear,
+            format_args!(
+                "the comma in \"{shown}\" can be a decimal mark or stand between \
              thousands; say which with --decimal , or --decimal ."
-        )));
+            ),
+        )
+        .line(line));
     }
     Ok(best)
 }

@@ -3,7 +3,7 @@
 use super::cell::Cell;
 use super::head::{Head, Table};
 use super::rows::ColumnKind;
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::recording::choice::transposed;
 use crate::recording::text::dialect::is_skipped;
 
@@ -35,12 +35,15 @@ pub fn refuse(head: &Head, table: &Table) -> Result<(), Failure> {
         if let Some(question) = transposed(table.width, Some(rows.len())) {
             return Err(question);
         }
-        return Err(Failure::failed(format_args!(
-            "the file is a list of results, not a recording: each of its {} rows from line {} on has a \
+        return Err(Failure::failed(
+            ErrorCode::NotARecording,
+            format_args!(
+                "the file is a list of results, not a recording: each of its {} rows from line {} on has a \
              name of its own in the first column; expected rows of numbers, one row for each moment",
-            rows.len(),
-            head.number(table.first)
-        )));
+                rows.len(),
+                head.number(table.first)
+            ),
+        ));
     }
     // Beside the time of each row, states such as those of alarms say nothing against a recording.
     let has_time = (0..table.width).any(|place| is_clock(&read, place));
@@ -49,12 +52,15 @@ pub fn refuse(head: &Head, table: &Table) -> Result<(), Failure> {
         .count();
     // One or two columns of remarks may stand beside a single signal.
     if texts > 2 && texts as f64 > TEXTS * table.width as f64 {
-        return Err(Failure::failed(format_args!(
-            "the file is a list of settings or results, not a recording: {texts} of the {} columns \
+        return Err(Failure::failed(
+            ErrorCode::NotARecording,
+            format_args!(
+                "the file is a list of settings or results, not a recording: {texts} of the {} columns \
              from line {} on hold texts; expected rows of numbers, one row for each moment",
-            table.width,
-            head.number(table.first)
-        )));
+                table.width,
+                head.number(table.first)
+            ),
+        ));
     }
     Ok(())
 }
@@ -80,11 +86,14 @@ pub fn refuse_variables(head: &Head, table: &Table, kinds: &[ColumnKind]) -> Res
             .then(|| (count, &rows[0][place]))
     });
     match listed {
-        Some((count, first)) => Err(Failure::failed(format_args!(
-            "line {}: the rows name {count} variables in turn, first \"{first}\", each with a value at the \
-             same time; expected a column for each variable: write the file anew that way",
-            head.number(table.first)
-        ))),
+        Some((count, first)) => Err(Failure::failed(
+            ErrorCode::NotARecording,
+            format_args!(
+                "the rows name {count} variables in turn, first \"{first}\", each with a value at the same time; \
+                 expected a column for each variable: write the file anew that way"
+            ),
+        )
+        .line(head.number(table.first))),
         None => Ok(()),
     }
 }

@@ -36,7 +36,7 @@ mod vocabulary;
 use std::io::{Cursor, Read};
 
 use super::{AllSamples, Recording, Segment};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::Reading;
 use crate::recording::text::dialect::decode_line;
 
@@ -97,8 +97,9 @@ impl TextFile {
     ) -> Result<Self, Failure> {
         let mut bytes = Vec::new();
         let mut head = (&mut input).take(FOR_ENCODING);
-        head.read_to_end(&mut bytes)
-            .map_err(|error| Failure::failed(format_args!("cannot be read: {error}")))?;
+        let read = head.read_to_end(&mut bytes);
+        let why = |error| format!("cannot be read: {error}");
+        read.map_err(|error| Failure::failed(ErrorCode::CannotRead, why(error)))?;
         let decoding = Decoding::of(&bytes)?;
         let mut chunks = Chunks::new(decoding.reader(bytes, input));
         let one_line = one_line(&mut chunks, reading)?;
@@ -216,7 +217,10 @@ impl TextFile {
 }
 
 fn no_channel() -> Failure {
-    Failure::failed("there is no column besides the time; expected one with the signal")
+    Failure::failed(
+        ErrorCode::NotARecording,
+        "there is no column besides the time; expected one with the signal",
+    )
 }
 
 /// Reads a text file of any dialect; `source` is its name for people.
@@ -259,19 +263,27 @@ fn tables(
             break;
         }
         if parts.len() > MOST_TABLES {
-            return Err(Failure::failed(format_args!(
-                "line {number}: there are more than {MOST_TABLES} tables below each other; split the \
+            return Err(Failure::failed(
+                ErrorCode::SeveralTables,
+                format_args!(
+                    "there are more than {MOST_TABLES} tables below each other; split the \
                  file"
-            )));
+                ),
+            )
+            .line(number));
         }
         next = Layout::find(chunks, number, hints, reading);
         if let Err(failure) = &next
             && begins_anew
         {
-            return Err(Failure::failed(format_args!(
-                "line {number}: a block of its own begins here, and cannot be read: {failure}; split \
+            return Err(Failure::failed(
+                ErrorCode::SeveralTables,
+                format_args!(
+                    "a block of its own begins here, and cannot be read: {failure}; split \
                  the file"
-            )));
+                ),
+            )
+            .line(number));
         }
     }
     Ok(parts)

@@ -11,7 +11,7 @@ use super::blocks::TableEnd;
 use super::cell::{Cell, is_instruments_mark};
 use super::clock::Clock;
 use super::row_template::RowTemplate;
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::number;
 use crate::recording::text::dialect::{Dialect, decode_line, is_comment, is_skipped};
 use crate::recording::{Hole, HoleKind};
@@ -147,10 +147,13 @@ impl Rows {
         }
         match self.too_ragged {
             None => Ok(at),
-            Some(line) => Err(Failure::failed(format_args!(
-                "line {line} is so much longer than the rows before it that these would need more \
+            Some(line) => Err(Failure::failed(
+                ErrorCode::NotARecording,
+                format_args!(
+                    "line {line} is so much longer than the rows before it that these would need more \
                  memory than the whole file; expected rows of about the same number of cells"
-            ))),
+                ),
+            )),
         }
     }
 

@@ -59,13 +59,14 @@ impl BandChoice {
 }
 
 /// A record's spectrum, divided by a stand's response.
+#[derive(Debug, Clone)]
 pub struct BandSearch {
-    rate_hz: f64,
-    step_hz: f64,
+    pub(super) rate_hz: f64,
+    pub(super) step_hz: f64,
     /// `|H⁻¹|²` at each line, as far as it is finite; zero for the mean.
-    power_gain: Vec<f64>,
-    density: Vec<f64>,
-    floor: f64,
+    pub(super) power_gain: Vec<f64>,
+    pub(super) density: Vec<f64>,
+    pub(super) floor: f64,
     /// Sums of `|H⁻¹|²` and of `|H⁻¹|² P` over the lines before each.
     sums: Vec<[f64; 2]>,
     /// Whether the record holds more than noise.
@@ -98,23 +99,35 @@ impl BandSearch {
             .collect();
         let mean_lines = power_gain.len().min(MEAN_LINES);
         power_gain[..mean_lines].fill(0.0);
-        let mut sums = vec![[0.0; 2]];
-        let (mut gains, mut record) = (0.0, 0.0);
-        for (gain, value) in power_gain.iter().zip(&density.values) {
-            gains += gain;
-            record += gain * value;
-            sums.push([gains, record]);
-        }
-        Some(Self {
+        let mut search = Self {
             rate_hz,
             step_hz: density.step_hz,
             has_signal: has_signal(density, floor),
             density: density.values.clone(),
             power_gain,
             floor,
-            sums,
+            sums: Vec::new(),
             edge: Edge::new(),
-        })
+        };
+        search.sum();
+        Some(search)
+    }
+
+    /// Adds up the lines.
+    pub(super) fn sum(&mut self) {
+        let (mut gains, mut record) = (0.0, 0.0);
+        self.sums = vec![[0.0; 2]];
+        for (gain, value) in self.power_gain.iter().zip(&self.density) {
+            gains += gain;
+            record += gain * value;
+            self.sums.push([gains, record]);
+        }
+    }
+
+    /// `|H⁻¹|²` at the lowest frequency behind the mean.
+    pub(super) fn gain_at_rest(&self) -> f64 {
+        let first = self.power_gain.iter().find(|gain| **gain > 0.0);
+        first.copied().unwrap_or(f64::INFINITY)
     }
 
     /// The band with the least expected error; `None` if the record holds nothing but noise.

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::ops::Range;
 
+use num_complex::Complex64;
+
 use crate::quality;
 
 /// A hit.
@@ -47,9 +49,13 @@ const SECOND: f64 = 0.05;
 const ABOVE_NOISE: f64 = 8.0;
 /// Distance from its extreme, over it, within which a signal counts as clipped.
 const LEVEL: f64 = 0.01;
+/// The same in standard deviations of the noise, and its largest value: noise on a limit spreads over so much.
+const NOISE: (f64, f64) = (6.0, 0.06);
 /// Consecutive samples at the extreme over those beyond half of it: 0.13 for half a sine and 0.12 for a bell; more means
 /// that an amplifier saturated.
 const STANDING: f64 = 0.3;
+/// The same over what half a sine has.
+const LONGER: f64 = 1.5;
 /// Fewest such samples.
 const LEAST_STANDING: usize = 4;
 /// Equal consecutive samples that mean clipping.
@@ -81,12 +87,13 @@ pub fn find_hits(force: &[f64], measured: &[f64], apart: usize) -> Vec<Hit> {
         }
     }
     let noise = spread(force, rest);
+    let noises = [noise, noise_of(measured)];
     let lengths = |k: usize| starts.get(k + 1).copied().unwrap_or(force.len()) - starts[k];
     let longest = (0..starts.len()).map(lengths).max().unwrap_or(0);
     (0..peaks.len())
         .map(|k| {
             let range = starts[k]..starts[k] + lengths(k);
-            let mut faults = faults(force, measured, rest, peaks[k], range.clone());
+            let mut faults = faults([force, measured], noises, rest, peaks[k], range.clone());
             let second = (SECOND * size(peaks[k])).max(ABOVE_NOISE * noise);
             let second = second_stroke(&size, peaks[k], range.end, second);
             if range.len() < longest / 2 {
@@ -140,20 +147,20 @@ fn has_decayed(measured: &[f64]) -> bool {
 
 /// Clipped signals of a hit.
 fn faults(
-    force: &[f64],
-    measured: &[f64],
+    [force, measured]: [&[f64]; 2],
+    noises: [f64; 2],
     rest: f64,
     peak: usize,
     range: Range<usize>,
 ) -> Vec<HitFault> {
     let mut faults = Vec::new();
     let pulse = range.start..(peak + (peak - range.start).max(BEFORE) * 2).min(range.end);
-    if flat(&force[pulse.clone()], rest) || stands(&force[pulse], rest) {
+    if flat(&force[pulse.clone()], rest) || stands(&force[pulse], rest, noises[0]) {
         faults.push(HitFault::ForceClipped);
     }
     let answer = &measured[range];
     let middle = median(answer);
-    if flat(answer, middle) || stands(answer, middle) {
+    if flat(answer, middle) || stands(answer, middle, noises[1]) {
         faults.push(HitFault::MeasuredClipped);
     }
     faults
@@ -185,25 +192,69 @@ fn flat(samples: &[f64], rest: f64) -> bool {
 }
 
 /// Whether a signal stays near its largest or smallest value longer than a pulse or a swing does: an amplifier that
-/// saturates before the converter has noise on its limit.
-fn stands(samples: &[f64], rest: f64) -> bool {
+/// saturates before the converter has noise on its limit. Of each swing beyond half of the extreme, the samples near the
+/// extreme are counted; of half a sine, `arccos(1 − w)/(π/3)` lie within the part w of its peak.
+fn stands(samples: &[f64], rest: f64, noise: f64) -> bool {
     [1.0, -1.0].into_iter().any(|side| {
-        let size = |i: usize| side * (samples[i] - rest);
-        let Some(top) = (0..samples.len()).max_by(|a, b| size(*a).total_cmp(&size(*b))) else {
+        let size = |v: &f64| side * (v - rest);
+        let extreme = samples.iter().map(size).fold(0.0, f64::max);
+        if extreme <= 0.0 {
             return false;
-        };
-        let run = |least: f64| {
-            let before = (0..top).rev().take_while(|i| size(*i) >= least).count();
-            let after = (top + 1..samples.len())
-                .take_while(|i| size(*i) >= least)
-                .count();
-            before + 1 + after
-        };
-        let extreme = size(top);
-        let standing = run((1.0 - LEVEL) * extreme);
-        let high = run(0.5 * extreme);
-        extreme > 0.0 && standing >= LEAST_STANDING && standing as f64 > STANDING * high as f64
+        }
+        let near = (NOISE.0 * noise / extreme).clamp(LEVEL, NOISE.1);
+        let usual = (1.0 - near).acos() / std::f64::consts::FRAC_PI_3;
+        let least = STANDING.max(LONGER * usual);
+        let is_high = |v: &f64| size(v) >= 0.5 * extreme;
+        let mut swings = samples.chunk_by(|a, b| is_high(a) == is_high(b));
+        swings.any(|swing| {
+            let standing = swing.iter().filter(|v| size(v) >= (1.0 - near) * extreme);
+            let standing = standing.count();
+            standing >= LEAST_STANDING && standing as f64 > least * swing.len() as f64
+        })
     })
+}
+
+/// Standard deviation of the noise in a signal that is slow beside it most of the time: of its second differences.
+fn noise_of(samples: &[f64]) -> f64 {
+    let second = samples.windows(3).map(|w| w[0] - 2.0 * w[1] + w[2]);
+    spread(&second.collect::<Vec<f64>>(), 0.0) / 6.0_f64.sqrt()
+}
+
+/// Lines between 0.4 and 0.5 of the rate that are looked at.
+const LINES: usize = 16;
+
+/// Largest size of the spectrum of the pulse that a hit begins with, between 0.4 and 0.5 of the rate, over that at rest and
+/// beyond what its noise explains. A pulse that has been sampled fast enough has none left there.
+///
+/// ```
+/// use torqcomp_dsp::frf::near_half_rate;
+/// let pulse = |width: f64| -> Vec<f64> {
+///     let half_sine = |u: f64| if (0.0..1.0).contains(&u) { (std::f64::consts::PI * u).sin() } else { 0.0 };
+///     (0..200).map(|i| half_sine((f64::from(i) - 16.3) / width)).collect()
+/// };
+/// // Half a sine of the width w: |cos(πfw)/(1 − 4f²w²)|, 0.001 for 30 samples and 0.4 for two.
+/// assert!(near_half_rate(&pulse(30.0)) < 0.003);
+/// assert!(near_half_rate(&pulse(2.0)) > 0.2);
+/// ```
+#[must_use]
+pub fn near_half_rate(force: &[f64]) -> f64 {
+    let rest = median(&force[..BEFORE.min(force.len())]);
+    let size = |i: &usize| (force[*i] - rest).abs();
+    let top = (0..force.len()).max_by(|a, b| size(a).total_cmp(&size(b)));
+    let Some(top) = top else {
+        return 0.0;
+    };
+    let pulse = &force[..(3 * top.max(BEFORE)).min(force.len())];
+    let at = |cycles: f64| -> f64 {
+        let turn = |i: usize| Complex64::cis(-std::f64::consts::TAU * cycles * i as f64);
+        let sum = pulse.iter().enumerate().map(|(i, v)| turn(i) * (v - rest));
+        sum.sum::<Complex64>().norm()
+    };
+    let lines = (0..=LINES).map(|k| 0.4 + 0.1 * k as f64 / LINES as f64);
+    let largest = lines.map(at).fold(0.0, f64::max);
+    // The largest of many lines of noise is about twice its rms.
+    let noise = 2.5 * noise_of(force) * (pulse.len() as f64).sqrt();
+    ((largest - noise) / at(0.0)).max(0.0)
 }
 
 /// Largest force of a second stroke over that of the peak, if it exceeds `second` after the force had vanished.

@@ -1,5 +1,6 @@
 //! Clipping: a signal cut off at its highest or lowest value.
 
+use super::pile_up::pile_up;
 use super::quantisation::quantisation;
 use super::runs::Lengths;
 use super::{Run, range, runs};
@@ -45,11 +46,31 @@ pub struct Rail {
 }
 
 impl Clipping {
+    /// Where a signal is cut off: at one value ([`clipping`]), or at a level that noise was added to ([`pile_up`]).
+    #[must_use]
+    pub fn of(samples: &[f64]) -> Option<Self> {
+        clipping(samples).or_else(|| pile_up(samples))
+    }
+
     /// Samples at either rail.
     #[must_use]
     pub fn samples(&self) -> usize {
         let count = |rail: Option<Rail>| rail.map_or(0, |rail| rail.samples);
         count(self.low) + count(self.high)
+    }
+
+    /// Whether a sample is cut off.
+    ///
+    /// ```
+    /// use torqcomp_dsp::quality::clipping::clipping;
+    /// let cut: Vec<f64> = (0..1000).map(|i| (0.05 * f64::from(i)).sin().min(0.9)).collect();
+    /// let found = clipping(&cut).unwrap();
+    /// assert!(found.holds(0.9) && !found.holds(0.89) && !found.holds(-1.0));
+    /// ```
+    #[must_use]
+    pub fn holds(&self, sample: f64) -> bool {
+        let at = |rail: Rail| (sample - rail.value).abs() <= rail.spread;
+        self.low.is_some_and(at) || self.high.is_some_and(at)
     }
 }
 

@@ -1,5 +1,6 @@
 //! Mains hum: lines at 50 or 60 Hz and their multiples that stand out of the spectrum.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::median;
@@ -46,16 +47,16 @@ pub struct Mains {
 }
 
 /// A line at a multiple of the mains frequency.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct MainsLine {
     /// Multiple of the mains frequency.
     #[serde(skip)]
     pub order: usize,
-    /// Where it was found, Hz: the highest bin.
+    /// Frequency of the highest bin, in Hz.
     pub frequency_hz: f64,
-    /// Peak value of its sine, in the channel's unit.
+    /// Peak value of the line's sine, in the channel's unit.
     pub amplitude: f64,
-    /// Its power over that of the highest bin beside it.
+    /// Power of the line over that of the highest bin beside it.
     pub prominence: f64,
 }
 

@@ -1,5 +1,6 @@
 //! The time axis: its usual step, and every step that is not.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::median;
@@ -59,7 +60,7 @@ pub struct Events {
 }
 
 /// An irregular step.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Event {
     /// Index of the stamp that ends it.
     #[serde(skip)]

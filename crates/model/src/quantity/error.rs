@@ -125,6 +125,21 @@ pub enum QuantityError {
         /// What was given: a text, or a number in SI units.
         got: String,
     },
+    /// A standard uncertainty of a ratio in percent.
+    #[error(
+        "\"{text}\" can be read as percent of {of} or as the ratio itself; write \"{relative}\" for the first, or \
+         \"{absolute}\" for the second"
+    )]
+    AmbiguousPercent {
+        /// Text got.
+        text: String,
+        /// The value that it belongs to.
+        of: String,
+        /// The standard uncertainty, if percent of the value are meant.
+        relative: f64,
+        /// The same otherwise.
+        absolute: f64,
+    },
     /// The value or uncertainty of an estimate is not finite.
     #[error("the {part} of the {kind} from {origin} is {value}; check the numbers it comes from")]
     EstimateNotFinite {

@@ -3,7 +3,8 @@
 use std::borrow::Cow;
 use std::fmt;
 
-use serde::ser::{Serialize, SerializeStruct, Serializer};
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::error::QuantityError;
 use super::estimates::slope;
@@ -40,7 +41,9 @@ impl From<String> for Measure {
 ///
 /// The uncertainty is a standard uncertainty (one standard deviation). `None` means that none is
 /// known; it is never written as 0. Serialised as `value`, `std` and `unit`.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[serde(into = "StatedEstimate")]
+#[schemars(from = "StatedEstimate")]
 pub struct Estimate {
     measure: Measure,
     value: f64,
@@ -136,7 +139,7 @@ impl Estimate {
         source: impl Into<Cow<'static, str>>,
     ) -> Result<Self, QuantityError> {
         let std_uncertainty = std_uncertainty
-            .map(|text| kind.parse_std(text))
+            .map(|text| kind.parse_std(text, value))
             .transpose()?;
         Self::new(kind, kind.parse(value)?, std_uncertainty, source)
     }
@@ -262,13 +265,25 @@ impl Estimate {
     }
 }
 
-impl Serialize for Estimate {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut fields = serializer.serialize_struct("Estimate", 3)?;
-        fields.serialize_field("value", &self.value)?;
-        fields.serialize_field("std", &self.std_uncertainty)?;
-        fields.serialize_field("unit", self.unit())?;
-        fields.end()
+/// An estimate in a document.
+#[derive(Serialize, JsonSchema)]
+struct StatedEstimate {
+    /// Value, in `unit`; `null` if infinite.
+    #[schemars(with = "Option<f64>")]
+    value: f64,
+    /// Standard uncertainty of the value, in `unit`; `null` if unknown.
+    std: Option<f64>,
+    /// Unit of value and uncertainty; 1 for a plain number.
+    unit: String,
+}
+
+impl From<Estimate> for StatedEstimate {
+    fn from(estimate: Estimate) -> Self {
+        Self {
+            value: estimate.value,
+            std: estimate.std_uncertainty,
+            unit: estimate.unit().to_owned(),
+        }
     }
 }
 

@@ -195,26 +195,45 @@ impl Kind {
 
     /// Reads a standard uncertainty of a quantity of this kind, in the SI unit of this kind.
     ///
-    /// Like [`Kind::parse`], but refuses a negative number and reads a degree as a difference.
+    /// Like [`Kind::parse`], but refuses a negative number and reads a degree as a difference. Percent are percent of the
+    /// value, `of`; of a ratio, which could be given in percent itself, only if it is.
     ///
     /// # Errors
-    /// As [`Kind::parse`], and [`QuantityError::NegativeUncertainty`].
+    /// As [`Kind::parse`], [`QuantityError::NegativeUncertainty`] and [`QuantityError::AmbiguousPercent`].
     ///
     /// ```
     /// use torqcomp_model::Kind;
     /// // ± 9 °F are ± 5 K.
-    /// assert!((Kind::TemperatureAbsolute.parse_std("9 degF")? - 5.0).abs() < 1e-12);
+    /// assert!((Kind::TemperatureAbsolute.parse_std("9 degF", "80 degF")? - 5.0).abs() < 1e-12);
+    /// // 0.5 % of 12 kN are 60 N.
+    /// assert!((Kind::Force.parse_std("0.5 %", "12 kN")? - 60.0).abs() < 1e-9);
+    /// // Of a damping ratio of 0.07: 0.0014 or 0.02?
+    /// assert!(Kind::Ratio.parse_std("2 %", "0.07").is_err());
+    /// assert!((Kind::Ratio.parse_std("2 %", "7 %")? - 0.02).abs() < 1e-15);
     /// # Ok::<(), torqcomp_model::QuantityError>(())
     /// ```
-    pub fn parse_std(self, text: &str) -> Result<f64, QuantityError> {
+    pub fn parse_std(self, text: &str, of: &str) -> Result<f64, QuantityError> {
         let (number, unit) = self.split(text)?;
-        let scale = self.scale(text, unit)?;
         if number < 0.0 {
             return Err(QuantityError::NegativeUncertainty {
                 got: text.trim().to_owned(),
             });
         }
-        finite(text, number * scale.factor)
+        let is_ratio = self.scale(text, "%").is_ok();
+        if unit != "%" || is_ratio && of.contains('%') || self == Self::TemperatureAbsolute {
+            return finite(text, number * self.scale(text, unit)?.factor);
+        }
+        let relative = number / 100.0;
+        let std = relative * self.parse(of)?.abs();
+        if is_ratio {
+            return Err(QuantityError::AmbiguousPercent {
+                text: text.trim().to_owned(),
+                of: of.trim().to_owned(),
+                relative: std,
+                absolute: relative,
+            });
+        }
+        finite(text, std)
     }
 
     /// SI units of this kind per unit of the text, for whole columns of numbers.

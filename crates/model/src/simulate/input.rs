@@ -31,16 +31,6 @@ impl Excitation {
     /// Prepares a band-limited record, with that many steps from sample to sample for integration in time.
     #[must_use]
     pub fn new(samples: Vec<f64>, rate_hz: f64, start_s: f64, substeps: usize) -> Self {
-        Self::of(samples, rate_hz, start_s, substeps, Between::BandLimited)
-    }
-
-    fn of(
-        samples: Vec<f64>,
-        rate_hz: f64,
-        start_s: f64,
-        substeps: usize,
-        between: Between,
-    ) -> Self {
         let count = samples.len();
         // Integration needs a step before the record and two after it, however short it is.
         let lead = (count / 16)
@@ -48,42 +38,68 @@ impl Excitation {
             .min(count.saturating_sub(1))
             .max(2);
         let total = quick_length(count + 2 * lead);
-        let forward = torqcomp_fourier::forward(total);
-        let backward = torqcomp_fourier::inverse(total);
-        let mut input = Self {
-            periods: periods(&samples),
+        let ends = periods(&samples);
+        Self::continued(samples, (rate_hz, start_s), substeps, (lead, total), ends)
+    }
+
+    /// The same of a record that is repeated without end: nothing is made up beyond its ends.
+    #[must_use]
+    pub fn periodic(samples: Vec<f64>, rate_hz: f64, start_s: f64, substeps: usize) -> Self {
+        let whole = (0, samples.len());
+        Self::continued(samples, (rate_hz, start_s), substeps, whole, [None; 2])
+    }
+
+    fn continued(
+        samples: Vec<f64>,
+        (rate_hz, start_s): (f64, f64),
+        substeps: usize,
+        (lead, total): (usize, usize),
+        periods: [Option<usize>; 2],
+    ) -> Self {
+        let input = Self {
             samples,
             rate_hz,
             start_s,
             lead,
             total,
+            periods,
             spectrum: Vec::new(),
-            forward,
-            backward,
+            forward: torqcomp_fourier::forward(total),
+            backward: torqcomp_fourier::inverse(total),
             substeps,
-            between,
+            between: Between::BandLimited,
             fine: Vec::new(),
         };
-        input.spectrum = input.transform_with(&input.samples, input.periods);
-        for (line, value) in input.spectrum.iter_mut().enumerate() {
-            *value *= between.factor(line as f64 / total as f64);
+        input.refined(substeps, Between::BandLimited)
+    }
+
+    fn refined(&self, substeps: usize, between: Between) -> Self {
+        let mut spectrum = self.transform_with(&self.samples, self.periods);
+        for (line, value) in spectrum.iter_mut().enumerate() {
+            *value *= between.factor(line as f64 / self.total as f64);
         }
-        input.fine = input.refine(substeps);
-        input
+        Self {
+            samples: self.samples.clone(),
+            fine: self.refine(&spectrum, substeps),
+            spectrum,
+            forward: self.forward.clone(),
+            backward: self.backward.clone(),
+            substeps,
+            between,
+            ..*self
+        }
     }
 
     /// The same record with another number of steps.
     #[must_use]
     pub fn with_substeps(&self, substeps: usize) -> Self {
-        let samples = self.samples.clone();
-        Self::of(samples, self.rate_hz, self.start_s, substeps, self.between)
+        self.refined(substeps, self.between)
     }
 
     /// The same record with another course between its samples.
     #[must_use]
     pub fn with_between(&self, between: Between) -> Self {
-        let samples = self.samples.clone();
-        Self::of(samples, self.rate_hz, self.start_s, self.substeps, between)
+        self.refined(self.substeps, between)
     }
 
     /// Its course between its samples.
@@ -128,7 +144,8 @@ impl Excitation {
         std::f64::consts::TAU * line as f64 * self.rate_hz / self.total as f64
     }
 
-    /// Excitation at the steps of integration, from one step before the first sample to two after the last.
+    /// Excitation at the steps of integration, from one step before the first sample to two after the last, or, if it is
+    /// repeated, to two after its first sample comes again.
     pub(super) fn fine(&self) -> &[f64] {
         &self.fine
     }
@@ -167,25 +184,26 @@ impl Excitation {
     }
 
     /// Interpolation of what acts: its spectrum, padded with zeros.
-    fn refine(&self, substeps: usize) -> Vec<f64> {
+    fn refine(&self, of: &[Complex64], substeps: usize) -> Vec<f64> {
         let long = self.total * substeps;
         let plan = torqcomp_fourier::inverse(long);
         let mut spectrum = plan.make_input_vec();
-        spectrum[..self.spectrum.len()].copy_from_slice(&self.spectrum);
+        spectrum[..of.len()].copy_from_slice(of);
         if substeps > 1 && self.total.is_multiple_of(2) {
             // The line at half the sampling rate stands for both signs of frequency.
-            spectrum[self.spectrum.len() - 1] *= 0.5;
+            spectrum[of.len() - 1] *= 0.5;
         }
         spectrum[0].im = 0.0;
         let mut fine = plan.make_output_vec();
         let _ = plan.process(&mut spectrum, &mut fine);
         let scale = 1.0 / self.total as f64;
-        let first = self.lead * substeps - 1;
-        let count = (self.samples.len() - 1) * substeps + 4;
-        fine[first..first + count]
-            .iter()
-            .map(|x| x * scale)
-            .collect()
+        let steps = match self.lead {
+            0 => self.samples.len() * substeps,
+            _ => (self.samples.len() - 1) * substeps + 1,
+        };
+        let first = (self.lead * substeps + long - 1) % long;
+        let nodes = fine.iter().cycle().skip(first);
+        nodes.take(steps + 3).map(|x| x * scale).collect()
     }
 }
 

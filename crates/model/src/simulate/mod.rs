@@ -5,7 +5,8 @@
 //! gage and recorder do follows sample by sample. Between samples the input is band-limited, not a
 //! straight line, unless it is said to be ([`Between`]).
 //!
-//! A record of any length is simulated piece by piece ([`Pieces`]).
+//! A record of any length is simulated piece by piece ([`Pieces`]); the answer to an input that repeats, once it has settled,
+//! is that of [`steady_answer`].
 
 mod between;
 mod input;
@@ -13,6 +14,7 @@ mod integrate;
 mod modes;
 mod pieces;
 mod run;
+mod steady;
 
 pub use between::Between;
 pub use input::Excitation;
@@ -21,6 +23,7 @@ pub use integrate::{MotionState, substeps};
 pub(crate) use modes::integrate_modes;
 pub use pieces::{Diverges, Pieces};
 pub(crate) use run::{MotionProgress, Torques, integrate};
+pub use steady::{NoSteadyAnswer, steady_answer};
 
 #[cfg(test)]
 mod tests;

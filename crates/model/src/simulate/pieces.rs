@@ -14,9 +14,9 @@ const SIDE: usize = 1 << 14;
 /// Size of an impulse response farther from its middle than the sides reach, over all of it, that is left out.
 const LEFT_OUT: f64 = 1e-4;
 /// Relative change of the result at which the step of integration is fine enough.
-const FINE: f64 = 1e-5;
+pub(super) const FINE: f64 = 1e-5;
 /// Most steps from sample to sample.
-const MOST_SUBSTEPS: usize = 256;
+pub(super) const MOST_SUBSTEPS: usize = 256;
 
 /// The motion leaves all bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -31,7 +31,7 @@ use torqcomp_dsp::frf::{Window, lines_of};
 use torqcomp_model::Covariance;
 
 use super::blocks::Set;
-use super::{Data, Driven, FinalFit, Modal};
+use super::{Data, Driven, FinalFit, Modal, foreign};
 use crate::identify::Pole;
 use crate::parallel::{in_parts, threads};
 use line::{ParameterValues, Parameters};
@@ -82,7 +82,7 @@ impl Whole {
 
     /// Fits them, starting from a fit of the averaged response; `None` if it does not converge or there are too few
     /// lines.
-    pub fn refine(self, shape: &Data, start: &Modal) -> Option<FinalFit> {
+    pub fn refine(self, shape: &Data, start: &Modal, set: &Set) -> Option<FinalFit> {
         let Self { records: mut all } = self;
         let layout = Parameters::of(shape, start.poles.len());
         let enough = |s: &Spectra| s.omega.len() >= LEAST_LINES * layout.columns();
@@ -107,13 +107,15 @@ impl Whole {
                 covariance[at] += a * b * gain_error * gain_error / 3.0;
             }
         }
-        let modal = shape.modal_of(&state.poles, delay_s, &state.linear);
+        let mut modal = shape.modal_of(&state.poles, delay_s, &state.linear);
         let covariance = Covariance::of(covariance);
+        foreign::mark(&mut modal, &covariance, set);
         Some(FinalFit {
             relative: residual_over_measured(&layout, &all, &state),
             static_gain_std: super::static_gain_std(&modal, &covariance, layout.searched()),
             modal,
             linear: layout.searched(),
+            has_residues: true,
             covariance,
             gain_error,
         })

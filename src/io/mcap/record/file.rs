@@ -9,7 +9,7 @@ use mcap::records::op;
 use super::chunk::{self, ChunkError};
 use super::input::CountedInput;
 use super::{RECORD_HEAD, record_head};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::Input;
 
 /// Longest record that is taken into memory; attachments may be longer, they are passed over.
@@ -287,11 +287,12 @@ impl FileReader {
         };
         file.held = file.want(MAGIC.len())?;
         if file.bytes() != MAGIC {
-            return Err(Failure::failed(format_args!(
-                "{}: not an MCAP file: it does not begin with the bytes 89 4d 43 41 50 30 0d 0a; \
+            return Err(Failure::failed(
+                ErrorCode::NotARecording,
+                "not an MCAP file: it does not begin with the bytes 89 4d 43 41 50 30 0d 0a; \
                  record with a recorder that writes MCAP, or convert the file first",
-                file.name
-            )));
+            )
+            .at(&file.name));
         }
         Ok(file)
     }
@@ -444,7 +445,11 @@ impl FileReader {
     fn want(&mut self, count: usize) -> Result<usize, Failure> {
         let there = self.input.want(count);
         there.map_err(|error| {
-            Failure::failed(format_args!("{}: cannot be read: {error}", self.name))
+            Failure::failed(
+                ErrorCode::CannotRead,
+                format_args!("cannot be read: {error}"),
+            )
+            .at(&self.name)
         })
     }
 }

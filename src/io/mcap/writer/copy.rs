@@ -7,7 +7,7 @@ use mcap::records::{AttachmentIndex, MetadataIndex, Record, op};
 use super::chunks::{ChunkBuilder, chunk_index};
 use super::index::FileIndex;
 use super::sink::RecordSink;
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::Input;
 use crate::io::mcap::record::chunk::{chunk_front, unpack, unpack_part};
 use crate::io::mcap::record::file::{FileReader, FileRecord, IN_ATTACHMENT, Loss};
@@ -50,11 +50,13 @@ pub(super) fn copy<W: Write>(
         if let Loss::Truncated { at, what } = loss
             && *what == IN_ATTACHMENT
         {
-            return Err(Failure::failed(format_args!(
-                "{}: the file ends within the attachment at byte {at}; such a file cannot be \
-                 copied. Make it whole first with \"mcap recover\"",
-                input.name()
-            )));
+            return Err(Failure::failed(
+                ErrorCode::DamagedFile,
+                format_args!(
+                    "the file ends within the attachment at byte {at}; make it whole first with \"mcap recover\""
+                ),
+            )
+            .at(input.name()));
         }
     }
     Ok(CopiedFile {

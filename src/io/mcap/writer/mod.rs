@@ -19,7 +19,7 @@ use std::io::{self, Write};
 use mcap::records::{Channel, Metadata, MetadataIndex, SchemaHeader, op};
 
 use super::decode::Encoding;
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::Input;
 use chunks::ChunkBuilder;
 use index::FileIndex;
@@ -74,17 +74,25 @@ impl<W: Write> Writer<W> {
         let copied = copy::copy(input, &mut sink, output_name)?;
         let mut index = copied.index;
         if index.topics.contains(&added.topic) {
-            return Err(Failure::failed(format_args!(
-                "{}: there is a topic \"{}\" in it already; name another one for the result",
-                input.name(),
-                added.topic
-            )));
+            return Err(Failure::failed(
+                ErrorCode::OutputExists,
+                format_args!(
+                    "there is a topic \"{}\" in it already; name another one for the result",
+                    added.topic
+                ),
+            )
+            .at(input.name()));
         }
         let torque = TorqueMessage::new(added.encoding, &added.name);
         let mut chunk = ChunkBuilder::new(copied.compression);
         let channel_id = declare(&mut index, &mut chunk, &torque, &added.topic)
             .map_err(|error| Failure::writing(output_name, &error))?
-            .ok_or_else(|| Failure::failed("the file has no number left for another channel"))?;
+            .ok_or_else(|| {
+                Failure::failed(
+                    ErrorCode::CannotWrite,
+                    "the file has no number left for another channel",
+                )
+            })?;
         Ok(Self {
             sink,
             name: output_name.to_owned(),

@@ -2,7 +2,7 @@
 
 use super::groups::Group;
 use super::{SAME, Sources, is_counting};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::recording::text::clock::{Clock, unwrap_midnights};
 use crate::recording::text::rows::{Column, ColumnKind};
 use crate::recording::text::units;
@@ -210,16 +210,21 @@ impl Sources<'_> {
     ) -> Result<Option<(f64, Option<String>)>, Failure> {
         let field = &self.fields[place];
         if let Some(text) = &self.reading.time_unit {
-            let unit = Unit::parse(text)
-                .map_err(|error| Failure::usage(format_args!("--time-unit {text}: {error}")))?;
+            let unit = Unit::parse(text).map_err(|error| {
+                Failure::usage(
+                    ErrorCode::InvalidValue,
+                    format_args!("--time-unit {text}: {error}"),
+                )
+            })?;
             let named = NamedUnit {
                 text: text.clone(),
                 unit,
             };
             if !units::is_time(&named) {
-                return Err(Failure::usage(format_args!(
-                    "--time-unit {text} is no unit of time"
-                )));
+                return Err(Failure::usage(
+                    ErrorCode::InvalidValue,
+                    format_args!("--time-unit {text} is no unit of time"),
+                ));
             }
             return Ok(Some((unit.factor(), None)));
         }

@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use super::{Maker, Rule};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::Reading;
 use crate::io::number;
 use crate::recording::moment::Moment;
@@ -95,6 +95,7 @@ fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
     }
     if recording.channels.is_empty() {
         return Err(Failure::failed(
+            ErrorCode::DamagedFile,
             "the LabVIEW file ends before its first sample; expected a segment with channels",
         ));
     }

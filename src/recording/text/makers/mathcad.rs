@@ -3,7 +3,7 @@
 //! SAVe:WAVEform:FILEFormat).
 
 use super::{Maker, Rule};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::{Reading, number};
 use crate::recording::text::FOR_MAKER;
 use crate::recording::text::chunks::Chunks;
@@ -67,8 +67,9 @@ fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
         text.len() <= FOR_MAKER,
         1,
     );
-    let start = MathcadHead::of(&head)
-        .ok_or_else(|| Failure::failed("the first four lines are no head"))?;
+    let start = MathcadHead::of(&head).ok_or_else(|| {
+        Failure::failed(ErrorCode::DamagedFile, "the first four lines are no head")
+    })?;
     let mut lines = text.split_inclusive(|byte| *byte == b'\n');
     let skipped: usize = lines.by_ref().take(HEAD).map(<[u8]>::len).sum();
     let (read, _) = rows::of_numbers(&text[skipped..], 1 + HEAD, DIALECT, [0], &[])?;

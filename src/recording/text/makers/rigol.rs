@@ -3,7 +3,7 @@
 //! The other ways of this maker are plain tables.
 
 use super::{Maker, Rule};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::Reading;
 use crate::io::number;
 use crate::recording::text::FOR_MAKER;
@@ -68,7 +68,10 @@ fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
     let (text, complete) = chunks.peek(FOR_MAKER)?;
     let head = Head::of(text, complete, 1);
     let (Some(start), Some(first)) = (Start::of(&head), head.lines.get(2)) else {
-        return Err(Failure::failed("the file ends before its first sample"));
+        return Err(Failure::failed(
+            ErrorCode::DamagedFile,
+            "the file ends before its first sample",
+        ));
     };
     chunks.skip(first.offset);
     let text = chunks.take_all()?;

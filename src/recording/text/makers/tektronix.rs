@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use super::{Maker, Rule};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
 use crate::io::Reading;
 use crate::recording::text::chunks::Chunks;
 use crate::recording::text::dialect::{Delimiter, Dialect};
@@ -74,6 +74,7 @@ fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
     );
     let Some((dialect, blocks, _)) = side_by_side(&head) else {
         return Err(Failure::failed(
+            ErrorCode::DamagedFile,
             "the first line has no time and value beside its key",
         ));
     };

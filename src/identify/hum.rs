@@ -1,11 +1,22 @@
-//! Lines of the mains in a record of decays.
+//! Lines of the mains in records of free ringing and of hits.
 
 use std::borrow::Cow;
 
 use torqcomp_dsp::harmonics::{fit, refine_fundamental};
 use torqcomp_dsp::quality::mains::mains;
 
-use super::search::SteadyLine;
+use super::Identification;
+use crate::print::rounded;
+
+/// A steady line beside what rings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct SteadyLine {
+    pub frequency_hz: f64,
+    /// Amplitude where it is largest.
+    pub amplitude: f64,
+    /// Whether it lies where lines of the mains do.
+    pub is_of_mains: bool,
+}
 
 /// How far the mains may be off their nominal frequency, over it.
 const OFF: f64 = 0.006;
@@ -49,6 +60,47 @@ pub(super) fn without_mains(
     let lines = fitted.components.iter().map(|c| SteadyLine {
         frequency_hz: c.frequency_hz,
         amplitude: c.phasor.norm(),
+        is_of_mains: true,
     });
     (left.into(), lines.collect())
+}
+
+/// The lines in words, each once.
+pub(super) fn listed(lines: &[SteadyLine]) -> String {
+    let each = |line: &SteadyLine| {
+        let [frequency, amplitude] =
+            [(line.frequency_hz, 5), (line.amplitude, 2)].map(|(v, digits)| rounded(v, digits));
+        format!("{frequency} Hz (amplitude {amplitude})")
+    };
+    // What is left of a line after the first fit is the same line.
+    let is_same = |a: &SteadyLine, b: &SteadyLine| (a.frequency_hz - b.frequency_hz).abs() < 0.5;
+    let first = |(i, line): &(usize, &SteadyLine)| !lines[..*i].iter().any(|l| is_same(l, line));
+    let different = lines.iter().enumerate().filter(first);
+    let each: Vec<String> = different.map(|(_, line)| each(line)).collect();
+    each.join(", ")
+}
+
+/// Warns about lines that were taken off.
+pub(super) fn taken_off(result: &mut Identification, lines: &[SteadyLine]) {
+    let (of_mains, others): (Vec<SteadyLine>, Vec<SteadyLine>) =
+        lines.iter().partition(|line| line.is_of_mains);
+    for (code, what, lines) in [
+        ("mains-taken-off", "steady lines of the mains", of_mains),
+        (
+            "tone-taken-off",
+            "steady lines, as of a fan or a motor that runs,",
+            others,
+        ),
+    ] {
+        if !lines.is_empty() {
+            result.warn(
+                code,
+                format!(
+                    "{what} were fitted and taken off: {}; if one of them is the stand's own, record for longer, until it \
+                     has decayed",
+                    listed(&lines)
+                ),
+            );
+        }
+    }
 }

@@ -1,0 +1,70 @@
+//! Wrong command lines.
+
+use clap::Error;
+use clap::error::ErrorKind;
+
+use crate::failure::{ErrorCode, Failure};
+
+/// Whether `--json` is among the arguments of the process, whatever else is wrong with them.
+pub(crate) fn is_json_asked() -> bool {
+    let mut options = std::env::args_os().skip(1).take_while(|arg| arg != "--");
+    options.any(|arg| arg == "--json")
+}
+
+/// What clap refuses, as a failure; `None` if it has only been asked for help or the version.
+pub(crate) fn wrong_usage(error: &Error) -> Option<Failure> {
+    let text = error.render().to_string();
+    error
+        .use_stderr()
+        .then(|| Failure::usage(code(error.kind()), message(&text)))
+}
+
+fn code(kind: ErrorKind) -> ErrorCode {
+    match kind {
+        ErrorKind::UnknownArgument | ErrorKind::InvalidSubcommand => ErrorCode::UnknownArgument,
+        ErrorKind::ArgumentConflict => ErrorCode::ConflictingArguments,
+        ErrorKind::MissingRequiredArgument
+        | ErrorKind::MissingSubcommand
+        | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => ErrorCode::MissingArgument,
+        _ => ErrorCode::InvalidValue,
+    }
+}
+
+/// The first paragraph of clap's text, and behind a semicolon its tip or, without one, the usage.
+fn message(text: &str) -> String {
+    let mut paragraphs = text.split("\n\n").map(|paragraph| {
+        let words: Vec<&str> = paragraph.split_whitespace().collect();
+        words.join(" ")
+    });
+    let first = paragraphs.next().unwrap_or_default();
+    let what = first.strip_prefix("error: ").unwrap_or(&first);
+    match paragraphs.find(|text| text.starts_with("tip: ") || text.starts_with("Usage: ")) {
+        Some(hint) => format!("{what}; {}", hint.strip_prefix("tip: ").unwrap_or(&hint)),
+        None => what.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_message_is_what_is_wrong_and_the_tip_what_to_do() {
+        let refused = |words: &[&str]| {
+            let error = crate::cli::command()
+                .try_get_matches_from(words)
+                .unwrap_err();
+            let failure = wrong_usage(&error)?;
+            let document = serde_json::to_value(failure.document()).unwrap();
+            Some(document["error"].clone())
+        };
+        let wrong = refused(&["torqcomp", "inspect", "a.csv", "--jsn"]).unwrap();
+        assert_eq!(wrong["code"], "unknown-argument");
+        assert_eq!(wrong["message"], "unexpected argument '--jsn' found");
+        assert_eq!(wrong["hint"], "a similar argument exists: '--json'");
+        let missing = refused(&["torqcomp", "table"]).unwrap();
+        assert_eq!(missing["code"], "missing-argument");
+        assert!(missing["hint"].as_str().unwrap().starts_with("Usage: "));
+        assert!(refused(&["torqcomp", "--help"]).is_none());
+    }
+}

@@ -1,0 +1,124 @@
+//! `schema`: the JSON Schema of what `--json` prints.
+
+#[cfg(test)]
+pub(crate) mod types;
+
+use serde_json::Value;
+
+use super::Outcome;
+use super::compensate::CompensateReport;
+use super::harmonics::HarmonicsReport;
+use super::inspect::InspectReport;
+use super::predict::PredictReport;
+use super::simulate::SimulateReport;
+use super::table::TableReport;
+use crate::batch::{BATCH_SCHEMA, MANIFEST_SCHEMA, Merged};
+#[cfg(test)]
+use crate::batch::{BatchReport, ManifestLine};
+use crate::cli::Schema;
+use crate::diagnose::Diagnosis;
+#[cfg(test)]
+use crate::failure::ErrorDocument;
+use crate::failure::{self, ErrorCode, Failure, did_you_mean};
+use crate::identify::Identification;
+use crate::print::Report;
+
+/// A kind of document.
+pub(crate) struct DocumentKind {
+    /// The verb, or what the document is of.
+    pub(crate) name: &'static str,
+    /// Name and version, as the document itself says them.
+    pub(crate) schema: &'static str,
+    /// The JSON Schema (2020-12), written from the types.
+    pub(crate) text: &'static str,
+}
+
+impl DocumentKind {
+    /// What it is, in a sentence.
+    pub(crate) fn about(&self) -> String {
+        let schema: Option<Value> = serde_json::from_str(self.text).ok();
+        let about = schema
+            .as_ref()
+            .and_then(|schema| schema["description"].as_str());
+        about.unwrap_or_default().to_owned()
+    }
+}
+
+macro_rules! documents {
+    ($($name:literal: $schema:expr),* $(,)?) => {
+        /// All documents.
+        pub(crate) const DOCUMENTS: &[DocumentKind] = &[$(DocumentKind {
+            name: $name,
+            schema: $schema,
+            text: include_str!(concat!("schema/", $name, ".json")),
+        }),*];
+    };
+}
+
+documents! {
+    "compensate": CompensateReport::SCHEMA,
+    "harmonics": HarmonicsReport::SCHEMA,
+    "table": TableReport::SCHEMA,
+    "predict": PredictReport::SCHEMA,
+    "inspect": InspectReport::SCHEMA,
+    "identify": Identification::SCHEMA,
+    "simulate": SimulateReport::SCHEMA,
+    "diagnose": Diagnosis::SCHEMA,
+    "merge": Merged::SCHEMA,
+    "batch": BATCH_SCHEMA,
+    "error": failure::SCHEMA,
+    "manifest": MANIFEST_SCHEMA,
+}
+
+/// Runs the verb.
+pub fn run(args: &Schema) -> Result<Outcome, Failure> {
+    let text = match &args.document {
+        Some(name) => find(name)?.text.to_owned(),
+        None => list(),
+    };
+    let mut output = args.result.open(&[])?;
+    output.write(text.as_bytes())?;
+    output.finish()?;
+    Ok(Outcome::Done)
+}
+
+fn find(name: &str) -> Result<&'static DocumentKind, Failure> {
+    let known = || DOCUMENTS.iter().map(|document| document.name);
+    DOCUMENTS
+        .iter()
+        .find(|document| document.name == name)
+        .ok_or_else(|| {
+            let names: Vec<&str> = known().collect();
+            Failure::usage(
+                ErrorCode::InvalidValue,
+                format_args!(
+                    "no document of \"{name}\"{}; expected one of {}",
+                    did_you_mean(name, known()),
+                    names.join(", ")
+                ),
+            )
+        })
+}
+
+/// Names of the documents and what they are, a line each.
+fn list() -> String {
+    let width = |text: fn(&DocumentKind) -> &'static str| {
+        DOCUMENTS
+            .iter()
+            .map(|document| text(document).len())
+            .max()
+            .unwrap_or(0)
+    };
+    let (name, schema) = (
+        width(|document| document.name),
+        width(|document| document.schema),
+    );
+    let line = |document: &DocumentKind| {
+        let about = document.about();
+        format!(
+            "{:name$}  {:schema$}  {about}\n",
+            document.name, document.schema
+        )
+    };
+    DOCUMENTS.iter().map(line).collect()
+}

@@ -1,0 +1,82 @@
+//! The last fit of what was found: with steps of integration that err by less than the noise leaves uncertain, and in the
+//! plainest form that does as well.
+
+use torqcomp_model::effects::Form;
+
+use super::fit::{FitEffort, FittedModel, fit};
+use super::records::Records;
+use super::score::ScoredModel;
+use super::structure::Structure;
+use crate::parallel::parallel;
+
+/// It starts where another fit ended.
+const LAST_FIT: FitEffort = FitEffort::full(8);
+/// Most steps of integration, over those with which the model was chosen: where switching instants keep the integration from
+/// converging faster, still finer steps cost more than they bring.
+const FINEST: usize = 8;
+
+impl ScoredModel {
+    /// The model fitted once more to the training records, and the records with the steps for it; `None` if the steps are
+    /// fine enough already. While effects are compared, the integration may err by a tenth of the residual. That is more
+    /// than long records leave uncertain of a model with few parameters, and it would bias them.
+    pub fn finished(&self, records: &Records, threads: usize) -> Option<(Self, Records)> {
+        let fine = self.fine_enough(records)?;
+        let last = |structure: Structure, values: &[f64]| {
+            let train = self.fitted.with_initial_states(&fine.train);
+            let fitted = fit(structure, values, &train, LAST_FIT).ok()?;
+            Self::of(fitted, &fine.training())
+        };
+        let mut forms = vec![(self.fitted.structure.clone(), self.fitted.values.clone())];
+        forms.extend(self.fitted.plainer_forms());
+        let models = parallel(forms.len(), threads, |k| {
+            last(forms[k].0.clone(), &forms[k].1)
+        });
+        let models = models.into_iter().flatten();
+        let best = models.min_by(|a, b| a.criterion().total_cmp(&b.criterion()))?;
+        Some((best, fine))
+    }
+
+    /// The records with steps so fine that the integration errs by less than the standard uncertainty of the modelled
+    /// record, `σ √(p/n)`; `None` if they are so already.
+    fn fine_enough(&self, records: &Records) -> Option<Records> {
+        let count: usize = self.train.iter().map(|r| r.samples.len()).sum();
+        let uncertain = self.train_rms() * (self.parameter_count() as f64 / count as f64).sqrt();
+        let present = records.substeps();
+        let mut fine = records.clone();
+        while self.fitted.integrates() && fine.substeps() < FINEST * present {
+            if self.fitted.step_change(&fine.train[0])? <= uncertain {
+                break;
+            }
+            fine.set_substeps(2 * fine.substeps());
+        }
+        (fine.substeps() > present).then_some(fine)
+    }
+}
+
+impl FittedModel {
+    /// The same with one of its effects in a form with fewer parameters, all of which the present form has, too.
+    fn plainer_forms(&self) -> Vec<(Structure, Vec<f64>)> {
+        let mut next = self.structure.context.plain_count();
+        let mut found = Vec::new();
+        for (k, present) in self.structure.effects.iter().enumerate() {
+            let own = next..next + present.moved();
+            next = own.end;
+            let value = |name: &str| {
+                let mut parameters = present.form.parameters[..own.len()].iter();
+                let place = parameters.position(|p| p.name == name)?;
+                Some(self.values[own.start + place])
+            };
+            let in_form = |form: &'static Form| {
+                let values: Option<Vec<f64>> =
+                    form.parameters.iter().map(|p| value(p.name)).collect();
+                let values = values.filter(|values| values.len() < own.len())?;
+                let mut structure = self.structure.clone();
+                structure.effects[k].form = form;
+                let (before, after) = (&self.values[..own.start], &self.values[own.end..]);
+                Some((structure, [before, &values, after].concat()))
+            };
+            found.extend(present.effect.forms.iter().filter_map(in_form));
+        }
+        found
+    }
+}

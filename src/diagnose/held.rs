@@ -1,0 +1,232 @@
+//! A body without a spring. How far it moves does not follow from what acts: the smallest error of a force adds up without end.
+//!
+//! So the body and its model are both held to the measured motion `y` by a spring of known stiffness `k`: with
+//! `J x'' + f x' + n = u`, also `J x'' + f x' + n + k x = u + k y`. What is on the right is known, and the equation is that of
+//! a stand whose gain is known, to which everything else applies. In the unit of what acts, `k x` is the record; what the
+//! model leaves of it is the force that it lacks, below the frequency `√(k/J)`.
+
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use torqcomp_model::Estimate;
+use torqcomp_model::effects::{Action, Memory};
+use torqcomp_model::simulate::Excitation;
+
+use super::plain::find_plain;
+use super::record::StandRecord;
+use super::residual_tests::without_mean;
+use super::structure::{EffectForm, FitContext};
+use super::units::ChannelUnits;
+use super::{Case, scales};
+use crate::failure::Failure;
+use crate::print::{rounded, unit_or_as_recorded};
+use crate::warning::Warning;
+
+/// The holding spring's force over what acts, rms. The body is then held at four times the frequency at which its inertia takes
+/// what acts.
+const HOLD: f64 = 16.0;
+/// A spring's force over what acts, rms, up to which the body counts as free.
+const SMALL_SPRING: f64 = 0.1;
+/// Frequency of the held body over that of the weak spring with which a stand file describes the free one: that
+/// spring takes a millionth of what the holding one does.
+const WEAKER: f64 = 1e3;
+
+/// A body without a spring that is held to its measured motion.
+#[derive(Debug, Clone)]
+pub struct HeldBody {
+    /// What holds it, in SI units of what acts and of the motion.
+    pub stiffness: f64,
+    /// Units of the channels as they were recorded.
+    pub recorded: ChannelUnits,
+}
+
+/// A case with the body held, and the context for it; `None` unless the records are of a body without a spring.
+///
+/// # Errors
+/// If the plain stand cannot be fitted to the body as it is held.
+pub fn hold(case: &Case, unscaled: &FitContext) -> Result<Option<(Case, FitContext)>, Failure> {
+    if case.declared.is_some() || case.gain_is_declared || case.recorder.is_some() {
+        return Ok(None);
+    }
+    let train = &case.records.train;
+    let acting = rms(train.iter().map(StandRecord::applied_in_range));
+    let moving = rms(train.iter().map(StandRecord::measured_in_range));
+    let stiffness = HOLD * acting / moving;
+    let mut records = case.records.clone();
+    let mean = train[0].measured.iter().sum::<f64>() / train[0].measured.len() as f64;
+    records.change_records(|record| record.held(stiffness, mean));
+    let recorded = case.units.clone();
+    let units = ChannelUnits {
+        measured: recorded.applied.clone(),
+        diagnosed: crate::stand::si_unit(&recorded.applied),
+        per_printed: recorded.factors[0],
+        factors: [recorded.factors[0]; 2],
+        ..recorded.clone()
+    };
+    let mut context = FitContext {
+        scales: scales(&records.train),
+        units: units.clone(),
+        held: Some(HeldBody {
+            stiffness,
+            recorded,
+        }),
+        ..unscaled.clone()
+    };
+    // A spring of its own makes the whole stiffer than the one that holds it: the gain is then less than 1.
+    let Ok(with_spring) = find_plain(&context, None, &records.train) else {
+        return Ok(None);
+    };
+    let spring = HOLD * (1.0 / with_spring.plain.gain - 1.0);
+    if spring.abs() > SMALL_SPRING {
+        return Ok(None);
+    }
+    context.gain_is_free = false;
+    context.plain.gain = 1.0;
+    let context = find_plain(&context, None, &records.train)?;
+    let held = Case {
+        records,
+        units,
+        gain_is_declared: true,
+        sources: case.sources.clone(),
+        declared: None,
+        declared_effects: Vec::new(),
+        recorder: None,
+        warnings: [case.warnings.clone(), vec![warning(&context, stiffness)]].concat(),
+    };
+    Ok(Some((held, context)))
+}
+
+fn warning(context: &FitContext, stiffness: f64) -> Warning {
+    let natural_hz = context.plain.natural_hz;
+    let units = context.held.as_ref().map(|held| &held.recorded);
+    let [acting, moved] = units.map_or(["", ""], |u| [u.applied.as_str(), u.measured.as_str()]);
+    let factors = units.map_or([1.0; 2], |u| u.factors);
+    Warning::new(
+        "free-body",
+        format!(
+            "the body moves freely: a spring of its own would take less than {} % of what is applied. So that the motion does not \
+             walk away from the model, both are held to the measured one by a spring of {} {} per {} ({} Hz): errors and \
+             noise are those of the applied quantity below that frequency",
+            rounded(100.0 * SMALL_SPRING, 2),
+            rounded(stiffness * factors[1] / factors[0], 4),
+            unit_or_as_recorded(acting),
+            unit_or_as_recorded(moved),
+            rounded(natural_hz, 3),
+        ),
+    )
+}
+
+/// Rms of several series together, each about its mean.
+fn rms<'a>(series: impl Iterator<Item = &'a [f64]>) -> f64 {
+    let (mut sum, mut count) = (0.0, 0_usize);
+    for values in series {
+        sum += without_mean(values).iter().map(|v| v * v).sum::<f64>();
+        count += values.len();
+    }
+    (sum / count as f64).sqrt()
+}
+
+impl StandRecord {
+    /// The record of the body held by a spring to what was measured, about a mean.
+    fn held(&self, stiffness: f64, mean: f64) -> Self {
+        let input = &self.input;
+        let spring: Vec<f64> = self
+            .measured
+            .iter()
+            .map(|y| stiffness * (y - mean))
+            .collect();
+        let acting = input.samples().iter().zip(&spring);
+        let acting = acting.map(|(u, spring)| u + spring).collect();
+        let (rate_hz, start_s) = (input.rate_hz(), input.start_s());
+        let input = Excitation::new(acting, rate_hz, start_s, input.substeps());
+        Self {
+            input: Arc::new(input),
+            measured: Arc::new(spring),
+            is_held: true,
+            ..self.clone()
+        }
+    }
+}
+
+impl HeldBody {
+    /// Rms of what acts on the body itself, without the spring, on some records.
+    pub fn acting_rms<'a>(records: impl Iterator<Item = &'a StandRecord>) -> f64 {
+        let all: Vec<Vec<f64>> = records.map(StandRecord::acting_in_range).collect();
+        rms(all.iter().map(Vec::as_slice))
+    }
+
+    /// Inertia `k/ω²` and damping `2ζk/ω` of the body, in the units of the files, from natural frequency and damping
+    /// ratio as it is held.
+    pub fn constants(&self, [natural_hz, ratio]: [&Estimate; 2]) -> [Estimate; 2] {
+        let units = &self.recorded;
+        let omega = TAU * natural_hz.value();
+        let stiffness = self.stiffness * units.factors[1] / units.factors[0];
+        let inertia = stiffness / (omega * omega);
+        let damping = 2.0 * ratio.value() * stiffness / omega;
+        let relative = natural_hz.relative_std();
+        let both = relative.zip(ratio.relative_std());
+        let [applied, measured] = [&units.applied, &units.measured].map(|u| unit_or_as_recorded(u));
+        [
+            Estimate::of(
+                format!("{applied} s^2/{measured}"),
+                inertia,
+                relative.map(|r| 2.0 * r * inertia),
+            ),
+            Estimate::of(
+                format!("{applied} s/{measured}"),
+                damping,
+                both.map(|(w, z)| damping * w.hypot(z)),
+            ),
+        ]
+    }
+
+    /// Natural frequency, damping ratio and gain of the body with the weak spring of a stand file.
+    pub fn weakly_held(&self, [natural_hz, ratio, _]: [Estimate; 3]) -> [Estimate; 3] {
+        let times = |estimate: &Estimate, factor: f64| {
+            let std = estimate.std_uncertainty().map(|std| std * factor);
+            Estimate::of(estimate.unit().to_owned(), estimate.value() * factor, std)
+        };
+        [
+            times(&natural_hz, 1.0 / WEAKER),
+            times(&ratio, WEAKER),
+            Estimate::of("", WEAKER * WEAKER / self.stiffness, None),
+        ]
+    }
+
+    /// Factor that makes a parameter of an effect beside the holding spring, measured in units of what acts to a power,
+    /// one beside the weak spring, in units of the motion.
+    pub fn weakly(&self, power_of_recorded: i32, is_size: bool) -> f64 {
+        let size = if is_size { WEAKER * WEAKER } else { 1.0 };
+        size * self.stiffness.powi(-power_of_recorded)
+    }
+}
+
+impl EffectForm {
+    /// Whether it is a torque beside the record that grows in proportion to its first parameter: such a one means the same
+    /// beside any spring, and in a body without one.
+    pub fn needs_no_spring(&self) -> bool {
+        let Some(start) = self.form.starts.first().filter(|start| !start.is_empty()) else {
+            return false;
+        };
+        let torque = |factor: f64, size: f64| {
+            let mut values = start.to_vec();
+            values[0] *= factor;
+            let Action::Torque {
+                torque,
+                in_gage_path: false,
+            } = (self.form.build)(&values)
+            else {
+                return None;
+            };
+            let mut memory: Memory = torque.begin(0.0);
+            Some(torque.value(&mut memory, 0.3 * size, 0.7 * size))
+        };
+        // In small motions and in large ones.
+        [1e-3, 1.0].into_iter().all(|size| {
+            let both = torque(1.0, size).zip(torque(2.0, size));
+            both.is_some_and(|(once, twice)| {
+                once != 0.0 && (twice - 2.0 * once).abs() <= 1e-9 * once.abs()
+            })
+        })
+    }
+}

@@ -1,0 +1,78 @@
+//! The kinds of failures.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+/// Kind of a failure: a stable name, whatever the words of the message.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ErrorCode {
+    /// There is no such verb or option.
+    UnknownArgument,
+    /// An argument that is needed is not given.
+    MissingArgument,
+    /// The value of an argument cannot be read or is out of its range.
+    InvalidValue,
+    /// Arguments exclude each other or do not apply here.
+    ConflictingArguments,
+    /// There is no such file or folder, or nothing in it that is looked for.
+    NotFound,
+    /// The system refuses to read a file.
+    CannotRead,
+    /// The system refuses to write a file, or its format has no place for the result.
+    CannotWrite,
+    /// The disk is full.
+    DiskFull,
+    /// The output exists and may not be replaced without --force.
+    OutputExists,
+    /// The numbers need more memory or scratch space than there is.
+    NotEnoughRoom,
+    /// The file is no recording: no table of numbers in time, and no MCAP file with numbers.
+    NotARecording,
+    /// The text can be read in two ways, and an option must say which is meant.
+    TextUnclear,
+    /// The file holds several tables and must be split.
+    SeveralTables,
+    /// The file is damaged or ends too early.
+    DamagedFile,
+    /// There is no channel, topic or field of that name.
+    ChannelNotFound,
+    /// Several channels could be meant.
+    ChannelUnclear,
+    /// The unit is missing, unknown or has two meanings.
+    UnitUnclear,
+    /// The unit is known, but not one that the work can use.
+    UnitUnsuitable,
+    /// The sampling rate or the time axis is unknown.
+    TimeUnknown,
+    /// Time stamps are not uniform: gaps, jitter, backward steps, or a clock that jumped.
+    IrregularTime,
+    /// No sample lies within the range asked for.
+    RangeEmpty,
+    /// A cell or sample holds no number, or none that can be a measurement.
+    InvalidSample,
+    /// The record is too short.
+    TooFewSamples,
+    /// The record is too long, or has too much in it, for this method.
+    TooManySamples,
+    /// Records or channels that belong together differ in rate, unit, length or content.
+    RecordsDiffer,
+    /// The channel is compensated already.
+    AlreadyCompensated,
+    /// The record does not show what is looked for, or its channels are the wrong ones.
+    UnsuitableRecord,
+    /// The data do not determine what is asked for.
+    NotIdentifiable,
+    /// The stand file cannot be read, or it contradicts itself or the record.
+    InvalidStand,
+    /// The stand file lacks what this work needs.
+    IncompleteStand,
+    /// Effects of the stand cannot be taken back, or not together.
+    NotInvertible,
+    /// Some of many recordings failed.
+    RecordingsFailed,
+    /// The manifests are not one finished job.
+    ManifestsDiffer,
+    /// A fault of torqcomp itself.
+    InternalError,
+}

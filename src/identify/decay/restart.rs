@@ -1,0 +1,174 @@
+//! Moments at which a decay starts again: a second hit that does not raise the swing, samples that are missing, the end of
+//! an overload.
+//!
+//! A sum of decaying sines with an offset obeys a linear recursion, `x_i = c + Σ a_k x_{i−k}`, whatever its modes are. It is
+//! fitted by least squares to the whole stretch; what is left is noise, and the larger the less linear the stand is, so that
+//! it falls with the swing. Where it jumps up instead, the ringing starts again. Neighbouring samples are averaged before, to
+//! about [`A_PERIOD`] in a period of the strongest line: means of decaying sines are decaying sines.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
+use torqcomp_dsp::{peaks, quality};
+
+/// Order of the recursion.
+const ORDER: usize = 16;
+/// Averaged samples in a period of the strongest line.
+const A_PERIOD: f64 = 20.0;
+/// Averaged samples before a moment that it is compared with.
+const BEFORE: usize = 160;
+/// What is left at a restart, over the largest before it …
+const JUMP: f64 = 5.0;
+/// … in standard deviations of all that is left …
+const NOISE: f64 = 10.0;
+/// … and over the largest swing.
+const SIZE: f64 = 0.01;
+/// Swing of a part over that of the whole below which it does not ring.
+const STILL: f64 = 0.01;
+/// Added to the diagonal of the equations, relative to it, where samples without noise need no such order.
+const RIDGE: f64 = 1e-12;
+
+/// The parts of a stretch, in samples: the whole, or those before and after each restart that ring and have `least` samples.
+pub(super) fn parts(values: &[f64], least: usize) -> Vec<Range<usize>> {
+    let factor = averaged(values);
+    let few: Vec<f64> = values.chunks_exact(factor).map(mean).collect();
+    let mut all = Vec::new();
+    let mut from = 0;
+    for gap in restarts(&few) {
+        all.push(from..gap.start * factor);
+        from = gap.end * factor;
+    }
+    all.push(from..values.len());
+    if all.len() > 1 {
+        let whole = swing(values);
+        all.retain(|part| part.len() >= least && swing(&values[part.clone()]) > STILL * whole);
+    }
+    all
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// Half the difference of the largest and the smallest value.
+fn swing(values: &[f64]) -> f64 {
+    let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+    0.5 * (high - low).max(0.0)
+}
+
+/// Samples of which a mean is taken.
+fn averaged(values: &[f64]) -> usize {
+    let middle = mean(values);
+    let about: Vec<f64> = values.iter().map(|v| v - middle).collect();
+    // In periods a sample, from two periods in the stretch on.
+    let lowest = 2.0 / values.len() as f64;
+    let line = peaks::strongest(&about, 1.0, lowest, 0.5).map_or(0.5, |peak| peak.frequency_hz);
+    ((1.0 / (A_PERIOD * line)) as usize).max(1)
+}
+
+/// From each restart to where the recursion holds again.
+fn restarts(values: &[f64]) -> Vec<Range<usize>> {
+    let Some(left) = unpredicted(values) else {
+        return Vec::new();
+    };
+    let noise = quality::median(&mut left[ORDER..].to_vec()).unwrap_or(0.0) / 0.674_489_75;
+    let least = (NOISE * noise).max(SIZE * swing(values));
+    let largest = |range: Range<usize>| left[range].iter().copied().fold(0.0, f64::max);
+    let mut found = Vec::new();
+    let mut from = ORDER;
+    let mut at = from + ORDER;
+    while at < left.len() {
+        let before = largest(at.saturating_sub(BEFORE).max(from)..at);
+        if left[at] <= least.max(JUMP * before) {
+            at += 1;
+            continue;
+        }
+        // The recursion reaches back over the restart for so many samples.
+        let near = at..(at + 2 * ORDER).min(left.len());
+        let last = near.rev().find(|i| left[*i] > least.max(JUMP * before));
+        let end = last.unwrap_or(at) + 1;
+        found.push(at..end);
+        from = (end + ORDER).min(left.len());
+        at = from + ORDER;
+    }
+    found
+}
+
+/// Size of what the recursion leaves at each sample, from the first that it predicts on; `None` if there are too few.
+fn unpredicted(values: &[f64]) -> Option<Vec<f64>> {
+    let rows = values.len().checked_sub(ORDER)?;
+    if rows < 4 * ORDER {
+        return None;
+    }
+    let design = DMatrix::from_fn(rows, ORDER + 1, |i, k| match k {
+        ORDER => 1.0,
+        _ => values[i + ORDER - 1 - k],
+    });
+    let right = DVector::from_column_slice(&values[ORDER..]);
+    let mut equations = design.tr_mul(&design);
+    for i in 0..=ORDER {
+        equations[(i, i)] *= 1.0 + RIDGE;
+    }
+    let solved = equations.cholesky()?.solve(&design.tr_mul(&right));
+    let left = right - design * solved;
+    let none = std::iter::repeat_n(0.0, ORDER);
+    Some(none.chain(left.iter().map(|e| e.abs())).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Decays of a stand, by their formula, each from a sample on with its amplitude.
+    fn decays(hits: &[(usize, f64)], noise: f64, count: usize) -> Vec<f64> {
+        let mut state = 1_u64;
+        let one = |i: usize| {
+            let from = |(at, size): &(usize, f64)| {
+                let t = i.checked_sub(*at).map_or(0.0, |t| t as f64);
+                size * (-0.003 * t).exp() * (0.2 * t).sin()
+            };
+            hits.iter().map(from).sum::<f64>()
+        };
+        let noise = |_| {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            noise * ((state >> 33) as f64 / f64::from(1_u32 << 31) - 0.5)
+        };
+        let noise: Vec<f64> = (0..count).map(noise).collect();
+        (0..count).map(|i| one(i) + noise[i]).collect()
+    }
+
+    #[test]
+    fn a_second_hit_is_found_and_a_decay_is_one_part() {
+        for noise in [0.0, 1e-3, 1e-2, 0.1] {
+            let one = decays(&[(0, 1.0)], noise, 3000);
+            let found = parts(&one, 40);
+            assert_eq!((found.len(), &found[0]), (1, &(0..3000)), "noise {noise}");
+        }
+        for (at, size) in [(200, -0.4), (500, 0.3), (1000, 0.1)] {
+            let two = decays(&[(0, 1.0), (at, size)], 1e-3, 3000);
+            let found = parts(&two, 40);
+            assert_eq!(found.len(), 2, "at {at}: {found:?}");
+            // Its sine is still zero at the hit.
+            assert!(found[0].end.abs_diff(at) < 3, "{found:?}");
+            assert!((at..at + 40).contains(&found[1].start), "{found:?}");
+        }
+    }
+
+    #[test]
+    fn lost_samples_and_an_overload_are_found() {
+        let mut joined = decays(&[(0, 1.0)], 1e-3, 3000);
+        joined.drain(300..315);
+        let found = parts(&joined, 40);
+        assert_eq!(found.len(), 2);
+        assert!(found[0].end.abs_diff(300) < 3, "{found:?}");
+        let mut over = decays(&[(0, 1.0)], 1e-3, 3000);
+        over[..100].fill(1.0);
+        let found = parts(&over, 40);
+        // The overload does not ring.
+        assert_eq!(found.len(), 1);
+        assert!((100..140).contains(&found[0].start), "{found:?}");
+    }
+}

@@ -1,0 +1,157 @@
+//! Modes of a fit that are none of the stand: of drift, of AC coupling, of steady tones, or beyond all frequencies of the
+//! records.
+//!
+//! A record that is coupled through a high-pass s/(s + a) has the response H(s) − H(s) a/(s + a): that of the stand, and one
+//! more pole far below. A drift beside a hit looks the same. Such a pole is needed in the fit, and has no part in what the
+//! stand does at rest.
+
+use std::f64::consts::TAU;
+
+use torqcomp_model::Covariance;
+
+use super::Modal;
+use super::blocks::Set;
+use crate::failure::{ErrorCode, Failure};
+use crate::identify::{Identification, Pole};
+use crate::print::rounded;
+
+/// Damping ratio from which a mode far below the others does not ring.
+const RINGS: f64 = 0.3;
+/// Natural frequency of such a mode, over that of the strongest, below which it is coupling or drift.
+const FAR_BELOW: f64 = 0.1;
+/// Lines of a block up to which it is.
+const SLOW: f64 = 10.0;
+/// Standard uncertainties by which a mode's decay rate must differ from zero, and part of its amplitude, as an exponent, that
+/// it must lose within a block; one of both is enough.
+const DECAYS: (f64, f64) = (2.0, 0.3);
+
+/// Why a mode is none of the stand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Foreign {
+    /// Slower than a block shows, or much slower than the others without ringing.
+    Drift,
+    /// Above all frequencies of the records.
+    OutOfReach,
+    /// Without a damping that the records show.
+    Steady,
+}
+
+fn natural_hz(pole: &Pole) -> f64 {
+    pole.rate_per_s.hypot(pole.omega_rad_per_s) / TAU
+}
+
+/// Whether a mode has no damping and is no drift.
+pub(super) fn is_undamped(pole: &Pole, set: &Set) -> bool {
+    pole.rate_per_s == 0.0 && natural_hz(pole) >= set.step_hz
+}
+
+/// Marks the modes that are none of the stand, unless none is left.
+pub(super) fn mark(modal: &mut Modal, covariance: &Covariance, set: &Set) {
+    let found = kinds(modal, covariance, set);
+    if found.contains(&None) {
+        modal.foreign = found;
+    }
+}
+
+fn kinds(modal: &Modal, covariance: &Covariance, set: &Set) -> Vec<Option<Foreign>> {
+    let highest_hz = set.step_hz * (set.blocks[0].applied.len() - 1) as f64;
+    let strongest = (0..modal.poles.len()).max_by(|a, b| {
+        let size = |k: usize| modal.residue(k).0.norm() / modal.poles[k].rate_per_s.max(1e-12);
+        let rings =
+            |k: usize| modal.poles[k].rate_per_s < RINGS * TAU * natural_hz(&modal.poles[k]);
+        (rings(*a), size(*a))
+            .partial_cmp(&(rings(*b), size(*b)))
+            .unwrap_or(std::cmp::Ordering::Equal)
+    });
+    let strongest_hz = strongest.map_or(0.0, |k| natural_hz(&modal.poles[k]));
+    let one = |(k, pole): (usize, &Pole)| {
+        let natural_hz = natural_hz(pole);
+        let is_slow = natural_hz < FAR_BELOW * strongest_hz
+            && natural_hz < SLOW * set.step_hz
+            && pole.rate_per_s > RINGS * TAU * natural_hz;
+        let is_uncertain = covariance
+            .std(2 * k)
+            .is_some_and(|std| pole.rate_per_s < DECAYS.0 * std);
+        let is_steady = is_uncertain && pole.rate_per_s < DECAYS.1 * set.step_hz;
+        if natural_hz < set.step_hz || is_slow {
+            Some(Foreign::Drift)
+        } else if natural_hz > highest_hz {
+            Some(Foreign::OutOfReach)
+        } else if pole.rate_per_s == 0.0 || is_steady {
+            Some(Foreign::Steady)
+        } else {
+            None
+        }
+    };
+    modal.poles.iter().enumerate().map(one).collect()
+}
+
+/// Whether the fit says what the stand does at rest: a mode out of reach may take any part of it.
+pub(super) fn has_rest(modal: &Modal) -> bool {
+    !modal.foreign.contains(&Some(Foreign::OutOfReach))
+}
+
+/// Warns about the modes that were left out.
+///
+/// # Errors
+/// If a stand file is to be written and no mode has a damping.
+pub(super) fn warn(
+    result: &mut Identification,
+    modal: &Modal,
+    is_written: bool,
+) -> Result<(), Failure> {
+    if is_written && modal.poles.iter().all(|pole| pole.rate_per_s == 0.0) {
+        return Err(Failure::failed(ErrorCode::NotIdentifiable, NONE));
+    }
+    let of_kind = |kind: Foreign| -> Vec<String> {
+        let all = modal.poles.iter().zip(&modal.foreign);
+        let chosen = all.filter(|(_, found)| **found == Some(kind));
+        chosen
+            .map(|(pole, _)| rounded(natural_hz(pole), 5))
+            .collect()
+    };
+    let drift = of_kind(Foreign::Drift);
+    if !drift.is_empty() {
+        result.warn(
+            "ac-coupled-or-drift",
+            format!(
+                "the fit needs a slow part, at {} Hz: a channel drifts or is AC coupled; this part is left out of the modes and \
+                 of the static gain, which then rests on the modes alone; record both channels with DC coupling, or check \
+                 the static gain with a weight",
+                drift.join(", ")
+            ),
+        );
+    }
+    let beyond = of_kind(Foreign::OutOfReach);
+    if !beyond.is_empty() {
+        result.warn(
+            "mode-out-of-reach",
+            format!(
+                "the fit has a mode at {} Hz, above all frequencies of the records: it is left out, and the static gain is not \
+                 determined; narrow the --band, or choose fewer --modes",
+                beyond.join(", ")
+            ),
+        );
+    }
+    undamped(result, &of_kind(Foreign::Steady));
+    Ok(())
+}
+
+/// Warns about modes without damping, by their frequencies.
+pub(super) fn undamped(result: &mut Identification, frequencies_hz: &[String]) {
+    if !frequencies_hz.is_empty() {
+        result.warn(
+            "undamped-left-out",
+            format!(
+                "the modes at {} Hz have no damping that these data show and are left out: a steady tone (of the mains, of a \
+                 fan), noise or a nonlinear stand makes such modes; switch off what hums, choose fewer --modes, or record \
+                 at one level and for longer",
+                frequencies_hz.join(", ")
+            ),
+        );
+    }
+}
+
+/// Said where no mode is one of the stand.
+pub(super) const NONE: &str =
+    "no mode has a damping that these records show; record for longer, or choose another --band";

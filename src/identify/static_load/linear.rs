@@ -1,0 +1,85 @@
+//! Whether a straight line describes the readings.
+//!
+//! The means of the readings at each load are compared with the curve, and with the scatter about these means: a load is
+//! applied again with that error, whatever the characteristic is (lack of fit; N. R. Draper, H. Smith, Applied Regression
+//! Analysis, 3rd ed., 1998, 2.1).
+
+use super::{Point, SAME, value_of};
+use crate::identify::{Identification, rms};
+use crate::print::rounded;
+
+/// Distance of the means from the curve over what their scatter explains, and over the deflection at the largest load, from
+/// which there is a warning.
+const OFF: (f64, f64) = (5.0, 1e-3);
+/// Step of the mean between the two largest loads, over that of the curve, below which the reading stands.
+const STANDS: f64 = 0.2;
+/// Fewest loads.
+const LEAST: usize = 3;
+
+/// Warns about readings that a curve of this degree does not follow.
+pub(super) fn warn(
+    result: &mut Identification,
+    points: &[Point],
+    curve: &[f64],
+    steps: &[f64],
+    largest: f64,
+) {
+    let at = |step: f64| -> Vec<f64> {
+        let near = points
+            .iter()
+            .filter(|p| (p.load - step).abs() <= SAME * largest);
+        near.map(|p| p.reading - value_of(curve, p.load)).collect()
+    };
+    let groups: Vec<Vec<f64>> = steps.iter().map(|step| at(*step)).collect();
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let means: Vec<f64> = groups.iter().map(|group| mean(group)).collect();
+    let about: Vec<f64> = groups
+        .iter()
+        .zip(&means)
+        .flat_map(|(group, mean)| group.iter().map(move |v| v - mean))
+        .collect();
+    let freedom = points.len().saturating_sub(steps.len());
+    if freedom == 0 || steps.len() < LEAST {
+        return;
+    }
+    let scatter = rms(&about) * (about.len() as f64 / freedom as f64).sqrt();
+    let each = (points.len() as f64 / steps.len() as f64).sqrt();
+    let off = rms(&means);
+    let deflection = (value_of(curve, largest) - curve[0]).abs();
+    if off <= OFF.0 * scatter / each || off <= OFF.1 * deflection {
+        return;
+    }
+    let why = match limit(&means, curve, steps, largest) {
+        Some(load) => format!(
+            "the reading hardly rises beyond the load {}: amplifier or recorder is at its limit; leave out the loads beyond, and \
+             choose a larger range",
+            rounded(load, 4)
+        ),
+        None => "the characteristic is curved, or one load or reading is wrong: look at the residual (--html), and use --degree 3 \
+                 if it bends evenly"
+            .to_owned(),
+    };
+    result.warn(
+        "not-linear",
+        format!(
+            "the mean readings lie {} % of the deflection off the curve, {} times what their scatter explains: {why}",
+            rounded(100.0 * off / deflection, 2),
+            rounded(off * each / scatter.max(f64::MIN_POSITIVE), 2)
+        ),
+    );
+}
+
+/// The load from which the reading hardly rises up to the largest one, if it does not; `means` are those of the residual.
+fn limit(means: &[f64], curve: &[f64], steps: &[f64], largest: f64) -> Option<f64> {
+    let rises = |from: usize, to: usize| {
+        let rise = value_of(curve, steps[to]) - value_of(curve, steps[from]);
+        (means[to] - means[from]) / rise + 1.0
+    };
+    let count = steps.len();
+    let ends = [(count - 2, count - 1), (1, 0)];
+    let mut loaded = ends
+        .into_iter()
+        .filter(|(_, to)| steps[*to].abs() > 0.5 * largest);
+    let (from, _) = loaded.find(|(from, to)| rises(*from, *to) < STANDS)?;
+    Some(steps[from])
+}
