@@ -342,6 +342,29 @@ fn a_number_that_is_none_is_seen() {
     }
 }
 
+/// Every four bytes of the records of a summary, taken for the length of a text of 4 GiB.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_length_that_a_summary_claims_takes_no_memory() {
+    let whole = fs::read(workplace().join("made/ros2.mcap")).expect("a recording");
+    let end = whole.len() - mcap::MAGIC.len();
+    // The end record: opcode and length, then where the summary begins.
+    let footer = &whole[end - 20..end];
+    let start = u64::from_le_bytes(footer[..8].try_into().expect("eight bytes")) as usize;
+    assert!(start > 0 && start < end, "no summary");
+    let folder = tempfile::tempdir().expect("a folder");
+    let words = ["extract", "broken.mcap", "--topic", "/temperature"];
+    let words: Vec<String> = words.into_iter().map(str::to_owned).collect();
+    let mut found = Vec::new();
+    for at in (start..end - 29).step_by(2) {
+        let mut broken = whole.clone();
+        broken[at..at + 4].copy_from_slice(&0xfff0_0000_u32.to_le_bytes());
+        fs::write(folder.path().join("broken.mcap"), broken).expect("a file");
+        found.extend(finding(&words, folder.path()).map(|what| format!("byte {at}: {what}")));
+    }
+    assert!(found.is_empty(), "{found:#?}");
+}
+
 #[test]
 fn damage_of_any_kind_ends_in_a_result_or_a_message() {
     let seeds: Vec<Vec<String>> = commands()

@@ -40,29 +40,6 @@ pub struct TopicChannel {
 }
 
 impl Channels {
-    /// The channels that the summary of a file repeats.
-    pub(super) fn of_summary(summary: &mcap::Summary) -> Self {
-        let mut channels = Self::default();
-        for schema in summary.schemas.values() {
-            channels.add_schema(DeclaredSchema {
-                id: schema.id,
-                name: schema.name.clone(),
-                encoding: schema.encoding.clone(),
-                data: schema.data.to_vec(),
-            });
-        }
-        for channel in summary.channels.values() {
-            channels.add_channel(records::Channel {
-                id: channel.id,
-                schema_id: channel.schema.as_ref().map_or(0, |schema| schema.id),
-                topic: channel.topic.clone(),
-                message_encoding: channel.message_encoding.clone(),
-                metadata: channel.metadata.clone(),
-            });
-        }
-        channels
-    }
-
     /// Takes note of a schema or a channel; other records are left alone.
     pub fn note(&mut self, op: u8, body: &[u8]) {
         // Message indexes need not be parsed.

@@ -3,15 +3,14 @@
 use std::fs::File;
 use std::io::{Cursor, Read, Seek, SeekFrom};
 
-use mcap::records::op;
-use mcap::sans_io::summary_reader::{SummaryReadEvent, SummaryReader, SummaryReaderOptions};
-use mcap::{MAGIC, Summary};
+use mcap::MAGIC;
+use mcap::records::{ChunkIndex, Footer, Record, Statistics, op};
 
 use super::channels::Channels;
-use super::record::RawMessage;
-use super::record::file::longest;
+use super::record::file::FOOTER;
 use super::record::input::CountedInput;
 use super::record::reader::RecordReader;
+use super::record::{self, RawMessage, split_record};
 use super::selection::FieldRequest;
 use super::signal::{SelectedSignal, TimeOptions, TopicSignal};
 use crate::io::Input;
@@ -26,36 +25,80 @@ pub struct SignalEnd {
     pub messages: u64,
 }
 
-/// A file and its summary; `None` if it cannot be sought, or has no summary that is whole.
-pub(super) fn summary(input: &Input) -> Option<(Stored<File>, Summary)> {
+/// The summary of a file.
+struct Summary {
+    channels: Channels,
+    chunks: Vec<ChunkIndex>,
+    statistics: Option<Statistics>,
+}
+
+impl Summary {
+    /// Reads it; `None` if there is none, the file cannot be sought, or a record of it cannot be read. The summary reader
+    /// of `mcap` does not suffice: it reserves memory for any length of a text that a chunk index claims.
+    fn read(input: &Input) -> Option<Self> {
+        let Input::File(path) = input else {
+            return None;
+        };
+        let length = Stored::open(path).ok()?.metadata().ok()?.len();
+        let end = length.checked_sub((FOOTER + MAGIC.len()) as u64)?;
+        let mut footer = Vec::new();
+        let mut file = open_at(input, end)?;
+        file.read_to_end(&mut footer).ok()?;
+        let Some((op::FOOTER, body)) = split_record(&footer) else {
+            return None;
+        };
+        let Record::Footer(Footer {
+            summary_start: start @ 1..,
+            ..
+        }) = mcap::parse_record(op::FOOTER, body).ok()?
+        else {
+            return None;
+        };
+        let mut records = records_at(input, start, length.checked_sub(start)?)?;
+        let mut found = Self {
+            channels: Channels::default(),
+            chunks: Vec::new(),
+            statistics: None,
+        };
+        while let Some((op, body)) = records.next().ok()? {
+            match op {
+                op::SCHEMA | op::CHANNEL => {
+                    record::parse(op, body)?;
+                    found.channels.note(op, body);
+                }
+                op::CHUNK_INDEX => found.chunks.push(record::read_chunk_index(body)?),
+                op::STATISTICS => match mcap::parse_record(op, body).ok()? {
+                    Record::Statistics(statistics) => found.statistics = Some(statistics),
+                    _ => return None,
+                },
+                _ => {}
+            }
+        }
+        records.is_closed().then_some(found)
+    }
+}
+
+/// A file from a byte on.
+fn open_at(input: &Input, at: u64) -> Option<Stored<File>> {
     let Input::File(path) = input else {
         return None;
     };
     let mut file = Stored::open(path).ok()?;
-    let length = file.metadata().ok()?.len();
-    let options = SummaryReaderOptions::default()
-        .with_file_size(length)
-        .with_record_length_limit(longest(op::CHANNEL) as usize);
-    let mut reader = SummaryReader::new_with_options(options);
-    while let Some(event) = reader.next_event() {
-        match event.ok()? {
-            // A damaged length: no memory is taken for what the file cannot hold.
-            SummaryReadEvent::ReadRequest(count) if count as u64 > length => return None,
-            SummaryReadEvent::ReadRequest(count) => {
-                let read = file.read(reader.insert(count)).ok()?;
-                reader.notify_read(read);
-            }
-            SummaryReadEvent::SeekRequest(to) => reader.notify_seeked(file.seek(to).ok()?),
-        }
-    }
-    Some((file, reader.finish()?))
+    file.seek(SeekFrom::Start(at)).ok()?;
+    Some(file)
+}
+
+/// The records of a part of a file.
+fn records_at(input: &Input, at: u64, length: u64) -> Option<RecordReader> {
+    let stream = Cursor::new(MAGIC).chain(open_at(input, at)?.take(length));
+    RecordReader::new(input.name(), CountedInput::new(Box::new(stream))).ok()
 }
 
 /// The channels of a file, if its summary repeats all of them.
 pub(super) fn channels(input: &Input) -> Option<Channels> {
-    let (_, summary) = summary(input)?;
-    let count = summary.stats.as_ref()?.channel_count as usize;
-    (count > 0 && count == summary.channels.len()).then(|| Channels::of_summary(&summary))
+    let summary = Summary::read(input)?;
+    let count = summary.statistics?.channel_count as usize;
+    (count > 0 && count == summary.channels.iter().count()).then_some(summary.channels)
 }
 
 /// The end of a signal, told from the summary and the chunk with its latest messages.
@@ -65,23 +108,20 @@ pub(super) fn signal_end(
     selected: &SelectedSignal,
     options: &TimeOptions,
 ) -> Option<SignalEnd> {
-    let (mut file, summary) = summary(input)?;
+    let mut summary = Summary::read(input)?;
     let is_ours = |id: &u16| {
-        let channel = summary.channels.get(id);
-        channel.is_some_and(|channel| channel.topic == selected.topic)
+        let channel = summary.channels.get(*id);
+        channel.is_some_and(|channel| channel.record.topic == selected.topic)
     };
-    let counts = &summary.stats.as_ref()?.channel_message_counts;
+    let counts = &summary.statistics.as_ref()?.channel_message_counts;
     let messages = counts.iter().filter(|(id, _)| is_ours(id));
     let messages = messages.map(|(_, count)| count).sum();
     let ours = summary
-        .chunk_indexes
+        .chunks
         .iter()
         .filter(|chunk| chunk.message_index_offsets.keys().any(is_ours));
     let last = ours.max_by_key(|chunk| chunk.message_end_time)?;
-    file.seek(SeekFrom::Start(last.chunk_start_offset)).ok()?;
-    let stream = Cursor::new(MAGIC).chain(file.take(last.chunk_length));
-    let mut records = RecordReader::new(input.name(), CountedInput::new(Box::new(stream))).ok()?;
-    let mut channels = Channels::of_summary(&summary);
+    let mut records = records_at(input, last.chunk_start_offset, last.chunk_length)?;
     let options = TimeOptions {
         time: Some(selected.time.choice),
         ..options.clone()
@@ -89,16 +129,16 @@ pub(super) fn signal_end(
     let mut signal = None;
     while let Some((op, body)) = records.next().ok()? {
         if op != op::MESSAGE {
-            channels.note(op, body);
+            summary.channels.note(op, body);
             continue;
         }
         let message = RawMessage::read(body)?;
         if signal.is_none() {
-            let found = TopicSignal::find(request, &message, &channels, &options, "");
+            let found = TopicSignal::find(request, &message, &summary.channels, &options, "");
             signal = found.transpose().ok()?;
         }
         if let Some(signal) = &mut signal {
-            signal.take(&message, &channels).ok()?;
+            signal.take(&message, &summary.channels).ok()?;
         }
     }
     let mut signal = signal?;

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use mcap::records::{Record, op};
 
 use super::file::{Loss, Losses};
-use super::{indexed_chunk, parse};
+use super::{parse, read_chunk_index};
 
 /// Counts of what passed, and what the file says of it.
 #[derive(Debug, Default)]
@@ -48,8 +48,8 @@ impl Census {
             },
             op::SCHEMA if parse(op, body).is_none() => losses.add(Loss::Unreadable { at, op }),
             op::ATTACHMENT => self.attachments += 1,
-            op::CHUNK_INDEX => match indexed_chunk(body) {
-                Some(start) => drop(self.indexed.insert(start)),
+            op::CHUNK_INDEX => match read_chunk_index(body) {
+                Some(index) => drop(self.indexed.insert(index.chunk_start_offset)),
                 None => losses.add(Loss::Unreadable { at, op }),
             },
             op::STATISTICS => match mcap::parse_record(op, body) {

@@ -19,7 +19,7 @@ static LONGEST_METADATA: AtomicU64 = AtomicU64::new(64 << 20);
 /// Bytes of an attachment that are looked at: its names.
 const ATTACHMENT_FRONT: u64 = 1 << 16;
 /// Bytes of an end record.
-const FOOTER: usize = RECORD_HEAD + 20;
+pub(crate) const FOOTER: usize = RECORD_HEAD + 20;
 /// Opcodes that no version of the format has given a meaning, up to those that anybody may use.
 const FIRST_RESERVED: u8 = 0x10;
 const FIRST_PRIVATE: u8 = 0x80;

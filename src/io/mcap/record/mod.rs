@@ -9,7 +9,7 @@ pub mod reader;
 
 use std::collections::BTreeMap;
 
-use mcap::records::{AttachmentHeader, Record, op};
+use mcap::records::{AttachmentHeader, ChunkIndex, Record, op};
 
 use fields::RecordFields;
 
@@ -53,18 +53,18 @@ fn mended(op: u8, body: &[u8]) -> Option<Vec<u8>> {
     Some(mended)
 }
 
-/// Where the chunk of a chunk index begins, if all of the index is there.
-fn indexed_chunk(body: &[u8]) -> Option<u64> {
+/// The index of a chunk, if all of it is there.
+pub(crate) fn read_chunk_index(body: &[u8]) -> Option<ChunkIndex> {
     let mut fields = RecordFields { rest: body };
-    // First and last time; then the place and length of the chunk, those of its indexes, compression, sizes.
-    fields.take(16)?;
-    let start = fields.u64()?;
-    fields.take(8)?;
+    // First and last time, place and length of the chunk; those of its indexes; compression, sizes.
+    fields.take(32)?;
     fields.bytes()?;
     fields.take(8)?;
     fields.bytes()?;
-    fields.take(16)?;
-    Some(start)
+    match mcap::parse_record(op::CHUNK_INDEX, body).ok()? {
+        Record::ChunkIndex(index) => Some(index),
+        _ => None,
+    }
 }
 
 fn push(record: &mut Vec<u8>, bytes: &[u8]) {
@@ -128,7 +128,7 @@ pub(crate) fn each_record(records: &[u8], mut each: impl FnMut(u8, &[u8])) {
 const RECORD_HEAD: usize = 9;
 
 /// Opcode and body of the record at the front, if it is whole.
-fn split_record(records: &[u8]) -> Option<(u8, &[u8])> {
+pub(super) fn split_record(records: &[u8]) -> Option<(u8, &[u8])> {
     let (op, length) = record_head(records)?;
     let body = records[RECORD_HEAD..].get(..usize::try_from(length).ok()?)?;
     Some((op, body))
