@@ -124,6 +124,21 @@ fn the_last_digit_of_a_display_is_part_of_the_uncertainty() {
     assert!((value - 1.0 / 0.0488).abs() < 2.0 * std.unwrap(), "{value}");
 }
 
+/// The square of such a reading is no number, nor is any residual.
+#[test]
+fn a_reading_beyond_all_instruments_is_refused() {
+    let folder = Folder::new();
+    folder.write(
+        "loads.csv",
+        "load (N m),reading (V)\n0,0.01\n2,-1e308\n4,0.4\n6,0.6\n0,0.01\n",
+    );
+    let args = ["identify", "static", "loads.csv"];
+    let columns = ["--load", "load", "--reading", "reading"];
+    folder
+        .run(&[&args[..], &columns].concat())
+        .says(1, &["row 2", "\"reading\"", "-1e308"]);
+}
+
 /// Loads of both signs, readings without: nothing follows anything, and no stand file comes of it.
 #[test]
 fn readings_that_do_not_follow_the_load_are_refused() {

@@ -488,3 +488,20 @@ fn a_gage_factor_of_no_gage_is_asked() {
     assert!(drawing("0.02") && drawing("\"2 %\"") && drawing("200"));
     assert!(!drawing("2.05") && !drawing("157"));
 }
+
+/// A period of no sample divides nothing, one of a single sample holds no line.
+#[test]
+fn a_period_without_lines_is_refused() {
+    let (force, shown) = hits(&[(0.1, 100.0), (1.1, 100.0)], 0.002, 10_000);
+    let folder = Folder::new();
+    let rows = force.iter().copied().zip(shown);
+    folder.write("hits.csv", table(["force (N)", "bridge (V)"], rows));
+    for period in ["0", "1"] {
+        let args = ["identify", "response", "hits.csv", "--rate", "5000"];
+        let columns = ["--applied", "force", "--measured", "bridge"];
+        let how = ["--excitation", "periodic", "--period", period];
+        folder
+            .run(&[&args[..], &columns, &how].concat())
+            .says(2, &["--period"]);
+    }
+}

@@ -19,6 +19,9 @@ const MASS: Dimension = Dimension::new([1, 0, 0, 0, 0, 0]);
 /// Gravity on the ground, mountains included, in m/s².
 const ON_EARTH: std::ops::RangeInclusive<f64> = 9.76..=9.84;
 
+/// Largest load or reading; the squares of larger ones are no numbers any more.
+const LARGEST: f64 = 1e150;
+
 /// Runs the test.
 pub fn run(args: &Static) -> Result<Outcome, Failure> {
     if args.table.resample {
@@ -206,6 +209,17 @@ fn numbers(
 fn column(recording: &Recording, choice: &ChannelChoice) -> Result<(Vec<f64>, NamedUnit), Failure> {
     let channel = recording.channel(choice)?;
     check_holes(channel)?;
+    if let Some(row) = channel.samples.iter().position(|v| v.abs() > LARGEST) {
+        return Err(Failure::failed(
+            ErrorCode::InvalidSample,
+            format_args!(
+                "row {} of column \"{}\" is {:e}, which no instrument reads; correct the cell, or leave the row out",
+                row + 1,
+                channel.name,
+                channel.samples[row]
+            ),
+        ));
+    }
     let (unit, _) = unit_of(choice, &channel.heading, channel.unit.as_ref())?;
     let flag = choice.flags.unit.unwrap_or_default();
     let named = RecordedChannel {
