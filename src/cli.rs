@@ -5,6 +5,7 @@ mod help;
 pub mod identify;
 pub mod init;
 pub(crate) mod many;
+mod messages;
 mod pages;
 pub mod simulate;
 mod values;
@@ -24,11 +25,12 @@ pub use diagnose::Diagnose;
 pub(crate) use help::command;
 pub(crate) use help::parse;
 pub use many::{BatchOptions, Merge};
+pub use messages::{Messages, ProgressMode};
 pub use pages::{Completions, Man, Schema};
 pub use simulate::Simulate;
 pub use values::{BandOption, Orders};
 use values::{band, digits, orders, percent, range, svg_file, warning_code};
-pub(crate) use wrong::{is_json_asked, wrong_usage};
+pub(crate) use wrong::{is_json_asked, log_asked, wrong_usage};
 
 /// Version, commit and target of this build.
 const BUILD: &str = concat!(
@@ -53,6 +55,9 @@ pub struct Cli {
     /// What to do.
     #[command(subcommand)]
     pub verb: Verb,
+    /// What is said meanwhile.
+    #[command(flatten)]
+    pub messages: Messages,
     /// The options given that a result may depend on, as `--name=value`.
     #[arg(skip)]
     pub options: Vec<String>,
@@ -92,18 +97,6 @@ pub enum Verb {
 }
 
 impl Verb {
-    /// Whether only warnings go to standard error.
-    pub(crate) fn is_quiet(&self) -> bool {
-        match self {
-            Self::Compensate(args) => args.work.quiet,
-            Self::Diagnose(args) => args.work.quiet,
-            Self::Extract(args) => args.quiet,
-            Self::Merge(args) => args.quiet,
-            Self::Simulate(args) => args.quiet,
-            _ => false,
-        }
-    }
-
     /// How its records are read, if it reads any.
     pub(crate) fn reading(&self) -> Option<&Reading> {
         match self {
@@ -229,9 +222,6 @@ pub struct Work {
     /// Threads to use [default: one for each core, at most 8]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     pub threads: Option<u16>,
-    /// Print only warnings to standard error
-    #[arg(short, long)]
-    pub quiet: bool,
 }
 
 impl Work {
@@ -331,9 +321,6 @@ pub struct Extract {
     /// What makes a warning a failure.
     #[command(flatten)]
     pub strictness: Strictness,
-    /// Print only warnings to standard error
-    #[arg(short, long)]
-    pub quiet: bool,
 }
 
 /// How far around the given fundamental `harmonics --refine` searches, in percent.

@@ -230,7 +230,7 @@ pub const SCHEMA: &str = "torqcomp.error/1";
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ErrorDocument<'a> {
     /// Why the command failed.
-    error: ErrorReport<'a>,
+    pub(crate) error: ErrorReport<'a>,
 }
 
 /// Why a command failed.

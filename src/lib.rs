@@ -11,10 +11,12 @@ pub mod failure;
 pub mod identify;
 pub mod inverse;
 pub mod io;
+mod log;
 pub mod outcome;
 mod parallel;
 mod pipeline;
 pub mod print;
+mod progress;
 mod provenance;
 pub mod quality;
 pub mod recording;
@@ -35,19 +37,38 @@ pub fn run() -> ExitCode {
         Ok(cli) => cli,
         Err(stopped) => return stopped_by(&stopped),
     };
+    print::set_quiet(cli.messages.quiet);
+    progress::choose(cli.messages.progress, cli.messages.quiet);
     let reading = cli.verb.reading();
     if let Some(mebibytes) = reading.and_then(|reading| reading.longest_metadata) {
         io::mcap::limit_metadata(mebibytes << 20);
     }
-    match commands::run(cli) {
-        Ok(outcome) => ExitCode::from(outcome.exit_code()),
+    let begun = cli.messages.log.as_deref().map_or(Ok(()), log::begin);
+    let code = match begun.and_then(|()| commands::run(cli)) {
+        Ok(outcome) => outcome.exit_code(),
+        Err(failure) => failed(&failure),
+    };
+    ExitCode::from(logged(code))
+}
+
+/// Says what kept the command from being done; the exit code.
+fn failed(failure: &failure::Failure) -> u8 {
+    let code = failure.exit_code();
+    if code != 0 {
+        print::say(&format!("torqcomp: {failure}\n"));
+        log::failure(failure);
+    }
+    print_document(failure);
+    code
+}
+
+/// Ends the log; the exit code of a run that would have ended with this one.
+fn logged(code: u8) -> u8 {
+    match log::end(code) {
+        Ok(()) => code,
         Err(failure) => {
-            let code = failure.exit_code();
-            if code != 0 {
-                print::say(&format!("torqcomp: {failure}\n"));
-            }
-            print_document(&failure);
-            ExitCode::from(code)
+            print::say(&format!("torqcomp: {failure}\n"));
+            code.max(failure.exit_code())
         }
     }
 }
@@ -56,13 +77,15 @@ pub fn run() -> ExitCode {
 fn stopped_by(stopped: &clap::Error) -> ExitCode {
     // Nobody may be there to read it.
     let _ = stopped.print();
-    match cli::wrong_usage(stopped) {
-        Some(failure) => {
-            print_document(&failure);
-            ExitCode::from(failure.exit_code())
-        }
-        None => ExitCode::SUCCESS,
+    let Some(failure) = cli::wrong_usage(stopped) else {
+        return ExitCode::SUCCESS;
+    };
+    // The words of the usage are the ones to say; that the log cannot be written as well would hide them.
+    if cli::log_asked().is_some_and(|path| log::begin(&path).is_ok()) {
+        log::failure(&failure);
     }
+    print_document(&failure);
+    ExitCode::from(logged(failure.exit_code()))
 }
 
 /// Prints a failure as a JSON document where a report was asked for as one and did not appear.

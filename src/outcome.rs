@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::failure::Failure;
 use crate::io::output::{self, Output};
-use crate::print;
 use crate::warning::Warning;
+use crate::{log, print};
 
 /// How a command ended well.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,7 +52,9 @@ pub(crate) struct Made {
     pub(crate) outputs: Vec<Output>,
     /// JSON document for standard output.
     pub(crate) document: Option<String>,
-    /// Report and warnings for standard error.
+    /// Report for standard error.
+    pub(crate) notes: String,
+    /// Warnings for standard error.
     pub(crate) talk: String,
     pub(crate) warnings: Vec<Warning>,
     pub(crate) outcome: Outcome,
@@ -70,7 +72,9 @@ impl Made {
             output::print(document)?;
         }
         output::finish_all(self.outputs)?;
+        print::note(&self.notes);
         print::say(&self.talk);
+        log::warnings(None, &self.warnings);
         Ok(self.outcome)
     }
 

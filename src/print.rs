@@ -8,6 +8,7 @@ use serde::Serialize;
 use unicode_width::UnicodeWidthStr;
 
 use crate::io::digits;
+use crate::progress;
 
 /// A JSON document, indented, with a line end.
 ///
@@ -15,7 +16,16 @@ use crate::io::digits;
 /// Never: the reports have string keys and no failing parts.
 #[must_use]
 pub fn json(report: &impl Serialize) -> String {
-    let text = serde_json::to_string_pretty(report).expect("reports are plain data");
+    escaped(serde_json::to_string_pretty(report))
+}
+
+/// The same on one line.
+pub(crate) fn json_line(entry: &impl Serialize) -> String {
+    escaped(serde_json::to_string(entry))
+}
+
+fn escaped(text: serde_json::Result<String>) -> String {
+    let text = text.expect("reports are plain data");
     let mut text = written_out(text, |c| format!("\\u{:04x}", u32::from(c)));
     text.push('\n');
     text
@@ -60,39 +70,28 @@ pub(crate) struct Document<'a, R> {
 
 /// Says something to a person on standard error. Nobody may be there to read it: that is no failure.
 pub fn say(text: &str) {
-    if IS_LINE_SHOWN.swap(false, Ordering::Relaxed) {
-        show("\r\x1b[K");
+    use std::io::Write;
+    if text.is_empty() {
+        return;
     }
-    show(&visible(text.to_owned()));
+    progress::clear();
+    let text = visible(text.to_owned());
+    let _ = std::io::stderr().lock().write_all(text.as_bytes());
 }
 
-/// Whether nothing is said of how far the work has got.
+/// Whether notes are left out.
 static IS_QUIET: AtomicBool = AtomicBool::new(false);
 
-/// Whether a line of it stands on the terminal.
-static IS_LINE_SHOWN: AtomicBool = AtomicBool::new(false);
-
-/// Says nothing of how far the work has got from now on.
-pub(crate) fn hide_progress() {
-    IS_QUIET.store(true, Ordering::Relaxed);
+/// Leaves notes out from now on, or not.
+pub(crate) fn set_quiet(is_quiet: bool) {
+    IS_QUIET.store(is_quiet, Ordering::Relaxed);
 }
 
-/// Writes how far the work has got over what the line showed before; an empty text clears the line.
-pub fn say_progress(text: &str) {
+/// Says something that `--quiet` leaves out.
+pub(crate) fn note(text: &str) {
     if !IS_QUIET.load(Ordering::Relaxed) {
-        show_progress(text);
+        say(text);
     }
-}
-
-/// The same of many recordings, where nothing is said of each of them.
-pub(crate) fn show_progress(text: &str) {
-    IS_LINE_SHOWN.store(!text.is_empty(), Ordering::Relaxed);
-    show(&format!("\r{}\x1b[K", visible(text.to_owned())));
-}
-
-fn show(text: &str) {
-    use std::io::Write;
-    let _ = std::io::stderr().lock().write_all(text.as_bytes());
 }
 
 /// A text whose control characters are written out: names out of a file can neither steer a terminal nor break a page.

@@ -17,13 +17,14 @@ use crate::golden::{words, workplace};
 use crate::util::{Folder, HERTEL};
 
 /// Whatever writes, with what it may read and write at once: names that begin with `out` are its outputs.
-const RUNS: [&str; 22] = [
+const RUNS: [&str; 23] = [
     "compensate made/short.csv --channel bridge --stand stands/declared.toml -o out.csv --plot out.svg --html out.html --json",
     "compensate made/short.csv --channel bridge --stand stands/cubic.toml -o out.csv --no-sync",
     "compensate made/short.csv --channel bridge --stand stands/declared.toml --with-recorded",
     "compensate made/blocks.mcap --topic /bridge --field data[:] --spacing dt --unit V --stand stands/declared.toml -o out.mcap",
     "extract made/short.csv --channel speed -o out.csv",
     "extract made/ros2.mcap --signal /joint_states.effort[0] -o out.csv",
+    "extract made/short.csv --channel speed -o out.csv --log run.jsonl --quiet",
     "harmonics made/short.csv --channel bridge --stand stands/declared.toml --fundamental 60 --orders 1,2 -o out.txt",
     "table --stand stands/declared.toml --step 100 -o out.csv",
     "predict --stand stands/drawing.toml -o out.txt --json",

@@ -39,6 +39,7 @@ mod refined;
 mod reports;
 mod schema;
 mod simulate;
+mod standard_error;
 mod stated_std;
 mod table;
 mod text_tables;

@@ -6,6 +6,7 @@ use std::path::Path;
 use super::{manifest, summary};
 use crate::io::MCAP_START;
 use crate::io::storage::Stored;
+use crate::log;
 
 /// Bytes that are looked at.
 const HEAD: u64 = 1 << 16;
@@ -15,7 +16,7 @@ const WIDE_TEXT: [&[u8]; 2] = [b"\xff\xfe", b"\xfe\xff"];
 const STAND: &str = "schema = \"torqcomp.";
 
 /// Whether it begins as an MCAP file does, or as a text with rows of numbers that torqcomp did not write as a stand file,
-/// manifest or summary. A file that cannot be read is one: the reason is said when it is read.
+/// manifest, log or summary. A file that cannot be read is one: the reason is said when it is read.
 pub(super) fn is_recording(path: &Path) -> bool {
     let mut head = Vec::new();
     let read = Stored::open(path).and_then(|file| file.take(HEAD).read_to_end(&mut head));
@@ -30,6 +31,7 @@ pub(super) fn is_recording(path: &Path) -> bool {
     }
     let text = String::from_utf8_lossy(&head);
     let is_ours = text.starts_with(manifest::BEGINNING)
+        || text.starts_with(log::BEGINNING)
         || text.starts_with(&summary::beginning())
         || text.lines().any(|line| line.starts_with(STAND));
     !is_ours && text.lines().any(is_row)

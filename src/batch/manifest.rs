@@ -1,7 +1,6 @@
 //! What was made from what: a file of JSON lines, appended to durably before the results get their names.
 
 use std::collections::{HashMap, HashSet};
-use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -10,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::cli::many::Shard;
 use crate::failure::Failure;
+use crate::io::json_lines::JsonLines;
 use crate::io::{storage, sum};
 use crate::outcome::RecordFigures;
 use crate::warning::Warning;
@@ -369,57 +369,12 @@ pub(super) fn usual(folder: &Path, shard: Option<Shard>) -> PathBuf {
     })
 }
 
-/// A manifest that is appended to.
-pub(super) struct Manifest {
-    path: PathBuf,
-    file: File,
-    sync: bool,
-    /// Whether its last line is cut: the next one begins on a line of its own.
-    is_cut: bool,
-}
-
-impl Manifest {
-    /// Opens a manifest, and makes it if it is not there.
-    ///
-    /// # Errors
-    /// If it cannot be written.
-    pub(super) fn open(path: &Path, sync: bool) -> Result<Self, Failure> {
-        let unwritable = |error| Failure::writing(&path.display().to_string(), &error);
-        let is_cut = storage::ends_without_line(path).map_err(unwritable)?;
-        let file = storage::open_at_end(path).map_err(unwritable)?;
-        if sync {
-            let folder = path
-                .parent()
-                .filter(|folder| !folder.as_os_str().is_empty());
-            storage::sync_folder(folder.unwrap_or(Path::new("."))).map_err(unwritable)?;
-        }
-        Ok(Self {
-            path: path.to_owned(),
-            file,
-            sync,
-            is_cut,
-        })
-    }
-
-    /// Adds a line, which is on the disk afterwards.
-    ///
-    /// # Errors
-    /// If it cannot be written.
-    pub(super) fn append(&mut self, entry: &impl Serialize) -> Result<(), Failure> {
-        let mut line = String::new();
-        if self.is_cut {
-            line.push('\n');
-        }
-        line.push_str(&serde_json::to_string(entry).expect("a line is plain data"));
-        line.push('\n');
-        let written = storage::write_all(&self.file, line.as_bytes());
-        self.is_cut = written.is_err();
-        let synced = written.and_then(|()| match self.sync {
-            true => storage::sync(&self.file),
-            false => Ok(()),
-        });
-        synced.map_err(|error| Failure::writing(&self.path.display().to_string(), &error))
-    }
+/// Opens a manifest to append to, and makes it if it is not there.
+///
+/// # Errors
+/// If it cannot be written.
+pub(super) fn open(path: &Path, sync: bool) -> Result<JsonLines, Failure> {
+    JsonLines::open(path, BEGINNING, sync)
 }
 
 #[cfg(test)]
@@ -437,17 +392,12 @@ mod tests {
         let mut entry = ManifestEntry::new(made_by, "a/ü x.csv", "logs/a/ü x.csv");
         entry.exit = 0;
         entry.figures.rms = Some(0.1);
-        let mut manifest = Manifest::open(&path, true).unwrap();
-        manifest.append(&entry).unwrap();
-        drop(manifest);
+        open(&path, true).unwrap().append([&entry]).unwrap();
         let whole = std::fs::read(&path).unwrap();
         assert!(whole.starts_with(BEGINNING.as_bytes()) && whole.ends_with(b"}\n"));
         for cut in 1..whole.len() {
             std::fs::write(&path, [&whole, &whole[..cut]].concat()).unwrap();
-            Manifest::open(&path, false)
-                .unwrap()
-                .append(&entry)
-                .unwrap();
+            open(&path, false).unwrap().append([&entry]).unwrap();
             let history = History::read(std::slice::from_ref(&path)).unwrap();
             // A line that lacks its end only is whole.
             assert_eq!(history.unread, usize::from(cut < whole.len() - 1), "{cut}");

@@ -9,7 +9,6 @@ mod list;
 mod manifest;
 mod merge;
 mod plan;
-mod progress;
 mod summary;
 
 use std::collections::HashSet;
@@ -27,16 +26,17 @@ pub(crate) use self::summary::BatchReport;
 pub(crate) use self::summary::SCHEMA as BATCH_SCHEMA;
 
 use self::list::Listing;
-use self::manifest::{MadeFrom, Manifest, ManifestEntry, NotedWarning, OutputSum, RunEnd};
+use self::manifest::{MadeFrom, ManifestEntry, NotedWarning, OutputSum, RunEnd};
 pub(crate) use self::plan::NEED_FOLDER;
 use self::plan::{BatchFile, BatchPlan};
-use self::progress::{Amount, BatchProgress};
 use self::summary::{BatchResult, Treated};
 use crate::cli::{BatchOptions, OutputArgs};
 use crate::failure::{ErrorCode, Failure};
+use crate::io::json_lines::JsonLines;
 use crate::io::output::{self, Output, end_of_links};
 use crate::outcome::{Made, Outcome};
-use crate::{parallel, print};
+use crate::progress::{Amount, Progress, Task};
+use crate::{log, parallel, print};
 
 /// What a verb is asked to do with many recordings.
 pub(crate) struct BatchTask<'a> {
@@ -53,7 +53,6 @@ pub(crate) struct BatchTask<'a> {
     pub(crate) as_json: bool,
     /// Whether `--json` is the format of the results, too.
     pub(crate) makes_json: bool,
-    pub(crate) is_quiet: bool,
 }
 
 /// What a verb is to do with one of them.
@@ -148,20 +147,22 @@ pub(crate) fn run(
     let summary = open_summary(task)?;
     let bytes = plan.files.iter().map(|file| file.bytes).sum();
     let all = Amount {
-        files: plan.files.len(),
+        count: plan.files.len() as u64,
         bytes,
     };
-    let mut manifest = Manifest::open(&plan.manifest, task.result.policy().sync)?;
-    manifest.append(&plan.begin())?;
+    let manifest = manifest::open(&plan.manifest, task.result.policy().sync)?;
+    manifest.append([plan.begin()])?;
     let running = Running {
         on_one,
         shared: Mutex::new(Shared {
             manifest,
-            progress: BatchProgress::new(all, task.is_quiet),
+            progress: Progress::new(Task::Recordings),
+            done: Amount::default(),
             failures: 0,
             broken: None,
         }),
         plan: &plan,
+        all,
     };
     let treat = |i: usize| running.treat(&plan.files[i]);
     let treated = parallel::parallel(plan.files.len(), plan.workers(), treat);
@@ -200,12 +201,14 @@ struct Running<'a> {
     plan: &'a BatchPlan<'a>,
     on_one: &'a OnOne<'a>,
     shared: Mutex<Shared>,
+    all: Amount,
 }
 
 /// What the workers share.
 struct Shared {
-    manifest: Manifest,
-    progress: BatchProgress,
+    manifest: JsonLines,
+    progress: Progress,
+    done: Amount,
     failures: u32,
     /// Why nothing can go on.
     broken: Option<Failure>,
@@ -226,7 +229,6 @@ impl Running<'_> {
     /// Says in the manifest that no recording is under way any more.
     fn end(&self, treated: &[Option<Treated>]) -> Result<(), Failure> {
         let mut shared = self.lock();
-        shared.progress.end();
         if let Some(failure) = shared.broken.take() {
             return Err(failure);
         }
@@ -237,7 +239,7 @@ impl Running<'_> {
                 Treated::Skipped(entry) => Some(entry.file.clone()),
                 Treated::Made(_) => None,
             });
-        shared.manifest.append(&RunEnd::new(skipped.collect()))
+        shared.manifest.append([RunEnd::new(skipped.collect())])
     }
 
     /// Does what is to be done with a recording; `None` if it is not begun.
@@ -250,6 +252,7 @@ impl Running<'_> {
         let treated = match self.make(file, &mut entry, begun) {
             Ok(treated) => treated,
             Err(failure) => {
+                log::failure(&failure.clone().at(&file.found.path));
                 entry.outputs.clear();
                 entry.exit = failure.exit_code().max(1);
                 entry.error = Some(failure.to_string());
@@ -260,7 +263,9 @@ impl Running<'_> {
         };
         let mut shared = self.lock();
         shared.failures += u32::from(treated.entry().has_failed());
-        shared.progress.add(file.bytes);
+        shared.done.count += 1;
+        shared.done.bytes += file.bytes;
+        shared.progress.report(shared.done, Some(self.all));
         Some(treated)
     }
 
@@ -296,6 +301,7 @@ impl Running<'_> {
         };
         let made = catch_unwind(AssertUnwindSafe(|| (self.on_one)(&one)));
         let made = made.unwrap_or_else(|_| Err(internal_error(one.input)))?;
+        log::warnings(Some(one.input), &made.warnings);
         entry.exit = made.outcome.exit_code();
         entry.warnings = made.warnings.iter().map(NotedWarning::of).collect();
         entry.figures = made.figures.clone();
@@ -311,7 +317,7 @@ impl Running<'_> {
     fn note(&self, entry: &ManifestEntry) -> bool {
         let mut shared = self.lock();
         if shared.broken.is_none()
-            && let Err(failure) = shared.manifest.append(entry)
+            && let Err(failure) = shared.manifest.append([entry])
         {
             shared.broken = Some(failure);
         }

@@ -9,12 +9,12 @@ use serde::Serialize;
 
 use super::manifest::{ManifestEntry, NotedWarning};
 use super::plan::BatchPlan;
-use super::progress::{Amount, rate};
 use crate::failure::{ErrorCode, Failure};
 use crate::io::output::{self, Output};
 use crate::io::storage::Stored;
 use crate::outcome::Outcome;
 use crate::print::{self, plural, rounded};
+use crate::progress::{Amount, rate};
 
 /// Headings of the CSV file.
 const HEADINGS: [&str; 12] = [
@@ -139,8 +139,8 @@ impl BatchResult<'_> {
         let task = self.plan.task;
         if task.as_json {
             output::print(&print::document(SCHEMA, &self.report()))?;
-        } else if !task.is_quiet {
-            print::say(&self.text());
+        } else {
+            print::note(&self.text());
         }
         ended(self.entries(), self.not_begun())
     }
@@ -221,7 +221,7 @@ impl BatchResult<'_> {
             .filter(|(_, t)| is_made(t))
             .map(|(file, _)| file.bytes);
         let amount = Amount {
-            files: report.recordings - report.skipped - report.not_begun,
+            count: (report.recordings - report.skipped - report.not_begun) as u64,
             bytes: bytes.sum(),
         };
         format!(

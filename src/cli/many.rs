@@ -89,9 +89,6 @@ pub struct Merge {
     /// Print a report as JSON (the table then needs -o FILE)
     #[arg(long)]
     pub json: bool,
-    /// Print only problems and failures to standard error
-    #[arg(short, long)]
-    pub quiet: bool,
 }
 
 /// A part of many recordings.

@@ -35,7 +35,7 @@ pub struct Man {
 /// Without a document, the list of them.
 #[derive(Debug, Args)]
 pub struct Schema {
-    /// Verb, or batch (many recordings), error or manifest
+    /// Verb, or batch (many recordings), error, manifest, log or progress
     #[arg(value_name = "DOCUMENT")]
     pub document: Option<String>,
     /// The schema.

@@ -51,9 +51,6 @@ pub struct Simulate {
     /// What makes a warning a failure.
     #[command(flatten)]
     pub strictness: Strictness,
-    /// Print only warnings to standard error
-    #[arg(short, long)]
-    pub quiet: bool,
 }
 
 impl Simulate {

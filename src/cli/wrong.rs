@@ -1,5 +1,7 @@
 //! Wrong command lines.
 
+use std::path::PathBuf;
+
 use clap::Error;
 use clap::error::ErrorKind;
 
@@ -9,6 +11,21 @@ use crate::failure::{ErrorCode, Failure};
 pub(crate) fn is_json_asked() -> bool {
     let mut options = std::env::args_os().skip(1).take_while(|arg| arg != "--");
     options.any(|arg| arg == "--json")
+}
+
+/// The file of `--log` among the arguments of the process, whatever else is wrong with them.
+pub(crate) fn log_asked() -> Option<PathBuf> {
+    let mut words = std::env::args_os().skip(1).take_while(|arg| arg != "--");
+    while let Some(word) = words.next() {
+        if word == "--log" {
+            return words.next().map(PathBuf::from);
+        }
+        let path = word.to_str().and_then(|word| word.strip_prefix("--log="));
+        if let Some(path) = path {
+            return Some(PathBuf::from(path));
+        }
+    }
+    None
 }
 
 /// What clap refuses, as a failure; `None` if it has only been asked for help or the version.

@@ -95,14 +95,11 @@ pub fn work(args: &cli::Compensate) -> Result<Made, Failure> {
     }
     let beside = plot.into_iter().chain(html);
     let outputs = beside.chain([sink.finish(args, &report)?]).collect();
-    let text = match args.work.quiet {
-        true => String::new(),
-        false => report.text(),
-    };
     Ok(Made {
         outputs,
         document: args.json.then(|| report.document(true)),
-        talk: text + &warned(&report.warnings),
+        notes: report.text(),
+        talk: warned(&report.warnings),
         outcome: judged(
             &report.warnings,
             seen.summary.lost.is_some(),

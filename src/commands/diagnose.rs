@@ -5,7 +5,6 @@ mod read;
 mod refined;
 mod text;
 
-use std::io::IsTerminal;
 use std::path::Path;
 
 use super::{Outcome, conclude};
@@ -13,7 +12,8 @@ use crate::cli::Diagnose;
 use crate::diagnose::{self, Workers};
 use crate::failure::Failure;
 use crate::io::output;
-use crate::print::{self, Report};
+use crate::print::Report;
+use crate::progress::{Amount, Progress, Task};
 use crate::provenance::Provenance;
 use crate::stand::{self, Stand};
 
@@ -39,20 +39,16 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
     let provenance = html.as_ref().map(|_| provenance(args, stand.as_ref()));
     let provenance = provenance.transpose()?;
     let (case, is_lossy) = read::read(args, stand.as_ref().map(|(stand, _)| stand))?;
-    let is_shown = !args.work.quiet && std::io::stderr().is_terminal();
+    let fits = Progress::new(Task::Fits);
     let progress = |done: usize, of: usize| {
-        if is_shown {
-            match done == of {
-                true => print::say_progress(""),
-                false => print::say_progress(&format!("{done} of {of} fits")),
-            }
-        }
+        fits.report(Amount::of_count(done), Some(Amount::of_count(of)));
     };
     let workers = Workers {
         threads: args.work.thread_count(),
         progress: &progress,
     };
     let mut diagnosis = diagnose::run(case, workers)?;
+    drop(fits);
     diagnosis.shows_all = args.all;
     if let Some(refined) = &mut refined {
         let declared = stand.as_ref().map(|(stand, text)| (stand, text.as_str()));

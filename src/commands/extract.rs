@@ -42,11 +42,11 @@ pub fn work(args: &Extract) -> Result<Made, Failure> {
     };
     let mut warnings: Vec<_> = summary.lost.iter().cloned().collect();
     warnings.extend(summary.warnings);
-    let said = if args.quiet { String::new() } else { said };
     Ok(Made {
         outputs: vec![output],
         document: None,
-        talk: said + &warned(&warnings),
+        notes: said,
+        talk: warned(&warnings),
         outcome: judged(&warnings, summary.lost.is_some(), &args.strictness),
         figures: RecordFigures {
             samples: Some(samples),

@@ -140,6 +140,7 @@ pub fn work(args: &cli::Harmonics) -> Result<Made, Failure> {
     Ok(Made {
         outputs: vec![output],
         document: None,
+        notes: String::new(),
         talk: warned(&report.warnings),
         outcome: judged(&report.warnings, is_lossy, &args.strictness),
         figures: RecordFigures {

@@ -9,7 +9,7 @@ use crate::cli::{
 };
 use crate::failure::{ErrorCode, Failure};
 use crate::outcome::Made;
-use crate::{print, stand};
+use crate::stand;
 
 /// A verb that reads one recording at a time.
 pub(super) trait OneByOne: Clone + Sync {
@@ -92,7 +92,6 @@ pub(super) fn run(args: &impl OneByOne, options: &[String]) -> Result<Outcome, F
     if let Some(path) = task.stand {
         stand::read(path)?;
     }
-    print::hide_progress();
     batch::run(&task, options, &|one| args.of_one(one).work())
 }
 
@@ -124,7 +123,6 @@ impl OneByOne for Compensate {
             stand: Some(&self.stand),
             as_json: self.json,
             makes_json: false,
-            is_quiet: self.work.quiet,
         }
     }
 
@@ -155,7 +153,6 @@ impl OneByOne for Extract {
             stand: None,
             as_json: false,
             makes_json: false,
-            is_quiet: self.quiet,
         }
     }
 
@@ -184,7 +181,6 @@ impl OneByOne for Harmonics {
             stand: self.stand.as_deref(),
             as_json: self.json,
             makes_json: self.json,
-            is_quiet: false,
         }
     }
 
@@ -213,7 +209,6 @@ impl OneByOne for Inspect {
             stand: None,
             as_json: self.json,
             makes_json: self.json,
-            is_quiet: false,
         }
     }
 
@@ -241,7 +236,6 @@ impl OneByOne for Simulate {
             stand: Some(&self.stand),
             as_json: self.json,
             makes_json: false,
-            is_quiet: self.quiet,
         }
     }
 

@@ -27,8 +27,8 @@ pub fn run(args: &Merge) -> Result<Outcome, Failure> {
     print::say(&merged.problems());
     output.write(&merged.table()?)?;
     output.finish()?;
-    if !args.json && !args.quiet {
-        print::say(&merged.document(false));
+    if !args.json {
+        print::note(&merged.document(false));
     }
     merged.ended()
 }

@@ -22,6 +22,7 @@ use torqcomp_dsp::conversion::ConversionError;
 use crate::cli::{Cli, Strictness, Verb};
 use crate::failure::Failure;
 use crate::io::output::Output;
+use crate::log;
 use crate::outcome::Outcome;
 use crate::print::{self, Report};
 use crate::stand::{Calibration, TransducerSignal};
@@ -33,9 +34,6 @@ use crate::warning::Warning;
 /// # Errors
 /// Whatever kept it from being done.
 pub fn run(cli: Cli) -> Result<Outcome, Failure> {
-    if cli.verb.is_quiet() {
-        print::hide_progress();
-    }
     match cli.verb {
         Verb::Init(args) => init::run(&args),
         Verb::Compensate(args) => many::run(&args, &cli.options),
@@ -63,6 +61,7 @@ fn publish(report: &impl Report, as_json: bool, mut output: Output) -> Result<()
 /// Says the warnings, what was lost among them, and how the command ended.
 fn conclude(warnings: &[Warning], lost: bool, strictness: &Strictness) -> Outcome {
     print::say(&warned(warnings));
+    log::warnings(None, warnings);
     judged(warnings, lost, strictness)
 }
 

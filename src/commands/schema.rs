@@ -21,7 +21,13 @@ use crate::diagnose::Diagnosis;
 use crate::failure::ErrorDocument;
 use crate::failure::{self, ErrorCode, Failure, did_you_mean};
 use crate::identify::Identification;
+use crate::log;
+#[cfg(test)]
+use crate::log::LogLine;
 use crate::print::Report;
+use crate::progress;
+#[cfg(test)]
+use crate::progress::ProgressLine;
 
 /// A kind of document.
 pub(crate) struct DocumentKind {
@@ -68,6 +74,8 @@ documents! {
     "batch": BATCH_SCHEMA,
     "error": failure::SCHEMA,
     "manifest": MANIFEST_SCHEMA,
+    "log": log::SCHEMA,
+    "progress": progress::SCHEMA,
 }
 
 /// Runs the verb.

@@ -112,14 +112,15 @@ pub fn work(args: &cli::Simulate) -> Result<Made, Failure> {
 
 /// The record that was written, and what is said of it.
 fn made(args: &cli::Simulate, report: SimulateReport, output: Output, is_lossy: bool) -> Made {
-    let text = match args.quiet || args.json {
+    let notes = match args.json {
         true => String::new(),
         false => report.text(),
     };
     Made {
         outputs: vec![output],
         document: args.json.then(|| report.document(true)),
-        talk: text + &warned(&report.warnings),
+        notes,
+        talk: warned(&report.warnings),
         outcome: judged(&report.warnings, is_lossy, &args.strictness),
         figures: RecordFigures {
             samples: Some(report.samples),

@@ -3,6 +3,7 @@
 pub mod digits;
 mod fault;
 mod input;
+pub(crate) mod json_lines;
 mod mark;
 pub mod mcap;
 pub mod number;

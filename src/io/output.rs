@@ -9,6 +9,7 @@ use tempfile::NamedTempFile;
 
 use super::{parts, storage, sum};
 use crate::failure::{ErrorCode, Failure};
+use crate::log;
 
 /// Whether anything was written to standard output.
 static IS_STDOUT_USED: AtomicBool = AtomicBool::new(false);
@@ -62,8 +63,10 @@ impl Output {
             return Ok(Self::stdout());
         };
         let name = path.display().to_string();
-        if let Some(other) = taken.iter().find(|other| is_same_file(other, path)) {
-            let other = match *other {
+        let log = log::path();
+        let mut taken = taken.iter().copied().chain(log.as_deref());
+        if let Some(other) = taken.find(|other| is_same_file(other, path)) {
+            let other = match other {
                 input if input == Path::new("-") => "standard input".to_owned(),
                 file => file.display().to_string(),
             };

@@ -41,7 +41,7 @@ pub struct Reading {
     /// What stands in for missing samples: empty cells, and gaps of whole steps between the time stamps [default: refuse]
     #[arg(long, value_name = "HOW", value_enum)]
     pub fill: Option<Fill>,
-    /// Topic of an MCAP file, as /joint_states; channels are then named by the fields of its messages
+    /// Topic of an MCAP file (/joint_states); its fields are the channels
     #[arg(long, value_name = "TOPIC")]
     pub topic: Option<String>,
     /// Time of messages that counts [default: their own stamp if they have one, else log]

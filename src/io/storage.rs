@@ -71,25 +71,40 @@ pub(super) fn open_for_writing(path: &Path) -> io::Result<File> {
     File::options().write(true).open(path)
 }
 
-/// Opens a file for writing at its end, and makes it if it is not there.
+/// Opens a file for writing at its end, and for reading, and makes it if it is not there.
 pub(crate) fn open_at_end(path: &Path) -> io::Result<File> {
     check(Call::Open)?;
-    File::options().append(true).create(true).open(path)
+    File::options()
+        .read(true)
+        .append(true)
+        .create(true)
+        .open(path)
 }
 
-/// Whether the last line of a file has no end; one that is not there has no line.
-pub(crate) fn ends_without_line(path: &Path) -> io::Result<bool> {
-    let mut file = match Stored::open(path) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(false),
-        file => file?,
-    };
-    if file.metadata()?.len() == 0 {
+/// The first bytes of a file, at most so many; none of a pipe or device.
+pub(crate) fn first_bytes(mut file: &File, most: usize) -> io::Result<Vec<u8>> {
+    let mut first = Vec::new();
+    if has_bytes(file)? {
+        file.seek(SeekFrom::Start(0))?;
+        Stored(file).take(most as u64).read_to_end(&mut first)?;
+    }
+    Ok(first)
+}
+
+/// Whether the last line of a file has no end; an empty one has no line, nor has a pipe or device.
+pub(crate) fn ends_without_line(mut file: &File) -> io::Result<bool> {
+    if !has_bytes(file)? {
         return Ok(false);
     }
     file.seek(SeekFrom::End(-1))?;
     let mut last = [0];
-    file.read_exact(&mut last)?;
+    Stored(file).read_exact(&mut last)?;
     Ok(last != *b"\n")
+}
+
+fn has_bytes(file: &File) -> io::Result<bool> {
+    let meta = file.metadata()?;
+    Ok(meta.is_file() && meta.len() > 0)
 }
 
 /// Writes all bytes at the end of a file.

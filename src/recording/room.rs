@@ -30,7 +30,7 @@ pub(super) fn look(input: &Input, text: &TextFile, most: usize) -> Result<(), Fa
     let length = std::fs::metadata(path).map_or(0, |meta| meta.len());
     let numbers = text.numbers_in(length).min(most as u64);
     if let Some(text) = Room::of_system().said_of(numbers, &input.name())? {
-        print::say(&format!("torqcomp: {text}\n"));
+        print::note(&format!("torqcomp: {text}\n"));
     }
     Ok(())
 }

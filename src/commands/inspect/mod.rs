@@ -20,6 +20,7 @@ use crate::cli::Inspect;
 use crate::failure::{ErrorCode, Failure};
 use crate::io::Input;
 use crate::io::output::Output;
+use crate::log;
 use crate::outcome::Made;
 use crate::print::{self, Report};
 use crate::quality::copies;
@@ -45,6 +46,7 @@ pub fn run(args: &Inspect, options: &[String]) -> Result<Outcome, Failure> {
         Some((last, others)) => {
             for failure in others {
                 print::say(&format!("torqcomp: {failure}\n"));
+                log::failure(failure);
             }
             Err(last.clone())
         }
@@ -142,6 +144,7 @@ fn finish(
     Ok(Made {
         outputs: plot.into_iter().chain([output]).collect(),
         document: None,
+        notes: String::new(),
         talk: String::new(),
         outcome: judged(&warnings, report.is_lossy(), &args.strictness),
         figures: report.figures(),

@@ -7,8 +7,8 @@ use serde_json::{Map, Value, json};
 
 use super::{
     BatchReport, CompensateReport, DOCUMENTS, Diagnosis, ErrorDocument, HarmonicsReport,
-    Identification, InspectReport, ManifestLine, Merged, PredictReport, SimulateReport,
-    TableReport,
+    Identification, InspectReport, LogLine, ManifestLine, Merged, PredictReport, ProgressLine,
+    SimulateReport, TableReport,
 };
 use crate::print::{self, Document};
 
@@ -27,6 +27,8 @@ pub(crate) fn texts() -> Vec<String> {
         closed::<Document<BatchReport>, BatchReport>,
         closed::<Document<ErrorDocument>, ErrorDocument>,
         closed::<ManifestLine, ManifestLine>,
+        closed::<LogLine, LogLine>,
+        closed::<ProgressLine, ProgressLine>,
     ];
     let pairs = schemas.iter().zip(DOCUMENTS);
     pairs
@@ -70,6 +72,19 @@ fn name_it(schema: &mut Value, name: &str) {
 /// Keywords with schemas that hold for the same object.
 const IN_PLACE: [&str; 3] = ["allOf", "anyOf", "oneOf"];
 
+/// The key that names a variant has the meaning of the variant.
+fn describe_tag(variant: &mut Value) {
+    let Some(about) = variant.get("description").cloned() else {
+        return;
+    };
+    let properties = variant.get_mut("properties").and_then(Value::as_object_mut);
+    for (_, property) in properties.into_iter().flat_map(Map::iter_mut) {
+        if property.get("const").is_some() && property.get("description").is_none() {
+            property["description"] = about.clone();
+        }
+    }
+}
+
 /// Allows no other keys in any object; `is_part` is of an object whose other keys stand in the schema around it.
 fn close(schema: &mut Value, is_part: bool) {
     let Value::Object(keywords) = schema else {
@@ -94,6 +109,7 @@ fn close(schema: &mut Value, is_part: bool) {
     for keyword in IN_PLACE {
         let parts = keywords.get_mut(keyword).and_then(Value::as_array_mut);
         for part in parts.into_iter().flatten() {
+            describe_tag(part);
             close(part, is_part || has_keys);
         }
     }

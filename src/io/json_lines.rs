@@ -1,0 +1,91 @@
+//! Files of JSON lines that are appended to durably, by several processes if need be.
+
+use std::fs::File;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::storage;
+use crate::failure::{ErrorCode, Failure};
+use crate::print;
+
+/// First bytes in which a line of the file's kind is looked for.
+const LOOKED_AT: usize = 1 << 16;
+
+/// A file of JSON lines.
+pub(crate) struct JsonLines {
+    path: PathBuf,
+    file: File,
+    sync: bool,
+}
+
+impl JsonLines {
+    /// Opens a file whose lines have this beginning, and makes it if it is not there.
+    ///
+    /// # Errors
+    /// If it cannot be written, or is another kind of file.
+    pub(crate) fn open(path: &Path, beginning: &str, sync: bool) -> Result<Self, Failure> {
+        let unwritable = |error| Failure::writing(&path.display().to_string(), &error);
+        let file = storage::open_at_end(path).map_err(unwritable)?;
+        let first = storage::first_bytes(&file, LOOKED_AT).map_err(unwritable)?;
+        let mut lines = first.split(|byte| *byte == b'\n');
+        // The first line may be cut.
+        let is_of_kind = beginning.as_bytes().starts_with(&first)
+            || lines.any(|line| line.starts_with(beginning.as_bytes()));
+        if !is_of_kind {
+            return Err(Failure::usage(
+                ErrorCode::ConflictingArguments,
+                format_args!(
+                    "this file has no lines that begin with {beginning}, so nothing is appended to it; name another file"
+                ),
+            )
+            .at(path.display()));
+        }
+        if sync {
+            let folder = path
+                .parent()
+                .filter(|folder| !folder.as_os_str().is_empty());
+            storage::sync_folder(folder.unwrap_or(Path::new("."))).map_err(unwritable)?;
+        }
+        Ok(Self {
+            path: path.to_owned(),
+            file,
+            sync,
+        })
+    }
+
+    /// Adds lines, which are on the disk afterwards. Those of several processes are not mixed, and a line that was cut
+    /// short stays by itself.
+    ///
+    /// # Errors
+    /// If they cannot be written.
+    pub(crate) fn append<T: Serialize>(
+        &self,
+        entries: impl IntoIterator<Item = T>,
+    ) -> Result<(), Failure> {
+        let lines: String = entries.into_iter().map(|e| print::json_line(&e)).collect();
+        let written = self.write(lines);
+        let synced = written.and_then(|()| match self.sync {
+            true => storage::sync(&self.file),
+            false => Ok(()),
+        });
+        synced.map_err(|error| Failure::writing(&self.path.display().to_string(), &error))
+    }
+
+    fn write(&self, mut lines: String) -> io::Result<()> {
+        // Where there are no locks, one call that writes at the end is all there is.
+        let is_locked = self.file.lock().is_ok();
+        let written = storage::ends_without_line(&self.file).and_then(|is_cut| {
+            if is_cut {
+                lines.insert(0, '\n');
+            }
+            storage::write_all(&self.file, lines.as_bytes())
+        });
+        if is_locked {
+            // Closing the file does it, too.
+            let _ = self.file.unlock();
+        }
+        written
+    }
+}

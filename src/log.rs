@@ -1,0 +1,177 @@
+//! What runs did: a file of JSON lines, one for each event, that any number of runs append to.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::failure::{ErrorReport, Failure};
+use crate::io::json_lines::JsonLines;
+use crate::recording::moment::utc;
+use crate::warning::Warning;
+
+/// Name and version of a line.
+pub(crate) const SCHEMA: &str = "torqcomp.log/1";
+/// How every line begins.
+pub(crate) const BEGINNING: &str = "{\"schema\":\"torqcomp.log/";
+
+/// The log of this run, if it has one.
+static LOG: Mutex<Option<Log>> = Mutex::new(None);
+
+struct Log {
+    path: PathBuf,
+    lines: JsonLines,
+    run: String,
+    begun: Instant,
+    /// Why a line could not be written.
+    broken: Option<Failure>,
+}
+
+/// An event of a run. A run without the event `end` was killed, or is under way.
+#[derive(Serialize, JsonSchema)]
+pub(crate) struct LogLine<'a> {
+    /// Name and version of the form of this line.
+    schema: &'static str,
+    /// Version of torqcomp.
+    version: &'static str,
+    /// Date and time in UTC (ISO 8601).
+    time: String,
+    /// The run: the same in all of its lines, and of no other run on this machine.
+    run: &'a str,
+    #[serde(flatten)]
+    event: LogEvent<'a>,
+}
+
+/// What happened.
+#[derive(Serialize, JsonSchema)]
+#[serde(tag = "event", rename_all = "kebab-case")]
+enum LogEvent<'a> {
+    /// The run began.
+    Start {
+        /// The command line, the program first.
+        command: Vec<String>,
+        /// The folder that paths start from; `null` if unknown.
+        folder: Option<String>,
+    },
+    /// A warning.
+    Warning {
+        /// The recording among many that it is about; `null` of a run over one.
+        file: Option<&'a str>,
+        /// Stable code of the warning.
+        code: &'a str,
+        /// The warning for people.
+        message: &'a str,
+    },
+    /// A failure, of the run or of a recording among many.
+    Failure {
+        #[serde(flatten)]
+        report: ErrorReport<'a>,
+    },
+    /// The run ended.
+    End {
+        /// Exit code.
+        exit: u8,
+        /// Time since the start, in s.
+        seconds: f64,
+    },
+}
+
+fn log() -> MutexGuard<'static, Option<Log>> {
+    LOG.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Log {
+    /// Writes events; the first failure to do so is kept for the end.
+    fn append<'a>(&mut self, events: impl IntoIterator<Item = LogEvent<'a>>) {
+        let time = now();
+        let line = |event| LogLine {
+            schema: SCHEMA,
+            version: env!("CARGO_PKG_VERSION"),
+            time: time.clone(),
+            run: &self.run,
+            event,
+        };
+        if let Err(failure) = self.lines.append(events.into_iter().map(line)) {
+            self.broken.get_or_insert(failure);
+        }
+    }
+}
+
+/// Begins the log of this run.
+///
+/// # Errors
+/// If it cannot be written.
+pub(crate) fn begin(path: &Path) -> Result<(), Failure> {
+    let mut new = Log {
+        path: path.to_owned(),
+        lines: JsonLines::open(path, BEGINNING, true)?,
+        run: format!("{}-{}", now(), std::process::id()),
+        begun: Instant::now(),
+        broken: None,
+    };
+    let words = std::env::args_os();
+    new.append([LogEvent::Start {
+        command: words
+            .map(|word| word.to_string_lossy().into_owned())
+            .collect(),
+        folder: std::env::current_dir()
+            .ok()
+            .map(|path| path.display().to_string()),
+    }]);
+    match new.broken.take() {
+        Some(failure) => Err(failure),
+        None => {
+            *log() = Some(new);
+            Ok(())
+        }
+    }
+}
+
+/// The file of the log, if this run has one.
+pub(crate) fn path() -> Option<PathBuf> {
+    log().as_ref().map(|log| log.path.clone())
+}
+
+/// Notes warnings, of a recording among many or of the only one.
+pub(crate) fn warnings(file: Option<&str>, warnings: &[Warning]) {
+    if let Some(log) = log().as_mut()
+        && !warnings.is_empty()
+    {
+        log.append(warnings.iter().map(|warning| LogEvent::Warning {
+            file,
+            code: warning.code,
+            message: &warning.message,
+        }));
+    }
+}
+
+/// Notes a failure, of the run or of a recording among many.
+pub(crate) fn failure(failure: &Failure) {
+    if let (Some(log), Some(document)) = (log().as_mut(), failure.document()) {
+        log.append([LogEvent::Failure {
+            report: document.error,
+        }]);
+    }
+}
+
+/// Notes the end of the run.
+///
+/// # Errors
+/// If an event could not be written.
+pub(crate) fn end(exit: u8) -> Result<(), Failure> {
+    let Some(mut log) = log().take() else {
+        return Ok(());
+    };
+    let seconds = log.begun.elapsed().as_secs_f64();
+    log.append([LogEvent::End { exit, seconds }]);
+    log.broken.map_or(Ok(()), Err)
+}
+
+/// Date and time in UTC, to the millisecond.
+fn now() -> String {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    let since = since.unwrap_or_default();
+    format!("{}.{:03}Z", utc(since.as_secs()), since.subsec_millis())
+}

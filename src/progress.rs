@@ -1,0 +1,318 @@
+//! How far the work has got, said on standard error: a line on a terminal, or JSON lines for programs.
+
+use std::io::{self, IsTerminal, Write};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::cli::ProgressMode;
+use crate::print;
+
+/// Time after which a terminal shows it.
+const BEGINS: Duration = Duration::from_secs(2);
+/// Time until it is said again.
+const REPEATS: Duration = Duration::from_millis(500);
+
+/// Name and version of the form of a line.
+pub(crate) const SCHEMA: &str = "torqcomp.progress/1";
+
+/// How and when it is said in this process.
+struct Display {
+    form: Option<Form>,
+    /// When it was said last.
+    last: Option<Instant>,
+    /// Whether a line of it stands on the terminal.
+    is_line_shown: bool,
+    /// Whether recordings are counted, so that nothing is said of each of them.
+    counts_recordings: bool,
+}
+
+/// How it is said.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Form {
+    Line,
+    Json,
+}
+
+static DISPLAY: Mutex<Display> = Mutex::new(Display {
+    form: None,
+    last: None,
+    is_line_shown: false,
+    counts_recordings: false,
+});
+
+fn display() -> MutexGuard<'static, Display> {
+    DISPLAY.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Settles how it is said. `--quiet` leaves it out, unless a program asks for it.
+pub(crate) fn choose(mode: Option<ProgressMode>, is_quiet: bool) {
+    let is_for_people = !is_quiet && io::stderr().is_terminal();
+    display().form = match mode.unwrap_or(ProgressMode::Auto) {
+        ProgressMode::Json => Some(Form::Json),
+        ProgressMode::Auto if is_for_people => Some(Form::Line),
+        ProgressMode::Auto | ProgressMode::Never => None,
+    };
+}
+
+/// Takes the line away before something else is said.
+pub(crate) fn clear() {
+    let mut display = display();
+    if std::mem::take(&mut display.is_line_shown) {
+        show("\r\x1b[K");
+    }
+}
+
+/// Nobody may be there to read it: that is no failure.
+fn show(text: &str) {
+    let _ = io::stderr().lock().write_all(text.as_bytes());
+}
+
+/// What takes long.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Task {
+    /// A file is read.
+    Read(String),
+    /// Many recordings are worked on.
+    Recordings,
+    /// Models are fitted.
+    Fits,
+}
+
+/// How much there is, or is done: things that are counted, and bytes.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct Amount {
+    pub(crate) count: u64,
+    pub(crate) bytes: u64,
+}
+
+impl Amount {
+    pub(crate) fn of_bytes(bytes: u64) -> Self {
+        Self { count: 0, bytes }
+    }
+
+    pub(crate) fn of_count(count: usize) -> Self {
+        Self {
+            count: count as u64,
+            bytes: 0,
+        }
+    }
+
+    /// Which part of a whole this is: of its bytes, or of what is counted if it has none.
+    fn share_of(self, all: Self) -> Option<f64> {
+        let (part, whole) = match all.bytes {
+            0 => (self.count, all.count),
+            bytes => (self.bytes, bytes),
+        };
+        (whole > 0).then(|| (part as f64 / whole as f64).min(1.0))
+    }
+}
+
+/// A task that is under way.
+pub(crate) struct Progress {
+    task: Task,
+    begun: Instant,
+}
+
+impl Progress {
+    pub(crate) fn new(task: Task) -> Self {
+        if task == Task::Recordings {
+            display().counts_recordings = true;
+        }
+        Self {
+            task,
+            begun: Instant::now(),
+        }
+    }
+
+    /// Says how much is done of how much, if it is time to.
+    pub(crate) fn report(&self, done: Amount, all: Option<Amount>) {
+        let mut display = display();
+        let Some(form) = display.form else {
+            return;
+        };
+        let is_part = display.counts_recordings && self.task != Task::Recordings;
+        let elapsed = self.begun.elapsed();
+        let since = display.last.map(|last| last.elapsed());
+        if is_part || !is_due(form, elapsed, since) {
+            return;
+        }
+        let text = match form {
+            Form::Json => Some(self.json(elapsed, done, all)),
+            Form::Line => self
+                .text(elapsed, done, all)
+                .map(|text| format!("\r{}\x1b[K", print::visible(text))),
+        };
+        if let Some(text) = text {
+            display.last = Some(Instant::now());
+            display.is_line_shown = form == Form::Line;
+            show(&text);
+        }
+    }
+
+    /// The line for people; `None` while there is nothing to say.
+    fn text(&self, elapsed: Duration, done: Amount, all: Option<Amount>) -> Option<String> {
+        let all = all?;
+        let share = done.share_of(all)?;
+        Some(match &self.task {
+            Task::Read(name) => format!("{:.0} % of {name} read", 100.0 * share),
+            Task::Fits => format!("{} of {} fits", done.count, all.count),
+            Task::Recordings => {
+                let seconds = elapsed.as_secs_f64().max(1e-3);
+                let mut text = format!(
+                    "{} of {} recordings, {}",
+                    done.count,
+                    all.count,
+                    rate(done, seconds)
+                );
+                if let Some(left) = seconds_left(seconds, share) {
+                    text += &format!(", {} left", duration(left));
+                }
+                text
+            }
+        })
+    }
+
+    /// The line for programs.
+    fn json(&self, elapsed: Duration, done: Amount, all: Option<Amount>) -> String {
+        let share = all.and_then(|all| done.share_of(all));
+        let (task, file) = match &self.task {
+            Task::Read(name) => ("read", Some(name.as_str())),
+            Task::Recordings => ("recordings", None),
+            Task::Fits => ("fits", None),
+        };
+        let counts = |amount: Amount| (task != "read").then_some(amount.count);
+        let bytes = |amount: Amount| (task != "fits").then_some(amount.bytes);
+        let seconds = elapsed.as_secs_f64();
+        print::json_line(&ProgressLine {
+            progress: share,
+            schema: SCHEMA,
+            task,
+            file,
+            done: counts(done),
+            total: all.and_then(counts),
+            bytes_done: bytes(done),
+            bytes_total: all.and_then(bytes),
+            seconds,
+            seconds_left: share.and_then(|share| seconds_left(seconds, share)),
+        })
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        let is_whole = self.task == Task::Recordings;
+        if is_whole || !display().counts_recordings {
+            clear();
+        }
+    }
+}
+
+/// How far a task has got: a line on standard error with `--progress json`, at most one in half a second.
+#[derive(Serialize, JsonSchema)]
+pub(crate) struct ProgressLine<'a> {
+    /// Share that is done, from 0 to 1; `null` if it is unknown how much there is.
+    progress: Option<f64>,
+    /// Name and version of the form of this line.
+    schema: &'static str,
+    /// What is under way: `read` (a file), `recordings` (many, each by itself) or `fits` (of models).
+    task: &'static str,
+    /// Name of the file that is read; `null` of other tasks.
+    file: Option<&'a str>,
+    /// Recordings or fits that are done; `null` of a file that is read.
+    done: Option<u64>,
+    /// Recordings or fits in all; `null` if unknown.
+    total: Option<u64>,
+    /// Bytes read, or in the recordings that are done; `null` of fits.
+    bytes_done: Option<u64>,
+    /// Bytes in all; `null` if unknown.
+    bytes_total: Option<u64>,
+    /// Time since the task began, in s.
+    seconds: f64,
+    /// Time to come at the same pace, in s; `null` if unknown.
+    seconds_left: Option<f64>,
+}
+
+/// Whether it is time to say it, so long after the task began and after it was said last.
+fn is_due(form: Form, elapsed: Duration, since: Option<Duration>) -> bool {
+    let has_begun = form == Form::Json || elapsed >= BEGINS;
+    has_begun && since.is_none_or(|since| since >= REPEATS)
+}
+
+/// Recordings and megabytes a second.
+pub(crate) fn rate(amount: Amount, seconds: f64) -> String {
+    format!(
+        "{} recordings/s, {} MB/s",
+        print::rounded(amount.count as f64 / seconds, 3),
+        print::rounded(1e-6 * amount.bytes as f64 / seconds, 3)
+    )
+}
+
+fn seconds_left(seconds: f64, share: f64) -> Option<f64> {
+    (share > 0.0 && share < 1.0).then(|| seconds * (1.0 - share) / share)
+}
+
+/// A time to come, as coarse as it is known.
+fn duration(seconds: f64) -> String {
+    let seconds = seconds.ceil() as u64;
+    match (seconds / 3600, seconds / 60 % 60, seconds % 60) {
+        (0, 0, seconds) => format!("{seconds} s"),
+        (0, minutes, seconds) => format!("{minutes} min {seconds} s"),
+        (hours, minutes, _) => format!("{hours} h {minutes} min"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_terminal_shows_it_after_two_seconds_and_a_program_at_once() {
+        let ms = Duration::from_millis;
+        assert!(!is_due(Form::Line, ms(1999), None));
+        assert!(is_due(Form::Line, ms(2000), None));
+        assert!(is_due(Form::Json, ms(0), None));
+        for form in [Form::Line, Form::Json] {
+            assert!(!is_due(form, ms(9000), Some(ms(499))));
+            assert!(is_due(form, ms(9000), Some(ms(500))));
+        }
+    }
+
+    #[test]
+    fn the_share_of_a_file_is_said_if_its_length_is_known() {
+        let read = Progress::new(Task::Read("a.csv".to_owned()));
+        let of = |bytes| Some(Amount::of_bytes(bytes));
+        let text = read.text(Duration::ZERO, Amount::of_bytes(100), of(800));
+        assert_eq!(text.unwrap(), "12 % of a.csv read");
+        assert_eq!(read.text(Duration::ZERO, Amount::of_bytes(100), None), None);
+        let line = read.json(Duration::from_secs(3), Amount::of_bytes(200), of(800));
+        assert_eq!(
+            line,
+            "{\"progress\":0.25,\"schema\":\"torqcomp.progress/1\",\"task\":\"read\",\"file\":\"a.csv\",\"done\":null,\
+             \"total\":null,\"bytes_done\":200,\"bytes_total\":800,\"seconds\":3.0,\"seconds_left\":9.0}\n"
+        );
+        let unknown = read.json(Duration::ZERO, Amount::of_bytes(200), None);
+        assert!(unknown.starts_with("{\"progress\":null,"), "{unknown}");
+    }
+
+    #[test]
+    fn the_time_left_of_many_recordings_follows_the_bytes() {
+        // Not by `new`, which is heard in the whole process.
+        let progress = Progress {
+            task: Task::Recordings,
+            begun: Instant::now(),
+        };
+        let amount = |count, bytes| Amount { count, bytes };
+        let (done, all) = (amount(1, 4_000_000), amount(10, 40_000_000));
+        assert_eq!(
+            progress
+                .text(Duration::from_secs(8), done, Some(all))
+                .unwrap(),
+            "1 of 10 recordings, 0.125 recordings/s, 0.5 MB/s, 1 min 12 s left"
+        );
+        assert_eq!(duration(7262.0), "2 h 1 min");
+        assert_eq!(duration(0.4), "1 s");
+    }
+}
