@@ -11,6 +11,7 @@ mod batch;
 mod blind;
 mod blind_generator;
 mod compensate;
+mod detection;
 mod diagnose;
 #[cfg(debug_assertions)] // optimised builds have no faults on purpose
 mod faults;

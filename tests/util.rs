@@ -45,6 +45,12 @@ pub const SIMULATE: [&str; 6] = [
     "applied_n_m",
 ];
 
+/// Records of each case of a test that counts how often something holds: few, unless the environment asks for more.
+pub fn trials(default: usize) -> usize {
+    let number = std::env::var("TORQCOMP_TRIALS").ok();
+    number.and_then(|n| n.parse().ok()).unwrap_or(default)
+}
+
 /// Sends a process a signal.
 pub fn signal(name: &str, child: &std::process::Child) {
     let sent = std::process::Command::new("kill")

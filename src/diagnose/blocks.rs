@@ -38,13 +38,29 @@ impl Comparison {
         self.before.iter().sum::<f64>() - self.after.iter().sum::<f64>()
     }
 
+    /// Reduction of the sum of squares without what noise adds to it or takes from it, and its standard deviation due to
+    /// noise.
+    pub fn expected_gain(&self) -> [f64; 2] {
+        let noise = 2.0 * self.product.iter().sum::<f64>();
+        [self.gain() - noise, self.std()]
+    }
+
+    /// Sums of squares of both residuals.
+    pub fn sums(&self) -> [f64; 2] {
+        [&self.before, &self.after].map(|squares| squares.iter().sum())
+    }
+
+    fn std(&self) -> f64 {
+        2.0 * self.product.iter().map(|p| p * p).sum::<f64>().sqrt()
+    }
+
     /// The gain over its standard deviation due to noise.
     ///
     /// With `d` the difference of the residuals and `r` the second one, the gain is `Σ d² + 2 Σ d r`. If `r` is noise,
     /// only the second sum varies, and the scatter of its blocks, which are long compared with the correlation of
     /// neighbours, gives its variance. A gain from a few places, as in a sweep, counts no less.
     pub fn significance(&self) -> f64 {
-        let std = 2.0 * self.product.iter().map(|p| p * p).sum::<f64>().sqrt();
+        let std = self.std();
         if std > 0.0 { self.gain() / std } else { 0.0 }
     }
 

@@ -8,6 +8,7 @@ mod blocks;
 mod columns;
 mod declared;
 mod describe;
+mod detection;
 mod exchange;
 mod finish;
 mod fit;
@@ -52,6 +53,7 @@ use structure::FitContext;
 use verdict::{noise_rms, remains};
 
 pub use declared::DeclaredForm;
+pub use detection::ShownSide;
 pub use fit::RecordResidual;
 pub use guard_models::GuardModel;
 pub use held::HeldBody;
@@ -182,7 +184,7 @@ pub fn run(mut case: Case, workers: Workers) -> Result<Diagnosis, Failure> {
         found = look(training.with_between(between))?;
     }
     found.judge_on(&case.records, workers.threads)?;
-    Ok(Diagnosis::of(case, found))
+    Ok(Diagnosis::of(case, found, workers.threads))
 }
 
 impl SearchState {

@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::describe;
+use super::detection::{DetectionLimit, detection_limits};
 use super::guard_models::GuardModel;
 use super::held::HeldBody;
 use super::ladder::Ladder;
@@ -52,6 +53,8 @@ pub struct Diagnosis {
     pub constants: Vec<StandConstant>,
     /// The effects that were tried: accepted ones first, then by hold-out error.
     pub candidates: Vec<CandidateFit>,
+    /// For `nothing-missing`: of each effect the smallest amount that the training records would have shown.
+    pub detection_limits: Vec<DetectionLimit>,
     /// A law that is not offered as an effect and leaves less than each of the effects; named, not added. `null` if there
     /// is none.
     pub suspected: Option<GuardModel>,
@@ -149,12 +152,16 @@ pub struct ExcitationLevels {
 }
 
 impl Diagnosis {
-    pub(super) fn of(case: Case, mut found: SearchState) -> Self {
+    pub(super) fn of(case: Case, mut found: SearchState, threads: usize) -> Self {
         let lines = found.lines_of(&found.after);
         let unit = case.units.per_printed;
         let verdict = found.conclude();
         found.settle_candidates();
         let effects = found.after.effect_names();
+        let detection_limits = match verdict {
+            Verdict::NothingMissing => detection_limits(&found.after, &found.records, threads),
+            _ => Vec::new(),
+        };
         let error = ErrorTable::of(&found);
         let levels = ExcitationLevels::of(&found, &error.before);
         let residual = ResidualReport {
@@ -185,6 +192,7 @@ impl Diagnosis {
             next_experiment: describe::next_experiment(&found, suspected.as_ref(), verdict),
             warnings: [case.warnings, describe::warnings(&found.before, verdict)].concat(),
             candidates: found.candidates(),
+            detection_limits,
             suspected,
             residual,
             shows_all: false,

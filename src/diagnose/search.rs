@@ -69,6 +69,8 @@ const LEAST_GAIN: f64 = 40.0;
 const LEAST_SHARE: f64 = 0.005;
 /// Minimum significance of the reduction over the blocks of the records.
 const LEAST_SIGNIFICANCE: f64 = 3.0;
+/// Standard deviations that a normal quantity exceeds in 95 % of all cases.
+const CERTAIN: f64 = 1.645;
 /// Significance up to which one effect counts as no better than another.
 const TIED_SIGNIFICANCE: f64 = 2.33;
 /// Reduction of the sum of squares, in residual variances, up to which one effect counts as no better than
@@ -141,14 +143,7 @@ pub fn try_effects(
     records: &Records,
     workers: Workers,
 ) -> Round {
-    let present: Vec<&str> = base.scored.fitted.structure.names().collect();
-    let context = &base.scored.fitted.structure.context;
-    let effects = EFFECTS.iter().copied().filter(|effect| {
-        let is_free = context.gain_is_free && effect.name == "gain-error";
-        let mut forms = EffectForm::all([*effect]).into_iter();
-        let is_allowed = forms.any(|form| context.allows(&form));
-        !present.contains(&effect.name) && !is_free && is_allowed && among(effect)
-    });
+    let effects = listed(base).filter(|effect| among(effect));
     let forms = EffectForm::all(effects.clone());
     let lines = residual_lines(base, records);
     let fits = fit_all(base, &forms, &lines, effort, records, workers);
@@ -164,6 +159,19 @@ pub fn try_effects(
     decide(&mut tried);
     let fits = fits.into_iter().flatten().collect();
     Round { tried, fits }
+}
+
+/// The effects that may be added to a base model.
+pub fn listed(base: &BaseModel) -> impl Iterator<Item = &'static Effect> + Clone {
+    let structure = &base.scored.fitted.structure;
+    let context = &structure.context;
+    EFFECTS.iter().copied().filter(move |effect| {
+        let is_free = context.gain_is_free && effect.name == "gain-error";
+        let mut forms = EffectForm::all([*effect]).into_iter();
+        let is_allowed = forms.any(|form| context.allows(&form));
+        let is_present = structure.names().any(|name| name == effect.name);
+        !is_present && !is_free && is_allowed
+    })
 }
 
 /// Sets the probability of each gain, for the number of effects that were tried.
@@ -351,6 +359,23 @@ pub fn no_gain(model: &ScoredModel, before: &ScoredModel) -> Option<Reason> {
         return Some(Reason::SmallShare { share });
     }
     None
+}
+
+/// By how many times a gain, with so many parameters from so many samples, meets what [`refusal`] asks of it, whatever the
+/// noise, with 95 % certainty.
+pub fn evidence(comparison: &Comparison, samples: usize, parameters: usize) -> f64 {
+    let [gain, std] = comparison.expected_gain();
+    let sure = gain - CERTAIN * std;
+    let [before, after] = comparison.sums();
+    let n = samples as f64;
+    let criterion = n * (1.0 + sure.max(0.0) / after).ln() / (parameters as f64 * n.ln());
+    let least = [
+        sure / (LEAST_GAIN * after / n),
+        sure / (LEAST_SIGNIFICANCE * std),
+        sure / (LEAST_SHARE * before),
+        criterion,
+    ];
+    least.into_iter().fold(f64::INFINITY, f64::min)
 }
 
 /// Accepts the best of the candidates that nothing speaks against, and compares the others with it.

@@ -1,5 +1,6 @@
 //! Where the fit of an effect starts: near the size that the residual suggests.
 
+use torqcomp_model::Chain;
 use torqcomp_model::effects::RecordScales;
 
 use super::fit::raw_residual;
@@ -95,6 +96,40 @@ fn with_shared_stiffness(structure: &Structure, present: f64, mut values: Vec<f6
     values
 }
 
+/// What an effect with these own values, the last of a structure, changes in the training records beyond what the base's own
+/// parameters can; one record after the other. `None` if the motion diverges.
+pub fn change(
+    base: &BaseModel,
+    structure: &Structure,
+    own: &[f64],
+    training: &[StandRecord],
+) -> Option<Vec<f64>> {
+    let plain = &base.scored.fitted.values;
+    let present = base
+        .scored
+        .fitted
+        .structure
+        .model(plain)
+        .0
+        .added_stiffness();
+    let values = [plain.as_slice(), own].concat();
+    let values = with_shared_stiffness(structure, present, values);
+    let (model, _) = structure.model(&values);
+    let records = training.iter().enumerate();
+    let changes = records.map(|(k, record)| change_of(base, &model, record, k));
+    Some(changes.collect::<Option<Vec<_>>>()?.concat())
+}
+
+/// What a model changes in a training record, by its number.
+fn change_of(base: &BaseModel, model: &Chain, record: &StandRecord, k: usize) -> Option<Vec<f64>> {
+    let mut moved = raw_residual(model, record).ok()?;
+    base.nuisance[k].clear(&mut moved);
+    let pairs = base.scored.train[k].samples.iter().zip(&moved);
+    let mut change: Vec<f64> = pairs.map(|(b, m)| b - m).collect();
+    base.slopes[k].clear(&mut change);
+    Some(change)
+}
+
 fn evaluate(
     base: &BaseModel,
     structure: &Structure,
@@ -104,8 +139,7 @@ fn evaluate(
     let (model, terms) = structure.model(&values);
     let (mut left, mut along, mut size) = (0.0, 0.0, 0.0);
     let residuals = training.iter().zip(base.scored.train.iter());
-    let slopes = base.slopes.iter().zip(&base.nuisance);
-    for ((record, before), (slopes, nuisance)) in residuals.zip(slopes) {
+    for (k, (record, before)) in residuals.enumerate() {
         if terms.disturb() {
             let mut residual = before.samples.clone();
             let nuisance = record.nuisance(&base.scored.fitted.free, &terms, None);
@@ -113,11 +147,7 @@ fn evaluate(
             left += dot(&residual, &residual);
             continue;
         }
-        let mut moved = raw_residual(&model, record).ok()?;
-        nuisance.clear(&mut moved);
-        let pairs = before.samples.iter().zip(&moved);
-        let mut change: Vec<f64> = pairs.map(|(b, m)| b - m).collect();
-        slopes.clear(&mut change);
+        let change = change_of(base, &model, record, k)?;
         let pairs = before.samples.iter().zip(&change);
         let rest: Vec<f64> = pairs.map(|(b, c)| b - c).collect();
         left += dot(&rest, &rest);

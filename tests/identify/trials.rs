@@ -6,13 +6,7 @@ use torqcomp::identify::{decay, response, static_load};
 
 use super::response::{driven, driven_by};
 use super::{Coverage, Noise, TAU, of, times};
-use crate::util::assert_close;
-
-/// Records of each case.
-fn records(default: usize) -> usize {
-    let number = std::env::var("TORQCOMP_TRIALS").ok();
-    number.and_then(|n| n.parse().ok()).unwrap_or(default)
-}
+use crate::util::{assert_close, trials};
 
 /// Between 92 and 97 % of the intervals include the true value, give or take three standard deviations of that share over
 /// so many records.
@@ -151,7 +145,7 @@ fn decays(colour: Colour, count: usize) -> ([Coverage; 2], usize) {
 
 #[test]
 fn intervals_of_decays_cover_the_truth_in_coloured_noise() {
-    let number = records(24);
+    let number = trials(24);
     let (mut found, mut all) = (0, 0);
     for colour in [
         Colour::OfStand,
@@ -244,7 +238,7 @@ fn responses(disturbance: Disturbance, count: usize) -> [Coverage; 3] {
 
 #[test]
 fn intervals_of_responses_cover_the_truth_whatever_the_noise() {
-    let number = records(60);
+    let number = trials(60);
     for disturbance in [Disturbance::Output, Disturbance::Torque, Disturbance::Input] {
         let covered = responses(disturbance, number);
         for (covered, what) in covered.iter().zip(["frequency", "damping", "stiffness"]) {
@@ -417,7 +411,7 @@ fn intervals_of_calibrations_cover_the_truth_whatever_disturbs_them() {
     use Calibration::{
         EvenDrift, Friction, Hysteresis, Mountings, Plain, SameMountings, Walk, WalkUp,
     };
-    let number = records(100);
+    let number = trials(100);
     for case in [
         Plain,
         Mountings(3),

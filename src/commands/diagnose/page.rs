@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use super::text::{
-    answer, candidates, cells, constant_rows, error_rows, error_sentences, ladder_rows, share_rows,
+    WOULD_SHOW, answer, candidates, cells, constant_rows, error_rows, error_sentences, ladder_rows,
+    limit_rows, share_rows,
 };
 use crate::chart::{Chart, Page, Series};
 use crate::diagnose::{
@@ -354,6 +355,10 @@ impl Draft<'_> {
             ])
         }));
         self.page.table(&rows);
+        if !self.diagnosis.detection_limits.is_empty() {
+            self.page.text(&format!("{WOULD_SHOW}:"));
+            self.page.table(&limit_rows(self.diagnosis));
+        }
     }
 }
 

@@ -3,7 +3,9 @@
 use torqcomp_model::Estimate;
 use torqcomp_model::effects::Effect;
 
-use crate::diagnose::{CandidateFit, Diagnosis, GuardModel, NoiseFloorSource, Status, Verdict};
+use crate::diagnose::{
+    CandidateFit, Diagnosis, GuardModel, NoiseFloorSource, ShownSide, Status, Verdict,
+};
 use crate::print::{Report, columns, enumeration, plural, rounded, unit_or_as_recorded, with_std};
 
 /// Candidates that are listed unless all are asked for.
@@ -41,6 +43,16 @@ impl Report for Diagnosis {
             }
         }
         text += &format!("\nresidual: {}\n", self.residual.described);
+        if !self.detection_limits.is_empty() {
+            text += &format!("\n{WOULD_SHOW}:\n\n");
+            for row in &limit_rows(self)[1..] {
+                let at = match row[2].as_str() {
+                    "" => String::new(),
+                    at => format!(", at {at}"),
+                };
+                text += &format!("{}: {}{at}\n", row[0], row[1]);
+            }
+        }
         text
     }
 }
@@ -218,6 +230,39 @@ pub fn error_sentences(diagnosis: &Diagnosis) -> Vec<String> {
     });
     let all = improvement.into_iter().chain([floor]).chain(course);
     all.collect()
+}
+
+/// What the detection limits are.
+pub const WOULD_SHOW: &str =
+    "Smallest amounts that the training records would have shown with 95 % certainty";
+
+/// The detection limits, with a head.
+pub fn limit_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
+    let mut rows = vec![cells(["effect", "from there on", "at"])];
+    rows.extend(diagnosis.detection_limits.iter().map(|limit| {
+        let side = match limit.shows {
+            ShownSide::From => ">=",
+            ShownSide::UpTo => "<=",
+        };
+        let shown = match limit.value {
+            Some(value) => format!(
+                "{} {side} {} {}",
+                limit.parameter,
+                rounded(value, 3),
+                limit.unit
+            ),
+            None => "no physical amount".to_owned(),
+        };
+        let at = limit.at.iter().map(|p| {
+            let value = rounded(p.estimate.value(), 3);
+            format!("{} {value} {}", p.name, p.estimate.unit())
+                .trim_end()
+                .to_owned()
+        });
+        let at: Vec<String> = at.collect();
+        cells([limit.effect, shown.trim_end(), &at.join(", ")])
+    }));
+    rows
 }
 
 /// The constants of the plain stand, with a head.

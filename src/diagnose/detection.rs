@@ -1,0 +1,222 @@
+//! What the records would have shown: for each effect the smallest amount that the search would have found in them.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+use std::f64::consts::TAU;
+
+use super::blocks::compare;
+use super::record::StandRecord;
+use super::records::Records;
+use super::score::{BaseModel, EffectParameter, ScoredModel};
+use super::search::{evidence, listed};
+use super::starts::change;
+use super::structure::EffectForm;
+use crate::parallel::parallel;
+use torqcomp_model::Estimate;
+
+/// The smallest amount of an effect that the training records would have shown with 95 % certainty.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct DetectionLimit {
+    /// Name of the effect.
+    pub effect: &'static str,
+    /// The form of the effect for which this holds.
+    pub form: &'static str,
+    /// The parameter that says how much of the effect there is.
+    pub parameter: &'static str,
+    /// Its magnitude from which on, or up to which, the effect shows; `null` if no physical amount does.
+    pub value: Option<f64>,
+    /// Unit of `value`; empty for a ratio.
+    pub unit: String,
+    /// Whether larger or smaller values show: the lower a corner or a limit is, the more it changes.
+    pub shows: ShownSide,
+    /// Values of the effect's other parameters for which this holds.
+    pub at: Vec<EffectParameter>,
+}
+
+/// Where an effect shows, seen from its detection limit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ShownSide {
+    /// From the limit on.
+    From,
+    /// Up to the limit.
+    UpTo,
+}
+
+/// Relative width to which a limit is found.
+const WIDTH: f64 = 0.01;
+/// Evaluations after which the search for a limit ends.
+const MOST: usize = 25;
+/// Largest change of the amount from one evaluation to the next.
+const LARGEST_STEP: f64 = 30.0;
+/// Frequency of a line for which no other is known, in natural frequencies.
+const LINE: f64 = 0.5;
+
+/// The limits of all effects that are not part of a model.
+pub fn detection_limits(
+    model: &ScoredModel,
+    records: &Records,
+    threads: usize,
+) -> Vec<DetectionLimit> {
+    let base = BaseModel::of(model.clone(), records);
+    let training = model.fitted.with_initial_states(&records.train);
+    let effects: Vec<_> = listed(&base).collect();
+    let limits = parallel(effects.len(), threads, |k| {
+        let effect = effects[k];
+        let form = effect.forms.first()?;
+        Amount::of(&base, EffectForm { effect, form }).map(|a| a.limit(&base, &training))
+    });
+    limits.into_iter().flatten().collect()
+}
+
+/// An effect of which there may be more or less.
+struct Amount {
+    effect: EffectForm,
+    /// Values of its parameters as a fit moves them.
+    values: Vec<f64>,
+    /// The parameter that says how much of it there is.
+    size: usize,
+    /// Whether there is the more of it the smaller that one is.
+    falls: bool,
+}
+
+impl Amount {
+    fn of(base: &BaseModel, effect: EffectForm) -> Option<Self> {
+        let scales = &base.scored.fitted.structure.context.scales;
+        let parameters = effect.form.parameters;
+        let starts = effect.form.starts;
+        let typical = starts.get(starts.len() / 2);
+        let mut values = match typical {
+            Some(values) => values.to_vec(),
+            None => vec![parameters.first()?.moved(LINE * scales.natural_hz, scales)],
+        };
+        let size = match effect.is_line() {
+            true => Some(1),
+            false => effect.size(),
+        };
+        values.resize(parameters.len(), 1.0);
+        Some(Self {
+            effect,
+            values,
+            size: size.unwrap_or(0),
+            falls: size.is_none(),
+        })
+    }
+
+    /// The values with so much of the effect.
+    fn with(&self, amount: f64) -> Vec<f64> {
+        let mut values = self.values.clone();
+        values[self.size] = match self.falls {
+            true => 1.0 / amount,
+            false => amount.copysign(values[self.size]),
+        };
+        values
+    }
+
+    /// The most of it that is physical.
+    fn most(&self) -> f64 {
+        let parameter = &self.effect.form.parameters[self.size];
+        match (self.falls, self.values[self.size] < 0.0) {
+            (true, _) => 1.0 / parameter.lower,
+            (false, true) => -parameter.lower,
+            (false, false) => parameter.upper,
+        }
+    }
+
+    fn limit(&self, base: &BaseModel, training: &[StandRecord]) -> DetectionLimit {
+        let scales = &base.scored.fitted.structure.context.scales;
+        let diagnosed = &base.scored.fitted.structure.context.units.diagnosed;
+        let found = self.smallest(|amount| {
+            let change = self.change(base, training, amount)?;
+            Some(self.evidence(base, &change))
+        });
+        let values = self.with(found.unwrap_or_else(|| self.most()));
+        let all = self.effect.form.parameters.iter().zip(&values);
+        let mut all: Vec<EffectParameter> = all
+            .map(|(parameter, value)| EffectParameter {
+                effect: self.effect.effect.name,
+                name: parameter.name,
+                estimate: Estimate::of(
+                    parameter.unit.text(diagnosed),
+                    parameter.value(*value, scales),
+                    None,
+                ),
+            })
+            .collect();
+        let own = all.remove(self.size);
+        let parameter = &self.effect.form.parameters[self.size];
+        DetectionLimit {
+            effect: own.effect,
+            form: self.effect.form.name,
+            parameter: own.name,
+            value: found.map(|_| own.estimate.value().abs()),
+            unit: own.estimate.unit().to_owned(),
+            shows: match self.falls != parameter.reciprocal {
+                true => ShownSide::UpTo,
+                false => ShownSide::From,
+            },
+            // Further lines are those of other forms.
+            at: all,
+        }
+    }
+
+    /// What so much of the effect changes in the training records, beyond what the model's own parameters can; one record
+    /// after the other.
+    fn change(&self, base: &BaseModel, training: &[StandRecord], amount: f64) -> Option<Vec<f64>> {
+        let context = &base.scored.fitted.structure.context;
+        if !self.effect.is_line() {
+            let structure = base.scored.fitted.structure.with(self.effect);
+            let own = &self.with(amount)[..self.effect.moved()];
+            return change(base, &structure, own, training);
+        }
+        let [frequency, size] = [0, 1].map(|k| &self.effect.form.parameters[k]);
+        let frequency_hz = frequency.value(self.values[0], &context.scales);
+        let amplitude = size.value(amount, &context.scales);
+        Some(base.cleared(|k| {
+            let record = &training[k];
+            let turn = TAU * frequency_hz / record.rate_hz();
+            let line = record.range.clone().map(|i| turn * i as f64);
+            let mut line: Vec<f64> = line.map(|phase| amplitude * phase.cos()).collect();
+            base.nuisance[k].clear(&mut line);
+            line
+        }))
+    }
+
+    /// By how many times a change of the records meets what the search asks of an effect.
+    fn evidence(&self, base: &BaseModel, change: &[f64]) -> f64 {
+        let left = base.scored.train.iter().map(|r| r.samples.as_slice());
+        let left = left.collect::<Vec<_>>().concat();
+        let with: Vec<f64> = left.iter().zip(change).map(|(r, c)| r + c).collect();
+        let parameters = self.effect.form.parameters.len();
+        evidence(&compare(&with, &left), left.len(), parameters)
+    }
+
+    /// The smallest amount with an evidence of 1: it grows about with the square of the amount.
+    fn smallest(&self, evidence: impl Fn(f64) -> Option<f64>) -> Option<f64> {
+        let most = self.most();
+        let start = self.values[self.size].abs();
+        let mut amount = if self.falls { 1.0 / start } else { start }.min(most);
+        let (mut low, mut high) = (0.0_f64, f64::INFINITY);
+        for _ in 0..MOST {
+            // Where the motion diverges, there is too much of it.
+            let found = evidence(amount).unwrap_or(f64::INFINITY);
+            match found >= 1.0 {
+                true => high = amount,
+                false => low = amount,
+            }
+            if low >= most || high <= low * (1.0 + WIDTH) {
+                break;
+            }
+            let step = (1.0 / found.max(1e-12)).sqrt();
+            let next = amount * step.clamp(1.0 / LARGEST_STEP, LARGEST_STEP);
+            amount = match low * (1.0 + 0.5 * WIDTH) < next && next < high * (1.0 - 0.5 * WIDTH) {
+                true => next,
+                false if high.is_infinite() => amount * (1.0 + WIDTH),
+                false if low == 0.0 => high / LARGEST_STEP,
+                false => (low * high).sqrt(),
+            };
+            amount = amount.min(most);
+        }
+        high.is_finite().then_some(high)
+    }
+}
