@@ -139,6 +139,15 @@ impl Failure {
         }
     }
 
+    /// A failure to read on in a file whose name is said elsewhere.
+    pub fn unreadable(error: &io::Error) -> Self {
+        let code = match error.kind() {
+            io::ErrorKind::InvalidData => ErrorCode::DamagedFile,
+            _ => ErrorCode::CannotRead,
+        };
+        Self::failed(code, format_args!("cannot be read: {error}"))
+    }
+
     /// A failure to read a file.
     pub fn reading(path: &Path, error: &io::Error) -> Self {
         let (code, hint) = match error.kind() {

@@ -1,6 +1,7 @@
 //! Peak memory of the verbs on records of two lengths: what grows with the record, and by how much a row.
 
 use std::fmt::Write as _;
+use std::io::Write as _;
 use std::process::Stdio;
 
 use crate::util::{Folder, command};
@@ -156,6 +157,29 @@ fn memory_grows_by_no_more_than_is_stated() {
         }
     }
     assert!(wrong.is_empty(), "{wrong}");
+}
+
+/// A bomb of compressed rows costs no more memory than its text.
+#[test]
+fn a_packed_record_takes_as_much_as_its_text() {
+    let folder = Folder::new();
+    let text = "0.5,1.25\n".repeat(4_000_000);
+    let text = format!("x_V,y_V\n{text}");
+    let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::best());
+    packed.write_all(text.as_bytes()).expect("memory takes all");
+    let packed = packed.finish().expect("memory takes all");
+    assert!(200 * packed.len() < text.len(), "{}", packed.len());
+    folder.write("plain", text).write("packed", packed);
+    let [plain, packed] = ["plain", "packed"].map(|name| {
+        let words = ["extract", name, "--channel", "x", "--rate", "1000"];
+        peak_of(&folder, &words)
+    });
+    println!(
+        "{:.0} MB of the text, {:.0} MB packed",
+        plain / 1e6,
+        packed / 1e6
+    );
+    assert!(packed < plain + 4e6, "{plain} and {packed} bytes");
 }
 
 /// What cannot have room is refused before anything is read or written.

@@ -32,6 +32,7 @@ mod mutations;
 mod noise;
 mod once;
 mod output;
+mod packed;
 mod pages;
 mod predict;
 mod rates;

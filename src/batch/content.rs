@@ -4,8 +4,7 @@ use std::io::Read;
 use std::path::Path;
 
 use super::{manifest, summary};
-use crate::io::MCAP_START;
-use crate::io::storage::Stored;
+use crate::io::{Input, MCAP_START};
 use crate::log;
 
 /// Bytes that are looked at.
@@ -19,8 +18,11 @@ const STAND: &str = "schema = \"torqcomp.";
 /// manifest, log or summary. A file that cannot be read is one: the reason is said when it is read.
 pub(super) fn is_recording(path: &Path) -> bool {
     let mut head = Vec::new();
-    let read = Stored::open(path).and_then(|file| file.take(HEAD).read_to_end(&mut head));
-    if read.is_err()
+    // What is compressed is judged by its content.
+    let read = Input::File(path.to_owned())
+        .open()
+        .map(|file| file.take(HEAD).read_to_end(&mut head));
+    if !matches!(read, Ok(Ok(_)))
         || head.starts_with(MCAP_START)
         || WIDE_TEXT.iter().any(|mark| head.starts_with(mark))
     {

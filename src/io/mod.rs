@@ -8,6 +8,7 @@ mod mark;
 pub mod mcap;
 pub mod number;
 pub mod output;
+pub(crate) mod packed;
 mod parts;
 mod reading;
 pub(crate) mod storage;

@@ -72,8 +72,8 @@ pub(super) fn of_text(
     from: Option<u64>,
     plan: &ChannelPlan,
 ) -> Result<Vec<f64>, Failure> {
-    match (input, from) {
-        (Input::File(path), Some(from)) => {
+    match (input.plain_file(), from) {
+        (Some(path), Some(from)) => {
             of_file(path, from, plan).map_err(|error| input.unreadable(&error))
         }
         _ => Ok(Vec::new()),

@@ -20,10 +20,8 @@ struct Followed {
 /// If it cannot be opened.
 pub(super) fn open(input: &Input) -> Result<Box<dyn Read + Send>, Failure> {
     let file = input.open()?;
-    let length = match input {
-        Input::File(path) => std::fs::metadata(path).map_or(0, |meta| meta.len()),
-        Input::Stdin => 0,
-    };
+    let length = input.plain_file().and_then(|path| path.metadata().ok());
+    let length = length.map_or(0, |meta| meta.len());
     Ok(Box::new(Followed {
         file,
         length: (length > 0).then(|| Amount::of_bytes(length)),

@@ -24,7 +24,7 @@ struct Room {
 /// # Errors
 /// If they cannot have room within what the process may have: before they are read or anything is written.
 pub(super) fn look(input: &Input, text: &TextFile, most: usize) -> Result<(), Failure> {
-    let Input::File(path) = input else {
+    let Some(path) = input.plain_file() else {
         return Ok(());
     };
     let length = std::fs::metadata(path).map_or(0, |meta| meta.len());

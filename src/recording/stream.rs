@@ -11,7 +11,7 @@ use super::stamps::{StampGrid, is_uniform};
 use super::text::{ChannelPlan, StampColumn, StampUse, TextFile, TextStream};
 use super::validator::{StreamValidator, TextLines};
 use super::{FilledSpan, RateFrom, Recording, TimeAxis, checkpoints, progress};
-use crate::failure::{ErrorCode, Failure};
+use crate::failure::Failure;
 use crate::io::{ChannelChoice, Input, Reading};
 use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
@@ -71,19 +71,23 @@ impl ChannelStream {
         choice: &ChannelChoice,
         reading: &Reading,
     ) -> Result<Self, Failure> {
+        let mut stream = Self::of_content(input, choice, reading)?;
+        stream.dialect = input.dialect(&stream.dialect);
+        Ok(stream)
+    }
+
+    fn of_content(
+        input: &Input,
+        choice: &ChannelChoice,
+        reading: &Reading,
+    ) -> Result<Self, Failure> {
         let name = input.name();
         if reading.is_partial() {
             let recording = Recording::read(input, std::slice::from_ref(choice), reading)?;
             return Self::of_recording(recording, choice, reading).map_err(|f| f.at(&name));
         }
         let mut bytes = progress::open(input)?;
-        let unreadable = |error| {
-            Failure::failed(
-                ErrorCode::CannotRead,
-                format_args!("cannot be read: {error}"),
-            )
-            .at(&name)
-        };
+        let unreadable = |error| Failure::unreadable(&error).at(&name);
         let mut head = Vec::new();
         let start = (&mut bytes).take(MAGIC).read_to_end(&mut head);
         start.map_err(unreadable)?;

@@ -26,6 +26,12 @@ pub struct Content {
 
 /// Reads a file, whatever its format.
 pub fn read(place: &Input, reading: &Reading) -> Result<Content, Failure> {
+    let mut content = unpacked(place, reading)?;
+    content.recording.dialect = place.dialect(&content.recording.dialect);
+    Ok(content)
+}
+
+fn unpacked(place: &Input, reading: &Reading) -> Result<Content, Failure> {
     if place.is_mcap()? {
         refuse_for_messages(reading)?;
         return messages::read(place, reading);

@@ -36,9 +36,7 @@ impl Summary {
     /// Reads it; `None` if there is none, the file cannot be sought, or a record of it cannot be read. The summary reader
     /// of `mcap` does not suffice: it reserves memory for any length of a text that a chunk index claims.
     fn read(input: &Input) -> Option<Self> {
-        let Input::File(path) = input else {
-            return None;
-        };
+        let path = input.plain_file()?;
         let length = Stored::open(path).ok()?.metadata().ok()?.len();
         let end = length.checked_sub((FOOTER + MAGIC.len()) as u64)?;
         let mut footer = Vec::new();
@@ -80,10 +78,7 @@ impl Summary {
 
 /// A file from a byte on.
 fn open_at(input: &Input, at: u64) -> Option<Stored<File>> {
-    let Input::File(path) = input else {
-        return None;
-    };
-    let mut file = Stored::open(path).ok()?;
+    let mut file = Stored::open(input.plain_file()?).ok()?;
     file.seek(SeekFrom::Start(at)).ok()?;
     Some(file)
 }

@@ -169,10 +169,7 @@ impl Chunks {
 }
 
 fn unreadable(error: io::Error) -> Failure {
-    Failure::failed(
-        ErrorCode::CannotRead,
-        format_args!("cannot be read: {error}"),
-    )
+    Failure::unreadable(&error)
 }
 
 #[cfg(test)]

@@ -98,8 +98,7 @@ impl TextFile {
         let mut bytes = Vec::new();
         let mut head = (&mut input).take(FOR_ENCODING);
         let read = head.read_to_end(&mut bytes);
-        let why = |error| format!("cannot be read: {error}");
-        read.map_err(|error| Failure::failed(ErrorCode::CannotRead, why(error)))?;
+        read.map_err(|error| Failure::unreadable(&error))?;
         let decoding = Decoding::of(&bytes)?;
         let mut chunks = Chunks::new(decoding.reader(bytes, input));
         let one_line = one_line(&mut chunks, reading)?;

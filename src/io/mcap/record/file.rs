@@ -444,12 +444,6 @@ impl FileReader {
 
     fn want(&mut self, count: usize) -> Result<usize, Failure> {
         let there = self.input.want(count);
-        there.map_err(|error| {
-            Failure::failed(
-                ErrorCode::CannotRead,
-                format_args!("cannot be read: {error}"),
-            )
-            .at(&self.name)
-        })
+        there.map_err(|error| Failure::unreadable(&error).at(&self.name))
     }
 }
