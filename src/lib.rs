@@ -12,6 +12,7 @@ pub mod identify;
 pub mod inverse;
 pub mod io;
 mod log;
+mod noise_colour;
 pub mod outcome;
 mod parallel;
 mod pipeline;

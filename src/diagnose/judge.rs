@@ -53,6 +53,9 @@ impl SearchState {
         self.tests = super::tests(&self.after);
         self.lower_noise_floor();
         self.confirm(threads);
+        for model in [&mut self.before, &mut self.after] {
+            *model = model.clone().with_coloured_std(&self.records);
+        }
         let without = std::mem::take(&mut self.without);
         self.ladder = Ladder::of(&self.after, &self.before, without, &self.records, threads);
         Ok(())

@@ -5,6 +5,7 @@
 //! is the JSON document of `diagnose`.
 
 mod blocks;
+mod coloured;
 mod columns;
 mod declared;
 mod describe;

@@ -299,24 +299,38 @@ impl BaseModel {
 
 /// Derivatives of a record's residual with respect to the parameters, and the nuisance terms removed from it.
 fn slopes(fitted: &FittedModel, record: &StandRecord) -> (Columns, Nuisance) {
-    let nuisance = record.nuisance(&fitted.free, &NuisanceTerms::NONE, None);
+    let (derivatives, nuisance) = derivatives(fitted, record, &NuisanceTerms::NONE);
+    let mut slopes = Columns::default();
+    for derivative in derivatives.into_iter().flatten() {
+        slopes.push(derivative);
+    }
+    (slopes, nuisance)
+}
+
+/// The derivative of a record's residual with respect to each parameter, nuisance terms removed; `None` if the motion
+/// diverges. And these terms.
+pub fn derivatives(
+    fitted: &FittedModel,
+    record: &StandRecord,
+    terms: &NuisanceTerms,
+) -> (Option<Vec<Vec<f64>>>, Nuisance) {
+    let nuisance = record.nuisance(&fitted.free, terms, None);
     let at = |values: &[f64]| {
-        let (model, _) = fitted.structure.model(values);
+        let (mut model, _) = fitted.structure.model(values);
+        model.shift = record.initial.preload;
         let mut residual = raw_residual(&model, record).ok()?;
         nuisance.clear(&mut residual);
         Some(residual)
     };
-    let mut slopes = Columns::default();
-    if let Some(here) = at(&fitted.values) {
-        for k in 0..fitted.values.len() {
-            let mut values = fitted.values.clone();
-            let step = STEP * values[k].abs().max(1e-3);
-            values[k] += step;
-            if let Some(there) = at(&values) {
-                let pairs = there.iter().zip(&here);
-                slopes.push(pairs.map(|(a, b)| (a - b) / step).collect());
-            }
-        }
-    }
-    (slopes, nuisance)
+    let along = |k: usize, here: &[f64]| {
+        let mut values = fitted.values.clone();
+        let step = STEP * values[k].abs().max(1e-3);
+        values[k] += step;
+        let there = at(&values)?;
+        let pairs = there.iter().zip(here);
+        Some(pairs.map(|(a, b)| (a - b) / step).collect())
+    };
+    let all = at(&fitted.values)
+        .and_then(|here| (0..fitted.values.len()).map(|k| along(k, &here)).collect());
+    (all, nuisance)
 }

@@ -11,7 +11,6 @@ pub mod static_load;
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use statrs::distribution::{ContinuousCDF, StudentsT};
 use torqcomp_model::{Covariance, Estimate, Estimates, Kind, Measure, UnitSystem};
 
 use crate::chart::Chart;
@@ -287,15 +286,6 @@ impl Identification {
         let all = self.parameters.iter_mut().chain(compared);
         all.for_each(|constant| constant.convert(units));
     }
-}
-
-/// Student's 97.5 % quantile over the normal one.
-fn student(freedom: f64) -> f64 {
-    if freedom.is_infinite() {
-        return 1.0;
-    }
-    let quantile = StudentsT::new(0.0, 1.0, freedom).map(|d| d.inverse_cdf(0.975));
-    quantile.map_or(1.0, |q| q / 1.959_963_984_540_054)
 }
 
 /// Root of the mean square; 0 for no values.

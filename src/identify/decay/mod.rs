@@ -1,7 +1,6 @@
 //! Frequencies and damping from free decays (Appendix C, II).
 
 mod by_hand;
-mod colour;
 mod dependence;
 mod laws;
 mod modes;

@@ -5,7 +5,7 @@
 //! ```
 //!
 //! Decay rates and frequencies belong to the stand and are common to all stretches; amplitudes, offset
-//! and drift belong to each stretch. Uncertainties allow for the colour of the noise ([`super::colour`]).
+//! and drift belong to each stretch. Uncertainties allow for the colour of the noise ([`crate::noise_colour`]).
 
 use std::ops::Range;
 
@@ -13,8 +13,8 @@ use nalgebra::DMatrix;
 use torqcomp_model::Covariance;
 use torqcomp_model::fit::{Fit, FitError, Options, Parameter, Residuals, linear, minimize};
 
-use super::colour::{self, NoiseColour};
 use crate::identify::Pole;
+use crate::noise_colour::{self, NoiseColour};
 
 /// A stretch of free ringing.
 #[derive(Debug, Clone, PartialEq)]
@@ -226,7 +226,13 @@ fn with_colour(mut fit: Fit, problem: &SineSum, wanted: usize) -> Result<ModesFi
     problem.jacobian(&fit.values, &mut jacobian)?;
     let groups = of_one_rate(stretches);
     let wanted = free.iter().filter(|i| **i < wanted).count();
-    let learnt = colour::learn(&residuals, &groups, &jacobian.select_columns(&free), wanted);
+    let learnt = noise_colour::learn(
+        &residuals,
+        &groups,
+        &jacobian.select_columns(&free),
+        wanted,
+        None,
+    );
     let colours = match learnt {
         Some((colours, covariance)) => {
             fit.covariance = Covariance::of_some(&free, count, covariance);

@@ -22,7 +22,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use torqcomp_model::fit::FitError;
 
 use super::{Point, SAME, terms};
-use crate::identify::student;
+use crate::noise_colour::student;
 
 /// Significance level of the hysteresis.
 const CHANCE: f64 = 0.01;

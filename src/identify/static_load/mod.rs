@@ -7,9 +7,10 @@ mod terms;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{FitQuality, Identification, NamedEstimate, rms, student};
+use super::{FitQuality, Identification, NamedEstimate, rms};
 use crate::chart::{Chart, Series};
 use crate::failure::{ErrorCode, Failure};
+use crate::noise_colour::student;
 use crate::print::{plural, rounded};
 use mixed::LoadCurve;
 

@@ -1,4 +1,4 @@
-//! Colour of the noise in decays, and the covariance of a fit in it.
+//! Colour of the noise that a fit leaves, and the covariance of the fit in it.
 //!
 //! ```text
 //! S(f) = Σ_s |R_s(f)|² / Σ_s n_s (1 − h_s(f)),   h_s(f) = Σ_j |Q_sj(f)|² / n_s
@@ -20,6 +20,10 @@
 //! ν = 2 u²/var(u),   var(u) = 2 u²/n + (∂u/∂a)ᵀ (v/n) Γ⁻¹ (∂u/∂a),   ∂S/∂a_k = 2 S Re(e^(−j2πfk)/(1 − Σ a_m e^(−j2πfm)))
 //! ```
 //!
+//! An autoregression does not resolve a narrow peak. Where one is to be expected, the spectrum is multiplied by what the
+//! residuals have of it around each frequency, `Σ_b |R|² / Σ_b E|R|²` over the bins b within a half-width, and
+//! `var(u) = (m/n) Σ_f ū(f)²` with `ū` the parts of u averaged over the same bins and m the length of the transform.
+//!
 //! Γ: autocovariances of the noise, p by p. (JCGM 100:2008, G.4; P. J. Brockwell, R. A. Davis, Time Series, 1991, 8.1.)
 
 use std::f64::consts::TAU;
@@ -28,7 +32,7 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-use crate::identify::student;
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Highest order of the autoregression, and fewest samples for each order.
 const MOST_ORDERS: usize = 40;
@@ -42,7 +46,7 @@ const LEAST_FREEDOM: f64 = 2.0;
 
 /// An autoregression of noise, in samples.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct NoiseColour {
+pub struct NoiseColour {
     coefficients: Vec<f64>,
     /// v, in squared units of the samples.
     innovation: f64,
@@ -50,7 +54,21 @@ pub(super) struct NoiseColour {
     covariances: Vec<f64>,
     /// Samples that it is known from.
     count: usize,
+    /// What the spectrum has beside that of the autoregression, if it is resolved further.
+    detail: Option<Detail>,
 }
+
+/// Factors on a spectrum, averages over neighbouring bins.
+#[derive(Debug, Clone, PartialEq)]
+struct Detail {
+    /// One for each bin.
+    factors: Vec<f64>,
+    /// Bins to each side over which they are averages.
+    half_width: usize,
+}
+
+/// Fewest bins to each side over which a spectrum is averaged, in those of the record.
+const LEAST_HALF_WIDTH: f64 = 4.0;
 
 /// Residuals of a stretch with the transforms of its orthonormal derivatives.
 struct Transformed {
@@ -64,12 +82,14 @@ struct Transformed {
 ///
 /// `stretches`: residuals of each stretch; `groups`: stretches of one sampling rate; `jacobian`: derivatives by the
 /// parameters, over all stretches. If `wanted` is not 0, the colour allows for what the fit absorbs of it, and the first
-/// `wanted` parameters for what is not known of the spectrum.
-pub(super) fn learn(
+/// `wanted` parameters for what is not known of the spectrum. With `peaks_rad`, peaks of that half-width in rad per sample are
+/// resolved.
+pub fn learn(
     stretches: &[Vec<f64>],
     groups: &[Range<usize>],
     jacobian: &DMatrix<f64>,
     wanted: usize,
+    peaks_rad: Option<f64>,
 ) -> Option<(Vec<NoiseColour>, DMatrix<f64>)> {
     let sizes: Vec<f64> = jacobian.column_iter().map(|c| c.norm()).collect();
     if sizes.contains(&0.0) {
@@ -100,6 +120,13 @@ pub(super) fn learn(
         colours = pairs.map(|(c, g)| c.refined(g, size, &middle)).collect();
         middle = gathered(&colours);
     }
+    if let Some(width_rad) = peaks_rad {
+        let pairs = colours.into_iter().zip(each());
+        colours = pairs
+            .map(|(c, g)| c.with_detail(g, size, &middle, width_rad))
+            .collect();
+        middle = gathered(&colours);
+    }
     let rows = inverse.rows(0, wanted.min(sizes.len())).into_owned();
     let none = DVector::zeros(rows.nrows());
     let variances = colours.iter().zip(each()).fold(none, |sum, (c, g)| {
@@ -118,6 +145,15 @@ pub(super) fn learn(
     }
     let is_finite = covariance.iter().all(|v| v.is_finite());
     is_finite.then_some((colours, covariance))
+}
+
+/// Student's 97.5 % quantile over the normal one.
+pub fn student(freedom: f64) -> f64 {
+    if freedom.is_infinite() {
+        return 1.0;
+    }
+    let quantile = StudentsT::new(0.0, 1.0, freedom).map(|d| d.inverse_cdf(0.975));
+    quantile.map_or(1.0, |q| q / 1.959_963_984_540_054)
 }
 
 fn transformed(stretches: &[Vec<f64>], q: &DMatrix<f64>, size: usize) -> Vec<Transformed> {
@@ -158,6 +194,14 @@ fn inverse(spectrum: &mut [Complex64], size: usize) -> Vec<f64> {
 }
 
 impl Transformed {
+    /// Expected |R(f)|² where the noise has that density, and no less than what a fit leaves at most frequencies.
+    fn left(&self, density: &[f64], size: usize, middle: &DMatrix<f64>) -> Vec<f64> {
+        let least = (1.0 - MOST_ABSORBED) * self.count as f64;
+        let each = self.expected(density, size, middle);
+        let pairs = each.into_iter().zip(density);
+        pairs.map(|(e, s)| e.max(least * s)).collect()
+    }
+
     /// Expected |R(f)|² where the noise has that density.
     fn expected(&self, density: &[f64], size: usize, middle: &DMatrix<f64>) -> Vec<f64> {
         let forward = torqcomp_fourier::forward(size);
@@ -195,14 +239,49 @@ impl Transformed {
     }
 }
 
+/// For each bin the power of the residuals, and that expected of them.
+fn powers(
+    stretches: &[Transformed],
+    size: usize,
+    expected: impl Fn(&Transformed) -> Vec<f64>,
+) -> Vec<(f64, f64)> {
+    let mut sums = vec![(0.0, 0.0); size / 2 + 1];
+    for stretch in stretches {
+        let pairs = stretch.residual.iter().zip(expected(stretch));
+        for (sum, (residual, expected)) in sums.iter_mut().zip(pairs) {
+            sum.0 += residual.norm_sqr();
+            sum.1 += expected;
+        }
+    }
+    sums
+}
+
+/// For each value the sum of those around it, and how many these are.
+fn around(values: impl Iterator<Item = f64>, half_width: usize) -> Vec<(f64, f64)> {
+    let mut sums = vec![0.0];
+    for value in values {
+        sums.push(sums[sums.len() - 1] + value);
+    }
+    let count = sums.len() - 1;
+    let of = |k: usize| {
+        let (from, to) = (
+            k.saturating_sub(half_width),
+            (k + half_width + 1).min(count),
+        );
+        (sums[to] - sums[from], (to - from) as f64)
+    };
+    (0..count).map(of).collect()
+}
+
 impl NoiseColour {
     /// White noise of that variance, from so many samples.
-    pub(super) fn white(variance: f64, count: usize) -> Self {
+    pub fn white(variance: f64, count: usize) -> Self {
         Self {
             coefficients: Vec::new(),
             innovation: variance,
             covariances: vec![variance],
             count,
+            detail: None,
         }
     }
 
@@ -213,14 +292,7 @@ impl NoiseColour {
         expected: impl Fn(&Transformed) -> Vec<f64>,
         density: impl Fn(usize) -> f64,
     ) -> Self {
-        let mut sums = vec![(0.0, 0.0); size / 2 + 1];
-        for stretch in stretches {
-            let pairs = stretch.residual.iter().zip(expected(stretch));
-            for (sum, (residual, expected)) in sums.iter_mut().zip(pairs) {
-                sum.0 += residual.norm_sqr();
-                sum.1 += expected;
-            }
-        }
+        let sums = powers(stretches, size, expected);
         let bins = sums.iter().enumerate();
         let mut spectrum: Vec<Complex64> = bins
             .map(|(k, sum)| Complex64::new(density(k) * sum.0 / sum.1, 0.0))
@@ -244,16 +316,47 @@ impl NoiseColour {
 
     /// The colour that the residuals show if the fit absorbs noise of this colour; `middle`: QᵀΩQ.
     fn refined(&self, stretches: &[Transformed], size: usize, middle: &DMatrix<f64>) -> Self {
-        let density: Vec<f64> = (0..=size / 2)
-            .map(|k| self.density(TAU * k as f64 / size as f64))
-            .collect();
-        let expected = |stretch: &Transformed| {
-            let least = (1.0 - MOST_ABSORBED) * stretch.count as f64;
-            let each = stretch.expected(&density, size, middle);
-            let pairs = each.into_iter().zip(&density);
-            pairs.map(|(e, s)| e.max(least * s)).collect()
-        };
+        let density = self.of_bins(size);
+        let expected = |stretch: &Transformed| stretch.left(&density, size, middle);
         Self::of(stretches, size, expected, |k| density[k])
+    }
+
+    /// The same with the peaks that the residuals show, of a half-width in rad per sample.
+    fn with_detail(
+        self,
+        stretches: &[Transformed],
+        size: usize,
+        middle: &DMatrix<f64>,
+        width_rad: f64,
+    ) -> Self {
+        let density = self.of_bins(size);
+        let sums = powers(stretches, size, |s| s.left(&density, size, middle));
+        let bins = size as f64 / TAU * width_rad;
+        let longest = stretches.iter().map(|s| s.count).max().unwrap_or(size);
+        let least = LEAST_HALF_WIDTH * size as f64 / longest as f64;
+        let half_width = bins.max(least) as usize;
+        let found = around(sums.iter().map(|sum| sum.0), half_width);
+        let expected = around(sums.iter().map(|sum| sum.1), half_width);
+        let pairs = found.iter().zip(&expected);
+        let factors = pairs
+            .map(|(f, e)| if e.0 > 0.0 { f.0 / e.0 } else { 1.0 })
+            .collect();
+        Self {
+            detail: Some(Detail {
+                factors,
+                half_width,
+            }),
+            ..self
+        }
+    }
+
+    /// S in each bin of a transform.
+    fn of_bins(&self, size: usize) -> Vec<f64> {
+        let of_bin = |k: usize| {
+            let factor = self.detail.as_ref().map_or(1.0, |detail| detail.factors[k]);
+            factor * self.density(TAU * k as f64 / size as f64)
+        };
+        (0..=size / 2).map(of_bin).collect()
     }
 
     /// The autoregression of the order with the least criterion, by Levinson's recursion.
@@ -286,6 +389,7 @@ impl NoiseColour {
                     innovation,
                     covariances: covariances[..=order].to_vec(),
                     count,
+                    detail: None,
                 };
             }
         }
@@ -293,7 +397,7 @@ impl NoiseColour {
     }
 
     /// S at an angular frequency in rad per sample: the variance of white noise with as much power there.
-    pub(super) fn density(&self, rad_per_sample: f64) -> f64 {
+    pub fn density(&self, rad_per_sample: f64) -> f64 {
         self.innovation / self.whitener(rad_per_sample).norm_sqr()
     }
 
@@ -305,12 +409,12 @@ impl NoiseColour {
     }
 
     /// Variance of the noise.
-    pub(super) fn variance(&self) -> f64 {
+    pub fn variance(&self) -> f64 {
         self.covariances[0]
     }
 
     /// S at an angular frequency in rad per sample over the variance of the noise; 1 for white noise.
-    pub(super) fn relative_density(&self, rad_per_sample: f64) -> f64 {
+    pub fn relative_density(&self, rad_per_sample: f64) -> f64 {
         match self.variance() > 0.0 {
             true => self.density(rad_per_sample) / self.variance(),
             false => 1.0,
@@ -319,11 +423,12 @@ impl NoiseColour {
 
     /// Power of the noise in each bin of a transform, with that of its mirror image.
     fn densities(&self, size: usize) -> Vec<f64> {
-        let of_bin = |k: usize| {
+        let bins = self.of_bins(size).into_iter().enumerate();
+        let of_bin = |(k, density): (usize, f64)| {
             let sides = if k == 0 || k == size / 2 { 1.0 } else { 2.0 };
-            sides * self.density(TAU * k as f64 / size as f64) / size as f64
+            sides * density / size as f64
         };
-        (0..=size / 2).map(of_bin).collect()
+        bins.map(of_bin).collect()
     }
 
     /// var(u) of the variances u that the noise gives the sums of the columns times the factors in each of these rows.
@@ -333,6 +438,28 @@ impl NoiseColour {
         size: usize,
         rows: &DMatrix<f64>,
     ) -> DVector<f64> {
+        let of_row = |factors: &[f64], k: usize| {
+            let of_stretch = |stretch: &Transformed| {
+                let parts = stretch.columns.iter().zip(factors);
+                parts.map(|(c, f)| c[k] * f).sum::<Complex64>().norm_sqr()
+            };
+            stretches.iter().map(of_stretch).sum::<f64>()
+        };
+        let factors: Vec<Vec<f64>> = rows
+            .row_iter()
+            .map(|row| row.iter().copied().collect())
+            .collect();
+        if let Some(detail) = &self.detail {
+            let density = self.densities(size);
+            let each = factors.iter().map(|factors| {
+                let parts = density.iter().enumerate();
+                let parts = parts.map(|(k, density)| density * of_row(factors, k));
+                let means = around(parts, detail.half_width).into_iter();
+                let squares: f64 = means.map(|(sum, count)| (sum / count).powi(2)).sum();
+                size as f64 / self.count as f64 * squares
+            });
+            return DVector::from_vec(each.collect());
+        }
         let order = self.coefficients.len();
         let mut variances = DVector::zeros(rows.nrows());
         let mut slopes = DMatrix::zeros(order, rows.nrows());
@@ -342,12 +469,8 @@ impl NoiseColour {
             let along = DVector::from_fn(order, |m, _| {
                 2.0 * (Complex64::cis(-angle * (m + 1) as f64) / whitener).re
             });
-            for (i, factors) in rows.row_iter().enumerate() {
-                let of_stretch = |stretch: &Transformed| {
-                    let parts = stretch.columns.iter().zip(factors.iter());
-                    parts.map(|(c, f)| c[k] * f).sum::<Complex64>().norm_sqr()
-                };
-                let part = density * stretches.iter().map(of_stretch).sum::<f64>();
+            for (i, factors) in factors.iter().enumerate() {
+                let part = density * of_row(factors, k);
                 variances[i] += part;
                 slopes.column_mut(i).axpy(part, &along, 1.0);
             }
@@ -410,6 +533,7 @@ mod tests {
             innovation: 1.0,
             covariances: vec![1.0 / 0.36, 0.8 / 0.36],
             count: n,
+            detail: None,
         };
         let q = DMatrix::from_element(n, 1, 1.0 / (n as f64).sqrt());
         let size = 512;

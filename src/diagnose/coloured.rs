@@ -1,0 +1,68 @@
+//! Standard uncertainties of what was fitted, in noise of the colour that the training residuals have.
+
+use nalgebra::DMatrix;
+
+use super::fit::FittedModel;
+use super::records::Records;
+use super::score::{ScoredModel, derivatives};
+use crate::noise_colour;
+
+/// Half-width over which the spectrum of the residual is averaged, in the damping `ζω₀` of the stand: noise on the applied
+/// quantity peaks at its resonance.
+const WIDTH: f64 = 0.5;
+
+impl ScoredModel {
+    /// The same with standard uncertainties that allow for the colour of the training residuals; noise on the applied
+    /// quantity, filtered by the stand, gives them one. Where the derivatives cannot tell, those for white noise stay.
+    pub fn with_coloured_std(mut self, records: &Records) -> Self {
+        if let Some(std) = coloured_std(&self, records) {
+            self.fitted.std = std;
+        }
+        self
+    }
+}
+
+fn coloured_std(model: &ScoredModel, records: &Records) -> Option<Vec<Option<f64>>> {
+    let fitted: &FittedModel = &model.fitted;
+    let (_, terms) = fitted.structure.model(&fitted.values);
+    let training = fitted.with_initial_states(&records.train);
+    let each = training
+        .iter()
+        .map(|record| derivatives(fitted, record, &terms).0);
+    let each: Vec<Vec<Vec<f64>>> = each.collect::<Option<_>>()?;
+    // The frequency of a line is fitted with its phases, record by record: it has no column here.
+    let moves = |k: usize| {
+        each.iter()
+            .any(|columns| columns[k].iter().any(|d| *d != 0.0))
+    };
+    let free: Vec<usize> = (0..fitted.values.len())
+        .filter(|k| fitted.std[*k].is_some() && moves(*k))
+        .collect();
+    let rows: usize = model.train.iter().map(|r| r.samples.len()).sum();
+    let mut jacobian = DMatrix::zeros(rows, free.len());
+    for (mut column, k) in jacobian.column_iter_mut().zip(&free) {
+        let whole = each.iter().flat_map(|columns| &columns[*k]);
+        column
+            .iter_mut()
+            .zip(whole)
+            .for_each(|(to, from)| *to = *from);
+    }
+    let residuals: Vec<Vec<f64>> = model.train.iter().map(|r| r.samples.clone()).collect();
+    let all = 0..residuals.len();
+    let mode = fitted.mode();
+    let width_rad = WIDTH * mode.damping_ratio * mode.omega_rad_s / records.rate_hz();
+    let wanted = free.len();
+    let learnt = noise_colour::learn(
+        &residuals,
+        std::slice::from_ref(&all),
+        &jacobian,
+        wanted,
+        Some(width_rad),
+    );
+    let (_, covariance) = learnt?;
+    let mut std = fitted.std.clone();
+    for (i, k) in free.iter().enumerate() {
+        std[*k] = Some(covariance[(i, i)].sqrt());
+    }
+    Some(std)
+}
