@@ -128,6 +128,9 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["time-left-out", "a column named as time does not run as the time of the rows does and was left out", "choose another with --time-column"],
     ]),
     ("Samples", &[
+        ["full-scale-unknown", "samples are fractions of full scale, which the file does not say", "give --full-scale with its unit"],
+        ["left-out", "functions or variables of the file are no channels over time and were left out", "export them in another form if they are wanted"],
+        ["file-cut", "the file ends before what it announces", "copy it again"],
         ["channel-copy", "a channel equals another one", "choose one of them"],
         ["channel-multiple", "a channel is a multiple of another one but for rounding", "choose one of them"],
         ["clipped", "the signal is cut off at its highest or lowest value", "record with a larger range"],

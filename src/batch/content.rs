@@ -6,6 +6,7 @@ use std::path::Path;
 use super::{manifest, summary};
 use crate::io::{Input, MCAP_START};
 use crate::log;
+use crate::recording::formats;
 
 /// Bytes that are looked at.
 const HEAD: u64 = 1 << 16;
@@ -24,6 +25,7 @@ pub(super) fn is_recording(path: &Path) -> bool {
         .map(|file| file.take(HEAD).read_to_end(&mut head));
     if !matches!(read, Ok(Ok(_)))
         || head.starts_with(MCAP_START)
+        || formats::is_recording(&head)
         || WIDE_TEXT.iter().any(|mark| head.starts_with(mark))
     {
         return true;

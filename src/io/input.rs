@@ -11,7 +11,7 @@ use crate::failure::Failure;
 /// The first bytes of an MCAP file that do not tell its version.
 pub(crate) const MCAP_START: &[u8] = b"\x89MCAP";
 /// First bytes that are looked at before a file is read.
-const HEAD: usize = 512;
+pub(crate) const HEAD: usize = 512;
 
 /// The content of standard input if it is compressed, with the bytes that were looked at and not yet read.
 static UNPACKED_STDIN: Mutex<Option<UnpackedStdin>> = Mutex::new(None);

@@ -16,8 +16,10 @@ pub(crate) mod sum;
 pub mod text;
 
 pub use input::Input;
-pub(crate) use input::MCAP_START;
+pub(crate) use input::{HEAD, MCAP_START};
 pub(crate) use mark::{COMPENSATED, already_compensated, names_compensated};
 pub use parts::remove_when_interrupted;
-pub use reading::{ChannelChoice, Delimiter, DialectOverride, Fill, Flags, Reading, TimeRange};
+pub use reading::{
+    ChannelChoice, Delimiter, DialectOverride, Fill, Flags, FullScale, Reading, TimeRange,
+};
 pub(crate) use reading::{frequency, positive_frequency};

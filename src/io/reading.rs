@@ -5,6 +5,8 @@ use clap::{Args, ValueEnum};
 use super::mcap::TimeChoice;
 use torqcomp_model::Kind;
 
+use crate::unit::NamedUnit;
+
 /// How cells are separated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Delimiter {
@@ -35,6 +37,9 @@ pub struct Reading {
     /// Interpolate where the time stamps are not uniform, instead of refusing
     #[arg(long)]
     pub resample: bool,
+    /// What full scale of a WAV file stands for, with its unit, as "10 V"
+    #[arg(long, value_name = "QUANTITY", value_parser = full_scale)]
+    pub full_scale: Option<FullScale>,
     /// Part of the record to use: seconds on its time axis (0.5..2), times of day or dates; either end may be left out
     #[arg(long, value_name = "FROM..TO", value_parser = time_range, allow_hyphen_values = true)]
     pub range: Option<TimeRange>,
@@ -65,6 +70,15 @@ pub struct TimeRange {
     pub from: Option<String>,
     /// Its last time.
     pub to: Option<String>,
+}
+
+/// What a sample of full scale stands for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FullScale {
+    /// Its value in the unit.
+    pub value: f64,
+    /// The unit.
+    pub unit: NamedUnit,
 }
 
 /// What stands in for samples that are missing.
@@ -205,6 +219,24 @@ pub(crate) fn positive_frequency(text: &str) -> Result<f64, String> {
     }
 }
 
+fn full_scale(text: &str) -> Result<FullScale, String> {
+    let text = text.trim();
+    let is_number = |c: char| c.is_ascii_digit() || "+-.".contains(c);
+    let end = text.find(|c| !is_number(c)).unwrap_or(text.len());
+    // Of 1e3, the letter belongs to the number.
+    let power = text[end..].strip_prefix(['e', 'E']).map_or(0, |rest| {
+        let digits = rest.find(|c| !is_number(c)).unwrap_or(rest.len());
+        if digits > 0 { digits + 1 } else { 0 }
+    });
+    let (number, unit) = text.split_at(end + power);
+    let value = number.parse::<f64>().ok();
+    let value = value.filter(|value| *value > 0.0 && value.is_finite());
+    match (value, NamedUnit::parse(unit)) {
+        (Some(value), Some(unit)) => Ok(FullScale { value, unit }),
+        _ => Err("expected a number greater than zero with its unit, such as \"10 V\"".to_owned()),
+    }
+}
+
 fn time_range(text: &str) -> Result<TimeRange, String> {
     let end = |text: &str| Some(text.trim().to_owned()).filter(|text| !text.is_empty());
     let (from, to) = text.split_once("..").unwrap_or_default();
@@ -253,6 +285,21 @@ mod tests {
         assert_eq!(frequency("2400"), Ok(2400.0));
         assert_eq!(frequency("2.4 kHz"), Ok(2400.0));
         assert!(frequency("-1").is_err() && frequency("nan").is_err() && frequency("2 V").is_err());
+        let full = full_scale(" 2.5e-1 mV").unwrap();
+        assert_eq!((full.value, full.unit.text.as_str()), (0.25, "mV"));
+        assert_eq!(full_scale("10V").unwrap().value, 10.0);
+        for wrong in [
+            "10",
+            "V",
+            "-1 V",
+            "0 V",
+            "1e400 V",
+            "10 furlongs",
+            "",
+            "1e V",
+        ] {
+            assert!(full_scale(wrong).is_err(), "{wrong}");
+        }
         assert_eq!(delimiter("tab"), Ok(Delimiter::Byte(b'\t')));
         assert!(delimiter("ab").is_err());
     }

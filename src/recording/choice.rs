@@ -4,7 +4,7 @@ use torqcomp_dsp::quality::rate::{Contradiction, contradiction};
 
 use super::axis::UNIFORM;
 use super::moment::Moment;
-use super::{Channel, RateFrom, Recording, TimeAxis, typical_step};
+use super::{Channel, RateFrom, Recording, TimeAxis, formats, typical_step};
 use crate::failure::{ErrorCode, Failure, did_you_mean};
 use crate::io::{ChannelChoice, Reading, digits};
 use crate::print::{list, plural};
@@ -269,6 +269,7 @@ impl Recording {
         reading: &Reading,
     ) -> Result<Selection<'_>, Failure> {
         let channel = &self.channels[place];
+        formats::refuse_unit_of_fraction(channel, choice)?;
         let (unit, warning) = unit_of(choice, &channel.heading, channel.unit.as_ref())?;
         let mut warnings: Vec<Warning> = warning.into_iter().collect();
         let axis = &channel.axis;

@@ -120,14 +120,18 @@ fn refuse_holes(channel: &Channel, by_stamps: bool) -> Result<(), Failure> {
         }
         HoleKind::Text => "is a text, expected a number",
     };
-    Err(Failure::failed(
+    let refused = Failure::failed(
         ErrorCode::InvalidSample,
         format_args!(
             "the value of \"{name}\" {what} ({} in all); {BRIDGE}",
             plural(count, "such cell")
         ),
-    )
-    .line(hole.line))
+    );
+    // Only texts have lines.
+    Err(match hole.line {
+        0 => refused.sample(hole.index + 1),
+        line => refused.line(line),
+    })
 }
 
 /// Samples that are in memory.

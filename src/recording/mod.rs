@@ -11,6 +11,7 @@ mod checkpoints;
 mod choice;
 mod fill;
 mod first_samples;
+pub(crate) mod formats;
 mod joined;
 mod memory_stream;
 mod message_stream;
@@ -26,11 +27,13 @@ pub mod text;
 mod uniform;
 mod validator;
 
+use std::io::{Cursor, Read};
+
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::failure::{ErrorCode, Failure};
-use crate::io::{ChannelChoice, Input, Reading};
+use crate::io::{ChannelChoice, HEAD, Input, Reading};
 use crate::unit::NamedUnit;
 use crate::warning::Warning;
 
@@ -55,7 +58,7 @@ pub(crate) use validator::{StreamSummary, StreamValidator};
 pub struct Recording {
     /// Name of the file, for people.
     pub source: String,
-    /// `csv` for any text, `mcap`.
+    /// `csv` for any text, `mcap`, `wav`, `uff`, `mat`.
     pub format: &'static str,
     /// How it is written, for people: `LabVIEW LVM, tab-separated, decimal point, 3 segments`.
     pub dialect: String,
@@ -159,6 +162,18 @@ pub fn read(input: &Input, reading: &Reading) -> Result<Recording, Failure> {
     Recording::read(input, &[ChannelChoice::default()], reading)
 }
 
+/// Reads bytes of a format that is neither text of a table nor MCAP; `None` if they begin as none of these. `source` is
+/// the name for people.
+#[must_use]
+pub fn read_other_format(
+    source: &str,
+    bytes: &[u8],
+    reading: &Reading,
+) -> Option<Result<Recording, Failure>> {
+    let format = formats::of(bytes)?;
+    Some(format.read(source, Box::new(Cursor::new(bytes.to_vec())), reading))
+}
+
 impl Recording {
     /// All channels of a text; of an MCAP file those that are chosen.
     ///
@@ -193,7 +208,16 @@ impl Recording {
         reading: &Reading,
         most: usize,
     ) -> Result<(Self, Vec<Option<AllSamples>>), Failure> {
-        let (name, bytes) = (input.name(), progress::open(input)?);
+        let (name, mut bytes) = (input.name(), progress::open(input)?);
+        let mut head = Vec::new();
+        let first = (&mut bytes).take(HEAD as u64).read_to_end(&mut head);
+        first.map_err(|error| Failure::unreadable(&error).at(&name))?;
+        let format = formats::of(&head);
+        let bytes = Box::new(Cursor::new(head).chain(bytes));
+        if let Some(format) = format {
+            return Ok((format.read(&name, bytes, reading)?, Vec::new()));
+        }
+        refuse_for_tables(reading)?;
         let file = text::TextFile::open(&name, bytes, reading).map_err(|f| f.at(&name))?;
         room::look(input, &file, most)?;
         file.read_first(most).map_err(|f| f.at(&name))
@@ -225,10 +249,20 @@ pub(crate) fn refuse_for_messages(reading: &Reading) -> Result<(), Failure> {
         ("--time-unit", reading.time_unit.is_some()),
         ("--delimiter", reading.dialect.delimiter.is_some()),
         ("--decimal", reading.dialect.decimal.is_some()),
+        ("--full-scale", reading.full_scale.is_some()),
     ];
     refuse(
         &given,
         "the input is an MCAP file, whose messages have time stamps",
+    )
+}
+
+/// Refuses what only WAV files have.
+fn refuse_for_tables(reading: &Reading) -> Result<(), Failure> {
+    let given = [("--full-scale", reading.full_scale.is_some())];
+    refuse(
+        &given,
+        "the input is a text, whose numbers are values; give their unit with --unit",
     )
 }
 
@@ -244,7 +278,7 @@ pub(crate) fn refuse_for_text(choice: &ChannelChoice, reading: &Reading) -> Resu
     let flag = choice.flags.channel;
     refuse(
         &given,
-        &format!("the input is a text; choose with {flag} NAME"),
+        &format!("the input is no MCAP file; choose with {flag} NAME"),
     )
 }
 

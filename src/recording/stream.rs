@@ -10,14 +10,11 @@ use super::moment::Moment;
 use super::stamps::{StampGrid, is_uniform};
 use super::text::{ChannelPlan, StampColumn, StampUse, TextFile, TextStream};
 use super::validator::{StreamValidator, TextLines};
-use super::{FilledSpan, RateFrom, Recording, TimeAxis, checkpoints, progress};
+use super::{FilledSpan, RateFrom, Recording, TimeAxis, checkpoints, formats, progress};
 use crate::failure::Failure;
-use crate::io::{ChannelChoice, Input, Reading};
+use crate::io::{ChannelChoice, HEAD, Input, Reading};
 use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
-
-/// Bytes that tell the format.
-const MAGIC: u64 = 8;
 
 /// A channel of a recording, chosen and open for reading.
 pub(crate) struct ChannelStream {
@@ -89,15 +86,21 @@ impl ChannelStream {
         let mut bytes = progress::open(input)?;
         let unreadable = |error| Failure::unreadable(&error).at(&name);
         let mut head = Vec::new();
-        let start = (&mut bytes).take(MAGIC).read_to_end(&mut head);
+        let start = (&mut bytes).take(HEAD as u64).read_to_end(&mut head);
         start.map_err(unreadable)?;
         let is_mcap = head.starts_with(::mcap::MAGIC);
+        let format = formats::of(&head);
         let bytes = Box::new(Cursor::new(head).chain(bytes));
         if is_mcap {
             super::refuse_for_messages(reading)?;
             return Self::of_messages(input, bytes, choice, reading);
         }
         super::refuse_for_text(choice, reading)?;
+        if let Some(format) = format {
+            let recording = format.read(&name, bytes, reading)?;
+            return Self::of_recording(recording, choice, reading).map_err(|f| f.at(&name));
+        }
+        super::refuse_for_tables(reading)?;
         let file = TextFile::open(&name, bytes, reading).map_err(|f| f.at(&name))?;
         if file.held_whole.is_some() {
             let recording = file.read().map_err(|f| f.at(&name))?;

@@ -40,6 +40,7 @@ use crate::failure::{ErrorCode, Failure};
 use crate::io::Reading;
 use crate::recording::text::dialect::decode_line;
 
+pub use axis_names::is_time_name;
 pub use chunks::{Chunks, LONGEST_LINE, Piece, too_long_a_line};
 pub use clock::Clock;
 pub use clock::days_between;

@@ -1,0 +1,42 @@
+//! Files of other programs that are refused with the way to convert them: ROS 2 bags of SQLite, and HDF5.
+
+use super::bytes::Bytes;
+use super::{Content, Format};
+use crate::failure::{ErrorCode, Failure};
+use crate::io::Reading;
+
+pub(super) const BAG: Format = Format {
+    name: "db3",
+    called: "no file that torqcomp reads",
+    is,
+    takes: &[],
+    read,
+};
+
+const SQLITE: &[u8] = b"SQLite format 3\0";
+const HDF5: &[u8] = b"\x89HDF\r\n\x1a\n";
+/// Where HDF5 begins in a file of MATLAB.
+const BEHIND_MATLAB: usize = 512;
+
+fn is(head: &[u8]) -> bool {
+    head.starts_with(SQLITE) || head.starts_with(HDF5) || is_matlab_hdf5(head)
+}
+
+/// Whether it is a file of MATLAB 7.3: the version in its head is 2.
+fn is_matlab_hdf5(head: &[u8]) -> bool {
+    let version = head.get(124..BEHIND_MATLAB.min(128));
+    head.starts_with(b"MATLAB") && version.is_some_and(|v| v == b"\0\x02IM" || v == b"\x02\0MI")
+}
+
+fn read(bytes: &mut Bytes, _: &Reading) -> Result<Content, Failure> {
+    let head = bytes.take(BEHIND_MATLAB as u64)?;
+    let message = if head.starts_with(SQLITE) {
+        "this is an SQLite database, as ROS 2 bags (.db3) are; convert the bag to MCAP with: mcap convert BAG.db3 BAG.mcap, or \
+         with: ros2 bag convert -i BAG -o OUT.yaml (storage_id: mcap)"
+    } else if is_matlab_hdf5(&head) {
+        "this is a MATLAB file of version 7.3 (HDF5); save it with the flag -v7 in MATLAB: save('FILE.mat', 'NAME', '-v7')"
+    } else {
+        "this is an HDF5 file; export the channels as text, MATLAB 5 (-v7) or MCAP"
+    };
+    Err(Failure::failed(ErrorCode::NotARecording, message))
+}

@@ -1,0 +1,203 @@
+//! Recordings that are neither text of a table nor MCAP, told by their first bytes: one format a file.
+//!
+//! Each reads a file from front to end into channels with names, units, rates and samples. To add one, write its file and a
+//! line in `FORMATS`.
+
+mod bag;
+mod bytes;
+mod matlab;
+mod universal;
+mod wave;
+
+use std::io::Read;
+use std::sync::Arc;
+
+use self::bytes::Bytes;
+use super::text::is_time_name;
+use super::{Channel, Hole, HoleKind, Recording, TimeAxis};
+use crate::failure::{ErrorCode, Failure};
+use crate::io::{ChannelChoice, Reading, names_compensated};
+use crate::unit::NamedUnit;
+use crate::warning::Warning;
+
+/// A format.
+pub(crate) struct Format {
+    /// As in the key `format` of a report.
+    name: &'static str,
+    /// Name for people, with an article: `a WAV file`.
+    called: &'static str,
+    /// Whether a file that begins so is one.
+    is: fn(&[u8]) -> bool,
+    /// Options beside those of any recording that apply to it.
+    takes: &'static [&'static str],
+    read: fn(&mut Bytes, &Reading) -> Result<Content, Failure>,
+}
+
+/// All of them.
+const FORMATS: [&Format; 4] = [
+    &wave::WAVE,
+    &universal::UNIVERSAL,
+    &matlab::MATLAB,
+    &bag::BAG,
+];
+
+/// The format of a file that begins so, if it is one of these.
+pub(crate) fn of(head: &[u8]) -> Option<&'static Format> {
+    FORMATS.into_iter().find(|format| (format.is)(head))
+}
+
+/// Whether a file of a folder that begins so is a recording of one of them, and not only refused with advice.
+pub(crate) fn is_recording(head: &[u8]) -> bool {
+    of(head).is_some_and(|format| format.name != bag::BAG.name)
+}
+
+/// Refuses a unit for fractions of full scale: it alone does not say what they are.
+///
+/// # Errors
+/// If one is given.
+pub(super) fn refuse_unit_of_fraction(
+    channel: &Channel,
+    choice: &ChannelChoice,
+) -> Result<(), Failure> {
+    if channel.unit_text.as_deref() != Some(wave::FRACTION) {
+        return Ok(());
+    }
+    let (Some(unit), Some(flag)) = (&choice.unit, choice.flags.unit) else {
+        return Ok(());
+    };
+    Err(Failure::usage(
+        ErrorCode::ConflictingArguments,
+        format_args!(
+            "the samples are fractions of full scale, so that {flag} {unit} alone does not say what they are; give full scale \
+             with its unit, as --full-scale \"10 {unit}\""
+        ),
+    ))
+}
+
+/// What is in a file.
+#[derive(Default)]
+struct Content {
+    /// How it is written, for people.
+    dialect: String,
+    /// What its head says besides, as pairs of key and value.
+    details: Vec<(String, String)>,
+    channels: Vec<Channel>,
+    warnings: Vec<Warning>,
+    /// What was announced, but is not there.
+    lost: Option<Warning>,
+}
+
+impl Format {
+    /// Reads a file; `source` is its name for people.
+    ///
+    /// # Errors
+    /// If it cannot be read, or has no channel.
+    pub(super) fn read(
+        &self,
+        source: &str,
+        bytes: Box<dyn Read + Send>,
+        reading: &Reading,
+    ) -> Result<Recording, Failure> {
+        self.refuse_others(reading)?;
+        let content = (self.read)(&mut Bytes::new(bytes), reading);
+        let content = content.map_err(|failure| failure.at(source))?;
+        if content.channels.is_empty() {
+            let why = content.warnings.iter().chain(&content.lost);
+            let why: String = why.map(|w| format!(": {}", w.message)).collect();
+            return Err(Failure::failed(
+                ErrorCode::NotARecording,
+                format_args!(
+                    "there is no channel with samples in time{why}; export one, as text with a column of time if need be"
+                ),
+            )
+            .at(source));
+        }
+        Ok(Recording {
+            dialect: content.dialect,
+            details: content.details,
+            channels: content.channels,
+            warnings: content.warnings,
+            lost: content.lost,
+            ..Recording::empty(self.name, source.to_owned())
+        })
+    }
+
+    /// Refuses options that apply to other formats only.
+    fn refuse_others(&self, reading: &Reading) -> Result<(), Failure> {
+        let given = [
+            ("--delimiter", reading.dialect.delimiter.is_some()),
+            ("--decimal", reading.dialect.decimal.is_some()),
+            ("--time-column", reading.time_column.is_some()),
+            ("--time-unit", reading.time_unit.is_some()),
+            ("--full-scale", reading.full_scale.is_some()),
+        ];
+        let others = given.map(|(flag, is_given)| (flag, is_given && !self.takes.contains(&flag)));
+        super::refuse(&others, &format!("the input is {}", self.called))
+    }
+}
+
+/// A channel as a file of these formats has it.
+fn channel(name: &str, unit_text: Option<&str>, samples: Vec<f64>, axis: TimeAxis) -> Channel {
+    let mut samples = samples;
+    let mut holes = Vec::new();
+    for (index, sample) in samples.iter_mut().enumerate() {
+        if !sample.is_finite() {
+            *sample = f64::NAN;
+            holes.push(Hole {
+                index,
+                line: 0,
+                what: HoleKind::NonFinite,
+            });
+        }
+    }
+    let unit_text = unit_text.map(str::trim).filter(|text| !text.is_empty());
+    Channel {
+        name: name.to_owned(),
+        heading: name.to_owned(),
+        unit: unit_text.and_then(NamedUnit::parse),
+        unit_text: unit_text.map(str::to_owned),
+        samples,
+        holes,
+        axis,
+        segment: None,
+        filled: Vec::new(),
+        is_compensated: names_compensated(name),
+    }
+}
+
+/// The axis of stamps in seconds, if all are numbers.
+fn stamped(heading: &str, stamps_s: Vec<f64>) -> TimeAxis {
+    let mut axis = TimeAxis::of_stamps(heading, Arc::new(stamps_s));
+    let stamps = axis.stamps_s.iter().flat_map(|stamps| stamps.iter());
+    let holes = stamps.enumerate().filter(|(_, stamp)| !stamp.is_finite());
+    axis.holes = holes
+        .map(|(index, _)| Hole {
+            index,
+            line: 0,
+            what: HoleKind::NonFinite,
+        })
+        .collect();
+    axis
+}
+
+/// A rate that a file states, if a clock can have it.
+fn plausible_rate(rate_hz: f64) -> Option<f64> {
+    (1e-12..=1e15).contains(&rate_hz).then_some(rate_hz)
+}
+
+/// A file that ends before what it announces.
+fn cut(what: &str) -> Warning {
+    Warning::new(
+        "file-cut",
+        format!("the file ends early: {what}; copy it again if it is longer elsewhere"),
+    )
+}
+
+/// A file whose content contradicts itself.
+fn damaged(what: impl std::fmt::Display, at: u64) -> Failure {
+    Failure::failed(
+        ErrorCode::DamagedFile,
+        format_args!("{what}; copy the file again, or export it anew"),
+    )
+    .with(|place| place.byte = Some(at))
+}
