@@ -3,8 +3,13 @@
 //! A data set stands between lines `    -1`. Each of 58 is one channel: eleven lines of head and the numbers, as text or (58b) as
 //! bytes. Functions over another axis than time are named and left out.
 
-use super::bytes::{Bytes, Number, Order};
-use super::{Content, Format, channel, cut, damaged, stamped};
+mod head;
+mod lines;
+
+use self::head::{Head, field};
+use self::lines::{Lines, numbers_of};
+use super::bytes::{Bytes, Order};
+use super::{Content, Format, channel, cut, stamped};
 use crate::failure::{ErrorCode, Failure};
 use crate::io::{Reading, digits};
 use crate::recording::{Channel, TimeAxis};
@@ -19,15 +24,6 @@ pub(super) const UNIVERSAL: Format = Format {
     read,
 };
 
-/// Longest line.
-const LONGEST_LINE: usize = 4096;
-/// Lines of the head of a data set 58.
-const HEAD_LINES: usize = 11;
-/// Kind of an axis of time.
-const TIME: i64 = 17;
-/// Longest data set of text, in bytes read ahead.
-const PIECE: u64 = 1 << 16;
-
 /// Whether the first two lines are `    -1` and the number of a data set.
 fn is(head: &[u8]) -> bool {
     let text = String::from_utf8_lossy(head);
@@ -38,256 +34,11 @@ fn is(head: &[u8]) -> bool {
     begins && number.starts_with("  ") && number.trim().parse::<u32>().is_ok()
 }
 
-/// The lines of a file, with bytes between them.
-struct Lines<'a> {
-    bytes: &'a mut Bytes,
-    ahead: Vec<u8>,
-    /// Bytes of `ahead` that are used.
-    used: usize,
-    /// Lines read so far.
-    number: usize,
-}
-
-impl Lines<'_> {
-    /// Reads ahead, so that a byte more is there if the file has one.
-    fn fill(&mut self) -> Result<bool, Failure> {
-        if self.used > self.ahead.len() / 2 {
-            self.ahead.drain(..self.used);
-            self.used = 0;
-        }
-        let more = self.bytes.take(PIECE)?;
-        self.ahead.extend_from_slice(&more);
-        Ok(!more.is_empty())
-    }
-
-    /// The next line without its end; `None` at the end of the file.
-    fn next(&mut self) -> Result<Option<String>, Failure> {
-        loop {
-            let rest = &self.ahead[self.used..];
-            let end = memchr::memchr(b'\n', rest);
-            if let Some(end) = end.filter(|end| *end <= LONGEST_LINE) {
-                let line = String::from_utf8_lossy(&rest[..end]);
-                let line = line.trim_end_matches('\r').to_owned();
-                self.used += end + 1;
-                self.number += 1;
-                return Ok(Some(line));
-            }
-            if rest.len() > LONGEST_LINE {
-                return Err(self.wrong("the line is too long for a universal file"));
-            }
-            if !self.fill()? {
-                let rest = &self.ahead[self.used..];
-                let line = String::from_utf8_lossy(rest).into_owned();
-                self.used = self.ahead.len();
-                self.number += 1;
-                return Ok(Some(line).filter(|line| !line.trim().is_empty()));
-            }
-        }
-    }
-
-    /// The next bytes, fewer at the end of the file.
-    fn bytes(&mut self, count: usize) -> Result<Vec<u8>, Failure> {
-        let there = (self.ahead.len() - self.used).min(count);
-        let mut bytes = self.ahead[self.used..self.used + there].to_vec();
-        self.used += there;
-        bytes.extend(self.bytes.take((count - there) as u64)?);
-        Ok(bytes)
-    }
-
-    fn wrong(&self, what: &str) -> Failure {
-        damaged(what, self.bytes.at).line(self.number)
-    }
-}
-
 /// How the numbers of a data set are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Storage {
     Text,
     Binary(Order, usize),
-}
-
-/// The head of a data set 58.
-struct Head {
-    name: String,
-    function: i64,
-    /// Kind of number: 2 single, 4 double, 5 and 6 the same of complex ones.
-    kind: i64,
-    count: usize,
-    is_even: bool,
-    start: f64,
-    step: f64,
-    /// Kinds and texts of both axes: abscissa, ordinate.
-    axes: [Axis; 2],
-}
-
-struct Axis {
-    kind: i64,
-    label: String,
-    unit: String,
-}
-
-/// A number in a field of a line.
-fn field<T: std::str::FromStr>(line: &str, from: usize, width: usize) -> Option<T> {
-    let field: String = line.chars().skip(from).take(width).collect();
-    field.trim().parse().ok()
-}
-
-/// A text in a field; `NONE` is none.
-fn text(line: &str, from: usize, width: usize) -> String {
-    let field: String = line.chars().skip(from).take(width).collect();
-    match field.trim() {
-        "NONE" | "None" | "none" => String::new(),
-        text => text.to_owned(),
-    }
-}
-
-impl Axis {
-    fn of(line: &str) -> Self {
-        Self {
-            kind: field(line, 0, 10).unwrap_or(0),
-            label: text(line, 26, 20),
-            unit: text(line, 47, 20),
-        }
-    }
-}
-
-impl Head {
-    fn read(lines: &mut Lines) -> Result<Option<Self>, Failure> {
-        let mut head = Vec::new();
-        for _ in 0..HEAD_LINES {
-            match lines.next()? {
-                Some(line) => head.push(line),
-                None => return Ok(None),
-            }
-        }
-        let numbers = &head[6];
-        let known = || {
-            Some((
-                field(numbers, 0, 10)?,
-                field(numbers, 10, 10)?,
-                field::<i64>(numbers, 20, 10)?,
-                field(numbers, 30, 13)?,
-                field(numbers, 43, 13)?,
-            ))
-        };
-        let Some((kind, count, spacing, start, step)) = known() else {
-            return Err(lines.wrong(
-                "the seventh line of a data set 58 has not the numbers that it should have",
-            ));
-        };
-        let [abscissa, ordinate] = [&head[7], &head[8]].map(|line| Axis::of(line));
-        Ok(Some(Self {
-            name: name(&head, &ordinate),
-            function: field(&head[5], 0, 5).unwrap_or(0),
-            kind,
-            count,
-            is_even: spacing == 1,
-            start,
-            step,
-            axes: [abscissa, ordinate],
-        }))
-    }
-
-    /// Numbers in all, and those of a sample.
-    fn numbers(&self) -> (usize, usize) {
-        let each = match (self.is_even, self.kind) {
-            (true, 5 | 6) => 2,
-            (true, _) => 1,
-            (false, 5 | 6) => 3,
-            (false, _) => 2,
-        };
-        (self.count.saturating_mul(each), each)
-    }
-
-    /// Why it is no channel over time, if it is none.
-    fn foreign(&self) -> Option<&'static str> {
-        let is_over_time =
-            self.axes[0].kind == TIME || (self.axes[0].kind == 0 && self.function == 1);
-        match self.kind {
-            5 | 6 => Some("complex numbers"),
-            2 | 4 if !is_over_time => Some("no function of time"),
-            2 | 4 => None,
-            _ => Some("numbers of an unknown kind"),
-        }
-    }
-
-    /// Bytes of the numbers of a data set 58b; its abscissas are single or double as the numbers are.
-    fn width(&self) -> Number {
-        match self.kind {
-            2 | 5 => Number::Float32,
-            _ => Number::Float64,
-        }
-    }
-}
-
-/// What a function is called: its first line, else its node and direction, else the label of its axis.
-fn name(head: &[String], ordinate: &Axis) -> String {
-    let identified = text(&head[0], 0, 80);
-    let response = text(&head[5], 31, 10);
-    let node: Option<i64> = field(&head[5], 41, 10);
-    let direction: Option<i64> = field(&head[5], 51, 4);
-    let place = match (node, direction) {
-        (Some(node), Some(direction)) if node != 0 => {
-            format!("node {node} {}", direction_name(direction))
-        }
-        _ => String::new(),
-    };
-    let parts = [identified, response, place];
-    let parts: Vec<&str> = parts
-        .iter()
-        .map(|part| part.trim())
-        .filter(|part| !part.is_empty())
-        .collect();
-    match parts.as_slice() {
-        [] => ordinate.label.clone(),
-        parts => parts.join(" "),
-    }
-}
-
-fn direction_name(direction: i64) -> &'static str {
-    match direction {
-        1 => "+X",
-        -1 => "-X",
-        2 => "+Y",
-        -2 => "-Y",
-        3 => "+Z",
-        -3 => "-Z",
-        4 => "+RX",
-        -4 => "-RX",
-        5 => "+RY",
-        -5 => "-RY",
-        6 => "+RZ",
-        -6 => "-RZ",
-        _ => "",
-    }
-}
-
-/// The numbers of a line of fixed fields, or between spaces where the fields are not those of the standard.
-fn numbers_of(line: &str, widths: &[usize], values: &mut Vec<f64>) -> bool {
-    let number = |text: &str| -> Option<f64> {
-        // FORTRAN writes double precision with a D.
-        text.trim().replace(['D', 'd'], "E").parse().ok()
-    };
-    let words: Option<Vec<f64>> = line.split_whitespace().map(number).collect();
-    if let Some(words) = words {
-        values.extend(words);
-        return true;
-    }
-    let mut rest = line;
-    for width in widths.iter().cycle() {
-        if rest.trim().is_empty() {
-            return true;
-        }
-        let Some((cell, behind)) = rest.split_at_checked((*width).min(rest.len())) else {
-            return false;
-        };
-        match number(cell) {
-            Some(value) => values.push(value),
-            None => return false,
-        }
-        rest = behind;
-    }
-    true
 }
 
 fn read(bytes: &mut Bytes, _: &Reading) -> Result<Content, Failure> {
