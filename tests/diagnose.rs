@@ -249,6 +249,19 @@ fn laws_beside_the_list_are_suspected_and_not_added() {
     }
 }
 
+/// The square of such a sample is no number, nor is any error.
+#[test]
+fn a_sample_beyond_all_instruments_is_refused() {
+    let folder = folder(&make(7, "none", 1).expect("the catalogue has it"));
+    let whole = folder.read("holdout.csv");
+    let mut lines: Vec<&str> = whole.lines().collect();
+    lines[1767] = "0.08825,-1.13780982,-1e308";
+    folder.write("holdout.csv", lines.join("\n") + "\n");
+    folder
+        .run(&diagnose(&["--json"]))
+        .says(1, &["holdout.csv", "measured_n_m", "-1e308"]);
+}
+
 /// What the training record shows and the held-out one does not, as it is of another stand without it, is not named, and the
 /// verdict is not that nothing is missing.
 #[test]

@@ -258,10 +258,11 @@ fn finding(words: &[String], folder: &Path) -> Option<String> {
 }
 
 /// Whether a cell of a table or a value of a document is no finite number where one stands. The headings of a table of
-/// results are names: a channel may be called `inf`.
+/// results are names: a channel may be called `inf`, and so may a file in a text of a JSON document.
 fn has_no_number(text: &str) -> bool {
+    let is_json = text.starts_with('{');
     let is_odd = |cell: &str| {
-        let cell = cell.trim_matches(|c: char| c.is_whitespace() || c == '"');
+        let cell = cell.trim_matches(|c: char| c.is_whitespace() || !is_json && c == '"');
         ["NaN", "-NaN", "inf", "-inf", "infinity"].contains(&cell)
             || cell.contains("infe")
             || cell.contains("NaNe")
@@ -336,6 +337,7 @@ fn a_number_that_is_none_is_seen() {
         "time_s,inf\n0,1",
         "2,3",
         "channel nan-1: 5",
+        "{\"output\": \"inf\"}",
         "banana",
     ] {
         assert!(!has_no_number(text), "{text}");

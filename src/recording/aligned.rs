@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use torqcomp_dsp::resample::{Resampled, Resampler};
 
-use super::memory_stream::check_cells;
+use super::memory_stream::{check_cells, check_size};
 use super::moment::Moment;
 use super::stamps::check_resampled;
 use super::{Recording, Selection, typical_step};
@@ -283,7 +283,7 @@ fn filled(
 fn check_finite(selection: &Selection) -> Result<(), Failure> {
     let channel = selection.channel;
     match channel.samples.iter().position(|v| !v.is_finite()) {
-        None => Ok(()),
+        None => check_size(channel),
         Some(place) => Err(Failure::failed(
             ErrorCode::InvalidSample,
             format_args!(

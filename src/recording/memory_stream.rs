@@ -95,6 +95,25 @@ pub(crate) fn check_holes(channel: &Channel) -> Result<(), Failure> {
     refuse_holes(channel, false)
 }
 
+/// Largest magnitude of a sample; the squares of larger ones are no numbers any more.
+const LARGEST: f64 = 1e150;
+
+/// Refuses samples beyond all instruments.
+pub(crate) fn check_size(channel: &Channel) -> Result<(), Failure> {
+    let Some(row) = channel.samples.iter().position(|v| v.abs() > LARGEST) else {
+        return Ok(());
+    };
+    Err(Failure::failed(
+        ErrorCode::InvalidSample,
+        format_args!(
+            "sample {} of \"{}\" is {:e}, which no instrument reads; correct it, or leave it out",
+            row + 1,
+            channel.name,
+            channel.samples[row]
+        ),
+    ))
+}
+
 fn refuse_holes(channel: &Channel, by_stamps: bool) -> Result<(), Failure> {
     let of_time = channel.axis.holes.iter().filter(|_| by_stamps);
     let of_time = of_time.filter(|hole| hole.index < channel.samples.len());

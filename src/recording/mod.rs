@@ -44,7 +44,7 @@ pub use axis::{RateFrom, TimeAxis, typical_step};
 pub(crate) use block::Block;
 pub(crate) use choice::{Selection, contradicted, unit_of};
 pub use fill::FilledSpan;
-pub(crate) use memory_stream::{check_cells, check_holes};
+pub(crate) use memory_stream::{check_cells, check_holes, check_size};
 pub(crate) use message_stream::MessageOrigin;
 pub(crate) use messages::times as message_times;
 pub(crate) use spool::Spool;

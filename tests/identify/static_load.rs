@@ -136,7 +136,7 @@ fn a_reading_beyond_all_instruments_is_refused() {
     let columns = ["--load", "load", "--reading", "reading"];
     folder
         .run(&[&args[..], &columns].concat())
-        .says(1, &["row 2", "\"reading\"", "-1e308"]);
+        .says(1, &["sample 2", "\"reading\"", "-1e308"]);
 }
 
 /// Loads of both signs, readings without: nothing follows anything, and no stand file comes of it.

@@ -9,7 +9,7 @@ use crate::failure::{ErrorCode, Failure};
 use crate::identify::Identification;
 use crate::identify::static_load::{CalibrationStep, LoadUnits, Point, identify, series_of};
 use crate::io::{ChannelChoice, Flags, Input, Reading, digits};
-use crate::recording::{Recording, check_holes, unit_of};
+use crate::recording::{Recording, check_holes, check_size, unit_of};
 use crate::stand::TransducerSignal;
 use crate::stand::update::Entry;
 use crate::unit::{NamedUnit, RecordedChannel};
@@ -18,9 +18,6 @@ const MASS: Dimension = Dimension::new([1, 0, 0, 0, 0, 0]);
 
 /// Gravity on the ground, mountains included, in m/s².
 const ON_EARTH: std::ops::RangeInclusive<f64> = 9.76..=9.84;
-
-/// Largest load or reading; the squares of larger ones are no numbers any more.
-const LARGEST: f64 = 1e150;
 
 /// Runs the test.
 pub fn run(args: &Static) -> Result<Outcome, Failure> {
@@ -209,17 +206,7 @@ fn numbers(
 fn column(recording: &Recording, choice: &ChannelChoice) -> Result<(Vec<f64>, NamedUnit), Failure> {
     let channel = recording.channel(choice)?;
     check_holes(channel)?;
-    if let Some(row) = channel.samples.iter().position(|v| v.abs() > LARGEST) {
-        return Err(Failure::failed(
-            ErrorCode::InvalidSample,
-            format_args!(
-                "row {} of column \"{}\" is {:e}, which no instrument reads; correct the cell, or leave the row out",
-                row + 1,
-                channel.name,
-                channel.samples[row]
-            ),
-        ));
-    }
+    check_size(channel)?;
     let (unit, _) = unit_of(choice, &channel.heading, channel.unit.as_ref())?;
     let flag = choice.flags.unit.unwrap_or_default();
     let named = RecordedChannel {
