@@ -259,7 +259,7 @@ fn a_sample_beyond_all_instruments_is_refused() {
     folder.write("holdout.csv", lines.join("\n") + "\n");
     folder
         .run(&diagnose(&["--json"]))
-        .says(1, &["holdout.csv", "measured_n_m", "-1e308"]);
+        .says(1, &["holdout.csv", "sample 1767", "-1e308"]);
 }
 
 /// What the training record shows and the held-out one does not, as it is of another stand without it, is not named, and the
