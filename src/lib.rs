@@ -76,9 +76,18 @@ fn logged(code: u8) -> u8 {
 
 /// Says what clap has to say, and how that ends: help and version with 0, wrong usage with 2.
 fn stopped_by(stopped: &clap::Error) -> ExitCode {
-    // Nobody may be there to read it.
-    let _ = stopped.print();
-    let Some(failure) = cli::wrong_usage(stopped) else {
+    let failure = cli::wrong_usage(stopped);
+    match &failure {
+        // clap does not say which argument it is.
+        Some(failure) if stopped.kind() == clap::error::ErrorKind::InvalidUtf8 => {
+            print::say(&format!("torqcomp: {failure}\n"));
+        }
+        _ => {
+            // Nobody may be there to read it.
+            let _ = stopped.print();
+        }
+    }
+    let Some(failure) = failure else {
         return ExitCode::SUCCESS;
     };
     // The words of the usage are the ones to say; that the log cannot be written as well would hide them.

@@ -123,6 +123,9 @@ fn written_out(text: String, written: impl Fn(char) -> String) -> String {
     text.chars().map(shown).collect()
 }
 
+/// Relative amount from which on percent are hard to read.
+const LARGE_RELATIVE: f64 = 10.0;
+
 /// A number for people: six significant digits.
 #[must_use]
 pub fn short(value: f64) -> String {
@@ -133,6 +136,22 @@ pub fn short(value: f64) -> String {
 #[must_use]
 pub fn rounded(value: f64, digits: u32) -> String {
     digits::text(value, digits)
+}
+
+/// A relative amount for people, with that many significant digits: in percent, and as a factor from ten on.
+///
+/// ```
+/// use torqcomp::print::relative;
+/// assert_eq!(relative(0.01234, 2), "1.2 %");
+/// assert_eq!(relative(-0.5, 2), "-50 %");
+/// assert_eq!(relative(230_000.0, 2), "230000 times");
+/// ```
+#[must_use]
+pub fn relative(ratio: f64, digits: u32) -> String {
+    match ratio.abs() < LARGE_RELATIVE {
+        true => format!("{} %", rounded(100.0 * ratio, digits)),
+        false => format!("{} times", rounded(ratio, digits)),
+    }
 }
 
 /// A value with its standard uncertainty, which has two significant digits; the value ends with the same digit

@@ -351,6 +351,145 @@ fn a_line_that_alone_decides_the_band_is_asked_about() {
     assert!(codes(&plain).is_empty(), "{plain}");
 }
 
+/// The zero is that of another record, or mV read under V.
+#[test]
+fn a_zero_far_from_the_record_is_said() {
+    let with = |zero: &str, heading: &str, level: f64, rated: &str| {
+        let calibration = format!("[calibration]\ntorque_per_volt = \"12.5 N m/V\"\n{rated}");
+        let zero = format!("[recorder]\nzero = \"{zero}\"\n");
+        let (_, report) = compensated(&stand(&format!("{calibration}{zero}")), heading, level);
+        codes(&report)
+            .into_iter()
+            .map(str::to_owned)
+            .collect::<Vec<_>>()
+    };
+    let far = "zero-far-from-record".to_owned();
+    assert!(with("5 V", "bridge_V", 0.01, "").contains(&far));
+    // A large load on a small zero, and a live zero.
+    assert!(!with("0.01 V", "bridge_V", 5.0, "").contains(&far));
+    assert!(!with("5 V", "bridge_V", 1.0, "").contains(&far));
+    assert!(!with("0 V", "bridge_V", 0.01, "").contains(&far));
+    let unusual = "volts-unusual".to_owned();
+    assert!(with("0 V", "bridge_V", 450.0, "").contains(&unusual));
+    assert!(!with("0 V", "bridge_mV", 450.0, "").contains(&unusual));
+    assert!(!with("0 V", "bridge_V", 9.0, "").contains(&unusual));
+}
+
+#[test]
+fn harmonics_say_a_zero_far_from_the_record() {
+    let folder = Folder::new();
+    let calibration =
+        "[calibration]\ntorque_per_volt = \"12.5 N m/V\"\n[recorder]\nzero = \"5 V\"\n";
+    folder.write("stand.toml", stand(calibration));
+    let volts = |t: f64| 0.01 + 0.02 * (TAU * 20.0 * t).sin();
+    folder.write("in.csv", over_time("bridge_V", 1000.0, 4000, volts));
+    let report = folder.json(&[&HARMONICS[..], &["20", "--orders", "1", "--json"]].concat());
+    assert!(codes(&report).contains(&"zero-far-from-record"), "{report}");
+}
+
+/// The speed stays and the load jumps; and a fundamental far beside the line.
+#[test]
+fn a_load_step_and_a_far_fundamental_are_said() {
+    let folder = Folder::new();
+    folder.write("stand.toml", stand(""));
+    let mut noise = crate::noise::Noise(21);
+    let noise: Vec<f64> = (0..10_000).map(|_| 0.05 * noise.normal()).collect();
+    let run = |load: &dyn Fn(f64) -> f64, actual_hz: f64, given: &str| {
+        let torque = |t: f64| {
+            let order = |n: f64, size: f64| size * (TAU * n * actual_hz * t + n).cos();
+            load(t) + order(1.0, 1.0) + order(2.0, 0.5) + noise[(t * 1000.0).round() as usize]
+        };
+        folder.write("in.csv", over_time("T [N m]", 1000.0, 10_000, torque));
+        folder.json(&[&HARMONICS[..], &[given, "--orders", "1,2", "--json"]].concat())
+    };
+    for at_s in [2.3, 5.0, 8.1] {
+        let report = run(&|t| if t < at_s { 2.0 } else { 6.0 }, 30.0, "30");
+        assert!(codes(&report).contains(&"load-changes"), "{report}");
+    }
+    let steady = run(&|_| 5.0, 30.0, "30");
+    assert!(!codes(&steady).contains(&"load-changes"), "{steady}");
+    // A component below the fundamental is no change of load.
+    let slow = run(&|t| 5.0 + 2.0 * (TAU * 11.3 * t).sin(), 30.0, "30");
+    assert!(!codes(&slow).contains(&"load-changes"), "{slow}");
+    let far = run(&|_| 5.0, 16.6, "17.6");
+    assert!(codes(&far).contains(&"fundamental-off"), "{far}");
+    assert!(far["warnings"].to_string().contains("16.6"), "{far}");
+}
+
+/// A logger wrote each row twice, or a block again.
+#[test]
+fn rows_written_twice_are_named() {
+    let folder = Folder::new();
+    folder.write("stand.toml", stand(""));
+    let row = |i: usize| {
+        let t = i as f64 / 1000.0;
+        format!("{t:.3},{:.6}\n", 2.0 + (TAU * 5.0 * t).sin())
+    };
+    let each: String = (0..2000).map(|i| row(i).repeat(2)).collect();
+    folder.write("in.csv", format!("time_s,T [N m]\n{each}"));
+    let said = "every row was written 2 times";
+    folder.run(&COMPENSATE).says(0, &[said]);
+    let inspected = folder.json(&["inspect", "in.csv", "--json"]);
+    assert!(
+        inspected["warnings"].to_string().contains(said),
+        "{inspected}"
+    );
+    let block: String = (0..1500).chain(1000..2000).map(row).collect();
+    folder.write("in.csv", format!("time_s,T [N m]\n{block}"));
+    folder
+        .run(&[&COMPENSATE[..], &["--force"]].concat())
+        .says(1, &["line 1502", "rows were written twice"]);
+}
+
+/// The applied channel comes late or early, or by another clock; a stand of 590 Hz, driven by 200 sines of all frequencies.
+#[test]
+fn an_applied_channel_of_another_time_is_no_effect() {
+    let folder = Folder::new();
+    let (natural_hz, ratio, rate_hz, count) = (590.0, 0.01, 10_000.0, 8000_usize);
+    folder.write(
+        "stand.toml",
+        format!("schema = \"torqcomp.stand/1\"\n[mechanics]\nnatural_frequency = \"{natural_hz} Hz\"\ndamping_ratio = {ratio}\n"),
+    );
+    let mut noise = crate::noise::Noise(17);
+    let parts: Vec<(f64, f64)> = (1..=200)
+        .map(|k| {
+            (
+                8.5 * (f64::from(k) + 0.6 * noise.uniform()),
+                TAU * noise.uniform(),
+            )
+        })
+        .collect();
+    let answer = |t: f64| {
+        let one = |(hz, phase): &(f64, f64)| {
+            let x = hz / natural_hz;
+            let (real, imaginary) = (1.0 - x * x, 2.0 * ratio * x);
+            (TAU * hz * t + phase - imaginary.atan2(real)).cos() / real.hypot(imaginary)
+        };
+        parts.iter().map(one).sum::<f64>()
+    };
+    let measured: Vec<f64> = (0..count)
+        .map(|i| answer(i as f64 / rate_hz) + 0.3 * noise.normal())
+        .collect();
+    let diagnose = |late_s: f64, clock: f64| {
+        let row = |i: usize| {
+            let t = i as f64 / rate_hz;
+            let at = t * clock - late_s;
+            let applied: f64 = parts.iter().map(|(hz, p)| (TAU * hz * at + p).cos()).sum();
+            format!("{t},{applied:.6},{:.6}\n", measured[i])
+        };
+        let rows: String = (0..count).map(row).collect();
+        folder.write("in.csv", format!("time_s,T [N m],M [N m]\n{rows}"));
+        let stand = ["diagnose", "--stand", "stand.toml", "--train", "in.csv"];
+        folder.run(&[&stand[..], &["--applied", "T", "--measured", "M"]].concat())
+    };
+    for late in [0.5e-4, 3e-4, 1e-3] {
+        diagnose(late, 1.0).says(1, &["the applied channel comes late", "ms"]);
+    }
+    diagnose(0.0, 1.0005).says(1, &["different clocks", "ppm"]);
+    let early = diagnose(-3e-4, 1.0);
+    assert!(early.stdout.contains("time-delay"), "{early:?}");
+}
+
 /// The load comes after a second, and clips the record: 5000 samples in.
 #[test]
 fn what_happens_later_in_a_record_is_seen() {

@@ -30,10 +30,27 @@ pub(crate) fn log_asked() -> Option<PathBuf> {
 
 /// What clap refuses, as a failure; `None` if it has only been asked for help or the version.
 pub(crate) fn wrong_usage(error: &Error) -> Option<Failure> {
+    if error.kind() == ErrorKind::InvalidUtf8 {
+        return Some(not_utf8());
+    }
     let text = error.render().to_string();
     error
         .use_stderr()
         .then(|| Failure::usage(code(error.kind()), message(&text)))
+}
+
+/// The first argument of the process that is no UTF-8.
+fn not_utf8() -> Failure {
+    let mut all = std::env::args_os().skip(1);
+    let wrong = all.find(|arg| arg.to_str().is_none());
+    Failure::usage(
+        ErrorCode::InvalidValue,
+        format_args!(
+            "the argument {:?} is not UTF-8, as names of files and channels must be here; rename the file, or read it through a \
+             pipe (\"-\" in the place of its name)",
+            wrong.unwrap_or_default()
+        ),
+    )
 }
 
 fn code(kind: ErrorKind) -> ErrorCode {

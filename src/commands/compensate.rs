@@ -200,6 +200,7 @@ impl Plan {
             zero_std: chain.zero_std.map(|std| std / chain.applied.factor),
             quantity: chain.applied.name,
             rated_torque: chain.rated_n_m.map(|rated| rated / chain.applied.factor),
+            levels: chain.levels(),
             rate_hz: stream.rate_hz,
             rate_std_hz: stream.time.rate_std_hz,
             filled: stream.filled.clone(),

@@ -311,9 +311,10 @@ fn of_orders(
     let is_given = fundamental.std_hz.is_none();
     let off = is_given.then(|| speed::off(record, hz, orders)).flatten();
     let changing = speed::warning(record, hz, orders);
+    let load = speed::load_changes(record, hz, orders);
     let is_compensated = way.stand.is_none();
     let beyond = is_compensated.then(|| filtered::warning(record, hz, orders));
-    let all = [off, changing, beyond.flatten()];
+    let all = [off, changing, load, beyond.flatten()];
     all.into_iter().flatten().collect()
 }
 
@@ -333,7 +334,10 @@ fn of_quality(
         start: record.start,
         samples: count,
     };
-    Ok(excerpt::warnings(&seen, of))
+    let levels = chain.levels().warnings(&seen, of.scale, of.unit);
+    let mut found = excerpt::warnings(&seen, of);
+    found.extend(levels);
+    Ok(found)
 }
 
 /// The largest torque of the record or of one of its components, in the printed unit.

@@ -11,7 +11,7 @@ use super::score::ScoredModel;
 use super::search::CandidateFit;
 use super::spectra::SpectralLine;
 use super::verdict::Verdict;
-use crate::print::rounded;
+use crate::print::{self, relative, rounded};
 use crate::warning::Warning;
 
 /// Ratio between levels of excitation from which on errors are compared.
@@ -95,10 +95,10 @@ fn level_dependence(levels: &ExcitationLevels) -> Option<String> {
     let differ = |ratio: f64, factor: f64| ratio.ln().abs() > factor.ln();
     (differ(level, LEVELS_DIFFER) && differ(error, ERRORS_DIFFER)).then(|| {
         format!(
-            "the plain stand has an error of {} % on the training records and {} % on the held-out ones, at {} times the \
+            "the plain stand has an error of {} on the training records and {} on the held-out ones, at {} times the \
              excitation: what it lacks depends on amplitude",
-            rounded(100.0 * levels.train_relative, 3),
-            rounded(100.0 * levels.holdout_relative, 3),
+            relative(levels.train_relative, 3),
+            relative(levels.holdout_relative, 3),
             rounded(level, 3)
         )
     })
@@ -178,10 +178,7 @@ fn uncertain_constants(before: &ScoredModel) -> Option<Warning> {
         let plain = &before.fitted;
         match plain.std[k].map(|s| s / plain.values[k].abs()) {
             Some(relative) if relative <= most => None,
-            Some(relative) => Some(format!(
-                "the {name} to ± {} %",
-                rounded(100.0 * relative, 2)
-            )),
+            Some(relative) => Some(format!("the {name} to ± {}", print::relative(relative, 2))),
             None => Some(format!("the {name} not at all")),
         }
     });

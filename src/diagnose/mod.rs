@@ -4,6 +4,7 @@
 //! takes the errors of what it found on the held-out ones ([`judge`]), and makes the [`Diagnosis`] of that ([`verdict`]), which
 //! is the JSON document of `diagnose`.
 
+mod alignment;
 mod blocks;
 mod coloured;
 mod columns;
@@ -172,7 +173,7 @@ pub fn run(mut case: Case, workers: Workers) -> Result<Diagnosis, Failure> {
     {
         (case, context) = held;
     }
-    refuse::check(&case, &context)?;
+    let alignment = refuse::check(&case, &context)?;
     case.records.prepare_for(&context.plain);
     let declared = case.declared.map(|plain| DeclaredStand {
         plain,
@@ -183,6 +184,14 @@ pub fn run(mut case: Case, workers: Workers) -> Result<Diagnosis, Failure> {
     let mut found = look(training.clone())?;
     if let Some(between) = found.other_course(workers.threads) {
         found = look(training.with_between(between))?;
+    }
+    if let Some(alignment) = &alignment {
+        case.warnings.extend(refuse::check_alignment(
+            &found,
+            &training,
+            alignment,
+            workers.threads,
+        )?);
     }
     found.judge_on(&case.records, workers.threads)?;
     Ok(Diagnosis::of(case, found, workers.threads))

@@ -91,6 +91,20 @@ fn scan(
     records: &[StandRecord],
 ) -> Vec<(f64, PlainStand)> {
     let record = &records[0];
+    let starts = starts(context, declared, record).into_iter();
+    let mut found: Vec<(f64, PlainStand)> = starts
+        .filter_map(|start| try_start(context, start, record))
+        .collect();
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    found
+}
+
+/// A coarse grid of plain stands: near the declared one, or all that a record may show.
+pub fn starts(
+    context: &FitContext,
+    declared: Option<PlainStand>,
+    record: &StandRecord,
+) -> Vec<PlainStand> {
     let frequencies: Vec<f64> = match declared {
         Some(declared) => NEAR.iter().map(|n| n * declared.natural_hz).collect(),
         None => {
@@ -103,19 +117,16 @@ fn scan(
     };
     let mut damping = DAMPING.to_vec();
     damping.extend(declared.map(|d| d.damping_ratio.max(1e-4)));
-    let mut found = Vec::new();
-    for natural_hz in frequencies {
-        for damping_ratio in &damping {
-            let start = PlainStand {
-                natural_hz,
-                damping_ratio: *damping_ratio,
-                gain: context.plain.gain,
-            };
-            found.extend(try_start(context, start, record));
-        }
-    }
-    found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    found
+    let gain = context.plain.gain;
+    let pairs = frequencies.iter().flat_map(|natural_hz| {
+        let stand = move |damping_ratio: &f64| PlainStand {
+            natural_hz: *natural_hz,
+            damping_ratio: *damping_ratio,
+            gain,
+        };
+        damping.iter().map(stand)
+    });
+    pairs.collect()
 }
 
 /// Sum of squares of a start; with its best gain, if that is free.

@@ -205,8 +205,14 @@ fn times(ratio: f64) -> String {
     }
 }
 
-/// A relative change in percent, with its sign.
+/// Relative change from which on it is a factor.
+const LARGE_CHANGE: f64 = 10.0;
+
+/// A relative change in percent, with its sign; a large one as a factor.
 fn percent(change: f64) -> String {
+    if change >= LARGE_CHANGE {
+        return format!("a factor of {}", rounded(1.0 + change, 2));
+    }
     let change = 100.0 * change;
     match change.abs() {
         size if size < 0.005 => "less than 0.01 %".to_owned(),

@@ -5,19 +5,32 @@ use std::sync::Arc;
 
 use torqcomp_model::simulate::{Excitation, MotionState};
 
+use super::alignment::{Alignment, Shift};
 use super::plain::find_plain;
 use super::record::{NuisanceTerms, StandRecord, dot};
+use super::records::Records;
 use super::residual_tests::without_mean;
 use super::score::ScoredModel;
 use super::structure::{FitContext, PlainStand, Structure};
-use super::{Case, scales};
+use super::{Case, SearchState, scales};
 use crate::failure::{ErrorCode, Failure};
-use crate::print::rounded;
+use crate::print::{relative, rounded};
+use crate::warning::Warning;
 
 /// Minimum number of periods of the natural frequency in the longest training record.
 const FEWEST_PERIODS: f64 = 10.0;
 /// Relative error of the plain stand from which on the channels are tried the other way round.
 const LARGE_ERROR: f64 = 0.3;
+/// The same from which on a shift of the channels is looked for.
+const NOTABLE_ERROR: f64 = 0.02;
+/// Error with the channels aligned, over that as given, below which they count as shifted, and as of two clocks.
+const SHIFTED: f64 = 0.2;
+const TWO_CLOCKS: f64 = 0.5;
+/// Reduction of the criterion from effects to channels aligned from which on the shift explains more, and error over that with
+/// effects up to which it explains as much.
+const BETTER: f64 = 10.0;
+const MUCH_LESS: f64 = 0.7;
+const AS_GOOD: f64 = 1.05;
 /// Error the other way round, over that as given, below which the channels count as swapped.
 const SWAPPED: f64 = 0.5;
 /// Error with the gain left free, over that with the declared one, below which the declared one belongs to another unit.
@@ -28,19 +41,33 @@ const GAIN_ERRORS: Range<f64> = 0.1..11.0;
 /// may be of two stands.
 const APART: f64 = 0.5;
 
-/// Refuses records that have the wrong sign or unit, have their channels swapped or are too short.
+/// Refuses records that have the wrong sign or unit, have their channels swapped or shifted, or are too short; the shift of the
+/// channels that remains to be weighed against effects.
 ///
 /// # Errors
 /// If they are.
-pub fn check(case: &Case, context: &FitContext) -> Result<(), Failure> {
+pub fn check(case: &Case, context: &FitContext) -> Result<Option<Alignment>, Failure> {
     let as_given = relative_error(context, &case.records.train);
-    if as_given >= LARGE_ERROR {
+    let alignment = (as_given >= NOTABLE_ERROR)
+        .then(|| Alignment::find(case, context, as_given))
+        .flatten();
+    if let Some(alignment) = &alignment {
+        refuse_shifted(case, alignment)?;
+    }
+    let is_shifted = alignment
+        .as_ref()
+        .is_some_and(|a| a.errors[1] < ANOTHER_UNIT * as_given);
+    if as_given >= LARGE_ERROR && !is_shifted {
         refuse_sign_or_unit(case, context, as_given)?;
         // Swapped channels fit any frequency, which may make them look too short.
         refuse_swapped(case, context, as_given)?;
     }
-    let train = &case.records.train;
-    let Some((record, duration_s)) = longest(train) else {
+    refuse_short(case, context)?;
+    Ok(alignment)
+}
+
+fn refuse_short(case: &Case, context: &FitContext) -> Result<(), Failure> {
+    let Some((record, duration_s)) = longest(&case.records.train) else {
         return Ok(());
     };
     let natural_hz = context.plain.natural_hz;
@@ -57,6 +84,157 @@ pub fn check(case: &Case, context: &FitContext) -> Result<(), Failure> {
         ),
     )
     .at(&record.source))
+}
+
+/// Refuses channels of two clocks, and a measured channel that comes long before the applied one.
+fn refuse_shifted(case: &Case, alignment: &Alignment) -> Result<(), Failure> {
+    let [as_given, error] = alignment.errors;
+    let shift = alignment.shift;
+    if shift.per_s != 0.0 && error < TWO_CLOCKS * as_given {
+        return Err(two_clocks(case, alignment));
+    }
+    if shift.late_s < 0.0 && as_given >= LARGE_ERROR && error < SHIFTED * as_given {
+        return Err(too_early(&case.records.train[0], shift, as_given, error));
+    }
+    Ok(())
+}
+
+/// Weighs a shift of the channels against the effects that were found: refuses the records if the shift explains them better,
+/// warns if it does as well. `training` are the records with an input of limited band, beside which effects may have been
+/// found with another one.
+///
+/// # Errors
+/// If it explains them better.
+pub fn check_alignment(
+    found: &SearchState,
+    training: &Records,
+    alignment: &Alignment,
+    threads: usize,
+) -> Result<Option<Warning>, Failure> {
+    let (records, after, shift) = (&found.records, &found.after, alignment.shift);
+    let effects = after.effect_names();
+    let is_named = shift.late_s > 0.0 && effects.contains(&"time-delay");
+    if is_named || shift.per_s != 0.0 {
+        return Ok(None);
+    }
+    let models = [records, training];
+    let models = models.map(|records| alignment.instead_of(after, records, threads));
+    let models = models.into_iter().flatten();
+    let Some(shifted) = models.min_by(|a, b| a.criterion().total_cmp(&b.criterion())) else {
+        return Ok(None);
+    };
+    let whole = RelativeTo::of(&records.train);
+    let count: usize = records.train.iter().map(StandRecord::count).sum();
+    // The shift is one more parameter.
+    let criterion = shifted.criterion() + (count as f64).ln();
+    let first = &records.train[0];
+    // A low-pass is a lag, too, and usually the better one.
+    let has_lag = shift.late_s > 0.0 && effects.contains(&"recorder-lowpass");
+    let is_less = !has_lag || shifted.train_rms() < MUCH_LESS * after.train_rms();
+    if is_less && criterion < after.criterion() - BETTER {
+        let [before, after] = [&found.before, &shifted].map(|model| whole.error(model));
+        return Err(match shift.late_s > 0.0 {
+            true => too_late(first, shift, before, after),
+            false => too_early(first, shift, before, after),
+        });
+    }
+    let [after, shifted] = [after, &shifted].map(|model| whole.error(model));
+    if effects.is_empty() || shift.late_s > 0.0 || shifted > AS_GOOD * after {
+        return Ok(None);
+    }
+    Ok(Some(Warning::new(
+        "shift-or-effect",
+        format!(
+            "an applied channel that is late by {} explains the training records about as well as {} ({} of error left, against \
+             {}): check that one recorder takes both channels, with the same filters",
+            stated(-shift.late_s, first.rate_hz()),
+            effects.join(" and "),
+            relative(shifted, 3),
+            relative(after, 3),
+        ),
+    )))
+}
+
+/// The rms of measured records, about their means.
+struct RelativeTo(f64);
+
+impl RelativeTo {
+    fn of(records: &[StandRecord]) -> Self {
+        let power = |r: &StandRecord| {
+            let measured = without_mean(r.measured_in_range());
+            dot(&measured, &measured)
+        };
+        let count: usize = records.iter().map(StandRecord::count).sum();
+        Self((records.iter().map(power).sum::<f64>() / count as f64).sqrt())
+    }
+
+    fn error(&self, model: &ScoredModel) -> f64 {
+        model.train_rms() / self.0
+    }
+}
+
+/// A shift in samples and in ms.
+fn stated(shift_s: f64, rate_hz: f64) -> String {
+    let samples = rounded(shift_s * rate_hz, 3);
+    let plural = if samples == "1" { "" } else { "s" };
+    format!(
+        "{samples} sample{plural} ({} ms)",
+        rounded(1e3 * shift_s, 3)
+    )
+}
+
+fn too_early(record: &StandRecord, shift: Shift, as_given: f64, error: f64) -> Failure {
+    Failure::failed(
+        ErrorCode::UnsuitableRecord,
+        format_args!(
+            "the applied channel comes late, by {}: a plain stand has an error of {}, and of {} with the applied channel \
+             shifted back by that; no stand answers before it is driven. Record both channels with one recorder and the same \
+             filters, or move the applied column up by that many rows",
+            stated(-shift.late_s, record.rate_hz()),
+            relative(as_given, 2),
+            relative(error, 2),
+        ),
+    )
+    .at(&record.source)
+}
+
+fn too_late(record: &StandRecord, shift: Shift, as_given: f64, error: f64) -> Failure {
+    Failure::failed(
+        ErrorCode::UnsuitableRecord,
+        format_args!(
+            "the measured channel comes late, by {}: a plain stand has an error of {}, and of {} with that taken out, which no \
+             effect of the list reaches; declare the lag as [recorder] delay = \"{} ms\" in the stand file",
+            stated(shift.late_s, record.rate_hz()),
+            relative(as_given, 2),
+            relative(error, 2),
+            rounded(1e3 * shift.late_s, 4),
+        ),
+    )
+    .at(&record.source)
+}
+
+fn two_clocks(case: &Case, alignment: &Alignment) -> Failure {
+    let shift = alignment.shift;
+    let record = longest(&case.records.train).map_or(&case.records.train[0], |(record, _)| record);
+    let rate_hz = record.rate_hz();
+    let end_s = record.measured.len() as f64 / rate_hz;
+    let [as_given, error] = alignment.errors.map(|e| relative(e, 2));
+    let late = |shift_s: f64| {
+        let side = if shift_s < 0.0 { "early" } else { "late" };
+        format!("{} {side}", stated(shift_s.abs(), rate_hz))
+    };
+    Failure::failed(
+        ErrorCode::UnsuitableRecord,
+        format_args!(
+            "the two channels have different clocks: against what the applied channel causes, the measured one is {} at the start \
+             and {} at the end, a difference of {} ppm; a plain stand has an error of {as_given}, and of {error} with that \
+             taken out. Record both channels with one clock, or resample one of them onto the other's",
+            late(shift.late_s),
+            late(shift.late_s + shift.per_s * end_s),
+            rounded(1e6 * shift.per_s, 3),
+        ),
+    )
+    .at(&record.source)
 }
 
 /// Whether no training record has enough periods of the fitted natural frequency.
@@ -109,11 +287,11 @@ fn refuse_sign_or_unit(case: &Case, context: &FitContext, as_given: f64) -> Resu
     Err(Failure::failed(
         ErrorCode::UnsuitableRecord,
         format_args!(
-            "{}: the measured torque {what}: a stand fitted to it as it is has an error of {:.0} %, one with that factor {} %; \
+            "{}: the measured torque {what}: a stand fitted to it as it is has an error of {}, one with that factor {}; \
          {remedy}",
             train[0].source,
-            100.0 * as_given,
-            rounded(100.0 * scaled, 2)
+            relative(as_given, 2),
+            relative(scaled, 2)
         ),
     ))
 }
@@ -142,10 +320,10 @@ fn refuse_swapped(case: &Case, context: &FitContext, as_given: f64) -> Result<()
     Err(Failure::failed(
         ErrorCode::UnsuitableRecord,
         format_args!(
-            "the channels look swapped: a stand from --applied to --measured has an error of {:.0} %, one from \
-             --measured to --applied {:.0} %; exchange the two",
-            100.0 * as_given,
-            100.0 * the_other_way
+            "the channels look swapped: a stand from --applied to --measured has an error of {}, one from \
+             --measured to --applied {}; exchange the two",
+            relative(as_given, 2),
+            relative(the_other_way, 2)
         ),
     )
     .at(&train[0].source))
@@ -163,7 +341,7 @@ fn swap(record: &StandRecord) -> StandRecord {
 }
 
 /// Rms error of the plain stand of a context on records, over their rms.
-fn relative_error(context: &FitContext, records: &[StandRecord]) -> f64 {
+pub fn relative_error(context: &FitContext, records: &[StandRecord]) -> f64 {
     let plain = context.plain;
     let structure = Structure::plain(Arc::new(context.clone()));
     let (model, _) = structure.model(&context.plain_values(&plain));

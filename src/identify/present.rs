@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::{Correlation, FitQuality, Identification, NamedEstimate};
 use crate::chart::Page;
-use crate::print::{Report, columns, rounded, short, value_and_std};
+use crate::print::{Report, columns, relative, rounded, short, value_and_std};
 use crate::provenance::Provenance;
 
 /// A table under its heading, and a sentence below it.
@@ -130,10 +130,10 @@ const TERMS: &str = "Terms of the calibration standards, largest over the loads"
 impl FitQuality {
     fn text(&self) -> String {
         format!(
-            "residual: {} {} rms, {} % of the data",
+            "residual: {} {} rms, {} of the data",
             rounded(self.rms, 4),
             self.unit,
-            rounded(100.0 * self.relative, 3)
+            relative(self.relative, 3)
         )
     }
 }
@@ -156,12 +156,12 @@ fn constant_rows(constants: &[NamedEstimate]) -> Vec<Vec<String>> {
             Some(std) => value_and_std(value, std),
             None => [short(value), "unknown".to_owned()],
         };
-        let relative = match constant.std() {
-            Some(std) if value != 0.0 => format!("{} %", rounded(100.0 * (std / value).abs(), 2)),
+        let part = match constant.std() {
+            Some(std) if value != 0.0 => relative((std / value).abs(), 2),
             _ => String::new(),
         };
         let unit = constant.estimate.unit().to_owned();
-        vec![constant.name.replace('_', " "), text, std, unit, relative]
+        vec![constant.name.replace('_', " "), text, std, unit, part]
     };
     let head = ["", "value", "std", "unit", "relative"];
     with_head(&head, constants.iter().map(row))

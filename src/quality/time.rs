@@ -7,7 +7,7 @@ use torqcomp_dsp::quality::steps::{Event, Events, Steps, rounded_steps, steps};
 
 use crate::print::plural;
 use crate::print::rounded as number;
-use crate::recording::{COARSE_STAMPS, Channel, TimeAxis, contradicted, rates_of};
+use crate::recording::{COARSE_STAMPS, Channel, TimeAxis, contradicted, rates_of, same_stamps};
 use crate::warning::Warning;
 
 /// Largest deviation of a step, as a part of it, in an axis that counts as uniform.
@@ -139,7 +139,8 @@ fn counted(events: &Events) -> Option<(&Event, &Event)> {
 fn backwards(whose: &str, axis: &TimeAxis, steps: &Steps) -> Option<Warning> {
     let (first, longest) = counted(&steps.backwards)?;
     let why = if -longest.step_s > SET_BACK * steps.typical_s {
-        "the clock was set back, or two recordings were joined; split the file there"
+        "the clock was set back, two recordings were joined, or rows were written twice; split the file there, or remove the \
+         rows that are there already"
     } else {
         "the samples are out of order"
     };
@@ -223,9 +224,10 @@ fn rounded_stamps(whose: &str, rounded: &Rounded, axis: &TimeAxis) -> Warning {
         "rounded-time-stamps",
         format!(
             "{whose}: the time stamps are written in multiples of {} s; but for that they are \
-             uniform, and all of them together give {} Hz{allowed}",
+             uniform, and all of them together give {} Hz{allowed}{}",
             number(rounded.quantum_s, 3),
-            number(1.0 / rounded.step_s, 9)
+            number(1.0 / rounded.step_s, 9),
+            same_stamps(rounded.quantum_s / rounded.step_s)
         ),
     )
 }

@@ -15,6 +15,8 @@ const USUAL: f64 = 0.25;
 const SAME: f64 = 1e-3;
 /// A step longer than this many usual ones leaves out a sample.
 const GAP: f64 = 1.5;
+/// Median deviations from the usual step beyond which a step is unlike the others: six standard deviations of a normal law.
+const BEYOND_SCATTER: f64 = 9.0;
 /// Fewest steps unlike the others that speak for rounding: one or two are gaps.
 const FEWEST_UNLIKE: usize = 3;
 /// Largest deviation of a step, as a fraction of it, that counts as uniform.
@@ -188,20 +190,60 @@ impl SampleStep {
         )
     }
 
-    /// Of the mean of usual steps: their scatter is that of both ends, over all of them.
-    fn of_mean(step: f64, stamps: &[f64]) -> Self {
-        let usual = stamps.windows(2).map(|pair| pair[1] - pair[0]);
-        let usual = usual.filter(|d| (d / step - 1.0).abs() <= USUAL);
-        let (count, squares) = usual.fold((0.0, 0.0), |(n, sum), d| {
-            (n + 1.0, sum + (d - step).powi(2))
+    /// Of usual steps: their mean, and of stamps without a gap all of the time that they cover.
+    fn of_mean(usual: f64, stamps: &[f64]) -> Self {
+        let steps: Vec<f64> = stamps.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let mut off: Vec<f64> = steps
+            .iter()
+            .map(|step| (step / usual - 1.0).abs())
+            .collect();
+        let middle = off.len() / 2;
+        let (_, scatter, _) = off.select_nth_unstable_by(middle, f64::total_cmp);
+        // A step far outside the scatter of the others leaves out samples.
+        let alike = (BEYOND_SCATTER * *scatter).clamp(GAP - 1.0, 1.0);
+        let counts = steps.iter().map(|step| match step / usual {
+            part if (part - 1.0).abs() <= alike => 1.0,
+            part => part.round().max(0.0),
         });
-        Self::new(step, (squares / count).sqrt() / (count * step))
+        let counts: Vec<f64> = counts.collect();
+        let count: f64 = counts.iter().sum();
+        let span = stamps[stamps.len() - 1] - stamps[0];
+        let has_gaps = counts.iter().any(|count| *count != 1.0);
+        let step = if has_gaps { usual } else { span / count };
+        let mut place = 0.0;
+        let places = std::iter::once(&0.0).chain(&counts).map(|count| {
+            place += count;
+            place
+        });
+        let off = stamps.iter().zip(places).map(|(t, place)| t - step * place);
+        let off: Vec<f64> = off.collect();
+        Self::new(step, std_over(&off, count) / (count * step))
     }
 
     /// Standard uncertainty of a rate that is this step's.
     pub(super) fn rate_std_hz(&self, rate_hz: f64) -> Option<f64> {
         self.relative_std.map(|relative| relative * rate_hz)
     }
+}
+
+/// Part of the record over which the scatter of stamps is followed.
+const FOLLOWED: usize = 8;
+
+/// Standard deviation of the difference of two stamps that are so many steps apart, from their distances from a uniform grid:
+/// `a + b m` over `m` steps, where each stamp has an error of its own (`a`), each step one (`b`), or both.
+fn std_over(off: &[f64], steps: f64) -> f64 {
+    let square = |lag: usize| {
+        let pairs = off.iter().zip(&off[lag..]);
+        let sum: f64 = pairs.map(|(a, b)| (b - a).powi(2)).sum();
+        sum / (off.len() - lag) as f64
+    };
+    let once = square(1);
+    let lag = (off.len() / FOLLOWED).max(1);
+    let growth = match lag {
+        1 => 0.0,
+        _ => ((square(lag) - once) / (lag - 1) as f64).max(0.0),
+    };
+    (once + growth * (steps - 1.0).max(0.0)).sqrt()
 }
 
 /// The step of the straight line that stamps are but for their rounding (3 and 4 ms by turns are a step of 3.5 ms), or
@@ -354,6 +396,44 @@ mod tests {
         assert_eq!(without_rounding(20_000.001), 20_000.001);
         assert_eq!(without_rounding(610.351_562_5), 610.351_562_5);
         assert_eq!(without_rounding(1000.0 / 3.0), 1000.0 / 3.0);
+    }
+
+    /// Stamps with an error each, as those of a network, and steps with an error each, as those of a loop that waits.
+    #[test]
+    fn the_rate_of_jittered_stamps_is_as_uncertain_as_it_is_stated() {
+        let mut state = 12_345_u64;
+        let mut normal = || {
+            let mut uniform = || {
+                state ^= state << 13;
+                state ^= state >> 7;
+                state ^= state << 17;
+                (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+            };
+            (0..12).map(|_| uniform()).sum::<f64>()
+        };
+        for (of_stamp, of_step) in [
+            (0.05, 0.0),
+            (0.1, 0.0),
+            (0.0, 0.05),
+            (0.0, 0.15),
+            (0.05, 0.02),
+        ] {
+            let (mut off, mut stated, runs) = (0.0, 0.0, 60);
+            for _ in 0..runs {
+                let mut clock = 0.0;
+                let stamps: Vec<f64> = (0..2000)
+                    .map(|_| {
+                        clock += 1e-3 * (1.0 + of_step * normal());
+                        clock + 1e-3 * of_stamp * normal()
+                    })
+                    .collect();
+                let found = step_of(&stamps, 0.0).unwrap();
+                off += (found.step / 1e-3 - 1.0).powi(2);
+                stated += found.relative_std.unwrap().powi(2);
+            }
+            let ratio = (off / stated).sqrt();
+            assert!((0.7..1.4).contains(&ratio), "{of_stamp} {of_step}: {ratio}");
+        }
     }
 
     #[test]

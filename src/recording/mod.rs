@@ -48,7 +48,7 @@ pub(crate) use memory_stream::{check_cells, check_holes, check_size};
 pub(crate) use message_stream::MessageOrigin;
 pub(crate) use messages::times as message_times;
 pub(crate) use spool::Spool;
-pub(crate) use stamps::{COARSE_STAMPS, StampGrid, is_uniform, rates_of};
+pub(crate) use stamps::{COARSE_STAMPS, StampGrid, is_uniform, rates_of, same_stamps};
 pub(crate) use stream::ChannelStream;
 pub(crate) use uniform::{UniformRecord, UniformStream};
 pub(crate) use validator::{StreamSummary, StreamValidator};

@@ -36,6 +36,18 @@ pub(crate) struct StampGrid {
     pub(super) quantum: f64,
 }
 
+/// What it may mean that each stamp stands in so many rows, if that is a whole number of them.
+pub(crate) fn same_stamps(rows: f64) -> String {
+    let whole = rows.round();
+    match whole >= 2.0 && (rows / whole - 1.0).abs() < 1e-6 {
+        true => format!(
+            "; each stamp stands in {whole} rows: if these repeat their values, too, every row was written {whole} times, and \
+             only one of each belongs to the record"
+        ),
+        false => String::new(),
+    }
+}
+
 /// Where and how stamps stop being uniform.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct IrregularStep {
@@ -182,10 +194,11 @@ impl StampGrid {
                 "rounded-time-stamps",
                 format!(
                     "{source}: the time stamps are rounded to {} s; but for that they are uniform, and all of them \
-                     together give {} Hz (to within {} Hz)",
+                     together give {} Hz (to within {} Hz){}",
                     digits::text(self.quantum * of_seconds, 3),
                     digits::text(rate_hz, 9),
                     digits::text(rate_hz * self.quantum / span, 2),
+                    same_stamps(self.quantum / self.step),
                 ),
             )
         })
@@ -262,7 +275,8 @@ impl StampGrid {
         if found.after < found.before {
             return format!(
                 "time runs backwards, from {before} to {after}: the clock was set \
-                 back or two recordings were joined; split the file there"
+                 back, two recordings were joined, or rows were written twice; split the file there, or remove the rows that \
+                 are there already"
             );
         }
         if found.after == found.before {

@@ -40,6 +40,8 @@ pub struct Calibration {
     pub described: String,
     /// Uncertainty of the static constant.
     pub std: ConstantStd,
+    /// The record at no load as the stand file gives it, with what it is of; in SI units.
+    pub given_zero: Option<(TransducerSignal, f64)>,
     /// Rated torque of the transducer in N m, if it is given.
     pub rated_n_m: Option<f64>,
     /// What was assumed on the way.
@@ -62,6 +64,100 @@ pub fn beyond_rated(largest: f64, rated: Option<f64>, unit: &str) -> Option<Warn
             short(rated)
         ),
     ))
+}
+
+/// Largest part of the given record at no load within which a record lies that it does not belong to.
+const NEAR_NOTHING: f64 = 0.1;
+/// Torque over the rated one up to which a full load in the other direction explains such a record.
+const FULL_LOAD: f64 = 1.2;
+/// Voltage in V beyond which no bridge amplifier goes.
+const MOST_VOLTS: f64 = 30.0;
+
+/// What a record can contradict of its calibration.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct RecordedLevels {
+    /// The given record at no load, for people; empty if there is none.
+    zero: String,
+    /// The applied quantity of a record of nothing, in SI units.
+    of_nothing: f64,
+    /// The applied quantity for each volt, in SI units, where the record is in V.
+    per_volt: Option<f64>,
+    rated_n_m: Option<f64>,
+}
+
+impl Calibration {
+    /// What a record can contradict of it.
+    #[must_use]
+    pub fn levels(&self) -> RecordedLevels {
+        let of = |recorded: f64| self.conversion.convert(recorded).ok();
+        let of_nothing = of(0.0).unwrap_or(0.0);
+        let is_in_volts =
+            self.signal == Some(TransducerSignal::Voltage) && self.recorded_factor == 1.0;
+        let slope = of(1.0).map(|one| one - of_nothing);
+        RecordedLevels {
+            zero: self
+                .given_zero
+                .filter(|(_, zero)| *zero != 0.0)
+                .map_or_else(String::new, |(signal, zero)| signal.text(zero)),
+            of_nothing,
+            per_volt: slope.filter(|slope| is_in_volts && *slope != 0.0),
+            rated_n_m: self.rated_n_m,
+        }
+    }
+}
+
+impl RecordedLevels {
+    /// Warnings about samples in SI units of the applied quantity, as recorded; `scale` makes them ones of the printed unit.
+    #[must_use]
+    pub fn warnings(&self, samples: &[f64], scale: f64, unit: &str) -> Vec<Warning> {
+        let far = self.zero_far(samples, scale, unit);
+        far.into_iter().chain(self.volts(samples)).collect()
+    }
+
+    /// A warning if the record is next to nothing beside the given record at no load, so that the result is hardly more than
+    /// an offset.
+    fn zero_far(&self, samples: &[f64], scale: f64, unit: &str) -> Option<Warning> {
+        let offset = self.of_nothing;
+        let is_near = |t: &f64| (t - offset).abs() <= NEAR_NOTHING * offset.abs();
+        let is_full_load = self
+            .rated_n_m
+            .is_some_and(|rated| offset.abs() <= FULL_LOAD * rated);
+        if self.zero.is_empty()
+            || is_full_load
+            || samples.is_empty()
+            || !samples.iter().all(is_near)
+        {
+            return None;
+        }
+        Some(Warning::new(
+            "zero-far-from-record",
+            format!(
+                "[recorder] zero = \"{}\" is more than {} times as large as anything in the record: the result is an offset of about \
+                 {} {unit} and little else; check the value of the zero and its unit",
+                self.zero,
+                rounded(1.0 / NEAR_NOTHING, 2),
+                rounded(offset * scale, 3)
+            ),
+        ))
+    }
+
+    /// A warning if most of a record in V is more than a bridge amplifier gives.
+    fn volts(&self, samples: &[f64]) -> Option<Warning> {
+        let per_volt = self.per_volt?;
+        let volts = samples
+            .iter()
+            .map(|t| ((t - self.of_nothing) / per_volt).abs());
+        let beyond = volts.clone().filter(|v| *v > MOST_VOLTS).count();
+        (2 * beyond > samples.len()).then(|| {
+            Warning::new(
+                "volts-unusual",
+                format!(
+                    "the record reaches {} V, more than bridge amplifiers and recorders give: is it in mV? Then say --unit mV",
+                    rounded(volts.fold(0.0, f64::max), 3)
+                ),
+            )
+        })
+    }
 }
 
 const TORQUE: Dimension = Dimension::new([1, 2, -2, 0, 0, 0]);
@@ -139,6 +235,7 @@ impl Calibration {
             applied: applied_by_unit(&named.text, units)?,
             described: "compensated already; used without change".to_owned(),
             std: ConstantStd::NotNeeded,
+            given_zero: None,
             rated_n_m: None,
             warnings: Vec::new(),
         })
@@ -178,6 +275,10 @@ impl Stand {
             applied: Applied::of(Kind::Torque, "torque", units),
             described: law.described,
             std: law.std,
+            given_zero: self
+                .zero_as(signal)
+                .zip(signal)
+                .map(|(z, of)| (of, z.value())),
             rated_n_m: self.rated_n_m(),
             warnings: law
                 .warnings
@@ -269,6 +370,9 @@ impl Stand {
             applied: applied_by_unit(&gain.applied_unit, units)?,
             described: "static gain of the stand file".to_owned(),
             std: ConstantStd::of(gain.relative_std),
+            given_zero: zero
+                .zip(TransducerSignal::of(&named.unit))
+                .map(|(z, of)| (of, z.value())),
             rated_n_m: None,
             warnings: Vec::new(),
         })

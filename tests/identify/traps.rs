@@ -394,6 +394,31 @@ fn readings_off_a_line_are_named() {
     );
 }
 
+/// The amplifier was set to another range from 30 N m on.
+#[test]
+fn a_sensitivity_that_jumps_is_refused() {
+    let once = &LOADS[..6];
+    let twice = [LOADS, LOADS].concat();
+    let mut noise = Noise(5);
+    for loads in [once, &twice] {
+        for factor in [2.0, 0.1, 1.1] {
+            let row = |load: &f64| {
+                let range = if *load >= 30.0 { factor } else { 1.0 };
+                (*load, range * load / 12.5 + 0.05 + 2e-4 * noise.normal())
+            };
+            let folder = Folder::new();
+            folder.write(
+                "in.csv",
+                table(["load_Nm", "bridge_V"], loads.iter().map(row)),
+            );
+            let channels = ["--load", "load", "--reading", "bridge"];
+            folder
+                .run(&[&["identify", "static", "in.csv"], &channels[..]].concat())
+                .says(1, &["from the load 30 on", "range"]);
+        }
+    }
+}
+
 #[test]
 fn the_unit_of_a_std_counts() {
     let folder = Folder::new();

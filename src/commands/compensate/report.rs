@@ -14,7 +14,7 @@ use crate::outcome::RecordFigures;
 use crate::print::{Report, plural, rounded, short};
 use crate::recording::FilledSpan;
 use crate::recording::moment::Moment;
-use crate::stand::ConstantStd;
+use crate::stand::{ConstantStd, RecordedLevels};
 use crate::warning::Warning;
 
 /// Stretches whose times the text gives.
@@ -49,6 +49,8 @@ pub(in crate::commands) struct CompensateReport {
     pub(super) zero_std: Option<f64>,
     /// Torque that the transducer is made for, in `unit`; `null` if the stand file does not give it.
     pub(super) rated_torque: Option<f64>,
+    #[serde(skip)]
+    pub(super) levels: RecordedLevels,
     /// Number of samples.
     pub(super) samples: usize,
     /// Number of samples, from the first on, in which clipping, dropouts and hum were looked for.

@@ -36,6 +36,8 @@ pub(super) fn add(report: &mut CompensateReport, seen: &Seen, traces: Option<&Tr
     );
     report.looked_at = seen.excerpt.len();
     more.extend(of_quality(report, seen));
+    let levels = &report.levels;
+    more.extend(levels.warnings(&seen.excerpt, report.scale, &report.unit));
     let largest = report.result.largest.max(-report.result.smallest);
     more.extend(beyond_rated(largest, report.rated_torque, &report.unit));
     if traces.is_some_and(Traces::is_empty) {

@@ -6,7 +6,9 @@ use torqcomp_model::effects::Effect;
 use crate::diagnose::{
     CandidateFit, Diagnosis, GuardModel, NoiseFloorSource, ShownSide, Status, Verdict,
 };
-use crate::print::{Report, columns, enumeration, plural, rounded, unit_or_as_recorded, with_std};
+use crate::print::{
+    Report, columns, enumeration, plural, relative, rounded, unit_or_as_recorded, with_std,
+};
 
 /// Candidates that are listed unless all are asked for.
 const FIRST: usize = 5;
@@ -195,10 +197,18 @@ pub fn error_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
             model,
             &rounded(errors.rms.train_rms, 4),
             &rounded(errors.rms.holdout_rms, 4),
-            &format!("{} %", rounded(100.0 * errors.holdout_relative, 3)),
+            &relative(errors.holdout_relative, 3),
         ])
     }));
     rows
+}
+
+/// A change of the error with one decimal; a large one as a factor.
+fn change(part: f64) -> String {
+    match part.abs() < 10.0 {
+        true => format!("{:.1} %", 100.0 * part),
+        false => relative(part, 2),
+    }
 }
 
 /// The improvement and the noise floor, a sentence each.
@@ -206,7 +216,7 @@ pub fn error_sentences(diagnosis: &Diagnosis) -> Vec<String> {
     let error = &diagnosis.error;
     let unit = unit_or_as_recorded(&error.unit);
     let improvement = error.improvement_ci95.map(|[low, high]| {
-        let [low, high] = [low, high].map(|part| format!("{:.1} %", 100.0 * part));
+        let [low, high] = [low, high].map(change);
         match low == high {
             true => format!("The hold-out error decreases by {low} (95 % interval)."),
             false => format!("The hold-out error decreases by {low} to {high} (95 % interval)."),

@@ -16,6 +16,7 @@ const MOST: usize = 1 << 15;
 const FEWEST: f64 = 8.0;
 /// How far from the fundamental it is looked for, relative to it, and where it is not there.
 const SPAN: f64 = 0.05;
+const FAR_SPAN: f64 = 0.15;
 const WIDE_SPAN: f64 = 0.3;
 /// Difference of two speeds, in their standard uncertainties, that is none by chance.
 const SIGNIFICANT: f64 = 5.0;
@@ -51,19 +52,27 @@ pub(super) fn off(
     if given.residual_rms.powi(2) <= LOST * power(&given) {
         return None;
     }
-    let found = refine_fundamental(&samples[..], rate_hz, fundamental_hz, SPAN, orders).ok()?;
-    let better = of(Fundamental::given(found.frequency_hz))?;
     let is_sure = |c: &Component| c.phasor.norm() > THERE * c.std_amplitude;
-    let is_there = better.components.iter().any(is_sure);
-    let lost = given.residual_rms.powi(2) - better.residual_rms.powi(2);
-    let shift_hz = (found.frequency_hz - fundamental_hz).abs();
-    let turns = shift_hz * highest(orders) * length as f64 / rate_hz;
-    let matters = lost > LOST * power(&better) && turns > TURNS;
-    (is_there && matters && shift_hz > SIGNIFICANT * found.std_hz?).then(|| {
+    let within = |span: f64| {
+        let found = refine_fundamental(&samples[..], rate_hz, fundamental_hz, span, orders).ok()?;
+        let better = of(Fundamental::given(found.frequency_hz))?;
+        let is_there = better.components.iter().any(is_sure);
+        let lost = given.residual_rms.powi(2) - better.residual_rms.powi(2);
+        let shift_hz = (found.frequency_hz - fundamental_hz).abs();
+        let turns = shift_hz * highest(orders) * length as f64 / rate_hz;
+        let matters = lost > LOST * power(&better) && turns > TURNS;
+        let is_off = is_there && matters && shift_hz > SIGNIFICANT * found.std_hz?;
+        is_off.then_some((found, shift_hz, span))
+    };
+    // A speed that is there is not looked for farther away.
+    let is_there = given.components.iter().any(is_sure);
+    let far = || within(FAR_SPAN).filter(|_| !is_there);
+    let found = within(SPAN).or_else(far);
+    found.map(|(found, shift_hz, span)| {
         let digits = rounded(found.frequency_hz, 7);
         let refine = match shift_hz < 0.01 * REFINE_SPAN * fundamental_hz {
             true => "--refine".to_owned(),
-            false => format!("--refine --refine-span {}", 100.0 * SPAN),
+            false => format!("--refine --refine-span {}", 100.0 * span),
         };
         Warning::new(
             "fundamental-off",
@@ -125,6 +134,65 @@ pub(super) fn warning(
                  out too small, the more the higher their order; take a part of constant speed with --range",
                 rounded(slowest.frequency_hz, 6),
                 rounded(fastest.frequency_hz, 6)
+            ),
+        )
+    })
+}
+
+/// Pieces of the record whose mean torques are compared.
+const PIECES: usize = 16;
+/// Change of the mean torque, over the largest of it and of the components, and over its scatter, that is worth saying.
+const LOAD_STEP: f64 = 0.2;
+const OVER_SCATTER: f64 = 8.0;
+
+/// A warning if the mean torque changes over the record, as at a load step: components of one load are not those of another.
+/// It is compared over whole periods, in which the components cancel.
+pub(super) fn load_changes(
+    record: &UniformRecord<Spool>,
+    fundamental_hz: f64,
+    orders: &[f64],
+) -> Option<Warning> {
+    let count = record.samples.count();
+    let period = record.rate_hz / fundamental_hz;
+    let periods = (count as f64 / PIECES as f64 / period).floor();
+    if periods < 1.0 {
+        return None;
+    }
+    let length = (periods * period).round() as usize;
+    let means = (0..PIECES).map(|piece| {
+        let start = piece * (count - length) / (PIECES - 1);
+        let samples = record.samples.part(start..start + length).ok()?;
+        Some(samples.iter().sum::<f64>() / length as f64)
+    });
+    let means: Vec<f64> = means.collect::<Option<_>>()?;
+    let mut steps: Vec<f64> = means.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
+    steps.sort_by(f64::total_cmp);
+    let scatter = steps[steps.len() / 2];
+    let (low, high) = means
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), m| {
+            (low.min(*m), high.max(*m))
+        });
+    let fundamental = Fundamental::given(fundamental_hz);
+    let fitted = fit(&record.samples, record.rate_hz, 0.0, fundamental, orders).ok()?;
+    let largest = fitted.components.iter().map(|c| c.phasor.norm());
+    let largest = largest.fold(low.abs().max(high.abs()), f64::max);
+    let change = high - low;
+    (change > LOAD_STEP * largest && change > OVER_SCATTER * scatter).then(|| {
+        // The largest step, in the middle between the pieces.
+        let at = (1..PIECES).max_by(|a, b| {
+            let step = |k: &usize| (means[*k] - means[k - 1]).abs();
+            step(a).total_cmp(&step(b))
+        });
+        let duration_s = count as f64 / record.rate_hz;
+        let at = at.unwrap_or(1) as f64 / PIECES as f64 * duration_s;
+        Warning::new(
+            "load-changes",
+            format!(
+                "the mean torque changes over the record by {} % of its largest value, most about {} s after its start: the components \
+                 are averages over different loads; take a part of constant load with --range",
+                rounded(100.0 * change / largest, 2),
+                rounded(at, 2)
             ),
         )
     })

@@ -9,7 +9,7 @@ use super::order::folds;
 use super::{FinalFit, Modal, ResponseOptions, foreign};
 use crate::chart::{Chart, Series};
 use crate::identify::{Comparison, Identification, NamedEstimate};
-use crate::print::{plural, rounded, short};
+use crate::print::{plural, relative, rounded, short};
 
 /// Adds every mode of the stand with its natural frequency and damping ratio, by rising frequency.
 pub(super) fn add_modes(result: &mut Identification, fitted: &FinalFit) {
@@ -82,8 +82,8 @@ pub(super) fn other_constants(
             _ => "",
         };
         result.method.push(format!(
-            "hold-out error: {} % of the measured signal{leakage}",
-            rounded(100.0 * error, 3)
+            "hold-out error: {} of the measured signal{leakage}",
+            relative(error, 3)
         ));
         let error = NamedEstimate::new("held_out_error", "%", 100.0 * error, None);
         result.parameters.push(error);

@@ -4,7 +4,8 @@
 //! applied again with that error, whatever the characteristic is (lack of fit; N. R. Draper, H. Smith, Applied Regression
 //! Analysis, 3rd ed., 1998, 2.1).
 
-use super::{Point, SAME, value_of};
+use super::{NONE, Point, SAME, value_of};
+use crate::failure::{ErrorCode, Failure};
 use crate::identify::{Identification, rms};
 use crate::print::rounded;
 
@@ -15,6 +16,68 @@ const OFF: (f64, f64) = (5.0, 1e-3);
 const STANDS: f64 = 0.2;
 /// Fewest loads.
 const LEAST: usize = 3;
+
+/// Error of two ranges over that of one, up to which there are two, and the least change of the sensitivity between them.
+const TWO_RANGES: f64 = 0.1;
+const LEAST_CHANGE: f64 = 0.02;
+/// Fewest loads of a range.
+const FEWEST: usize = 2;
+
+/// Refuses readings whose sensitivity jumps from one load to the next: each range of an amplifier has its own.
+///
+/// # Errors
+/// If it does.
+pub(super) fn refuse_two_ranges(
+    points: &[Point],
+    steps: &[f64],
+    largest: f64,
+) -> Result<(), Failure> {
+    let (empty, loaded): (Vec<&Point>, Vec<&Point>) =
+        points.iter().partition(|p| p.load.abs() <= NONE * largest);
+    if empty.is_empty() {
+        return Ok(());
+    }
+    let zero = empty.iter().map(|p| p.reading).sum::<f64>() / empty.len() as f64;
+    // The sensitivity from that zero on, and the sum of squares that it leaves.
+    let through_zero = |of: &[&Point]| {
+        let squares: f64 = of.iter().map(|p| p.load * p.load).sum();
+        let products: f64 = of.iter().map(|p| p.load * (p.reading - zero)).sum();
+        let slope = products / squares;
+        let left = of
+            .iter()
+            .map(|p| (p.reading - zero - slope * p.load).powi(2));
+        (slope, left.sum::<f64>())
+    };
+    let mut sizes: Vec<f64> = steps.iter().map(|step| step.abs()).collect();
+    sizes.retain(|size| *size > NONE * largest);
+    sizes.sort_by(f64::total_cmp);
+    sizes.dedup_by(|a, b| (*a - *b).abs() <= SAME * largest);
+    let (_, one_range) = through_zero(&loaded);
+    let last = sizes.len().saturating_sub(FEWEST);
+    let splits = sizes.get(FEWEST..=last).unwrap_or_default().iter();
+    let with_split = |from: &f64| {
+        let is_below = |p: &&Point| p.load.abs() < from - SAME * largest;
+        let (below, above): (Vec<&Point>, Vec<&Point>) = loaded.iter().copied().partition(is_below);
+        let ((low, left), (high, more)) = (through_zero(&below), through_zero(&above));
+        (*from, high / low, left + more)
+    };
+    let best = splits.map(with_split).min_by(|a, b| a.2.total_cmp(&b.2));
+    let Some((from, ratio, two_ranges)) = best else {
+        return Ok(());
+    };
+    if two_ranges > TWO_RANGES.powi(2) * one_range || (ratio - 1.0).abs() < LEAST_CHANGE {
+        return Ok(());
+    }
+    Err(Failure::failed(
+        ErrorCode::UnsuitableRecord,
+        format_args!(
+            "the sensitivity jumps: from the load {} on, the readings are {} times as large for the same load as below, as with \
+             two ranges of an amplifier; record all loads in one range, or evaluate the rows of each range by themselves",
+            rounded(from, 4),
+            rounded(ratio, 3)
+        ),
+    ))
+}
 
 /// Warns about readings that a curve of this degree does not follow.
 pub(super) fn warn(

@@ -11,7 +11,7 @@ use super::{FitQuality, Identification, NamedEstimate, rms};
 use crate::chart::{Chart, Series};
 use crate::failure::{ErrorCode, Failure};
 use crate::noise_colour::student;
-use crate::print::{plural, rounded};
+use crate::print::{self, plural, rounded};
 use mixed::LoadCurve;
 
 /// One reading under a known load.
@@ -123,6 +123,7 @@ pub fn identify(
             "the reading does not change with load; check --reading and the bridge supply",
         ));
     }
+    linear::refuse_two_ranges(points, &steps, largest)?;
     let mut fit = mixed::fit(points, degree, (&steps, largest))?;
     walking_zero(&mut fit, points, largest);
     follows(points, &fit, largest)?;
@@ -389,9 +390,9 @@ fn poor(result: &mut Identification, relative: f64) {
         result.warn(
             "poor-fit",
             format!(
-                "the residual is {} % of the range of the readings: check that the columns are the right ones and the rows in \
+                "the residual is {} of the range of the readings: check that the columns are the right ones and the rows in \
                  the order in which they were taken, or use --degree 3",
-                rounded(100.0 * relative, 2)
+                print::relative(relative, 2)
             ),
         );
     }

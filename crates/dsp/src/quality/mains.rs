@@ -31,6 +31,8 @@ const ROUNDING: f64 = 1e-9;
 /// Largest denominator of the fractions of a mains frequency at which a shaft that makes a line there
 /// is expected to make others.
 const LARGEST_DENOMINATOR: usize = 6;
+/// Orders of a shaft by which a line is recognised as its own.
+const SHAFT_ORDERS: usize = 6;
 
 /// Lines of the mains in a record.
 #[derive(Debug, Clone, PartialEq)]
@@ -103,10 +105,13 @@ pub fn mains(samples: &[f64], rate_hz: f64) -> Option<Mains> {
         if !told || strongest < least {
             continue;
         }
-        // Multiples of 300 Hz belong to both: the fundamental decides, then the number of lines.
-        let weight = lines.len() as f64 + if lines[0].order == 1 { 100.0 } else { 0.0 };
+        // Multiples of 300 Hz belong to both: lines that are no orders of a shaft decide, then the fundamental, then the
+        // number of lines.
+        let shaft_hz = shaft(&density, nominal_hz);
+        let weight = lines.len() as f64
+            + if lines[0].order == 1 { 100.0 } else { 0.0 }
+            + if shaft_hz.is_none() { 1000.0 } else { 0.0 };
         if best.as_ref().is_none_or(|(other, _)| weight > *other) {
-            let shaft_hz = shaft(&density, nominal_hz);
             let found = Mains {
                 nominal_hz,
                 lines,
@@ -119,14 +124,28 @@ pub fn mains(samples: &[f64], rate_hz: f64) -> Option<Mains> {
     best.map(|(_, found)| found)
 }
 
-/// The lowest line at `p/q` of a mains frequency below twice of it, `q` from 2 to 6.
+/// The lowest line at `p/q` of a mains frequency below twice of it, `q` from 2 to 6, of a shaft that may make a line at the
+/// mains frequency, too.
 fn shaft(density: &Density, nominal_hz: f64) -> Option<f64> {
     let fractions = (2..=LARGEST_DENOMINATOR).flat_map(|q| (1..2 * q).map(move |p| (p, q)));
-    fractions
-        .filter(|(p, q)| p % q != 0)
-        .filter_map(|(p, q)| peak(density, nominal_hz * p as f64 / q as f64))
-        .min()
-        .map(|bin| bin as f64 * density.step_hz)
+    let fractions = fractions.filter(|(p, q)| p % q != 0);
+    let lines = fractions.filter_map(|(p, q)| {
+        let hz = nominal_hz * p as f64 / q as f64;
+        let bin = peak(density, hz)?;
+        (!is_of_another_shaft(density, nominal_hz, hz)).then_some(bin)
+    });
+    lines.min().map(|bin| bin as f64 * density.step_hz)
+}
+
+/// Whether a line is one of the first orders of a shaft whose first three are lines, and of which the mains frequency is none.
+fn is_of_another_shaft(density: &Density, nominal_hz: f64, line_hz: f64) -> bool {
+    (1..=SHAFT_ORDERS).any(|order| {
+        let shaft_hz = line_hz / order as f64;
+        let mains = nominal_hz / shaft_hz;
+        let is_order = (mains - mains.round()).abs() < OFF * mains;
+        let mut first = (1..=3).map(|n| f64::from(n) * shaft_hz);
+        !is_order && first.all(|hz| peak(density, hz).is_some())
+    })
 }
 
 /// Density, variance and mean square of the record, from blocks spread over it.
@@ -248,6 +267,25 @@ mod tests {
         );
         let found = mains(&sum(&orders, &noise(8, 10_000)), 1000.0).unwrap();
         assert_eq!(found.shaft_hz, Some(25.0));
+    }
+
+    /// 50 Hz is no order of a shaft at 30 Hz that shows its own, nor 60 Hz one at 25 Hz.
+    #[test]
+    fn hum_beside_the_orders_of_a_shaft_is_found() {
+        for (shaft, mains_hz, rate_hz) in [(30.0, 50.0, 1000.0), (25.0, 60.0, 2000.0)] {
+            let count = (10.0 * rate_hz) as usize;
+            let order = |n: f64| tone(1.0 / n, n * shaft, rate_hz, count);
+            let orders = [1.0, 2.0, 3.0].map(order);
+            let orders = orders
+                .iter()
+                .fold(noise(6, count), |all, one| sum(&all, one));
+            let hum = sum(&orders, &tone(0.3, mains_hz, rate_hz, count));
+            let found = mains(&hum, rate_hz).unwrap();
+            assert_eq!((found.nominal_hz, found.shaft_hz), (mains_hz, None));
+            assert!((found.lines[0].amplitude - 0.3).abs() < 0.01, "{found:?}");
+            let without = mains(&orders, rate_hz);
+            assert!(without.is_none_or(|m| m.shaft_hz.is_some()), "{shaft}");
+        }
     }
 
     #[test]

@@ -143,7 +143,7 @@ pub(super) const ROWS: [KindRow; 32] = [
         "V", print("V", 1.0)),
     row(Kind::Current, "current", "5 mA", CURRENT,
         "A", print("A", 1.0)),
-    row(Kind::Resistance, "resistance", "5900 ohm", RESISTANCE,
+    row(Kind::Resistance, "resistance", "350 ohm", RESISTANCE,
         "ohm", print("ohm", 1.0)),
     row(Kind::TorquePerVolt, "torque per volt", "12.5 N m/V", TORQUE_PER_VOLT,
         "N m/V", print("ft lbf/V", FOOT_POUND)),
