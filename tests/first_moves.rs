@@ -413,7 +413,10 @@ fn a_load_step_and_a_far_fundamental_are_said() {
     assert!(!codes(&slow).contains(&"load-changes"), "{slow}");
     let far = run(&|_| 5.0, 16.6, "17.6");
     assert!(codes(&far).contains(&"fundamental-off"), "{far}");
-    assert!(far["warnings"].to_string().contains("--refine-span 15"), "{far}");
+    assert!(
+        far["warnings"].to_string().contains("--refine-span 15"),
+        "{far}"
+    );
 }
 
 /// A logger wrote each row twice, or a block again.

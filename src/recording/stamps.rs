@@ -36,10 +36,13 @@ pub(crate) struct StampGrid {
     pub(super) quantum: f64,
 }
 
+/// Most copies of a row: more rows of one stamp are those of a coarse clock.
+const MOST_COPIES: f64 = 4.0;
+
 /// What it may mean that each stamp stands in so many rows, if that is a whole number of them.
 pub(crate) fn same_stamps(rows: f64) -> String {
     let whole = rows.round();
-    match whole >= 2.0 && (rows / whole - 1.0).abs() < 1e-6 {
+    match (2.0..=MOST_COPIES).contains(&whole) && (rows / whole - 1.0).abs() < 1e-6 {
         true => format!(
             "; each stamp stands in {whole} rows: if these repeat their values, too, every row was written {whole} times, and \
              only one of each belongs to the record"
