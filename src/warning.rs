@@ -63,6 +63,8 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["modulus-unusual", "the elastic modulus is that of no usual beam", "check its unit: steel has 200 GPa"],
     ]),
     ("Simulate and diagnose", &[
+        ["shift-explains-more", "a shift of one channel against the other explains the records better than all effects", "record both channels with one recorder and the same filters, or declare the delay that is named"],
+        ["two-clocks", "the two channels drift apart, as if each had a clock of its own", "record both channels with one clock"],
         ["shift-or-effect", "a shift of the applied channel explains the records about as well as the effects that were found", "record both channels with one recorder and the same filters"],
         ["free-body", "the body has no spring: it and the model are both held to the measured motion by a known one, and the errors are those of what acts", "read constants and effects as they are; to have the motion predicted, add the spring that the stand will have"],
         ["no-record-held-out", "no hold-out record was given; the last 30 % of each training record are held out instead", "give --holdout"],

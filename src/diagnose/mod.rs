@@ -120,6 +120,8 @@ struct SearchState {
     settled: bool,
     /// Whether the held-out records show none of the effects that the training records show.
     is_refuted: bool,
+    /// Whether a shift of the channels explains the records better than the effects.
+    is_outdone: bool,
 }
 
 /// Power over the spectrum around it from which on a line of the residual is reported, and most such lines.
@@ -185,13 +187,12 @@ pub fn run(mut case: Case, workers: Workers) -> Result<Diagnosis, Failure> {
     if let Some(between) = found.other_course(workers.threads) {
         found = look(training.with_between(between))?;
     }
-    if let Some(alignment) = &alignment {
-        case.warnings.extend(refuse::check_alignment(
-            &found,
-            &training,
-            alignment,
-            workers.threads,
-        )?);
+    let alignment = alignment.or_else(|| refuse::find_shift(&case, &context, &found));
+    if let Some(alignment) = &alignment
+        && let Some(weighed) = refuse::weigh_shift(&found, &training, alignment, workers.threads)
+    {
+        found.is_outdone = weighed.outdoes;
+        case.warnings.push(weighed.warning);
     }
     found.judge_on(&case.records, workers.threads)?;
     Ok(Diagnosis::of(case, found, workers.threads))
@@ -241,6 +242,7 @@ impl SearchState {
             tests,
             settled: true,
             is_refuted: false,
+            is_outdone: false,
         };
         let coarse = found.records.substeps();
         found.build(coarse, workers);

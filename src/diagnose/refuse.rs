@@ -12,6 +12,7 @@ use super::records::Records;
 use super::residual_tests::without_mean;
 use super::score::ScoredModel;
 use super::structure::{FitContext, PlainStand, Structure};
+use super::verdict::remains;
 use super::{Case, SearchState, scales};
 use crate::failure::{ErrorCode, Failure};
 use crate::print::{relative, rounded};
@@ -48,7 +49,7 @@ const APART: f64 = 0.5;
 /// If they are.
 pub fn check(case: &Case, context: &FitContext) -> Result<Option<Alignment>, Failure> {
     let as_given = relative_error(context, &case.records.train);
-    let alignment = (as_given >= NOTABLE_ERROR)
+    let alignment = (as_given >= LARGE_ERROR)
         .then(|| Alignment::find(case, context, as_given))
         .flatten();
     if let Some(alignment) = &alignment {
@@ -89,70 +90,97 @@ fn refuse_short(case: &Case, context: &FitContext) -> Result<(), Failure> {
 /// Refuses channels of two clocks, and a measured channel that comes long before the applied one.
 fn refuse_shifted(case: &Case, alignment: &Alignment) -> Result<(), Failure> {
     let [as_given, error] = alignment.errors;
-    let shift = alignment.shift;
-    if shift.per_s != 0.0 && error < TWO_CLOCKS * as_given {
-        return Err(two_clocks(case, alignment));
-    }
-    if shift.late_s < 0.0 && as_given >= LARGE_ERROR && error < SHIFTED * as_given {
-        return Err(too_early(&case.records.train[0], shift, as_given, error));
-    }
-    Ok(())
+    let (shift, train) = (alignment.shift, &case.records.train);
+    let text = if shift.per_s != 0.0 && error < TWO_CLOCKS * as_given {
+        two_clocks(train, alignment)
+    } else if shift.late_s < 0.0 && error < SHIFTED * as_given {
+        too_early(&train[0], shift, as_given, error)
+    } else {
+        return Ok(());
+    };
+    Err(Failure::failed(ErrorCode::UnsuitableRecord, text).at(&train[0].source))
 }
 
-/// Weighs a shift of the channels against the effects that were found: refuses the records if the shift explains them better,
-/// warns if it does as well. `training` are the records with an input of limited band, beside which effects may have been
-/// found with another one.
-///
-/// # Errors
-/// If it explains them better.
-pub fn check_alignment(
+/// Weighs a shift of the channels against the effects that were found. `training` are the records with an input of limited band,
+/// beside which effects may have been found with another one.
+pub fn weigh_shift(
     found: &SearchState,
     training: &Records,
     alignment: &Alignment,
     threads: usize,
-) -> Result<Option<Warning>, Failure> {
+) -> Option<ShiftWarning> {
     let (records, after, shift) = (&found.records, &found.after, alignment.shift);
+    let first = &records.train[0];
+    let [as_given, error] = alignment.errors;
+    if shift.per_s != 0.0 {
+        let explains = error < TWO_CLOCKS * as_given;
+        return explains.then(|| ShiftWarning {
+            warning: Warning::new("two-clocks", two_clocks(&records.train, alignment)),
+            outdoes: true,
+        });
+    }
     let effects = after.effect_names();
-    let is_named = shift.late_s > 0.0 && effects.contains(&"time-delay");
-    if is_named || shift.per_s != 0.0 {
-        return Ok(None);
+    if shift.late_s > 0.0 && effects.contains(&"time-delay") {
+        return None;
     }
     let models = [records, training];
     let models = models.map(|records| alignment.instead_of(after, records, threads));
     let models = models.into_iter().flatten();
-    let Some(shifted) = models.min_by(|a, b| a.criterion().total_cmp(&b.criterion())) else {
-        return Ok(None);
-    };
+    let shifted = models.min_by(|a, b| a.criterion().total_cmp(&b.criterion()))?;
     let whole = RelativeTo::of(&records.train);
     let count: usize = records.train.iter().map(StandRecord::count).sum();
     // The shift is one more parameter.
     let criterion = shifted.criterion() + (count as f64).ln();
-    let first = &records.train[0];
     // A low-pass is a lag, too, and usually the better one.
     let has_lag = shift.late_s > 0.0 && effects.contains(&"recorder-lowpass");
     let is_less = !has_lag || shifted.train_rms() < MUCH_LESS * after.train_rms();
     if is_less && criterion < after.criterion() - BETTER {
         let [before, after] = [&found.before, &shifted].map(|model| whole.error(model));
-        return Err(match shift.late_s > 0.0 {
+        let text = match shift.late_s > 0.0 {
             true => too_late(first, shift, before, after),
             false => too_early(first, shift, before, after),
+        };
+        return Some(ShiftWarning {
+            warning: Warning::new("shift-explains-more", text),
+            outdoes: true,
         });
     }
     let [after, shifted] = [after, &shifted].map(|model| whole.error(model));
     if effects.is_empty() || shift.late_s > 0.0 || shifted > AS_GOOD * after {
-        return Ok(None);
+        return None;
     }
-    Ok(Some(Warning::new(
-        "shift-or-effect",
-        format!(
-            "an applied channel that is late by {} explains the training records about as well as {} ({} of error left, against \
-             {}): check that one recorder takes both channels, with the same filters",
-            stated(-shift.late_s, first.rate_hz()),
-            effects.join(" and "),
-            relative(shifted, 3),
-            relative(after, 3),
-        ),
-    )))
+    let text = format!(
+        "an applied channel that is late by {} explains the training records about as well as {} ({} of error left, against \
+         {}): check that one recorder takes both channels, with the same filters",
+        stated(-shift.late_s, first.rate_hz()),
+        effects.join(" and "),
+        relative(shifted, 3),
+        relative(after, 3),
+    );
+    Some(ShiftWarning {
+        warning: Warning::new("shift-or-effect", text),
+        outdoes: false,
+    })
+}
+
+/// What a shift of the channels explains.
+pub struct ShiftWarning {
+    pub warning: Warning,
+    /// Whether it explains the records better than the effects that were found.
+    pub outdoes: bool,
+}
+
+/// A shift of the channels that lowers the error of the plain stand, where effects were found that resemble one, or something is
+/// left.
+pub fn find_shift(case: &Case, context: &FitContext, found: &SearchState) -> Option<Alignment> {
+    let resembles = found.after.effect_names().contains(&"second-mode");
+    if !resembles && !remains(&found.after, &found.tests, found.noise_floor) {
+        return None;
+    }
+    let as_given = relative_error(context, &case.records.train);
+    (as_given >= NOTABLE_ERROR)
+        .then(|| Alignment::find(case, context, as_given))
+        .flatten()
 }
 
 /// The rms of measured records, about their means.
@@ -183,39 +211,31 @@ fn stated(shift_s: f64, rate_hz: f64) -> String {
     )
 }
 
-fn too_early(record: &StandRecord, shift: Shift, as_given: f64, error: f64) -> Failure {
-    Failure::failed(
-        ErrorCode::UnsuitableRecord,
-        format_args!(
-            "the applied channel comes late, by {}: a plain stand has an error of {}, and of {} with the applied channel \
-             shifted back by that; no stand answers before it is driven. Record both channels with one recorder and the same \
-             filters, or move the applied column up by that many rows",
-            stated(-shift.late_s, record.rate_hz()),
-            relative(as_given, 2),
-            relative(error, 2),
-        ),
+fn too_early(record: &StandRecord, shift: Shift, as_given: f64, error: f64) -> String {
+    format!(
+        "the applied channel comes late, by {}: a plain stand has an error of {}, and of {} with the applied channel \
+         shifted back by that; no stand answers before it is driven. Record both channels with one recorder and the same \
+         filters, or move the applied column up by that many rows",
+        stated(-shift.late_s, record.rate_hz()),
+        relative(as_given, 2),
+        relative(error, 2),
     )
-    .at(&record.source)
 }
 
-fn too_late(record: &StandRecord, shift: Shift, as_given: f64, error: f64) -> Failure {
-    Failure::failed(
-        ErrorCode::UnsuitableRecord,
-        format_args!(
-            "the measured channel comes late, by {}: a plain stand has an error of {}, and of {} with that taken out, which no \
-             effect of the list reaches; declare the lag as [recorder] delay = \"{} ms\" in the stand file",
-            stated(shift.late_s, record.rate_hz()),
-            relative(as_given, 2),
-            relative(error, 2),
-            rounded(1e3 * shift.late_s, 4),
-        ),
+fn too_late(record: &StandRecord, shift: Shift, as_given: f64, error: f64) -> String {
+    format!(
+        "the measured channel comes late, by {}: a plain stand has an error of {}, and of {} with that taken out, which no \
+         effect of the list reaches; declare the lag as [recorder] delay = \"{} ms\" in the stand file",
+        stated(shift.late_s, record.rate_hz()),
+        relative(as_given, 2),
+        relative(error, 2),
+        rounded(1e3 * shift.late_s, 4),
     )
-    .at(&record.source)
 }
 
-fn two_clocks(case: &Case, alignment: &Alignment) -> Failure {
+fn two_clocks(train: &[StandRecord], alignment: &Alignment) -> String {
     let shift = alignment.shift;
-    let record = longest(&case.records.train).map_or(&case.records.train[0], |(record, _)| record);
+    let record = longest(train).map_or(&train[0], |(record, _)| record);
     let rate_hz = record.rate_hz();
     let end_s = record.measured.len() as f64 / rate_hz;
     let [as_given, error] = alignment.errors.map(|e| relative(e, 2));
@@ -223,18 +243,14 @@ fn two_clocks(case: &Case, alignment: &Alignment) -> Failure {
         let side = if shift_s < 0.0 { "early" } else { "late" };
         format!("{} {side}", stated(shift_s.abs(), rate_hz))
     };
-    Failure::failed(
-        ErrorCode::UnsuitableRecord,
-        format_args!(
-            "the two channels have different clocks: against what the applied channel causes, the measured one is {} at the start \
-             and {} at the end, a difference of {} ppm; a plain stand has an error of {as_given}, and of {error} with that \
-             taken out. Record both channels with one clock, or resample one of them onto the other's",
-            late(shift.late_s),
-            late(shift.late_s + shift.per_s * end_s),
-            rounded(1e6 * shift.per_s, 3),
-        ),
+    format!(
+        "the two channels have different clocks: against what the applied channel causes, the measured one is {} at the start \
+         and {} at the end, a difference of {} ppm; a plain stand has an error of {as_given}, and of {error} with that \
+         taken out; record both channels with one clock, or resample one of them onto the other's",
+        late(shift.late_s),
+        late(shift.late_s + shift.per_s * end_s),
+        rounded(1e6 * shift.per_s, 3),
     )
-    .at(&record.source)
 }
 
 /// Whether no training record has enough periods of the fitted natural frequency.

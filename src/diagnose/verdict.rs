@@ -142,10 +142,11 @@ impl SearchState {
     /// The verdict; rejects the effects where they explain too little.
     pub fn conclude(&mut self) -> Verdict {
         let is_suspected = self.suspected.is_some();
-        let is_left = !self.settled || is_suspected || self.leaves(&self.after, &self.tests);
+        let is_known_left = !self.settled || is_suspected || self.is_outdone;
+        let is_left = is_known_left || self.leaves(&self.after, &self.tests);
         if self.after.effect_names().is_empty() {
             let is_left = self.leaves(&self.before, &self.tests_before);
-            let is_missing = is_suspected || is_left || self.is_refuted;
+            let is_missing = is_suspected || is_left || self.is_refuted || self.is_outdone;
             return match is_missing {
                 true => Verdict::Unexplained,
                 false => Verdict::NothingMissing,
