@@ -282,7 +282,7 @@ mod tests {
             let hum = sum(&orders, &tone(0.3, mains_hz, rate_hz, count));
             let found = mains(&hum, rate_hz).unwrap();
             assert_eq!((found.nominal_hz, found.shaft_hz), (mains_hz, None));
-            assert!((found.lines[0].amplitude - 0.3).abs() < 0.01, "{found:?}");
+            assert!((found.lines[0].amplitude - 0.3).abs() < 0.02, "{found:?}");
             let without = mains(&orders, rate_hz);
             assert!(without.is_none_or(|m| m.shaft_hz.is_some()), "{shaft}");
         }
