@@ -1,6 +1,6 @@
 //! What runs did: a file of JSON lines, one for each event, that any number of runs append to.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
@@ -9,6 +9,8 @@ use serde::Serialize;
 
 use crate::failure::{ErrorReport, Failure};
 use crate::io::json_lines::JsonLines;
+use crate::io::output;
+use crate::print;
 use crate::recording::moment::utc;
 use crate::warning::Warning;
 
@@ -21,7 +23,6 @@ pub(crate) const BEGINNING: &str = "{\"schema\":\"torqcomp.log/";
 static LOG: Mutex<Option<Log>> = Mutex::new(None);
 
 struct Log {
-    path: PathBuf,
     lines: JsonLines,
     run: String,
     begun: Instant,
@@ -93,7 +94,11 @@ impl Log {
             run: &self.run,
             event,
         };
-        if let Err(failure) = self.lines.append(events.into_iter().map(line)) {
+        let lines = events
+            .into_iter()
+            .map(|e| print::json_line(&line(e)))
+            .collect();
+        if let Err(failure) = self.lines.append(lines) {
             self.broken.get_or_insert(failure);
         }
     }
@@ -105,12 +110,12 @@ impl Log {
 /// If it cannot be written.
 pub(crate) fn begin(path: &Path) -> Result<(), Failure> {
     let mut new = Log {
-        path: path.to_owned(),
         lines: JsonLines::open(path, BEGINNING, true)?,
         run: format!("{}-{}", now(), std::process::id()),
         begun: Instant::now(),
         broken: None,
     };
+    output::keep_free(path);
     let words = std::env::args_os();
     new.append([LogEvent::Start {
         command: words
@@ -127,11 +132,6 @@ pub(crate) fn begin(path: &Path) -> Result<(), Failure> {
             Ok(())
         }
     }
-}
-
-/// The file of the log, if this run has one.
-pub(crate) fn path() -> Option<PathBuf> {
-    log().as_ref().map(|log| log.path.clone())
 }
 
 /// Notes warnings, of a recording among many or of the only one.

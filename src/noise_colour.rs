@@ -55,12 +55,12 @@ pub struct NoiseColour {
     /// Samples that it is known from.
     count: usize,
     /// What the spectrum has beside that of the autoregression, if it is resolved further.
-    detail: Option<Detail>,
+    detail: Option<SpectrumDetail>,
 }
 
 /// Factors on a spectrum, averages over neighbouring bins.
 #[derive(Debug, Clone, PartialEq)]
-struct Detail {
+struct SpectrumDetail {
     /// One for each bin.
     factors: Vec<f64>,
     /// Bins to each side over which they are averages.
@@ -105,31 +105,11 @@ pub fn learn(
     let size = (2 * longest).next_power_of_two();
     let transformed = transformed(stretches, &q, size);
     let inverse = r.solve_upper_triangular(&DMatrix::identity(sizes.len(), sizes.len()))?;
-    let each = || groups.iter().map(|group| &transformed[group.clone()]);
-    let gathered = |colours: &[NoiseColour]| {
-        let pairs = colours.iter().zip(each());
-        pairs.fold(DMatrix::zeros(sizes.len(), sizes.len()), |sum, (c, g)| {
-            sum + c.gathered(g, size, sizes.len())
-        })
-    };
-    let mut colours: Vec<NoiseColour> = each().map(|g| NoiseColour::first(g, size)).collect();
-    let mut middle = gathered(&colours);
-    let refinements = if wanted > 0 { REFINEMENTS } else { 0 };
-    for _ in 0..refinements {
-        let pairs = colours.iter().zip(each());
-        colours = pairs.map(|(c, g)| c.refined(g, size, &middle)).collect();
-        middle = gathered(&colours);
-    }
-    if let Some(width_rad) = peaks_rad {
-        let pairs = colours.into_iter().zip(each());
-        colours = pairs
-            .map(|(c, g)| c.with_detail(g, size, &middle, width_rad))
-            .collect();
-        middle = gathered(&colours);
-    }
+    let groups: Vec<&[Transformed]> = groups.iter().map(|g| &transformed[g.clone()]).collect();
+    let (colours, middle) = colours_of(&groups, size, sizes.len(), wanted > 0, peaks_rad);
     let rows = inverse.rows(0, wanted.min(sizes.len())).into_owned();
     let none = DVector::zeros(rows.nrows());
-    let variances = colours.iter().zip(each()).fold(none, |sum, (c, g)| {
+    let variances = colours.iter().zip(&groups).fold(none, |sum, (c, g)| {
         sum + c.variances_of_variances(g, size, &rows)
     });
     let mut covariance = &inverse * middle * inverse.transpose();
@@ -145,6 +125,39 @@ pub fn learn(
     }
     let is_finite = covariance.iter().all(|v| v.is_finite());
     is_finite.then_some((colours, covariance))
+}
+
+/// The colour of each group of stretches and QᵀΩQ, of as many rows as there are `parameters`; refined for what the fit absorbs,
+/// and with peaks of that half-width in rad per sample, if asked for.
+fn colours_of(
+    groups: &[&[Transformed]],
+    size: usize,
+    parameters: usize,
+    is_refined: bool,
+    peaks_rad: Option<f64>,
+) -> (Vec<NoiseColour>, DMatrix<f64>) {
+    let gathered = |colours: &[NoiseColour]| {
+        let pairs = colours.iter().zip(groups);
+        pairs.fold(DMatrix::zeros(parameters, parameters), |sum, (c, g)| {
+            sum + c.gathered(g, size, parameters)
+        })
+    };
+    let first = groups.iter().map(|g| NoiseColour::first(g, size));
+    let mut colours: Vec<NoiseColour> = first.collect();
+    let mut middle = gathered(&colours);
+    for _ in 0..if is_refined { REFINEMENTS } else { 0 } {
+        let pairs = colours.iter().zip(groups);
+        colours = pairs.map(|(c, g)| c.refined(g, size, &middle)).collect();
+        middle = gathered(&colours);
+    }
+    if let Some(width_rad) = peaks_rad {
+        let pairs = colours.into_iter().zip(groups);
+        colours = pairs
+            .map(|(c, g)| c.with_detail(g, size, &middle, width_rad))
+            .collect();
+        middle = gathered(&colours);
+    }
+    (colours, middle)
 }
 
 /// Student's 97.5 % quantile over the normal one.
@@ -342,7 +355,7 @@ impl NoiseColour {
             .map(|(f, e)| if e.0 > 0.0 { f.0 / e.0 } else { 1.0 })
             .collect();
         Self {
-            detail: Some(Detail {
+            detail: Some(SpectrumDetail {
                 factors,
                 half_width,
             }),

@@ -1,6 +1,7 @@
 //! Numbers, columns and documents as they are printed.
 
 use std::fmt;
+use std::io::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use schemars::JsonSchema;
@@ -8,7 +9,6 @@ use serde::Serialize;
 use unicode_width::UnicodeWidthStr;
 
 use crate::io::digits;
-use crate::progress;
 
 /// A JSON document, indented, with a line end.
 ///
@@ -70,13 +70,37 @@ pub(crate) struct Document<'a, R> {
 
 /// Says something to a person on standard error. Nobody may be there to read it: that is no failure.
 pub fn say(text: &str) {
-    use std::io::Write;
     if text.is_empty() {
         return;
     }
-    progress::clear();
+    clear_line();
     let text = visible(text.to_owned());
+    write(&text);
+}
+
+fn write(text: &str) {
     let _ = std::io::stderr().lock().write_all(text.as_bytes());
+}
+
+/// Whether a line that will be taken away stands on the terminal.
+static IS_LINE_SHOWN: AtomicBool = AtomicBool::new(false);
+
+/// Shows a line on the terminal in the place of the last such line, until something else is said.
+pub(crate) fn show_line(text: String) {
+    IS_LINE_SHOWN.store(true, Ordering::Relaxed);
+    write(&format!("\r{}\x1b[K", visible(text)));
+}
+
+/// Takes the line away.
+pub(crate) fn clear_line() {
+    if IS_LINE_SHOWN.swap(false, Ordering::Relaxed) {
+        write("\r\x1b[K");
+    }
+}
+
+/// Says a line to a program on standard error, as it is.
+pub(crate) fn say_line(text: &str) {
+    write(text);
 }
 
 /// Whether notes are left out.

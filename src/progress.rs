@@ -1,6 +1,6 @@
 //! How far the work has got, said on standard error: a line on a terminal, or JSON lines for programs.
 
-use std::io::{self, IsTerminal, Write};
+use std::io::{self, IsTerminal};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -20,26 +20,23 @@ pub(crate) const SCHEMA: &str = "torqcomp.progress/1";
 
 /// How and when it is said in this process.
 struct Display {
-    form: Option<Form>,
+    style: Option<Style>,
     /// When it was said last.
     last: Option<Instant>,
-    /// Whether a line of it stands on the terminal.
-    is_line_shown: bool,
     /// Whether recordings are counted, so that nothing is said of each of them.
     counts_recordings: bool,
 }
 
 /// How it is said.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Form {
+enum Style {
     Line,
     Json,
 }
 
 static DISPLAY: Mutex<Display> = Mutex::new(Display {
-    form: None,
+    style: None,
     last: None,
-    is_line_shown: false,
     counts_recordings: false,
 });
 
@@ -50,24 +47,11 @@ fn display() -> MutexGuard<'static, Display> {
 /// Settles how it is said. `--quiet` leaves it out, unless a program asks for it.
 pub(crate) fn choose(mode: Option<ProgressMode>, is_quiet: bool) {
     let is_for_people = !is_quiet && io::stderr().is_terminal();
-    display().form = match mode.unwrap_or(ProgressMode::Auto) {
-        ProgressMode::Json => Some(Form::Json),
-        ProgressMode::Auto if is_for_people => Some(Form::Line),
+    display().style = match mode.unwrap_or(ProgressMode::Auto) {
+        ProgressMode::Json => Some(Style::Json),
+        ProgressMode::Auto if is_for_people => Some(Style::Line),
         ProgressMode::Auto | ProgressMode::Never => None,
     };
-}
-
-/// Takes the line away before something else is said.
-pub(crate) fn clear() {
-    let mut display = display();
-    if std::mem::take(&mut display.is_line_shown) {
-        show("\r\x1b[K");
-    }
-}
-
-/// Nobody may be there to read it: that is no failure.
-fn show(text: &str) {
-    let _ = io::stderr().lock().write_all(text.as_bytes());
 }
 
 /// What takes long.
@@ -130,26 +114,23 @@ impl Progress {
     /// Says how much is done of how much, if it is time to.
     pub(crate) fn report(&self, done: Amount, all: Option<Amount>) {
         let mut display = display();
-        let Some(form) = display.form else {
+        let Some(style) = display.style else {
             return;
         };
         let is_part = display.counts_recordings && self.task != Task::Recordings;
         let elapsed = self.begun.elapsed();
         let since = display.last.map(|last| last.elapsed());
-        if is_part || !is_due(form, elapsed, since) {
+        if is_part || !is_due(style, elapsed, since) {
             return;
         }
-        let text = match form {
-            Form::Json => Some(self.json(elapsed, done, all)),
-            Form::Line => self
-                .text(elapsed, done, all)
-                .map(|text| format!("\r{}\x1b[K", print::visible(text))),
-        };
-        if let Some(text) = text {
-            display.last = Some(Instant::now());
-            display.is_line_shown = form == Form::Line;
-            show(&text);
+        match style {
+            Style::Json => print::say_line(&self.json(elapsed, done, all)),
+            Style::Line => match self.text(elapsed, done, all) {
+                Some(text) => print::show_line(text),
+                None => return,
+            },
         }
+        display.last = Some(Instant::now());
     }
 
     /// The line for people; `None` while there is nothing to say.
@@ -205,7 +186,7 @@ impl Drop for Progress {
     fn drop(&mut self) {
         let is_whole = self.task == Task::Recordings;
         if is_whole || !display().counts_recordings {
-            clear();
+            print::clear_line();
         }
     }
 }
@@ -236,8 +217,8 @@ pub(crate) struct ProgressLine<'a> {
 }
 
 /// Whether it is time to say it, so long after the task began and after it was said last.
-fn is_due(form: Form, elapsed: Duration, since: Option<Duration>) -> bool {
-    let has_begun = form == Form::Json || elapsed >= BEGINS;
+fn is_due(style: Style, elapsed: Duration, since: Option<Duration>) -> bool {
+    let has_begun = style == Style::Json || elapsed >= BEGINS;
     has_begun && since.is_none_or(|since| since >= REPEATS)
 }
 
@@ -271,12 +252,12 @@ mod tests {
     #[test]
     fn a_terminal_shows_it_after_two_seconds_and_a_program_at_once() {
         let ms = Duration::from_millis;
-        assert!(!is_due(Form::Line, ms(1999), None));
-        assert!(is_due(Form::Line, ms(2000), None));
-        assert!(is_due(Form::Json, ms(0), None));
-        for form in [Form::Line, Form::Json] {
-            assert!(!is_due(form, ms(9000), Some(ms(499))));
-            assert!(is_due(form, ms(9000), Some(ms(500))));
+        assert!(!is_due(Style::Line, ms(1999), None));
+        assert!(is_due(Style::Line, ms(2000), None));
+        assert!(is_due(Style::Json, ms(0), None));
+        for style in [Style::Line, Style::Json] {
+            assert!(!is_due(style, ms(9000), Some(ms(499))));
+            assert!(is_due(style, ms(9000), Some(ms(500))));
         }
     }
 

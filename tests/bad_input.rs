@@ -434,15 +434,7 @@ fn a_record_cut_in_its_last_line_is_used_up_to_there() {
     for keep in ["0.1499", "0.1499,", "0.14995,-1.2e-", "0.14995,-"] {
         let end = whole.rfind("0.14995,").unwrap();
         folder.write("in.csv", format!("{}{keep}", &whole[..end]));
-        let ran = folder.run(&[
-            "compensate",
-            "in.csv",
-            "--stand",
-            "stand.toml",
-            "-o",
-            "out.csv",
-            "--force",
-        ]);
+        let ran = folder.run(&[&COMPENSATE[..], &["--force"]].concat());
         ran.says(3, &["truncated-last-line", "line 3001", "left out"]);
         assert_eq!(folder.read("out.csv").lines().count(), 3000);
     }

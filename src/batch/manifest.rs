@@ -380,6 +380,7 @@ pub(super) fn open(path: &Path, sync: bool) -> Result<JsonLines, Failure> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::print;
 
     #[test]
     fn a_cut_last_line_costs_that_line_alone() {
@@ -392,12 +393,18 @@ mod tests {
         let mut entry = ManifestEntry::new(made_by, "a/ü x.csv", "logs/a/ü x.csv");
         entry.exit = 0;
         entry.figures.rms = Some(0.1);
-        open(&path, true).unwrap().append([&entry]).unwrap();
+        open(&path, true)
+            .unwrap()
+            .append(print::json_line(&entry))
+            .unwrap();
         let whole = std::fs::read(&path).unwrap();
         assert!(whole.starts_with(BEGINNING.as_bytes()) && whole.ends_with(b"}\n"));
         for cut in 1..whole.len() {
             std::fs::write(&path, [&whole, &whole[..cut]].concat()).unwrap();
-            open(&path, false).unwrap().append([&entry]).unwrap();
+            open(&path, false)
+                .unwrap()
+                .append(print::json_line(&entry))
+                .unwrap();
             let history = History::read(std::slice::from_ref(&path)).unwrap();
             // A line that lacks its end only is whole.
             assert_eq!(history.unread, usize::from(cut < whole.len() - 1), "{cut}");

@@ -151,7 +151,7 @@ pub(crate) fn run(
         bytes,
     };
     let manifest = manifest::open(&plan.manifest, task.result.policy().sync)?;
-    manifest.append([plan.begin()])?;
+    manifest.append(print::json_line(&plan.begin()))?;
     let running = Running {
         on_one,
         shared: Mutex::new(Shared {
@@ -239,7 +239,8 @@ impl Running<'_> {
                 Treated::Skipped(entry) => Some(entry.file.clone()),
                 Treated::Made(_) => None,
             });
-        shared.manifest.append([RunEnd::new(skipped.collect())])
+        let end = RunEnd::new(skipped.collect());
+        shared.manifest.append(print::json_line(&end))
     }
 
     /// Does what is to be done with a recording; `None` if it is not begun.
@@ -317,7 +318,7 @@ impl Running<'_> {
     fn note(&self, entry: &ManifestEntry) -> bool {
         let mut shared = self.lock();
         if shared.broken.is_none()
-            && let Err(failure) = shared.manifest.append([entry])
+            && let Err(failure) = shared.manifest.append(print::json_line(&entry))
         {
             shared.broken = Some(failure);
         }

@@ -32,6 +32,7 @@ mod result;
 mod score;
 mod search;
 mod several;
+mod shift;
 mod spectra;
 mod starts;
 mod stationarity;
@@ -184,12 +185,14 @@ pub fn run(mut case: Case, workers: Workers) -> Result<Diagnosis, Failure> {
     let training = case.records.training();
     let look = |records: Records| SearchState::with(records, &context, declared, workers);
     let mut found = look(training.clone())?;
-    if let Some(between) = found.other_course(workers.threads) {
+    let between = found.other_course(workers.threads);
+    let smooth = between.is_some().then_some(&training);
+    if let Some(between) = between {
         found = look(training.with_between(between))?;
     }
-    let alignment = alignment.or_else(|| refuse::find_shift(&case, &context, &found));
+    let alignment = alignment.or_else(|| shift::find(&case, &context, &found));
     if let Some(alignment) = &alignment
-        && let Some(weighed) = refuse::weigh_shift(&found, &training, alignment, workers.threads)
+        && let Some(weighed) = shift::weigh(&found, smooth, alignment, workers.threads)
     {
         found.is_outdone = weighed.outdoes;
         case.warnings.push(weighed.warning);

@@ -5,33 +5,20 @@ use std::sync::Arc;
 
 use torqcomp_model::simulate::{Excitation, MotionState};
 
-use super::alignment::{Alignment, Shift};
+use super::alignment::Alignment;
 use super::plain::find_plain;
 use super::record::{NuisanceTerms, StandRecord, dot};
-use super::records::Records;
 use super::residual_tests::without_mean;
 use super::score::ScoredModel;
 use super::structure::{FitContext, PlainStand, Structure};
-use super::verdict::remains;
-use super::{Case, SearchState, scales};
+use super::{Case, scales, shift};
 use crate::failure::{ErrorCode, Failure};
 use crate::print::{relative, rounded};
-use crate::warning::Warning;
 
 /// Minimum number of periods of the natural frequency in the longest training record.
 const FEWEST_PERIODS: f64 = 10.0;
 /// Relative error of the plain stand from which on the channels are tried the other way round.
-const LARGE_ERROR: f64 = 0.3;
-/// The same from which on a shift of the channels is looked for.
-const NOTABLE_ERROR: f64 = 0.02;
-/// Error with the channels aligned, over that as given, below which they count as shifted, and as of two clocks.
-const SHIFTED: f64 = 0.2;
-const TWO_CLOCKS: f64 = 0.5;
-/// Reduction of the criterion from effects to channels aligned from which on the shift explains more, and error over that with
-/// effects up to which it explains as much.
-const BETTER: f64 = 10.0;
-const MUCH_LESS: f64 = 0.7;
-const AS_GOOD: f64 = 1.05;
+pub const LARGE_ERROR: f64 = 0.3;
 /// Error the other way round, over that as given, below which the channels count as swapped.
 const SWAPPED: f64 = 0.5;
 /// Error with the gain left free, over that with the declared one, below which the declared one belongs to another unit.
@@ -53,7 +40,7 @@ pub fn check(case: &Case, context: &FitContext) -> Result<Option<Alignment>, Fai
         .then(|| Alignment::find(case, context, as_given))
         .flatten();
     if let Some(alignment) = &alignment {
-        refuse_shifted(case, alignment)?;
+        shift::refuse(case, alignment)?;
     }
     let is_shifted = alignment
         .as_ref()
@@ -87,172 +74,6 @@ fn refuse_short(case: &Case, context: &FitContext) -> Result<(), Failure> {
     .at(&record.source))
 }
 
-/// Refuses channels of two clocks, and a measured channel that comes long before the applied one.
-fn refuse_shifted(case: &Case, alignment: &Alignment) -> Result<(), Failure> {
-    let [as_given, error] = alignment.errors;
-    let (shift, train) = (alignment.shift, &case.records.train);
-    let text = if shift.per_s != 0.0 && error < TWO_CLOCKS * as_given {
-        two_clocks(train, alignment)
-    } else if shift.late_s < 0.0 && error < SHIFTED * as_given {
-        too_early(&train[0], shift, as_given, error)
-    } else {
-        return Ok(());
-    };
-    Err(Failure::failed(ErrorCode::UnsuitableRecord, text).at(&train[0].source))
-}
-
-/// Weighs a shift of the channels against the effects that were found. `training` are the records with an input of limited band,
-/// beside which effects may have been found with another one.
-pub fn weigh_shift(
-    found: &SearchState,
-    training: &Records,
-    alignment: &Alignment,
-    threads: usize,
-) -> Option<ShiftWarning> {
-    let (records, after, shift) = (&found.records, &found.after, alignment.shift);
-    let first = &records.train[0];
-    let [as_given, error] = alignment.errors;
-    if shift.per_s != 0.0 {
-        let explains = error < TWO_CLOCKS * as_given;
-        return explains.then(|| ShiftWarning {
-            warning: Warning::new("two-clocks", two_clocks(&records.train, alignment)),
-            outdoes: true,
-        });
-    }
-    let effects = after.effect_names();
-    if shift.late_s > 0.0 && effects.contains(&"time-delay") {
-        return None;
-    }
-    let models = [records, training];
-    let models = models.map(|records| alignment.instead_of(after, records, threads));
-    let models = models.into_iter().flatten();
-    let shifted = models.min_by(|a, b| a.criterion().total_cmp(&b.criterion()))?;
-    let whole = RelativeTo::of(&records.train);
-    let count: usize = records.train.iter().map(StandRecord::count).sum();
-    // The shift is one more parameter.
-    let criterion = shifted.criterion() + (count as f64).ln();
-    // A low-pass is a lag, too, and usually the better one.
-    let has_lag = shift.late_s > 0.0 && effects.contains(&"recorder-lowpass");
-    let is_less = !has_lag || shifted.train_rms() < MUCH_LESS * after.train_rms();
-    if is_less && criterion < after.criterion() - BETTER {
-        let [before, after] = [&found.before, &shifted].map(|model| whole.error(model));
-        let text = match shift.late_s > 0.0 {
-            true => too_late(first, shift, before, after),
-            false => too_early(first, shift, before, after),
-        };
-        return Some(ShiftWarning {
-            warning: Warning::new("shift-explains-more", text),
-            outdoes: true,
-        });
-    }
-    let [after, shifted] = [after, &shifted].map(|model| whole.error(model));
-    if effects.is_empty() || shift.late_s > 0.0 || shifted > AS_GOOD * after {
-        return None;
-    }
-    let text = format!(
-        "an applied channel that is late by {} explains the training records about as well as {} ({} of error left, against \
-         {}): check that one recorder takes both channels, with the same filters",
-        stated(-shift.late_s, first.rate_hz()),
-        effects.join(" and "),
-        relative(shifted, 3),
-        relative(after, 3),
-    );
-    Some(ShiftWarning {
-        warning: Warning::new("shift-or-effect", text),
-        outdoes: false,
-    })
-}
-
-/// What a shift of the channels explains.
-pub struct ShiftWarning {
-    pub warning: Warning,
-    /// Whether it explains the records better than the effects that were found.
-    pub outdoes: bool,
-}
-
-/// A shift of the channels that lowers the error of the plain stand, where effects were found that resemble one, or something is
-/// left.
-pub fn find_shift(case: &Case, context: &FitContext, found: &SearchState) -> Option<Alignment> {
-    let resembles = found.after.effect_names().contains(&"second-mode");
-    if !resembles && !remains(&found.after, &found.tests, found.noise_floor) {
-        return None;
-    }
-    let as_given = relative_error(context, &case.records.train);
-    (as_given >= NOTABLE_ERROR)
-        .then(|| Alignment::find(case, context, as_given))
-        .flatten()
-}
-
-/// The rms of measured records, about their means.
-struct RelativeTo(f64);
-
-impl RelativeTo {
-    fn of(records: &[StandRecord]) -> Self {
-        let power = |r: &StandRecord| {
-            let measured = without_mean(r.measured_in_range());
-            dot(&measured, &measured)
-        };
-        let count: usize = records.iter().map(StandRecord::count).sum();
-        Self((records.iter().map(power).sum::<f64>() / count as f64).sqrt())
-    }
-
-    fn error(&self, model: &ScoredModel) -> f64 {
-        model.train_rms() / self.0
-    }
-}
-
-/// A shift in samples and in ms.
-fn stated(shift_s: f64, rate_hz: f64) -> String {
-    let samples = rounded(shift_s * rate_hz, 3);
-    let plural = if samples == "1" { "" } else { "s" };
-    format!(
-        "{samples} sample{plural} ({} ms)",
-        rounded(1e3 * shift_s, 3)
-    )
-}
-
-fn too_early(record: &StandRecord, shift: Shift, as_given: f64, error: f64) -> String {
-    format!(
-        "the applied channel comes late, by {}: a plain stand has an error of {}, and of {} with the applied channel \
-         shifted back by that; no stand answers before it is driven. Record both channels with one recorder and the same \
-         filters, or move the applied column up by that many rows",
-        stated(-shift.late_s, record.rate_hz()),
-        relative(as_given, 2),
-        relative(error, 2),
-    )
-}
-
-fn too_late(record: &StandRecord, shift: Shift, as_given: f64, error: f64) -> String {
-    format!(
-        "the measured channel comes late, by {}: a plain stand has an error of {}, and of {} with that taken out, which no \
-         effect of the list reaches; declare the lag as [recorder] delay = \"{} ms\" in the stand file",
-        stated(shift.late_s, record.rate_hz()),
-        relative(as_given, 2),
-        relative(error, 2),
-        rounded(1e3 * shift.late_s, 4),
-    )
-}
-
-fn two_clocks(train: &[StandRecord], alignment: &Alignment) -> String {
-    let shift = alignment.shift;
-    let record = longest(train).map_or(&train[0], |(record, _)| record);
-    let rate_hz = record.rate_hz();
-    let end_s = record.measured.len() as f64 / rate_hz;
-    let [as_given, error] = alignment.errors.map(|e| relative(e, 2));
-    let late = |shift_s: f64| {
-        let side = if shift_s < 0.0 { "early" } else { "late" };
-        format!("{} {side}", stated(shift_s.abs(), rate_hz))
-    };
-    format!(
-        "the two channels have different clocks: against what the applied channel causes, the measured one is {} at the start \
-         and {} at the end, a difference of {} ppm; a plain stand has an error of {as_given}, and of {error} with that \
-         taken out; record both channels with one clock, or resample one of them onto the other's",
-        late(shift.late_s),
-        late(shift.late_s + shift.per_s * end_s),
-        rounded(1e6 * shift.per_s, 3),
-    )
-}
-
 /// Whether no training record has enough periods of the fitted natural frequency.
 pub fn is_short(case: &Case, context: &FitContext) -> bool {
     let longest = longest(&case.records.train);
@@ -260,7 +81,7 @@ pub fn is_short(case: &Case, context: &FitContext) -> bool {
 }
 
 /// The longest training record and its duration in s.
-fn longest(train: &[StandRecord]) -> Option<(&StandRecord, f64)> {
+pub fn longest(train: &[StandRecord]) -> Option<(&StandRecord, f64)> {
     let longest = train.iter().max_by_key(|r| r.count())?;
     Some((longest, longest.count() as f64 / longest.rate_hz()))
 }

@@ -4,11 +4,8 @@ use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
-
 use super::storage;
 use crate::failure::{ErrorCode, Failure};
-use crate::print;
 
 /// First bytes in which a line of the file's kind is looked for.
 const LOOKED_AT: usize = 1 << 16;
@@ -60,11 +57,7 @@ impl JsonLines {
     ///
     /// # Errors
     /// If they cannot be written.
-    pub(crate) fn append<T: Serialize>(
-        &self,
-        entries: impl IntoIterator<Item = T>,
-    ) -> Result<(), Failure> {
-        let lines: String = entries.into_iter().map(|e| print::json_line(&e)).collect();
+    pub(crate) fn append(&self, lines: String) -> Result<(), Failure> {
         let written = self.write(lines);
         let synced = written.and_then(|()| match self.sync {
             true => storage::sync(&self.file),

@@ -3,16 +3,19 @@
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use tempfile::NamedTempFile;
 
 use super::{parts, storage, sum};
 use crate::failure::{ErrorCode, Failure};
-use crate::log;
 
 /// Whether anything was written to standard output.
 static IS_STDOUT_USED: AtomicBool = AtomicBool::new(false);
+
+/// A file that no output of this process may replace.
+static KEPT_FREE: OnceLock<PathBuf> = OnceLock::new();
 
 /// Most links that lead to one file.
 const LINKS: usize = 40;
@@ -43,6 +46,11 @@ enum Kind {
     },
 }
 
+/// Keeps a file from being replaced by any output of this process; the first one that is named.
+pub(crate) fn keep_free(path: &Path) {
+    let _ = KEPT_FREE.set(path.to_owned());
+}
+
 impl Output {
     /// Standard output.
     #[must_use]
@@ -63,8 +71,8 @@ impl Output {
             return Ok(Self::stdout());
         };
         let name = path.display().to_string();
-        let log = log::path();
-        let mut taken = taken.iter().copied().chain(log.as_deref());
+        let kept_free = KEPT_FREE.get().map(PathBuf::as_path);
+        let mut taken = taken.iter().copied().chain(kept_free);
         if let Some(other) = taken.find(|other| is_same_file(other, path)) {
             let other = match other {
                 input if input == Path::new("-") => "standard input".to_owned(),

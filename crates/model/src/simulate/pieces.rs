@@ -214,20 +214,7 @@ mod tests {
     use crate::chain::Link;
     use crate::effects::{Effect, Mode};
     use crate::modal::{ModalPart, ModalResponse};
-
-    const RATE_HZ: f64 = 20_000.0;
-    const MODE: Mode = Mode {
-        omega_rad_s: TAU * 590.0,
-        damping_ratio: 0.07,
-    };
-
-    fn chain(effects: &[(&str, &str, &[f64])]) -> Chain {
-        let link = |(effect, form, values): &(&str, &str, &[f64])| {
-            let effect = Effect::named(effect).unwrap();
-            Link::of(effect, effect.form(Some(form)).unwrap(), values)
-        };
-        Chain::new(MODE, 1.0).with_links(effects.iter().map(link))
-    }
+    use crate::simulate::tests::{RATE_HZ, chain};
 
     /// Two modes with dry friction at the gage.
     fn several() -> Chain {

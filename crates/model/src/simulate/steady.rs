@@ -151,23 +151,10 @@ mod tests {
     use super::*;
     use crate::chain::Link;
     use crate::effects::{Effect, Mode};
+    use crate::simulate::tests::{MODE, RATE_HZ, chain};
 
-    const RATE_HZ: f64 = 20_000.0;
     /// Not a product of small primes, and odd.
     const PERIOD: usize = 1997;
-    const MODE: Mode = Mode {
-        omega_rad_s: TAU * 590.0,
-        damping_ratio: 0.07,
-    };
-
-    fn chain(effects: &[(&str, &str, &[f64])]) -> Chain {
-        let link = |(effect, form, values): &(&str, &str, &[f64])| {
-            let effect = Effect::named(effect).unwrap();
-            Link::of(effect, effect.form(Some(form)).unwrap(), values)
-        };
-        Chain::new(MODE, 1.0).with_links(effects.iter().map(link))
-    }
-
     fn period() -> Vec<f64> {
         let turn = |i: usize, k: f64| TAU * k * i as f64 / PERIOD as f64;
         let tones = |i| turn(i, 8.0).sin() + 0.8 * turn(i, 31.0).cos() + 0.7 * turn(i, 62.0).sin();

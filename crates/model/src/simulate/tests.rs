@@ -7,9 +7,9 @@ use crate::chain::{Chain, Link};
 use crate::effects::{Action, Effect, Mode, RIVALS, Stage};
 use crate::modal::{ModalPart, ModalResponse};
 
-const RATE_HZ: f64 = 20_000.0;
+pub(super) const RATE_HZ: f64 = 20_000.0;
 const COUNT: usize = 2000;
-const MODE: Mode = Mode {
+pub(super) const MODE: Mode = Mode {
     omega_rad_s: TAU * 590.0,
     damping_ratio: 0.07,
 };
@@ -29,6 +29,15 @@ fn input_at(time_s: f64) -> f64 {
 fn input(substeps: usize) -> Excitation {
     let samples = (0..COUNT).map(|i| input_at(i as f64 / RATE_HZ)).collect();
     Excitation::new(samples, RATE_HZ, 0.0, substeps)
+}
+
+/// A stand with effects: name, form and parameters of each.
+pub(super) fn chain(effects: &[(&str, &str, &[f64])]) -> Chain {
+    let link = |(effect, form, values): &(&str, &str, &[f64])| {
+        let effect = Effect::named(effect).unwrap();
+        Link::of(effect, effect.form(Some(form)).unwrap(), values)
+    };
+    Chain::new(MODE, 1.0).with_links(effects.iter().map(link))
 }
 
 fn model(effect: &str, form: &str, values: &[f64]) -> Chain {
