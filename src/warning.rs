@@ -169,6 +169,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["mcap-count", "messages, chunks or attachments that the file counts are not there", "recover the file from its source"],
         ["mcap-damaged-chunk", "a chunk is damaged and was left out", "recover the file from its source"],
         ["mcap-damaged-record", "a record is damaged and was left out", "recover the file from its source"],
+        ["mcap-items-move", "the item asked for by its place changes it; it was followed by its name", "ask for it by its name"],
         ["mcap-lost", "messages were lost", "recover the file from its source"],
         ["mcap-more-losses", "there were more losses of the same kind", "see the ones before"],
         ["mcap-out-of-order", "samples came after later ones and were put in order", "nothing, if the stamps are right"],

@@ -147,6 +147,16 @@ fn a_calibration_in_any_signal_stands_beside_the_drawing() {
     let volts = of(&found, "torque_per_volt");
     close(&volts["predicted"], 22.2222, 1e-3);
     close(&volts["measured"], 25.0, 1e-9);
+    // The drawing alone gives it too, without a supply as well.
+    for given in ["", "excitation = \"10 V\"\n"] {
+        let folder = Folder::new();
+        let bare = drawing.replace("excitation = \"10 V\"\n", given);
+        folder.write("stand.toml", bare.replace("[recorder]\ngain = 100\n", ""));
+        let report = folder.json(&["predict", "--stand", "stand.toml", "--json"]);
+        let ratio = of(report["constants"].as_array().unwrap(), "torque_per_ratio").clone();
+        close(&ratio["predicted"], 22.2222, 1e-3);
+        assert!(ratio["measured"].is_null());
+    }
     let cases = [
         (
             "lever_arm = \"0.11 m\"",

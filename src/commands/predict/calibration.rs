@@ -7,10 +7,11 @@ use super::report::PredictedConstant;
 use crate::stand::TransducerSignal;
 
 impl Drawing<'_> {
-    /// The calibration in its own signal, where that is not a voltage.
+    /// The calibration in its own signal, where that is not a voltage; without one, that of the bridge in V/V.
     pub(super) fn calibration(&self, units: UnitSystem) -> Option<PredictedConstant> {
-        let measured = self.stand.calibration.as_ref()?;
-        let (name, by) = match measured.signal {
+        let measured = self.stand.calibration.as_ref();
+        let signal = measured.map_or(TransducerSignal::Ratio, |measured| measured.signal);
+        let (name, by) = match signal {
             TransducerSignal::Voltage => return None,
             TransducerSignal::Ratio => (
                 "torque_per_ratio",
@@ -21,7 +22,7 @@ impl Drawing<'_> {
             TransducerSignal::Current => ("torque_per_current", "no drawing gives it"),
             TransducerSignal::Frequency => ("torque_per_frequency", "no drawing gives it"),
         };
-        let (unit, factor) = measured.signal.slope_unit(units);
+        let (unit, factor) = signal.slope_unit(units);
         let estimate = |(slope, relative): (f64, Option<f64>), source: &'static str| {
             let value = slope / factor;
             let std = relative.map(|relative| (relative * value).abs());
@@ -29,12 +30,15 @@ impl Drawing<'_> {
         };
         let predicted = self
             .stand
-            .drawn_slope(measured.signal)
+            .drawn_slope(signal)
             .map(|slope| estimate(slope, "drawing"));
         let found = self
             .stand
-            .measured_slope(measured.signal)
+            .measured_slope(signal)
             .map(|slope| estimate(slope, "calibration"));
+        if measured.is_none() && predicted.is_none() {
+            return None;
+        }
         Some(PredictedConstant {
             by,
             ..PredictedConstant::between(name, predicted.as_ref(), found.as_ref(), &unit)

@@ -36,6 +36,8 @@ pub struct Reading {
     pub nanoseconds: Option<i64>,
     /// The number that says how far samples are apart.
     pub spacing: Option<f64>,
+    /// Place of an item that is asked for by its name.
+    pub place: Option<usize>,
 }
 
 impl Reading {
@@ -45,6 +47,7 @@ impl Reading {
         self.seconds = None;
         self.nanoseconds = None;
         self.spacing = None;
+        self.place = None;
     }
 
     /// The stamp in ns.

@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::channels::{Channels, TopicChannel};
 use super::decode::{Damage, Decoder, Encoding, Reading, Targets};
 use super::index;
-use super::path::{self, PathPart};
+use super::path::{self, NOBODY, PathPart};
 use super::record::input::CountedInput;
 use super::record::reader::RecordReader;
 use super::record::{self, RawMessage};
@@ -28,8 +28,6 @@ use crate::warning::Warning;
 
 /// Leaves of a channel whose value in the first message is shown.
 const EXAMPLES: usize = 64;
-/// A name that no item has: asked for, all names are told.
-const NOBODY: &str = "\0";
 
 /// What is in a file.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -454,7 +452,7 @@ fn leaf_report(
         let read = Decoder::new(encoding, schema, targets).read(message, &mut reading);
         read.map(|()| reading.values.first().copied())
     };
-    let by_name = parts.and_then(|parts| called(parts, NOBODY));
+    let by_name = parts.and_then(|parts| path::by_name(parts, NOBODY));
     let by_name = by_name.as_ref().and_then(find);
     let missed = by_name
         .zip(message)
@@ -476,16 +474,6 @@ fn leaf_report(
         },
         is_stamp: leaf.is_stamp,
     }
-}
-
-/// A path whose first item of a list is asked for by a name.
-fn called(mut parts: Vec<PathPart>, name: &str) -> Option<Vec<PathPart>> {
-    let item = parts.iter_mut().find(|part| **part == PathPart::Index(0))?;
-    *item = PathPart::Called {
-        key: None,
-        name: name.to_owned(),
-    };
-    Some(parts)
 }
 
 fn rate_hz(seen: &ChannelCount) -> Option<f64> {

@@ -94,6 +94,19 @@ fn item(word: &str, text: &str) -> Result<PathPart, String> {
     Ok(PathPart::Called { key, name })
 }
 
+/// A name that no item has: asked for, all names are told.
+pub const NOBODY: &str = "\0";
+
+/// A path whose first item of a list is asked for by a name instead of its place.
+pub fn by_name(mut parts: Vec<PathPart>, name: &str) -> Option<Vec<PathPart>> {
+    let is_place = |part: &&mut PathPart| matches!(part, PathPart::Index(_));
+    *parts.iter_mut().find(is_place)? = PathPart::Called {
+        key: None,
+        name: name.to_owned(),
+    };
+    Some(parts)
+}
+
 /// The text again.
 pub fn text(parts: &[PathPart]) -> String {
     let mut text = String::new();

@@ -5,10 +5,12 @@ use std::sync::Arc;
 use super::blocks::{Blocks, Spacing};
 use super::channels::{Channels, TopicChannel};
 use super::clock::ClockCheck;
-use super::decode::{Decoder, Reading, Targets};
+use super::decode::{Damage, Decoder, Encoding, Reading, Targets};
 use super::order::Sorter;
+use super::path::{self, NOBODY, PathPart};
 use super::record::RawMessage;
 use super::route::Route;
+use super::schema::Schema;
 use super::selection::{FieldRequest, FieldText};
 use super::summary::Tally;
 use super::time::{Stamp, TimeChoice, TimeUsed};
@@ -68,6 +70,8 @@ pub(super) struct TopicSignal {
     pub selected: SelectedSignal,
     pub options: TimeOptions,
     decoder: Decoder,
+    /// The field with the name of its item, if it was asked for by its place and has one.
+    pub by_name: Option<String>,
     reading: Reading,
     /// Messages held back until the time is chosen.
     first: Vec<CopiedMessage>,
@@ -117,7 +121,13 @@ impl TopicSignal {
         options: &TimeOptions,
     ) -> Result<Self, String> {
         let (encoding, schema) = channel.layout(message.data)?;
-        let route = Route::find(&schema, &field.parts()?)?;
+        let parts = field.parts()?;
+        let mut route = Route::find(&schema, &parts)?;
+        let by_name = by_name(encoding, &schema, (&route, parts), message.data);
+        let by_name = by_name.map(|named| {
+            let text = std::mem::replace(&mut route, named).text;
+            std::mem::replace(&mut route.text, text)
+        });
         let spacing = Spacing::find(&schema, &route, options.spacing.as_deref())?;
         let stamp = Stamp::find(&schema);
         let selected = SelectedSignal {
@@ -145,6 +155,7 @@ impl TopicSignal {
             selected,
             options: options.clone(),
             decoder: Decoder::new(encoding, &schema, targets),
+            by_name,
             reading: Reading::default(),
             first: Vec::new(),
             is_time_chosen: false,
@@ -210,6 +221,7 @@ impl TopicSignal {
             self.tally.skip(damage, log_time_ns);
             return;
         }
+        self.tally.place(self.reading.place);
         let time_ns = self.time_ns(log_time_ns, message.publish_time_ns);
         if self.selected.time.choice == TimeChoice::Header {
             self.clock.note(time_ns, log_time_ns);
@@ -277,6 +289,43 @@ impl TopicSignal {
         }
         Ok(())
     }
+}
+
+/// The way by name to an item that is asked for by its place, if the first message names it: joints change their places when
+/// several nodes publish on a topic.
+fn by_name(
+    encoding: Encoding,
+    schema: &Arc<Schema>,
+    (route, parts): (&Route, Vec<PathPart>),
+    message: &[u8],
+) -> Option<Route> {
+    let mut reading = Reading::default();
+    let mut read = |value: &Route| {
+        let targets = Targets {
+            value: value.clone(),
+            stamp: None,
+            spacing: None,
+        };
+        let read = Decoder::new(encoding, schema, targets).read(message, &mut reading);
+        read.map(|()| std::mem::take(&mut reading.values))
+    };
+    let place = parts.iter().find_map(|part| match part {
+        PathPart::Index(place) => usize::try_from(*place).ok(),
+        _ => None,
+    })?;
+    let called = |name: &str| {
+        let parts = path::by_name(parts.clone(), name)?;
+        Route::find(schema, &parts).ok()
+    };
+    let Err(Damage::NoName { there, .. }) = read(&called(NOBODY)?) else {
+        return None;
+    };
+    let name = there.get(place).filter(|name| !name.is_empty())?;
+    let named = called(name)?;
+    let is_only = there.iter().filter(|other| *other == name).count() == 1;
+    let bits = |values: Vec<f64>| values.into_iter().map(f64::to_bits).collect::<Vec<_>>();
+    let is_same = bits(read(route).ok()?) == bits(read(&named).ok()?);
+    (is_only && is_same).then_some(named)
 }
 
 /// The time that counts, and why: the one asked for, or what the messages carry in a field.

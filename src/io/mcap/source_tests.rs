@@ -292,6 +292,32 @@ fn messages_without_the_item_or_unreadable_are_counted_apart() {
 }
 
 #[test]
+fn an_item_asked_for_by_its_place_is_followed_by_its_name() {
+    let mut file = File::new(options(None));
+    file.channel(1, "/joints", "json+", ("", b""));
+    let messages = [
+        r#"{"name": ["arm", "hand"], "effort": [1, 7]}"#,
+        r#"{"name": ["hand", "arm"], "effort": [8, 2]}"#,
+        r#"{"name": ["wheel"], "effort": [9]}"#,
+        r#"{"name": ["arm", "hand"], "effort": [3, 9]}"#,
+    ];
+    for (time, text) in messages.iter().enumerate() {
+        file.message(1, time as u64, text.as_bytes());
+    }
+    let bytes = file.finish();
+    let said = |field| {
+        let (_, values, summary) = read(&bytes, "/joints", field);
+        let codes: Vec<_> = summary.warnings.iter().map(|w| w.code).collect();
+        (values, codes, summary.without_item)
+    };
+    let moved = vec!["mcap-without-item", "mcap-items-move"];
+    assert_eq!(said("effort[0]"), (vec![1.0, 2.0, 3.0], moved.clone(), 1));
+    assert_eq!(said("effort[1]"), (vec![7.0, 8.0, 9.0], moved, 1));
+    let asked = (vec![1.0, 2.0, 3.0], vec!["mcap-without-item"], 1);
+    assert_eq!(said("effort[name=arm]"), asked);
+}
+
+#[test]
 fn whole_lists_have_times_between_messages() {
     let mut file = File::new(options(None));
     file.channel(1, "/x", "json+", ("", b""));

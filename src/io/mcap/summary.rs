@@ -38,6 +38,10 @@ pub(super) struct Tally {
     unset: u64,
     unreadable: Skipped,
     last_ns: Option<i64>,
+    /// Place of the item in the first message, if it is read by its name.
+    first_place: Option<usize>,
+    /// Messages that have it at another one.
+    moved: u64,
 }
 
 /// Messages left out, and why the first of them was.
@@ -75,6 +79,14 @@ impl Tally {
         skipped.add(damage, log_time_ns);
     }
 
+    /// Looks where a message has the item, if it is read by its name.
+    pub fn place(&mut self, place: Option<usize>) {
+        if let Some(place) = place {
+            let first = *self.first_place.get_or_insert(place);
+            self.moved += u64::from(place != first);
+        }
+    }
+
     /// Counts samples that are given.
     pub fn samples(&mut self, times_ns: &[i64]) {
         self.samples += times_ns.len() as u64;
@@ -92,6 +104,14 @@ impl Tally {
         let what = format!("messages have no {field}");
         if let Some(said) = self.without_item.say(&what) {
             say("mcap-without-item", format!("{topic}: {said}"));
+        }
+        if let (Some(by_name), 1..) = (&signal.by_name, self.moved) {
+            let message = format!(
+                "{topic}: the item that {field} is in the first message has another place in {} later ones; it was followed \
+                 by its name, as {by_name} does",
+                self.moved
+            );
+            say("mcap-items-move", message);
         }
         let without_spacing = signal.blocks.without_spacing;
         if self.without_time + broken + without_spacing > 0 {

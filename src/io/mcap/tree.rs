@@ -62,6 +62,7 @@ impl TreeTargets {
                 Ok(names)
             })?;
             called = names.found;
+            reading.place = called;
         }
         collect(message, &self.value, called, &mut reading.values)?;
         if let Some([seconds, nanoseconds]) = &self.stamp {

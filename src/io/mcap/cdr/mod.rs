@@ -91,6 +91,7 @@ impl CdrDecoder {
                 Ok(std::mem::take(&mut walk.names))
             })?;
             walk.at = 0;
+            walk.reading.place = walk.names.found;
         }
         walk.follow(&plan.steps)
     }
