@@ -41,6 +41,41 @@ fn known_loads_give_the_calibration() {
     );
 }
 
+/// A zero far from nothing, as of 4 to 20 mA, changes the zero alone: readings to 1e-5 V with noise of 1e-4 V.
+#[test]
+fn a_zero_far_from_nothing_changes_no_uncertainty() {
+    let noise = [13, 3, 2, -4, -2, -9, 11, 4, -6, 0, 7];
+    let loads = [0.0, 5.0, 10.0, 5.0, 0.0, 0.0, 5.0, 10.0, 5.0, 0.0, 5.0];
+    let at_zero = |zero: f64| {
+        let folder = Folder::new();
+        let reading = |(load, noise): (&f64, &i32)| {
+            format!(
+                "{load},{:.5}\n",
+                zero + 0.16 * load + 1e-5 * f64::from(*noise)
+            )
+        };
+        let rows: String = loads.iter().zip(&noise).map(reading).collect();
+        folder.write("loads.csv", format!("torque_Nm,reading_V\n{rows}"));
+        let args = "identify static loads.csv --load torque --reading reading --json";
+        let report = folder.json(&args.split(' ').collect::<Vec<_>>());
+        let [(slope, of_slope, _), (at, of_zero, _)] =
+            ["torque_per_volt", "zero"].map(|name| parameter(&report, name));
+        [slope, of_slope.unwrap(), at - zero, of_zero.unwrap()]
+    };
+    let near = at_zero(0.0);
+    // The scatter of 7e-5 V over a spread of the loads of 12 N m, with Student's factor.
+    assert!(near[1] / near[0] < 2e-4, "{near:?}");
+    for zero in [1.0, 2.5, 12.0, 60.0] {
+        let far = at_zero(zero);
+        for (far, near) in far.iter().zip(near) {
+            assert!(
+                (far - near).abs() <= 1e-3 * near.abs() + 1e-6,
+                "{zero}: {far} is not {near}"
+            );
+        }
+    }
+}
+
 /// Three series of eleven loads up and ten down; readings 0.02 V + 0.1 V/(N m) times the load, noise so
 /// many decibels below the largest, of one size or growing with the load (and then known).
 fn points(decibel: f64, known: bool, noise: &mut Noise) -> Vec<Point> {

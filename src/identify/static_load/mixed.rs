@@ -423,10 +423,19 @@ impl Mixed {
         for i in fixed..all.ncols() {
             equations[(i, i)] += 1.0;
         }
-        let right = all.tr_mul(&readings);
         let factor = equations.cholesky()?;
-        let solution = factor.solve(&right);
-        let left = (readings.norm_squared() - right.dot(&solution)).max(0.0);
+        let mut solution = factor.solve(&all.tr_mul(&readings));
+        // What is left is summed, as a difference of sums would be that of rounding beside a large zero; so is its share in the
+        // solution, solved for once more.
+        let mut rest = &readings - &all * &solution;
+        let mut correction = all.tr_mul(&rest);
+        for i in fixed..all.ncols() {
+            correction[i] -= solution[i];
+        }
+        solution += factor.solve(&correction);
+        rest = readings - &all * &solution;
+        let random = solution.rows(fixed, all.ncols() - fixed);
+        let left = rest.norm_squared() + random.norm_squared();
         let freedom = self.freedom();
         let determinant = 2.0
             * factor

@@ -97,9 +97,9 @@ fn item(word: &str, text: &str) -> Result<PathPart, String> {
 /// A name that no item has: asked for, all names are told.
 pub const NOBODY: &str = "\0";
 
-/// A path whose first item of a list is asked for by a name instead of its place.
+/// A path whose first item of a list, or all of them, become the one of a name.
 pub fn by_name(mut parts: Vec<PathPart>, name: &str) -> Option<Vec<PathPart>> {
-    let is_place = |part: &&mut PathPart| matches!(part, PathPart::Index(_));
+    let is_place = |part: &&mut PathPart| matches!(part, PathPart::Index(_) | PathPart::All);
     *parts.iter_mut().find(is_place)? = PathPart::Called {
         key: None,
         name: name.to_owned(),

@@ -123,6 +123,9 @@ impl TopicSignal {
         let (encoding, schema) = channel.layout(message.data)?;
         let parts = field.parts()?;
         let mut route = Route::find(&schema, &parts)?;
+        if parts.is_empty() && route.is_whole_list() {
+            ask_for_item(encoding, &schema, &route, message.data)?;
+        }
         let by_name = by_name(encoding, &schema, (&route, parts), message.data);
         let by_name = by_name.map(|named| {
             let text = std::mem::replace(&mut route, named).text;
@@ -299,33 +302,77 @@ fn by_name(
     (route, parts): (&Route, Vec<PathPart>),
     message: &[u8],
 ) -> Option<Route> {
-    let mut reading = Reading::default();
-    let mut read = |value: &Route| {
-        let targets = Targets {
-            value: value.clone(),
-            stamp: None,
-            spacing: None,
-        };
-        let read = Decoder::new(encoding, schema, targets).read(message, &mut reading);
-        read.map(|()| std::mem::take(&mut reading.values))
-    };
     let place = parts.iter().find_map(|part| match part {
         PathPart::Index(place) => usize::try_from(*place).ok(),
         _ => None,
     })?;
-    let called = |name: &str| {
-        let parts = path::by_name(parts.clone(), name)?;
-        Route::find(schema, &parts).ok()
-    };
-    let Err(Damage::NoName { there, .. }) = read(&called(NOBODY)?) else {
-        return None;
-    };
+    let there = names(encoding, schema, &parts, message)?;
     let name = there.get(place).filter(|name| !name.is_empty())?;
-    let named = called(name)?;
+    let named = Route::find(schema, &path::by_name(parts, name)?).ok()?;
     let is_only = there.iter().filter(|other| *other == name).count() == 1;
-    let bits = |values: Vec<f64>| values.into_iter().map(f64::to_bits).collect::<Vec<_>>();
-    let is_same = bits(read(route).ok()?) == bits(read(&named).ok()?);
+    let bits = |route: &Route| {
+        let values = read(encoding, schema, route, message).ok()?;
+        Some(values.into_iter().map(f64::to_bits).collect::<Vec<_>>())
+    };
+    let is_same = bits(route)? == bits(&named)?;
     (is_only && is_same).then_some(named)
+}
+
+/// Asks which item of a list is meant, where the only number of a topic is a list whose items have names of their own: they
+/// are no samples of one signal.
+fn ask_for_item(
+    encoding: Encoding,
+    schema: &Arc<Schema>,
+    route: &Route,
+    message: &[u8],
+) -> Result<(), String> {
+    let parts = path::parse(&route.text).unwrap_or_default();
+    let names = names(encoding, schema, &parts, message).unwrap_or_default();
+    let field = |name: &String| {
+        let parts = path::by_name(parts.clone(), name);
+        parts.map(|parts| format!("--field '{}'", path::text(&parts)))
+    };
+    let fields: Vec<String> = names.iter().filter_map(field).collect();
+    match fields.len() {
+        0 | 1 => Ok(()),
+        count => Err(format!(
+            "\"{}\" holds {count} items with names of their own; choose one: {}",
+            route.text,
+            fields.join(", ")
+        )),
+    }
+}
+
+/// Names of the items of the list that a path goes through, in a message; `None` if they have none.
+fn names(
+    encoding: Encoding,
+    schema: &Arc<Schema>,
+    parts: &[PathPart],
+    message: &[u8],
+) -> Option<Vec<String>> {
+    let by_name = path::by_name(parts.to_vec(), NOBODY)?;
+    let route = Route::find(schema, &by_name).ok()?;
+    match read(encoding, schema, &route, message) {
+        Err(Damage::NoName { there, .. }) => Some(there),
+        _ => None,
+    }
+}
+
+/// What a message holds of a number.
+fn read(
+    encoding: Encoding,
+    schema: &Arc<Schema>,
+    route: &Route,
+    message: &[u8],
+) -> Result<Vec<f64>, Damage> {
+    let targets = Targets {
+        value: route.clone(),
+        stamp: None,
+        spacing: None,
+    };
+    let mut reading = Reading::default();
+    Decoder::new(encoding, schema, targets).read(message, &mut reading)?;
+    Ok(reading.values)
 }
 
 /// The time that counts, and why: the one asked for, or what the messages carry in a field.

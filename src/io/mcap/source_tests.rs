@@ -318,6 +318,20 @@ fn an_item_asked_for_by_its_place_is_followed_by_its_name() {
 }
 
 #[test]
+fn items_with_names_are_asked_for_instead_of_taken_for_samples() {
+    let mut file = File::new(options(None));
+    file.channel(1, "/joints", "json+", ("", b""));
+    let text = br#"{"name": ["arm", "hand"], "effort": [1, 7]}"#;
+    file.message(1, 0, text);
+    let said = open(&file.finish(), ("/joints", ""), &TimeOptions::default());
+    let said = said.err().unwrap().to_string();
+    assert!(
+        said.contains("--field 'effort[name=arm]', --field 'effort[name=hand]'"),
+        "{said}"
+    );
+}
+
+#[test]
 fn whole_lists_have_times_between_messages() {
     let mut file = File::new(options(None));
     file.channel(1, "/x", "json+", ("", b""));
