@@ -18,6 +18,7 @@ use torqcomp_model::UnitSystem;
 
 use crate::failure::Failure;
 use crate::io::digits::Digits;
+use crate::io::name;
 use crate::io::output::{Output, Policy};
 use crate::io::{ChannelChoice, Reading, frequency, positive_frequency};
 
@@ -151,7 +152,7 @@ pub struct OneChannel {
     /// Recording to read (CSV, TSV, a recorder's text export, or MCAP), or - for standard input; several, folders and
     /// patterns such as 'logs/**/*.csv' with -o FOLDER/ (--help)
     #[arg(value_name = "INPUT", required_unless_present = "files_from")]
-    pub inputs: Vec<String>,
+    pub inputs: Vec<PathBuf>,
     /// Which channel.
     #[command(flatten)]
     pub choice: ChannelChoice,
@@ -166,7 +167,7 @@ pub struct OneChannel {
 impl OneChannel {
     /// The one recording that is read.
     #[must_use]
-    pub fn input(&self) -> &str {
+    pub fn input(&self) -> &Path {
         &self.inputs[0]
     }
 }
@@ -176,7 +177,7 @@ impl OneChannel {
 pub struct OutputArgs {
     /// File to write, or - for standard output
     #[arg(short, long, value_name = "OUT")]
-    pub output: Option<String>,
+    pub output: Option<PathBuf>,
     /// Replace the output if it exists
     #[arg(long)]
     pub force: bool,
@@ -188,7 +189,7 @@ pub struct OutputArgs {
 impl OutputArgs {
     /// Opens the output; `inputs` are the files that it must not replace.
     pub(crate) fn open(&self, inputs: &[&Path]) -> Result<Output, Failure> {
-        let place = self.output.as_deref().map(Path::new);
+        let place = self.output.as_deref();
         Output::open(place, self.policy(), inputs)
     }
 
@@ -198,7 +199,7 @@ impl OutputArgs {
         place: Option<&Path>,
         taken: &[&Path],
     ) -> Result<Option<Output>, Failure> {
-        let first = self.output.as_deref().map(Path::new);
+        let first = self.output.as_deref();
         let taken: Vec<&Path> = taken.iter().copied().chain(first).collect();
         let open = |place| Output::open(Some(place), self.policy(), &taken);
         place.map(open).transpose()
@@ -212,7 +213,7 @@ impl OutputArgs {
     }
 
     pub(crate) fn is_stdout(&self) -> bool {
-        matches!(self.output.as_deref(), None | Some("-"))
+        self.output.as_deref().is_none_or(name::is_dash)
     }
 }
 
@@ -410,7 +411,7 @@ pub struct Inspect {
     /// Recordings to inspect, folders and patterns such as 'logs/**/*.csv', or - for standard input; several are compared
     /// with each other, or reported one by one with -o FOLDER/
     #[arg(value_name = "FILE", required_unless_present = "files_from")]
-    pub files: Vec<String>,
+    pub files: Vec<PathBuf>,
     /// The result.
     #[command(flatten)]
     pub result: OutputArgs,

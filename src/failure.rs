@@ -6,6 +6,7 @@ use std::fmt;
 use std::io;
 use std::path::Path;
 
+use crate::io::name::ShowPath;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -158,7 +159,7 @@ impl Failure {
             }
             _ => (ErrorCode::CannotRead, ""),
         };
-        Self::failed(code, format_args!("cannot be read: {error}{hint}")).at(path.display())
+        Self::failed(code, format_args!("cannot be read: {error}{hint}")).at(path.shown())
     }
 
     /// The exit code.

@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use crate::failure::{ErrorReport, Failure};
 use crate::io::json_lines::JsonLines;
+use crate::io::name::ShowPath;
 use crate::io::output;
 use crate::print;
 use crate::recording::moment::utc;
@@ -118,12 +119,10 @@ pub(crate) fn begin(path: &Path) -> Result<(), Failure> {
     output::keep_free(path);
     let words = std::env::args_os();
     new.append([LogEvent::Start {
-        command: words
-            .map(|word| word.to_string_lossy().into_owned())
-            .collect(),
+        command: words.map(|word| word.shown().to_string()).collect(),
         folder: std::env::current_dir()
             .ok()
-            .map(|path| path.display().to_string()),
+            .map(|path| path.shown().to_string()),
     }]);
     match new.broken.take() {
         Some(failure) => Err(failure),

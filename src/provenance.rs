@@ -1,10 +1,12 @@
 //! Where a page comes from: date, command line, version, the files read with their SHA-256, and the stand file.
 
 use std::io;
+use std::path::PathBuf;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use crate::chart::Page;
 use crate::failure::{ErrorCode, Failure};
+use crate::io::name::ShowPath;
 use crate::io::{Input, sum};
 use crate::recording::moment::utc;
 
@@ -27,14 +29,14 @@ impl Provenance {
     ///
     /// # Errors
     /// If one of them cannot be read, or `SOURCE_DATE_EPOCH` is set and no time.
-    pub(crate) fn of(inputs: &[String], stand: Option<(&str, &str)>) -> Result<Self, Failure> {
+    pub(crate) fn of(inputs: &[PathBuf], stand: Option<(&str, &str)>) -> Result<Self, Failure> {
         let each = inputs.iter().map(|input| {
             let input = Input::of(input);
             Ok([input.name(), hash(&input)?])
         });
         Ok(Self {
             date: date()?,
-            command: command(std::env::args_os().map(|word| word.to_string_lossy().into_owned())),
+            command: command(std::env::args_os().map(|word| word.shown().to_string())),
             inputs: each.collect::<Result<_, Failure>>()?,
             stand: stand.map(|(name, text)| {
                 [

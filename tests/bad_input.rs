@@ -472,22 +472,3 @@ fn a_record_cut_in_its_last_line_is_used_up_to_there() {
     ran.says(3, &["unended-last-line", "line 3001"]);
     assert_eq!(folder.read("out.csv").lines().count(), 3001);
 }
-
-/// A name that is not UTF-8 is named, and its file can be read through a pipe.
-#[cfg(unix)]
-#[test]
-fn a_name_that_is_no_utf8_is_named() {
-    use std::os::unix::ffi::OsStrExt;
-    let folder = Folder::new();
-    let name = std::ffi::OsStr::from_bytes(b"caf\xe9.csv");
-    let output = crate::util::command(&folder.path("."), &["inspect"])
-        .arg(name)
-        .output()
-        .expect("the binary runs");
-    assert_eq!(output.status.code(), Some(2));
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(
-        said.contains("caf\\xE9.csv") && said.contains("UTF-8"),
-        "{said}"
-    );
-}

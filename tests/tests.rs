@@ -30,6 +30,8 @@ mod merge;
 mod messages;
 mod modes;
 mod mutations;
+#[cfg(all(unix, not(target_os = "macos")))] // file systems of macOS refuse other names
+mod names;
 mod noise;
 mod once;
 mod output;

@@ -6,6 +6,7 @@ use std::path::Path;
 use super::manifest::{ManifestEntry, ManifestLine, RunBegin};
 use crate::cli::many::{self, Shard};
 use crate::failure::Failure;
+use crate::io::name::ShowPath;
 use crate::io::storage;
 
 /// What became of the recordings of a manifest's last run.
@@ -43,7 +44,7 @@ impl LastRun {
         for line in bytes.split(|byte| *byte == b'\n') {
             lines.take(line);
         }
-        Ok(lines.run(path.display().to_string()))
+        Ok(lines.run(path.shown().to_string()))
     }
 
     /// What identifies it to people: its part, or that it has none.

@@ -1,18 +1,20 @@
 //! The recordings that are meant: paths, folders, patterns and lists of paths.
 
 use std::collections::HashSet;
-use std::io::Read;
+use std::ffi::{OsStr, OsString};
+use std::io::{self, ErrorKind, Read};
 use std::path::{Component, Path, PathBuf};
 
 use super::content;
 use crate::failure::{ErrorCode, Failure};
 use crate::io::Input;
+use crate::io::name::{self, ShowPath, is_dash};
 
 /// A recording to read.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct FoundFile {
     /// Its path as given, or below the folder as given.
-    pub(super) path: String,
+    pub(super) path: PathBuf,
     /// Its path below its root, the folders separated by `/`: the same in its results.
     pub(super) relative: String,
     /// Why it cannot be read, if that is known already.
@@ -31,12 +33,61 @@ pub(super) struct Listing {
 const PATTERN: [char; 3] = ['*', '?', '['];
 
 /// Whether a path names a folder, or files by a pattern.
-pub(super) fn is_several(input: &str) -> bool {
-    input != "-" && (Path::new(input).is_dir() || is_pattern(input))
+pub(super) fn is_several(input: &Path) -> bool {
+    !is_dash(input) && (input.is_dir() || is_pattern(input))
 }
 
-fn is_pattern(input: &str) -> bool {
-    input.contains(PATTERN) && std::fs::symlink_metadata(input).is_err()
+fn is_pattern(input: &Path) -> bool {
+    input.shown().to_string().contains(PATTERN) && std::fs::symlink_metadata(input).is_err()
+}
+
+/// How names match a pattern.
+const OPTIONS: glob::MatchOptions = glob::MatchOptions {
+    case_sensitive: true,
+    require_literal_separator: true,
+    require_literal_leading_dot: true,
+};
+
+/// A part of a pattern, between separators.
+enum PatternPart<'a> {
+    /// A name, a root, `.` or `..`.
+    Fixed(&'a OsStr),
+    /// `**`: any number of folders.
+    AnyFolders,
+    /// Names that match.
+    Names(glob::Pattern),
+}
+
+impl<'a> PatternPart<'a> {
+    fn of(part: Component<'a>) -> Result<Self, glob::PatternError> {
+        let text = part.as_os_str().to_string_lossy();
+        Ok(match text.as_ref() {
+            "**" => Self::AnyFolders,
+            text if text.contains(PATTERN) => Self::Names(glob::Pattern::new(text)?),
+            _ => Self::Fixed(part.as_os_str()),
+        })
+    }
+}
+
+/// The names in a folder, sorted.
+fn names_in(folder: &Path) -> io::Result<Vec<OsString>> {
+    let folder = match folder.as_os_str().is_empty() {
+        true => Path::new("."),
+        false => folder,
+    };
+    let entries = std::fs::read_dir(folder)?.flatten();
+    let mut names: Vec<OsString> = entries.map(|entry| entry.file_name()).collect();
+    names.sort();
+    Ok(names)
+}
+
+fn is_hidden(name: &OsStr) -> bool {
+    name.as_encoded_bytes().starts_with(b".")
+}
+
+/// Whether recordings are looked for in a folder. Links to folders are not followed.
+fn is_folder_to_enter(name: &OsStr, path: &Path) -> bool {
+    !is_hidden(name) && path.is_dir() && !path.is_symlink()
 }
 
 impl Listing {
@@ -47,28 +98,27 @@ impl Listing {
     /// If nothing is meant by it.
     pub(super) fn add(
         &mut self,
-        input: &str,
+        input: &Path,
         is_ours: &dyn Fn(&Path) -> bool,
     ) -> Result<(), Failure> {
-        if input == "-" {
+        if is_dash(input) {
             return Err(Failure::usage(
                 ErrorCode::MissingArgument,
                 "standard input is one recording and has no name; name files, or give --files-from - for a list of \
                  paths",
             ));
         }
-        let path = Path::new(input);
-        if path.is_dir() {
+        if input.is_dir() {
             let before = self.files.len();
-            self.add_folder(path, is_ours);
+            self.add_folder(input, is_ours);
             if self.files.len() == before {
                 return Err(self.nothing_in(input));
             }
         } else if is_pattern(input) {
             self.add_pattern(input)?;
         } else {
-            let name = path.file_name().map(|name| name.to_string_lossy());
-            self.push(input, name.unwrap_or_default().into_owned());
+            let name = input.file_name().unwrap_or_default();
+            self.push(input, name.shown().to_string());
         }
         Ok(())
     }
@@ -77,7 +127,7 @@ impl Listing {
     ///
     /// # Errors
     /// If the list cannot be read.
-    pub(super) fn add_listed(&mut self, list: &str, by_zero: bool) -> Result<(), Failure> {
+    pub(super) fn add_listed(&mut self, list: &Path, by_zero: bool) -> Result<(), Failure> {
         let input = Input::of(list);
         let mut bytes = Vec::new();
         let read = input.open()?.read_to_end(&mut bytes);
@@ -88,22 +138,17 @@ impl Listing {
                 true => line,
                 false => line.strip_suffix(b"\r").unwrap_or(line),
             };
-            let path = std::str::from_utf8(line).map_err(|_| {
+            if line.is_empty() {
+                continue;
+            }
+            let path = name::path_of_bytes(line).ok_or_else(|| {
                 Failure::failed(
                     ErrorCode::CannotRead,
                     format_args!("path {} is not UTF-8; rename the file", i + 1),
                 )
                 .at(input.name())
             })?;
-            if path.is_empty() {
-                continue;
-            }
-            let parts = Path::new(path).components().filter_map(|part| match part {
-                Component::Normal(name) => Some(name.to_string_lossy()),
-                _ => None,
-            });
-            let relative = parts.collect::<Vec<_>>().join("/");
-            self.push(path, relative);
+            self.push(&path, name::with_slashes(&path));
         }
         Ok(())
     }
@@ -116,7 +161,7 @@ impl Listing {
         self
     }
 
-    fn push(&mut self, path: &str, relative: String) {
+    fn push(&mut self, path: &Path, relative: String) {
         self.files.push(FoundFile {
             path: path.to_owned(),
             relative,
@@ -124,7 +169,7 @@ impl Listing {
         });
     }
 
-    fn nothing_in(&self, folder: &str) -> Failure {
+    fn nothing_in(&self, folder: &Path) -> Failure {
         let rest = match self.left_out.len() {
             0 => "it has no files except hidden ones and results".to_owned(),
             count => format!(
@@ -135,44 +180,74 @@ impl Listing {
             ErrorCode::NotFound,
             format_args!("no recordings found: {rest}; check the path"),
         )
-        .at(folder)
+        .at(folder.shown())
     }
 
     /// Adds the files that a pattern matches; hidden ones only if it names their point.
-    fn add_pattern(&mut self, pattern: &str) -> Result<(), Failure> {
-        let options = glob::MatchOptions {
-            case_sensitive: true,
-            require_literal_separator: true,
-            require_literal_leading_dot: true,
-        };
-        let matches = glob::glob_with(pattern, options).map_err(|error| {
-            Failure::usage(ErrorCode::InvalidValue, format_args!("no pattern: {error}")).at(pattern)
+    fn add_pattern(&mut self, pattern: &Path) -> Result<(), Failure> {
+        let parts: Result<Vec<_>, _> = pattern.components().map(PatternPart::of).collect();
+        let parts = parts.map_err(|error| {
+            Failure::usage(ErrorCode::InvalidValue, format_args!("no pattern: {error}"))
+                .at(pattern.shown())
         })?;
-        let is_fixed = |part: &Component| !part.as_os_str().to_string_lossy().contains(PATTERN);
-        let root: PathBuf = Path::new(pattern)
-            .components()
-            .take_while(is_fixed)
-            .collect();
+        let is_fixed = |part: &PatternPart| matches!(part, PatternPart::Fixed(_));
+        let fixed = parts.iter().take_while(|part| is_fixed(part)).count();
+        let root: PathBuf = pattern.components().take(fixed).collect();
         let before = self.files.len();
-        for found in matches {
-            match found {
-                Ok(path) if path.is_dir() => {}
-                Ok(path) => self.add_below(&root, &path),
-                Err(error) => {
-                    self.add_problem(error.path(), Failure::reading(error.path(), error.error()))
-                }
-            }
-        }
+        self.add_matching(&root, &root, &parts[fixed..]);
         match self.files.len() == before {
             true => Err(
                 Failure::failed(ErrorCode::NotFound, "matches no file; check the pattern")
-                    .at(pattern),
+                    .at(pattern.shown()),
             ),
             false => Ok(()),
         }
     }
 
-    /// Adds the recordings in a folder and those in it. Links to folders are not followed.
+    /// Adds the files in a folder that the rest of a pattern matches.
+    fn add_matching(&mut self, root: &Path, folder: &Path, parts: &[PatternPart]) {
+        let Some((part, rest)) = parts.split_first() else {
+            if !folder.is_dir() {
+                self.add_below(root, folder);
+            }
+            return;
+        };
+        if let PatternPart::Fixed(name) = part {
+            let path = folder.join(name);
+            if path.symlink_metadata().is_ok() {
+                self.add_matching(root, &path, rest);
+            }
+            return;
+        }
+        if matches!(part, PatternPart::AnyFolders) {
+            self.add_matching(root, folder, rest);
+        }
+        let names = match names_in(folder) {
+            Ok(names) => names,
+            // Of a folder that does not exist, nothing matches.
+            Err(error) if error.kind() == ErrorKind::NotFound => return,
+            Err(error) => return self.add_problem(folder, Failure::reading(folder, &error)),
+        };
+        for name in names {
+            let path = folder.join(&name);
+            let is_last = rest.is_empty();
+            match part {
+                PatternPart::Names(pattern)
+                    if pattern.matches_with(&name.to_string_lossy(), OPTIONS) =>
+                {
+                    if is_last || path.is_dir() {
+                        self.add_matching(root, &path, rest);
+                    }
+                }
+                PatternPart::AnyFolders if is_folder_to_enter(&name, &path) => {
+                    self.add_matching(root, &path, parts);
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// Adds the recordings in a folder and those in it.
     fn add_folder(&mut self, root: &Path, is_ours: &dyn Fn(&Path) -> bool) {
         let mut files = Vec::new();
         let real = root.canonicalize().unwrap_or_else(|_| root.to_owned());
@@ -187,7 +262,7 @@ impl Listing {
         for file in &files {
             match endings.contains(&ending(file)) {
                 true => self.add_below(root, file),
-                false => self.left_out.push(file.display().to_string()),
+                false => self.left_out.push(file.shown().to_string()),
             }
         }
     }
@@ -199,27 +274,18 @@ impl Listing {
         is_ours: &dyn Fn(&Path) -> bool,
         files: &mut Vec<PathBuf>,
     ) {
-        let entries = match std::fs::read_dir(folder) {
-            Ok(entries) => entries.flatten(),
-            Err(error) => {
-                self.add_problem(folder, Failure::reading(folder, &error));
-                return;
-            }
+        let names = match names_in(folder) {
+            Ok(names) => names,
+            Err(error) => return self.add_problem(folder, Failure::reading(folder, &error)),
         };
-        let mut names: Vec<_> = entries.map(|entry| entry.file_name()).collect();
-        names.sort();
         for name in names {
             let (path, real) = (folder.join(&name), real.join(&name));
-            let is_hidden = name.as_encoded_bytes().starts_with(b".");
-            if is_hidden || is_ours(&real) {
+            if is_hidden(&name) || is_ours(&real) {
                 continue;
             }
-            let is_link = path.is_symlink();
-            if path.is_dir() {
-                if !is_link {
-                    self.walk(&path, &real, is_ours, files);
-                }
-            } else {
+            if is_folder_to_enter(&name, &path) {
+                self.walk(&path, &real, is_ours, files);
+            } else if !path.is_dir() {
                 files.push(path);
             }
         }
@@ -228,25 +294,13 @@ impl Listing {
     /// Adds a file by its path below a root.
     fn add_below(&mut self, root: &Path, path: &Path) {
         let below = path.strip_prefix(root).unwrap_or(path);
-        let parts: Option<Vec<&str>> = below.iter().map(|part| part.to_str()).collect();
-        match (path.to_str(), parts) {
-            (Some(text), Some(parts)) => self.push(text, parts.join("/")),
-            _ => self.add_problem(
-                path,
-                Failure::failed(
-                    ErrorCode::CannotRead,
-                    "the name is not UTF-8; rename the file",
-                )
-                .at(path.display()),
-            ),
-        }
+        self.push(path, name::with_slashes(below));
     }
 
     fn add_problem(&mut self, path: &Path, problem: Failure) {
-        let path = path.display().to_string();
         self.files.push(FoundFile {
-            relative: path.clone(),
-            path,
+            relative: path.shown().to_string(),
+            path: path.to_owned(),
             problem: Some(problem),
         });
     }
@@ -280,21 +334,21 @@ mod tests {
         let ours = root.canonicalize().unwrap().join("ours.csv");
         let mut listing = Listing::default();
         let text = root.to_str().unwrap();
-        listing.add(text, &|path| path == ours).unwrap();
+        listing.add(root, &|path| path == ours).unwrap();
         assert_eq!(found(&listing), ["a b/broken.csv", "a b/ü/y.csv", "x.csv"]);
         assert_eq!(listing.left_out, [format!("{text}/a b/README.md")]);
 
         let mut listing = Listing::default();
         let pattern = format!("{text}/**/[x-y].c?v");
-        listing.add(&pattern, &|_| false).unwrap();
+        listing.add(Path::new(&pattern), &|_| false).unwrap();
         assert_eq!(found(&listing), ["a b/ü/y.csv", "x.csv"]);
-        let none = listing.add(&format!("{text}/*.dat"), &|_| false);
+        let none = listing.add(&root.join("*.dat"), &|_| false);
         assert!(none.unwrap_err().to_string().contains("matches no file"));
 
         let list = root.join("list");
         std::fs::write(&list, "runs/a b.csv\0./../c\nd.csv\0\0").unwrap();
         let mut listing = Listing::default();
-        listing.add_listed(list.to_str().unwrap(), true).unwrap();
+        listing.add_listed(&list, true).unwrap();
         assert_eq!(found(&listing), ["runs/a b.csv", "c\nd.csv"]);
     }
 }

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::cli::many::Shard;
 use crate::failure::Failure;
 use crate::io::json_lines::JsonLines;
+use crate::io::name::{self, ShowPath};
 use crate::io::{storage, sum};
 use crate::outcome::RecordFigures;
 use crate::warning::Warning;
@@ -173,11 +174,11 @@ impl MadeFrom {
     ///
     /// # Errors
     /// If one of them cannot be read.
-    pub(super) fn read(input: &str, stand: Option<&Path>) -> Result<Self, Failure> {
+    pub(super) fn read(input: &Path, stand: Option<&Path>) -> Result<Self, Failure> {
         let sum = |path: &Path| sum::of_file(path).map_err(|error| Failure::reading(path, &error));
         Ok(Self {
-            input_sha256: Some(sum(Path::new(input))?),
-            stand: stand.map(|path| path.display().to_string()),
+            input_sha256: Some(sum(input)?),
+            stand: stand.map(|path| path.shown().to_string()),
             stand_sha256: stand.map(sum).transpose()?,
         })
     }
@@ -341,7 +342,7 @@ impl History {
             && entry.made_from.is_same(&wanted.made_from)
             && entry.outputs.len() == outputs.len();
         let is_there = |output: &OutputSum| {
-            let sum = sum::of_file(&folder.join(&output.file));
+            let sum = sum::of_file(&folder.join(name::path_of(&output.file)));
             outputs.contains(&output.file) && sum.is_ok_and(|sum| sum == output.sha256)
         };
         (is_same && entry.outputs.iter().all(is_there)).then_some(entry)

@@ -12,6 +12,7 @@ use super::manifest::{MadeFrom, ManifestEntry};
 use super::summary;
 use crate::cli::many::Shard;
 use crate::failure::{ErrorCode, Failure};
+use crate::io::name::ShowPath;
 use crate::outcome::Outcome;
 use crate::print::{Report, plural};
 
@@ -69,7 +70,7 @@ impl Merged {
         for path in paths {
             match LastRun::read(path)? {
                 Some(run) => runs.push(run),
-                None => problems.push(no_run(path.display().to_string())),
+                None => problems.push(no_run(path.shown().to_string())),
             }
         }
         for run in &runs {
@@ -80,7 +81,7 @@ impl Merged {
             problems.extend(other_stands(&runs));
             problems.extend(missing_parts(&runs));
         }
-        let manifests = paths.iter().map(|path| path.display().to_string());
+        let manifests = paths.iter().map(|path| path.shown().to_string());
         let verb = runs.first().map(|run| run.begin.made_by.verb.clone());
         let joined = Joined::of(runs);
         problems.extend(joined.problems);

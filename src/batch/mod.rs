@@ -33,6 +33,7 @@ use self::summary::{BatchResult, Treated};
 use crate::cli::{BatchOptions, OutputArgs};
 use crate::failure::{ErrorCode, Failure};
 use crate::io::json_lines::JsonLines;
+use crate::io::name::{self, ShowPath};
 use crate::io::output::{self, Output, end_of_links};
 use crate::outcome::{Made, Outcome};
 use crate::progress::{Amount, Progress, Task};
@@ -41,7 +42,7 @@ use crate::{log, parallel, print};
 /// What a verb is asked to do with many recordings.
 pub(crate) struct BatchTask<'a> {
     pub(crate) verb: &'static str,
-    pub(crate) inputs: &'a [String],
+    pub(crate) inputs: &'a [PathBuf],
     pub(crate) many: &'a BatchOptions,
     pub(crate) result: &'a OutputArgs,
     /// Template of the names of its results, unless another is asked for.
@@ -57,7 +58,7 @@ pub(crate) struct BatchTask<'a> {
 
 /// What a verb is to do with one of them.
 pub(crate) struct OneRun<'a> {
-    pub(crate) input: &'a str,
+    pub(crate) input: &'a Path,
     /// The result, then those beside it.
     pub(crate) outputs: &'a [PathBuf],
     /// Whether these are replaced if they are there.
@@ -70,15 +71,15 @@ pub(crate) struct OneRun<'a> {
 type OnOne<'a> = dyn Fn(&OneRun) -> Result<Made, Failure> + Sync + 'a;
 
 /// Whether these arguments ask for many recordings, each by itself.
-pub(crate) fn is_asked(inputs: &[String], many: &BatchOptions, result: &OutputArgs) -> bool {
-    let output = result.output.as_deref().unwrap_or_default();
+pub(crate) fn is_asked(inputs: &[PathBuf], many: &BatchOptions, result: &OutputArgs) -> bool {
+    let output = result.output.as_deref();
     many.is_asked()
-        || output.ends_with(std::path::is_separator)
-        || (Path::new(output).is_dir() && is_several(inputs))
+        || output.is_some_and(name::ends_with_separator)
+        || (output.is_some_and(Path::is_dir) && is_several(inputs))
 }
 
 /// Whether these are several recordings, or may be.
-pub(crate) fn is_several(inputs: &[String]) -> bool {
+pub(crate) fn is_several(inputs: &[PathBuf]) -> bool {
     inputs.len() > 1 || inputs.iter().any(|input| list::is_several(input))
 }
 
@@ -86,7 +87,7 @@ pub(crate) fn is_several(inputs: &[String]) -> bool {
 ///
 /// # Errors
 /// If one of them means none.
-pub(crate) fn expand(inputs: &[String]) -> Result<Vec<String>, Failure> {
+pub(crate) fn expand(inputs: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     let mut paths = Vec::new();
     for input in inputs {
         if list::is_several(input) {
@@ -104,22 +105,20 @@ pub(crate) fn expand(inputs: &[String]) -> Result<Vec<String>, Failure> {
 ///
 /// # Errors
 /// If a folder or pattern has none.
-pub(crate) fn manifests(paths: &[String]) -> Result<Vec<PathBuf>, Failure> {
+pub(crate) fn manifests(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     let mut found = Vec::new();
-    for text in paths {
-        let path = PathBuf::from(text);
+    for path in paths {
         if !path.is_dir() {
-            let matching = expand(std::slice::from_ref(text))?;
-            found.extend(matching.into_iter().map(PathBuf::from));
+            found.extend(expand(std::slice::from_ref(path))?);
             continue;
         }
-        let inside = manifest::in_folder(&path);
+        let inside = manifest::in_folder(path);
         if inside.is_empty() {
             return Err(Failure::failed(
                 ErrorCode::NotFound,
                 "no manifest in this folder; name the manifests, or the folder of the results",
             )
-            .at(path.display()));
+            .at(path.shown()));
         }
         found.extend(inside);
     }
@@ -178,9 +177,13 @@ pub(crate) fn run(
 /// What would be done, a line for each recording.
 fn dry_run(plan: &BatchPlan) -> String {
     let line = |file: &BatchFile| {
-        let outputs: Vec<String> = file.outputs.iter().map(|o| plan.path(o)).collect();
-        let to = outputs.join(", ");
-        format!("{}: {} -> {to}\n", plan.intent(file), file.found.path)
+        let outputs: Vec<PathBuf> = file.outputs.iter().map(|o| plan.result(o)).collect();
+        let to = name::list(&outputs);
+        format!(
+            "{}: {} -> {to}\n",
+            plan.intent(file),
+            file.found.path.shown()
+        )
     };
     plan.files.iter().map(line).collect()
 }
@@ -253,7 +256,7 @@ impl Running<'_> {
         let treated = match self.make(file, &mut entry, begun) {
             Ok(treated) => treated,
             Err(failure) => {
-                log::failure(&failure.clone().at(&file.found.path));
+                log::failure(&failure.clone().at(file.found.path.shown()));
                 entry.outputs.clear();
                 entry.exit = failure.exit_code().max(1);
                 entry.error = Some(failure.to_string());
@@ -289,7 +292,7 @@ impl Running<'_> {
             }
             return Ok(Treated::Skipped(standing.clone()));
         }
-        let outputs: Vec<PathBuf> = file.outputs.iter().map(|o| plan.folder.join(o)).collect();
+        let outputs: Vec<PathBuf> = file.outputs.iter().map(|o| plan.result(o)).collect();
         outputs
             .iter()
             .filter_map(|path| path.parent())
@@ -302,7 +305,7 @@ impl Running<'_> {
         };
         let made = catch_unwind(AssertUnwindSafe(|| (self.on_one)(&one)));
         let made = made.unwrap_or_else(|_| Err(internal_error(one.input)))?;
-        log::warnings(Some(one.input), &made.warnings);
+        log::warnings(Some(&entry.input), &made.warnings);
         entry.exit = made.outcome.exit_code();
         entry.warnings = made.warnings.iter().map(NotedWarning::of).collect();
         entry.figures = made.figures.clone();
@@ -329,13 +332,11 @@ impl Running<'_> {
 /// The results with their sums, by their paths below the folder.
 fn sums(outputs: &[Output], folder: &Path) -> Result<Vec<OutputSum>, Failure> {
     let each = outputs.iter().map(|output| {
-        let unreadable = |error| Failure::reading(Path::new(output.name()), &error);
-        let below = Path::new(output.name()).strip_prefix(folder);
-        let parts = below.unwrap_or(Path::new(output.name())).iter();
-        let parts: Vec<_> = parts.map(|part| part.to_string_lossy()).collect();
+        let unreadable = |error| Failure::reading(output.place(), &error);
+        let below = output.place().strip_prefix(folder);
         let sum = output.sum().map_err(unreadable)?;
         Ok(sum.map(|sha256| OutputSum {
-            file: parts.join("/"),
+            file: name::with_slashes(below.unwrap_or(output.place())),
             sha256,
         }))
     });
@@ -343,10 +344,10 @@ fn sums(outputs: &[Output], folder: &Path) -> Result<Vec<OutputSum>, Failure> {
     Ok(known.into_iter().flatten().collect())
 }
 
-fn internal_error(input: &str) -> Failure {
+fn internal_error(input: &Path) -> Failure {
     Failure::failed(
         ErrorCode::InternalError,
         "internal error, as said above; please report it with this recording",
     )
-    .at(input)
+    .at(input.shown())
 }

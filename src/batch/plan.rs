@@ -7,6 +7,7 @@ use super::BatchTask;
 use super::list::{FoundFile, Listing};
 use super::manifest::{self, History, MadeBy, MadeFrom, ManifestEntry, RunBegin, WholeList};
 use crate::failure::{ErrorCode, Failure};
+use crate::io::name::{self, ShowPath, is_dash};
 use crate::io::output::end_of_links;
 use crate::parallel::cores;
 
@@ -84,7 +85,7 @@ impl<'a> BatchPlan<'a> {
     /// The recordings that are meant.
     fn list(&self) -> Result<Listing, Failure> {
         let task = self.task;
-        let results = self.history.results().map(|name| self.folder.join(name));
+        let results = self.history.results().map(|name| self.result(name));
         let single = [
             Some(self.manifest.as_path()),
             task.many.summary.as_deref(),
@@ -112,13 +113,12 @@ impl<'a> BatchPlan<'a> {
         let task = self.task;
         let name = task.many.name.as_deref().unwrap_or(task.name);
         let beside = task.beside.iter().map(|(option, path)| {
-            let text = path.to_str().unwrap_or_default();
-            crate::cli::many::template(text).map_err(|expected| {
+            crate::cli::many::template(&path.shown().to_string()).map_err(|expected| {
                 Failure::usage(
                     ErrorCode::ConflictingArguments,
                     format_args!(
                         "{option} {}: of many recordings each has its own, in the folder of -o: {expected}",
-                        path.display()
+                        path.shown()
                     ),
                 )
             })
@@ -134,17 +134,10 @@ impl<'a> BatchPlan<'a> {
 
     /// Refuses two recordings with the same result, and a result in the place of a recording.
     fn check_names(&self) -> Result<(), Failure> {
-        let mut owners: HashMap<&str, &str> = HashMap::new();
-        let inputs: HashMap<PathBuf, &str> = self
-            .files
-            .iter()
-            .map(|file| {
-                (
-                    end_of_links(Path::new(&file.found.path)),
-                    file.found.path.as_str(),
-                )
-            })
-            .collect();
+        let mut owners: HashMap<&str, &Path> = HashMap::new();
+        let path = |file: &'_ BatchFile| file.found.path.clone();
+        let real = |file| (end_of_links(&path(file)), path(file));
+        let inputs: HashMap<PathBuf, PathBuf> = self.files.iter().map(real).collect();
         for file in &self.files {
             for output in &file.outputs {
                 let path = &file.found.path;
@@ -152,17 +145,21 @@ impl<'a> BatchPlan<'a> {
                     return Err(Failure::usage(
                         ErrorCode::ConflictingArguments,
                         format_args!(
-                            "{other} and {path} would both become {output}; give --name '{{name}}…' if they differ \
-                             in their endings, or one folder that holds both, so that its tree is kept"
+                            "{} and {} would both become {output}; give --name '{{name}}…' if they differ \
+                             in their endings, or one folder that holds both, so that its tree is kept",
+                            other.shown(),
+                            path.shown()
                         ),
                     ));
                 }
-                if let Some(input) = inputs.get(&end_of_links(&self.folder.join(output))) {
+                if let Some(input) = inputs.get(&end_of_links(&self.result(output))) {
                     return Err(Failure::usage(
                         ErrorCode::ConflictingArguments,
                         format_args!(
-                            "the result of {path} would take the place of the recording {input}; give another \
-                             --name, or another folder with -o"
+                            "the result of {} would take the place of the recording {}; give another \
+                             --name, or another folder with -o",
+                            path.shown(),
+                            input.shown()
                         ),
                     ));
                 }
@@ -186,7 +183,7 @@ impl<'a> BatchPlan<'a> {
     /// What is known of a recording beforehand.
     pub(super) fn entry(&self, file: &BatchFile) -> ManifestEntry {
         let FoundFile { path, relative, .. } = &file.found;
-        ManifestEntry::new(self.made_by.clone(), relative, path)
+        ManifestEntry::new(self.made_by.clone(), relative, &path.shown().to_string())
     }
 
     /// The entry of results that need not be made again, if such are asked for.
@@ -201,16 +198,16 @@ impl<'a> BatchPlan<'a> {
 
     /// Whether results that are there are replaced: with `--force`, or if they came from this recording by a run before.
     pub(super) fn may_replace(&self, file: &BatchFile) -> bool {
-        let is_known = |output: &String| {
-            self.history.made(output, &file.found.path) || !self.folder.join(output).exists()
-        };
+        let input = file.found.path.shown().to_string();
+        let is_known =
+            |output: &String| self.history.made(output, &input) || !self.result(output).exists();
         let is_ours = self.task.many.skip_existing && file.outputs.iter().all(is_known);
         self.task.result.force || is_ours
     }
 
-    /// The path of a result, for people.
-    pub(super) fn path(&self, output: &str) -> String {
-        self.folder.join(output).display().to_string()
+    /// The path of a result.
+    pub(super) fn result(&self, output: &str) -> PathBuf {
+        self.folder.join(name::path_of(output))
     }
 
     /// What will be done with a recording, in a word.
@@ -224,7 +221,7 @@ impl<'a> BatchPlan<'a> {
             return "fail (unreadable)";
         };
         wanted.made_from = made_from;
-        let exists = |output: &String| self.folder.join(output).exists();
+        let exists = |output: &String| self.result(output).exists();
         if self.standing(file, &wanted).is_some() {
             "skip"
         } else if !file.outputs.iter().any(exists) {
@@ -253,18 +250,17 @@ impl<'a> BatchPlan<'a> {
 
 /// The folder of the results.
 fn folder(task: &BatchTask) -> Result<PathBuf, Failure> {
-    let Some(text) = task.result.output.as_deref().filter(|text| *text != "-") else {
+    let Some(path) = task.result.output.as_deref().filter(|path| !is_dash(path)) else {
         return Err(Failure::usage(ErrorCode::MissingArgument, NEED_FOLDER));
     };
-    let path = Path::new(text);
     let is_file = match std::fs::metadata(path) {
         Ok(meta) => !meta.is_dir(),
-        Err(_) => !text.ends_with(std::path::is_separator) && path.extension().is_some(),
+        Err(_) => !name::ends_with_separator(path) && path.extension().is_some(),
     };
     match is_file {
         true => Err(Failure::usage(
             ErrorCode::MissingArgument,
-            format_args!("{NEED_FOLDER} ({text} names a file)"),
+            format_args!("{NEED_FOLDER} ({} names a file)", path.shown()),
         )),
         false => Ok(path.to_owned()),
     }

@@ -10,6 +10,7 @@ use serde::Serialize;
 use super::manifest::{ManifestEntry, NotedWarning};
 use super::plan::BatchPlan;
 use crate::failure::{ErrorCode, Failure};
+use crate::io::name::ShowPath;
 use crate::io::output::{self, Output};
 use crate::io::storage::Stored;
 use crate::outcome::Outcome;
@@ -167,8 +168,8 @@ impl BatchResult<'_> {
             (self.skipped(), failed(self.entries()), self.not_begun());
         BatchReport {
             verb: self.plan.task.verb,
-            output: self.plan.folder.display().to_string(),
-            manifest: self.plan.manifest.display().to_string(),
+            output: self.plan.folder.shown().to_string(),
+            manifest: self.plan.manifest.shown().to_string(),
             recordings: count,
             made: count - skipped - failed - not_begun,
             skipped,
@@ -190,7 +191,7 @@ impl BatchResult<'_> {
         rows.extend(self.treated.iter().flatten().map(row));
         let mut text = print::columns(&rows);
         text += &self.totals();
-        text += &warnings(self.entries(), &self.plan.manifest.display().to_string());
+        text += &warnings(self.entries(), &self.plan.manifest.shown().to_string());
         let left_out = &self.plan.left_out;
         if !left_out.is_empty() {
             let names = some_of(left_out, left_out.len());

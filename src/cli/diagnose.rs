@@ -16,10 +16,10 @@ pub struct Diagnose {
     pub stand: Option<PathBuf>,
     /// Record to fit; may be given several times
     #[arg(long, value_name = "FILE", required = true)]
-    pub train: Vec<String>,
+    pub train: Vec<PathBuf>,
     /// Hold-out record; may be given several times [default: the last 30 % of each training record]
     #[arg(long, value_name = "FILE")]
-    pub holdout: Vec<String>,
+    pub holdout: Vec<PathBuf>,
     /// Channel with the applied quantity: its number as inspect gives it, heading or name; of an MCAP file topic and
     /// field, as '/joint_states.effort[name=motor]', or the field of --topic
     #[arg(long, value_name = "COL")]
@@ -38,7 +38,7 @@ pub struct Diagnose {
     pub reading: Reading,
     /// Write an HTML report with charts of records, models and residuals
     #[arg(long, value_name = "FILE")]
-    pub html: Option<String>,
+    pub html: Option<PathBuf>,
     /// List all candidates in the text, not the best five
     #[arg(long)]
     pub all: bool,

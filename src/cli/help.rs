@@ -4,6 +4,7 @@ use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Command, CommandFactory, FromArgMatches};
 
 use super::Cli;
+use crate::io::name::ShowPath;
 
 /// Headings of the help, with the options below each.
 const GROUPS: [(&str, &[&str]); 7] = [
@@ -365,7 +366,7 @@ fn options(command: &Command, matches: &ArgMatches) -> Vec<String> {
             continue;
         }
         let values = given.get_raw(id).into_iter().flatten();
-        options.extend(values.map(|value| format!("--{long}={}", value.to_string_lossy())));
+        options.extend(values.map(|value| format!("--{long}={}", value.shown())));
     }
     options.sort();
     options

@@ -43,7 +43,7 @@ impl Test {
 
     /// What is written, and the records that must not be replaced.
     #[must_use]
-    pub fn target(&self) -> (&Findings, &[String]) {
+    pub fn target(&self) -> (&Findings, &[PathBuf]) {
         match self {
             Self::Decay(test) => (&test.findings, &test.inputs),
             Self::Response(test) => (&test.findings, &test.inputs),
@@ -70,7 +70,7 @@ pub struct Findings {
     pub json: bool,
     /// Write an HTML page with the fit, the residual and the constants
     #[arg(long, value_name = "FILE")]
-    pub html: Option<String>,
+    pub html: Option<PathBuf>,
     /// What makes a warning a failure.
     #[command(flatten)]
     pub strictness: Strictness,
@@ -92,7 +92,7 @@ pub struct Anchors {
 pub struct Decay {
     /// Recordings of free decays of one stand, or - for standard input
     #[arg(value_name = "INPUT", required = true)]
-    pub inputs: Vec<String>,
+    pub inputs: Vec<PathBuf>,
     /// Which channel.
     #[command(flatten)]
     pub choice: ChannelChoice,
@@ -118,7 +118,7 @@ pub struct Decay {
 pub struct Response {
     /// Recordings of one stand
     #[arg(value_name = "INPUT", required = true)]
-    pub inputs: Vec<String>,
+    pub inputs: Vec<PathBuf>,
     /// Channel of the excitation (hammer force, exciter force, known torque): its number as inspect gives it, heading or
     /// name; of an MCAP file topic and field, as '/joint_states.effort[name=motor]', or the field of --topic
     #[arg(long, value_name = "NAME")]
@@ -172,7 +172,7 @@ pub struct Response {
 pub struct Runup {
     /// Recording of the run
     #[arg(value_name = "INPUT")]
-    pub input: String,
+    pub input: PathBuf,
     /// Column of the position, speed or acceleration
     #[arg(long, value_name = "NAME")]
     pub motion: String,
@@ -210,7 +210,7 @@ pub struct Runup {
 pub struct Static {
     /// Table of loads and readings, one row each, in the order in which they were taken
     #[arg(value_name = "INPUT")]
-    pub input: String,
+    pub input: PathBuf,
     /// Column of the load
     #[arg(long, value_name = "NAME")]
     pub load: String,

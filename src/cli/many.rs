@@ -13,7 +13,7 @@ use crate::io::sum;
 pub struct BatchOptions {
     /// Also take the recordings that a file lists, one path a line (- for standard input)
     #[arg(long, value_name = "FILE")]
-    pub files_from: Option<String>,
+    pub files_from: Option<PathBuf>,
     /// Paths of --files-from end with a zero byte instead of a line end
     #[arg(short = '0', long, requires = "files_from")]
     pub null: bool,
@@ -82,7 +82,7 @@ impl BatchOptions {
 pub struct Merge {
     /// Manifests of the runs, folders with manifests, or patterns such as 'out/*.jsonl'
     #[arg(value_name = "MANIFEST", required = true)]
-    pub manifests: Vec<String>,
+    pub manifests: Vec<PathBuf>,
     /// The table.
     #[command(flatten)]
     pub result: OutputArgs,

@@ -1,6 +1,6 @@
 //! The command line of `simulate`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use torqcomp_model::simulate;
@@ -15,7 +15,7 @@ pub struct Simulate {
     /// Recording with the applied quantity, or - for standard input; several, folders and patterns such as
     /// 'logs/**/*.csv' with -o FOLDER/
     #[arg(value_name = "INPUT", required_unless_present = "files_from")]
-    pub inputs: Vec<String>,
+    pub inputs: Vec<PathBuf>,
     /// The result.
     #[command(flatten)]
     pub result: OutputArgs,
@@ -56,7 +56,7 @@ pub struct Simulate {
 impl Simulate {
     /// The one recording that is read.
     #[must_use]
-    pub fn input(&self) -> &str {
+    pub fn input(&self) -> &Path {
         &self.inputs[0]
     }
 }

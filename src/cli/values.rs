@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::failure::did_you_mean;
 use crate::io::digits::Digits;
+use crate::io::name::ShowPath;
 use crate::io::positive_frequency;
 use crate::warning::CODES;
 
@@ -67,7 +68,7 @@ pub fn svg_file(text: &str) -> Result<PathBuf, String> {
     match path.extension() {
         Some(end) if !end.eq_ignore_ascii_case("svg") => Err(format!(
             "charts are written as SVG only; name it {}, and convert that if need be",
-            path.with_extension("svg").display()
+            path.with_extension("svg").shown()
         )),
         _ => Ok(path.to_owned()),
     }

@@ -6,6 +6,7 @@ use clap::Error;
 use clap::error::ErrorKind;
 
 use crate::failure::{ErrorCode, Failure};
+use crate::io::name::path_of_bytes;
 
 /// Whether `--json` is among the arguments of the process, whatever else is wrong with them.
 pub(crate) fn is_json_asked() -> bool {
@@ -20,9 +21,9 @@ pub(crate) fn log_asked() -> Option<PathBuf> {
         if word == "--log" {
             return words.next().map(PathBuf::from);
         }
-        let path = word.to_str().and_then(|word| word.strip_prefix("--log="));
+        let path = word.as_encoded_bytes().strip_prefix(b"--log=");
         if let Some(path) = path {
-            return Some(PathBuf::from(path));
+            return path_of_bytes(path);
         }
     }
     None
@@ -46,8 +47,7 @@ fn not_utf8() -> Failure {
     Failure::usage(
         ErrorCode::InvalidValue,
         format_args!(
-            "the argument {:?} is not UTF-8, as names of files and channels must be here; rename the file, or read it through a \
-             pipe (\"-\" in the place of its name)",
+            "the argument {:?} is not UTF-8; only names of files may be something else",
             wrong.unwrap_or_default()
         ),
     )

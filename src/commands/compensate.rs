@@ -72,7 +72,7 @@ pub fn work(args: &cli::Compensate) -> Result<Made, Failure> {
         ));
     }
     let opened = Opened::new(args)?;
-    let inputs = [args.record.input().as_ref(), args.stand.as_path()];
+    let inputs = [args.record.input(), args.stand.as_path()];
     let output = args.result.open(&inputs)?;
     let mut plot = args.result.open_beside(args.plot.as_deref(), &inputs)?;
     let taken: Vec<&Path> = inputs.into_iter().chain(args.plot.as_deref()).collect();

@@ -5,7 +5,7 @@ mod read;
 mod refined;
 mod text;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::{Outcome, conclude};
 use crate::cli::Diagnose;
@@ -26,7 +26,7 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
             Some((stand::parse(&name, &text)?, text))
         }
     };
-    let records = args.train.iter().chain(&args.holdout).map(Path::new);
+    let records = args.train.iter().chain(&args.holdout).map(PathBuf::as_path);
     let files: Vec<&Path> = records.chain(args.stand.as_deref()).collect();
     let result = &args.result;
     let mut refined = result
@@ -34,8 +34,7 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
         .as_ref()
         .map(|_| result.open(&files))
         .transpose()?;
-    let html = args.html.as_deref().map(Path::new);
-    let mut html = result.open_beside(html, &files)?;
+    let mut html = result.open_beside(args.html.as_deref(), &files)?;
     let provenance = html.as_ref().map(|_| provenance(args, stand.as_ref()));
     let provenance = provenance.transpose()?;
     let (case, is_lossy) = read::read(args, stand.as_ref().map(|(stand, _)| stand))?;

@@ -25,7 +25,7 @@ pub fn work(args: &Extract) -> Result<Made, Failure> {
     };
     let input = args.record.input();
     let stream = ChannelStream::open(&Input::of(input), choice, &reading)?;
-    let mut output = args.result.open(&[input.as_ref()])?;
+    let mut output = args.result.open(&[input])?;
     output.write(&heading(&stream))?;
     let said = format!(
         "{}: {}; {} Hz {}\n",

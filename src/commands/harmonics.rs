@@ -126,7 +126,7 @@ pub fn work(args: &cli::Harmonics) -> Result<Made, Failure> {
     let input = args.record.input();
     let stream = ChannelStream::open(&Input::of(input), choice, reading)?;
     let way = WayBack::new(&stream, stand, args.units.into())?;
-    let inputs = [Some(input.as_ref()), args.stand.as_deref()];
+    let inputs = [Some(input), args.stand.as_deref()];
     let inputs: Vec<&Path> = inputs.into_iter().flatten().collect();
     let mut output = args.result.open(&inputs)?;
     let source = stream.source.clone();

@@ -4,11 +4,13 @@ mod questions;
 
 use std::fmt::Write as _;
 use std::io::{BufRead, IsTerminal, Write};
+use std::path::Path;
 
 use self::questions::{BRIDGE, DRAWING, MECHANICS, Question, TRANSDUCER};
 use super::{Outcome, conclude};
 use crate::cli::Strictness;
 use crate::cli::init::{Init, InitFrom};
+use crate::io::name::{ShowPath, is_dash};
 use torqcomp_model::Kind;
 
 use crate::failure::{ErrorCode, Failure};
@@ -227,8 +229,8 @@ impl Answer {
 /// What the file says, section by section; what is missing stands there as a comment.
 fn page(args: &Init, from: InitFrom, answers: &[Answer]) -> String {
     let name = args.name.as_deref().unwrap_or("my stand");
-    let file = args.result.output.as_deref().filter(|file| *file != "-");
-    let file = file.unwrap_or("FILE");
+    let file = args.result.output.as_deref().filter(|file| !is_dash(file));
+    let file = file.unwrap_or(Path::new("FILE")).shown().to_string();
     let mut text = format!(
         "schema = \"torqcomp.stand/1\"\nname = {}\n\n# Every number has its unit; a known uncertainty is written as\n\
          #     {{ value = \"50 N m\", std = \"0.1 N m\", source = \"certificate\" }}\n",
@@ -245,7 +247,7 @@ fn page(args: &Init, from: InitFrom, answers: &[Answer]) -> String {
                 ("calibration", InitFrom::Bridge | InitFrom::Unknown) => NO_CALIBRATION,
                 _ => "",
             };
-            text += &how.replace("FILE", file);
+            text += &how.replace("FILE", &file);
             continue;
         }
         let _ = write!(text, "\n# {about}\n[{section}]\n");

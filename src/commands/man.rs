@@ -9,12 +9,13 @@ use clap_mangen::roff::{Roff, bold, roman};
 use super::Outcome;
 use crate::cli::Man;
 use crate::failure::{ErrorCode, Failure, did_you_mean};
+use crate::io::name::{self, ShowPath};
 use crate::io::output::{self, Output};
 
 /// Runs the verb.
 pub fn run(args: &Man) -> Result<Outcome, Failure> {
     let program = command();
-    let folder = args.result.output.as_deref().map(Path::new);
+    let folder = args.result.output.as_deref();
     let folder = folder.filter(|path| names_a_folder(path));
     match (folder, args.verb.is_empty()) {
         (Some(folder), true) => {
@@ -27,7 +28,7 @@ pub fn run(args: &Man) -> Result<Outcome, Failure> {
                 ErrorCode::ConflictingArguments,
                 format_args!(
                     "{} is a folder, for all pages; leave {} out, or name a file",
-                    folder.display(),
+                    folder.shown(),
                     args.verb.join(" ")
                 ),
             ));
@@ -51,8 +52,7 @@ fn command() -> Command {
 }
 
 fn names_a_folder(path: &Path) -> bool {
-    let text = path.as_os_str().to_string_lossy();
-    path.is_dir() || text.ends_with(std::path::is_separator)
+    path.is_dir() || name::ends_with_separator(path)
 }
 
 /// The verb with these words.

@@ -8,6 +8,7 @@ use crate::cli::{
     BatchOptions, Compensate, Extract, Format, Harmonics, Inspect, OutputArgs, Simulate,
 };
 use crate::failure::{ErrorCode, Failure};
+use crate::io::name::ShowPath;
 use crate::outcome::Made;
 use crate::stand;
 
@@ -26,8 +27,7 @@ pub(super) trait OneByOne: Clone + Sync {
         *own.inputs = vec![one.input.to_owned()];
         *own.many = BatchOptions::default();
         own.result.force = one.replace;
-        let output = one.outputs.first();
-        own.result.output = output.map(|path| path.display().to_string());
+        own.result.output = one.outputs.first().cloned();
         for (asked, path) in own.beside.into_iter().zip(one.outputs.iter().skip(1)) {
             asked.clone_from(path);
         }
@@ -43,7 +43,7 @@ pub(super) trait OneByOne: Clone + Sync {
 
 /// The arguments that differ from recording to recording.
 pub(super) struct Own<'a> {
-    inputs: &'a mut Vec<String>,
+    inputs: &'a mut Vec<PathBuf>,
     many: &'a mut BatchOptions,
     result: &'a mut OutputArgs,
     /// Where what is written beside the result goes, in the order of [`BatchTask::beside`].
@@ -55,7 +55,7 @@ pub(super) struct Own<'a> {
 impl<'a> Own<'a> {
     /// Of a verb with one result, on one thread.
     fn of(
-        inputs: &'a mut Vec<String>,
+        inputs: &'a mut Vec<PathBuf>,
         many: &'a mut BatchOptions,
         result: &'a mut OutputArgs,
     ) -> Self {
@@ -86,7 +86,7 @@ pub(super) fn run(args: &impl OneByOne, options: &[String]) -> Result<Outcome, F
             ErrorCode::MissingArgument,
             format_args!("{}", batch::NEED_FOLDER),
         )
-        .at(folder));
+        .at(folder.shown()));
     }
     // A fault of the stand file would be said for each recording.
     if let Some(path) = task.stand {

@@ -8,6 +8,7 @@ use torqcomp_model::{Chain, Unit, UnitSystem};
 use super::{judged, rows, warned};
 use crate::cli;
 use crate::failure::{ErrorCode, Failure};
+use crate::io::name::ShowPath;
 use crate::io::output::Output;
 use crate::io::{ChannelChoice, Flags, Input};
 use crate::outcome::{Made, RecordFigures};
@@ -64,7 +65,7 @@ pub fn work(args: &cli::Simulate) -> Result<Made, Failure> {
         ));
     }
     let mut applied = AppliedInput::open(args)?;
-    let inputs = [args.input().as_ref(), args.stand.as_path()];
+    let inputs = [args.input(), args.stand.as_path()];
     let mut output = args.result.open(&inputs)?;
     let mut of_channel = Vec::new();
     let units = ChannelUnits::of(&stand, applied.channel(), &mut of_channel)?;
@@ -92,8 +93,8 @@ pub fn work(args: &cli::Simulate) -> Result<Made, Failure> {
     }
     let is_lossy = applied.is_lossy;
     let report = SimulateReport {
-        input: args.input().to_owned(),
-        stand: args.stand.display().to_string(),
+        input: args.input().shown().to_string(),
+        stand: args.stand.shown().to_string(),
         applied: applied.name,
         applied_unit: units.applied_text,
         measured_unit: units.measured_text,

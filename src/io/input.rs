@@ -7,6 +7,7 @@ use std::sync::{Mutex, PoisonError};
 use super::packed::{self, Packing};
 use super::storage::Stored;
 use crate::failure::Failure;
+use crate::io::name::{ShowPath, is_dash};
 
 /// The first bytes of an MCAP file that do not tell its version.
 pub(crate) const MCAP_START: &[u8] = b"\x89MCAP";
@@ -34,11 +35,11 @@ pub enum Input {
 impl Input {
     /// `-` is standard input.
     #[must_use]
-    pub fn of(text: &str) -> Self {
-        if text == "-" {
+    pub fn of(path: &Path) -> Self {
+        if is_dash(path) {
             Self::Stdin
         } else {
-            Self::File(PathBuf::from(text))
+            Self::File(path.to_owned())
         }
     }
 
@@ -47,7 +48,7 @@ impl Input {
     pub fn name(&self) -> String {
         match self {
             Self::Stdin => "standard input".to_owned(),
-            Self::File(path) => path.display().to_string(),
+            Self::File(path) => path.shown().to_string(),
         }
     }
 

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::storage;
 use crate::failure::{ErrorCode, Failure};
+use crate::io::name::ShowPath;
 
 /// First bytes in which a line of the file's kind is looked for.
 const LOOKED_AT: usize = 1 << 16;
@@ -23,7 +24,7 @@ impl JsonLines {
     /// # Errors
     /// If it cannot be written, or is another kind of file.
     pub(crate) fn open(path: &Path, beginning: &str, sync: bool) -> Result<Self, Failure> {
-        let unwritable = |error| Failure::writing(&path.display().to_string(), &error);
+        let unwritable = |error| Failure::writing(&path.shown().to_string(), &error);
         let file = storage::open_at_end(path).map_err(unwritable)?;
         let first = storage::first_bytes(&file, LOOKED_AT).map_err(unwritable)?;
         let mut lines = first.split(|byte| *byte == b'\n');
@@ -37,7 +38,7 @@ impl JsonLines {
                     "this file has no lines that begin with {beginning}, so nothing is appended to it; name another file"
                 ),
             )
-            .at(path.display()));
+            .at(path.shown()));
         }
         if sync {
             let folder = path
@@ -63,7 +64,7 @@ impl JsonLines {
             true => storage::sync(&self.file),
             false => Ok(()),
         });
-        synced.map_err(|error| Failure::writing(&self.path.display().to_string(), &error))
+        synced.map_err(|error| Failure::writing(&self.path.shown().to_string(), &error))
     }
 
     fn write(&self, mut lines: String) -> io::Result<()> {

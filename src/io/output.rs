@@ -10,6 +10,7 @@ use tempfile::NamedTempFile;
 
 use super::{parts, storage, sum};
 use crate::failure::{ErrorCode, Failure};
+use crate::io::name::{ShowPath, is_dash};
 
 /// Whether anything was written to standard output.
 static IS_STDOUT_USED: AtomicBool = AtomicBool::new(false);
@@ -31,6 +32,7 @@ pub struct Policy {
 
 /// An output: standard output, a device, or a file that takes its name when it is complete.
 pub struct Output {
+    place: PathBuf,
     name: String,
     kind: Kind,
 }
@@ -56,6 +58,7 @@ impl Output {
     #[must_use]
     pub fn stdout() -> Self {
         Self {
+            place: PathBuf::from("-"),
             name: "standard output".to_owned(),
             kind: Kind::Stdout(io::stdout()),
         }
@@ -67,16 +70,16 @@ impl Output {
     /// # Errors
     /// If the output is one of them, exists and may not be replaced, or its folder cannot be written.
     pub fn open(place: Option<&Path>, policy: Policy, taken: &[&Path]) -> Result<Self, Failure> {
-        let Some(path) = place.filter(|path| *path != Path::new("-")) else {
+        let Some(path) = place.filter(|path| !is_dash(path)) else {
             return Ok(Self::stdout());
         };
-        let name = path.display().to_string();
+        let (path_as_given, name) = (path.to_owned(), path.shown().to_string());
         let kept_free = KEPT_FREE.get().map(PathBuf::as_path);
         let mut taken = taken.iter().copied().chain(kept_free);
         if let Some(other) = taken.find(|other| is_same_file(other, path)) {
             let other = match other {
-                input if input == Path::new("-") => "standard input".to_owned(),
-                file => file.display().to_string(),
+                input if is_dash(input) => "standard input".to_owned(),
+                file => file.shown().to_string(),
             };
             return Err(Failure::usage(
                 ErrorCode::ConflictingArguments,
@@ -117,7 +120,11 @@ impl Output {
                 Kind::File { part, path, policy }
             }
         };
-        Ok(Self { name, kind })
+        Ok(Self {
+            place: path_as_given,
+            name,
+            kind,
+        })
     }
 
     /// Writes bytes.
@@ -155,6 +162,11 @@ impl Output {
         }
     }
 
+    /// Its path as given, `-` of standard output.
+    pub(crate) fn place(&self) -> &Path {
+        &self.place
+    }
+
     /// Name for people.
     #[must_use]
     pub fn name(&self) -> &str {
@@ -189,7 +201,7 @@ impl Write for Output {
 /// If the system refuses.
 pub(crate) fn make_folder(folder: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(folder)
-        .map_err(|error| Failure::writing(&folder.display().to_string(), &error))
+        .map_err(|error| Failure::writing(&folder.shown().to_string(), &error))
 }
 
 /// Completes the outputs of one run: all files get their names, or none does.
@@ -273,7 +285,7 @@ impl Renamed {
                      content may be back"
                 ),
             )
-            .at(self.path.display())
+            .at(self.path.shown())
         })
     }
 }
@@ -295,16 +307,16 @@ fn folder_failure(path: &Path, error: &io::Error) -> Failure {
                 error.kind()
             ),
         )
-        .at(path.display())
+        .at(path.shown())
     } else {
         Failure::failed(
             ErrorCode::CannotWrite,
             format_args!(
                 "the folder {} does not exist; make it first",
-                folder.display()
+                folder.shown()
             ),
         )
-        .at(path.display())
+        .at(path.shown())
     }
 }
 
@@ -333,7 +345,7 @@ pub(crate) fn end_of_links(path: &Path) -> PathBuf {
 
 /// Whether an input or another output is the file of that path.
 fn is_same_file(other: &Path, path: &Path) -> bool {
-    match other == Path::new("-") {
+    match is_dash(other) {
         true => is_stdin(path),
         false => end_of_links(other) == end_of_links(path),
     }

@@ -9,6 +9,7 @@ use torqcomp_dsp::store::SampleStore;
 
 use super::uniform::KeepSamples;
 use crate::failure::{ErrorCode, Failure};
+use crate::io::name::ShowPath;
 use crate::io::storage::Scratch;
 
 /// Samples that stay in memory.
@@ -42,7 +43,7 @@ impl KeepSamples for Spool {
                          bytes a sample in TMPDIR"
                     ),
                 )
-                .at(std::env::temp_dir().display())
+                .at(std::env::temp_dir().shown())
             }),
         }
     }

@@ -13,6 +13,7 @@ use super::mechanics::mechanics;
 use super::section::{Section, SourceText};
 use super::{Diagnosed, Mechanics, Stand, TransducerSignal};
 use crate::failure::Failure;
+use crate::io::name::ShowPath;
 use crate::io::storage;
 use crate::print::short;
 use crate::warning::Warning;
@@ -36,7 +37,7 @@ pub fn read(path: &Path) -> Result<Stand, Failure> {
 /// If it cannot be read.
 pub fn text(path: &Path) -> Result<(String, String), Failure> {
     match storage::read_to_string(path) {
-        Ok(text) => Ok((path.display().to_string(), text)),
+        Ok(text) => Ok((path.shown().to_string(), text)),
         Err(error) => Err(Failure::reading(path, &error)),
     }
 }

@@ -173,7 +173,7 @@ fn heading(chain: &Calibration, with_recorded: bool) -> String {
 
 /// The format that is asked for, or that the name of the output says.
 fn format(args: &Compensate) -> Format {
-    let output = args.result.output.as_deref().map(Path::new);
+    let output = args.result.output.as_deref();
     let is_mcap = output
         .and_then(Path::extension)
         .is_some_and(|end| end.eq_ignore_ascii_case("mcap"));

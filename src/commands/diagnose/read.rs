@@ -1,5 +1,6 @@
 //! Reading the records of a diagnosis.
 
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use torqcomp_model::effects::Fixed;
@@ -13,6 +14,7 @@ use crate::diagnose::{
     StandRecord,
 };
 use crate::failure::{ErrorCode, Failure};
+use crate::io::name::{ShowPath, texts};
 use crate::io::{ChannelChoice, Input};
 use crate::print::short;
 use crate::recording::AlignedChannels;
@@ -54,7 +56,7 @@ impl Pair {
 
 /// Reads all records, and what the stand file declares of them; whether something of a record was lost.
 pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<(Case, bool), Failure> {
-    let pairs = |files: &[String]| -> Result<Vec<Pair>, Failure> {
+    let pairs = |files: &[PathBuf]| -> Result<Vec<Pair>, Failure> {
         files.iter().map(|file| pair(args, file)).collect()
     };
     let (train, holdout) = (pairs(&args.train)?, pairs(&args.holdout)?);
@@ -94,9 +96,9 @@ pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<(Case, bool), Fail
     }
     let case = Case {
         sources: SourceFiles {
-            stand: args.stand.as_ref().map(|p| p.display().to_string()),
-            train: args.train.clone(),
-            holdout: args.holdout.clone(),
+            stand: args.stand.as_ref().map(|p| p.shown().to_string()),
+            train: texts(&args.train),
+            holdout: texts(&args.holdout),
         },
         records,
         declared,
@@ -130,7 +132,7 @@ fn declared_effects(stand: Option<&Stand>) -> Vec<DeclaredForm> {
     effects.iter().map(form).collect()
 }
 
-fn pair(args: &Diagnose, file: &str) -> Result<Pair, Failure> {
+fn pair(args: &Diagnose, file: &Path) -> Result<Pair, Failure> {
     if args.applied == args.measured {
         return Err(Failure::usage(
             ErrorCode::ConflictingArguments,

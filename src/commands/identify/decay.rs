@@ -1,6 +1,7 @@
 //! `identify decay`.
 
 use std::borrow::Cow;
+use std::path::Path;
 
 use torqcomp_dsp::quality::clipping::Clipping;
 
@@ -11,6 +12,7 @@ use crate::commands::Outcome;
 use crate::failure::Failure;
 use crate::identify::decay::{DecayOptions, Ringing, identify};
 use crate::identify::{Identification, ModalPole};
+use crate::io::name::{self, ShowPath};
 use crate::io::{Input, Reading, already_compensated};
 use crate::quality;
 use crate::recording::{AlignedChannels, Recording, check_cells, is_uniform};
@@ -56,31 +58,36 @@ pub fn run(args: &Decay) -> Result<Outcome, Failure> {
 }
 
 /// Reads one recording, without missing samples: the fit needs no uniform steps.
-fn load(args: &Decay, input: &str, recorded: &mut Recorded) -> Result<Loaded, Failure> {
+fn load(args: &Decay, input: &Path, recorded: &mut Recorded) -> Result<Loaded, Failure> {
     let Reading {
         rate_hz, resample, ..
     } = args.reading;
     let choices = std::slice::from_ref(&args.choice);
     let mut recording = Recording::read(&Input::of(input), choices, &args.reading)?;
-    let place = recording.place(&args.choice).map_err(|f| f.at(input))?;
+    let place = recording
+        .place(&args.choice)
+        .map_err(|f| f.at(input.shown()))?;
     let chosen = &recording.channels[place];
     if chosen.is_compensated {
-        return Err(already_compensated(input, &chosen.name));
+        return Err(already_compensated(
+            &input.shown().to_string(),
+            &chosen.name,
+        ));
     }
     if resample {
         let aligned = AlignedChannels::of(recording, choices, &args.reading);
         return Ok(resampled(
             input,
-            aligned.map_err(|f| f.at(input))?,
+            aligned.map_err(|f| f.at(input.shown()))?,
             recorded,
         ));
     }
     let filled = recording.fill(place, &args.reading);
-    filled.map_err(|failure| failure.at(input))?;
+    filled.map_err(|failure| failure.at(input.shown()))?;
     let selection = recording
         .select(&args.choice, &args.reading)
-        .map_err(|failure| failure.at(input))?;
-    check_cells(selection.channel, &args.reading).map_err(|failure| failure.at(input))?;
+        .map_err(|failure| failure.at(input.shown()))?;
+    check_cells(selection.channel, &args.reading).map_err(|failure| failure.at(input.shown()))?;
     let samples = &selection.channel.samples;
     let count = samples.len();
     let stamps = match (&selection.channel.axis.stamps_s, rate_hz) {
@@ -103,7 +110,7 @@ fn load(args: &Decay, input: &str, recorded: &mut Recorded) -> Result<Loaded, Fa
     let warnings = [recording.all_warnings(), selection.warnings, clipped].concat();
     recorded.warn(warnings, recording.lost.is_some());
     Ok(Loaded {
-        name: input.to_owned(),
+        name: input.shown().to_string(),
         times_s,
         rate_hz,
         values,
@@ -124,7 +131,7 @@ fn rising(stamps: &[f64], samples: &[f64]) -> (Vec<f64>, Vec<f64>) {
 }
 
 /// A recording that was interpolated to a uniform step.
-fn resampled(input: &str, mut aligned: AlignedChannels, recorded: &mut Recorded) -> Loaded {
+fn resampled(input: &Path, mut aligned: AlignedChannels, recorded: &mut Recorded) -> Loaded {
     let clipped = [aligned.warnings.clone(), quality::clipped(&aligned)].concat();
     let channel = aligned.channels.swap_remove(0);
     let (start_s, rate_hz) = (aligned.start.after_s, aligned.rate_hz);
@@ -136,7 +143,7 @@ fn resampled(input: &str, mut aligned: AlignedChannels, recorded: &mut Recorded)
     );
     recorded.warn(clipped, aligned.is_lossy);
     Loaded {
-        name: input.to_owned(),
+        name: input.shown().to_string(),
         times_s: (0..channel.samples.len()).map(time_s).collect(),
         rate_hz: Some(rate_hz),
         values: channel.samples,
@@ -148,7 +155,7 @@ fn resampled(input: &str, mut aligned: AlignedChannels, recorded: &mut Recorded)
 fn entries(args: &Decay, result: &mut Identification) -> Result<Vec<Entry>, Failure> {
     let several = result.modes.len() > 1 && args.findings.result.output.is_some();
     let mode = (&result.modes[0].clone(), Ratios::OverInertia);
-    let source = format!("identify decay: {}", args.inputs.join(", "));
+    let source = format!("identify decay: {}", name::list(&args.inputs));
     let of_one = from_ratios(&args.anchors, &args.findings, mode, &source, result)?;
     match several {
         true => Ok(vec![modes(result, &source)]),

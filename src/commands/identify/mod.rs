@@ -7,7 +7,7 @@ mod response;
 mod runup;
 mod static_load;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use torqcomp_model::{Dimension, Kind, UnitSystem};
 
@@ -15,6 +15,7 @@ use super::{Outcome, conclude};
 use crate::cli::identify::{Findings, Identify, Test};
 use crate::failure::{ErrorCode, Failure};
 use crate::identify::{Identification, NamedEstimate};
+use crate::io::name::{self, ShowPath, is_dash};
 use crate::io::output::{self, Output, Policy};
 use crate::print::Report;
 use crate::provenance::Provenance;
@@ -42,7 +43,7 @@ pub fn run(args: &Identify) -> Result<Outcome, Failure> {
 /// What was read, for the result.
 #[derive(Default)]
 struct Recorded {
-    inputs: Vec<String>,
+    inputs: Vec<PathBuf>,
     samples: usize,
     rate_hz: Option<f64>,
     rate_std_hz: Option<f64>,
@@ -52,7 +53,7 @@ struct Recorded {
 
 impl Recorded {
     /// Adds a file; the sampling rate, with its standard uncertainty, is that of the first one.
-    fn add(&mut self, input: &str, samples: usize, rate_hz: Option<(f64, Option<f64>)>) {
+    fn add(&mut self, input: &Path, samples: usize, rate_hz: Option<(f64, Option<f64>)>) {
         if self.inputs.is_empty() {
             self.rate_hz = rate_hz.map(|(rate_hz, _)| rate_hz);
             self.rate_std_hz = rate_hz.and_then(|(_, std_hz)| std_hz);
@@ -77,7 +78,7 @@ fn stand_text(findings: &Findings) -> Result<Option<(String, String)>, Failure> 
 /// The stand file of `-o`, if it is there already.
 fn existing(findings: &Findings) -> Option<&Path> {
     let place = findings.result.output.as_deref()?;
-    (place != "-" && Path::new(place).is_file()).then(|| Path::new(place))
+    (!is_dash(place) && place.is_file()).then_some(place)
 }
 
 /// A value of `[mechanics]` that is declared, and its standard uncertainty.
@@ -109,13 +110,13 @@ fn deliver(
     findings: &Findings,
     entries: &[Entry],
 ) -> Result<Outcome, Failure> {
-    result.inputs = recorded.inputs;
+    result.inputs = name::texts(&recorded.inputs);
     result.samples = recorded.samples;
     result.rate_hz = recorded.rate_hz;
     result.rate_std_hz = recorded.rate_std_hz;
     result.warnings.extend(recorded.warnings);
     result.convert(UnitSystem::from(findings.units));
-    let mut targets = Targets::open(findings, &result.inputs)?;
+    let mut targets = Targets::open(findings, &recorded.inputs)?;
     if let Some(stand) = &mut targets.stand {
         stand.write(stand_file(findings, entries)?.as_bytes())?;
     }
@@ -124,7 +125,7 @@ fn deliver(
         let stand = stand
             .as_ref()
             .map(|(name, text)| (name.as_str(), text.as_str()));
-        let provenance = Provenance::of(&result.inputs, stand)?;
+        let provenance = Provenance::of(&recorded.inputs, stand)?;
         page.write(result.page(&provenance).as_bytes())?;
     }
     // Standard output has the stand file.
@@ -147,22 +148,22 @@ struct Targets {
 
 impl Targets {
     /// Opens them; a stand file that is there is updated.
-    fn open(findings: &Findings, inputs: &[String]) -> Result<Self, Failure> {
+    fn open(findings: &Findings, inputs: &[PathBuf]) -> Result<Self, Failure> {
         let result = &findings.result;
-        if result.output.as_deref() == Some("-") && findings.json {
+        if result.output.as_deref().is_some_and(is_dash) && findings.json {
             return Err(Failure::usage(
                 ErrorCode::ConflictingArguments,
                 "the stand file and the JSON document cannot both go to standard output; give -o FILE",
             ));
         }
-        let inputs: Vec<&Path> = inputs.iter().map(Path::new).collect();
+        let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
         let policy = Policy {
             replace: result.force || existing(findings).is_some(),
             ..result.policy()
         };
-        let place = result.output.as_deref().map(Path::new);
+        let place = result.output.as_deref();
         let stand = place.map(|_| Output::open(place, policy, &inputs));
-        let page = findings.html.as_deref().map(Path::new);
+        let page = findings.html.as_deref();
         Ok(Self {
             stand: stand.transpose()?,
             page: result.open_beside(page, &inputs)?,
@@ -176,8 +177,8 @@ fn stand_file(findings: &Findings, entries: &[Entry]) -> Result<String, Failure>
     match basis.map(stand::text).transpose()? {
         Some((name, text)) => update::update(&name, Some(&text), entries),
         None => {
-            let name = findings.result.output.as_deref().unwrap_or("-");
-            update::update(name, None, entries)
+            let name = findings.result.output.as_deref().unwrap_or(Path::new("-"));
+            update::update(&name.shown().to_string(), None, entries)
         }
     }
 }

@@ -10,6 +10,7 @@ use crate::commands::Outcome;
 use crate::failure::{ErrorCode, Failure};
 use crate::identify::response::{Driven, RATIO, ResponseOptions, identify};
 use crate::identify::{Identification, Motion, NamedEstimate};
+use crate::io::name::{self, ShowPath};
 use crate::io::{ChannelChoice, Input};
 use crate::quality;
 use crate::recording::{AlignedChannel, AlignedChannels};
@@ -40,11 +41,12 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
         }
         loaded.push(read);
     }
+    let names = name::texts(&args.inputs);
     let records: Vec<Driven> = loaded
         .iter()
-        .zip(&args.inputs)
-        .map(|(l, input)| Driven {
-            name: input,
+        .zip(&names)
+        .map(|(l, name)| Driven {
+            name,
             rate_hz: l.rate_hz,
             applied: &l.channels[0].samples,
             measured: &l.channels[1].samples,
@@ -65,7 +67,7 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
         result.label_charts(RATIO, &unit);
     }
     let written = modes::WrittenModes {
-        source: format!("identify response: {}", args.inputs.join(", ")),
+        source: format!("identify response: {}", name::list(&args.inputs)),
         motion,
         units,
     };
@@ -147,7 +149,7 @@ fn calibration(
         name: key.to_owned(),
         estimate: Estimate::of(unit, value, std),
     };
-    let source = format!("identify response: {}", args.inputs.join(", "));
+    let source = format!("identify response: {}", name::list(&args.inputs));
     let written = entry("calibration", key, &constant, &source);
     result.parameters.push(constant);
     if std.is_none() {
@@ -203,7 +205,8 @@ fn rad_per_n_m(
             ErrorCode::RecordsDiffer,
             format_args!(
                 "{} and {} have different units; records of one response need the same",
-                args.inputs[0], args.inputs[other]
+                args.inputs[0].shown(),
+                args.inputs[other].shown()
             ),
         )),
     }
@@ -222,7 +225,7 @@ fn entries(
         }
         _ => return Ok(Vec::new()),
     };
-    let source = format!("identify response: {}", args.inputs.join(", "));
+    let source = format!("identify response: {}", name::list(&args.inputs));
     match rad_per_n_m {
         Some(size) => {
             let mode = mode.scaled(size);

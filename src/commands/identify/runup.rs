@@ -8,6 +8,7 @@ use crate::commands::Outcome;
 use crate::failure::{ErrorCode, Failure};
 use crate::identify::runup::{Body, FreeRun, RunupOptions, identify};
 use crate::identify::{Identification, Motion};
+use crate::io::name::ShowPath;
 use crate::io::{ChannelChoice, Input};
 use crate::print::short;
 use crate::quality;
@@ -70,7 +71,7 @@ pub fn run(args: &Runup) -> Result<Outcome, Failure> {
 /// The entry of the stand file: the inertia.
 fn entries(args: &Runup, result: &Identification) -> Result<Vec<Entry>, Failure> {
     let is_written = args.findings.result.output.is_some();
-    let source = format!("identify runup: {}", args.input);
+    let source = format!("identify runup: {}", args.input.shown());
     match result.get("inertia") {
         Some(inertia) if inertia.value() <= 0.0 && is_written => Err(Failure::failed(
             ErrorCode::NotIdentifiable,

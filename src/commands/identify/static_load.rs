@@ -8,6 +8,7 @@ use crate::commands::Outcome;
 use crate::failure::{ErrorCode, Failure};
 use crate::identify::Identification;
 use crate::identify::static_load::{CalibrationStep, LoadUnits, Point, identify, series_of};
+use crate::io::name::ShowPath;
 use crate::io::{ChannelChoice, Flags, Input, Reading, digits};
 use crate::recording::{Recording, check_holes, check_size, unit_of};
 use crate::stand::TransducerSignal;
@@ -130,7 +131,7 @@ fn points(
             ErrorCode::RecordsDiffer,
             "the columns differ in length; each load needs a reading",
         )
-        .at(&args.input));
+        .at(args.input.shown()));
     }
     let point = |i: usize| Point {
         load: loads[i],
@@ -185,7 +186,7 @@ fn stds(
             format_args!(
                 "row {} of {}: the standard uncertainty must be greater than 0",
                 i + 1,
-                args.input
+                args.input.shown()
             ),
         )),
         None => Ok(Some(channel.samples.iter().map(|s| s * factor).collect())),
@@ -329,7 +330,7 @@ fn ranks(values: &[f64]) -> Vec<usize> {
 
 /// The entries of the stand file: the calibration in the form of the readings' unit, and the zero.
 fn entries(args: &Static, result: &Identification, units: &LoadUnits) -> Vec<Entry> {
-    let source = format!("identify static: {}", args.input);
+    let source = format!("identify static: {}", args.input.shown());
     let is_signal = |signal: &TransducerSignal| signal.usual_unit().0 == units.reading;
     let Some(signal) = TransducerSignal::ALL.into_iter().find(is_signal) else {
         return Vec::new();

@@ -9,7 +9,7 @@ mod same;
 mod text;
 mod whole;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use self::content::Content;
 pub(super) use self::report::InspectReport;
@@ -19,6 +19,7 @@ use crate::batch;
 use crate::cli::Inspect;
 use crate::failure::{ErrorCode, Failure};
 use crate::io::Input;
+use crate::io::name::{ShowPath, is_dash};
 use crate::io::output::Output;
 use crate::log;
 use crate::outcome::Made;
@@ -64,7 +65,7 @@ pub fn work(args: &Inspect) -> Result<Made, Failure> {
 /// Inspects files and compares them; also why some of several could not be read.
 fn compare(args: &Inspect) -> Result<(Made, Vec<Failure>), Failure> {
     check(args)?;
-    let inputs: Vec<&Path> = args.files.iter().map(Path::new).collect();
+    let inputs: Vec<&Path> = args.files.iter().map(PathBuf::as_path).collect();
     let output = args.result.open(&inputs)?;
     let plot = args.result.open_beside(args.plot.as_deref(), &inputs)?;
 
@@ -86,7 +87,7 @@ fn compare(args: &Inspect) -> Result<(Made, Vec<Failure>), Failure> {
 
 /// Refuses what cannot be done.
 fn check(args: &Inspect) -> Result<(), Failure> {
-    if args.files.iter().filter(|file| *file == "-").count() > 1 {
+    if args.files.iter().filter(|file| is_dash(file)).count() > 1 {
         return Err(Failure::usage(
             ErrorCode::ConflictingArguments,
             "standard input can be read once only; name files",
@@ -101,18 +102,18 @@ fn check(args: &Inspect) -> Result<(), Failure> {
     Ok(())
 }
 
-fn entry((read, file): (&Result<Content, Failure>, &String)) -> Inspected {
+fn entry((read, file): (&Result<Content, Failure>, &PathBuf)) -> Inspected {
     match read {
         Ok(content) => Inspected::Read(Box::new(describe::file(content))),
         Err(failure) => Inspected::Failed {
-            file: file.clone(),
+            file: file.shown().to_string(),
             error: failure.to_string(),
         },
     }
 }
 
 /// What comparing the files shows. Files that are the same need no comparison of their channels.
-fn between(files: &[String], read: &[Result<Content, Failure>]) -> Vec<ChannelWarning> {
+fn between(files: &[PathBuf], read: &[Result<Content, Failure>]) -> Vec<ChannelWarning> {
     let (mut found, firsts) = same::files(files);
     let recordings: Vec<&Recording> = firsts
         .iter()

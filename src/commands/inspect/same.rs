@@ -1,7 +1,9 @@
 //! Files that are the same, byte by byte, though named differently.
 
 use std::io::{self, BufReader, Read};
+use std::path::{Path, PathBuf};
 
+use crate::io::name::{ShowPath, is_dash};
 use crate::io::storage::Stored;
 use crate::warning::Warning;
 
@@ -10,7 +12,7 @@ const PIECE: usize = 1 << 16;
 
 /// The warnings about files that hold the same bytes, and the numbers of those that differ from all
 /// before them. Standard input is different from all.
-pub fn files(names: &[String]) -> (Vec<Warning>, Vec<usize>) {
+pub fn files(names: &[PathBuf]) -> (Vec<Warning>, Vec<usize>) {
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for (i, name) in names.iter().enumerate() {
         let group = groups
@@ -25,12 +27,13 @@ pub fn files(names: &[String]) -> (Vec<Warning>, Vec<usize>) {
         .iter()
         .filter(|group| group.len() > 1)
         .map(|group| {
-            let others: Vec<&str> = group[1..].iter().map(|i| names[*i].as_str()).collect();
+            let others = group[1..].iter().map(|i| names[*i].shown().to_string());
+            let others: Vec<String> = others.collect();
             Warning::new(
                 "identical-files",
                 format!(
                     "{} and {} are the same, byte by byte: one record under several names",
-                    names[group[0]],
+                    names[group[0]].shown(),
                     others.join(", ")
                 ),
             )
@@ -39,11 +42,11 @@ pub fn files(names: &[String]) -> (Vec<Warning>, Vec<usize>) {
     (warnings, groups.iter().map(|group| group[0]).collect())
 }
 
-fn is_same(a: &str, b: &str) -> io::Result<bool> {
-    if a == "-" || b == "-" {
+fn is_same(a: &Path, b: &Path) -> io::Result<bool> {
+    if is_dash(a) || is_dash(b) {
         return Ok(false);
     }
-    let (a, b) = (Stored::open(a.as_ref())?, Stored::open(b.as_ref())?);
+    let (a, b) = (Stored::open(a)?, Stored::open(b)?);
     let (of_a, of_b) = (a.metadata()?, b.metadata()?);
     if !of_a.is_file() || !of_b.is_file() || of_a.len() != of_b.len() {
         return Ok(false);
@@ -70,10 +73,10 @@ mod tests {
     #[test]
     fn equal_files_are_grouped_and_others_are_not() {
         let folder = tempfile::tempdir().unwrap();
-        let write = |name: &str, bytes: &[u8]| -> String {
+        let write = |name: &str, bytes: &[u8]| -> PathBuf {
             let path = folder.path().join(name);
             std::fs::write(&path, bytes).unwrap();
-            path.to_str().unwrap().to_owned()
+            path
         };
         let long = vec![7; 3 * PIECE + 5];
         let mut other = long.clone();
@@ -84,13 +87,13 @@ mod tests {
             write("c", &long),
             write("d", b""),
             write("e", b""),
-            "missing".to_owned(),
-            "-".to_owned(),
-            "-".to_owned(),
+            "missing".into(),
+            "-".into(),
+            "-".into(),
         ];
         let (warnings, firsts) = files(&names);
         assert_eq!(firsts, [0, 1, 3, 5, 6, 7]);
         assert_eq!(warnings.len(), 2);
-        assert!(warnings[0].message.contains(&names[2]));
+        assert!(warnings[0].message.contains(names[2].to_str().unwrap()));
     }
 }
