@@ -13,6 +13,7 @@ mod wrong;
 
 use std::path::{Path, PathBuf};
 
+use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use torqcomp_model::UnitSystem;
 
@@ -288,7 +289,7 @@ pub struct Compensate {
     #[arg(long)]
     pub whole_record: bool,
     /// Plot the recorded and the compensated torque to an SVG file
-    #[arg(long, value_name = "FILE", value_parser = svg_file)]
+    #[arg(long, value_name = "FILE", value_parser = PathBufValueParser::new().try_map(svg_file))]
     pub plot: Option<PathBuf>,
     /// Time range to plot, in seconds
     #[arg(long, value_name = "FROM..TO", value_parser = range, requires = "plot")]
@@ -422,7 +423,7 @@ pub struct Inspect {
     #[command(flatten)]
     pub many: BatchOptions,
     /// Plot the channels to an SVG file
-    #[arg(long, value_name = "FILE", value_parser = svg_file)]
+    #[arg(long, value_name = "FILE", value_parser = PathBufValueParser::new().try_map(svg_file))]
     pub plot: Option<PathBuf>,
     /// Print JSON instead of a table
     #[arg(long)]

@@ -195,6 +195,7 @@ impl Listing {
         let root: PathBuf = pattern.components().take(fixed).collect();
         let before = self.files.len();
         self.add_matching(&root, &root, &parts[fixed..]);
+        self.files[before..].sort_by(|a, b| a.path.cmp(&b.path));
         match self.files.len() == before {
             true => Err(
                 Failure::failed(ErrorCode::NotFound, "matches no file; check the pattern")
@@ -224,20 +225,21 @@ impl Listing {
         }
         let names = match names_in(folder) {
             Ok(names) => names,
-            // Of a folder that does not exist, nothing matches.
-            Err(error) if error.kind() == ErrorKind::NotFound => return,
+            // Nothing matches below a file, or below what does not exist.
+            Err(error)
+                if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) =>
+            {
+                return;
+            }
             Err(error) => return self.add_problem(folder, Failure::reading(folder, &error)),
         };
         for name in names {
             let path = folder.join(&name);
-            let is_last = rest.is_empty();
             match part {
                 PatternPart::Names(pattern)
                     if pattern.matches_with(&name.to_string_lossy(), OPTIONS) =>
                 {
-                    if is_last || path.is_dir() {
-                        self.add_matching(root, &path, rest);
-                    }
+                    self.add_matching(root, &path, rest);
                 }
                 PatternPart::AnyFolders if is_folder_to_enter(&name, &path) => {
                     self.add_matching(root, &path, parts);

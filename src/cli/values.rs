@@ -1,10 +1,10 @@
 //! Values as people write them on the command line.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use crate::failure::did_you_mean;
 use crate::io::digits::Digits;
-use crate::io::name::ShowPath;
+use crate::io::name::{ShowPath, is_dash};
 use crate::io::positive_frequency;
 use crate::warning::CODES;
 
@@ -60,9 +60,8 @@ pub fn range(text: &str) -> Result<(f64, f64), String> {
 }
 
 /// A file for charts, which are written as SVG.
-pub fn svg_file(text: &str) -> Result<PathBuf, String> {
-    let path = Path::new(text);
-    if text == "-" {
+pub fn svg_file(path: PathBuf) -> Result<PathBuf, String> {
+    if is_dash(&path) {
         return Err("charts need the name of a file, such as chart.svg".to_owned());
     }
     match path.extension() {
@@ -70,7 +69,7 @@ pub fn svg_file(text: &str) -> Result<PathBuf, String> {
             "charts are written as SVG only; name it {}, and convert that if need be",
             path.with_extension("svg").shown()
         )),
-        _ => Ok(path.to_owned()),
+        _ => Ok(path),
     }
 }
 
@@ -129,9 +128,13 @@ mod tests {
         assert_eq!(range("0.1..0.2"), Ok((0.1, 0.2)));
         assert!(range("0.2..0.1").is_err());
         assert_eq!(digits("9"), Ok(Digits::Significant(9)));
-        assert_eq!(svg_file("a/x.svg"), Ok(PathBuf::from("a/x.svg")));
-        assert!(svg_file("x.tar.png").unwrap_err().contains("x.tar.svg"));
-        assert!(svg_file("-").is_err());
+        assert_eq!(svg_file("a/x.svg".into()), Ok(PathBuf::from("a/x.svg")));
+        assert!(
+            svg_file("x.tar.png".into())
+                .unwrap_err()
+                .contains("x.tar.svg")
+        );
+        assert!(svg_file("-".into()).is_err());
         assert!(digits("0").is_err() && digits("16").is_err());
     }
 }

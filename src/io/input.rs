@@ -153,7 +153,10 @@ impl Input {
     pub fn unreadable(&self, error: &io::Error) -> Failure {
         match error.kind() {
             ErrorKind::InvalidData => Failure::unreadable(error).at(self.name()),
-            _ => Failure::reading(Path::new(&self.name()), error),
+            _ => match self {
+                Self::Stdin => Failure::reading(Path::new(&self.name()), error),
+                Self::File(path) => Failure::reading(path, error),
+            },
         }
     }
 
