@@ -18,8 +18,8 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use torqcomp_model::UnitSystem;
 
 use crate::failure::Failure;
+use crate::file_name;
 use crate::io::digits::Digits;
-use crate::io::name;
 use crate::io::output::{Output, Policy};
 use crate::io::{ChannelChoice, Reading, frequency, positive_frequency};
 
@@ -214,7 +214,7 @@ impl OutputArgs {
     }
 
     pub(crate) fn is_stdout(&self) -> bool {
-        self.output.as_deref().is_none_or(name::is_dash)
+        self.output.as_deref().is_none_or(file_name::is_dash)
     }
 }
 

@@ -6,7 +6,7 @@ use std::fmt;
 use std::io;
 use std::path::Path;
 
-use crate::io::name::ShowPath;
+use crate::file_name::ShowPath;
 use schemars::JsonSchema;
 use serde::Serialize;
 

@@ -8,6 +8,7 @@ mod diagnose;
 #[cfg(test)]
 mod docs_tests;
 pub mod failure;
+mod file_name;
 pub mod identify;
 pub mod inverse;
 pub mod io;

@@ -8,8 +8,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::failure::{ErrorReport, Failure};
+use crate::file_name::ShowPath;
 use crate::io::json_lines::JsonLines;
-use crate::io::name::ShowPath;
 use crate::io::output;
 use crate::print;
 use crate::recording::moment::utc;

@@ -75,10 +75,11 @@ pub fn say(text: &str) {
     }
     clear_line();
     let text = visible(text.to_owned());
-    write(&text);
+    say_line(&text);
 }
 
-fn write(text: &str) {
+/// Says a text on standard error as it is.
+pub(crate) fn say_line(text: &str) {
     let _ = std::io::stderr().lock().write_all(text.as_bytes());
 }
 
@@ -88,19 +89,14 @@ static IS_LINE_SHOWN: AtomicBool = AtomicBool::new(false);
 /// Shows a line on the terminal in the place of the last such line, until something else is said.
 pub(crate) fn show_line(text: String) {
     IS_LINE_SHOWN.store(true, Ordering::Relaxed);
-    write(&format!("\r{}\x1b[K", visible(text)));
+    say_line(&format!("\r{}\x1b[K", visible(text)));
 }
 
 /// Takes the line away.
 pub(crate) fn clear_line() {
     if IS_LINE_SHOWN.swap(false, Ordering::Relaxed) {
-        write("\r\x1b[K");
+        say_line("\r\x1b[K");
     }
-}
-
-/// Says a line to a program on standard error, as it is.
-pub(crate) fn say_line(text: &str) {
-    write(text);
 }
 
 /// Whether notes are left out.

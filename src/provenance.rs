@@ -6,7 +6,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use crate::chart::Page;
 use crate::failure::{ErrorCode, Failure};
-use crate::io::name::ShowPath;
+use crate::file_name::ShowPath;
 use crate::io::{Input, sum};
 use crate::recording::moment::utc;
 

@@ -176,47 +176,14 @@ fn what_identifies_and_diagnoses_reads_and_writes_names_that_are_no_utf8() {
     assert!(String::from_utf8_lossy(&bytes(&folder, ".id.toml")).contains(r"\xE4.decay.csv"));
     assert!(!bytes(&folder, ".id.html").is_empty());
 
-    let missing = run(
-        &folder,
-        &[
-            "diagnose",
-            "--train",
-            "@.none.csv",
-            "--applied",
-            "a",
-            "--measured",
-            "b",
-            "-o",
-            "@.r.toml",
-        ],
-    );
-    missing.says(1, &[r"Messung \xE4.none.csv: cannot be read"]);
-    let missing = run(
-        &folder,
-        &[
-            "identify",
-            "static",
-            "@.none.csv",
-            "--load",
-            "a",
-            "--reading",
-            "b",
-        ],
-    );
-    missing.says(1, &[r"Messung \xE4.none.csv: cannot be read"]);
-    let missing = run(
-        &folder,
-        &[
-            "identify",
-            "runup",
-            "@.none.csv",
-            "--motion",
-            "a",
-            "--torque",
-            "b",
-        ],
-    );
-    missing.says(1, &[r"Messung \xE4.none.csv: cannot be read"]);
+    for verb in [
+        "diagnose --train @.none.csv --applied a --measured b -o @.r.toml",
+        "identify static @.none.csv --load a --reading b",
+        "identify runup @.none.csv --motion a --torque b",
+    ] {
+        let missing = run(&folder, &verb.split(' ').collect::<Vec<_>>());
+        missing.says(1, &[r"Messung \xE4.none.csv: cannot be read"]);
+    }
 }
 
 /// All results of a tree with such names, by a folder, a pattern and a list, go on where a run before ended.

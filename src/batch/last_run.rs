@@ -6,7 +6,7 @@ use std::path::Path;
 use super::manifest::{ManifestEntry, ManifestLine, RunBegin};
 use crate::cli::many::{self, Shard};
 use crate::failure::Failure;
-use crate::io::name::ShowPath;
+use crate::file_name::ShowPath;
 use crate::io::storage;
 
 /// What became of the recordings of a manifest's last run.

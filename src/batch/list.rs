@@ -7,8 +7,8 @@ use std::path::{Component, Path, PathBuf};
 
 use super::content;
 use crate::failure::{ErrorCode, Failure};
+use crate::file_name::{self, ShowPath, is_dash};
 use crate::io::Input;
-use crate::io::name::{self, ShowPath, is_dash};
 
 /// A recording to read.
 #[derive(Debug, Clone, PartialEq)]
@@ -141,14 +141,14 @@ impl Listing {
             if line.is_empty() {
                 continue;
             }
-            let path = name::path_of_bytes(line).ok_or_else(|| {
+            let path = file_name::path_of_bytes(line).ok_or_else(|| {
                 Failure::failed(
                     ErrorCode::CannotRead,
                     format_args!("path {} is not UTF-8; rename the file", i + 1),
                 )
                 .at(input.name())
             })?;
-            self.push(&path, name::with_slashes(&path));
+            self.push(&path, file_name::with_slashes(&path));
         }
         Ok(())
     }
@@ -296,7 +296,7 @@ impl Listing {
     /// Adds a file by its path below a root.
     fn add_below(&mut self, root: &Path, path: &Path) {
         let below = path.strip_prefix(root).unwrap_or(path);
-        self.push(path, name::with_slashes(below));
+        self.push(path, file_name::with_slashes(below));
     }
 
     fn add_problem(&mut self, path: &Path, problem: Failure) {

@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::cli::many::Shard;
 use crate::failure::Failure;
+use crate::file_name::{self, ShowPath};
 use crate::io::json_lines::JsonLines;
-use crate::io::name::{self, ShowPath};
 use crate::io::{storage, sum};
 use crate::outcome::RecordFigures;
 use crate::warning::Warning;
@@ -342,7 +342,7 @@ impl History {
             && entry.made_from.is_same(&wanted.made_from)
             && entry.outputs.len() == outputs.len();
         let is_there = |output: &OutputSum| {
-            let sum = sum::of_file(&folder.join(name::path_of(&output.file)));
+            let sum = sum::of_file(&folder.join(file_name::path_of(&output.file)));
             outputs.contains(&output.file) && sum.is_ok_and(|sum| sum == output.sha256)
         };
         (is_same && entry.outputs.iter().all(is_there)).then_some(entry)

@@ -12,7 +12,7 @@ use super::manifest::{MadeFrom, ManifestEntry};
 use super::summary;
 use crate::cli::many::Shard;
 use crate::failure::{ErrorCode, Failure};
-use crate::io::name::ShowPath;
+use crate::file_name::ShowPath;
 use crate::outcome::Outcome;
 use crate::print::{Report, plural};
 

@@ -32,8 +32,8 @@ use self::plan::{BatchFile, BatchPlan};
 use self::summary::{BatchResult, Treated};
 use crate::cli::{BatchOptions, OutputArgs};
 use crate::failure::{ErrorCode, Failure};
+use crate::file_name::{self, ShowPath};
 use crate::io::json_lines::JsonLines;
-use crate::io::name::{self, ShowPath};
 use crate::io::output::{self, Output, end_of_links};
 use crate::outcome::{Made, Outcome};
 use crate::progress::{Amount, Progress, Task};
@@ -74,7 +74,7 @@ type OnOne<'a> = dyn Fn(&OneRun) -> Result<Made, Failure> + Sync + 'a;
 pub(crate) fn is_asked(inputs: &[PathBuf], many: &BatchOptions, result: &OutputArgs) -> bool {
     let output = result.output.as_deref();
     many.is_asked()
-        || output.is_some_and(name::ends_with_separator)
+        || output.is_some_and(file_name::ends_with_separator)
         || (output.is_some_and(Path::is_dir) && is_several(inputs))
 }
 
@@ -178,7 +178,7 @@ pub(crate) fn run(
 fn dry_run(plan: &BatchPlan) -> String {
     let line = |file: &BatchFile| {
         let outputs: Vec<PathBuf> = file.outputs.iter().map(|o| plan.result(o)).collect();
-        let to = name::list(&outputs);
+        let to = file_name::list(&outputs);
         format!(
             "{}: {} -> {to}\n",
             plan.intent(file),
@@ -336,7 +336,7 @@ fn sums(outputs: &[Output], folder: &Path) -> Result<Vec<OutputSum>, Failure> {
         let below = output.place().strip_prefix(folder);
         let sum = output.sum().map_err(unreadable)?;
         Ok(sum.map(|sha256| OutputSum {
-            file: name::with_slashes(below.unwrap_or(output.place())),
+            file: file_name::with_slashes(below.unwrap_or(output.place())),
             sha256,
         }))
     });

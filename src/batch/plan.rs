@@ -7,7 +7,7 @@ use super::BatchTask;
 use super::list::{FoundFile, Listing};
 use super::manifest::{self, History, MadeBy, MadeFrom, ManifestEntry, RunBegin, WholeList};
 use crate::failure::{ErrorCode, Failure};
-use crate::io::name::{self, ShowPath, is_dash};
+use crate::file_name::{self, ShowPath, is_dash};
 use crate::io::output::end_of_links;
 use crate::parallel::cores;
 
@@ -207,7 +207,7 @@ impl<'a> BatchPlan<'a> {
 
     /// The path of a result.
     pub(super) fn result(&self, output: &str) -> PathBuf {
-        self.folder.join(name::path_of(output))
+        self.folder.join(file_name::path_of(output))
     }
 
     /// What will be done with a recording, in a word.
@@ -255,7 +255,7 @@ fn folder(task: &BatchTask) -> Result<PathBuf, Failure> {
     };
     let is_file = match std::fs::metadata(path) {
         Ok(meta) => !meta.is_dir(),
-        Err(_) => !name::ends_with_separator(path) && path.extension().is_some(),
+        Err(_) => !file_name::ends_with_separator(path) && path.extension().is_some(),
     };
     match is_file {
         true => Err(Failure::usage(

@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::manifest::{ManifestEntry, NotedWarning};
 use super::plan::BatchPlan;
 use crate::failure::{ErrorCode, Failure};
-use crate::io::name::ShowPath;
+use crate::file_name::ShowPath;
 use crate::io::output::{self, Output};
 use crate::io::storage::Stored;
 use crate::outcome::Outcome;

@@ -4,7 +4,7 @@ use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Command, CommandFactory, FromArgMatches};
 
 use super::Cli;
-use crate::io::name::ShowPath;
+use crate::file_name::ShowPath;
 
 /// Headings of the help, with the options below each.
 const GROUPS: [(&str, &[&str]); 7] = [

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use crate::failure::did_you_mean;
+use crate::file_name::{ShowPath, is_dash};
 use crate::io::digits::Digits;
-use crate::io::name::{ShowPath, is_dash};
 use crate::io::positive_frequency;
 use crate::warning::CODES;
 

@@ -6,7 +6,7 @@ use clap::Error;
 use clap::error::ErrorKind;
 
 use crate::failure::{ErrorCode, Failure};
-use crate::io::name::path_of_bytes;
+use crate::file_name::path_of_bytes;
 
 /// Whether `--json` is among the arguments of the process, whatever else is wrong with them.
 pub(crate) fn is_json_asked() -> bool {

@@ -10,7 +10,7 @@ use self::questions::{BRIDGE, DRAWING, MECHANICS, Question, TRANSDUCER};
 use super::{Outcome, conclude};
 use crate::cli::Strictness;
 use crate::cli::init::{Init, InitFrom};
-use crate::io::name::{ShowPath, is_dash};
+use crate::file_name::{ShowPath, is_dash};
 use torqcomp_model::Kind;
 
 use crate::failure::{ErrorCode, Failure};

@@ -9,7 +9,7 @@ use clap_mangen::roff::{Roff, bold, roman};
 use super::Outcome;
 use crate::cli::Man;
 use crate::failure::{ErrorCode, Failure, did_you_mean};
-use crate::io::name::{self, ShowPath};
+use crate::file_name::{self, ShowPath};
 use crate::io::output::{self, Output};
 
 /// Runs the verb.
@@ -52,7 +52,7 @@ fn command() -> Command {
 }
 
 fn names_a_folder(path: &Path) -> bool {
-    path.is_dir() || name::ends_with_separator(path)
+    path.is_dir() || file_name::ends_with_separator(path)
 }
 
 /// The verb with these words.

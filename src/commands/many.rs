@@ -8,7 +8,7 @@ use crate::cli::{
     BatchOptions, Compensate, Extract, Format, Harmonics, Inspect, OutputArgs, Simulate,
 };
 use crate::failure::{ErrorCode, Failure};
-use crate::io::name::ShowPath;
+use crate::file_name::ShowPath;
 use crate::outcome::Made;
 use crate::stand;
 

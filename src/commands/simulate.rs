@@ -8,7 +8,7 @@ use torqcomp_model::{Chain, Unit, UnitSystem};
 use super::{judged, rows, warned};
 use crate::cli;
 use crate::failure::{ErrorCode, Failure};
-use crate::io::name::ShowPath;
+use crate::file_name::ShowPath;
 use crate::io::output::Output;
 use crate::io::{ChannelChoice, Flags, Input};
 use crate::outcome::{Made, RecordFigures};

@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 use super::packed::{self, Packing};
 use super::storage::Stored;
 use crate::failure::Failure;
-use crate::io::name::{ShowPath, is_dash};
+use crate::file_name::{ShowPath, is_dash};
 
 /// The first bytes of an MCAP file that do not tell its version.
 pub(crate) const MCAP_START: &[u8] = b"\x89MCAP";

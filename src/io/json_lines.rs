@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::storage;
 use crate::failure::{ErrorCode, Failure};
-use crate::io::name::ShowPath;
+use crate::file_name::ShowPath;
 
 /// First bytes in which a line of the file's kind is looked for.
 const LOOKED_AT: usize = 1 << 16;

@@ -6,7 +6,6 @@ mod input;
 pub(crate) mod json_lines;
 mod mark;
 pub mod mcap;
-pub(crate) mod name;
 pub mod number;
 pub mod output;
 pub(crate) mod packed;

@@ -10,7 +10,7 @@ use tempfile::NamedTempFile;
 
 use super::{parts, storage, sum};
 use crate::failure::{ErrorCode, Failure};
-use crate::io::name::{ShowPath, is_dash};
+use crate::file_name::{ShowPath, is_dash};
 
 /// Whether anything was written to standard output.
 static IS_STDOUT_USED: AtomicBool = AtomicBool::new(false);

@@ -9,7 +9,7 @@ use torqcomp_dsp::store::SampleStore;
 
 use super::uniform::KeepSamples;
 use crate::failure::{ErrorCode, Failure};
-use crate::io::name::ShowPath;
+use crate::file_name::ShowPath;
 use crate::io::storage::Scratch;
 
 /// Samples that stay in memory.

@@ -13,7 +13,7 @@ use super::mechanics::mechanics;
 use super::section::{Section, SourceText};
 use super::{Diagnosed, Mechanics, Stand, TransducerSignal};
 use crate::failure::Failure;
-use crate::io::name::ShowPath;
+use crate::file_name::ShowPath;
 use crate::io::storage;
 use crate::print::short;
 use crate::warning::Warning;

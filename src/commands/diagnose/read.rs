@@ -14,7 +14,7 @@ use crate::diagnose::{
     StandRecord,
 };
 use crate::failure::{ErrorCode, Failure};
-use crate::io::name::{ShowPath, texts};
+use crate::file_name::{ShowPath, texts};
 use crate::io::{ChannelChoice, Input};
 use crate::print::short;
 use crate::recording::AlignedChannels;

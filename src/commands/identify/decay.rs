@@ -10,9 +10,9 @@ use super::{Recorded, deliver};
 use crate::cli::identify::Decay;
 use crate::commands::Outcome;
 use crate::failure::Failure;
+use crate::file_name::{self, ShowPath};
 use crate::identify::decay::{DecayOptions, Ringing, identify};
 use crate::identify::{Identification, ModalPole};
-use crate::io::name::{self, ShowPath};
 use crate::io::{Input, Reading, already_compensated};
 use crate::quality;
 use crate::recording::{AlignedChannels, Recording, check_cells, is_uniform};
@@ -155,7 +155,7 @@ fn resampled(input: &Path, mut aligned: AlignedChannels, recorded: &mut Recorded
 fn entries(args: &Decay, result: &mut Identification) -> Result<Vec<Entry>, Failure> {
     let several = result.modes.len() > 1 && args.findings.result.output.is_some();
     let mode = (&result.modes[0].clone(), Ratios::OverInertia);
-    let source = format!("identify decay: {}", name::list(&args.inputs));
+    let source = format!("identify decay: {}", file_name::list(&args.inputs));
     let of_one = from_ratios(&args.anchors, &args.findings, mode, &source, result)?;
     match several {
         true => Ok(vec![modes(result, &source)]),

@@ -14,8 +14,8 @@ use torqcomp_model::{Dimension, Kind, UnitSystem};
 use super::{Outcome, conclude};
 use crate::cli::identify::{Findings, Identify, Test};
 use crate::failure::{ErrorCode, Failure};
+use crate::file_name::{self, ShowPath, is_dash};
 use crate::identify::{Identification, NamedEstimate};
-use crate::io::name::{self, ShowPath, is_dash};
 use crate::io::output::{self, Output, Policy};
 use crate::print::Report;
 use crate::provenance::Provenance;
@@ -110,7 +110,7 @@ fn deliver(
     findings: &Findings,
     entries: &[Entry],
 ) -> Result<Outcome, Failure> {
-    result.inputs = name::texts(&recorded.inputs);
+    result.inputs = file_name::texts(&recorded.inputs);
     result.samples = recorded.samples;
     result.rate_hz = recorded.rate_hz;
     result.rate_std_hz = recorded.rate_std_hz;

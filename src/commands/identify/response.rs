@@ -8,9 +8,9 @@ use super::{FORCE, Recorded, TORQUE, deliver, entry, quantity, stand_text, unit_
 use crate::cli::identify::Response;
 use crate::commands::Outcome;
 use crate::failure::{ErrorCode, Failure};
+use crate::file_name::{self, ShowPath};
 use crate::identify::response::{Driven, RATIO, ResponseOptions, identify};
 use crate::identify::{Identification, Motion, NamedEstimate};
-use crate::io::name::{self, ShowPath};
 use crate::io::{ChannelChoice, Input};
 use crate::quality;
 use crate::recording::{AlignedChannel, AlignedChannels};
@@ -41,7 +41,7 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
         }
         loaded.push(read);
     }
-    let names = name::texts(&args.inputs);
+    let names = file_name::texts(&args.inputs);
     let records: Vec<Driven> = loaded
         .iter()
         .zip(&names)
@@ -67,7 +67,7 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
         result.label_charts(RATIO, &unit);
     }
     let written = modes::WrittenModes {
-        source: format!("identify response: {}", name::list(&args.inputs)),
+        source: format!("identify response: {}", file_name::list(&args.inputs)),
         motion,
         units,
     };
@@ -149,7 +149,7 @@ fn calibration(
         name: key.to_owned(),
         estimate: Estimate::of(unit, value, std),
     };
-    let source = format!("identify response: {}", name::list(&args.inputs));
+    let source = format!("identify response: {}", file_name::list(&args.inputs));
     let written = entry("calibration", key, &constant, &source);
     result.parameters.push(constant);
     if std.is_none() {
@@ -225,7 +225,7 @@ fn entries(
         }
         _ => return Ok(Vec::new()),
     };
-    let source = format!("identify response: {}", name::list(&args.inputs));
+    let source = format!("identify response: {}", file_name::list(&args.inputs));
     match rad_per_n_m {
         Some(size) => {
             let mode = mode.scaled(size);

@@ -3,7 +3,7 @@
 use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 
-use crate::io::name::{ShowPath, is_dash};
+use crate::file_name::{ShowPath, is_dash};
 use crate::io::storage::Stored;
 use crate::warning::Warning;
 

@@ -7,6 +7,7 @@ use prost_reflect::MessageDescriptor;
 
 use super::cdr;
 use super::json;
+use super::path::{self, PathPart};
 use super::protobuf;
 use super::route::{Hop, Route};
 use super::schema::Schema;
@@ -245,4 +246,42 @@ impl Decoder {
             Self::Json(targets) => json::read(targets, data, reading),
         }
     }
+}
+
+/// A name that no item has: asked for, all names are told.
+const NOBODY: &str = "\0";
+
+/// Names of the items of the list that a path goes through, in a message; `None` if they have none.
+pub fn item_names(
+    encoding: Encoding,
+    schema: &Arc<Schema>,
+    parts: &[PathPart],
+    message: &[u8],
+) -> Option<Vec<String>> {
+    let by_name = path::by_name(parts.to_vec(), NOBODY)?;
+    let route = Route::find(schema, &by_name).ok()?;
+    match values(encoding, schema, &route, message) {
+        Err(Damage::NoName { there, .. }) => Some(there),
+        _ => None,
+    }
+}
+
+/// What a message holds of a number.
+///
+/// # Errors
+/// [`Damage`] if it does not hold it.
+pub fn values(
+    encoding: Encoding,
+    schema: &Arc<Schema>,
+    route: &Route,
+    message: &[u8],
+) -> Result<Vec<f64>, Damage> {
+    let targets = Targets {
+        value: route.clone(),
+        stamp: None,
+        spacing: None,
+    };
+    let mut reading = Reading::default();
+    Decoder::new(encoding, schema, targets).read(message, &mut reading)?;
+    Ok(reading.values)
 }

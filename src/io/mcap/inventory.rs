@@ -9,9 +9,9 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::channels::{Channels, TopicChannel};
-use super::decode::{Damage, Decoder, Encoding, Reading, Targets};
+use super::decode::{Encoding, item_names, values};
 use super::index;
-use super::path::{self, NOBODY, PathPart};
+use super::path::{self, PathPart};
 use super::record::input::CountedInput;
 use super::record::reader::RecordReader;
 use super::record::{self, RawMessage};
@@ -442,21 +442,9 @@ fn leaf_report(
     let parts = path::parse(&leaf.first_item()).ok();
     let find = |parts: &Vec<PathPart>| Route::find(schema, parts).ok();
     let route = parts.as_ref().and_then(find);
-    let read = |value: Route, message: &[u8]| {
-        let targets = Targets {
-            value,
-            stamp: None,
-            spacing: None,
-        };
-        let mut reading = Reading::default();
-        let read = Decoder::new(encoding, schema, targets).read(message, &mut reading);
-        read.map(|()| reading.values.first().copied())
-    };
-    let by_name = parts.and_then(|parts| path::by_name(parts, NOBODY));
-    let by_name = by_name.as_ref().and_then(find);
-    let missed = by_name
+    let names = parts
         .zip(message)
-        .map(|(value, message)| read(value, message));
+        .and_then(|(parts, message)| item_names(encoding, schema, &parts, message));
     LeafReport {
         path: leaf.path.clone(),
         kind: leaf.number.name(),
@@ -467,11 +455,9 @@ fn leaf_report(
             .map(|found| found.unit),
         example: route
             .zip(message)
-            .and_then(|(value, message)| read(value, message).ok().flatten()),
-        names: match missed {
-            Some(Err(Damage::NoName { there, .. })) => there,
-            _ => Vec::new(),
-        },
+            .and_then(|(route, message)| values(encoding, schema, &route, message).ok())
+            .and_then(|values| values.first().copied()),
+        names: names.unwrap_or_default(),
         is_stamp: leaf.is_stamp,
     }
 }

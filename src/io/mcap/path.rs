@@ -94,9 +94,6 @@ fn item(word: &str, text: &str) -> Result<PathPart, String> {
     Ok(PathPart::Called { key, name })
 }
 
-/// A name that no item has: asked for, all names are told.
-pub const NOBODY: &str = "\0";
-
 /// A path whose first item of a list, or all of them, become the one of a name.
 pub fn by_name(mut parts: Vec<PathPart>, name: &str) -> Option<Vec<PathPart>> {
     let is_place = |part: &&mut PathPart| matches!(part, PathPart::Index(_) | PathPart::All);

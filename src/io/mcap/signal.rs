@@ -5,9 +5,9 @@ use std::sync::Arc;
 use super::blocks::{Blocks, Spacing};
 use super::channels::{Channels, TopicChannel};
 use super::clock::ClockCheck;
-use super::decode::{Damage, Decoder, Encoding, Reading, Targets};
+use super::decode::{Decoder, Encoding, Reading, Targets, item_names, values};
 use super::order::Sorter;
-use super::path::{self, NOBODY, PathPart};
+use super::path::{self, PathPart};
 use super::record::RawMessage;
 use super::route::Route;
 use super::schema::Schema;
@@ -306,12 +306,12 @@ fn by_name(
         PathPart::Index(place) => usize::try_from(*place).ok(),
         _ => None,
     })?;
-    let there = names(encoding, schema, &parts, message)?;
+    let there = item_names(encoding, schema, &parts, message)?;
     let name = there.get(place).filter(|name| !name.is_empty())?;
     let named = Route::find(schema, &path::by_name(parts, name)?).ok()?;
     let is_only = there.iter().filter(|other| *other == name).count() == 1;
     let bits = |route: &Route| {
-        let values = read(encoding, schema, route, message).ok()?;
+        let values = values(encoding, schema, route, message).ok()?;
         Some(values.into_iter().map(f64::to_bits).collect::<Vec<_>>())
     };
     let is_same = bits(route)? == bits(&named)?;
@@ -327,7 +327,7 @@ fn ask_for_item(
     message: &[u8],
 ) -> Result<(), String> {
     let parts = path::parse(&route.text).unwrap_or_default();
-    let names = names(encoding, schema, &parts, message).unwrap_or_default();
+    let names = item_names(encoding, schema, &parts, message).unwrap_or_default();
     let field = |name: &String| {
         let parts = path::by_name(parts.clone(), name);
         parts.map(|parts| format!("--field '{}'", path::text(&parts)))
@@ -341,38 +341,6 @@ fn ask_for_item(
             fields.join(", ")
         )),
     }
-}
-
-/// Names of the items of the list that a path goes through, in a message; `None` if they have none.
-fn names(
-    encoding: Encoding,
-    schema: &Arc<Schema>,
-    parts: &[PathPart],
-    message: &[u8],
-) -> Option<Vec<String>> {
-    let by_name = path::by_name(parts.to_vec(), NOBODY)?;
-    let route = Route::find(schema, &by_name).ok()?;
-    match read(encoding, schema, &route, message) {
-        Err(Damage::NoName { there, .. }) => Some(there),
-        _ => None,
-    }
-}
-
-/// What a message holds of a number.
-fn read(
-    encoding: Encoding,
-    schema: &Arc<Schema>,
-    route: &Route,
-    message: &[u8],
-) -> Result<Vec<f64>, Damage> {
-    let targets = Targets {
-        value: route.clone(),
-        stamp: None,
-        spacing: None,
-    };
-    let mut reading = Reading::default();
-    Decoder::new(encoding, schema, targets).read(message, &mut reading)?;
-    Ok(reading.values)
 }
 
 /// The time that counts, and why: the one asked for, or what the messages carry in a field.
