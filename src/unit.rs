@@ -13,6 +13,9 @@ pub struct NamedUnit {
     pub unit: Unit,
 }
 
+/// Unit of samples whose full scale is not known.
+pub(crate) const OF_FULL_SCALE: &str = "of full scale";
+
 impl NamedUnit {
     /// Reads a unit as recorders write it; words in brackets after it are left out
     /// (`Voltage (unscaled)` names no unit).

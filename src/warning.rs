@@ -152,6 +152,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["extra-cells", "rows have more cells than there are headings", "check the headings"],
         ["filled", "missing samples were filled in, as --fill asks", "do not trust the result there"],
         ["first-samples-only", "only the first samples were looked at", "cut the file into parts if the rest matters"],
+        ["items-move", "rows name the items of a list (`name[0]` beside `effort[0]`) in changing places; each was followed by the name that it has in the first row", "write each item to a column of its own"],
         ["lines-skipped", "lines among the rows are no rows and were left out", "check these lines"],
         ["sample-count", "the head says another number of rows than there are", "copy or export the file again"],
         ["samples-missing", "the header announces another number of samples than there are", "copy or export the file again"],

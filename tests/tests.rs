@@ -16,6 +16,7 @@ mod diagnose;
 #[cfg(debug_assertions)] // optimised builds have no faults on purpose
 mod faults;
 mod first_moves;
+mod first_moves_files;
 mod formats;
 mod free_body;
 mod golden;

@@ -1,6 +1,7 @@
 //! Choosing one channel of a recording: the same way for every format and verb.
 
 use torqcomp_dsp::quality::rate::{Contradiction, contradiction};
+use torqcomp_model::Unit;
 
 use super::axis::UNIFORM;
 use super::moment::Moment;
@@ -184,7 +185,16 @@ pub(crate) fn unit_of(
         return Ok((of_file.cloned(), None));
     };
     let given = NamedUnit::given(flag, text)?;
-    let other = of_file.filter(|named| named.unit != given.unit);
+    // The answer to whether a pound is a force is none that overrides it.
+    let answers = |named: &NamedUnit| {
+        let readings = Unit::readings_of_weight(&named.text).into_iter().flatten();
+        let mut units = readings.filter_map(|text| Unit::parse(&text).ok());
+        units.any(|unit| {
+            unit.dimension() == given.unit.dimension()
+                && (unit.factor() / given.unit.factor() - 1.0).abs() < 1e-12
+        })
+    };
+    let other = of_file.filter(|named| named.unit != given.unit && !answers(named));
     let warning = other.map(|named| {
         Warning::new(
             "unit-overrides-heading",

@@ -98,7 +98,7 @@ pub struct Segment {
     pub name: String,
     /// Start after the first segment, in s; `null` if the file does not say.
     pub start_s: Option<f64>,
-    /// Its date and time as written.
+    /// Its date and time: in ISO 8601 where they can be read in one way only, as written otherwise.
     #[serde(rename = "start_time")]
     pub start_text: Option<String>,
 }

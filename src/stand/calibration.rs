@@ -7,7 +7,7 @@ use super::static_law::StaticLaw;
 use super::{ConstantStd, Stand, TransducerSignal};
 use crate::failure::{ErrorCode, Failure};
 use crate::print::{rounded, short};
-use crate::unit::{NamedUnit, RecordedChannel};
+use crate::unit::{NamedUnit, OF_FULL_SCALE, RecordedChannel};
 use crate::warning::Warning;
 
 /// What acts on the stand: its name, and the unit it is printed in.
@@ -406,6 +406,13 @@ fn without_unit(channel: RecordedChannel) -> Failure {
                 "the channel \"{name}\" does not say its unit; give it: --unit V for what an amplifier or recorder put out \
                  (mV/V, mA, Hz, ustrain likewise), --unit \"N m\" (or N) for what is torque (or force) already, as from \
                  simulate"
+            ),
+        ),
+        Some(OF_FULL_SCALE) => Failure::failed(
+            ErrorCode::UnitUnclear,
+            format_args!(
+                "the samples of the channel \"{name}\" are fractions of full scale, and the file does not say what that is; \
+                 give it with its unit, as --full-scale \"10 V\""
             ),
         ),
         Some(text) => {

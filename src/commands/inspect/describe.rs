@@ -11,6 +11,7 @@ use super::whole;
 use crate::parallel::{parallel, threads};
 use crate::quality::{self, Findings, TimeFindings, copies, labels, unit_of};
 use crate::recording::moment::Moment;
+use crate::recording::text::Clock;
 use crate::recording::{Channel, Recording, TimeAxis};
 use crate::warning::Warning;
 
@@ -231,7 +232,7 @@ fn describe(channel: &Channel, found: &Findings, time: Option<&TimeFindings>) ->
             .filter(|start| start.origin_ns != 0)
             .map(Moment::nanoseconds),
         start_unit: "s",
-        start_time: axis.start_text.clone(),
+        start_time: axis.start_text.as_deref().map(Clock::iso_or_as_written),
         duration_s: duration_s(channel),
         assumed: axis.assumed.clone(),
         ..InspectedChannel::default()

@@ -107,7 +107,8 @@ pub(super) struct InspectedChannel {
     pub(super) start_ns: Option<i64>,
     /// Unit of `start`: always s.
     pub(super) start_unit: &'static str,
-    /// Date and time of the first sample, as written.
+    /// Date and time of the first sample, or those that the head gives: in ISO 8601 where they can be read in one way only, as
+    /// written otherwise.
     pub(super) start_time: Option<String>,
     /// Time from the first sample to the last, in s.
     pub(super) duration_s: Option<f64>,

@@ -76,7 +76,7 @@ pub(super) fn order(
     if folds.len() < 2 {
         return Err(Failure::failed(
             ErrorCode::TooFewSamples,
-            "one block is not enough to choose the number of modes; give it with --modes, or record more",
+            "one block is not enough to choose the number of modes; give it, as --modes 1 for a single resonance, or record more",
         ));
     }
     let errors = tried(set, lines, options, &folds)?;

@@ -17,7 +17,7 @@ use super::text::is_time_name;
 use super::{Channel, Hole, HoleKind, Recording, TimeAxis};
 use crate::failure::{ErrorCode, Failure};
 use crate::io::{ChannelChoice, Reading, names_compensated};
-use crate::unit::NamedUnit;
+use crate::unit::{NamedUnit, OF_FULL_SCALE};
 use crate::warning::Warning;
 
 /// A format.
@@ -59,7 +59,7 @@ pub(super) fn refuse_unit_of_fraction(
     channel: &Channel,
     choice: &ChannelChoice,
 ) -> Result<(), Failure> {
-    if channel.unit_text.as_deref() != Some(wave::FRACTION) {
+    if channel.unit_text.as_deref() != Some(OF_FULL_SCALE) {
         return Ok(());
     }
     let (Some(unit), Some(flag)) = (&choice.unit, choice.flags.unit) else {

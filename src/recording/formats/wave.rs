@@ -7,6 +7,7 @@ use super::{Content, Format, channel, cut, damaged, plausible_rate};
 use crate::failure::{ErrorCode, Failure};
 use crate::io::Reading;
 use crate::recording::TimeAxis;
+use crate::unit::OF_FULL_SCALE;
 use crate::warning::Warning;
 
 pub(super) const WAVE: Format = Format {
@@ -19,8 +20,6 @@ pub(super) const WAVE: Format = Format {
 
 /// Length of data that a recorder did not fill in, or that stands in a chunk `ds64`.
 const UNKNOWN: u32 = u32::MAX;
-/// Unit of samples whose full scale is not known.
-pub(super) const FRACTION: &str = "of full scale";
 /// Longest chunk that is no data and is kept in memory.
 const LONGEST_CHUNK: u64 = 1 << 16;
 
@@ -153,7 +152,7 @@ fn data(
     let frames = stored.len() / layout.frame();
     let (scale, unit) = match &reading.full_scale {
         Some(full) => (full.value / layout.full, full.unit.text.as_str()),
-        None => (1.0 / layout.full, FRACTION),
+        None => (1.0 / layout.full, OF_FULL_SCALE),
     };
     let width = layout.number.width();
     let samples = |place: usize| -> Vec<f64> {

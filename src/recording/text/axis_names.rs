@@ -27,6 +27,9 @@ pub fn is_time_name(name: &str) -> bool {
     match words.as_slice() {
         [] => false,
         [one] => is(one),
+        // header.stamp.nanosec, /joint_states/header/stamp
+        [.., "stamp", last] if is(last) => true,
+        [.., "header", "stamp"] => true,
         // "elapsed time", "rel_time", "time stamp", "Date/Time", "Time 1 - default sample rate".
         [first, .., last] => {
             let first_is = is(first) && *first != "t" && *first != "second";
@@ -118,6 +121,11 @@ mod tests {
             "TimeMs",
             "ms_since_boot",
             "millis()",
+            "stamp",
+            "header.stamp",
+            "/joint_states/header/stamp",
+            "header.stamp.nanosec",
+            "nsecs",
         ] {
             assert!(is_time_name(name), "{name}");
         }

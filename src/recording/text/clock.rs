@@ -4,6 +4,8 @@
 //! Only differences are used, so a time zone is passed over and the order of day and month between
 //! slashes matters only where both are at most 12 (then the month is taken to be first).
 
+use crate::recording::moment::date_and_time;
+
 /// Nanoseconds of a second.
 const SECOND: i64 = 1_000_000_000;
 /// Nanoseconds of a day.
@@ -86,6 +88,40 @@ impl Clock {
         })
     }
 
+    /// Date and time in a form of ISO 8601, with the zone that is given, if a text can be read in one way only.
+    ///
+    /// ```
+    /// use torqcomp::recording::text::Clock;
+    /// assert_eq!(Clock::iso("14.03.2025 10:11:12,5").unwrap(), "2025-03-14T10:11:12.5");
+    /// assert_eq!(Clock::iso("2025-03-14 10:11:12+01:00").unwrap(), "2025-03-14T10:11:12+01:00");
+    /// assert_eq!(Clock::iso("03/04/2025 10:11:12"), None);
+    /// ```
+    #[must_use]
+    pub fn iso(text: &str) -> Option<String> {
+        let clock = Self::parse(text)?;
+        let (Some(_), Some(_), false) = (clock.day, clock.nanoseconds, is_ambiguous(text)) else {
+            return None;
+        };
+        let utc = date_and_time(clock.total())?;
+        let (_, behind_hour) = text.split_once(':')?;
+        let zone = match behind_hour.find(['+', '-']) {
+            Some(place) => behind_hour[place..].trim(),
+            None if behind_hour.ends_with(['Z', 'z', 'C', 'c', 'T', 't']) => "Z",
+            None => "",
+        };
+        let without_zeros = utc.trim_end_matches('Z').trim_end_matches('0');
+        Some(format!("{}{zone}", without_zeros.trim_end_matches('.')))
+    }
+
+    /// The same, or the text as it is written, as where it is of ISO 8601 already.
+    #[must_use]
+    pub fn iso_or_as_written(text: &str) -> String {
+        let is_iso =
+            text.as_bytes().get(4) == Some(&b'-') && text.as_bytes().get(10) == Some(&b'T');
+        let found = Self::iso(text).filter(|_| !is_iso);
+        found.unwrap_or_else(|| text.to_owned())
+    }
+
     /// Seconds after another one.
     #[must_use]
     pub fn seconds_after(self, first: Self) -> f64 {
@@ -113,6 +149,25 @@ pub fn days_between(last: f64, times: &[f64]) -> f64 {
     let first = times.first().copied().unwrap_or(last);
     let days = ((last - first + 0.5 * DAY_S) / DAY_S).floor();
     if days > 0.0 { days * DAY_S } else { 0.0 }
+}
+
+/// Whether the order of day and month, or of day and year, cannot be seen: `03/04/2025`, `25-03-14`.
+fn is_ambiguous(text: &str) -> bool {
+    let Some(mark) = text.chars().find(|c| !c.is_ascii_digit()) else {
+        return false;
+    };
+    let parts: Vec<&str> = text
+        .splitn(4, |c: char| !c.is_ascii_digit())
+        .take(3)
+        .collect();
+    let number = |place: usize| parts.get(place).and_then(|part| part.parse::<u32>().ok());
+    match (mark, parts.as_slice(), number(0), number(1)) {
+        ('/' | '-', [first, _, year], Some(a), Some(b)) if first.len() < 4 => {
+            let is_year = year.len() == 4;
+            a <= 12 && b <= 12 && a != b || !is_year && b <= 12
+        }
+        _ => false,
+    }
 }
 
 /// Whether a text has a mark of dates or times in it, or ends in a year, as `2 May 2022` does.

@@ -17,37 +17,43 @@ pub fn split(heading: &str) -> (&str, Option<NamedUnit>) {
     {
         return (name.trim(), Some(unit));
     }
-    // The longest suffix wins: `accel_m_s` does not end in seconds.
-    let ending = words("endings")
-        .iter()
-        .filter_map(|word| {
-            let name = heading.strip_suffix(word.text)?.strip_suffix('_')?;
-            (!name.is_empty()).then_some((word.text.len(), name, word.meaning))
-        })
-        .max_by_key(|(length, ..)| *length);
-    if let Some((_, name, meaning)) = ending
+    if let Some((name, meaning)) = ending(heading).or_else(|| suffixed(heading))
         && let Ok(unit) = Unit::parse(meaning)
     {
         let text = meaning.to_owned();
         return (name, Some(NamedUnit { text, unit }));
     }
-    if let Some((name, unit)) = suffixed(heading) {
-        return (name, NamedUnit::parse(unit));
-    }
     (heading, None)
 }
 
-/// A unit of one letter after an underscore, where the name says that it is meant: `position_m` and
+/// Name of a heading and the unit behind an underscore; the longest unit, since `accel_m_s` does not end in seconds.
+fn ending(heading: &str) -> Option<(&str, &'static str)> {
+    let before = |text: &str, unit: &str| Some(text.strip_suffix(unit)?.strip_suffix('_')?.len());
+    // torque_N mm, torque_ft-lbf
+    let plain = heading.rsplit_once('_').map(|(name, unit)| {
+        let is_mark = |c: char| matches!(c, ' ' | '-' | '.' | '*' | '·' | '⋅');
+        format!("{name}_{}", unit.replace(is_mark, ""))
+    });
+    let known = words("endings").iter().filter_map(|word| {
+        let of_plain = || before(plain.as_deref()?, word.text);
+        let end = before(heading, word.text).or_else(of_plain)?;
+        (end > 0).then_some((word.text.len(), &heading[..end], word.meaning))
+    });
+    let (_, name, meaning) = known.max_by_key(|(length, ..)| *length)?;
+    Some((name, meaning))
+}
+
+/// A unit after an underscore that can be something else, where the name says that it is meant: `position_m` and
 /// `motor_current_A`, but not `arm_m` and `phase_A`.
 fn suffixed(text: &str) -> Option<(&str, &'static str)> {
-    let (name, letter) = text.rsplit_once('_')?;
-    let lower = text.to_lowercase();
+    let (name, letters) = text.rsplit_once('_')?;
+    let lower = name.to_lowercase();
     let mut known = words("endings after words").iter();
-    let found = known.find(|word| word.meaning == letter && lower.contains(word.text))?;
-    let unit = if found.meaning == "C" {
-        "degC"
-    } else {
-        found.meaning
+    let found = known.find(|word| word.meaning == letters && lower.contains(word.text))?;
+    let unit = match found.meaning {
+        "C" => "degC",
+        "nm" => "N m",
+        letters => letters,
     };
     Some((name, unit))
 }
@@ -77,6 +83,25 @@ mod tests {
             ("strain [µm/m]", "strain", Some("µm/m")),
             ("motor_in", "motor_in", None),
             ("position_nm", "position_nm", None),
+            ("torque_nm", "torque", Some("N m")),
+            ("torque_N mm", "torque", Some("N mm")),
+            ("torque_Nmm", "torque", Some("N mm")),
+            ("torque_mNm", "torque", Some("mN m")),
+            ("torque_mN m", "torque", Some("mN m")),
+            ("torque_N·m", "torque", Some("N m")),
+            ("torque_lbft", "torque", Some("ft lb")),
+            ("torque_ft-lbs", "torque", Some("ft lb")),
+            ("torque_ft_lb", "torque", Some("ft lb")),
+            ("torque_ft-lbf", "torque", Some("ft lbf")),
+            ("torque_oz_in", "torque", Some("in oz")),
+            ("test_mass_g", "test_mass", Some("g")),
+            ("accel_g", "accel_g", None),
+            ("force_lb", "force", Some("lb")),
+            ("wheel_lb", "wheel_lb", None),
+            ("sensor_a", "sensor_a", None),
+            ("motor_m", "motor_m", None),
+            ("channel_n", "channel_n", None),
+            ("motor_N.s", "motor_N.s", None),
             ("phase_A", "phase_A", None),
             ("accel_m_s2", "accel", Some("m/s^2")),
             ("hit_1", "hit_1", None),

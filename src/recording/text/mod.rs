@@ -347,7 +347,8 @@ fn recording_of(parts: Vec<ReadTable>) -> (Recording, Vec<Option<AllSamples>>) {
                 recording.segments.push(Segment {
                     name: format!("segment {}", segment + 1),
                     start_s: None,
-                    start_text: keys::date_text(&part.header.entries),
+                    start_text: keys::date_text(&part.header.entries)
+                        .map(|text| Clock::iso_or_as_written(&text)),
                 });
             }
             for mut channel in channels {

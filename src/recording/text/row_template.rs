@@ -64,7 +64,7 @@ struct Run {
 
 impl RowTemplate {
     pub(super) fn of(plan: &RowPlan) -> Self {
-        let is_pair = plan.kinds == [ColumnKind::Numbers; 2];
+        let is_pair = plan.kinds == [ColumnKind::Numbers; 2] && plan.items.is_empty();
         Self {
             separator: match plan.dialect.delimiter {
                 Delimiter::Byte(mark) if is_pair => Some(mark),
@@ -247,6 +247,7 @@ mod tests {
             stamps: Some(time),
             keeps_stamp_text: true,
             end: TableEnd::of_marks(&[], COMMA),
+            items: Vec::new(),
         }
     }
 

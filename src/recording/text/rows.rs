@@ -5,6 +5,7 @@
 //! All three ways give the same numbers.
 
 mod cut;
+mod items;
 mod plain_row;
 
 use super::blocks::TableEnd;
@@ -16,6 +17,7 @@ use crate::io::number;
 use crate::recording::text::dialect::{Dialect, decode_line, is_comment, is_skipped};
 use crate::recording::{Hole, HoleKind};
 use cut::line_of;
+pub use items::{Item, items};
 
 /// What a column holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,6 +48,8 @@ pub struct RowPlan {
     pub keeps_stamp_text: bool,
     /// What ends the table.
     pub end: TableEnd,
+    /// Columns whose values follow names that stand in other columns.
+    pub items: Vec<Item>,
 }
 
 /// A column as read.
@@ -89,6 +93,8 @@ pub struct LineNotes {
     pub too_wide: Option<usize>,
     /// Zero bytes that were passed over.
     pub zeros: usize,
+    /// Rows in which an item of a list stood in another place.
+    pub moved: usize,
 }
 
 /// Empty cells that any file may have, besides one for each byte.
@@ -235,9 +241,17 @@ impl Rows {
             self.notes.too_wide.get_or_insert(number);
         }
         self.note_break(number);
-        for (place, (cell, text)) in read.iter().zip(&cells).enumerate().take(plan.kinds.len()) {
-            self.put(place, *cell, text, plan);
+        let mut moved = false;
+        for place in 0..read.len().min(plan.kinds.len()) {
+            let item = plan.items.iter().find(|item| item.column == place);
+            let from = item.map_or(Some(place), |item| item.place_in(&cells));
+            moved |= from != Some(place);
+            match from {
+                Some(from) if from < read.len() => self.put(place, read[from], &cells[from], plan),
+                _ => self.put(place, Cell::Text, "", plan),
+            }
         }
+        self.notes.moved += usize::from(moved);
         if plan.keeps_stamp_text {
             // The same text elsewhere in the line does as well, as long as it is not quoted.
             let cell = plan.stamps.and_then(|place| cells.get(place));
@@ -343,6 +357,7 @@ impl LineNotes {
         self.odd_count += more.odd_count;
         self.too_wide = self.too_wide.or(more.too_wide.map(|line| before + line));
         self.zeros += more.zeros;
+        self.moved += more.moved;
     }
 }
 
@@ -366,6 +381,7 @@ pub fn of_numbers(
         stamps: Some(0),
         keeps_stamp_text: false,
         end: TableEnd::of_marks(marks, dialect),
+        items: Vec::new(),
         kinds,
     };
     let mut rows = Rows::default();

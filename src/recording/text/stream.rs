@@ -161,6 +161,13 @@ impl ChannelPlan {
             rows: RowPlan {
                 kinds: (0..=last).map(kind).collect(),
                 stamps: time.filter(|_| !is_watched),
+                items: layout
+                    .plan
+                    .items
+                    .iter()
+                    .filter(|item| item.column == value)
+                    .cloned()
+                    .collect(),
                 keeps_stamp_text: time.is_some() && !is_watched,
                 ..layout.plan.clone()
             },

@@ -12,7 +12,7 @@ use super::chunks::{Chunks, Piece};
 use super::head::{self, Head, Table};
 use super::header::{self, Field, Header};
 use super::last_line::{LastLine, last_line};
-use super::rows::{Column, ColumnKind, RowPlan, Rows, cleaned};
+use super::rows::{Column, ColumnKind, Item, RowPlan, Rows, cleaned, items};
 use super::tail::Tail;
 use super::{listing, sparse, summary};
 use crate::failure::Failure;
@@ -115,6 +115,7 @@ impl Layout {
             stamps: Some(0),
             keeps_stamp_text: false,
             end: TableEnd::of(&header, &kinds, table.dialect),
+            items: named_items(&head, &header, first, table.dialect),
             kinds,
         };
         let offset = head.lines[first].offset;
@@ -361,8 +362,9 @@ impl Layout {
             .rules
             .iter()
             .filter_map(|rule| rule.stamps.as_ref());
-        let mut rules =
-            rules.filter(|rule| rule.place == place || rule.milliseconds == Some(place));
+        let mut rules = rules.filter(|rule| {
+            rule.place == place || rule.parts.is_some_and(|parts| parts.place == place)
+        });
         rules.next().is_some()
     }
 
@@ -426,6 +428,16 @@ fn column_kinds(
         }
     }
     counts.into_iter().map(Counts::kind).collect()
+}
+
+/// The columns that follow names in other columns.
+fn named_items(head: &Head, header: &Header, first: usize, dialect: Dialect) -> Vec<Item> {
+    let headings: Vec<&str> = header
+        .fields
+        .iter()
+        .map(|field| field.heading.as_str())
+        .collect();
+    items(&headings, &dialect.cells(&head.lines[first].text))
 }
 
 /// The first row: a row with something wrong in it may stand between the headings and the first good

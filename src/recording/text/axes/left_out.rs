@@ -33,7 +33,9 @@ impl Sources<'_> {
         let stamps = rule.stamps(self.columns);
         let is_other = |place: &&usize| {
             let values = &self.columns[**place].values;
-            !self.fields[**place].is_label
+            let is_used = rule.parts.is_some() && rule.place == **place;
+            !is_used
+                && !self.fields[**place].is_label
                 && !self.is_clock(**place)
                 && values.len() >= ROWS
                 && values.windows(2).all(|pair| pair[1] >= pair[0])

@@ -32,7 +32,11 @@ impl Sources<'_> {
     /// or a first column that can be nothing else.
     pub(super) fn time_places(&self, used: &[usize]) -> Result<TimePlaces, Failure> {
         if let Some(wanted) = &self.reading.time_column {
-            return Ok(TimePlaces::sure(vec![self.given_time(wanted)?]));
+            let place = self.given_time(wanted)?;
+            let parts = self.parts_of(place).map(|parts| parts.place);
+            let mut times: Vec<usize> = [place].into_iter().chain(parts).collect();
+            times.sort_unstable();
+            return Ok(TimePlaces::sure(times));
         }
         let field = |place: usize| &self.fields[place];
         let named: Vec<usize> = used

@@ -27,14 +27,25 @@ pub struct StampRule {
     pub clock_ns: Option<i64>,
     /// Whether they are times of day, which begin anew at midnight.
     pub is_time_of_day: bool,
-    /// The column with the milliseconds of each stamp, if they stand in one of their own.
-    pub milliseconds: Option<usize>,
+    /// The column with the parts of a second of each stamp, if they stand in one of their own.
+    pub parts: Option<Parts>,
     /// Whether each value is the time since the row before.
     pub is_sum: bool,
     /// Date and time of the first one as written.
     pub start_text: Option<String>,
     /// What was taken for granted.
     pub assumed: Option<String>,
+}
+
+/// A column with the parts of a second.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Parts {
+    /// Its place.
+    pub place: usize,
+    /// Seconds per unit of its values.
+    seconds_per_unit: f64,
+    /// The whole seconds of the first row, which are taken off the others, so that no digit of the parts is lost.
+    whole: f64,
 }
 
 impl StampRule {
@@ -48,11 +59,9 @@ impl StampRule {
         if self.is_time_of_day {
             unwrap_midnights(&mut stamps);
         }
-        if let Some(place) = self.milliseconds {
-            let parts = &columns[place].values;
-            let first = parts.first().copied().unwrap_or(0.0);
-            for (stamp, part) in stamps.iter_mut().zip(parts) {
-                *stamp += (part - first) * 1e-3;
+        if let Some(rule) = self.parts {
+            for (stamp, part) in stamps.iter_mut().zip(&columns[rule.place].values) {
+                *stamp = *stamp - rule.whole + part * rule.seconds_per_unit;
             }
         }
         if self.is_sum {
@@ -75,7 +84,7 @@ impl StampRule {
             origin_ns: 0,
             clock_ns: None,
             is_time_of_day: false,
-            milliseconds: None,
+            parts: None,
             is_sum: false,
             start_text: None,
             assumed: None,
@@ -84,7 +93,7 @@ impl StampRule {
 
     /// Whether each row has its stamp in one cell, whatever the other rows say.
     pub fn is_of_one_cell(&self) -> bool {
-        !self.is_sum && self.milliseconds.is_none()
+        !self.is_sum && self.parts.is_none()
     }
 }
 
@@ -96,6 +105,9 @@ impl Sources<'_> {
         header_hz: Option<f64>,
     ) -> Result<Option<StampRule>, Failure> {
         let mut found = Vec::new();
+        if let Some(rule) = self.rule_of_two(group) {
+            return Ok(Some(rule));
+        }
         for place in &group.times {
             let rule = match self.kinds[*place] {
                 ColumnKind::Clock(first) if first.nanoseconds.is_none() => None,
@@ -160,6 +172,11 @@ impl Sources<'_> {
                 !self.is_clock(*p)
                     && values.iter().all(|v| (0.0..1000.0).contains(v))
                     && !rises(values)
+            })
+            .map(|place| Parts {
+                place,
+                seconds_per_unit: 1e-3,
+                whole: 0.0,
             });
         let text = self.clock_texts[place].clone().unwrap_or_default();
         let date = group
@@ -170,13 +187,67 @@ impl Sources<'_> {
         StampRule {
             is_time_of_day: first.day.is_none(),
             clock_ns: Some(first.total()),
-            milliseconds,
+            parts: milliseconds,
             start_text: Some(match date.filter(|_| first.day.is_none()) {
                 Some(date) => format!("{date} {text}"),
                 None => text,
             }),
             ..StampRule::of_seconds(&self.fields[place].heading, place)
         }
+    }
+
+    /// Whole seconds in one column and the parts of them in another, as ROS has them: `sec` beside `nanosec`.
+    fn rule_of_two(&self, group: &Group) -> Option<StampRule> {
+        let place = *group.times.iter().find(|p| self.parts_of(**p).is_some())?;
+        let parts = self.parts_of(place)?;
+        let is_there = group.times.contains(&parts.place);
+        let origin = match self.kinds[place] {
+            ColumnKind::Offset(origin) => origin as f64,
+            _ => 0.0,
+        };
+        let origin_ns = ((origin + parts.whole) * 1e9) as i64;
+        Some(StampRule {
+            origin_ns,
+            clock_ns: Some(origin_ns).filter(|ns| *ns != 0),
+            parts: Some(parts),
+            ..StampRule::of_seconds(&self.fields[place].heading, place)
+        })
+        .filter(|_| is_there)
+    }
+
+    /// The parts of the whole seconds that a column holds, in the column beside it.
+    pub(super) fn parts_of(&self, place: usize) -> Option<Parts> {
+        let seconds_of = |place: usize| {
+            let field = self.fields.get(place)?;
+            let unit = field.unit.as_ref().filter(|_| field.is_named_time())?;
+            units::is_time(unit).then(|| unit.unit.factor())
+        };
+        let numbers = |place: usize| &self.columns[place].values;
+        let are_whole = numbers(place).iter().all(|value| value.fract() == 0.0);
+        if seconds_of(place) != Some(1.0) || !are_whole || self.is_clock(place) {
+            return None;
+        }
+        let whole = *numbers(place).first()?;
+        let beside = [Some(place + 1), place.checked_sub(1)];
+        let known = beside.into_iter().flatten().find_map(|beside| {
+            let parts = Parts {
+                place: beside,
+                seconds_per_unit: seconds_of(beside).filter(|seconds| *seconds < 1e-2)?,
+                whole,
+            };
+            let is_part = |value: &f64| {
+                value.fract() == 0.0 && (0.0..1.0).contains(&(value * parts.seconds_per_unit))
+            };
+            let is_filled = numbers(beside).len() == numbers(place).len();
+            (is_filled && !self.is_clock(beside) && numbers(beside).iter().all(is_part))
+                .then_some(parts)
+        })?;
+        // A pair of two other times would not rise.
+        let rule = StampRule {
+            parts: Some(known),
+            ..StampRule::of_seconds("", place)
+        };
+        rises(&rule.stamps(self.columns)).then_some(known)
     }
 
     fn number_rule(

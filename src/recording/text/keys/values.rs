@@ -161,9 +161,11 @@ pub fn date_text(entries: &[Entry]) -> Option<String> {
     for entry in entries {
         let about = entry.key.to_lowercase();
         let is_date = entry.topic() == Some(Topic::Date)
-            || ["date", "time", "datum", "zeit", "start", "t0"]
-                .iter()
-                .any(|w| about.contains(w));
+            || [
+                "date", "time", "datum", "zeit", "start", "t0", "record", "begin",
+            ]
+            .iter()
+            .any(|w| about.contains(w));
         if !is_date {
             continue;
         }

@@ -9,6 +9,7 @@ use crate::failure::{ErrorCode, Failure};
 use crate::io::Reading;
 use crate::io::number;
 use crate::recording::moment::Moment;
+use crate::recording::text::Clock;
 use crate::recording::text::chunks::Chunks;
 use crate::recording::text::dialect::{Delimiter, Dialect};
 use crate::recording::text::header::Field;
@@ -75,7 +76,8 @@ fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
         let mut segment = Segment {
             name: format!("segment {}", place + 1),
             start_s: None,
-            start_text: joined(&header.dates, &header.times, 0),
+            start_text: joined(&header.dates, &header.times, 0)
+                .map(|text| Clock::iso_or_as_written(&text)),
         };
         let channels =
             segment_channels(&mut lines, &file, &header, &names, reading, &mut recording)?;

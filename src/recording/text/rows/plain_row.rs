@@ -31,6 +31,10 @@ impl Rows {
 
     #[inline]
     fn plain_cells(&mut self, text: &[u8], start: usize, plan: &RowPlan) -> Option<usize> {
+        // Names are looked at with care.
+        if !plan.items.is_empty() {
+            return None;
+        }
         // A remark begins like a text.
         let begins_with_text = plan.kinds.first() == Some(&ColumnKind::Nothing);
         if begins_with_text && matches!(text.get(start), Some(b'#' | b'%' | b'!' | b'/')) {

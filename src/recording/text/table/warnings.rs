@@ -63,6 +63,15 @@ fn of_lines(notes: &LineNotes, zeros: usize) -> Vec<Warning> {
             ),
         ));
     }
+    if notes.moved > 0 {
+        warnings.push(Warning::new(
+            "items-move",
+            format!(
+                "in {} the items of a list stand in other places than in the first; they were followed by their names",
+                plural(notes.moved, "row")
+            ),
+        ));
+    }
     if let Some(line) = notes.too_wide {
         warnings.push(Warning::new(
             "extra-cells",

@@ -1,0 +1,209 @@
+//! What labs' files say in headings, heads and columns of their own, as new users bring them.
+
+use serde_json::Value;
+
+use crate::util::{COMPENSATE, Folder, assert_close};
+
+/// A stand that takes torque and volts.
+const STAND: &str = "schema = \"torqcomp.stand/1\"\n[mechanics]\nnatural_frequency = \"60 Hz\"\ndamping_ratio = 0.02\n";
+
+fn torque(row: usize) -> f64 {
+    (row as f64 / 50.0).sin()
+}
+
+/// A file with a head, and rows of some cells before the torque.
+fn file(head: &str, cells: impl Fn(usize) -> String) -> String {
+    let rows = (0..3000).map(|row| format!("{},{:.5}\n", cells(row), torque(row)));
+    format!("{head}\n{}", rows.collect::<String>())
+}
+
+fn channel_of(folder: &Folder, text: &str) -> Value {
+    folder.write("in.csv", text);
+    let report = folder.json(&["inspect", "in.csv", "--json"]);
+    report["channels"][0].clone()
+}
+
+#[test]
+fn units_behind_an_underscore_are_read() {
+    let folder = Folder::new();
+    folder.write("stand.toml", STAND);
+    for (heading, rms) in [
+        ("torque_N mm", 1e-3),
+        ("torque_Nmm", 1e-3),
+        ("torque_mNm", 1e-3),
+        ("torque_ft-lbf", 1.355_817_948_331_4),
+    ] {
+        let head = format!("time_s,{heading}");
+        folder.write(
+            "in.csv",
+            file(&head, |row| format!("{}", row as f64 / 1000.0)),
+        );
+        let report = folder.json(&[&COMPENSATE[..], &["--force", "--json"]].concat());
+        let found = report["result"]["rms"].as_f64().expect("a number");
+        assert_close(found, rms * 0.5_f64.sqrt(), 0.02);
+    }
+    for heading in ["torque_lbft", "mass_g", "force_lb"] {
+        let head = format!("time_s,{heading}");
+        folder.write(
+            "in.csv",
+            file(&head, |row| format!("{}", row as f64 / 1000.0)),
+        );
+        let run = folder.run(&[&COMPENSATE[..], &["--force"]].concat());
+        run.says(1, &["with a force or with a mass"]);
+    }
+    // The answer to the question is no contradiction.
+    folder.write(
+        "in.csv",
+        file("time_s,torque_lbft", |row| {
+            format!("{}", row as f64 / 1000.0)
+        }),
+    );
+    for (unit, code) in [("ft lbf", 0), ("lbf ft", 0), ("N m", 3)] {
+        let answer = ["--unit", unit, "--strict", "--force"];
+        let run = folder.run(&[&COMPENSATE[..], &answer].concat());
+        assert_eq!(run.code, code, "{unit}: {}", run.stderr);
+    }
+}
+
+#[test]
+fn stamps_of_ros_are_exact_in_one_column_and_in_two() {
+    let folder = Folder::new();
+    folder.write("stand.toml", STAND);
+    let first_ns = 1_700_000_000_900_000_001_u64;
+    let stamp = |row: usize| first_ns + 1_000_000 * row as u64;
+    for (sec, part, digits) in [
+        ("sec", "nanosec", 1),
+        ("header.stamp.sec", "header.stamp.nanosec", 1),
+        ("secs", "nsecs", 1),
+        (
+            "/joint_states/header/stamp/sec",
+            "/joint_states/header/stamp/nanosec",
+            1,
+        ),
+        ("stamp_sec", "stamp_nsec", 1),
+        ("sec", "usec", 1000),
+    ] {
+        let parts = |row: usize| {
+            (
+                stamp(row) / 1_000_000_000,
+                stamp(row) % 1_000_000_000 / digits,
+            )
+        };
+        let pair = |row: usize| format!("{},{}", parts(row).0, parts(row).1);
+        let text = file(&format!("{sec},{part},T [N m]"), pair);
+        let channel = channel_of(&folder, &text);
+        assert_eq!(
+            channel["start_ns"],
+            first_ns / digits * digits,
+            "{sec}: {channel}"
+        );
+        assert_close(channel["rate_hz"].as_f64().expect("a rate"), 1000.0, 1e-9);
+        for more in [&[][..], &["--time-column", sec]] {
+            let report = folder.json(&[&COMPENSATE[..], &["--force", "--json"], more].concat());
+            assert_eq!(report["warnings"], Value::Array(Vec::new()), "{sec}");
+            assert_eq!(
+                report["start_ns"],
+                first_ns / digits * digits,
+                "{sec}: {report}"
+            );
+        }
+    }
+    for heading in ["stamp", "header.stamp", "field.header.stamp"] {
+        let text = file(&format!("{heading},T [N m]"), |row| stamp(row).to_string());
+        assert_eq!(
+            channel_of(&folder, &text)["start_ns"],
+            first_ns,
+            "{heading}"
+        );
+    }
+}
+
+#[test]
+fn dates_in_the_head_are_of_iso_8601_where_they_can_be_read_in_one_way() {
+    let folder = Folder::new();
+    for (head, want) in [
+        ("Date,2025-03-14\nTime,10:11:12", "2025-03-14T10:11:12"),
+        ("# Start: 14.03.2025 10:11:12.5", "2025-03-14T10:11:12.5"),
+        (
+            "# Start: 2025-03-14 10:11:12+01:00",
+            "2025-03-14T10:11:12+01:00",
+        ),
+        (
+            "Trigger Date,03/14/2025\nTrigger Time,10:11:12 PM",
+            "2025-03-14T22:11:12",
+        ),
+        ("Recorded on,14 Mar 2025 10:11:12", "2025-03-14T10:11:12"),
+        ("Date,03/04/2025\nTime,10:11:12", "03/04/2025 10:11:12"),
+    ] {
+        let text = file(&format!("{head}\ntime_s,T [N m]"), |row| {
+            format!("{}", row as f64 / 1000.0)
+        });
+        assert_eq!(channel_of(&folder, &text)["start_time"], want, "{head}");
+    }
+}
+
+/// Joints change places from row to row, as nodes write them that list them out of a map.
+#[test]
+fn an_item_of_a_list_is_followed_by_its_name() {
+    let folder = Folder::new();
+    folder.write("stand.toml", STAND);
+    let rows = |moves: bool| {
+        let row = |row: usize| {
+            let (torque, other) = (torque(row), 40.0);
+            let seconds = row as f64 / 1000.0;
+            match moves && row % 3 == 1 {
+                true => format!("{seconds},b,a,{other},{torque:.5}\n"),
+                false => format!("{seconds},a,b,{torque:.5},{other}\n"),
+            }
+        };
+        let head = "time_s,name[0],name[1],effort[0],effort[1]\n";
+        format!("{head}{}", (0..3000).map(row).collect::<String>())
+    };
+    let result = |moves: bool| {
+        folder.write("in.csv", rows(moves));
+        let choice = ["--channel", "effort[0]", "--unit", "N m", "--force"];
+        let run = folder.run(&[&COMPENSATE[..], &choice].concat());
+        run.says(0, &[]);
+        assert_eq!(run.stderr.contains("items-move"), moves, "{}", run.stderr);
+        folder.read("out.csv")
+    };
+    assert_eq!(result(true), result(false));
+    folder.write("in.csv", rows(true).replace("b,a", "b,c"));
+    let choice = ["--channel", "effort[0]", "--unit", "N m", "--force"];
+    folder
+        .run(&[&COMPENSATE[..], &choice].concat())
+        .says(1, &["line 3"]);
+}
+
+/// Advice for a WAV file that works.
+#[test]
+fn full_scale_is_what_a_wav_file_lacks() {
+    let folder = Folder::new();
+    folder.write(
+        "stand.toml",
+        format!("{STAND}[calibration]\ntorque_per_volt = \"2 N m/V\"\n"),
+    );
+    let samples: Vec<u8> = (0..2000)
+        .flat_map(|row| ((1e4 * torque(row)) as i16).to_le_bytes())
+        .collect();
+    let mut wav = b"RIFF".to_vec();
+    wav.extend((36 + samples.len() as u32).to_le_bytes());
+    wav.extend(b"WAVEfmt \x10\0\0\0\x01\0\x01\0");
+    wav.extend([1000_u32, 2000].iter().flat_map(|n| n.to_le_bytes()));
+    wav.extend(b"\x02\0\x10\0data");
+    wav.extend((samples.len() as u32).to_le_bytes());
+    wav.extend(samples);
+    folder.write("in.wav", wav);
+    let args = [
+        "compensate",
+        "in.wav",
+        "--stand",
+        "stand.toml",
+        "-o",
+        "out.csv",
+    ];
+    folder.run(&args).says(1, &["--full-scale \"10 V\""]);
+    folder
+        .run(&[&args[..], &["--full-scale", "10 V"]].concat())
+        .says(0, &[]);
+}
