@@ -35,6 +35,12 @@ pub fn residual(
         parts.push(format!("{} times the noise floor", rounded(ratio, 3)));
     }
     parts.push(if tests.white { "white" } else { "not white" }.to_owned());
+    if found.is_coloured_noise(&found.after, tests) && !tests.white {
+        parts.push(
+            "coloured noise: the floor is that of white noise, and no effect explains a significant part of the rest"
+                .to_owned(),
+        );
+    }
     parts.extend(dependence(tests));
     if tests.has_spikes() {
         parts.push(format!(

@@ -93,9 +93,10 @@ pub fn fit(
     let mut free = start_model.free_mode();
     let mut found = minimize(&structure, start, &mut records, Some(&free), effort)?;
     if effort.corrects_start {
-        // Where the motion is integrated, its start is corrected instead; a plain stand starts near its own mode.
+        // Where the motion is integrated, its start is corrected instead.
         let integrates = start_model.has_torques();
-        let may_move = !integrates && !structure.effects.is_empty();
+        // That of a plain stand matters where it lasts: elsewhere the fits of its rivals would only start from another place.
+        let may_move = !integrates && (!structure.effects.is_empty() || lasts(&records, &free));
         let has_moved = may_move && moves_on(&structure, &found.values, &records, &free);
         let is_corrected =
             integrates && correct_starts(&structure, &found.values, &mut records, &free);
@@ -256,6 +257,14 @@ fn moves_on(structure: &Structure, values: &[f64], records: &[StandRecord], free
         let turned = (apart * duration_s.min(1.0 / fade(&now).min(fade(free)))).min(1.0);
         turned * x.hypot(speed) > START_MATTERS * mean_square.sqrt()
     })
+}
+
+/// Whether a free motion is still there at the end of a record: more than a thousandth of it.
+fn lasts(records: &[StandRecord], free: &Mode) -> bool {
+    let fades = |record: &StandRecord| {
+        free.damping_ratio * free.omega_rad_s * record.range.end as f64 / record.rate_hz()
+    };
+    records.iter().any(|record| fades(record) < 1000.0_f64.ln())
 }
 
 /// Mean amplitude of each line over the records.

@@ -8,6 +8,7 @@ use super::reason::Reason;
 use super::records::Records;
 use super::score::ScoredModel;
 use super::search::{CandidateFit, no_gain, reject_all};
+use super::structure::EffectForm;
 use crate::failure::{ErrorCode, Failure};
 use crate::parallel::parallel;
 
@@ -97,7 +98,10 @@ impl SearchState {
                 candidate.reason = reason.clone();
             }
         }
-        self.is_refuted = true;
+        // A line or a drift belongs to its record, and noise that rings or wanders may look like one: that it is not in the
+        // others is no contradiction.
+        let added = self.after.fitted.structure.added();
+        self.is_refuted = !added.iter().all(EffectForm::is_disturbance);
         self.without.clear();
         self.after = self.before.clone();
         self.tests = self.tests_before.clone();

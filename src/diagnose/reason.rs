@@ -103,6 +103,14 @@ impl Reason {
         }
     }
 
+    /// Whether the effect reduces the training error by more than chance.
+    pub fn is_significant(&self) -> bool {
+        !matches!(
+            self,
+            Self::NotFitted | Self::NoReduction { .. } | Self::NotSignificant { .. }
+        )
+    }
+
     /// The reason for people.
     pub fn text(&self) -> String {
         match self {

@@ -77,7 +77,7 @@ impl ResidualTests {
             independent_of_input,
             largest_lag,
             in_largest_hundredth: in_largest_hundredth(residuals),
-            shares: shares(residuals),
+            shares: shares(residuals, mode),
             changing_constants: stationarity::changing_constants(residuals, mode),
             with_signal: stationarity::with_signal(residuals),
             with_slope: stationarity::with_slope(residuals),
@@ -89,6 +89,12 @@ impl ResidualTests {
     pub fn dependence(&self) -> Option<&PowerShare> {
         let shares = self.shares.iter().filter(|s| s.exceeds(DEPENDENT));
         shares.max_by(|a, b| a.share.total_cmp(&b.share))
+    }
+
+    /// Whether any test sees a dependence on input, motion or time.
+    pub fn follows_anything(&self) -> bool {
+        let is_seen = self.dependence().is_some() || self.nonstationary().is_some();
+        is_seen || self.has_spikes() || !self.independent_of_input
     }
 
     /// Whether a few samples have most of the power.
@@ -217,14 +223,17 @@ const MOTION_FUNCTIONS: [MotionFunction; 6] = [
 /// What the share that follows linearly from the input is called.
 pub const FROM_INPUT: &str = "the input";
 
-fn shares(residuals: &[RecordResidual]) -> Vec<PowerShare> {
+fn shares(residuals: &[RecordResidual], mode: &Mode) -> Vec<PowerShare> {
     let shortest = residuals.iter().map(|r| r.samples.len()).min();
     let length = (shortest.unwrap_or(0) / 24).next_power_of_two();
     let length = length.clamp(32, 2048);
     let input = |r: &RecordResidual| r.record.acting_in_range();
-    let mut found = vec![pooled_share(FROM_INPUT, residuals, length, input)];
+    let pooled = |of, from: &dyn Fn(&RecordResidual) -> Vec<f64>| {
+        pooled_share(of, residuals, length, mode, from)
+    };
+    let mut found = vec![pooled(FROM_INPUT, &input)];
     for (of, function) in MOTION_FUNCTIONS {
-        found.push(pooled_share(of, residuals, length, |r| {
+        found.push(pooled(of, &|r| {
             let x = without_mean(&r.modelled);
             let (x, v) = (over_rms(&x), over_rms(&differences(&x)));
             x.iter().zip(&v).map(|(x, v)| function(*x, *v)).collect()
@@ -255,12 +264,16 @@ fn pooled_share(
     of: &'static str,
     residuals: &[RecordResidual],
     length: usize,
+    mode: &Mode,
     from: impl Fn(&RecordResidual) -> Vec<f64>,
 ) -> PowerShare {
     let (mut share, mut variance, mut total) = (0.0, 0.0, 0.0_f64);
     for residual in residuals {
         let power = dot(&residual.samples, &residual.samples);
-        let (own, significance) = coherent_share(&from(residual), &residual.samples, length);
+        let decay_s = 1.0 / (mode.damping_ratio * mode.omega_rad_s);
+        let memory = decay_s * residual.record.rate_hz();
+        let samples = &residual.samples;
+        let (own, significance) = coherent_share(&from(residual), samples, length, memory);
         share += power * own;
         total += power;
         if significance != 0.0 {

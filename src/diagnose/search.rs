@@ -67,7 +67,8 @@ impl Workers<'_> {
 const LEAST_GAIN: f64 = 40.0;
 /// Minimum relative reduction of the sum of squares.
 const LEAST_SHARE: f64 = 0.005;
-/// Minimum significance of the reduction over the blocks of the records.
+/// Minimum significance of the reduction over the blocks of the records; times the root of the number of effects that
+/// reduce it together, as they fit more of the noise.
 const LEAST_SIGNIFICANCE: f64 = 3.0;
 /// Standard deviations that a normal quantity exceeds in 95 % of all cases.
 const CERTAIN: f64 = 1.645;
@@ -218,6 +219,18 @@ impl CandidateFit {
         self.reason.status()
     }
 
+    /// Whether it reduces the error by more than chance. A line or a drift that the held-out records do not have is noise that
+    /// rings or wanders.
+    pub fn is_confirmed(&self) -> bool {
+        let effects = self
+            .model
+            .iter()
+            .flat_map(|model| &model.fitted.structure.effects);
+        let is_disturbance = effects.last().is_some_and(EffectForm::is_disturbance);
+        let is_of_one_record = is_disturbance && matches!(self.reason, Reason::NotConfirmed { .. });
+        self.reason.is_significant() && !is_of_one_record
+    }
+
     /// Hold-out error for comparisons: infinite without a fit.
     pub fn holdout_error(&self) -> f64 {
         self.holdout_rms.unwrap_or(f64::INFINITY)
@@ -351,7 +364,10 @@ pub fn no_gain(model: &ScoredModel, before: &ScoredModel) -> Option<Reason> {
     if gain <= 0.0 {
         return Some(Reason::NoReduction { change });
     }
-    if gain < LEAST_GAIN * variance || comparison.significance() < LEAST_SIGNIFICANCE {
+    let count = |m: &ScoredModel| m.effect_names().len();
+    let added = count(model).saturating_sub(count(before)).max(1) as f64;
+    let least = LEAST_SIGNIFICANCE * added.sqrt();
+    if gain < LEAST_GAIN * variance || comparison.significance() < least {
         return Some(Reason::NotSignificant { change });
     }
     if gain < LEAST_SHARE * total {

@@ -52,18 +52,62 @@ impl SegmentSpectra {
     }
 }
 
-/// Share of the power of `output` that follows linearly from `input`, and how many standard deviations it lies above
-/// zero. Segments are only compared with other segments, so that noise adds nothing on average.
-pub fn coherent_share(input: &[f64], output: &[f64], length: usize) -> (f64, f64) {
+/// Energy of samples at each frequency from 0 to half the sampling rate, such that the sum over all is that over the samples;
+/// averaged over so many resolved frequencies to each side.
+pub fn energy_spectrum(samples: &[f64], to_each_side: usize) -> Vec<f64> {
+    let length = samples.len().next_power_of_two();
+    let plan = torqcomp_fourier::forward(length);
+    let mut padded = samples.to_vec();
+    padded.resize(length, 0.0);
+    let mut spectrum = plan.make_output_vec();
+    // The length is the one that the plan was made for.
+    let _ = plan.process(&mut padded, &mut spectrum);
+    let last = spectrum.len() - 1;
+    let sides = |k: usize| if k == 0 || k == last { 1.0 } else { 2.0 };
+    let energy = |(k, s): (usize, &Complex64)| sides(k) * s.norm_sqr() / length as f64;
+    let energies: Vec<f64> = spectrum.iter().enumerate().map(energy).collect();
+    if to_each_side == 0 || samples.is_empty() {
+        return energies;
+    }
+    let reach = to_each_side * length / samples.len();
+    let mut before = vec![0.0];
+    before.extend(energies.iter().scan(0.0, |sum, e| {
+        *sum += e;
+        Some(*sum)
+    }));
+    let around = |k: usize| {
+        let (from, to) = (k.saturating_sub(reach), (k + reach).min(last) + 1);
+        (before[to] - before[from]) / (to - from) as f64
+    };
+    (0..=last).map(around).collect()
+}
+
+/// Power of an input at a frequency, over its mean at all of them, below which it may be noise: noise of 1 % of the input is
+/// 1e-4 of it. A stand answers noise on the input as well, and what it answers follows from it.
+const ONLY_NOISE: f64 = 2.5e-4;
+
+/// Share of the power of `output` that follows linearly from `input`, at frequencies where that is more than noise, and how
+/// many standard deviations it lies above zero. Segments are only compared with other segments, so that noise adds nothing
+/// on average: with those beyond the samples over which noise on the output, which may ring with the stand, remembers.
+pub fn coherent_share(
+    input: &[f64],
+    output: &[f64],
+    length: usize,
+    memory_samples: f64,
+) -> (f64, f64) {
     let (u, y) = (spectra(input, length), spectra(output, length));
     let (mut explained, mut total, mut variance) = (0.0, 0.0, 0.0);
+    let power = u.power();
+    let least = ONLY_NOISE * power.iter().sum::<f64>() / power.len().max(1) as f64;
+    let memory = memory_samples / (0.5 * length as f64);
+    let apart = 1 + (1.5 * memory) as usize;
     for k in 0..u.frequencies() {
         let pairs = u.segments.iter().zip(&y.segments);
         let cross: Vec<Complex64> = pairs.map(|(u, y)| y[k] * u[k].conj()).collect();
         let uu: f64 = u.segments.iter().map(|u| u[k].norm_sqr()).sum();
         let yy: f64 = y.segments.iter().map(|y| y[k].norm_sqr()).sum();
         total += yy;
-        if uu <= 0.0 {
+        if uu <= 0.0 || power[k] < least {
             continue;
         }
         // Neighbours overlap and share noise: they are excluded like a segment's product with itself.
@@ -71,9 +115,8 @@ pub fn coherent_share(input: &[f64], output: &[f64], length: usize) -> (f64, f64
         let mut pairs = sum.norm_sqr();
         for (i, c) in cross.iter().enumerate() {
             pairs -= c.norm_sqr();
-            if let Some(next) = cross.get(i + 1) {
-                pairs -= 2.0 * (c * next.conj()).re;
-            }
+            let near: Complex64 = cross.iter().skip(i + 1).take(apart).sum();
+            pairs -= 2.0 * (c * near.conj()).re;
         }
         let own: f64 = cross.iter().map(|c| c.norm_sqr()).sum();
         explained += pairs / uu;
@@ -82,7 +125,9 @@ pub fn coherent_share(input: &[f64], output: &[f64], length: usize) -> (f64, f64
     if total <= 0.0 || variance <= 0.0 {
         return (0.0, 0.0);
     }
-    (explained / total, explained / (2.0 * variance).sqrt())
+    // So many segments in turn have the same noise.
+    let std = (2.0 * variance).sqrt() * memory.max(1.0);
+    (explained / total, explained / std)
 }
 
 /// A line in a spectrum.
@@ -167,5 +212,28 @@ fn line_at(power: &[f64], k: usize, step: f64) -> SpectralLine {
         frequency_hz: (k as f64 + shift.clamp(-0.5, 0.5)) * step,
         amplitude: b,
         prominence: power[k] / median.max(1e-300),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::test_noise::noise;
+
+    /// An input of low frequencies with 0.5 % of white noise, and what answers that noise alone.
+    #[test]
+    fn what_answers_noise_on_the_input_does_not_follow_from_it() {
+        let mut random = noise(2);
+        let line = |i: usize, k: usize| (0.004 * (k * i) as f64 + (k * k) as f64).sin();
+        let noise: Vec<f64> = (0..40_000)
+            .map(|_| 0.005 * 12_f64.sqrt() * random())
+            .collect();
+        let input = |(i, n): (usize, &f64)| n + (1..20).map(|k| line(i, k)).sum::<f64>() / 3.0;
+        let input: Vec<f64> = noise.iter().enumerate().map(input).collect();
+        let (share, significance) = coherent_share(&input, &noise, 1024, 0.0);
+        assert!(share < 0.04, "{share}, {significance}");
+        // What answers the input itself still does.
+        let (share, _) = coherent_share(&input, &input, 1024, 0.0);
+        assert!(share > 0.9, "{share}");
     }
 }

@@ -25,9 +25,14 @@ const SHIFTS: usize = 33;
 const GOLDEN: f64 = 0.618_033_988_749_895;
 /// Range of the shifts, as parts of the record.
 const SHIFT_RANGE: [f64; 2] = [0.1, 0.9];
-/// Lowest lines of a record's spectrum, where a drifting zero shows, and the lines around for comparison.
+/// Lowest lines of a record's spectrum, where a drifting zero shows, and the lines above, which show what noise has there.
 const LOWEST: RangeInclusive<usize> = 1..=12;
-const AROUND: Range<usize> = 30..130;
+const ABOVE: Range<usize> = 13..130;
+/// Corners of noise of first order that are tried, in lines: the lowest, the ratio of one to the next, and their number. With a
+/// lower one, the spectrum of a jump would pass for noise.
+const CORNERS: (f64, f64, i32) = (10.0, 1.3, 12);
+/// Relative standard deviation of the level of that noise.
+const LEVEL_STD: f64 = 0.3;
 /// Standard deviation of a normal law over its median absolute deviation.
 const STD_PER_MAD: f64 = 1.4826;
 
@@ -123,21 +128,20 @@ fn with_square(
 }
 
 /// The power at the lowest frequencies above that of the noise next to them: a zero that drifts or jumps. The mean is not
-/// part of it.
+/// part of it. Noise may rise towards them as that of first order does.
 pub fn wandering_zero(residuals: &[RecordResidual]) -> PowerShare {
     const OF: &str = "a zero that drifts or jumps";
     let (mut excess, mut total, mut variance) = (0.0, 0.0, 0.0);
     for residual in residuals {
         let spectrum = spectra(&residual.samples, residual.samples.len()).power();
         total += spectrum.iter().sum::<f64>();
-        let Some(around) = spectrum.get(AROUND) else {
+        let Some(level) = level_at_zero(&spectrum) else {
             continue;
         };
-        // The median of an exponential distribution is ln 2 of its mean.
-        let level = median(around.to_vec()) / std::f64::consts::LN_2;
         let lowest = &spectrum[LOWEST];
-        excess += lowest.iter().sum::<f64>() - level * lowest.len() as f64;
-        variance += level * level * lowest.len() as f64;
+        let count = lowest.len() as f64;
+        excess += lowest.iter().sum::<f64>() - level * count;
+        variance += level * level * (count + (LEVEL_STD * count).powi(2));
     }
     if total <= 0.0 || variance <= 0.0 {
         return PowerShare::none(OF);
@@ -147,6 +151,26 @@ pub fn wandering_zero(residuals: &[RecordResidual]) -> PowerShare {
         share: excess / total,
         significance: excess / variance.sqrt(),
     }
+}
+
+/// Power of the noise at the lowest lines of a spectrum: `S = a/(1 + (f/f_c)²)`, of the greatest likelihood for the lines above
+/// (P. Whittle, Ark. Mat. 2 (1953), 423).
+fn level_at_zero(spectrum: &[f64]) -> Option<f64> {
+    let above = spectrum.get(ABOVE)?;
+    let (lowest, ratio, count) = CORNERS;
+    let corners = (0..count).map(|k| lowest * ratio.powi(k));
+    let fits = corners.chain([f64::INFINITY]).map(|corner| {
+        let falls = ABOVE.map(|k| 1.0 + (k as f64 / corner).powi(2));
+        let (mut sum, mut logarithms) = (0.0, 0.0);
+        for (power, fall) in above.iter().zip(falls) {
+            sum += power * fall;
+            logarithms += fall.ln();
+        }
+        let level = sum / above.len() as f64;
+        (above.len() as f64 * level.ln() - logarithms, level)
+    });
+    let best = fits.min_by(|a, b| a.0.total_cmp(&b.0));
+    best.map(|(_, level)| level)
 }
 
 impl PowerShare {
@@ -334,6 +358,25 @@ mod tests {
             (found.share - 0.4).abs() < 0.1 && found.significance > 10.0,
             "{found:?}"
         );
+    }
+
+    /// What makes a zero drift in [`ResidualTests`](super::super::residual_tests::ResidualTests).
+    const NONE: f64 = 6.0;
+
+    #[test]
+    fn noise_of_first_order_is_no_drifting_zero() {
+        let mut random = noise(6);
+        let mut colour = 0.0;
+        for _ in 0..20 {
+            let coloured: Vec<f64> = (0..1000)
+                .map(|_| {
+                    colour = 0.9 * colour + random();
+                    colour
+                })
+                .collect();
+            let found = wandering_zero(&of(&coloured, &coloured));
+            assert!(found.significance < NONE, "{found:?}");
+        }
     }
 
     #[test]

@@ -113,10 +113,15 @@ impl EffectForm {
         sizes.position(|is_size| is_size && !self.is_line())
     }
 
+    /// Whether it adds what does not come from the input: it may be in one record and not in another.
+    pub fn is_disturbance(&self) -> bool {
+        self.form.stage == Stage::Disturbance
+    }
+
     /// Whether it adds lines: its parameters are a frequency, then amplitudes.
     pub fn is_line(&self) -> bool {
         let first = self.form.parameters.first();
-        first.is_some_and(|p| p.unit == Unit::Hertz) && self.form.stage == Stage::Disturbance
+        first.is_some_and(|p| p.unit == Unit::Hertz) && self.is_disturbance()
     }
 }
 

@@ -6,7 +6,7 @@ use super::noise_floor::{NoiseFloor, NoiseFloorSource};
 use super::reason::{Reason, Status};
 use super::residual_tests::ResidualTests;
 use super::score::ScoredModel;
-use super::search::reject_all;
+use super::search::{CandidateFit, reject_all};
 
 /// How a diagnosis ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
@@ -37,6 +37,9 @@ impl Verdict {
 const AT_FLOOR: f64 = 1.1;
 /// Error over a floor from out of band above which no colour of the noise accounts for it.
 const FAR_ABOVE: f64 = 1.5;
+/// The same up to which it may be coloured noise, if nothing else speaks against that: noise of first order with a correlation of
+/// 0.9 from one sample to the next is at four times the floor of white noise.
+const MOST_COLOURED: f64 = 8.0;
 /// Minimum part of the excess error power that an effect must explain to be named.
 const NAMED: f64 = 0.5;
 /// Error over a noise floor from periods from which on that part is known well enough to require it.
@@ -129,7 +132,24 @@ impl SearchState {
     /// Whether something is left, above the noise or hidden in it. Changes over a record also raise a floor that is taken
     /// from differences of its periods. They are no reason to look for a second effect: none of the list causes them.
     fn leaves(&self, model: &ScoredModel, tests: &ResidualTests) -> bool {
-        remains(model, tests, self.noise_floor) || tests.nonstationary().is_some()
+        let is_above = remains(model, tests, self.noise_floor);
+        is_above && !self.is_coloured_noise(model, tests) || tests.nonstationary().is_some()
+    }
+
+    /// Whether what the plain stand leaves is above the noise floor only because that is the one of white noise: no test sees a
+    /// dependence on input or motion, and no effect explains a significant part of the training residual. Beside an effect,
+    /// what is left of it would look the same.
+    pub(super) fn is_coloured_noise(&self, model: &ScoredModel, tests: &ResidualTests) -> bool {
+        let error = model.compared_rms();
+        let may_be = |floor: NoiseFloor| {
+            floor.from == NoiseFloorSource::OutOfBand && error <= MOST_COLOURED * floor.rms
+        };
+        let is_plain = model.effect_names().is_empty();
+        if !is_plain || !self.noise_floor.is_some_and(may_be) || tests.follows_anything() {
+            return false;
+        }
+        let round = self.rounds.first();
+        round.is_some_and(|round| !round.iter().any(CandidateFit::is_confirmed))
     }
 
     /// Whether the residual after is above the noise, coloured, and depends on the input, small as it may be.
