@@ -416,8 +416,10 @@ impl NoiseColour {
 
     /// 1 − Σ a_k e^(−jωk).
     fn whitener(&self, rad_per_sample: f64) -> Complex64 {
-        let turned = |(k, a): (usize, &f64)| *a * Complex64::cis(-rad_per_sample * (k + 1) as f64);
-        let sum: Complex64 = self.coefficients.iter().enumerate().map(turned).sum();
+        let turn = Complex64::cis(-rad_per_sample);
+        let powers = self.coefficients.iter().rev();
+        // Horner's rule.
+        let sum = powers.fold(Complex64::ZERO, |sum, a| (sum + a) * turn);
         Complex64::ONE - sum
     }
 
@@ -479,9 +481,10 @@ impl NoiseColour {
         for (k, density) in self.densities(size).into_iter().enumerate() {
             let angle = TAU * k as f64 / size as f64;
             let whitener = self.whitener(angle);
-            let along = DVector::from_fn(order, |m, _| {
-                2.0 * (Complex64::cis(-angle * (m + 1) as f64) / whitener).re
-            });
+            let turn = Complex64::cis(-angle);
+            let first = 2.0 * turn / whitener;
+            let along = std::iter::successors(Some(first), |last| Some(last * turn));
+            let along = DVector::from_iterator(order, along.map(|along| along.re).take(order));
             for (i, factors) in factors.iter().enumerate() {
                 let part = density * of_row(factors, k);
                 variances[i] += part;

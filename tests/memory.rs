@@ -120,7 +120,7 @@ const VERBS: [Measured; 8] = [
         "identify decay LONG",
         &["ringing_V"],
         [1_100_000, 2_000_000],
-        40.0,
+        32.0,
     ),
     (
         "identify response LONG --applied noise --measured answer --excitation random --modes 1 --band 300..3000",

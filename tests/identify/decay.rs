@@ -205,6 +205,50 @@ fn several_modes_and_hits_are_found() {
     }
 }
 
+/// A decay of so many periods that it is filtered to bands around its lines and undersampled: as exact as all samples allow,
+/// var σ = var ω = 16 σ³ s² Δt/A² (Cramér and Rao, for a decay that is recorded to its end), for the mode that rings for long
+/// and for the one that is gone after a thirtieth of the record.
+#[test]
+fn a_decay_of_very_many_periods_is_as_exact_with_fewer_samples() {
+    let mut noise = Noise(31);
+    let (rate_hz, size) = (20_000.0, 0.02);
+    let t = times(1_000_000, rate_hz);
+    let modes = [(1.0, 0.15, 3100.0), (0.3, 3.0, 3300.0)];
+    let one =
+        |t: f64, (a, sigma, hz): (f64, f64, f64)| a * (-sigma * t).exp() * (TAU * hz * t).cos();
+    let y: Vec<f64> = t
+        .iter()
+        .map(|t| modes.iter().map(|mode| one(*t, *mode)).sum::<f64>() + 0.1 + size * noise.normal())
+        .collect();
+    let (found, stretches) = ring(&t, &y, rate_hz);
+    assert!(
+        found.method.iter().any(|m| m.starts_with("filtered to ")),
+        "{:?}",
+        found.method
+    );
+    assert!(
+        stretches[0].values.len() < 70_000,
+        "{}",
+        stretches[0].values.len()
+    );
+    assert_eq!(found.modes.len(), 2);
+    for (k, (a, sigma, hz)) in modes.into_iter().enumerate() {
+        let least = (16.0 * sigma * sigma * sigma * size * size / rate_hz).sqrt() / a;
+        for (name, want, least) in [
+            ("decay_rate", sigma, least),
+            ("damped_frequency", hz, least / TAU),
+        ] {
+            let got = of(&found, &format!("mode_{}_{name}", k + 1));
+            let std = got.std().unwrap();
+            let off = (got.value() - want).abs();
+            assert!(
+                off < 4.0 * std && (0.8..1.6).contains(&(std / least)),
+                "{name} {k}: {off}, {std}, {least}"
+            );
+        }
+    }
+}
+
 #[test]
 fn the_law_of_damping_is_told() {
     let mut noise = Noise(14);

@@ -9,7 +9,7 @@ const REACH: usize = 8;
 /// Corner over the new rate.
 const CORNER: f64 = 0.36;
 /// Shape of the Kaiser window, for 80 dB.
-const BETA: f64 = 7.9;
+pub(crate) const BETA: f64 = 7.9;
 
 /// Frequency, over the new rate, up to which the response is 1 within 2·10⁻⁴.
 pub const PASS: f64 = 0.2;
@@ -92,7 +92,7 @@ fn taps(half: usize, corner: f64) -> Vec<f64> {
 }
 
 /// Modified Bessel function of order 0 by its series.
-fn bessel_i0(x: f64) -> f64 {
+pub(crate) fn bessel_i0(x: f64) -> f64 {
     let (mut term, mut sum, mut k) = (1.0, 1.0, 1.0);
     while term > 1e-17 * sum {
         term *= (0.5 * x / k).powi(2);

@@ -34,6 +34,7 @@ pub mod recorder;
 pub mod resample;
 pub mod spectrum;
 pub mod store;
+pub mod undersample;
 pub mod weak;
 pub mod zero_phase;
 

@@ -1,5 +1,7 @@
 //! The strongest line of a record, as a start for a fit.
 
+use std::ops::Range;
+
 /// A peak of a power spectrum.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Peak {
@@ -14,9 +16,15 @@ pub struct Peak {
 /// Longest transform; longer records are truncated, which is enough for a start.
 const LONGEST: usize = 1 << 20;
 
+/// What is transformed of a record.
+#[must_use]
+pub fn looked_at(samples: &[f64]) -> &[f64] {
+    &samples[..samples.len().min(LONGEST)]
+}
+
 /// Power at frequencies k·rate/size, with the record padded to at least twice its length.
 fn power(samples: &[f64]) -> (Vec<f64>, usize) {
-    let used = &samples[..samples.len().min(LONGEST)];
+    let used = looked_at(samples);
     let size = (2 * used.len()).next_power_of_two().max(16);
     let mut padded = used.to_vec();
     padded.resize(size, 0.0);
@@ -65,6 +73,67 @@ pub fn strongest(samples: &[f64], rate_hz: f64, from_hz: f64, to_hz: f64) -> Opt
     })
 }
 
+/// Power from which on a bin is significant: `share` times the strongest and 50 times the median.
+fn significant(power: &[f64], share: f64) -> f64 {
+    let top = power[1..].iter().fold(0.0_f64, |m, p| m.max(*p));
+    let mut sorted = power[1..].to_vec();
+    let middle = sorted.len() / 2;
+    let (_, median, _) = sorted.select_nth_unstable_by(middle, f64::total_cmp);
+    (50.0 * *median).max(share * top)
+}
+
+/// Lengths over which bands of lines are looked for, each a quarter of the one before: what rings for a short time only is not
+/// seen over a long one.
+const LENGTHS: usize = 4;
+/// Fewest samples for that.
+const SHORTEST: usize = 1 << 12;
+/// What belongs to a line: that part of its frequency to either side, and so many bins.
+const BESIDE: (f64, f64) = (0.01, 2.0);
+/// The window of Blackman and Harris, with sidelobes of −92 dB (F. J. Harris, Proc. IEEE 66 (1978), 51).
+const WINDOW: [f64; 4] = [0.358_75, -0.488_29, 0.141_28, -0.011_68];
+
+/// Bands, in cycles per sample, outside which a free decay has nothing that is significant by [`highest`]. They may overlap.
+/// Lines are seen through a window, as what leaks of a line that stops would be taken for others.
+#[must_use]
+pub fn bands(samples: &[f64], share: f64) -> Vec<Range<f64>> {
+    let mut all = Vec::new();
+    let longest = looked_at(samples).len();
+    for length in (0..LENGTHS).map(|k| longest >> (2 * k)) {
+        if length < SHORTEST {
+            break;
+        }
+        let (power, size) = power(&tapered(&samples[..length]));
+        let limit = significant(&power, share);
+        let high = (1..power.len()).filter(|k| power[*k] > limit);
+        for place in high.map(|k| k as f64 / size as f64) {
+            let beside = (BESIDE.0 * place).max(BESIDE.1 / length as f64);
+            let band = (place - beside).max(0.0)..(place + beside).min(0.5);
+            match all.last_mut() {
+                Some(Range { start, end }) if *start <= band.start && band.start <= *end => {
+                    *end = band.end;
+                }
+                _ => all.push(band),
+            }
+        }
+    }
+    all
+}
+
+/// Samples without their mean, within a window.
+fn tapered(samples: &[f64]) -> Vec<f64> {
+    let count = samples.len() as f64;
+    let weight = |i: usize| {
+        let turn = std::f64::consts::TAU * (i as f64 + 0.5) / count;
+        let terms = WINDOW.iter().enumerate();
+        terms.map(|(k, a)| a * (k as f64 * turn).cos()).sum::<f64>()
+    };
+    let weights: Vec<f64> = (0..samples.len()).map(weight).collect();
+    let products = samples.iter().zip(&weights).map(|(x, w)| x * w);
+    let mean = products.sum::<f64>() / (WINDOW[0] * count);
+    let pairs = samples.iter().zip(weights);
+    pairs.map(|(x, w)| (x - mean) * w).collect()
+}
+
 /// Highest frequency with a significant peak: at least `share` times the power of the strongest and 50 times the median.
 #[must_use]
 pub fn highest(samples: &[f64], rate_hz: f64, share: f64) -> Option<f64> {
@@ -72,11 +141,7 @@ pub fn highest(samples: &[f64], rate_hz: f64, share: f64) -> Option<f64> {
         return None;
     }
     let (power, size) = power(samples);
-    let top = power[1..].iter().fold(0.0_f64, |m, p| m.max(*p));
-    let mut sorted = power[1..].to_vec();
-    let middle = sorted.len() / 2;
-    let (_, median, _) = sorted.select_nth_unstable_by(middle, f64::total_cmp);
-    let limit = (50.0 * *median).max(share * top);
+    let limit = significant(&power, share);
     let peak = |k: &usize| {
         power[*k] > limit
             && power[*k] >= power[k - 1]
@@ -89,6 +154,31 @@ pub fn highest(samples: &[f64], rate_hz: f64, share: f64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn bands_hold_what_rings_long_and_short() {
+        let line = |f: f64, sigma: f64, i: i32| {
+            let t = f64::from(i);
+            (-sigma * t).exp() * (std::f64::consts::TAU * f * t).cos()
+        };
+        let mut state = 1_u64;
+        let mut noise = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        let record: Vec<f64> = (0..300_000)
+            .map(|i| line(0.02, 1e-6, i) + 0.1 * line(0.2, 1e-3, i) + 0.05 * noise())
+            .collect();
+        let found = bands(&record, 1e-6);
+        let holds = |f: f64| found.iter().any(|band| band.contains(&f));
+        assert!(
+            holds(0.0199) && holds(0.0201) && holds(0.2) && !holds(0.1),
+            "{found:?}"
+        );
+        assert!(bands(&record[..1000], 1e-6).is_empty());
+    }
 
     #[test]
     fn width_is_that_of_the_decay() {

@@ -1,7 +1,7 @@
 //! `identify decay`.
 
-use std::borrow::Cow;
 use std::path::Path;
+use std::sync::Arc;
 
 use torqcomp_dsp::quality::clipping::Clipping;
 
@@ -15,7 +15,7 @@ use crate::identify::decay::{DecayOptions, Ringing, identify};
 use crate::identify::{Identification, ModalPole};
 use crate::io::{Input, Reading, already_compensated};
 use crate::quality;
-use crate::recording::{AlignedChannels, Recording, check_cells, is_uniform};
+use crate::recording::{AlignedChannels, Channel, Recording, check_cells, is_uniform};
 use crate::stand::update::Entry;
 
 /// A recording of decays.
@@ -88,27 +88,35 @@ fn load(args: &Decay, input: &Path, recorded: &mut Recorded) -> Result<Loaded, F
         .select(&args.choice, &args.reading)
         .map_err(|failure| failure.at(input.shown()))?;
     check_cells(selection.channel, &args.reading).map_err(|failure| failure.at(input.shown()))?;
-    let samples = &selection.channel.samples;
-    let count = samples.len();
-    let stamps = match (&selection.channel.axis.stamps_s, rate_hz) {
-        (Some(stamps), None) => Cow::Borrowed(stamps.as_slice()),
-        _ => {
-            let (start, rate) = (selection.start.after_s, selection.rate_hz);
-            (0..count).map(|i| start + i as f64 / rate).collect()
-        }
-    };
-    let is_whole = selection.channel.holes.is_empty();
-    let rate_hz = (is_whole && is_uniform(&stamps, selection.rate_hz)).then_some(selection.rate_hz);
-    let (times_s, values) = rising(&stamps, samples);
-    let rate = rate_hz.map(|hz| (hz, selection.rate_std_hz));
-    recorded.add(input, values.len(), rate);
+    let (start_s, rate, rate_std) = (
+        selection.start.after_s,
+        selection.rate_hz,
+        selection.rate_std_hz,
+    );
+    let chosen = selection.channel;
     let unit = selection.unit.map_or_else(String::new, |u| u.text);
-    let axis = &selection.channel.axis;
-    let clipped = Clipping::of(samples)
-        .map(|found| quality::clipped_ends(&selection.channel.name, &unit, &found, axis));
+    let clipped = Clipping::of(&chosen.samples)
+        .map(|found| quality::clipped_ends(&chosen.name, &unit, &found, &chosen.axis));
     let clipped = clipped.unwrap_or_default();
     let warnings = [recording.all_warnings(), selection.warnings, clipped].concat();
     recorded.warn(warnings, recording.lost.is_some());
+    // The other channels make room for the fit.
+    let Channel {
+        samples,
+        axis,
+        holes,
+        ..
+    } = recording.channels.swap_remove(place);
+    drop(recording);
+    let stamps = match (axis.stamps_s, rate_hz) {
+        (Some(stamps), None) => Arc::unwrap_or_clone(stamps),
+        _ => (0..samples.len())
+            .map(|i| start_s + i as f64 / rate)
+            .collect(),
+    };
+    let rate_hz = (holes.is_empty() && is_uniform(&stamps, rate)).then_some(rate);
+    let (times_s, values) = rising(stamps, samples);
+    recorded.add(input, values.len(), rate_hz.map(|hz| (hz, rate_std)));
     Ok(Loaded {
         name: input.shown().to_string(),
         times_s,
@@ -119,9 +127,13 @@ fn load(args: &Decay, input: &Path, recorded: &mut Recorded) -> Result<Loaded, F
 }
 
 /// The samples that are numbers and later than all before them, with their times.
-fn rising(stamps: &[f64], samples: &[f64]) -> (Vec<f64>, Vec<f64>) {
+fn rising(stamps: Vec<f64>, samples: Vec<f64>) -> (Vec<f64>, Vec<f64>) {
+    let is_rising = stamps.windows(2).all(|pair| pair[0] < pair[1]);
+    if is_rising && stamps.len() == samples.len() && samples.iter().all(|v| v.is_finite()) {
+        return (stamps, samples);
+    }
     let mut last = f64::NEG_INFINITY;
-    let pairs = stamps.iter().copied().zip(samples.iter().copied());
+    let pairs = stamps.into_iter().zip(samples);
     let later = pairs.filter(|(t, v)| {
         let later = *t > last && v.is_finite();
         last = if later { *t } else { last };

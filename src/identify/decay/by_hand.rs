@@ -2,17 +2,21 @@
 
 use std::f64::consts::{PI, TAU};
 
-use torqcomp_dsp::peaks;
-
 use super::modes::{ModesFit, Stretch};
 use crate::identify::{Comparison, Identification, NamedEstimate};
 
 /// Peaks smaller than this part of the first are ignored.
 const SMALLEST: f64 = 0.05;
+/// Samples in a period below which half cycles have no three samples for a parabola.
+const FEWEST: f64 = 8.0;
 
 /// Damped frequency in Hz and decay rate in 1/s from the heights of successive peaks: the slope of
-/// ln|peak| over time through all of them, by plain regression. `None` with fewer than three peaks.
+/// ln|peak| over time through all of them, by plain regression. `None` with fewer than three peaks, or too few samples to
+/// see them.
 pub(super) fn log_decrement(stretch: &Stretch, offset: f64, omega: f64) -> Option<(f64, f64)> {
+    if TAU / omega < FEWEST * stretch.step_s() {
+        return None;
+    }
     let peaks = peaks_of(stretch, offset, PI / omega);
     if peaks.len() < 3 {
         return None;
@@ -74,19 +78,12 @@ fn peaks_of(stretch: &Stretch, offset: f64, half_period_s: f64) -> Vec<(f64, f64
 /// Frequency in Hz and damping ratio from the width of the spectrum's peak at half its power,
 /// ζ = Δf/2f. Too large where the record ends before the decay does. `None` without a peak.
 pub(super) fn half_power(stretch: &Stretch, offset: f64, omega: f64) -> Option<(f64, f64)> {
-    let length = *stretch.times_s.last()?;
-    let rate_hz = (stretch.times_s.len() - 1) as f64 / length;
     let values: Vec<f64> = stretch.values.iter().map(|v| v - offset).collect();
     let near = omega / TAU;
     // Eightfold padding draws the peak finely enough.
     let mut padded = values;
     padded.resize(padded.len().min(1 << 17) * 8, 0.0);
-    let peak = peaks::strongest(
-        &padded,
-        rate_hz,
-        0.7 * near,
-        (1.4 * near).min(0.49 * rate_hz),
-    )?;
+    let peak = stretch.strongest(&padded, 0.7 * near..1.4 * near)?;
     Some((peak.frequency_hz, 0.5 * peak.width_hz / peak.frequency_hz))
 }
 

@@ -80,14 +80,8 @@ pub(super) fn amplitude_dependence(
     if middle < 30 || stretch.times_s.len() - middle < 30 {
         return;
     }
-    let part = |from: usize, to: usize| {
-        let half = Stretch::new(
-            &stretch.times_s[from..to],
-            stretch.values[from..to].to_vec(),
-        );
-        modes::fit(&[half], &[pole]).ok()
-    };
-    let halves = (part(0, middle), part(middle, stretch.times_s.len()));
+    let part = |range| modes::fit(&[stretch.part(range)], &[pole]).ok();
+    let halves = (part(0..middle), part(middle..stretch.times_s.len()));
     let (Some(early), Some(late)) = halves else {
         return;
     };

@@ -8,6 +8,7 @@ mod present;
 mod restart;
 mod search;
 mod stretches;
+mod turns;
 
 use super::{FitQuality, Identification, ModalPole, hum, rms};
 use crate::failure::Failure;

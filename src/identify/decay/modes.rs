@@ -10,9 +10,12 @@
 use std::ops::Range;
 
 use nalgebra::DMatrix;
+use torqcomp_dsp::peaks::{self, Peak};
+use torqcomp_dsp::undersample::folded;
 use torqcomp_model::Covariance;
 use torqcomp_model::fit::{Fit, FitError, Options, Parameter, Residuals, linear, minimize};
 
+use super::turns::turns;
 use crate::identify::Pole;
 use crate::noise_colour::{self, NoiseColour};
 
@@ -25,6 +28,9 @@ pub struct Stretch {
     pub times_s: Vec<f64>,
     /// Samples.
     pub values: Vec<f64>,
+    /// Bands in Hz to which the frequencies of a stretch with fewer than two samples a period are limited; none if all
+    /// below half its rate is in it.
+    pub bands_hz: Vec<Range<f64>>,
 }
 
 impl Stretch {
@@ -35,6 +41,59 @@ impl Stretch {
             start_s,
             times_s: times_s.iter().map(|t| t - start_s).collect(),
             values,
+            bands_hz: Vec::new(),
+        }
+    }
+
+    /// Some of its samples.
+    pub(super) fn part(&self, range: Range<usize>) -> Self {
+        Self {
+            bands_hz: self.bands_hz.clone(),
+            ..Self::new(&self.times_s[range.clone()], self.values[range].to_vec())
+        }
+    }
+
+    /// Samples per second.
+    pub(super) fn rate_hz(&self) -> f64 {
+        (self.times_s.len() - 1) as f64 / self.times_s.last().copied().unwrap_or(1.0)
+    }
+
+    /// The strongest line of samples at its rate between two frequencies; of several bands, what stands out most.
+    pub(super) fn strongest(&self, samples: &[f64], within_hz: Range<f64>) -> Option<Peak> {
+        let rate_hz = self.rate_hz();
+        if self.bands_hz.is_empty() {
+            let highest = within_hz.end.min(HIGHEST * rate_hz);
+            return peaks::strongest(samples, rate_hz, within_hz.start, highest);
+        }
+        let of_band = |band: &Range<f64>| {
+            let [start, end] = [band.start.max(within_hz.start), band.end.min(within_hz.end)];
+            let (image, back) = folded(&(start / rate_hz..end / rate_hz));
+            let [low, high] = [image.start, image.end].map(|place| place * rate_hz);
+            let peak = peaks::strongest(samples, rate_hz, low, high).filter(|_| start < end)?;
+            let frequency_hz = rate_hz * back(peak.frequency_hz / rate_hz);
+            Some(Peak {
+                frequency_hz,
+                ..peak
+            })
+        };
+        let peaks = self.bands_hz.iter().filter_map(of_band);
+        peaks.max_by(|a, b| a.prominence.total_cmp(&b.prominence))
+    }
+
+    /// Lowest and highest angular frequency that the samples tell from this one.
+    fn limits_rad_per_s(&self, omega: f64) -> (f64, f64) {
+        let tau = std::f64::consts::TAU;
+        let distance = |band: &&Range<f64>| {
+            let hz = omega / tau;
+            (band.start - hz).max(hz - band.end)
+        };
+        let nearest = self
+            .bands_hz
+            .iter()
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        match nearest {
+            Some(band) => (tau * band.start, tau * band.end),
+            None => (0.0, 0.5 * tau * self.rate_hz()),
         }
     }
 
@@ -43,6 +102,9 @@ impl Stretch {
         self.times_s.last().copied().unwrap_or(1.0) / (self.times_s.len() - 1) as f64
     }
 }
+
+/// Highest frequency of a line, over the rate.
+const HIGHEST: f64 = 0.49;
 
 /// A fit of a number of modes.
 #[derive(Debug, Clone, PartialEq)]
@@ -72,23 +134,24 @@ impl SineSum<'_> {
     fn amplitudes_at(&self, stretch: usize) -> usize {
         2 * self.modes + stretch * (2 * self.modes + TREND)
     }
-
-    fn value(&self, p: &[f64], stretch: usize, t: f64) -> f64 {
-        let at = self.amplitudes_at(stretch);
-        let mut x = p[at + 2 * self.modes] + p[at + 2 * self.modes + 1] * t;
-        for k in 0..self.modes {
-            let (sin, cos) = (p[2 * k + 1] * t).sin_cos();
-            x += (-p[2 * k] * t).exp() * (p[at + 2 * k] * cos + p[at + 2 * k + 1] * sin);
-        }
-        x
-    }
 }
 
 impl Residuals for SineSum<'_> {
     fn residuals(&self, p: &[f64], out: &mut Vec<f64>) -> Result<(), FitError> {
         for (s, stretch) in self.stretches.iter().enumerate() {
-            let pairs = stretch.times_s.iter().zip(&stretch.values);
-            out.extend(pairs.map(|(t, y)| self.value(p, s, *t) - y));
+            let at = self.amplitudes_at(s);
+            let [offset, drift] = [0, 1].map(|i| p[at + 2 * self.modes + i]);
+            let from = out.len();
+            out.extend(stretch.times_s.iter().map(|t| offset + drift * t));
+            for (k, pole) in Pole::all(&p[..2 * self.modes]).into_iter().enumerate() {
+                let (a, b) = (p[at + 2 * k], p[at + 2 * k + 1]);
+                let out = &mut out[from..];
+                turns(&stretch.times_s, pole, |i, turn| {
+                    out[i] += a * turn.re + b * turn.im
+                });
+            }
+            let pairs = out[from..].iter_mut().zip(&stretch.values);
+            pairs.for_each(|(x, y)| *x -= y);
         }
         Ok(())
     }
@@ -98,23 +161,27 @@ impl Residuals for SineSum<'_> {
     }
 
     fn jacobian(&self, p: &[f64], out: &mut DMatrix<f64>) -> Result<(), FitError> {
-        let mut row = 0;
+        let rows = out.nrows();
+        let out = out.as_mut_slice();
+        let mut from = 0;
         for (s, stretch) in self.stretches.iter().enumerate() {
-            let at = self.amplitudes_at(s);
-            for t in &stretch.times_s {
-                for k in 0..self.modes {
-                    let (sin, cos) = (p[2 * k + 1] * t).sin_cos();
-                    let fall = (-p[2 * k] * t).exp();
-                    let (a, b) = (p[at + 2 * k], p[at + 2 * k + 1]);
-                    out[(row, 2 * k)] = -t * fall * (a * cos + b * sin);
-                    out[(row, 2 * k + 1)] = t * fall * (b * cos - a * sin);
-                    out[(row, at + 2 * k)] = fall * cos;
-                    out[(row, at + 2 * k + 1)] = fall * sin;
-                }
-                out[(row, at + 2 * self.modes)] = 1.0;
-                out[(row, at + 2 * self.modes + 1)] = *t;
-                row += 1;
+            let (at, times) = (self.amplitudes_at(s), &stretch.times_s);
+            for (k, pole) in Pole::all(&p[..2 * self.modes]).into_iter().enumerate() {
+                let (a, b) = (p[at + 2 * k], p[at + 2 * k + 1]);
+                let columns = [2 * k, 2 * k + 1, at + 2 * k, at + 2 * k + 1];
+                let [by_rate, by_omega, by_a, by_b] = columns.map(|column| column * rows + from);
+                turns(times, pole, |i, turn| {
+                    let (cos, sin) = (turn.re, turn.im);
+                    out[by_rate + i] = -times[i] * (a * cos + b * sin);
+                    out[by_omega + i] = times[i] * (b * cos - a * sin);
+                    out[by_a + i] = cos;
+                    out[by_b + i] = sin;
+                });
             }
+            let [by_offset, by_drift] = [0, 1].map(|i| (at + 2 * self.modes + i) * rows + from);
+            out[by_offset..][..times.len()].fill(1.0);
+            out[by_drift..][..times.len()].copy_from_slice(times);
+            from += times.len();
         }
         Ok(())
     }
@@ -132,16 +199,22 @@ pub(super) fn linear_part(
         .copied()
         .unwrap_or(1.0)
         .max(f64::MIN_POSITIVE);
-    let mut design = DMatrix::zeros(stretch.times_s.len(), columns);
-    for (row, t) in stretch.times_s.iter().enumerate() {
-        for (k, pole) in poles.iter().enumerate() {
-            let (sin, cos) = (pole.omega_rad_per_s * t).sin_cos();
-            let fall = (-pole.rate_per_s * t).exp();
-            design[(row, 2 * k)] = fall * cos;
-            design[(row, 2 * k + 1)] = fall * sin;
-        }
-        design[(row, columns - 2)] = 1.0;
-        design[(row, columns - 1)] = t / length;
+    let rows = stretch.times_s.len();
+    let mut design = DMatrix::zeros(rows, columns);
+    for (k, pole) in poles.iter().enumerate() {
+        let design = &mut design.as_mut_slice()[2 * k * rows..][..2 * rows];
+        turns(&stretch.times_s, *pole, |i, turn| {
+            design[i] = turn.re;
+            design[rows + i] = turn.im;
+        });
+    }
+    design.column_mut(columns - 2).fill(1.0);
+    for (slot, t) in design
+        .column_mut(columns - 1)
+        .iter_mut()
+        .zip(&stretch.times_s)
+    {
+        *slot = t / length;
     }
     let fit = linear::solve(&design, &stretch.values, None, false)?;
     let mut values = fit.values;
@@ -159,13 +232,14 @@ pub(super) fn fit(stretches: &[Stretch], starts: &[Pole]) -> Result<ModesFit, Fi
         modes: starts.len(),
     };
     let mut parameters = Vec::new();
-    let fastest = fastest_rad_per_s(stretches);
     for (k, pole) in starts.iter().enumerate() {
         let (rate, omega) = (pole.rate_per_s, pole.omega_rad_per_s);
         // A free decay does not grow.
         parameters.push(Parameter::new(format!("rate {}", k + 1), rate).at_least(0.0));
-        let omega = Parameter::new(format!("omega {}", k + 1), omega.min(0.999 * fastest));
-        parameters.push(omega.at_least(0.0).at_most(fastest));
+        let (slowest, fastest) = limits_rad_per_s(stretches, omega);
+        let start = omega.clamp(slowest, 0.999 * fastest);
+        let omega = Parameter::new(format!("omega {}", k + 1), start);
+        parameters.push(omega.at_least(slowest).at_most(fastest));
     }
     for (s, stretch) in stretches.iter().enumerate() {
         let (values, _) = linear_part(stretch, starts)?;
@@ -202,13 +276,12 @@ pub(super) fn with_honest_std(
     with_colour(found.fit.clone(), &problem, 2 * modes)
 }
 
-/// Half the usual sampling rate, as an angular frequency.
-fn fastest_rad_per_s(stretches: &[Stretch]) -> f64 {
-    stretches
-        .iter()
-        .map(|s| 1.0 / s.step_s())
-        .fold(f64::INFINITY, f64::min)
-        * std::f64::consts::PI
+/// Lowest and highest angular frequency that all stretches tell from this one.
+fn limits_rad_per_s(stretches: &[Stretch], omega: f64) -> (f64, f64) {
+    let each = stretches.iter().map(|s| s.limits_rad_per_s(omega));
+    each.fold((0.0, f64::INFINITY), |all, one| {
+        (all.0.max(one.0), all.1.min(one.1))
+    })
 }
 
 /// The fit with its covariance for the colour of the noise.
@@ -289,13 +362,10 @@ impl ModesFit {
             self.fit.values[at + 1],
             self.poles[mode],
         );
-        let times = stretches[stretch].times_s.iter();
-        times
-            .map(|t| {
-                let (sin, cos) = (pole.omega_rad_per_s * t).sin_cos();
-                (-pole.rate_per_s * t).exp() * (a * cos + b * sin)
-            })
-            .collect()
+        let times = &stretches[stretch].times_s;
+        let mut part = Vec::with_capacity(times.len());
+        turns(times, pole, |_, turn| part.push(a * turn.re + b * turn.im));
+        part
     }
 
     /// Offset and drift per second of a stretch.

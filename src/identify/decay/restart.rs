@@ -6,6 +6,7 @@
 //! it falls with the swing. Where it jumps up instead, the ringing starts again. Neighbouring samples are averaged before, to
 //! about [`A_PERIOD`] in a period of the strongest line: means of decaying sines are decaying sines.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
@@ -31,7 +32,10 @@ const RIDGE: f64 = 1e-12;
 /// The parts of a stretch, in samples: the whole, or those before and after each restart that ring and have `least` samples.
 pub(super) fn parts(values: &[f64], least: usize) -> Vec<Range<usize>> {
     let factor = averaged(values);
-    let few: Vec<f64> = values.chunks_exact(factor).map(mean).collect();
+    let few: Cow<[f64]> = match factor {
+        1 => values.into(),
+        _ => values.chunks_exact(factor).map(mean).collect(),
+    };
     let mut all = Vec::new();
     let mut from = 0;
     for gap in restarts(&few) {
@@ -60,7 +64,8 @@ fn swing(values: &[f64]) -> f64 {
 /// Samples of which a mean is taken.
 fn averaged(values: &[f64]) -> usize {
     let middle = mean(values);
-    let about: Vec<f64> = values.iter().map(|v| v - middle).collect();
+    let about = peaks::looked_at(values).iter().map(|v| v - middle);
+    let about: Vec<f64> = about.collect();
     // In periods a sample, from two periods in the stretch on.
     let lowest = 2.0 / values.len() as f64;
     let line = peaks::strongest(&about, 1.0, lowest, 0.5).map_or(0.5, |peak| peak.frequency_hz);
@@ -101,19 +106,53 @@ fn unpredicted(values: &[f64]) -> Option<Vec<f64>> {
     if rows < 4 * ORDER {
         return None;
     }
-    let design = DMatrix::from_fn(rows, ORDER + 1, |i, k| match k {
-        ORDER => 1.0,
-        _ => values[i + ORDER - 1 - k],
-    });
-    let right = DVector::from_column_slice(&values[ORDER..]);
-    let mut equations = design.tr_mul(&design);
+    let (mut equations, right) = equations(values);
     for i in 0..=ORDER {
         equations[(i, i)] *= 1.0 + RIDGE;
     }
-    let solved = equations.cholesky()?.solve(&design.tr_mul(&right));
-    let left = right - design * solved;
+    let solved = equations.cholesky()?.solve(&right);
+    let (weights, offset) = (&solved.as_slice()[..ORDER], solved[ORDER]);
     let none = std::iter::repeat_n(0.0, ORDER);
-    Some(none.chain(left.iter().map(|e| e.abs())).collect())
+    let left = values.windows(ORDER + 1).map(|window| {
+        let before = window[..ORDER].iter().rev();
+        let predicted: f64 = before.zip(weights).map(|(x, a)| x * a).sum();
+        (window[ORDER] - predicted - offset).abs()
+    });
+    Some(none.chain(left).collect())
+}
+
+/// The normal equations of the recursion, without its rows: what a product of two lags sums to differs from that of the lags
+/// one less by its first and last term.
+fn equations(values: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
+    let rows = values.len() - ORDER;
+    // Column k of the rows, the sample so many before the predicted one; the last is 1. Lag 0 is the right side.
+    let at = |lag: usize| &values[ORDER - lag..][..rows];
+    let mut products = DMatrix::zeros(ORDER + 1, ORDER + 1);
+    for lag in 0..=ORDER {
+        products[(0, lag)] = at(0).iter().zip(at(lag)).map(|(x, y)| x * y).sum::<f64>();
+    }
+    for i in 1..=ORDER {
+        for j in i..=ORDER {
+            let [first, last] = [0, rows].map(|k| values[ORDER - i + k] * values[ORDER - j + k]);
+            products[(i, j)] = products[(i - 1, j - 1)] + first - last;
+        }
+    }
+    let total: f64 = at(0).iter().sum();
+    let mut sums = vec![total];
+    for lag in 1..=ORDER {
+        let [first, last] = [0, rows].map(|k| values[ORDER - lag + k]);
+        sums.push(sums[lag - 1] + first - last);
+    }
+    let matrix = DMatrix::from_fn(ORDER + 1, ORDER + 1, |i, j| match (i.min(j), i.max(j)) {
+        (ORDER, ORDER) => rows as f64,
+        (k, ORDER) => sums[k + 1],
+        (i, j) => products[(i + 1, j + 1)],
+    });
+    let right = DVector::from_fn(ORDER + 1, |k, _| match k {
+        ORDER => total,
+        _ => products[(0, k + 1)],
+    });
+    (matrix, right)
 }
 
 #[cfg(test)]

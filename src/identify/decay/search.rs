@@ -1,6 +1,6 @@
 //! Which modes a decay has, found one by one.
 
-use torqcomp_dsp::peaks::{self, Peak};
+use torqcomp_dsp::peaks::Peak;
 use torqcomp_model::fit::FitError;
 
 use super::modes::{ModesFit, Stretch, fit, linear_part};
@@ -286,11 +286,9 @@ fn next_pole(stretches: &[Stretch], so_far: &ModesFit, band_hz: (f64, f64)) -> O
     let stretch = &stretches[loudest];
     let left: Vec<f64> = so_far.residuals[loudest].iter().map(|r| -r).collect();
     let length = *stretch.times_s.last()?;
-    let rate_hz = (stretch.times_s.len() - 1) as f64 / length;
-    let uniform = on_grid(&stretch.times_s, &left, rate_hz);
-    let lowest = band_hz.0.max(1.5 / length);
-    let highest = band_hz.1.min(0.49 * rate_hz);
-    let within = |from, to| peaks::strongest(&uniform, rate_hz, from, to);
+    let uniform = on_grid(&stretch.times_s, &left, stretch.rate_hz());
+    let (lowest, highest) = (band_hz.0.max(1.5 / length), band_hz.1);
+    let within = |from, to| stretch.strongest(&uniform, from..to);
     let peak = within(lowest, highest)?;
     // Coloured noise can have a stronger line than a mode that rings for a short time.
     let below = within(lowest, peak.frequency_hz / APART);

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 use torqcomp_dsp::quality::clipping::Clipping;
+use torqcomp_dsp::undersample::Undersampling;
 use torqcomp_dsp::{decimate, onset, peaks};
 
 use super::modes::Stretch;
@@ -15,6 +16,11 @@ use crate::print::short;
 
 /// Most samples that are fitted, of all stretches together.
 const MOST_SAMPLES: usize = 20_000;
+
+/// Samples left by decimation above which the stretches are undersampled.
+const MANY_SAMPLES: usize = 65_536;
+/// Lengths of the filter, to either side, that a stretch to be undersampled must have.
+const LEAST_LENGTHS: usize = 16;
 
 /// Most stretches that are used.
 const MOST_STRETCHES: usize = 12;
@@ -33,57 +39,148 @@ pub(super) fn stretches(
     result: &mut Identification,
 ) -> Result<(Vec<Stretch>, Vec<SteadyLine>), Failure> {
     let mut lines = Vec::new();
-    let cut = cut(records, options, (result, &mut lines))?;
-    let total: usize = cut.iter().map(|(stretch, _)| stretch.values.len()).sum();
-    let mut all = Vec::new();
-    for (stretch, rate_hz) in cut {
-        let share = MOST_SAMPLES * stretch.values.len() / total;
-        let factor = match (rate_hz, options.band_hz) {
-            (Some(rate), None) => factor(&stretch.values, rate, share),
+    let (prepared, ranges) = cut(records, options, (result, &mut lines))?;
+    let part = |(place, range): &(usize, Range<usize>)| prepared[*place].part(range);
+    let cut: Vec<Part> = ranges.iter().map(part).collect();
+    let total: usize = cut.iter().map(|part| part.values.len()).sum();
+    let of_one = |part: &Part| {
+        let share = MOST_SAMPLES * part.values.len() / total;
+        match (part.rate_hz, options.band_hz) {
+            (Some(rate), None) => factor(part.values, rate, share),
             _ => 1,
-        };
+        }
+    };
+    let factors: Vec<usize> = cut.iter().map(of_one).collect();
+    if options.band_hz.is_none()
+        && let Some((few, rate_hz)) = undersampling(&cut, &factors)
+    {
+        let bands = few.bands.iter().map(|band| {
+            let [start, end] = [band.start, band.end].map(|place| short(place * rate_hz));
+            format!("{start} to {end} Hz")
+        });
+        result.method.push(format!(
+            "filtered to {} and decimated to one sample in {}: nothing rings beside that",
+            bands.collect::<Vec<_>>().join(", "),
+            few.factor
+        ));
+        let all = cut.iter().map(|part| part.undersampled(&few, rate_hz));
+        return Ok((all.collect::<Result<_, _>>()?, lines));
+    }
+    let mut all = Vec::new();
+    for (part, factor) in cut.iter().zip(factors) {
         if factor > 1 {
             result.method.push(format!(
                 "decimated to one sample in {factor}: there are no modes above {} Hz",
-                short(decimate::PASS * rate_hz.unwrap_or(0.0) / factor as f64)
+                short(decimate::PASS * part.rate_hz.unwrap_or(0.0) / factor as f64)
             ));
         }
-        all.push(decimated(&stretch, factor)?);
+        all.push(part.decimated(factor)?);
     }
     result.method.dedup();
     Ok((all, lines))
 }
 
-/// All stretches as recorded, with the sampling rate of their record.
-fn cut(
-    records: &[Ringing],
+/// How to keep fewer samples than decimation leaves, if these are too many; and the rate of the stretches. `None` if they lie
+/// at several rates or ring in bands that are too wide for that.
+fn undersampling(cut: &[Part], factors: &[usize]) -> Option<(Undersampling, f64)> {
+    let rate_hz = cut.first()?.rate_hz?;
+    let lengths = cut.iter().map(|part| part.values.len());
+    let left = lengths
+        .clone()
+        .zip(factors)
+        .map(|(length, factor)| length / factor);
+    let is_one = cut.iter().all(|part| part.rate_hz == Some(rate_hz));
+    if !is_one || left.sum::<usize>() <= MANY_SAMPLES {
+        return None;
+    }
+    let bands = cut.iter().flat_map(|part| peaks::bands(part.values, WORTH));
+    let bands: Vec<Range<f64>> = bands.collect();
+    let least = factors.iter().max()? + 1;
+    let most = lengths.clone().sum::<usize>() / MOST_SAMPLES;
+    let found = Undersampling::of(&bands, least, most)?;
+    (lengths.min()? > LEAST_LENGTHS * found.reach()).then_some((found, rate_hz))
+}
+
+/// A record, low-passed and decimated if a band is given.
+struct Prepared<'a> {
+    times_s: Cow<'a, [f64]>,
+    values: Cow<'a, [f64]>,
+    /// Sampling rate of the record.
+    rate_hz: Option<f64>,
+}
+
+/// A stretch of it.
+struct Part<'a> {
+    times_s: &'a [f64],
+    values: &'a [f64],
+    rate_hz: Option<f64>,
+}
+
+impl Prepared<'_> {
+    fn part(&self, range: &Range<usize>) -> Part<'_> {
+        Part {
+            times_s: &self.times_s[range.clone()],
+            values: &self.values[range.clone()],
+            rate_hz: self.rate_hz,
+        }
+    }
+}
+
+impl Part<'_> {
+    /// One sample in `factor`.
+    fn decimated(&self, factor: usize) -> Result<Stretch, Failure> {
+        let few = decimate::decimate(self.values, factor)?;
+        let kept = self.times_s[few.first..].iter().step_by(factor).copied();
+        let kept: Vec<f64> = kept.take(few.samples.len()).collect();
+        Ok(Stretch::new(&kept, few.samples))
+    }
+
+    /// Fewer samples than two in a period.
+    fn undersampled(&self, few: &Undersampling, rate_hz: f64) -> Result<Stretch, Failure> {
+        let kept = few.apply(self.values)?;
+        let time_s = |k: usize| (k * few.factor) as f64 / rate_hz;
+        let bands = few.bands.iter();
+        Ok(Stretch {
+            start_s: self.times_s[kept.first],
+            times_s: (0..kept.samples.len()).map(time_s).collect(),
+            values: kept.samples,
+            bands_hz: bands
+                .map(|band| rate_hz * band.start..rate_hz * band.end)
+                .collect(),
+        })
+    }
+}
+
+/// The records, and the stretches of free ringing in them, each with the place of its record.
+type Cut<'a> = (Vec<Prepared<'a>>, Vec<(usize, Range<usize>)>);
+
+/// Cuts all records.
+fn cut<'a>(
+    records: &[Ringing<'a>],
     options: &DecayOptions,
     (result, lines): (&mut Identification, &mut Vec<SteadyLine>),
-) -> Result<Vec<(Stretch, Option<f64>)>, Failure> {
-    let mut cuts = Cuts::default();
+) -> Result<Cut<'a>, Failure> {
+    let (mut all, mut cuts) = (Vec::new(), Cuts::default());
     for record in records {
         check(record)?;
         let clipped_s = clipped_times(record);
         let (values, of_mains) = without_mains(record.values, record.rate_hz);
         lines.extend(of_mains);
-        let record = &Ringing {
-            values: &values,
-            ..*record
-        };
-        let [times, values] = prepared(record, options, result)?;
-        for range in onset::decays(&values) {
-            cuts.add(&times, &values, range, (&clipped_s, record.rate_hz));
+        let prepared = prepared(record, values, options, result)?;
+        for range in onset::decays(&prepared.values) {
+            cuts.add(&prepared, range, (&clipped_s, all.len()));
         }
+        all.push(prepared);
     }
     cuts.describe(result)?;
-    Ok(cuts.stretches)
+    Ok((all, cuts.stretches))
 }
 
 /// The stretches that are fitted, and what is left out of the decays.
 #[derive(Default)]
 struct Cuts {
-    /// With the sampling rate of their record.
-    stretches: Vec<(Stretch, Option<f64>)>,
+    /// With the place of their record.
+    stretches: Vec<(usize, Range<usize>)>,
     found: usize,
     /// Samples of noise behind the ringing.
     left_out: usize,
@@ -95,13 +192,8 @@ struct Cuts {
 
 impl Cuts {
     /// Adds the stretches of a decay; `clipped_s` are the times of the clipped samples of its record.
-    fn add(
-        &mut self,
-        times: &[f64],
-        values: &[f64],
-        range: Range<usize>,
-        (clipped_s, rate_hz): (&[f64], Option<f64>),
-    ) {
+    fn add(&mut self, record: &Prepared, range: Range<usize>, (clipped_s, place): (&[f64], usize)) {
+        let (times, values) = (&record.times_s, &record.values);
         let clipped = clipped_at_start(clipped_s, &times[range.clone()]);
         if clipped > 0 && range.len() < clipped + LEAST_SAMPLES {
             self.left_clipped += range.len();
@@ -111,14 +203,13 @@ impl Cuts {
         let range = range.start + clipped..range.end;
         let rings = ringing(values, &range);
         self.left_out += range.end - rings.end;
-        for part in parts(values, &rings, rate_hz.is_some()) {
+        for part in parts(values, &rings, record.rate_hz.is_some()) {
             if part.start > rings.start {
                 self.restarts_s.push(times[part.start]);
             }
             self.found += 1;
             if self.found <= MOST_STRETCHES {
-                let stretch = Stretch::new(&times[part.clone()], values[part].to_vec());
-                self.stretches.push((stretch, rate_hz));
+                self.stretches.push((place, part));
             }
         }
     }
@@ -221,44 +312,41 @@ fn check(record: &Ringing) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Times and samples, low-passed and decimated if a band is given.
+/// A record with these values, low-passed and decimated if a band is given.
 fn prepared<'a>(
     record: &Ringing<'a>,
+    values: Cow<'a, [f64]>,
     options: &DecayOptions,
     result: &mut Identification,
-) -> Result<[Cow<'a, [f64]>; 2], Failure> {
-    let (times, values) = (record.times_s, record.values);
-    let (Some((_, highest)), Some(rate_hz)) = (options.band_hz, record.rate_hz) else {
-        return Ok([times.into(), values.into()]);
+) -> Result<Prepared<'a>, Failure> {
+    let (times, rate_hz) = (record.times_s, record.rate_hz);
+    let (Some((_, highest)), Some(rate)) = (options.band_hz, rate_hz) else {
+        return Ok(Prepared {
+            times_s: times.into(),
+            values,
+            rate_hz,
+        });
     };
-    let factor = band_factor(rate_hz, highest);
+    let factor = band_factor(rate, highest);
     if factor > 1 {
         result.method.push(format!(
             "low-passed at {} Hz and decimated to one sample in {factor}",
             short(highest)
         ));
     }
-    let few = decimate::decimate(values, factor)?;
+    let few = decimate::decimate(&values, factor)?;
     let times = times[few.first..].iter().step_by(factor);
     let times = times.take(few.samples.len()).copied();
-    Ok([times.collect(), few.samples.into()])
+    Ok(Prepared {
+        times_s: times.collect(),
+        values: few.samples.into(),
+        rate_hz,
+    })
 }
 
 /// Decimation factor for a band.
 fn band_factor(rate_hz: f64, highest_hz: f64) -> usize {
     ((decimate::PASS * rate_hz / highest_hz).floor() as usize).max(1)
-}
-
-/// A stretch with one sample in `factor`.
-fn decimated(stretch: &Stretch, factor: usize) -> Result<Stretch, Failure> {
-    let few = decimate::decimate(&stretch.values, factor)?;
-    let later = stretch.times_s[few.first];
-    let kept = stretch.times_s[few.first..].iter().step_by(factor);
-    Ok(Stretch {
-        start_s: stretch.start_s + later,
-        times_s: kept.take(few.samples.len()).map(|t| t - later).collect(),
-        values: few.samples,
-    })
 }
 
 /// Decimation factor that the highest significant line allows, for records with many samples.
@@ -267,7 +355,8 @@ fn factor(values: &[f64], rate_hz: f64, enough: usize) -> usize {
         return 1;
     }
     let mean = values.iter().sum::<f64>() / values.len() as f64;
-    let centred: Vec<f64> = values.iter().map(|v| v - mean).collect();
+    let centred = peaks::looked_at(values).iter().map(|v| v - mean);
+    let centred: Vec<f64> = centred.collect();
     let Some(highest) = peaks::highest(&centred, rate_hz, WORTH) else {
         return 1;
     };

@@ -14,7 +14,8 @@ pub(super) struct Reduced {
 }
 
 /// Reduces [A | b] by Householder transformations, one block of rows after another (Golub & Van Loan, Matrix Computations,
-/// 4th ed., 5.2, and 6.5.3 for joining blocks).
+/// 4th ed., 5.2, and 6.5.3 for joining blocks). A block in which some columns are zero is first reduced without them, so that
+/// parameters that belong to a part of the rows cost nothing in the others.
 pub(super) fn reduce(a: &DMatrix<f64>, b: &[f64]) -> Reduced {
     let (rows, columns) = a.shape();
     let width = columns + 1;
@@ -22,14 +23,39 @@ pub(super) fn reduce(a: &DMatrix<f64>, b: &[f64]) -> Reduced {
     let mut from = 0;
     while from < rows {
         let count = BLOCK.max(width).min(rows - from);
-        let mut stacked = DMatrix::zeros(width + count, width);
+        let block = from..from + count;
+        let of_column = |j: usize| match j == columns {
+            true => &b[block.clone()],
+            false => &a.as_slice()[j * rows..][block.clone()],
+        };
+        let is_active = |j: &usize| *j == columns || of_column(*j).iter().any(|v| *v != 0.0);
+        let active: Vec<usize> = (0..width).filter(is_active).collect();
+        let is_whole = active.len() == width;
+        let height = if is_whole {
+            count
+        } else {
+            active.len().min(count)
+        };
+        let mut stacked = DMatrix::zeros(width + height, width);
         stacked.rows_mut(0, width).copy_from(&top);
-        for j in 0..columns {
-            let source = &a.column(j);
-            let source = &source.as_slice()[from..from + count];
-            stacked.column_mut(j).as_mut_slice()[width..].copy_from_slice(source);
+        if is_whole {
+            for j in active {
+                stacked.column_mut(j).as_mut_slice()[width..].copy_from_slice(of_column(j));
+            }
+        } else {
+            let mut few = DMatrix::zeros(count, active.len());
+            for (k, j) in active.iter().enumerate() {
+                few.column_mut(k)
+                    .as_mut_slice()
+                    .copy_from_slice(of_column(*j));
+            }
+            triangularize(&mut few);
+            for (k, j) in active.into_iter().enumerate() {
+                let source = &few.column(k);
+                stacked.column_mut(j).as_mut_slice()[width..]
+                    .copy_from_slice(&source.as_slice()[..height]);
+            }
         }
-        stacked.column_mut(columns).as_mut_slice()[width..].copy_from_slice(&b[from..from + count]);
         triangularize(&mut stacked);
         top.copy_from(&stacked.rows(0, width));
         from += count;
@@ -94,11 +120,22 @@ mod tests {
 
     #[test]
     fn keeps_the_normal_equations() {
-        let rows = 5000;
-        let a = DMatrix::from_fn(rows, 3, |i, j| ((i * (j + 2)) as f64 * 0.37).sin());
+        let value = |i: usize, j: usize| ((i * (j + 2)) as f64 * 0.37).sin();
+        keeps(&DMatrix::from_fn(5000, 3, value));
+        // The last three columns belong to a part of the rows each, as the amplitudes of several decays.
+        keeps(&DMatrix::from_fn(9000, 5, |i, j| {
+            match j < 2 || i / 3000 + 2 == j {
+                true => value(i, j),
+                false => 0.0,
+            }
+        }));
+    }
+
+    fn keeps(a: &DMatrix<f64>) {
+        let rows = a.nrows();
         let b: Vec<f64> = (0..rows).map(|i| (i as f64 * 0.11).cos()).collect();
-        let reduced = reduce(&a, &b);
-        let error = (reduced.r.tr_mul(&reduced.r) - a.tr_mul(&a)).norm();
+        let reduced = reduce(a, &b);
+        let error = (reduced.r.tr_mul(&reduced.r) - a.tr_mul(a)).norm();
         assert!(error < 1e-9, "{error}");
         let right = a.tr_mul(&DVector::from_vec(b));
         let error = (reduced.r.tr_mul(&reduced.c) - right).norm();

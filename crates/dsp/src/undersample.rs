@@ -1,0 +1,217 @@
+//! A rate below twice the frequencies of a record whose lines lie in a few narrow bands.
+//!
+//! Of one sample in D, a line of f cycles a sample looks like one of `|f − k/D|` below `1/(2D)`. Where everything outside
+//! the bands is filtered out before, and these images of the bands lie apart, nothing else is mixed with the lines: the
+//! samples are still those of the lines at their own frequencies and decay rates, and only fewer. (R. G. Vaughan, N. L.
+//! Scott, D. R. White, IEEE Trans. Signal Process. 39 (1991), 1973.)
+
+use std::f64::consts::PI;
+use std::ops::Range;
+
+use crate::Error;
+use crate::decimate::{BETA, Decimated, bessel_i0};
+
+/// Half-length of the filter in samples of the result.
+const REACH: usize = 32;
+/// From the end of a band to where the filter passes nothing (80 dB), times the factor: Kaiser's 5.0 over twice the
+/// half-length.
+const EDGE: f64 = 5.0 / (2 * REACH) as f64;
+/// Sums of products that are kept side by side.
+const LANES: usize = 8;
+
+/// Bands, in cycles per sample, and a factor for which their images lie apart.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Undersampling {
+    /// Samples of the record per sample.
+    pub factor: usize,
+    /// What is kept, by rising frequency.
+    pub bands: Vec<Range<f64>>,
+}
+
+impl Undersampling {
+    /// The largest factor between two for which the images of bands, in cycles per sample, lie apart; `None` if there is none.
+    ///
+    /// ```
+    /// use torqcomp_dsp::undersample::Undersampling;
+    /// let found = Undersampling::of(&[0.201..0.204, 0.31..0.312], 2, 100).unwrap();
+    /// assert!(found.factor > 20);
+    /// assert_eq!(Undersampling::of(&[0.0..0.4], 2, 100), None);
+    /// ```
+    #[must_use]
+    pub fn of(bands: &[Range<f64>], least: usize, most: usize) -> Option<Self> {
+        let candidates = (least.max(2)..=most).rev();
+        candidates
+            .map(|factor| Self {
+                factor,
+                bands: joined(bands, 2.0 * EDGE / factor as f64),
+            })
+            .find(Self::is_apart)
+    }
+
+    /// Samples that the filter reaches to either side.
+    #[must_use]
+    pub fn reach(&self) -> usize {
+        REACH * self.factor
+    }
+
+    /// Whether the images of all bands, with the edges of the filter, lie apart.
+    fn is_apart(&self) -> bool {
+        let edge = EDGE / self.factor as f64;
+        let images = self.bands.iter().map(|band| {
+            let wide = (band.start - edge).max(0.0)..band.end + edge;
+            let zone = zone(wide.start, self.factor);
+            let is_within = wide.end * 2.0 * self.factor as f64 <= (zone + 1) as f64;
+            let rate = self.factor as f64;
+            is_within.then(|| folded(&(rate * wide.start..rate * wide.end)).0)
+        });
+        let Some(mut images) = images.collect::<Option<Vec<_>>>() else {
+            return false;
+        };
+        images.sort_by(|a, b| a.start.total_cmp(&b.start));
+        !images.is_empty() && images.windows(2).all(|pair| pair[0].end <= pair[1].start)
+    }
+
+    /// The samples, filtered by a symmetrical filter that reaches 32 of them to either side, where it lies within the record.
+    ///
+    /// # Errors
+    /// [`Error::TooShort`] if fewer than two samples would remain.
+    pub fn apply(&self, samples: &[f64]) -> Result<Decimated, Error> {
+        let half = self.reach();
+        let expected = 2 * half + 1 + self.factor;
+        if samples.len() < expected {
+            return Err(Error::TooShort {
+                what: "a lower rate",
+                expected,
+                got: samples.len(),
+            });
+        }
+        let taps = self.taps(half);
+        let windows = samples.windows(taps.len()).step_by(self.factor);
+        Ok(Decimated {
+            samples: windows.map(|window| dot(window, &taps)).collect(),
+            first: half,
+            factor: self.factor,
+        })
+    }
+
+    /// The filter: a windowed difference of two low-passes for each band.
+    fn taps(&self, half: usize) -> Vec<f64> {
+        let middle = 0.5 * EDGE / self.factor as f64;
+        let low_pass = |corner: f64, k: f64| match k == 0.0 {
+            true => 2.0 * corner,
+            false => (2.0 * PI * corner * k).sin() / (PI * k),
+        };
+        let tap = |i: usize| {
+            let k = i as f64 - half as f64;
+            let x = k / (half + 1) as f64;
+            let one = |band: &Range<f64>| {
+                let start = if band.start > middle {
+                    band.start - middle
+                } else {
+                    0.0
+                };
+                low_pass(band.end + middle, k) - low_pass(start, k)
+            };
+            let window = bessel_i0(BETA * (1.0 - x * x).sqrt()) / bessel_i0(BETA);
+            window * self.bands.iter().map(one).sum::<f64>()
+        };
+        (0..=2 * half).map(tap).collect()
+    }
+}
+
+/// Zone of half a lower rate that a frequency lies in, from 0.
+fn zone(frequency: f64, factor: usize) -> usize {
+    (2.0 * factor as f64 * frequency).floor() as usize
+}
+
+/// What a band looks like in samples, if it lies within one zone of half their rate, and the way back from there; all in
+/// cycles per sample.
+#[must_use]
+pub fn folded(band: &Range<f64>) -> (Range<f64>, impl Fn(f64) -> f64 + use<>) {
+    let zone = zone(band.start, 1);
+    // The same both ways but for the sign.
+    let turn = move |frequency: f64, sign: f64| match zone % 2 == 0 {
+        true => frequency - sign * 0.5 * zone as f64,
+        false => 0.5 * (zone + 1) as f64 - frequency,
+    };
+    let (start, end) = (turn(band.start, 1.0), turn(band.end, 1.0));
+    let back = move |frequency: f64| turn(frequency, -1.0);
+    (start.min(end)..start.max(end), back)
+}
+
+/// Bands by rising frequency; those that are closer than that are one.
+fn joined(bands: &[Range<f64>], closest: f64) -> Vec<Range<f64>> {
+    let mut sorted = bands.to_vec();
+    sorted.sort_by(|a, b| a.start.total_cmp(&b.start));
+    let mut out: Vec<Range<f64>> = Vec::new();
+    for band in sorted {
+        match out.last_mut() {
+            Some(last) if band.start - last.end < closest => last.end = last.end.max(band.end),
+            _ => out.push(band),
+        }
+    }
+    out
+}
+
+fn dot(window: &[f64], taps: &[f64]) -> f64 {
+    let mut sums = [0.0; LANES];
+    let (xs, hs) = (window.chunks_exact(LANES), taps.chunks_exact(LANES));
+    let rest = xs.remainder().iter().zip(hs.remainder());
+    let rest: f64 = rest.map(|(x, h)| x * h).sum();
+    for (x, h) in xs.zip(hs) {
+        for (lane, sum) in sums.iter_mut().enumerate() {
+            *sum += x[lane] * h[lane];
+        }
+    }
+    rest + sums.iter().sum::<f64>()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_are_those_of_the_lines_and_what_lies_beside_is_gone() {
+        let bands = [0.0995..0.1005, 0.3055..0.3065];
+        let low = |t: f64| (-2e-5 * t).exp() * (2.0 * PI * 0.1 * t).cos();
+        let high = |t: f64| 0.3 * (-3e-5 * t).exp() * (2.0 * PI * 0.306 * t + 1.0).cos();
+        let beside = |t: f64| 0.1 + (2.0 * PI * 0.2 * t).cos() + (2.0 * PI * 0.45 * t).sin();
+        let record: Vec<f64> = (0..60_000)
+            .map(f64::from)
+            .map(|t| low(t) + high(t) + beside(t))
+            .collect();
+        let found = Undersampling::of(&bands, 2, 200).unwrap();
+        assert!(found.factor > 25 && found.bands == bands, "{found:?}");
+        let few = found.apply(&record).unwrap();
+        for (k, value) in few.samples.iter().enumerate() {
+            let t = (few.first + k * found.factor) as f64;
+            let want = low(t) + high(t);
+            assert!((value - want).abs() < 5e-4, "{k}: {value} {want}");
+        }
+    }
+
+    #[test]
+    fn an_image_leads_back_to_its_band() {
+        for (band, want) in [
+            (0.1..0.2, 0.1..0.2),
+            (0.6..0.7, 0.3..0.4),
+            (3.1..3.2, 0.1..0.2),
+        ] {
+            let (image, back) = folded(&band);
+            assert!(
+                (image.start - want.start).abs() < 1e-12 && (image.end - want.end).abs() < 1e-12
+            );
+            let (a, b) = (back(image.start), back(image.end));
+            assert!((a.min(b) - band.start).abs() < 1e-12 && (a.max(b) - band.end).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn short_records_are_refused() {
+        let found = Undersampling::of(&[0.1..0.101], 2, 30).unwrap();
+        assert!(matches!(
+            found.apply(&[0.0; 100]),
+            Err(Error::TooShort { .. })
+        ));
+    }
+}
