@@ -5,6 +5,7 @@ mod decay;
 mod files;
 mod response;
 mod runup;
+mod short_hits;
 mod static_load;
 mod traps;
 mod trials;

@@ -8,7 +8,9 @@
 //! weighted errors of H1 at lines k and l, where the noise of the measured signal changes little from line to line;
 //! X_kb: applied signal at line k of block b, S_k = Σ_b |X_kb|²; d: transform of the squared window over its value at 0,
 //! which correlates neighbouring lines; s_k²: power of the weighted errors, from the scatter of the response between
-//! blocks, or from the residuals where they are larger or there is only one block. (R. Pintelon, J. Schoukens, System
+//! blocks, or from the residuals where they are larger or there is only one block. One block also does not show the error of
+//! the applied signal, |H|² N/|X|²: the fit follows it where it matters, at the resonance. Its power N, of noise and of what
+//! is folded, is that of the applied signal near half the sampling rate. (R. Pintelon, J. Schoukens, System
 //! Identification, 2nd ed., 2012, 2.6 and 9; J. S. Bendat, A. G. Piersol, Random Data, 4th ed., 2010, 9.2.)
 //!
 //! Besides, from the change that each block makes:
@@ -45,6 +47,8 @@ const REACH: usize = 40;
 const SILENT: f64 = 1e-3;
 /// Lines on each side over which the power of the errors is averaged.
 const NEIGHBOURS: usize = 5;
+/// Part of the lines, up to half the sampling rate, that show the noise and the folding of the applied signal.
+const TOP: usize = 10;
 /// Part of the noise's amplitude that half-overlapping Hann-weighted segments share.
 const SHARED: f64 = 1.0 / 6.0;
 
@@ -204,17 +208,35 @@ fn from_noise(
     let searched = solved.free.iter().filter(|i| **i < solved.searched).count();
     let freedom = (2 * counted).saturating_sub(searched + linear).max(1);
     let power = 2.0 * squares / freedom as f64;
-    let sizes = error_sizes(set, lines, &data.weight, power, counted);
+    let sizes = match set.blocks.len() {
+        0 | 1 => sizes_of_one(set, lines, data, &fitted.response, power),
+        _ => error_sizes(set, lines, &data.weight, power, counted),
+    };
     let middle = gathered(set, lines, solved, &sizes) * 0.5;
     &solved.inverse * middle * &solved.inverse
 }
 
+/// s_k of each line of one block; `power` is the mean power of the residuals over the lines that count.
+fn sizes_of_one(
+    set: &Set,
+    lines: &Lines,
+    data: &Data,
+    response: &[Complex64],
+    power: f64,
+) -> Vec<f64> {
+    let applied = set.blocks.first().map_or(&[][..], |block| &block.applied);
+    let top = &applied[applied.len() - applied.len() / TOP..];
+    let unseen = top.iter().map(Complex64::norm_sqr).sum::<f64>() / top.len().max(1) as f64;
+    let size = |(k, line): (usize, usize)| {
+        let of_applied = applied[line].norm_sqr();
+        let error = response[k].norm_sqr() * data.weight[k].powi(2) * unseen / of_applied;
+        (power + if of_applied > 0.0 { error } else { 0.0 }).sqrt()
+    };
+    lines.clone().enumerate().map(size).collect()
+}
+
 /// s_k of each line; `power` is the mean power of the residuals over the lines that count.
 fn error_sizes(set: &Set, lines: &Lines, weight: &[f64], power: f64, counted: usize) -> Vec<f64> {
-    let blocks = set.blocks.len();
-    if blocks < 2 {
-        return vec![power.sqrt(); weight.len()];
-    }
     let scattered: Vec<f64> = lines
         .clone()
         .zip(weight)

@@ -1,0 +1,72 @@
+//! Uncertainties from one short hit, of a few samples, against a simulation in fine steps of its own.
+
+use std::f64::consts::{PI, TAU};
+
+use crate::noise::Noise;
+use crate::util::Folder;
+
+const RATE_HZ: f64 = 5000.0;
+
+/// Half a sine of force, and the motion of a stand under it, by the classic Runge-Kutta method.
+fn hit(hz: f64, ratio: f64, pulse_s: f64, at_s: f64) -> Vec<(f64, f64)> {
+    const STEPS: usize = 10;
+    let omega = TAU * hz;
+    let force = |t: f64| match (t - at_s) / pulse_s {
+        part if (0.0..1.0).contains(&part) => (PI * part).sin(),
+        _ => 0.0,
+    };
+    let slope =
+        |t: f64, [x, v]: [f64; 2]| [v, omega * omega * (force(t) - x) - 2.0 * ratio * omega * v];
+    let h = 1.0 / RATE_HZ / STEPS as f64;
+    let mut state = [0.0; 2];
+    let mut rows = Vec::new();
+    for row in 0..3000 {
+        let start = f64::from(row) / RATE_HZ;
+        rows.push((force(start), state[0]));
+        for step in 0..STEPS {
+            let t = start + step as f64 * h;
+            let on = |by: f64, d: [f64; 2]| [state[0] + by * d[0], state[1] + by * d[1]];
+            let a = slope(t, state);
+            let b = slope(t + 0.5 * h, on(0.5 * h, a));
+            let c = slope(t + 0.5 * h, on(0.5 * h, b));
+            let d = slope(t + h, on(h, c));
+            let sum = |i: usize| a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i];
+            state = on(h / 6.0, [sum(0), sum(1)]);
+        }
+    }
+    rows
+}
+
+#[test]
+fn the_uncertainty_of_one_short_hit_covers_its_error() {
+    let folder = Folder::new();
+    let mut noise = Noise(11);
+    let (mut held, mut stated, mut wide) = (0, 0, 0);
+    for trial in 0..40 {
+        let part = |step: f64| (f64::from(trial) * step).fract();
+        let (hz, ratio) = (60.0 + 240.0 * part(0.618), 0.01 + 0.03 * part(0.755));
+        let pulse_s = (3.0 + 17.0 * part(0.57)) / RATE_HZ;
+        let size = 10.0_f64.powf(-5.0 + 2.0 * part(0.819));
+        let rows = hit(hz, ratio, pulse_s, 0.05 + part(0.31) / RATE_HZ);
+        let rows = rows.iter().enumerate().map(|(row, (force, x))| {
+            let (force, x) = (force + size * noise.normal(), x + size * noise.normal());
+            format!("{:.4},{force:.9e},{x:.9e}\n", row as f64 / RATE_HZ)
+        });
+        folder.write(
+            "hit.csv",
+            format!("time_s,force [N m],T [N m]\n{}", rows.collect::<String>()),
+        );
+        let verb = ["identify", "response", "hit.csv", "--modes", "1", "--json"];
+        let report = folder.json(&[&verb[..], &["--applied", "force", "--measured", "T"]].concat());
+        for (name, truth) in [("natural_frequency", hz), ("damping_ratio", ratio)] {
+            let all = report["parameters"].as_array().expect("parameters");
+            let found = all.iter().find(|p| p["name"] == name).expect(name);
+            let number = |key: &str| found[key].as_f64().expect("a number");
+            stated += 1;
+            held += i32::from((number("value") - truth).abs() <= 1.96 * number("std"));
+            wide += i32::from(number("std") > 0.05 * truth);
+        }
+    }
+    assert!(10 * held >= 9 * stated, "{held} of {stated}");
+    assert!(10 * wide <= stated, "{wide} of {stated} are of no use");
+}
