@@ -95,6 +95,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["no-unloading", "there are no readings while unloading, so that the hysteresis is unknown", "unload in steps, too"],
         ["noise-before-resonance", "the residual follows the resonance: the stand is driven by something else too, or the input is recorded with noise, which makes the gain too small", "reduce the noise of --applied, or excite more"],
         ["noisy-motion", "noise is a notable part of a regressor; it was corrected for", "use a longer window or a better sensor"],
+        ["one-hit", "a single hit does not show the error of its own force, which decides the uncertainties: those of frequency and damping are upper limits, that of the static gain can be too small", "take several hits"],
         ["nonlinear", "the response has power at frequencies that were not applied: the stand is nonlinear", "look for the cause with diagnose"],
         ["mode-out-of-reach", "a fitted mode lies above all frequencies of the records and was left out", "check for a shift between the channels, or choose fewer --modes"],
         ["undamped-left-out", "a mode without a damping that the records show was left out", "choose fewer --modes, or record for longer"],

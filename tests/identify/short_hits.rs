@@ -41,7 +41,7 @@ fn hit(hz: f64, ratio: f64, pulse_s: f64, at_s: f64) -> Vec<(f64, f64)> {
 fn the_uncertainty_of_one_short_hit_covers_its_error() {
     let folder = Folder::new();
     let mut noise = Noise(11);
-    let (mut held, mut stated, mut wide) = (0, 0, 0);
+    let (mut held, mut stated, mut wide, mut warned) = (0, 0, 0, 0);
     for trial in 0..40 {
         let part = |step: f64| (f64::from(trial) * step).fract();
         let (hz, ratio) = (60.0 + 240.0 * part(0.618), 0.01 + 0.03 * part(0.755));
@@ -58,6 +58,8 @@ fn the_uncertainty_of_one_short_hit_covers_its_error() {
         );
         let verb = ["identify", "response", "hit.csv", "--modes", "1", "--json"];
         let report = folder.json(&[&verb[..], &["--applied", "force", "--measured", "T"]].concat());
+        let warnings = report["warnings"].as_array().expect("warnings");
+        warned += i32::from(warnings.iter().any(|w| w["code"] == "one-hit"));
         for (name, truth) in [("natural_frequency", hz), ("damping_ratio", ratio)] {
             let all = report["parameters"].as_array().expect("parameters");
             let found = all.iter().find(|p| p["name"] == name).expect(name);
@@ -67,6 +69,10 @@ fn the_uncertainty_of_one_short_hit_covers_its_error() {
             wide += i32::from(number("std") > 0.05 * truth);
         }
     }
+    assert!(
+        5 * warned >= 2 * stated,
+        "{warned} of {stated} fits are said to rest on the force"
+    );
     assert!(10 * held >= 9 * stated, "{held} of {stated}");
     assert!(10 * wide <= stated, "{wide} of {stated} are of no use");
 }

@@ -126,11 +126,10 @@ fn zone(frequency: f64, factor: usize) -> usize {
 
 /// What a band looks like in samples, if it lies within one zone of half their rate, and the way back from there; all in
 /// cycles per sample.
-#[must_use]
 pub fn folded(band: &Range<f64>) -> (Range<f64>, impl Fn(f64) -> f64 + use<>) {
     let zone = zone(band.start, 1);
     // The same both ways but for the sign.
-    let turn = move |frequency: f64, sign: f64| match zone % 2 == 0 {
+    let turn = move |frequency: f64, sign: f64| match zone.is_multiple_of(2) {
         true => frequency - sign * 0.5 * zone as f64,
         false => 0.5 * (zone + 1) as f64 - frequency,
     };

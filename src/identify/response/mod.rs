@@ -212,6 +212,9 @@ fn without_undamped(
     }
 }
 
+const ONE_HIT: &str = "one hit does not show the error of its own force (noise, and what is folded), which decides the \
+    uncertainties here: those of frequency and damping are upper limits, that of the static gain can be too small; take several hits";
+
 /// The final fit: of the whole records without a window where windows have leakage, or of the averaged response.
 fn final_fit(
     whole: Option<whole::Whole>,
@@ -231,6 +234,9 @@ fn final_fit(
     let mut modal = data.fit(&coarse.poles, Effort::Fine)?;
     check::leakage(result, set, &modal);
     let searched = modal.fit.as_ref().map_or(0, |fit| fit.values.len());
+    if scatter::is_of_force(set, lines, data, &modal) {
+        result.warn("one-hit", ONE_HIT);
+    }
     let all = scatter::of_all(set, lines, data, &modal)?;
     let of_poles = scatter::of_poles(set, lines, data, &modal)?;
     foreign::mark(&mut modal, &of_poles, set);

@@ -224,15 +224,29 @@ fn sizes_of_one(
     response: &[Complex64],
     power: f64,
 ) -> Vec<f64> {
+    let unseen = power_of_force_error(set, lines, data, response);
+    unseen.into_iter().map(|u| (power + u).sqrt()).collect()
+}
+
+/// Power of the weighted errors that the error of the applied signal of one block makes, by line.
+fn power_of_force_error(set: &Set, lines: &Lines, data: &Data, response: &[Complex64]) -> Vec<f64> {
     let applied = set.blocks.first().map_or(&[][..], |block| &block.applied);
     let top = &applied[applied.len() - applied.len() / TOP..];
     let unseen = top.iter().map(Complex64::norm_sqr).sum::<f64>() / top.len().max(1) as f64;
-    let size = |(k, line): (usize, usize)| {
-        let of_applied = applied[line].norm_sqr();
-        let error = response[k].norm_sqr() * data.weight[k].powi(2) * unseen / of_applied;
-        (power + if of_applied > 0.0 { error } else { 0.0 }).sqrt()
+    let size = |(k, line): (usize, usize)| match applied[line].norm_sqr() {
+        of_applied if of_applied > 0.0 => {
+            response[k].norm_sqr() * data.weight[k].powi(2) * unseen / of_applied
+        }
+        _ => 0.0,
     };
     lines.clone().enumerate().map(size).collect()
+}
+
+/// Whether the error of the force decides the uncertainty of a fit to one block.
+pub(super) fn is_of_force(set: &Set, lines: &Lines, data: &Data, fitted: &Modal) -> bool {
+    let squares = fitted.fit.as_ref().map_or(0.0, |f| f.sum_of_squares);
+    let of_force = power_of_force_error(set, lines, data, &fitted.response);
+    set.blocks.len() == 1 && of_force.iter().sum::<f64>() > squares
 }
 
 /// s_k of each line; `power` is the mean power of the residuals over the lines that count.
