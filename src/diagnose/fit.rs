@@ -6,7 +6,9 @@ use torqcomp_model::Chain;
 use torqcomp_model::Mode;
 use torqcomp_model::fit::{self, Differences, Fit, FitError, Options, Parameter};
 
-use super::record::{InitialState, Nuisance, NuisanceFit, NuisanceTerms, StandRecord, dot};
+use super::record::{
+    InitialState, Nuisance, NuisanceFit, NuisanceTerms, StandRecord, StateSlopes, dot,
+};
 use super::structure::{PlainStand, Structure};
 
 /// A model with fitted values.
@@ -69,14 +71,19 @@ impl FitEffort {
 
 /// Relative reduction of the sum of squares at which a fit has converged.
 const TOLERANCE: f64 = 1e-6;
-/// Iterations for the initial state of a held-out record.
-const INITIAL_STATE_ITERATIONS: usize = 3;
 /// Largest displacement by a constant load, over the rms of the record.
 const LARGEST_PRELOAD: f64 = 0.5;
-/// Step of that displacement for differences, over the rms of the record.
-const PRELOAD_STEP: f64 = 1e-4;
+/// Step of the initial state for differences, over the rms of the record.
+const STATE_STEP: f64 = 1e-4;
 /// Correction of the motion at a record's start, over the rms of the residual, that makes a second fit worthwhile.
 const START_MATTERS: f64 = 0.05;
+
+/// Parts of a step to a better initial state that are tried.
+const STEPS: [f64; 3] = [1.0, 0.3, 0.1];
+/// Such steps, or fits after them, at most, and the relative reduction of the sum of squares by one that makes the next one worthwhile: a start that was
+/// fitted without the effect is corrected in part only, as long as the effect's size is wrong for it.
+const MOST_STARTS: usize = 8;
+const START_SETTLED: f64 = 0.01;
 
 /// Fits a model from start values.
 ///
@@ -97,15 +104,22 @@ pub fn fit(
         let integrates = start_model.has_torques();
         // That of a plain stand matters where it lasts: elsewhere the fits of its rivals would only start from another place.
         let may_move = !integrates && (!structure.effects.is_empty() || lasts(&records, &free));
-        let has_moved = may_move && moves_on(&structure, &found.values, &records, &free);
-        let is_corrected =
-            integrates && correct_starts(&structure, &found.values, &mut records, &free);
-        let values = &found.values[..start.len()];
-        if has_moved {
+        if may_move && moves_on(&structure, &found.values, &records, &free) {
+            let values = &found.values[..start.len()];
             found = minimize(&structure, values, &mut records, None, effort)?;
             free = structure.model(&found.values).0.free_mode();
-        } else if is_corrected {
-            found = minimize(&structure, values, &mut records, Some(&free), effort)?;
+        }
+        for _ in 0..MOST_STARTS {
+            if !integrates || !correct_starts(&structure, &found.values, &mut records, &free) {
+                break;
+            }
+            let values = &found.values[..start.len()];
+            let next = minimize(&structure, values, &mut records, Some(&free), effort)?;
+            let has_settled = next.sum_of_squares > (1.0 - START_SETTLED) * found.sum_of_squares;
+            found = next;
+            if has_settled {
+                break;
+            }
         }
     }
     let count = structure.bounds().len();
@@ -205,6 +219,116 @@ pub fn raw_residual(model: &Chain, record: &StandRecord) -> Result<Vec<f64>, Fit
     Ok(residual)
 }
 
+/// How a record of a model changes with its own initial state, by differences; `residual` is its raw residual.
+fn state_slopes(
+    model: &mut Chain,
+    record: &StandRecord,
+    residual: &[f64],
+    free: &Mode,
+    rms: f64,
+) -> Option<StateSlopes> {
+    let step = STATE_STEP * rms;
+    let slope = |model: &Chain, record: &StandRecord| {
+        let moved = raw_residual(model, record).ok()?;
+        let pairs = residual.iter().zip(&moved);
+        Some(pairs.map(|(a, b)| (a - b) / step).collect::<Vec<_>>())
+    };
+    let along = |model: &Chain, motion: [f64; 2]| {
+        let mut moved = record.clone();
+        moved.initial.correct(motion, free);
+        slope(model, &moved)
+    };
+    let motion = match record.has_free_motion(free) {
+        true => Some([along(model, [step, 0.0])?, along(model, [0.0, step])?]),
+        false => None,
+    };
+    let preload = match model.has_zero() {
+        true => {
+            model.shift += step;
+            let loaded = slope(model, record);
+            model.shift -= step;
+            Some(loaded?)
+        }
+        false => None,
+    };
+    Some(StateSlopes { motion, preload })
+}
+
+/// The residual of a record with the initial state that it has.
+fn evaluate(
+    model: &mut Chain,
+    terms: &NuisanceTerms,
+    record: StandRecord,
+    free: &Mode,
+    rms: f64,
+) -> Option<RecordResidual> {
+    model.shift = record.initial.preload;
+    let mut samples = raw_residual(model, &record).ok()?;
+    let slopes = match model.has_torques() {
+        true => Some(state_slopes(model, &record, &samples, free, rms)?),
+        false => None,
+    };
+    let pairs = record.measured_in_range().iter().zip(&samples);
+    let modelled = pairs.map(|(y, r)| y - r).collect();
+    let nuisance = record.nuisance(free, terms, slopes).fit(&mut samples);
+    Some(RecordResidual {
+        record,
+        samples,
+        modelled,
+        nuisance,
+    })
+}
+
+/// The residual of a record with the initial state that leaves least of it. A motion that is integrated depends on it in a curved
+/// way: the search begins with the state that the record has and at rest, and goes on by Gauss's and Newton's steps as
+/// long as they help. `None` if the motion diverges.
+fn settled(
+    model: &mut Chain,
+    terms: &NuisanceTerms,
+    record: StandRecord,
+    free: &Mode,
+    rms: f64,
+) -> Option<RecordResidual> {
+    if !model.has_torques() {
+        return evaluate(model, terms, record, free, rms);
+    }
+    let starts = [record.initial, InitialState::default()];
+    let starts = starts.map(|initial| record.starting_from(initial));
+    let sum = |found: &RecordResidual| dot(&found.samples, &found.samples);
+    let found = starts
+        .into_iter()
+        .filter_map(|record| evaluate(model, terms, record, free, rms))
+        .min_by(|a, b| sum(a).total_cmp(&sum(b)));
+    let mut found = found?;
+    for _ in 0..MOST_STARTS {
+        let better = STEPS.into_iter().find_map(|part| {
+            let record = found.stepped(part, free, rms);
+            let next = evaluate(model, terms, record, free, rms)?;
+            (sum(&next) < sum(&found)).then_some(next)
+        });
+        let Some(next) = better else { break };
+        let has_settled = sum(&next) > (1.0 - START_SETTLED) * sum(&found);
+        found = next;
+        if has_settled {
+            break;
+        }
+    }
+    Some(found)
+}
+
+impl RecordResidual {
+    /// The record with part of the correction of its initial state that the residual shows.
+    fn stepped(&self, part: f64, free: &Mode, rms: f64) -> StandRecord {
+        let mut record = self.record.clone();
+        let motion = self.nuisance.motion.unwrap_or_default();
+        record.initial.correct(motion.map(|x| part * x), free);
+        let limit = LARGEST_PRELOAD * rms;
+        let preload = record.initial.preload + part * self.nuisance.preload.unwrap_or(0.0);
+        record.initial.preload = preload.clamp(-limit, limit);
+        record
+    }
+}
+
 /// Mean square of the raw residual of a record, and the nuisance terms in it.
 fn nuisance_of(
     (model, terms): &mut (Chain, NuisanceTerms),
@@ -218,23 +342,26 @@ fn nuisance_of(
     Some((mean_square, nuisance.fit(&mut residual)))
 }
 
-/// Corrects the motion at the start of each record by what the residual shows of it; whether any correction matters.
+/// Searches the motion at the start of each record again; whether that changes any record.
 fn correct_starts(
     structure: &Structure,
     values: &[f64],
     records: &mut [StandRecord],
     free: &Mode,
 ) -> bool {
-    let mut model = structure.model(values);
+    let (mut model, terms) = structure.model(values);
+    let rms = structure.context.scales.rms;
     let mut matters = false;
     for record in records {
-        let Some((mean_square, found)) = nuisance_of(&mut model, record, free) else {
+        let old = record.initial.motion;
+        let Some(found) = settled(&mut model, &terms, record.clone(), free, rms) else {
             continue;
         };
-        if let Some([x, speed]) = found.motion {
-            record.initial.correct([x, speed], free);
-            matters |= x.hypot(speed) > START_MATTERS * mean_square.sqrt();
-        }
+        record.initial.motion = found.record.initial.motion;
+        let x = record.initial.motion.x - old.x;
+        let speed = (record.initial.motion.speed - old.speed) / free.omega_rad_s;
+        let mean_square = dot(&found.samples, &found.samples) / found.samples.len() as f64;
+        matters |= x.hypot(speed) > START_MATTERS * mean_square.sqrt();
     }
     matters
 }
@@ -331,53 +458,10 @@ impl FittedModel {
     /// nothing else. `None` if the motion diverges.
     pub fn residual(&self, record: &StandRecord) -> Option<RecordResidual> {
         let (mut model, terms) = self.structure.model(&self.values);
-        let context = &self.structure.context;
-        let limit = LARGEST_PRELOAD * context.scales.rms;
-        let mut found = self.evaluate(&mut model, &terms, record.clone())?;
-        let iterations = match model.has_torques() {
-            true => INITIAL_STATE_ITERATIONS,
-            false => 1,
-        };
-        for _ in 1..iterations {
-            let mut record = found.record;
-            let motion = found.nuisance.motion.unwrap_or_default();
-            record.initial.correct(motion, &self.free);
-            let preload = record.initial.preload + found.nuisance.preload.unwrap_or(0.0);
-            record.initial.preload = preload.clamp(-limit, limit);
-            found = self.evaluate(&mut model, &terms, record)?;
-        }
+        let rms = self.structure.context.scales.rms;
+        let mut found = settled(&mut model, &terms, record.clone(), &self.free, rms)?;
         self.restore_amplitudes(&terms, &mut found);
         Some(found)
-    }
-
-    /// The residual of a record with the initial state that it has.
-    fn evaluate(
-        &self,
-        model: &mut Chain,
-        terms: &NuisanceTerms,
-        record: StandRecord,
-    ) -> Option<RecordResidual> {
-        let context = &self.structure.context;
-        model.shift = record.initial.preload;
-        let mut samples = raw_residual(model, &record).ok()?;
-        let mut preload = None;
-        if model.has_zero() {
-            let step = PRELOAD_STEP * context.scales.rms;
-            model.shift += step;
-            let moved = raw_residual(model, &record).ok()?;
-            let pairs = samples.iter().zip(&moved);
-            preload = Some(pairs.map(|(a, b)| (a - b) / step).collect());
-        }
-        let pairs = record.measured_in_range().iter().zip(&samples);
-        let modelled = pairs.map(|(y, r)| y - r).collect();
-        let nuisance = record.nuisance(&self.free, terms, preload);
-        let nuisance = nuisance.fit(&mut samples);
-        Some(RecordResidual {
-            record,
-            samples,
-            modelled,
-            nuisance,
-        })
     }
 
     /// The phase of a line belongs to the record, its amplitude to the stand: undoes the difference between the

@@ -3,6 +3,7 @@
 
 use torqcomp_model::simulate::Between;
 
+use super::record::{StandRecord, dot};
 use super::records::Records;
 use super::score::ScoredModel;
 use super::search::refusal;
@@ -11,7 +12,37 @@ use crate::parallel::parallel;
 /// Largest part of a model's excess error power that may remain with another course of the input.
 const LEFT: f64 = 0.5;
 
-/// The course of the input, other than band-limited, with which one of the models explains more for its parameters than the
+/// Change beside a jump, over the jump, up to which there are plateaus on both sides of it.
+const LEVEL: f64 = 0.15;
+/// Part of the squared changes of an input of plateaus that are jumps.
+const MOSTLY_JUMPS: f64 = 0.9;
+/// Their rms over that of the input, below which they are steps of a converter in a slow signal.
+const SMALL: f64 = 0.1;
+
+/// The course that the inputs show by themselves. Plateaus with jumps from one sample to the next need frequencies without limit
+/// and are held; everything else is taken to be band-limited until the records say otherwise.
+pub fn from_inputs(records: &[StandRecord]) -> Between {
+    match !records.is_empty() && records.iter().all(|r| has_plateaus(r.input.samples())) {
+        true => Between::Held,
+        false => Between::BandLimited,
+    }
+}
+
+fn has_plateaus(input: &[f64]) -> bool {
+    let changes: Vec<f64> = input.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let is_jump = |near: &&[f64]| near[0].abs().max(near[2].abs()) <= LEVEL * near[1].abs();
+    let jumps = changes.windows(3).filter(is_jump).map(|near| near[1]);
+    let jumps: Vec<f64> = jumps.filter(|jump| *jump != 0.0).collect();
+    let mean = input.iter().sum::<f64>() / input.len() as f64;
+    let about: Vec<f64> = input.iter().map(|value| value - mean).collect();
+    let power_of_jumps = dot(&jumps, &jumps) / jumps.len().max(1) as f64;
+    let power = dot(&about, &about) / about.len() as f64;
+    !jumps.is_empty()
+        && dot(&jumps, &jumps) >= MOSTLY_JUMPS * dot(&changes, &changes)
+        && power_of_jumps >= SMALL * SMALL * power
+}
+
+/// The course of the input, other than the present one, with which one of the models explains more for its parameters than the
 /// last one. A course has no parameter that could adapt it to an effect.
 pub fn better_course(
     models: &[&ScoredModel],
@@ -20,7 +51,10 @@ pub fn better_course(
     records: &Records,
     threads: usize,
 ) -> Option<Between> {
-    let others = &Between::ALL[1..];
+    let others: Vec<Between> = Between::ALL
+        .into_iter()
+        .filter(|between| *between != records.between())
+        .collect();
     let changed: Vec<Records> = others.iter().map(|b| records.with_between(*b)).collect();
     let found = parallel(others.len() * models.len(), threads, |job| {
         let (course, model) = (job / models.len(), models[job % models.len()]);
@@ -33,4 +67,25 @@ pub fn better_course(
     let found = found.into_iter().flatten();
     let best = found.min_by(|a, b| a.0.total_cmp(&b.0));
     best.map(|(_, between)| between)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn plateaus_are_seen_in_noise_and_not_in_smooth_or_slow_signals() {
+        let level = |i: usize| ((i / 9 * 7) % 11) as f64 - 5.0;
+        let noise = |i: usize| ((i * 7919) % 1009) as f64 / 1009.0 - 0.5;
+        let made = |value: &dyn Fn(usize) -> f64| (0..4000).map(value).collect::<Vec<_>>();
+        assert!(has_plateaus(&made(&|i| level(i) + 0.05 * noise(i))));
+        assert!(!has_plateaus(&made(&|i| (0.3 * i as f64).sin())));
+        assert!(!has_plateaus(&made(&|i| level(7 * i))));
+        // A slow sine in steps of a converter, and single values that stand out.
+        assert!(!has_plateaus(&made(&|i| (100.0
+            * (0.001 * i as f64).sin())
+        .round())));
+        assert!(!has_plateaus(&made(&|i| f64::from(u8::from(i % 40 == 0)))));
+        assert!(!has_plateaus(&[1.0; 50]));
+    }
 }

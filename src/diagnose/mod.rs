@@ -183,16 +183,18 @@ pub fn run(mut case: Case, workers: Workers) -> Result<Diagnosis, Failure> {
         effects: &case.declared_effects,
     });
     let training = case.records.training();
+    let training = training.with_between(intersample::from_inputs(&training.train));
     let look = |records: Records| SearchState::with(records, &context, declared, workers);
     let mut found = look(training.clone())?;
     let between = found.other_course(workers.threads);
-    let smooth = between.is_some().then_some(&training);
     if let Some(between) = between {
         found = look(training.with_between(between))?;
     }
+    let smooth = (found.records.between() != Between::BandLimited)
+        .then(|| training.with_between(Between::BandLimited));
     let alignment = alignment.or_else(|| shift::find(&case, &context, &found));
     if let Some(alignment) = &alignment
-        && let Some(weighed) = shift::weigh(&found, smooth, alignment, workers.threads)
+        && let Some(weighed) = shift::weigh(&found, smooth.as_ref(), alignment, workers.threads)
     {
         found.is_outdone = weighed.outdoes;
         case.warnings.push(weighed.warning);

@@ -62,6 +62,14 @@ impl NuisanceTerms {
     }
 }
 
+/// Change of a record, over its range, with its own initial state.
+pub struct StateSlopes {
+    /// With the displacement, and with the speed over `ω₀`, at the first sample; none if the motion from there is gone.
+    pub motion: Option<[Vec<f64>; 2]>,
+    /// With the displacement by a constant load, where that is more than a constant.
+    pub preload: Option<Vec<f64>>,
+}
+
 /// What belongs to a record and not to the stand: it is removed from the record's residual by least squares.
 #[derive(Default)]
 pub struct Nuisance {
@@ -119,28 +127,41 @@ impl StandRecord {
         }
     }
 
+    /// Whether free motion of a mode from before the range is left in it.
+    pub fn has_free_motion(&self, mode: &Mode) -> bool {
+        self.decay_to_range(mode) < DECAYED
+    }
+
+    /// Time constants of a mode from the first sample to the range.
+    fn decay_to_range(&self, mode: &Mode) -> f64 {
+        mode.damping_ratio * mode.omega_rad_s / self.rate_hz() * self.range.start as f64
+    }
+
     /// What belongs to this record: a constant, the free motion of the plain stand after the record's start, and the
-    /// given terms. `preload` is the change of the record with a constant load, where that is more than a constant.
+    /// given terms. `slopes` replace that motion where the stand's effects change it.
     pub fn nuisance(
         &self,
         mode: &Mode,
         terms: &NuisanceTerms,
-        preload: Option<Vec<f64>>,
+        slopes: Option<StateSlopes>,
     ) -> Nuisance {
         let mut nuisance = Nuisance::default();
         let columns = &mut nuisance.columns;
         columns.push(vec![1.0; self.count()]);
         let rate_hz = self.rate_hz();
-        let decay = mode.damping_ratio * mode.omega_rad_s / rate_hz * self.range.start as f64;
-        if decay < DECAYED {
+        if self.has_free_motion(mode) {
             nuisance.motion = Some(1);
-            nuisance.sees_start = decay < START_SEEN;
-            let model = Chain::new(*mode, 1.0);
-            for column in model.free_motion(rate_hz, self.range.end) {
-                columns.push(column[self.range.clone()].to_vec());
+            nuisance.sees_start = self.decay_to_range(mode) < START_SEEN;
+            let slopes = slopes.as_ref().and_then(|slopes| slopes.motion.clone());
+            let free = || {
+                let free = Chain::new(*mode, 1.0).free_motion(rate_hz, self.range.end);
+                free.map(|column| column[self.range.clone()].to_vec())
+            };
+            for column in slopes.unwrap_or_else(free) {
+                columns.push(column);
             }
         }
-        if let Some(column) = preload {
+        if let Some(column) = slopes.and_then(|slopes| slopes.preload) {
             nuisance.preload = Some(columns.count());
             columns.push(column);
         }
