@@ -21,6 +21,8 @@ struct Setting {
     /// Noise over the rms of the record, and its correlation from one sample to the next.
     noise: f64,
     memory: f64,
+    /// White noise on the applied torque over its rms.
+    applied: f64,
 }
 
 /// Applied and recorded torque from rest: Runge and Kutta's method in steps of 1/400 period.
@@ -63,6 +65,10 @@ fn record(setting: &Setting, noise: &mut Noise) -> (Vec<f64>, Vec<f64>) {
     for y in &mut shown {
         *y += setting.noise * of_shown * colour;
         colour = setting.memory * colour + fresh * noise.normal();
+    }
+    let of_applied = (applied.iter().map(|u| u * u).sum::<f64>() / applied.len() as f64).sqrt();
+    for u in &mut applied {
+        *u += setting.applied * of_applied * noise.normal();
     }
     (applied, shown)
 }
@@ -120,6 +126,7 @@ fn noise_that_is_not_white_is_no_missing_effect() {
         samples: 30,
         noise: 0.005,
         memory: 0.9,
+        applied: 0.0,
     };
     let (right, named) = answers(&setting);
     assert!(right >= 7 && named.is_empty(), "{right} of 8, {named:?}");
@@ -135,6 +142,22 @@ fn a_stand_that_rings_longer_than_its_record_is_fitted() {
         samples: 24,
         noise: 0.005,
         memory: 0.0,
+        applied: 0.0,
+    };
+    let (right, named) = answers(&setting);
+    assert!(right >= 7 && named.is_empty(), "{right} of 8, {named:?}");
+}
+
+/// The model answers noise on the recorded torque and rings with it, the stand does not.
+#[test]
+fn noise_on_the_applied_torque_is_no_missing_effect() {
+    let setting = Setting {
+        damping_ratio: 0.02,
+        periods: 100,
+        samples: 30,
+        noise: 0.002,
+        memory: 0.0,
+        applied: 0.005,
     };
     let (right, named) = answers(&setting);
     assert!(right >= 7 && named.is_empty(), "{right} of 8, {named:?}");

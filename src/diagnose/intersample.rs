@@ -29,17 +29,28 @@ pub fn from_inputs(records: &[StandRecord]) -> Between {
 }
 
 fn has_plateaus(input: &[f64]) -> bool {
+    noise_on_plateaus(input).is_some()
+}
+
+/// Mean square of the noise on an input of plateaus: half that of the changes on them. `None` if the input has none.
+pub fn noise_on_plateaus(input: &[f64]) -> Option<f64> {
     let changes: Vec<f64> = input.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let is_jump = |near: &&[f64]| near[0].abs().max(near[2].abs()) <= LEVEL * near[1].abs();
     let jumps = changes.windows(3).filter(is_jump).map(|near| near[1]);
-    let jumps: Vec<f64> = jumps.filter(|jump| *jump != 0.0).collect();
+    let squares: Vec<f64> = jumps.map(|jump| jump * jump).filter(|s| *s > 0.0).collect();
+    let (jumps, all) = (squares.iter().sum::<f64>(), dot(&changes, &changes));
     let mean = input.iter().sum::<f64>() / input.len() as f64;
-    let about: Vec<f64> = input.iter().map(|value| value - mean).collect();
-    let power_of_jumps = dot(&jumps, &jumps) / jumps.len().max(1) as f64;
-    let power = dot(&about, &about) / about.len() as f64;
-    !jumps.is_empty()
-        && dot(&jumps, &jumps) >= MOSTLY_JUMPS * dot(&changes, &changes)
-        && power_of_jumps >= SMALL * SMALL * power
+    let power = input.iter().map(|u| (u - mean).powi(2)).sum::<f64>() / input.len() as f64;
+    let is_seen = jumps > 0.0
+        && jumps >= MOSTLY_JUMPS * all
+        && jumps >= SMALL * SMALL * power * squares.len() as f64;
+    // Of the changes on plateaus a few look like jumps, but not by their size.
+    is_seen.then(|| {
+        let mut small: Vec<f64> = changes.iter().map(|c| c * c).collect();
+        small.sort_by(f64::total_cmp);
+        small.truncate(small.len().saturating_sub(squares.len()));
+        0.5 * small.iter().sum::<f64>() / small.len().max(1) as f64
+    })
 }
 
 /// The course of the input, other than the present one, with which one of the models explains more for its parameters than the

@@ -36,7 +36,7 @@ impl SearchState {
             guard.errors = guard.model.errors();
             Some(guard)
         });
-        self.noise_floor = NoiseFloor::of(&self.before.compared, &self.before.fitted.mode());
+        self.noise_floor = NoiseFloor::of(&self.before.compared, &self.before.fitted.stand());
         self.tests_before = super::tests(&self.before);
         let without = std::mem::take(&mut self.without);
         self.without = parallel(without.len(), threads, |k| {

@@ -234,7 +234,7 @@ impl SearchState {
         let mut found = Self {
             records,
             declared,
-            noise_floor: NoiseFloor::of(&before.compared, &before.fitted.mode()),
+            noise_floor: NoiseFloor::of(&before.compared, &before.fitted.stand()),
             after: before.clone(),
             before,
             without: Vec::new(),
@@ -261,8 +261,8 @@ impl SearchState {
             let old = self.noise_floor;
             old.is_some_and(|old| old.from == NoiseFloorSource::Periods && new.rms < old.rms)
         };
-        let mode = self.before.fitted.mode();
-        let new = NoiseFloor::of_residuals(&self.after.compared, &mode);
+        let plain = self.after.fitted.stand();
+        let new = NoiseFloor::of_residuals(&self.after.compared, &plain);
         if let Some(new) = new.filter(is_lower) {
             self.noise_floor = Some(new);
         }

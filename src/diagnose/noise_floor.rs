@@ -1,13 +1,17 @@
-//! The noise floor, estimated without any model of the stand.
+//! The noise floor: what the best model of the stand must leave.
+
+use std::f64::consts::PI;
 
 use schemars::JsonSchema;
 use serde::Serialize;
 use torqcomp_model::Mode;
 
 use super::fit::RecordResidual;
+use super::intersample::noise_on_plateaus;
 use super::record::{DECAYED, StandRecord, dot};
 use super::residual_tests::without_mean;
-use super::spectra::spectra;
+use super::spectra::{ONLY_NOISE, spectra};
+use super::structure::PlainStand;
 
 /// The noise of the held-out records.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,29 +40,54 @@ const SHORTEST: usize = 64;
 /// Largest part of the power out of band that the signal may have.
 const SIGNAL: f64 = 0.2;
 
+/// Ratio of two parts of a spectrum up to which it is flat.
+const FLAT: f64 = 1.5;
+/// Most of the power of noise that a stand passes on: near no damping the integral is that of a ringing that never settles.
+const MOST_PASSED: f64 = 10.0;
+
 /// Mean square of the noise, and the number of samples it is taken from.
 type MeanSquare = (f64, usize);
 
 impl NoiseFloor {
     /// The noise of records: from the differences of periods where every input repeats, otherwise from the top of the
-    /// spectrum, where the plain stand's modelled record says that there is no signal.
-    pub fn of(residuals: &[RecordResidual], mode: &Mode) -> Option<Self> {
+    /// spectrum, where the plain stand's modelled record says that there is no signal. To either the noise on the applied
+    /// quantity is added as the stand passes it on: the records do not have it, what a model makes of the applied quantity has.
+    pub fn of(residuals: &[RecordResidual], plain: &PlainStand) -> Option<Self> {
+        let mode = plain.mode();
         let periods = residuals.iter().map(|r| {
             let record = &r.record;
-            of_periods(record, record.measured_in_range(), mode)
+            of_periods(record, record.measured_in_range(), &mode)
         });
-        Self::pooled(periods, NoiseFloorSource::Periods).or_else(|| {
+        let measured = Self::pooled(periods, NoiseFloorSource::Periods).or_else(|| {
             let found = residuals.iter().filter_map(out_of_band);
             Self::pooled(found.map(Some), NoiseFloorSource::OutOfBand)
-        })
+        });
+        measured.map(|floor| floor.with_applied(residuals, plain))
     }
 
     /// The noise in the residuals of a model, from differences of periods: disturbances that do not repeat with the input,
     /// such as mains pickup, are not in it if the model has them.
-    pub fn of_residuals(residuals: &[RecordResidual], mode: &Mode) -> Option<Self> {
+    pub fn of_residuals(residuals: &[RecordResidual], plain: &PlainStand) -> Option<Self> {
+        let mode = plain.mode();
         let found = residuals.iter();
-        let found = found.map(|r| of_periods(&r.record, &r.samples, mode));
-        Self::pooled(found, NoiseFloorSource::Periods)
+        let found = found.map(|r| of_periods(&r.record, &r.samples, &mode));
+        let floor = Self::pooled(found, NoiseFloorSource::Periods)?;
+        Some(floor.with_applied(residuals, plain))
+    }
+
+    /// Adds the noise on the applied quantity. White noise of variance `σ²` at the rate `f_s` leaves the stand with
+    /// `σ² g² π f₀ / (2 ζ f_s)`, as `∫ |H|² df = g² π f₀ / (4 ζ)` from 0 on.
+    fn with_applied(self, residuals: &[RecordResidual], plain: &PlainStand) -> Self {
+        let passed = |residual: &RecordResidual| {
+            let record = &residual.record;
+            let width_hz = PI * plain.natural_hz / (2.0 * plain.damping_ratio);
+            let passed = (width_hz / record.rate_hz()).min(MOST_PASSED);
+            let mean_square = noise_of_input(record.input.samples()) * plain.gain.powi(2) * passed;
+            Some((mean_square, residual.samples.len()))
+        };
+        let applied = Self::pooled(residuals.iter().map(passed), self.from);
+        let rms = applied.map_or(self.rms, |applied| self.rms.hypot(applied.rms));
+        Self { rms, ..self }
     }
 
     /// The noise of several records together; `None` if it is unknown for one of them.
@@ -71,6 +100,30 @@ impl NoiseFloor {
         let sum: f64 = found.iter().map(|(s, n)| s * *n as f64).sum();
         let rms = (sum / count as f64).sqrt();
         (count > 0).then_some(Self { rms, from })
+    }
+}
+
+/// Mean square of the white noise on an applied quantity: what changes on its plateaus, or the flat top of its spectrum, if that
+/// is too low to be part of the excitation; otherwise none is known.
+fn noise_of_input(input: &[f64]) -> f64 {
+    if let Some(noise) = noise_on_plateaus(input) {
+        return noise;
+    }
+    let length = (input.len() / 16).next_power_of_two().clamp(64, 2048);
+    let power = spectra(input, length.min(input.len())).power();
+    let lines = power.len();
+    let mean = |range: std::ops::Range<usize>| {
+        let count = range.len().max(1) as f64;
+        power[range].iter().sum::<f64>() / count
+    };
+    let [below, top] = [
+        mean(lines * 6 / 10..lines * 8 / 10),
+        mean(lines * 8 / 10..lines * 97 / 100),
+    ];
+    let is_flat = below < FLAT * top && top < FLAT * below;
+    match is_flat && top < ONLY_NOISE * mean(0..lines) {
+        true => top * lines as f64,
+        false => 0.0,
     }
 }
 
@@ -150,16 +203,17 @@ mod tests {
     const NOISE: f64 = 1e-3;
 
     /// A stand at 2 Hz: its time constant is 1.6 s.
-    fn mode() -> Mode {
-        Mode {
-            omega_rad_s: std::f64::consts::TAU * 2.0,
+    fn stand() -> PlainStand {
+        PlainStand {
+            natural_hz: 2.0,
             damping_ratio: 0.05,
+            gain: 1.0,
         }
     }
 
     /// The stand's answer to steps of ±1 at these times: `1 − e^(−ζωt) (cos ω_d t + ζω/ω_d sin ω_d t)` for each.
     fn steps(times_s: &[f64], count: usize) -> RecordResidual {
-        let mode = mode();
+        let mode = stand().mode();
         let decay = mode.damping_ratio * mode.omega_rad_s;
         let swing = mode.omega_rad_s * (1.0 - mode.damping_ratio.powi(2)).sqrt();
         let answer = |t: f64| {
@@ -187,17 +241,33 @@ mod tests {
     fn the_floor_after_a_step_is_the_noise() {
         // The plateaus are constant, the stand swings on them for 20 s.
         for times_s in [&[5.0][..], &[5.0, 20.0], &[1.0, 9.0, 17.0, 25.0]] {
-            let floor = NoiseFloor::of(&[steps(times_s, 32_000)], &mode()).expect("a floor");
+            let floor = NoiseFloor::of(&[steps(times_s, 32_000)], &stand()).expect("a floor");
             let ratio = floor.rms / NOISE;
             assert!((0.9..1.1).contains(&ratio), "{times_s:?}: {ratio}");
         }
     }
 
     #[test]
+    fn noise_on_the_input_is_told_from_excitation() {
+        let noise = |i: usize| 12_f64.sqrt() * ((0.618_034 * (i * i) as f64).fract() - 0.5);
+        let line = |i: usize| (1..9).map(move |k| (0.03 * (k * i) as f64 + (k * k) as f64).sin());
+        let made = |value: &dyn Fn(usize) -> f64| (0..20_000).map(value).collect::<Vec<_>>();
+        let smooth = |i: usize| line(i).sum::<f64>() / 2.0;
+        let level = |i: usize| ((i / 90 * 7) % 11) as f64 / 3.0 - 1.5;
+        for clean in [&smooth as &dyn Fn(usize) -> f64, &level] {
+            let found = noise_of_input(&made(&|i| clean(i) + 0.005 * noise(i))).sqrt();
+            assert!((0.0045..0.0055).contains(&found), "{found}");
+            assert!(noise_of_input(&made(clean)).sqrt() < 1e-4);
+        }
+        // White excitation is none.
+        assert!(noise_of_input(&made(&noise)) < 1e-12);
+    }
+
+    #[test]
     fn steps_that_repeat_give_the_noise_once_the_stand_has_settled() {
         // From the second period on the input has repeated; 12 time constants, 19.1 s, later the motion has, too.
         let times_s: Vec<f64> = (0..40).map(|k| 1.5 * f64::from(k)).collect();
-        let floor = NoiseFloor::of(&[steps(&times_s, 64_000)], &mode()).expect("a floor");
+        let floor = NoiseFloor::of(&[steps(&times_s, 64_000)], &stand()).expect("a floor");
         assert_eq!(floor.from, NoiseFloorSource::Periods);
         assert!((0.9..1.1).contains(&(floor.rms / NOISE)), "{}", floor.rms);
     }

@@ -146,11 +146,12 @@ impl ScoredModel {
         all.collect::<Vec<_>>().concat()
     }
 
-    /// Number of parameters, amplitudes of lines included.
+    /// Number of parameters, amplitudes of lines included, and their phases on each training record.
     pub fn parameter_count(&self) -> usize {
         let (_, terms) = self.fitted.structure.model(&self.fitted.values);
         self.fitted.values.len()
             + self.fitted.amplitudes.len()
+            + terms.lines_hz.len() * self.train.len()
             + terms.drift_half_waves
             + terms.decays_per_s.len()
     }

@@ -429,14 +429,24 @@ fn is_tied(tried: &[CandidateFit], k: usize, best: usize) -> bool {
         || comparison.gain() < TIED_GAIN * other.compared_rms().powi(2)
 }
 
-/// Of effects that the records cannot distinguish: the one with the smallest criterion, which penalises parameters; of
-/// those close to it, the one that comes first in the list. So a line at the mains frequency is mains pickup rather than a
+/// Of effects that the records cannot distinguish: those with the fewest parameters, as the criterion takes noise that rings for
+/// more evidence than it is; of these the one with the smallest criterion, or of those close to it the first in the list. So a line at the mains frequency is mains pickup rather than a
 /// shaft that happens to turn so fast, and a lag without a corner is a delay.
 fn simplest(tried: &[CandidateFit], tied: &[usize]) -> Option<usize> {
+    let count = |k: usize| {
+        let model = tried[k].model.as_ref();
+        model.map_or(usize::MAX, ScoredModel::parameter_count)
+    };
+    let fewest = tied.iter().map(|k| count(*k)).min()?;
+    let tied: Vec<usize> = tied
+        .iter()
+        .copied()
+        .filter(|k| count(*k) == fewest)
+        .collect();
     let least = tied.iter().map(|k| criterion(tried, *k));
     let least = least.fold(f64::INFINITY, f64::min);
     // The candidates are in the order of the list.
-    let mut tied = tied.iter().copied();
+    let mut tied = tied.into_iter();
     tied.find(|k| criterion(tried, *k) <= least + SAME)
 }
 

@@ -84,7 +84,7 @@ pub fn energy_spectrum(samples: &[f64], to_each_side: usize) -> Vec<f64> {
 
 /// Power of an input at a frequency, over its mean at all of them, below which it may be noise: noise of 1 % of the input is
 /// 1e-4 of it. A stand answers noise on the input as well, and what it answers follows from it.
-const ONLY_NOISE: f64 = 2.5e-4;
+pub const ONLY_NOISE: f64 = 2.5e-4;
 
 /// Share of the power of `output` that follows linearly from `input`, at frequencies where that is more than noise, and how
 /// many standard deviations it lies above zero. Segments are only compared with other segments, so that noise adds nothing
