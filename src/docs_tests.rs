@@ -48,8 +48,9 @@ fn the_list_of_effects_is_that_of_the_code() {
          transition_speed = \"40 N m/s\"\n```\n\n\
          `diagnose` finds effects in records and writes them into the stand file; `simulate` applies them, and \
          `compensate` takes them back ([how](compensation.md)). In the equations `n` is a torque beside `x`, \
-         `x'' + 2 zeta w0 x' + w0^2 (x + n) = w0^2 G u`, and `y` is the record. Units are powers of the unit of the \
-         record, here V, and of the second. Bounds are those of `diagnose`, in multiples of what the table says: \
+         `x'' + 2 zeta w0 x' + w0^2 (x + n) = w0^2 G u`, and `y` is the record. Units are powers of \
+         N m, the unit of the torque, whatever the unit of the record that a calibration makes it from; of a stand with \
+         `static_gain`, of the unit of the record in it, here V; and of the second. Bounds are those of `diagnose`, in multiples of what the table says: \
          `rms` and `peak` of the record about its mean, `w0` and `f0` the natural frequency in rad/s and Hz, `length` of \
          the record in s. A stand file may go beyond them.\n\n"
     );

@@ -28,6 +28,7 @@ impl Warning {
 pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
     ("Compensate and harmonics", &[
         ["beyond-rated-torque", "the torque lies more than 1.5 times beyond the transducer's rated torque", "check unit, gain and zero of the channel"],
+        ["below-rated-torque", "the torque stays below 0.5 % of the transducer's rated torque", "check unit and gain of the channel"],
         ["band-lost-in-noise", "part of the band does not rise above the record's noise, which the compensation multiplies there", "choose a lower --band"],
         ["components-lost-in-noise", "components do not exceed twice their own uncertainty", "average over a longer record, or take them as zero"],
         ["direction-unknown", "the speed is not significantly different from zero over part of the record, where a friction depends on its sign", "take the torque there as known to the size of the friction only"],
@@ -147,7 +148,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["mains-lines", "lines at multiples of 50 or 60 Hz stand out", "check grounding and shielding, or declare the effect mains-pickup"],
         ["non-finite", "cells hold no number, or no finite one", "repair them, or cut the record there"],
         ["repeated-samples", "samples repeat the one before more often than the resolution explains", "record the source at its own rate"],
-        ["stuck-channel", "the signal stands still for a while", "check cables and transmitters, and leave that part out"],
+        ["stuck-channel", "the signal stands still for a while, or drops out", "check cables and transmitters, and leave that part out"],
     ]),
     ("Reading text", &[
         ["extra-cells", "rows have more cells than there are headings", "check the headings"],

@@ -376,6 +376,11 @@ fn stand_files() {
         "\"8.1e4 ft lbf\"",
         &["line 5", "dimension"],
     );
+    with(
+        "[calibration]\n",
+        "[[effects]]\nkind = \"cubic-stiffness\"\ncoefficient = \"0.3 1/V^2\"\n[calibration]\n",
+        &["powers of N m, the unit of the torque", "0.01 1/(N m)^2"],
+    );
     with("[mechanics]", "[mechanics", &["line 2"]);
     with(
         "torque_per_volt = \"1.23e3 ft lbf/V\"\n",

@@ -99,6 +99,12 @@ fn every_fault_is_found_with_its_size() {
     assert_eq!(codes(&report), ["stuck-channel"]);
     assert_eq!(report["channels"][0]["stuck"], 300);
 
+    let mut dropped: Vec<f64> = good.iter().map(|x| x + 50.0).collect();
+    dropped[2000..2012].fill(0.0);
+    let report = inspect(&csv(&times, &[("a_V", &dropped)]));
+    assert_eq!(codes(&report), ["stuck-channel"]);
+    assert_eq!(report["channels"][0]["stuck"], 12);
+
     let chance = noise(3, 6000);
     let mut repeated = good.clone();
     for i in 1..6000 {

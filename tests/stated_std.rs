@@ -145,15 +145,16 @@ fn an_effect_that_bends_is_part_of_the_uncertainty() {
 }
 
 #[test]
-fn a_torque_far_beyond_the_rated_one_is_warned_about() {
-    let codes = |more: &str| -> Vec<bool> {
+fn a_torque_far_off_the_rated_one_is_warned_about() {
+    let with_code = |code: &str, more: &str| -> Vec<bool> {
         let folder = folder("U [V]", more);
         let has = |report: &Value| {
             let all = report["warnings"].as_array().unwrap();
-            all.iter().any(|w| w["code"] == "beyond-rated-torque")
+            all.iter().any(|w| w["code"] == code)
         };
         both(&folder).iter().map(has).collect()
     };
+    let codes = |more: &str| with_code("beyond-rated-torque", more);
     // The record reaches 3 V: 37.5 N m.
     let of = |rated: &str| {
         format!("[calibration]\ntorque_per_volt = \"12.5 N m/V\"\nrated_torque = \"{rated}\"\n")
@@ -163,4 +164,8 @@ fn a_torque_far_beyond_the_rated_one_is_warned_about() {
     let sheet = "[calibration]\nsensitivity = \"2 V\"\nrated_torque = \"20 N m\"\n";
     assert_eq!(codes(sheet), [false, false]);
     assert_eq!(codes(&sheet.replace("2 V", "200 mV")), [true, true]);
+    // As of a record before the amplifier: 0.15 % of the rated torque.
+    let below = |text: &str| with_code("below-rated-torque", &sheet.replace("2 V", text));
+    assert_eq!(below("2000 V"), [true, true]);
+    assert_eq!(below("400 V"), [false, false]);
 }

@@ -45,6 +45,27 @@ fn a_typeset_minus_is_a_minus() {
 }
 
 #[test]
+fn stamps_with_exponents_of_fortran_are_written_as_numbers() {
+    let folder = Folder::new();
+    let rows = |mark: &str| -> String {
+        let row = |i: usize| format!("{:.6e},{}\n", 1e-3 * i as f64, plain(i)).replace('e', mark);
+        (0..2000).map(row).collect()
+    };
+    let mut times = Vec::new();
+    for mark in ["e", "D", "d"] {
+        folder.write("in.csv", format!("Time [s],Torque [Nm]\n{}", rows(mark)));
+        folder
+            .run(&[&COMPENSATE[..], &["--force"]].concat())
+            .says(0, &["2000 samples at 1000 Hz"]);
+        times.push(column(&folder.read("out.csv"), "time_s"));
+    }
+    for found in &times[1..] {
+        let apart = |(a, b): (&f64, &f64)| (a - b).abs();
+        assert!(found.iter().zip(&times[0]).map(apart).all(|d| d < 1e-9));
+    }
+}
+
+#[test]
 fn words_for_missing_values_neither_begin_nor_end_a_table() {
     let folder = Folder::new();
     for word in ["OL", "OVLD", "----", "Overload", "#N/A", "sensor lost"] {

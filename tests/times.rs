@@ -305,6 +305,33 @@ fn a_cut_text_is_never_taken_for_a_whole_one() {
     }
 }
 
+/// Stamps as pandas writes them: with offsets over the end of daylight saving, and as times since the start.
+#[test]
+fn offsets_and_durations_of_pandas_are_times() {
+    let folder = Folder::new();
+    let with = |stamp: &dyn Fn(u32) -> String| {
+        let rows = (0..2000_u32).map(|i| {
+            let torque = 5.0 + (0.3 * f64::from(i)).sin();
+            format!("{},{torque:.6}\n", stamp(i))
+        });
+        folder.write(
+            "in.csv",
+            format!("time,torque [N m]\n{}", rows.collect::<String>()),
+        );
+        let report = json(&folder.run(&["inspect", "in.csv", "--json"]));
+        assert_eq!(report["channels"][0]["rate_hz"], 1000.0, "{report}");
+        assert_eq!(report["warnings"], Value::Array(Vec::new()));
+        folder
+            .run(&[&crate::util::COMPENSATE[..], &["--force"]].concat())
+            .says(0, &["2000 samples at 1000 Hz"]);
+    };
+    with(&|i| match i {
+        0..1000 => format!("2024-10-27T02:59:59.{i:03}+02:00"),
+        _ => format!("2024-10-27T02:00:00.{:03}+01:00", i - 1000),
+    });
+    with(&|i| format!("0 days 00:00:{:02}.{:03}000", i / 1000, i % 1000));
+}
+
 /// 20 kHz with stamps in whole milliseconds, twenty samples a stamp: the rate is that of all of them, nothing is left out,
 /// and the times are those of the samples.
 #[test]

@@ -24,7 +24,7 @@ use crate::print::{Report, enumeration, short};
 use crate::quality::excerpt;
 use crate::recording::moment::Moment;
 use crate::recording::{ChannelStream, Spool, UniformRecord};
-use crate::stand::{self, Calibration, ConstantStd, Stand, TorqueStd, beyond_rated};
+use crate::stand::{self, Calibration, ConstantStd, Stand, TorqueStd, off_rated};
 use crate::unit::NamedUnit;
 use crate::warning::Warning;
 
@@ -269,7 +269,7 @@ fn fit(
         .collect();
     let rated = chain.rated_n_m.map(|rated| rated * printed);
     let largest = largest(samples, &components, printed)?;
-    warnings.extend(beyond_rated(largest, rated, &chain.applied.unit));
+    warnings.extend(off_rated(largest, rated, &chain.applied.unit));
     warnings.extend(of_orders(way, record, &fundamental, &orders));
     warnings.extend(lost_warning(&components));
     warnings.extend(mains_warning(&components, duration_s));

@@ -12,6 +12,9 @@ use super::section::Section;
 use crate::failure::{ErrorCode, Failure};
 use crate::identify::Motion;
 
+/// Unit in which the mechanics move the record of a stand without a static gain.
+const TORQUE: &str = "N m";
+
 /// An effect that the stand file declares.
 #[derive(Debug, Clone)]
 pub struct DeclaredEffect {
@@ -44,7 +47,7 @@ fn derivative(measures: Motion) -> Link {
     }
 }
 
-/// Reads one effect; its parameters are in powers of the unit of the record.
+/// Reads one effect; its parameters are in powers of the unit that the mechanics move the record by.
 pub(super) fn effect(section: &Section, recorded_unit: &str) -> Result<DeclaredEffect, Failure> {
     let names: Vec<&str> = EFFECTS.iter().map(|e| e.name).collect();
     let kind = section
@@ -100,7 +103,16 @@ fn value(
         let written = TextUnit::parse(written).map_err(|error| wrong(&error))?;
         let expected = TextUnit::parse(&unit).map_err(|error| wrong(&error))?;
         if written.dimension() != expected.dimension() {
-            return Err(wrong(&"the unit does not fit the record"));
+            return Err(wrong(&match parameter.unit {
+                Unit::Powers { recorded, .. } if recorded != 0 => format!(
+                    "the unit does not fit: effects are in powers of {recorded_unit}, the unit of {}",
+                    match recorded_unit {
+                        TORQUE => "the torque, whatever the unit of the record",
+                        _ => "the record in static_gain",
+                    }
+                ),
+                _ => "the unit does not fit".to_owned(),
+            }));
         }
         // One hertz is one cycle, whatever its angle.
         let factor = match parameter.unit {
@@ -117,7 +129,7 @@ impl Stand {
     #[must_use]
     pub fn recorded_unit(&self) -> &str {
         self.static_gain()
-            .map_or("N m", |gain| gain.recorded_unit.as_str())
+            .map_or(TORQUE, |gain| gain.recorded_unit.as_str())
     }
 
     /// The modes of the mechanics.

@@ -27,7 +27,7 @@ use crate::failure::{ErrorCode, Failure};
 use crate::identify::Motion;
 use crate::warning::Warning;
 
-pub use calibration::{Applied, Calibration, RecordedLevels, applied_by_unit, beyond_rated};
+pub use calibration::{Applied, Calibration, RecordedLevels, applied_by_unit, off_rated};
 pub use effects::DeclaredEffect;
 pub use file::{parse, read, text};
 pub use measured::{CalibrationLaw, MeasuredCalibration};

@@ -455,6 +455,23 @@ fn the_unit_of_a_std_counts() {
 }
 
 #[test]
+fn units_that_contradict_the_headings_are_said() {
+    let folder = Folder::new();
+    let rows = LOADS.iter().map(|load| (*load, load / 12.5 + 0.05));
+    folder.write("in.csv", table(["force_N", "bridge_V"], rows));
+    let channels = ["--load", "force", "--reading", "bridge", "--json"];
+    let codes_with = |unit: &[&str]| {
+        let ran = folder.run(&[&["identify", "static", "in.csv"], &channels[..], unit].concat());
+        let report: Value = serde_json::from_str(&ran.stdout).expect("a document");
+        codes(&report).concat()
+    };
+    let code = "unit-overrides-heading";
+    assert!(codes_with(&["--load-unit", "N m"]).contains(code));
+    assert!(codes_with(&["--reading-unit", "mV"]).contains(code));
+    assert!(!codes_with(&["--reading-unit", "V"]).contains(code));
+}
+
+#[test]
 fn gravity_of_no_place_on_earth_is_refused() {
     let folder = Folder::new();
     let rows = LOADS.iter().map(|m| (*m, m * 0.2 + 0.05));

@@ -9,7 +9,7 @@ use super::plot::Traces;
 use super::report::CompensateReport;
 use crate::print::{plural, rounded, short};
 use crate::quality::excerpt;
-use crate::stand::{Stand, beyond_rated};
+use crate::stand::{Stand, off_rated};
 use crate::warning::Warning;
 
 /// Gain from which a record of unknown noise is worth a warning.
@@ -39,7 +39,7 @@ pub(super) fn add(report: &mut CompensateReport, seen: &Seen, traces: Option<&Tr
     let levels = &report.levels;
     more.extend(levels.warnings(&seen.excerpt, report.scale, &report.unit));
     let largest = report.result.largest.max(-report.result.smallest);
-    more.extend(beyond_rated(largest, report.rated_torque, &report.unit));
+    more.extend(off_rated(largest, report.rated_torque, &report.unit));
     if traces.is_some_and(Traces::is_empty) {
         more.push(empty_plot(report));
     }

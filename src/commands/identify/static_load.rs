@@ -14,6 +14,7 @@ use crate::recording::{Recording, check_holes, check_size, unit_of};
 use crate::stand::TransducerSignal;
 use crate::stand::update::Entry;
 use crate::unit::{NamedUnit, RecordedChannel};
+use crate::warning::Warning;
 
 const MASS: Dimension = Dimension::new([1, 0, 0, 0, 0, 0]);
 
@@ -35,7 +36,8 @@ pub fn run(args: &Static) -> Result<Outcome, Failure> {
     };
     let columns = Columns::of(args);
     let recording = Recording::read(&Input::of(&args.input), &columns.all(), &reading)?;
-    let (points, units) = points(args, &columns, &recording)?;
+    let mut recorded = Recorded::default();
+    let (points, units) = points(args, &columns, &recording, &mut recorded.warnings)?;
     let result = identify(&points, args.degree, &units)?;
     let entries = entries(args, &result, &units);
     if entries.is_empty() && args.findings.result.output.is_some() {
@@ -45,7 +47,6 @@ pub fn run(args: &Static) -> Result<Outcome, Failure> {
              --radius, and the reading in V, mV/V, mA, Hz, ustrain or N; or omit -o",
         ));
     }
-    let mut recorded = Recorded::default();
     recorded.add(&args.input, points.len(), None);
     recorded.warn(recording.all_warnings(), recording.lost.is_some());
     deliver(result, recorded, &args.findings, &entries)
@@ -90,14 +91,15 @@ impl Columns {
     }
 }
 
-/// Loads and readings in SI units, with the units' names.
+/// Loads and readings in SI units, with the units' names, and warnings of units that contradict the headings.
 fn points(
     args: &Static,
     columns: &Columns,
     recording: &Recording,
+    warnings: &mut Vec<Warning>,
 ) -> Result<(Vec<Point>, LoadUnits), Failure> {
-    let (loads, load_unit) = column(recording, &columns.load)?;
-    let (readings, unit) = column(recording, &columns.reading)?;
+    let (loads, load_unit) = column(recording, &columns.load, warnings)?;
+    let (readings, unit) = column(recording, &columns.reading, warnings)?;
     let is_effort = [TORQUE, FORCE].contains(&unit.unit.dimension());
     let is_signal =
         load_unit.unit.dimension() != FORCE && TransducerSignal::of(&load_unit.unit).is_some();
@@ -204,11 +206,16 @@ fn numbers(
     Ok(Some(ranks(&recording.channel(choice)?.samples)))
 }
 
-fn column(recording: &Recording, choice: &ChannelChoice) -> Result<(Vec<f64>, NamedUnit), Failure> {
+fn column(
+    recording: &Recording,
+    choice: &ChannelChoice,
+    warnings: &mut Vec<Warning>,
+) -> Result<(Vec<f64>, NamedUnit), Failure> {
     let channel = recording.channel(choice)?;
     check_holes(channel)?;
     check_size(channel)?;
-    let (unit, _) = unit_of(choice, &channel.heading, channel.unit.as_ref())?;
+    let (unit, warning) = unit_of(choice, &channel.heading, channel.unit.as_ref())?;
+    warnings.extend(warning);
     let flag = choice.flags.unit.unwrap_or_default();
     let named = RecordedChannel {
         name: &channel.name,

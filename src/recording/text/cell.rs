@@ -93,6 +93,16 @@ pub fn has_typeset_minus(text: &[u8]) -> bool {
     spellings.any(|minus| memchr::memmem::find(text, minus).is_some())
 }
 
+/// Whether some number has an exponent of Fortran (`1.5D-03`), which no result may take over.
+#[must_use]
+pub fn has_fortran_exponent(text: &[u8]) -> bool {
+    let is_exponent = |part: &[u8]| {
+        matches!(part, [before, b'D' | b'd', b'+' | b'-', after]
+            if (before.is_ascii_digit() || *before == b'.') && after.is_ascii_digit())
+    };
+    text.windows(4).any(is_exponent)
+}
+
 /// Whether a cell says that there is no number: NaN, infinity and their Windows spellings.
 fn is_not_a_number(cell: &str) -> bool {
     const WORDS: [&str; 6] = ["nan", "inf", "infinity", "1.#qnan", "1.#ind", "1.#inf"];

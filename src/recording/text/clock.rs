@@ -1,8 +1,8 @@
 //! Dates and times of day as recorders write them: `12:34:56.789`, `2026-03-26T14:34:31Z`,
-//! `26.03.2026 14:34:31,5`, `3/26/2026 2:34:31 PM`, `26-Mar-2026`.
+//! `26.03.2026 14:34:31,5`, `3/26/2026 2:34:31 PM`, `26-Mar-2026`; times since a start with days, `0 days 00:00:01.5`.
 //!
-//! Only differences are used, so a time zone is passed over and the order of day and month between
-//! slashes matters only where both are at most 12 (then the month is taken to be first).
+//! Only differences are used, so a time zone counts only where it changes within a record, and the order of day and month
+//! between slashes matters only where both are at most 12 (then the month is taken to be first).
 
 use crate::recording::moment::date_and_time;
 
@@ -18,6 +18,8 @@ pub struct Clock {
     pub day: Option<i32>,
     /// Nanoseconds since midnight.
     pub nanoseconds: Option<i64>,
+    /// Seconds that its time zone is ahead of UTC, if it says so.
+    pub ahead_s: Option<i32>,
 }
 
 const MONTHS: [&str; 12] = [
@@ -46,16 +48,18 @@ impl Clock {
         if !(6..=60).contains(&text.len()) || !may_be_clock(text) {
             return None;
         }
-        if let Some(nanoseconds) = time_of_day(text) {
+        if let Some((nanoseconds, ahead_s)) = time_of_day(text).or_else(|| since_start(text)) {
             return Some(Self {
                 day: None,
                 nanoseconds: Some(nanoseconds),
+                ahead_s,
             });
         }
         if let Some(day) = date(text) {
             return Some(Self {
                 day: Some(day),
                 nanoseconds: None,
+                ahead_s: None,
             });
         }
         text.char_indices()
@@ -63,9 +67,11 @@ impl Clock {
             .find_map(|(place, c)| {
                 let day = date(text[..place].trim())?;
                 let rest = text[place + c.len_utf8()..].trim();
+                let (nanoseconds, ahead_s) = time_of_day(rest)?;
                 Some(Self {
                     day: Some(day),
-                    nanoseconds: Some(time_of_day(rest)?),
+                    nanoseconds: Some(nanoseconds),
+                    ahead_s,
                 })
             })
     }
@@ -85,6 +91,7 @@ impl Clock {
             nanoseconds: Some(
                 ((hours * 60 + minutes) * 60 + seconds) * SECOND + fraction(decimals)?,
             ),
+            ahead_s: None,
         })
     }
 
@@ -122,10 +129,12 @@ impl Clock {
         found.unwrap_or_else(|| text.to_owned())
     }
 
-    /// Seconds after another one.
+    /// Seconds after another one; at the end of daylight saving, the zone changes between them.
     #[must_use]
     pub fn seconds_after(self, first: Self) -> f64 {
-        (self.total() - first.total()) as f64 * 1e-9
+        let zones = self.ahead_s.zip(first.ahead_s);
+        let ahead_s = zones.map_or(0, |(own, other)| own - other);
+        (self.total() - first.total() - i64::from(ahead_s) * SECOND) as f64 * 1e-9
     }
 
     /// Nanoseconds since 1970, or since midnight without a date.
@@ -177,13 +186,14 @@ fn may_be_clock(text: &str) -> bool {
         || text.rsplit_once(' ').is_some_and(|(_, last)| is_year(last))
 }
 
-/// `h:mm:ss`, with decimals after `.`, `,` or `:`, with AM or PM, with a zone; `mm:ss.f`.
-fn time_of_day(text: &str) -> Option<i64> {
+/// `h:mm:ss`, with decimals after `.`, `,` or `:`, with AM or PM, with a zone; `mm:ss.f`. Beside it, the seconds that the
+/// zone is ahead of UTC.
+fn time_of_day(text: &str) -> Option<(i64, Option<i32>)> {
     let lower = text.to_ascii_lowercase();
-    let (body, half) = match lower.strip_suffix("pm").or(lower.strip_suffix("p.m.")) {
-        Some(body) => (body.trim_end(), Some(12)),
+    let ((body, ahead_s), half) = match lower.strip_suffix("pm").or(lower.strip_suffix("p.m.")) {
+        Some(body) => ((body.trim_end(), None), Some(12)),
         None => match lower.strip_suffix("am").or(lower.strip_suffix("a.m.")) {
-            Some(body) => (body.trim_end(), Some(0)),
+            Some(body) => ((body.trim_end(), None), Some(0)),
             None => (without_zone(&lower), None),
         },
     };
@@ -213,17 +223,43 @@ fn time_of_day(text: &str) -> Option<i64> {
     if minutes >= 60 || whole > 60 {
         return None;
     }
-    Some(((hours * 60 + minutes) * 60 + whole) * SECOND + fraction(decimals)?)
+    let seconds = (hours * 60 + minutes) * 60 + whole;
+    Some((seconds * SECOND + fraction(decimals)?, ahead_s))
 }
 
-/// Without `Z`, `+02:00`, `-0500` or ` UTC` at the end.
-fn without_zone(text: &str) -> &str {
-    let text = text.trim_end_matches("utc").trim_end_matches("gmt");
-    let text = text.trim_end().trim_end_matches('z');
-    match text.rfind(['+', '-']) {
-        Some(place) if text.len() - place >= 3 && place >= 5 => text[..place].trim_end(),
-        _ => text,
+/// `0 days 00:00:01.5`, `-1 days +23:59:59.5` and `1 day, 0:00:01.5`, as pandas and Python write durations.
+fn since_start(text: &str) -> Option<(i64, Option<i32>)> {
+    let (days, rest) = text.split_once(" day")?;
+    let time = rest.strip_prefix('s').unwrap_or(rest);
+    let time = time.trim_start_matches([',', ' ', '+']);
+    let days: i64 = days
+        .parse()
+        .ok()
+        .filter(|days: &i64| days.abs() < 100_000)?;
+    let (nanoseconds, ahead_s) = time_of_day(time)?;
+    Some((days * DAY + nanoseconds, ahead_s))
+}
+
+/// A text without `Z`, `+02:00`, `-0500` or ` utc` at its end, and the seconds that this is ahead of UTC.
+fn without_zone(text: &str) -> (&str, Option<i32>) {
+    let plain = text.trim_end_matches("utc").trim_end_matches("gmt");
+    let plain = plain.trim_end().trim_end_matches('z');
+    match plain.rfind(['+', '-']) {
+        Some(place) if plain.len() - place >= 3 && place >= 5 => {
+            (plain[..place].trim_end(), ahead_s(&plain[place..]))
+        }
+        _ => (plain, (plain.len() < text.len()).then_some(0)),
     }
+}
+
+/// Seconds of `+02:00`, `-0500` or `+02`.
+fn ahead_s(text: &str) -> Option<i32> {
+    let (sign, rest) = text.split_at(1);
+    let all = rest.replace(':', "");
+    let number = |range: std::ops::Range<usize>| all.get(range)?.parse::<i32>().ok();
+    let minutes = number(2..4).or((all.len() == 2).then_some(0))?;
+    let seconds = (number(0..2)? * 60 + minutes) * 60;
+    Some(if sign == "-" { -seconds } else { seconds })
 }
 
 fn fraction(decimals: &str) -> Option<i64> {
@@ -328,6 +364,10 @@ mod tests {
             ("05:12.5", 312.5),
             ("14:34:31Z", 52_471.0),
             ("14:34:31.25+02:00", 52_471.25),
+            ("0 days 00:00:00.001000", 0.001),
+            ("2 days 00:00:01", 172_801.0),
+            ("-1 days +23:59:59.5", -0.5),
+            ("1 day, 0:00:01.5", 86_401.5),
         ] {
             assert!((seconds(text) - value).abs() < 1e-9, "{text}");
         }
@@ -374,6 +414,28 @@ mod tests {
     }
 
     #[test]
+    fn zones_count_where_they_change() {
+        let at = |text: &str| Clock::parse(text).expect(text);
+        for (first, later, seconds) in [
+            (
+                "2024-10-27T02:59:59.999+02:00",
+                "2024-10-27T02:00:00+01:00",
+                1e-3,
+            ),
+            (
+                "2024-10-27 02:59:59.999 +0200",
+                "2024-10-27 01:00:00Z",
+                1e-3,
+            ),
+            ("23:59:59-05:30", "23:59:59-06", 1800.0),
+            ("12:00:00+02:00", "12:00:01", 1.0),
+        ] {
+            let found = at(later).seconds_after(at(first));
+            assert!((found - seconds).abs() < 1e-9, "{later}: {found}");
+        }
+    }
+
+    #[test]
     fn what_is_no_clock() {
         for text in [
             "1.5",
@@ -394,6 +456,8 @@ mod tests {
             "Run 12 of 2022",
             "20221502155624",
             "2022050215562",
+            "3 days",
+            "some days 00:00:01",
         ] {
             assert_eq!(Clock::parse(text), None, "{text}");
         }

@@ -15,6 +15,10 @@ const CHANCE: f64 = 1e-6;
 const FINE: f64 = 4.0;
 /// Step into or out of a standstill, over the usual one, from which it is abrupt.
 const ABRUPT: f64 = 0.5;
+/// Fewest samples of a drop-out.
+const FEWEST_DROPPED: usize = 3;
+/// Steps into and out of a drop-out, over the largest one anywhere else.
+const FAR: f64 = 3.0;
 
 /// The value of a channel that has only one; `None` if it has several, or fewer than two samples.
 /// That is a fact; whether it is a fault, the user knows.
@@ -39,6 +43,9 @@ pub fn constant(samples: &[f64]) -> Option<f64> {
 /// of at least half the median one. A drive that comes to rest slows down first, so that it is not
 /// reported; of real standstills in noise, one in fourteen is missed for that.
 ///
+/// A shorter run counts if the signal jumps to it and back again, each time at least three times as far as anywhere else: the
+/// drop-out of a cable or of a recorder.
+///
 /// Runs at the channel's extreme values count too: a caller that knows them to be clipping leaves
 /// them out.
 ///
@@ -52,7 +59,9 @@ pub fn constant(samples: &[f64]) -> Option<f64> {
 /// ```
 #[must_use]
 pub fn standstills(samples: &[f64]) -> Vec<Run> {
-    let candidates: Vec<Run> = runs(samples).filter(|r| r.length >= SHORTEST).collect();
+    let mut candidates: Vec<Run> = runs(samples)
+        .filter(|r| r.length >= SHORTEST || is_aside(samples, r))
+        .collect();
     if candidates.is_empty() {
         return candidates;
     }
@@ -67,11 +76,29 @@ pub fn standstills(samples: &[f64]) -> Vec<Run> {
     if usual < FINE * smallest {
         return Vec::new();
     }
+    candidates.retain(|r| samples.len() as f64 * chance.powi(r.length as i32 - 1) < CHANCE);
+    let far = FAR * largest_step_between(&candidates, samples);
+    candidates.retain(|r| match r.length >= SHORTEST {
+        true => is_abrupt(samples, r, ABRUPT * usual),
+        false => steps_beside(samples, r).all(|step| step.abs() >= far),
+    });
     candidates
-        .into_iter()
-        .filter(|r| samples.len() as f64 * chance.powi(r.length as i32 - 1) < CHANCE)
-        .filter(|r| is_abrupt(samples, r, ABRUPT * usual))
-        .collect()
+}
+
+/// Whether the signal jumps to a short run and back to the same side.
+fn is_aside(samples: &[f64], run: &Run) -> bool {
+    let is_inside = run.start > 0 && run.end() < samples.len();
+    let product: f64 = steps_beside(samples, run).product();
+    run.length >= FEWEST_DROPPED && is_inside && product > 0.0
+}
+
+/// Largest step outside runs, which are in order, and not beside them.
+fn largest_step_between(runs: &[Run], samples: &[f64]) -> f64 {
+    let starts = runs.iter().map(|run| run.start).chain([samples.len()]);
+    let ends = [0].into_iter().chain(runs.iter().map(Run::end));
+    let parts = ends.zip(starts).map(|(from, to)| &samples[from..to]);
+    let steps = parts.flat_map(|part| part.windows(2));
+    steps.fold(0.0, |largest, pair| (pair[1] - pair[0]).abs().max(largest))
 }
 
 /// Median and smallest of the steps that are not zero.
@@ -87,12 +114,18 @@ fn usual_and_smallest_step(samples: &[f64]) -> (f64, f64) {
 }
 
 fn is_abrupt(samples: &[f64], run: &Run, least: f64) -> bool {
+    steps_beside(samples, run).any(|step| step.abs() >= least)
+}
+
+/// The samples beside a run, less its value.
+fn steps_beside(samples: &[f64], run: &Run) -> impl Iterator<Item = f64> {
     let into = run.start.checked_sub(1).map(|i| samples[i]);
     let out = samples.get(run.end()).copied();
+    let value = run.value;
     [into, out]
         .into_iter()
         .flatten()
-        .any(|beside| (beside - run.value).abs() >= least)
+        .map(move |beside| beside - value)
 }
 
 #[cfg(test)]
@@ -134,6 +167,27 @@ mod tests {
             .collect();
         assert_eq!(standstills(&stop), []);
         assert!(runs(&stop).any(|r| r.length > 390));
+    }
+
+    #[test]
+    fn a_short_drop_out_is_found_and_short_pulses_are_left_alone() {
+        let good = rounded(&sum(&sine(2.0, 97.0, 20_000), &noise(4, 20_000)), 1e-4);
+        assert_eq!(standstills(&good), []);
+        let mut dropped: Vec<f64> = good.iter().map(|x| x + 50.0).collect();
+        dropped[8000..8012].fill(0.0);
+        dropped[9000..9007].fill(0.0);
+        let found = standstills(&dropped);
+        let places: Vec<(usize, usize)> = found.iter().map(|r| (r.start, r.length)).collect();
+        assert_eq!(places, [(8000, 12), (9000, 7)]);
+        // No farther than the record steps by itself.
+        let mut near = good.clone();
+        near[8000..8012].fill(0.0);
+        assert_eq!(standstills(&near), []);
+        // Steps between levels, as of a set point, are no drop-outs.
+        let levels: Vec<f64> = (0..5000)
+            .map(|i| if i % 100 < 6 { 5.0 } else { 0.0 })
+            .collect();
+        assert_eq!(standstills(&levels), []);
     }
 
     #[test]

@@ -180,6 +180,7 @@ pub fn date_text(entries: &[Entry]) -> Option<String> {
                 Some(Clock {
                     day: Some(_),
                     nanoseconds: Some(_),
+                    ..
                 }) => return Some(text),
                 Some(Clock { day: Some(_), .. }) => date = date.or(Some(text)),
                 Some(Clock {
