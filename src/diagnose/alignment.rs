@@ -10,12 +10,13 @@ use std::sync::Arc;
 use super::Case;
 use super::fit::{FitEffort, fit};
 use super::plain::starts;
-use super::record::{StandRecord, dot};
+use super::record::StandRecord;
 use super::records::Records;
 use super::refuse::relative_error;
 use super::residual_tests::without_mean;
 use super::score::ScoredModel;
 use super::structure::{FitContext, PlainStand, Structure};
+use torqcomp_dsp::dot;
 
 /// Parts of a record in which the shift is looked for one by one.
 const PARTS: usize = 8;

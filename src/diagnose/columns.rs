@@ -1,6 +1,6 @@
 //! Columns that a residual is cleared of.
 
-use super::record::dot;
+use torqcomp_dsp::dot;
 
 /// Part of a column that must be left after the others are taken out of it.
 const LEFT: f64 = 1e-6;

@@ -6,10 +6,9 @@ use torqcomp_model::Chain;
 use torqcomp_model::Mode;
 use torqcomp_model::fit::{self, Differences, Fit, FitError, Options, Parameter};
 
-use super::record::{
-    InitialState, Nuisance, NuisanceFit, NuisanceTerms, StandRecord, StateSlopes, dot,
-};
+use super::record::{InitialState, Nuisance, NuisanceFit, NuisanceTerms, StandRecord, StateSlopes};
 use super::structure::{PlainStand, Structure};
+use torqcomp_dsp::dot;
 
 /// A model with fitted values.
 #[derive(Clone)]
@@ -77,12 +76,12 @@ const LARGEST_PRELOAD: f64 = 0.5;
 const STATE_STEP: f64 = 1e-4;
 /// Correction of the motion at a record's start, over the rms of the residual, that makes a second fit worthwhile.
 const START_MATTERS: f64 = 0.05;
-
 /// Parts of a step to a better initial state that are tried.
 const STEPS: [f64; 3] = [1.0, 0.3, 0.1];
-/// Such steps, or fits after them, at most, and the relative reduction of the sum of squares by one that makes the next one worthwhile: a start that was
-/// fitted without the effect is corrected in part only, as long as the effect's size is wrong for it.
+/// Such steps, or fits after them, at most.
 const MOST_STARTS: usize = 8;
+/// Relative reduction of the sum of squares by one that makes the next one worthwhile: a start that was fitted without the
+/// effect is corrected in part only, as long as the effect's size is wrong for it.
 const START_SETTLED: f64 = 0.01;
 
 /// Fits a model from start values.
@@ -219,113 +218,119 @@ pub fn raw_residual(model: &Chain, record: &StandRecord) -> Result<Vec<f64>, Fit
     Ok(residual)
 }
 
-/// How a record of a model changes with its own initial state, by differences; `residual` is its raw residual.
-fn state_slopes(
-    model: &mut Chain,
-    record: &StandRecord,
-    residual: &[f64],
-    free: &Mode,
+/// A model that is run on records, each with its own initial state.
+struct RecordModel {
+    chain: Chain,
+    terms: NuisanceTerms,
+    /// The mode of the free motion from a record's start.
+    free: Mode,
+    /// Rms of the training records.
     rms: f64,
-) -> Option<StateSlopes> {
-    let step = STATE_STEP * rms;
-    let slope = |model: &Chain, record: &StandRecord| {
-        let moved = raw_residual(model, record).ok()?;
-        let pairs = residual.iter().zip(&moved);
-        Some(pairs.map(|(a, b)| (a - b) / step).collect::<Vec<_>>())
-    };
-    let along = |model: &Chain, motion: [f64; 2]| {
-        let mut moved = record.clone();
-        moved.initial.correct(motion, free);
-        slope(model, &moved)
-    };
-    let motion = match record.has_free_motion(free) {
-        true => Some([along(model, [step, 0.0])?, along(model, [0.0, step])?]),
-        false => None,
-    };
-    let preload = match model.has_zero() {
-        true => {
-            model.shift += step;
-            let loaded = slope(model, record);
-            model.shift -= step;
-            Some(loaded?)
-        }
-        false => None,
-    };
-    Some(StateSlopes { motion, preload })
 }
 
-/// The residual of a record with the initial state that it has.
-fn evaluate(
-    model: &mut Chain,
-    terms: &NuisanceTerms,
-    record: StandRecord,
-    free: &Mode,
-    rms: f64,
-) -> Option<RecordResidual> {
-    model.shift = record.initial.preload;
-    let mut samples = raw_residual(model, &record).ok()?;
-    let slopes = match model.has_torques() {
-        true => Some(state_slopes(model, &record, &samples, free, rms)?),
-        false => None,
-    };
-    let pairs = record.measured_in_range().iter().zip(&samples);
-    let modelled = pairs.map(|(y, r)| y - r).collect();
-    let nuisance = record.nuisance(free, terms, slopes).fit(&mut samples);
-    Some(RecordResidual {
-        record,
-        samples,
-        modelled,
-        nuisance,
-    })
-}
-
-/// The residual of a record with the initial state that leaves least of it. A motion that is integrated depends on it in a curved
-/// way: the search begins with the state that the record has and at rest, and goes on by Gauss's and Newton's steps as
-/// long as they help. `None` if the motion diverges.
-fn settled(
-    model: &mut Chain,
-    terms: &NuisanceTerms,
-    record: StandRecord,
-    free: &Mode,
-    rms: f64,
-) -> Option<RecordResidual> {
-    if !model.has_torques() {
-        return evaluate(model, terms, record, free, rms);
-    }
-    let starts = [record.initial, InitialState::default()];
-    let starts = starts.map(|initial| record.starting_from(initial));
-    let sum = |found: &RecordResidual| dot(&found.samples, &found.samples);
-    let found = starts
-        .into_iter()
-        .filter_map(|record| evaluate(model, terms, record, free, rms))
-        .min_by(|a, b| sum(a).total_cmp(&sum(b)));
-    let mut found = found?;
-    for _ in 0..MOST_STARTS {
-        let better = STEPS.into_iter().find_map(|part| {
-            let record = found.stepped(part, free, rms);
-            let next = evaluate(model, terms, record, free, rms)?;
-            (sum(&next) < sum(&found)).then_some(next)
-        });
-        let Some(next) = better else { break };
-        let has_settled = sum(&next) > (1.0 - START_SETTLED) * sum(&found);
-        found = next;
-        if has_settled {
-            break;
+impl RecordModel {
+    fn of(structure: &Structure, values: &[f64], free: Mode) -> Self {
+        let (chain, terms) = structure.model(values);
+        Self {
+            chain,
+            terms,
+            free,
+            rms: structure.context.scales.rms,
         }
     }
-    Some(found)
+
+    /// How a record changes with its own initial state, by differences; `residual` is its raw residual.
+    fn slopes(&mut self, record: &StandRecord, residual: &[f64]) -> Option<StateSlopes> {
+        let step = STATE_STEP * self.rms;
+        let slope = |chain: &Chain, record: &StandRecord| {
+            let moved = raw_residual(chain, record).ok()?;
+            let pairs = residual.iter().zip(&moved);
+            Some(pairs.map(|(a, b)| (a - b) / step).collect::<Vec<_>>())
+        };
+        let along = |motion: [f64; 2]| {
+            let mut moved = record.clone();
+            moved.initial.correct(motion, &self.free);
+            slope(&self.chain, &moved)
+        };
+        let motion = match record.has_free_motion(&self.free) {
+            true => Some([along([step, 0.0])?, along([0.0, step])?]),
+            false => None,
+        };
+        let preload = match self.chain.has_zero() {
+            true => {
+                self.chain.shift += step;
+                let loaded = slope(&self.chain, record);
+                self.chain.shift -= step;
+                Some(loaded?)
+            }
+            false => None,
+        };
+        Some(StateSlopes { motion, preload })
+    }
+
+    /// The residual of a record with the initial state that it has; `None` if the motion diverges.
+    fn residual(&mut self, record: StandRecord) -> Option<RecordResidual> {
+        self.chain.shift = record.initial.preload;
+        let mut samples = raw_residual(&self.chain, &record).ok()?;
+        let slopes = match self.chain.has_torques() {
+            true => Some(self.slopes(&record, &samples)?),
+            false => None,
+        };
+        let pairs = record.measured_in_range().iter().zip(&samples);
+        let modelled = pairs.map(|(y, r)| y - r).collect();
+        let nuisance = record.nuisance(&self.free, &self.terms, slopes);
+        let nuisance = nuisance.fit(&mut samples);
+        Some(RecordResidual {
+            record,
+            samples,
+            modelled,
+            nuisance,
+        })
+    }
+
+    /// The residual of a record with the initial state that leaves least of it. A motion that is integrated depends on it in a
+    /// curved way: the search begins with the state that the record has and at rest, and goes on by Gauss's and Newton's steps
+    /// as long as they help. `None` if the motion diverges.
+    fn settled(&mut self, record: &StandRecord) -> Option<RecordResidual> {
+        if !self.chain.has_torques() {
+            return self.residual(record.clone());
+        }
+        let starts = [record.initial, InitialState::default()];
+        let found = starts
+            .into_iter()
+            .filter_map(|initial| self.residual(record.starting_from(initial)))
+            .min_by(|a, b| a.sum_of_squares().total_cmp(&b.sum_of_squares()));
+        let mut found = found?;
+        for _ in 0..MOST_STARTS {
+            let sum = found.sum_of_squares();
+            let better = STEPS.into_iter().find_map(|part| {
+                let next = self.residual(self.stepped(&found, part))?;
+                (next.sum_of_squares() < sum).then_some(next)
+            });
+            let Some(next) = better else { break };
+            found = next;
+            if found.sum_of_squares() > (1.0 - START_SETTLED) * sum {
+                break;
+            }
+        }
+        Some(found)
+    }
+
+    /// A record with part of the correction of its initial state that its residual shows.
+    fn stepped(&self, found: &RecordResidual, part: f64) -> StandRecord {
+        let mut record = found.record.clone();
+        let motion = found.nuisance.motion.unwrap_or_default();
+        record.initial.correct(motion.map(|x| part * x), &self.free);
+        let limit = LARGEST_PRELOAD * self.rms;
+        let preload = record.initial.preload + part * found.nuisance.preload.unwrap_or(0.0);
+        record.initial.preload = preload.clamp(-limit, limit);
+        record
+    }
 }
 
 impl RecordResidual {
-    /// The record with part of the correction of its initial state that the residual shows.
-    fn stepped(&self, part: f64, free: &Mode, rms: f64) -> StandRecord {
-        let mut record = self.record.clone();
-        let motion = self.nuisance.motion.unwrap_or_default();
-        record.initial.correct(motion.map(|x| part * x), free);
-        let limit = LARGEST_PRELOAD * rms;
-        let preload = record.initial.preload + part * self.nuisance.preload.unwrap_or(0.0);
-        record.initial.preload = preload.clamp(-limit, limit);
-        record
+    fn sum_of_squares(&self) -> f64 {
+        dot(&self.samples, &self.samples)
     }
 }
 
@@ -349,18 +354,17 @@ fn correct_starts(
     records: &mut [StandRecord],
     free: &Mode,
 ) -> bool {
-    let (mut model, terms) = structure.model(values);
-    let rms = structure.context.scales.rms;
+    let mut model = RecordModel::of(structure, values, *free);
     let mut matters = false;
     for record in records {
         let old = record.initial.motion;
-        let Some(found) = settled(&mut model, &terms, record.clone(), free, rms) else {
+        let Some(found) = model.settled(record) else {
             continue;
         };
         record.initial.motion = found.record.initial.motion;
         let x = record.initial.motion.x - old.x;
         let speed = (record.initial.motion.speed - old.speed) / free.omega_rad_s;
-        let mean_square = dot(&found.samples, &found.samples) / found.samples.len() as f64;
+        let mean_square = found.sum_of_squares() / found.samples.len() as f64;
         matters |= x.hypot(speed) > START_MATTERS * mean_square.sqrt();
     }
     matters
@@ -457,10 +461,9 @@ impl FittedModel {
     /// What the fitted model leaves of a record: the record's own constants, initial state and phases are estimated,
     /// nothing else. `None` if the motion diverges.
     pub fn residual(&self, record: &StandRecord) -> Option<RecordResidual> {
-        let (mut model, terms) = self.structure.model(&self.values);
-        let rms = self.structure.context.scales.rms;
-        let mut found = settled(&mut model, &terms, record.clone(), &self.free, rms)?;
-        self.restore_amplitudes(&terms, &mut found);
+        let mut model = RecordModel::of(&self.structure, &self.values, self.free);
+        let mut found = model.settled(record)?;
+        self.restore_amplitudes(&model.terms, &mut found);
         Some(found)
     }
 

@@ -3,11 +3,12 @@
 
 use torqcomp_model::simulate::Between;
 
-use super::record::{StandRecord, dot};
+use super::record::StandRecord;
 use super::records::Records;
 use super::score::ScoredModel;
 use super::search::refusal;
 use crate::parallel::parallel;
+use torqcomp_dsp::dot;
 
 /// Largest part of a model's excess error power that may remain with another course of the input.
 const LEFT: f64 = 0.5;
@@ -22,14 +23,14 @@ const SMALL: f64 = 0.1;
 /// The course that the inputs show by themselves. Plateaus with jumps from one sample to the next need frequencies without limit
 /// and are held; everything else is taken to be band-limited until the records say otherwise.
 pub fn from_inputs(records: &[StandRecord]) -> Between {
-    match !records.is_empty() && records.iter().all(|r| has_plateaus(r.input.samples())) {
+    match !records.is_empty()
+        && records
+            .iter()
+            .all(|r| noise_on_plateaus(r.input.samples()).is_some())
+    {
         true => Between::Held,
         false => Between::BandLimited,
     }
-}
-
-fn has_plateaus(input: &[f64]) -> bool {
-    noise_on_plateaus(input).is_some()
 }
 
 /// Mean square of the noise on an input of plateaus: half that of the changes on them. `None` if the input has none.
@@ -83,6 +84,10 @@ pub fn better_course(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn has_plateaus(input: &[f64]) -> bool {
+        noise_on_plateaus(input).is_some()
+    }
 
     #[test]
     fn plateaus_are_seen_in_noise_and_not_in_smooth_or_slow_signals() {

@@ -4,10 +4,10 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::fit::{FitEffort, FittedModel, fit};
-use super::record::dot;
 use super::records::Records;
 use super::score::{RmsErrors, ScoredModel};
 use crate::parallel::parallel;
+use torqcomp_dsp::dot;
 
 /// A fit of a model from which effects were taken out.
 const REPEATED: FitEffort = FitEffort::full(6);

@@ -8,10 +8,11 @@ use torqcomp_model::Mode;
 
 use super::fit::RecordResidual;
 use super::intersample::noise_on_plateaus;
-use super::record::{DECAYED, StandRecord, dot};
+use super::record::{DECAYED, StandRecord};
 use super::residual_tests::without_mean;
 use super::spectra::{ONLY_NOISE, spectra};
 use super::structure::PlainStand;
+use torqcomp_dsp::dot;
 
 /// The noise of the held-out records.
 #[derive(Debug, Clone, Copy, PartialEq)]

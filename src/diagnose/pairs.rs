@@ -1,12 +1,12 @@
 //! Pairs of effects fitted together: what two effects leave shows neither of them clearly while the other is missing.
 
 use super::fit::{FitEffort, FittedModel, fit};
-use super::record::dot;
 use super::records::Records;
 use super::score::{BaseModel, ScoredModel};
 use super::search::Workers;
 use super::structure::{EffectForm, Structure};
 use crate::parallel::parallel;
+use torqcomp_dsp::dot;
 
 /// Forms of a pair of effects that are fitted.
 const FORMS: usize = 2;

@@ -7,10 +7,11 @@ use torqcomp_model::simulate::MotionState;
 
 use super::declared::DeclaredStand;
 use super::fit::{FitEffort, FittedModel, fit};
-use super::record::{StandRecord, dot};
+use super::record::StandRecord;
 use super::residual_tests::without_mean;
 use super::structure::{FitContext, PlainStand, Structure};
 use crate::failure::{ErrorCode, Failure};
+use torqcomp_dsp::dot;
 
 /// Natural frequencies tried per decade where none is declared.
 const PER_DECADE: f64 = 24.0;

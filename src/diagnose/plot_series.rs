@@ -5,9 +5,9 @@ use std::ops::Range;
 use num_complex::Complex64;
 
 use super::fit::RecordResidual;
-use super::record::dot;
 use super::residual_tests::{autocorrelations, differences, without_mean};
 use super::spectra::spectra;
+use torqcomp_dsp::dot;
 
 impl RecordResidual {
     /// Time of each sample of the range.

@@ -7,13 +7,14 @@ use torqcomp_model::simulate::{Excitation, MotionState};
 
 use super::alignment::Alignment;
 use super::plain::find_plain;
-use super::record::{NuisanceTerms, StandRecord, dot};
+use super::record::{NuisanceTerms, StandRecord};
 use super::residual_tests::without_mean;
 use super::score::ScoredModel;
 use super::structure::{FitContext, PlainStand, Structure};
 use super::{Case, scales, shift};
 use crate::failure::{ErrorCode, Failure};
 use crate::print::{relative, rounded};
+use torqcomp_dsp::dot;
 
 /// Minimum number of periods of the natural frequency in the longest training record.
 const FEWEST_PERIODS: f64 = 10.0;

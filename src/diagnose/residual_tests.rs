@@ -6,9 +6,9 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 use torqcomp_model::Mode;
 
 use super::fit::RecordResidual;
-use super::record::dot;
 use super::spectra::coherent_share;
 use super::stationarity;
+use torqcomp_dsp::dot;
 
 /// Lags of the tests of whiteness and of independence from the input.
 const LAGS: usize = 25;

@@ -10,9 +10,10 @@ use torqcomp_model::Estimate;
 use super::blocks::{Comparison, compare};
 use super::columns::Columns;
 use super::fit::{FitEffort, FittedModel, RecordResidual, raw_residual};
-use super::record::{Nuisance, NuisanceTerms, StandRecord, dot};
+use super::record::{Nuisance, NuisanceTerms, StandRecord};
 use super::records::Records;
 use super::structure::EffectForm;
+use torqcomp_dsp::dot;
 
 /// A fitted model with its residuals.
 #[derive(Clone)]

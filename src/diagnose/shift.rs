@@ -1,7 +1,7 @@
 //! A shift between the channels of records, or between their clocks, weighed against effects.
 
 use super::alignment::{Alignment, Shift};
-use super::record::{StandRecord, dot};
+use super::record::StandRecord;
 use super::records::Records;
 use super::refuse::{LARGE_ERROR, longest, relative_error};
 use super::residual_tests::without_mean;
@@ -12,6 +12,7 @@ use super::{Case, SearchState};
 use crate::failure::{ErrorCode, Failure};
 use crate::print::{relative, rounded};
 use crate::warning::Warning;
+use torqcomp_dsp::dot;
 
 /// Relative error of the plain stand from which on a shift of the channels is looked for.
 const NOTABLE_ERROR: f64 = 0.02;

@@ -4,10 +4,11 @@ use torqcomp_model::Chain;
 use torqcomp_model::effects::RecordScales;
 
 use super::fit::raw_residual;
-use super::record::{StandRecord, dot};
+use super::record::StandRecord;
 use super::score::BaseModel;
 use super::spectra::SpectralLine;
 use super::structure::{EffectForm, Structure};
+use torqcomp_dsp::dot;
 
 /// Starts that are fitted.
 const FITTED: usize = 2;

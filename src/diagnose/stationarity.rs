@@ -9,9 +9,9 @@ use torqcomp_model::Mode;
 
 use super::columns::Columns;
 use super::fit::RecordResidual;
-use super::record::dot;
 use super::residual_tests::{PowerShare, differences, without_mean};
 use super::spectra::spectra;
+use torqcomp_dsp::dot;
 
 /// Segments that a record is cut into: few for slow changes, many for fast ones.
 const SEGMENTS: [usize; 3] = [12, 36, 108];

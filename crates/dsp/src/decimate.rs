@@ -9,7 +9,7 @@ const REACH: usize = 8;
 /// Corner over the new rate.
 const CORNER: f64 = 0.36;
 /// Shape of the Kaiser window, for 80 dB.
-pub(crate) const BETA: f64 = 7.9;
+const BETA: f64 = 7.9;
 
 /// Frequency, over the new rate, up to which the response is 1 within 2·10⁻⁴.
 pub const PASS: f64 = 0.2;
@@ -74,25 +74,34 @@ pub fn decimate(samples: &[f64], factor: usize) -> Result<Decimated, Error> {
 
 /// A low-pass of 2·half + 1 taps with sum 1; the corner in cycles per sample.
 fn taps(half: usize, corner: f64) -> Vec<f64> {
-    let mut taps: Vec<f64> = (0..=2 * half)
-        .map(|i| {
-            let k = i as f64 - half as f64;
-            let x = k / (half + 1) as f64;
-            let sinc = if k == 0.0 {
-                2.0 * corner
-            } else {
-                (2.0 * PI * corner * k).sin() / (PI * k)
-            };
-            sinc * bessel_i0(BETA * (1.0 - x * x).sqrt())
-        })
-        .collect();
+    let mut taps = windowed_sinc(half, corner);
     let sum: f64 = taps.iter().sum();
     taps.iter_mut().for_each(|t| *t /= sum);
     taps
 }
 
+/// The same with a gain of about [`window_gain`].
+pub(crate) fn windowed_sinc(half: usize, corner: f64) -> Vec<f64> {
+    let tap = |i: usize| {
+        let k = i as f64 - half as f64;
+        let x = k / (half + 1) as f64;
+        let sinc = if k == 0.0 {
+            2.0 * corner
+        } else {
+            (2.0 * PI * corner * k).sin() / (PI * k)
+        };
+        sinc * bessel_i0(BETA * (1.0 - x * x).sqrt())
+    };
+    (0..=2 * half).map(tap).collect()
+}
+
+/// The middle of the Kaiser window as it is computed here.
+pub(crate) fn window_gain() -> f64 {
+    bessel_i0(BETA)
+}
+
 /// Modified Bessel function of order 0 by its series.
-pub(crate) fn bessel_i0(x: f64) -> f64 {
+fn bessel_i0(x: f64) -> f64 {
     let (mut term, mut sum, mut k) = (1.0, 1.0, 1.0);
     while term > 1e-17 * sum {
         term *= (0.5 * x / k).powi(2);

@@ -22,6 +22,7 @@ pub mod compensate;
 pub mod conversion;
 pub mod curve;
 pub mod decimate;
+mod dot;
 mod error;
 pub mod frf;
 pub mod gage;
@@ -38,4 +39,5 @@ pub mod undersample;
 pub mod weak;
 pub mod zero_phase;
 
+pub use dot::dot;
 pub use error::Error;

@@ -5,19 +5,16 @@
 //! samples are still those of the lines at their own frequencies and decay rates, and only fewer. (R. G. Vaughan, N. L.
 //! Scott, D. R. White, IEEE Trans. Signal Process. 39 (1991), 1973.)
 
-use std::f64::consts::PI;
 use std::ops::Range;
 
-use crate::Error;
-use crate::decimate::{BETA, Decimated, bessel_i0};
+use crate::decimate::{Decimated, window_gain, windowed_sinc};
+use crate::{Error, dot};
 
 /// Half-length of the filter in samples of the result.
 const REACH: usize = 32;
 /// From the end of a band to where the filter passes nothing (80 dB), times the factor: Kaiser's 5.0 over twice the
 /// half-length.
 const EDGE: f64 = 5.0 / (2 * REACH) as f64;
-/// Sums of products that are kept side by side.
-const LANES: usize = 8;
 
 /// Bands, in cycles per sample, and a factor for which their images lie apart.
 #[derive(Debug, Clone, PartialEq)]
@@ -97,25 +94,18 @@ impl Undersampling {
     /// The filter: a windowed difference of two low-passes for each band.
     fn taps(&self, half: usize) -> Vec<f64> {
         let middle = 0.5 * EDGE / self.factor as f64;
-        let low_pass = |corner: f64, k: f64| match k == 0.0 {
-            true => 2.0 * corner,
-            false => (2.0 * PI * corner * k).sin() / (PI * k),
+        let mut taps = vec![0.0; 2 * half + 1];
+        let mut add = |corner: f64, share: f64| {
+            let low_pass = windowed_sinc(half, corner);
+            let pairs = taps.iter_mut().zip(low_pass);
+            pairs.for_each(|(sum, tap)| *sum += share * tap);
         };
-        let tap = |i: usize| {
-            let k = i as f64 - half as f64;
-            let x = k / (half + 1) as f64;
-            let one = |band: &Range<f64>| {
-                let start = if band.start > middle {
-                    band.start - middle
-                } else {
-                    0.0
-                };
-                low_pass(band.end + middle, k) - low_pass(start, k)
-            };
-            let window = bessel_i0(BETA * (1.0 - x * x).sqrt()) / bessel_i0(BETA);
-            window * self.bands.iter().map(one).sum::<f64>()
-        };
-        (0..=2 * half).map(tap).collect()
+        let share = 1.0 / window_gain();
+        for band in &self.bands {
+            add(band.end + middle, share);
+            add((band.start - middle).max(0.0), -share);
+        }
+        taps
     }
 }
 
@@ -152,21 +142,10 @@ fn joined(bands: &[Range<f64>], closest: f64) -> Vec<Range<f64>> {
     out
 }
 
-fn dot(window: &[f64], taps: &[f64]) -> f64 {
-    let mut sums = [0.0; LANES];
-    let (xs, hs) = (window.chunks_exact(LANES), taps.chunks_exact(LANES));
-    let rest = xs.remainder().iter().zip(hs.remainder());
-    let rest: f64 = rest.map(|(x, h)| x * h).sum();
-    for (x, h) in xs.zip(hs) {
-        for (lane, sum) in sums.iter_mut().enumerate() {
-            *sum += x[lane] * h[lane];
-        }
-    }
-    rest + sums.iter().sum::<f64>()
-}
-
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use super::*;
 
     #[test]

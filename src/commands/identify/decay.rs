@@ -88,11 +88,8 @@ fn load(args: &Decay, input: &Path, recorded: &mut Recorded) -> Result<Loaded, F
         .select(&args.choice, &args.reading)
         .map_err(|failure| failure.at(input.shown()))?;
     check_cells(selection.channel, &args.reading).map_err(|failure| failure.at(input.shown()))?;
-    let (start_s, rate, rate_std) = (
-        selection.start.after_s,
-        selection.rate_hz,
-        selection.rate_std_hz,
-    );
+    let clock = (selection.start.after_s, selection.rate_hz);
+    let rate_std_hz = selection.rate_std_hz;
     let chosen = selection.channel;
     let unit = selection.unit.map_or_else(String::new, |u| u.text);
     let clipped = Clipping::of(&chosen.samples)
@@ -101,22 +98,10 @@ fn load(args: &Decay, input: &Path, recorded: &mut Recorded) -> Result<Loaded, F
     let warnings = [recording.all_warnings(), selection.warnings, clipped].concat();
     recorded.warn(warnings, recording.lost.is_some());
     // The other channels make room for the fit.
-    let Channel {
-        samples,
-        axis,
-        holes,
-        ..
-    } = recording.channels.swap_remove(place);
+    let channel = recording.channels.swap_remove(place);
     drop(recording);
-    let stamps = match (axis.stamps_s, rate_hz) {
-        (Some(stamps), None) => Arc::unwrap_or_clone(stamps),
-        _ => (0..samples.len())
-            .map(|i| start_s + i as f64 / rate)
-            .collect(),
-    };
-    let rate_hz = (holes.is_empty() && is_uniform(&stamps, rate)).then_some(rate);
-    let (times_s, values) = rising(stamps, samples);
-    recorded.add(input, values.len(), rate_hz.map(|hz| (hz, rate_std)));
+    let (times_s, values, rate_hz) = ringing(channel, clock, rate_hz.is_some());
+    recorded.add(input, values.len(), rate_hz.map(|hz| (hz, rate_std_hz)));
     Ok(Loaded {
         name: input.shown().to_string(),
         times_s,
@@ -124,6 +109,25 @@ fn load(args: &Decay, input: &Path, recorded: &mut Recorded) -> Result<Loaded, F
         values,
         unit,
     })
+}
+
+/// Times and samples of a channel that starts at a time and has a rate, and that rate if the times are uniform; a given rate
+/// counts in place of its stamps.
+fn ringing(
+    channel: Channel,
+    (start_s, rate_hz): (f64, f64),
+    is_given: bool,
+) -> (Vec<f64>, Vec<f64>, Option<f64>) {
+    let samples = channel.samples;
+    let stamps = match channel.axis.stamps_s {
+        Some(stamps) if !is_given => Arc::unwrap_or_clone(stamps),
+        _ => (0..samples.len())
+            .map(|i| start_s + i as f64 / rate_hz)
+            .collect(),
+    };
+    let is_uniform = channel.holes.is_empty() && is_uniform(&stamps, rate_hz);
+    let (times_s, values) = rising(stamps, samples);
+    (times_s, values, is_uniform.then_some(rate_hz))
 }
 
 /// The samples that are numbers and later than all before them, with their times.

@@ -41,9 +41,9 @@ pub(super) fn stretches(
     let mut lines = Vec::new();
     let (prepared, ranges) = cut(records, options, (result, &mut lines))?;
     let part = |(place, range): &(usize, Range<usize>)| prepared[*place].part(range);
-    let cut: Vec<Part> = ranges.iter().map(part).collect();
+    let cut: Vec<Cutout> = ranges.iter().map(part).collect();
     let total: usize = cut.iter().map(|part| part.values.len()).sum();
-    let of_one = |part: &Part| {
+    let of_one = |part: &Cutout| {
         let share = MOST_SAMPLES * part.values.len() / total;
         match (part.rate_hz, options.band_hz) {
             (Some(rate), None) => factor(part.values, rate, share),
@@ -82,7 +82,7 @@ pub(super) fn stretches(
 
 /// How to keep fewer samples than decimation leaves, if these are too many; and the rate of the stretches. `None` if they lie
 /// at several rates or ring in bands that are too wide for that.
-fn undersampling(cut: &[Part], factors: &[usize]) -> Option<(Undersampling, f64)> {
+fn undersampling(cut: &[Cutout], factors: &[usize]) -> Option<(Undersampling, f64)> {
     let rate_hz = cut.first()?.rate_hz?;
     let lengths = cut.iter().map(|part| part.values.len());
     let left = lengths
@@ -110,15 +110,15 @@ struct Prepared<'a> {
 }
 
 /// A stretch of it.
-struct Part<'a> {
+struct Cutout<'a> {
     times_s: &'a [f64],
     values: &'a [f64],
     rate_hz: Option<f64>,
 }
 
 impl Prepared<'_> {
-    fn part(&self, range: &Range<usize>) -> Part<'_> {
-        Part {
+    fn part(&self, range: &Range<usize>) -> Cutout<'_> {
+        Cutout {
             times_s: &self.times_s[range.clone()],
             values: &self.values[range.clone()],
             rate_hz: self.rate_hz,
@@ -126,7 +126,7 @@ impl Prepared<'_> {
     }
 }
 
-impl Part<'_> {
+impl Cutout<'_> {
     /// One sample in `factor`.
     fn decimated(&self, factor: usize) -> Result<Stretch, Failure> {
         let few = decimate::decimate(self.values, factor)?;

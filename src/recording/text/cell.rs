@@ -85,17 +85,25 @@ fn with_plain_minus(text: &str) -> Option<String> {
     (plain != text).then_some(plain)
 }
 
-/// Whether some number may have a minus sign of typesetters, which no result may take over.
+/// What spelling of numbers keeps time stamps from being taken over as they stand.
 #[must_use]
-pub fn has_typeset_minus(text: &[u8]) -> bool {
+pub fn foreign_spelling(stamps: &[f64], text: &[u8]) -> Option<&'static str> {
+    if has_fortran_exponent(text) {
+        return Some("its numbers have exponents of Fortran");
+    }
+    let is_negative = stamps.iter().any(|t| *t < 0.0);
+    (is_negative && has_typeset_minus(text)).then_some("its time stamps have a typeset minus")
+}
+
+/// Whether some number may have a minus sign of typesetters, which no result may take over.
+fn has_typeset_minus(text: &[u8]) -> bool {
     let spellings = [&b"\xE2\x88\x92"[..], b"\xE2\x80\x93", b"\x96"];
     let mut spellings = spellings.into_iter();
     spellings.any(|minus| memchr::memmem::find(text, minus).is_some())
 }
 
 /// Whether some number has an exponent of Fortran (`1.5D-03`), which no result may take over.
-#[must_use]
-pub fn has_fortran_exponent(text: &[u8]) -> bool {
+fn has_fortran_exponent(text: &[u8]) -> bool {
     let is_exponent = |part: &[u8]| {
         matches!(part, [before, b'D' | b'd', b'+' | b'-', after]
             if (before.is_ascii_digit() || *before == b'.') && after.is_ascii_digit())

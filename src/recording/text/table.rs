@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use super::axes::{AxisPlan, Role, Sources, StampRule};
 use super::blocks::{self, TableEnd};
-use super::cell::{Cell, has_fortran_exponent, has_typeset_minus};
+use super::cell::{Cell, foreign_spelling};
 use super::chunks::{Chunks, Piece};
 use super::head::{self, Head, Table};
 use super::header::{self, Field, Header};
@@ -175,11 +175,8 @@ impl Layout {
         let is_time = |role: &Role| *role == Role::Time;
         self.plan.stamps = self.axes.roles.iter().position(is_time);
         let stamps = self.plan.stamps.map(|place| &rows.columns[place].values);
-        if stamps.is_some_and(|stamps| stamps.iter().any(|t| *t < 0.0)) && has_typeset_minus(text) {
-            self.held_whole = Some("its time stamps have a typeset minus");
-        }
-        if stamps.is_some() && has_fortran_exponent(text) {
-            self.held_whole = Some("its numbers have exponents of Fortran");
+        if let Some(spelling) = stamps.and_then(|stamps| foreign_spelling(stamps, text)) {
+            self.held_whole = Some(spelling);
         }
         if !blocks::restarts(&rows, &self.plan.kinds, &self.axes.roles).is_empty() {
             self.held_whole = Some("time begins anew within it");
