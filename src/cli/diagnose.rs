@@ -15,15 +15,22 @@ pub struct Diagnose {
     #[arg(long, value_name = "FILE")]
     pub stand: Option<PathBuf>,
     /// Record to fit; may be given several times
-    #[arg(long, value_name = "FILE", required = true)]
+    #[arg(long, value_name = "FILE", required_unless_present = "decay")]
     pub train: Vec<PathBuf>,
     /// Hold-out record; may be given several times [default: the last 30 % of each training record]
     #[arg(long, value_name = "FILE")]
     pub holdout: Vec<PathBuf>,
+    /// Record of free ringing to fit, of the measured quantity alone: after hits or a load that was let go; may be given
+    /// several times
+    #[arg(long, value_name = "FILE")]
+    pub decay: Vec<PathBuf>,
+    /// Hold-out record of free ringing; may be given several times [default: without --train, the last decay]
+    #[arg(long, value_name = "FILE")]
+    pub holdout_decay: Vec<PathBuf>,
     /// Channel with the applied quantity: its number as inspect gives it, heading or name; of an MCAP file topic and
     /// field, as '/joint_states.effort[name=motor]', or the field of --topic
-    #[arg(long, value_name = "COL")]
-    pub applied: String,
+    #[arg(long, value_name = "COL", required_unless_present = "decay")]
+    pub applied: Option<String>,
     /// Channel with the measured quantity
     #[arg(long, value_name = "COL")]
     pub measured: String,
@@ -54,4 +61,21 @@ pub struct Diagnose {
     /// How it works.
     #[command(flatten)]
     pub work: Work,
+}
+
+impl Diagnose {
+    /// The files that are fitted.
+    pub fn training_files(&self) -> Vec<PathBuf> {
+        [self.train.as_slice(), &self.decay].concat()
+    }
+
+    /// The files that are held out.
+    pub fn held_out_files(&self) -> Vec<PathBuf> {
+        [self.holdout.as_slice(), &self.holdout_decay].concat()
+    }
+
+    /// All records.
+    pub fn records(&self) -> Vec<PathBuf> {
+        [self.training_files(), self.held_out_files()].concat()
+    }
 }

@@ -26,8 +26,9 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
             Some((stand::parse(&name, &text)?, text))
         }
     };
-    let records = args.train.iter().chain(&args.holdout).map(PathBuf::as_path);
-    let files: Vec<&Path> = records.chain(args.stand.as_deref()).collect();
+    let records = args.records();
+    let files = records.iter().map(PathBuf::as_path);
+    let files: Vec<&Path> = files.chain(args.stand.as_deref()).collect();
     let result = &args.result;
     let mut refined = result
         .output
@@ -63,7 +64,6 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
 
 /// Where the page comes from.
 fn provenance(args: &Diagnose, stand: Option<&(Stand, String)>) -> Result<Provenance, Failure> {
-    let inputs = [args.train.as_slice(), &args.holdout].concat();
     let stand = stand.map(|(stand, text)| (stand.file.as_str(), text.as_str()));
-    Provenance::of(&inputs, stand)
+    Provenance::of(&args.records(), stand)
 }

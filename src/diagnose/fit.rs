@@ -36,7 +36,7 @@ pub struct RecordResidual {
     pub record: StandRecord,
     /// Measured less modelled over the record's range, nuisance terms removed.
     pub samples: Vec<f64>,
-    /// The modelled record over the range, without the nuisance terms.
+    /// The modelled record over the range, without the nuisance terms; of free ringing with them.
     pub modelled: Vec<f64>,
     pub nuisance: NuisanceFit,
 }
@@ -97,10 +97,16 @@ pub fn fit(
     let mut records = records.to_vec();
     let start_model = structure.model(start).0;
     let mut free = start_model.free_mode();
-    let mut found = minimize(&structure, start, &mut records, Some(&free), effort)?;
-    if effort.corrects_start {
-        // Where the motion is integrated, its start is corrected instead.
-        let integrates = start_model.has_torques();
+    // Where the motion is integrated, its start is corrected instead.
+    let integrates = start_model.has_torques();
+    // Of a plain stand that rings freely, the mode of that motion is all there is to fit.
+    let rings = !integrates && records.iter().any(StandRecord::is_free);
+    let fixed = (!rings).then_some(&free);
+    let mut found = minimize(&structure, start, &mut records, fixed, effort)?;
+    if rings {
+        free = structure.model(&found.values).0.free_mode();
+    }
+    if effort.corrects_start && !rings {
         // That of a plain stand matters where it lasts: elsewhere the fits of its rivals would only start from another place.
         let may_move = !integrates && (!structure.effects.is_empty() || lasts(&records, &free));
         if may_move && moves_on(&structure, &found.values, &records, &free) {
@@ -276,10 +282,13 @@ impl RecordModel {
             true => Some(self.slopes(&record, &samples)?),
             false => None,
         };
-        let pairs = record.measured_in_range().iter().zip(&samples);
-        let modelled = pairs.map(|(y, r)| y - r).collect();
+        let raw = samples.clone();
         let nuisance = record.nuisance(&self.free, &self.terms, slopes);
         let nuisance = nuisance.fit(&mut samples);
+        // Of a stand that rings freely, all motion follows from its state.
+        let left = if record.is_free() { &samples } else { &raw };
+        let pairs = record.measured_in_range().iter().zip(left);
+        let modelled = pairs.map(|(y, r)| y - r).collect();
         Some(RecordResidual {
             record,
             samples,

@@ -23,11 +23,9 @@ const SMALL: f64 = 0.1;
 /// The course that the inputs show by themselves. Plateaus with jumps from one sample to the next need frequencies without limit
 /// and are held; everything else is taken to be band-limited until the records say otherwise.
 pub fn from_inputs(records: &[StandRecord]) -> Between {
-    match !records.is_empty()
-        && records
-            .iter()
-            .all(|r| noise_on_plateaus(r.input.samples()).is_some())
-    {
+    let mut driven = records.iter().filter(|r| !r.is_free()).peekable();
+    let are_driven = driven.peek().is_some();
+    match are_driven && driven.all(|r| noise_on_plateaus(r.input.samples()).is_some()) {
         true => Between::Held,
         false => Between::BandLimited,
     }

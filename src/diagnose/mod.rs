@@ -171,7 +171,8 @@ pub fn run(mut case: Case, workers: Workers) -> Result<Diagnosis, Failure> {
         held: None,
     };
     let mut context = plain::find_plain(&unscaled, case.declared, &case.records.train)?;
-    if refuse::is_short(&case, &context)
+    if !case.records.are_free()
+        && refuse::is_short(&case, &context)
         && let Some(held) = held::hold(&case, &unscaled)?
     {
         (case, context) = held;
@@ -272,7 +273,8 @@ impl SearchState {
     fn other_course(&self, threads: usize) -> Option<Between> {
         let floor = self.noise_floor;
         let has_effects = !self.after.effect_names().is_empty();
-        if !has_effects && !remains(&self.before, &self.tests_before, floor) {
+        let is_noise = !has_effects && !remains(&self.before, &self.tests_before, floor);
+        if is_noise || self.records.are_free() {
             return None;
         }
         let mut alone: Vec<&ScoredModel> = self

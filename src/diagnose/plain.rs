@@ -7,16 +7,18 @@ use torqcomp_model::simulate::MotionState;
 
 use super::declared::DeclaredStand;
 use super::fit::{FitEffort, FittedModel, fit};
-use super::record::StandRecord;
+use super::record::{NuisanceTerms, StandRecord};
 use super::residual_tests::without_mean;
 use super::structure::{FitContext, PlainStand, Structure};
 use crate::failure::{ErrorCode, Failure};
-use torqcomp_dsp::dot;
+use torqcomp_dsp::{dot, peaks};
 
 /// Natural frequencies tried per decade where none is declared.
 const PER_DECADE: f64 = 24.0;
 /// Damping ratios tried.
 const DAMPING: [f64; 4] = [0.01, 0.05, 0.2, 0.7];
+/// Damping ratios tried at a line of free ringing.
+const RINGING: [f64; 5] = [3e-4, 1e-3, 3e-3, 0.01, 0.04];
 /// Factors of the declared frequency that are tried.
 const NEAR: [f64; 9] = [0.5, 0.7, 0.8, 0.9, 1.0, 1.1, 1.25, 1.4, 2.0];
 /// Starts that get a full fit.
@@ -92,7 +94,11 @@ fn scan(
     records: &[StandRecord],
 ) -> Vec<(f64, PlainStand)> {
     let record = &records[0];
-    let starts = starts(context, declared, record).into_iter();
+    let mut starts = starts(context, declared, record);
+    if record.is_free() {
+        starts.extend(from_ringing(context, record));
+    }
+    let starts = starts.into_iter();
     let mut found: Vec<(f64, PlainStand)> = starts
         .filter_map(|start| try_start(context, start, record))
         .collect();
@@ -130,12 +136,34 @@ pub fn starts(
     pairs.collect()
 }
 
+/// Plain stands at the strongest line of free ringing: between those of the grid a light damping fits none.
+fn from_ringing(context: &FitContext, record: &StandRecord) -> Vec<PlainStand> {
+    let y = without_mean(record.measured_in_range());
+    let rate_hz = record.rate_hz();
+    let lowest_hz = 2.0 * rate_hz / y.len() as f64;
+    let line = peaks::strongest(&y, rate_hz, lowest_hz, 0.5 * rate_hz);
+    let stand = |natural_hz| {
+        RINGING.map(|damping_ratio| PlainStand {
+            natural_hz,
+            damping_ratio,
+            gain: context.plain.gain,
+        })
+    };
+    line.map_or_else(Vec::new, |line| stand(line.frequency_hz).to_vec())
+}
+
 /// Sum of squares of a start; with its best gain, if that is free.
 fn try_start(
     context: &FitContext,
     mut start: PlainStand,
     record: &StandRecord,
 ) -> Option<(f64, PlainStand)> {
+    if record.is_free() {
+        let mut left = record.measured_in_range().to_vec();
+        let nuisance = record.nuisance(&start.mode(), &NuisanceTerms::NONE, None);
+        nuisance.clear(&mut left);
+        return Some((dot(&left, &left), start));
+    }
     let is_free = context.gain_is_free;
     let gain = if is_free { 1.0 } else { start.gain };
     let model = Chain::new(start.mode(), gain).with_recorder(context.recorder.clone(), false);

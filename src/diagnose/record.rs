@@ -100,6 +100,11 @@ impl StandRecord {
         self.input.rate_hz()
     }
 
+    /// Whether nothing acts: the stand rings freely.
+    pub fn is_free(&self) -> bool {
+        self.input.samples().iter().all(|u| *u == 0.0)
+    }
+
     /// The applied quantity over the range.
     pub fn applied_in_range(&self) -> &[f64] {
         &self.input.samples()[self.range.clone()]

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use torqcomp_model::simulate::{Between, Excitation, substeps};
 
+use super::intersample::{from_inputs, noise_on_plateaus};
 use super::record::StandRecord;
 use super::structure::PlainStand;
 
@@ -29,6 +30,11 @@ const MOST_EXCLUDED: f64 = 0.1;
 /// Part of a training record that is fitted if the rest is held out.
 const FITTED: f64 = 0.7;
 
+/// Whether an input consists of plateaus.
+fn has_plateaus(input: &Excitation) -> bool {
+    noise_on_plateaus(input.samples()).is_some()
+}
+
 impl Records {
     /// Holds out the end of each training record.
     pub fn hold_out_ends(&mut self) {
@@ -50,6 +56,11 @@ impl Records {
         }
     }
 
+    /// Whether nothing acts in any of them.
+    pub fn are_free(&self) -> bool {
+        self.train.iter().chain(&self.holdout).all(StandRecord::is_free)
+    }
+
     fn all(&mut self) -> impl Iterator<Item = &mut StandRecord> {
         self.train.iter_mut().chain(&mut self.holdout)
     }
@@ -67,16 +78,26 @@ impl Records {
         self.change_inputs(|input| input.with_substeps(substeps));
     }
 
-    /// The same records with another course of the input between its samples.
+    /// The same records with another course of the input between its samples. Beside training records of other inputs, plateaus
+    /// are held in any case; beside held plateaus alone, other inputs are of limited band.
     pub fn with_between(&self, between: Between) -> Self {
+        let only_plateaus = from_inputs(&self.train) == Between::Held;
         let mut other = self.clone();
-        other.change_inputs(|input| input.with_between(between));
+        other.change_inputs(|input| {
+            let own = match (has_plateaus(input), only_plateaus, between) {
+                (true, false, _) => Between::Held,
+                (false, true, Between::Held) => Between::BandLimited,
+                _ => between,
+            };
+            input.with_between(own)
+        });
         other
     }
 
-    /// Course of the input between its samples.
+    /// Course of the input between its samples; of plateaus only where no training record has another input.
     pub fn between(&self) -> Between {
-        self.train[0].input.between()
+        let other = self.train.iter().find(|r| !has_plateaus(&r.input));
+        other.unwrap_or(&self.train[0]).input.between()
     }
 
     /// Changes applied and measured quantity; records that share them go on sharing them.
@@ -120,7 +141,8 @@ impl Records {
         let rate_hz = self.rate_hz();
         let mode = plain.mode();
         let decay = mode.damping_ratio * mode.omega_rad_s / rate_hz;
-        for record in self.all() {
+        // Of a decay all counts: its state is estimated, and nothing acts beyond it.
+        for record in self.all().filter(|record| !record.is_free()) {
             let count = record.measured.len();
             let most = (MOST_EXCLUDED * count as f64) as usize;
             let [first, last] =

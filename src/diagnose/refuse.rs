@@ -36,6 +36,10 @@ const APART: f64 = 0.5;
 /// # Errors
 /// If they are.
 pub fn check(case: &Case, context: &FitContext) -> Result<Option<Alignment>, Failure> {
+    if case.records.are_free() {
+        // There is no other channel.
+        return refuse_short(case, context).map(|()| None);
+    }
     let as_given = relative_error(context, &case.records.train);
     let alignment = (as_given >= LARGE_ERROR)
         .then(|| Alignment::find(case, context, as_given))

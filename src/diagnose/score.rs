@@ -317,11 +317,15 @@ pub fn derivatives(
     terms: &NuisanceTerms,
 ) -> (Option<Vec<Vec<f64>>>, Nuisance) {
     let nuisance = record.nuisance(&fitted.free, terms, None);
+    let rings = record.is_free() && !fitted.integrates();
     let at = |values: &[f64]| {
         let (mut model, _) = fitted.structure.model(values);
         model.shift = record.initial.preload;
         let mut residual = raw_residual(&model, record).ok()?;
-        nuisance.clear(&mut residual);
+        match rings {
+            true => record.nuisance(&model.free_mode(), terms, None).clear(&mut residual),
+            false => nuisance.clear(&mut residual),
+        }
         Some(residual)
     };
     let along = |k: usize, here: &[f64]| {

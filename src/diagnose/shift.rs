@@ -110,6 +110,9 @@ pub struct ShiftWarning {
 /// A shift of the channels that lowers the error of the plain stand, where effects were found that resemble one, or something is
 /// left.
 pub fn find(case: &Case, context: &FitContext, found: &SearchState) -> Option<Alignment> {
+    if case.records.are_free() {
+        return None;
+    }
     let resembles = found.after.effect_names().contains(&"second-mode");
     if !resembles && !remains(&found.after, &found.tests, found.noise_floor) {
         return None;

@@ -192,8 +192,14 @@ impl ChannelChoice {
     pub fn applied_and_measured(names: [&str; 2], units: [Option<&str>; 2]) -> [Self; 2] {
         [
             Self::named(["--applied", "--applied-unit"], names[0], units[0]),
-            Self::named(["--measured", "--measured-unit"], names[1], units[1]),
+            Self::measured_alone(names[1], units[1]),
         ]
+    }
+
+    /// The channel that `--measured` names, with its unit if one is given.
+    #[must_use]
+    pub fn measured_alone(name: &str, unit: Option<&str>) -> Self {
+        Self::named(["--measured", "--measured-unit"], name, unit)
     }
 }
 

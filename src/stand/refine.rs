@@ -103,12 +103,16 @@ impl Refined<'_> {
             }
             return;
         }
+        const GAIN: &str = "static_gain";
+        let kept = mechanics.get(GAIN).cloned();
         let mut table = Table::new();
         table["natural_frequency"] = self.quantity(self.natural_hz, "Hz");
         table["damping_ratio"] = self.quantity(self.damping_ratio, "");
         if let Some(gain) = self.gain {
-            table["static_gain"] = value(self.static_gain(gain));
+            table[GAIN] = value(self.static_gain(gain));
             document.remove("calibration");
+        } else if let Some(kept) = kept {
+            table[GAIN] = kept;
         }
         document["mechanics"] = Item::Table(table);
     }

@@ -1,8 +1,10 @@
 //! Reading the records of a diagnosis.
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use torqcomp_dsp::onset;
 use torqcomp_model::effects::Fixed;
 use torqcomp_model::simulate::Excitation;
 use torqcomp_model::{Dimension, UnitSystem};
@@ -28,12 +30,15 @@ const FEWEST: usize = 200;
 const FIRST_STEPS: usize = 2;
 /// Samples at the start that do not count until the natural frequency is known.
 const EXCLUDED: usize = 32;
+/// Most of a decay that does not count at its start, as one in so many samples: there the hit may not be over.
+const PART_OF_DECAY: usize = 50;
 
 const TORQUE: Dimension = Dimension::new([1, 2, -2, 0, 0, 0]);
 
 struct Pair {
     source: String,
-    applied: Vec<f64>,
+    /// Nothing acts on a stand that rings freely.
+    applied: Option<Vec<f64>>,
     measured: Vec<f64>,
     rate_hz: f64,
     start_s: f64,
@@ -56,10 +61,22 @@ impl Pair {
 
 /// Reads all records, and what the stand file declares of them; whether something of a record was lost.
 pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<(Case, bool), Failure> {
-    let pairs = |files: &[PathBuf]| -> Result<Vec<Pair>, Failure> {
-        files.iter().map(|file| pair(args, file)).collect()
+    let pairs = |files: &[PathBuf], decays: &[PathBuf]| -> Result<Vec<Pair>, Failure> {
+        let mut all: Vec<Pair> = files
+            .iter()
+            .map(|file| pair(args, file))
+            .collect::<Result<_, _>>()?;
+        for file in decays {
+            all.extend(self::decays(args, file)?);
+        }
+        Ok(all)
     };
-    let (train, holdout) = (pairs(&args.train)?, pairs(&args.holdout)?);
+    let mut train = pairs(&args.train, &args.decay)?;
+    let mut holdout = pairs(&args.holdout, &args.holdout_decay)?;
+    let last_is_held_out = holdout.is_empty() && args.train.is_empty();
+    if last_is_held_out {
+        holdout.extend(last_decay(&mut train)?);
+    }
     let first = &train[0];
     for other in train.iter().chain(&holdout) {
         check_same_kind(first, other)?;
@@ -87,6 +104,12 @@ pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<(Case, bool), Fail
         train: convert(train)?,
         holdout: convert(holdout)?,
     };
+    if last_is_held_out {
+        warnings.push(Warning::new(
+            "no-record-held-out",
+            "no hold-out record was given; the last decay is held out instead",
+        ));
+    }
     if records.holdout.is_empty() {
         records.hold_out_ends();
         warnings.push(Warning::new(
@@ -97,13 +120,14 @@ pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<(Case, bool), Fail
     let case = Case {
         sources: SourceFiles {
             stand: args.stand.as_ref().map(|p| p.shown().to_string()),
-            train: texts(&args.train),
-            holdout: texts(&args.holdout),
+            train: texts(&args.training_files()),
+            holdout: texts(&args.held_out_files()),
         },
         records,
         declared,
         declared_effects: declared_effects(stand),
-        gain_is_declared: gain.is_some() && static_gain(stand).is_none(),
+        // Free ringing does not show the gain.
+        gain_is_declared: gain.is_some() && static_gain(stand).is_none() || args.train.is_empty(),
         recorder: stand.and_then(recorder),
         units,
         warnings,
@@ -133,14 +157,21 @@ fn declared_effects(stand: Option<&Stand>) -> Vec<DeclaredForm> {
 }
 
 fn pair(args: &Diagnose, file: &Path) -> Result<Pair, Failure> {
-    if args.applied == args.measured {
+    let applied = args.applied.as_deref().ok_or_else(|| {
+        Failure::usage(
+            ErrorCode::MissingArgument,
+            "--train and --holdout need --applied COL, the channel with the applied quantity; records of free ringing without \
+             one are given with --decay and --holdout-decay",
+        )
+    })?;
+    if applied == args.measured {
         return Err(Failure::usage(
             ErrorCode::ConflictingArguments,
             "--applied and --measured name the same column",
         ));
     }
     let choices = ChannelChoice::applied_and_measured(
-        [&args.applied, &args.measured],
+        [applied, &args.measured],
         [args.applied_unit.as_deref(), args.measured_unit.as_deref()],
     );
     let read = AlignedChannels::read(&Input::of(file), &choices, &args.reading)?;
@@ -163,7 +194,7 @@ fn pair(args: &Diagnose, file: &Path) -> Result<Pair, Failure> {
     }
     Ok(Pair {
         source: read.source,
-        applied: applied.samples,
+        applied: Some(applied.samples),
         measured: measured.samples,
         rate_hz: read.rate_hz,
         start_s: read.start.after_s,
@@ -172,6 +203,53 @@ fn pair(args: &Diagnose, file: &Path) -> Result<Pair, Failure> {
         warnings: read.warnings,
         is_lossy: read.is_lossy,
     })
+}
+
+/// The decays in a record of the measured quantity alone, each from its largest swing on.
+fn decays(args: &Diagnose, file: &Path) -> Result<Vec<Pair>, Failure> {
+    let choice = ChannelChoice::measured_alone(&args.measured, args.measured_unit.as_deref());
+    let read = AlignedChannels::read(&Input::of(file), &[choice], &args.reading)?;
+    let measured = read.channels.into_iter().next().ok_or_else(|| {
+        Failure::failed(ErrorCode::ChannelNotFound, "a channel is needed").at(&read.source)
+    })?;
+    measured.must_be_as_recorded(&read.source)?;
+    let ranges = onset::decays(&measured.samples).into_iter();
+    let long: Vec<Range<usize>> = ranges.filter(|range| range.len() >= FEWEST).collect();
+    if long.is_empty() {
+        return Err(Failure::failed(
+            ErrorCode::TooFewSamples,
+            format_args!(
+                "no free decay of at least {FEWEST} samples is found; try another channel or --range, or record for longer"
+            ),
+        )
+        .at(&read.source));
+    }
+    let mut warnings = read.warnings;
+    let pairs = long.into_iter().map(|range| Pair {
+        source: read.source.clone(),
+        applied: None,
+        measured: measured.samples[range.clone()].to_vec(),
+        rate_hz: read.rate_hz,
+        start_s: read.start.after_s + range.start as f64 / read.rate_hz,
+        applied_unit: None,
+        measured_unit: measured.unit.clone(),
+        warnings: std::mem::take(&mut warnings),
+        is_lossy: read.is_lossy,
+    });
+    Ok(pairs.collect())
+}
+
+/// The last decay, taken out of the training records, which must have another one.
+fn last_decay(train: &mut Vec<Pair>) -> Result<Option<Pair>, Failure> {
+    if let [only] = train.as_slice() {
+        return Err(Failure::failed(
+            ErrorCode::TooFewSamples,
+            "one decay is fitted, and none is left to check the result: record another one, better of another size, and give \
+             it with --holdout-decay",
+        )
+        .at(&only.source));
+    }
+    Ok(train.pop())
 }
 
 /// Refuses records at different rates or in different units.
@@ -193,7 +271,8 @@ fn check_same_kind(first: &Pair, other: &Pair) -> Result<(), Failure> {
         let [first, other] = [first, other].map(|p| of(p).as_ref().map(|u| u.unit.factor()));
         first != other
     };
-    if differ(|p| &p.applied_unit) || differ(|p| &p.measured_unit) {
+    let both_act = first.applied.is_some() && other.applied.is_some();
+    if both_act && differ(|p| &p.applied_unit) || differ(|p| &p.measured_unit) {
         return Err(Failure::failed(
             ErrorCode::RecordsDiffer,
             format_args!(
@@ -236,6 +315,11 @@ fn units(pair: &Pair, stand: Option<&Stand>) -> (ChannelUnits, bool) {
     let [applied_text, measured_text] =
         channels.map(|unit| unit.as_ref().map_or_else(String::new, |u| u.text.clone()));
     let [applied, measured] = channels.map(|unit| unit.as_ref().map(|u| u.unit.dimension()));
+    // What does not act has any unit.
+    let applied = match pair.applied {
+        Some(_) => applied,
+        None => Some(TORQUE),
+    };
     let factors = channels.map(|unit| unit.as_ref().map_or(1.0, |u| u.unit.factor()));
     let is_torque_stand = static_gain(stand).is_none();
     let signal = pair
@@ -301,7 +385,11 @@ fn record(
     units: &ChannelUnits,
 ) -> Result<StandRecord, Failure> {
     let [applied_factor, measured_factor] = units.factors;
-    let applied: Vec<f64> = pair.applied.iter().map(|u| u * applied_factor).collect();
+    let is_free = pair.applied.is_none();
+    let applied: Vec<f64> = match &pair.applied {
+        Some(applied) => applied.iter().map(|u| u * applied_factor).collect(),
+        None => vec![0.0; pair.measured.len()],
+    };
     let measured: Vec<f64> = match calibrated {
         None => pair.measured.iter().map(|y| y * measured_factor).collect(),
         Some(stand) => {
@@ -320,7 +408,9 @@ fn record(
             values
         }
     };
-    refuse_constant(&pair.source, "applied", &applied)?;
+    if !is_free {
+        refuse_constant(&pair.source, "applied", &applied)?;
+    }
     refuse_constant(&pair.source, "measured", &measured)?;
     let count = measured.len();
     let (rate_hz, start_s) = (pair.rate_hz, pair.start_s);
@@ -328,7 +418,10 @@ fn record(
         source: pair.source,
         input: Arc::new(Excitation::new(applied, rate_hz, start_s, FIRST_STEPS)),
         measured: Arc::new(measured),
-        range: EXCLUDED.min(count / 10)..count,
+        range: match is_free {
+            true => EXCLUDED.min(count / PART_OF_DECAY)..count,
+            false => EXCLUDED.min(count / 10)..count,
+        },
         initial: InitialState::default(),
         is_held: false,
     })
