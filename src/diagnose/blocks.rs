@@ -153,9 +153,15 @@ pub fn family_p_values(comparisons: &[Comparison]) -> Vec<Option<f64>> {
 }
 
 /// Reproducible pseudo-random numbers (SplitMix64; G. Steele et al., OOPSLA 2014).
-struct SplitMix64(u64);
+pub struct SplitMix64(pub u64);
 
 impl SplitMix64 {
+    /// A number of unit variance, roughly normal: the sum of twelve in [0, 1), less 6.
+    pub fn normal(&mut self) -> f64 {
+        let uniform = |r: &mut Self| r.below(1 << 20) as f64 / f64::from(1 << 20);
+        (0..12).map(|_| uniform(self)).sum::<f64>() - 6.0
+    }
+
     fn below(&mut self, limit: usize) -> usize {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut z = self.0;
@@ -169,14 +175,8 @@ impl SplitMix64 {
 mod tests {
     use super::*;
 
-    /// Independent numbers of unit variance, roughly normal: sums of twelve in [0, 1), less 6.
     fn noise(random: &mut SplitMix64, count: usize) -> Vec<f64> {
-        let mut one = || {
-            (0..12)
-                .map(|_| random.below(1 << 20) as f64 / f64::from(1 << 20))
-                .sum::<f64>()
-        };
-        (0..count).map(|_| one() - 6.0).collect()
+        (0..count).map(|_| random.normal()).collect()
     }
 
     /// Of twenty models none of which is better than the first, the best has p < 5 % in 5 % of 200 cases: 10, and hardly ever

@@ -6,6 +6,7 @@ use super::fit::FittedModel;
 use super::records::Records;
 use super::score::{ScoredModel, derivatives};
 use crate::noise_colour;
+use torqcomp_dsp::dot;
 
 /// Half-width over which the spectrum of the residual is averaged, in the damping `ζω₀` of the stand: noise on the applied
 /// quantity peaks at its resonance.
@@ -15,14 +16,39 @@ impl ScoredModel {
     /// The same with standard uncertainties that allow for the colour of the training residuals; noise on the applied
     /// quantity, filtered by the stand, gives them one. Where the derivatives cannot tell, those for white noise stay.
     pub fn with_coloured_std(mut self, records: &Records) -> Self {
-        if let Some(std) = coloured_std(&self, records) {
-            self.fitted.std = std;
+        if let Some((free, covariance)) = coloured_covariance(&self, records) {
+            for (i, k) in free.iter().enumerate() {
+                self.fitted.std[*k] = Some(covariance[(i, i)].sqrt());
+            }
+            self.uncertain_rms = uncertain_rms(&self, &free, &covariance).unwrap_or(0.0);
         }
         self
     }
 }
 
-fn coloured_std(model: &ScoredModel, records: &Records) -> Option<Vec<Option<f64>>> {
+/// Rms of what parameters of that covariance leave uncertain of the compared records: with `J` their derivatives,
+/// `√(tr(C JᵀJ)/n)`.
+fn uncertain_rms(model: &ScoredModel, free: &[usize], covariance: &DMatrix<f64>) -> Option<f64> {
+    let fitted = &model.fitted;
+    let (_, terms) = fitted.structure.model(&fitted.values);
+    let (mut sum, mut count) = (0.0, 0);
+    for residual in model.compared.iter() {
+        let columns = derivatives(fitted, &residual.record, &terms).0?;
+        for (i, one) in free.iter().enumerate() {
+            for (j, other) in free.iter().enumerate() {
+                sum += covariance[(i, j)] * dot(&columns[*one], &columns[*other]);
+            }
+        }
+        count += residual.samples.len();
+    }
+    Some((sum.max(0.0) / count.max(1) as f64).sqrt())
+}
+
+/// The parameters that the training records determine, by their places, and their covariance.
+fn coloured_covariance(
+    model: &ScoredModel,
+    records: &Records,
+) -> Option<(Vec<usize>, DMatrix<f64>)> {
     let fitted: &FittedModel = &model.fitted;
     let (_, terms) = fitted.structure.model(&fitted.values);
     let training = fitted.with_initial_states(&records.train);
@@ -60,9 +86,5 @@ fn coloured_std(model: &ScoredModel, records: &Records) -> Option<Vec<Option<f64
         Some(width_rad),
     );
     let (_, covariance) = learnt?;
-    let mut std = fitted.std.clone();
-    for (i, k) in free.iter().enumerate() {
-        std[*k] = Some(covariance[(i, i)].sqrt());
-    }
-    Some(std)
+    Some((free, covariance))
 }

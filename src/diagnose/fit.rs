@@ -98,7 +98,7 @@ pub fn fit(
     let start_model = structure.model(start).0;
     let mut free = start_model.free_mode();
     // Where the motion is integrated, its start is corrected instead.
-    let integrates = start_model.has_torques();
+    let integrates = start_model.is_integrated();
     // Of a plain stand that rings freely, the mode of that motion is all there is to fit.
     let rings = !integrates && records.iter().any(StandRecord::is_free);
     let fixed = (!rings).then_some(&free);
@@ -278,7 +278,7 @@ impl RecordModel {
     fn residual(&mut self, record: StandRecord) -> Option<RecordResidual> {
         self.chain.shift = record.initial.preload;
         let mut samples = raw_residual(&self.chain, &record).ok()?;
-        let slopes = match self.chain.has_torques() {
+        let slopes = match self.chain.is_integrated() {
             true => Some(self.slopes(&record, &samples)?),
             false => None,
         };
@@ -301,7 +301,7 @@ impl RecordModel {
     /// curved way: the search begins with the state that the record has and at rest, and goes on by Gauss's and Newton's steps
     /// as long as they help. `None` if the motion diverges.
     fn settled(&mut self, record: &StandRecord) -> Option<RecordResidual> {
-        if !self.chain.has_torques() {
+        if !self.chain.is_integrated() {
             return self.residual(record.clone());
         }
         let starts = [record.initial, InitialState::default()];
@@ -454,7 +454,7 @@ impl FittedModel {
 
     /// Whether its motion is integrated in time.
     pub fn integrates(&self) -> bool {
-        self.structure.model(&self.values).0.has_torques()
+        self.structure.model(&self.values).0.is_integrated()
     }
 
     /// The mode of the plain stand in it.

@@ -5,6 +5,7 @@
 //! is the JSON document of `diagnose`.
 
 mod alignment;
+mod applied_noise;
 mod blocks;
 mod coloured;
 mod columns;
@@ -169,6 +170,7 @@ pub fn run(mut case: Case, workers: Workers) -> Result<Diagnosis, Failure> {
         recorder: case.recorder.clone(),
         units: case.units.clone(),
         held: None,
+        rings_at_start: false,
     };
     let mut context = plain::find_plain(&unscaled, case.declared, &case.records.train)?;
     if !case.records.are_free()
@@ -179,6 +181,8 @@ pub fn run(mut case: Case, workers: Workers) -> Result<Diagnosis, Failure> {
     }
     let alignment = refuse::check(&case, &context)?;
     case.records.prepare_for(&context.plain);
+    let mode = context.plain.mode();
+    context.rings_at_start = case.records.train.iter().any(|r| r.sees_start(&mode));
     let declared = case.declared.map(|plain| DeclaredStand {
         plain,
         effects: &case.declared_effects,

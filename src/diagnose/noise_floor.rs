@@ -106,7 +106,7 @@ impl NoiseFloor {
 
 /// Mean square of the white noise on an applied quantity: what changes on its plateaus, or the flat top of its spectrum, if that
 /// is too low to be part of the excitation; otherwise none is known.
-fn noise_of_input(input: &[f64]) -> f64 {
+pub fn noise_of_input(input: &[f64]) -> f64 {
     if let Some(noise) = noise_on_plateaus(input) {
         return noise;
     }

@@ -45,6 +45,8 @@ pub enum Reason {
     SmallShare {
         share: f64,
     },
+    /// It explains no more than what the noise of the applied quantity does in the model.
+    TakesOutNoise,
     /// An essential parameter does not differ from zero.
     ZeroParameter {
         name: &'static str,
@@ -130,6 +132,10 @@ impl Reason {
                 )
             }
             Self::SmallShare { share } => small_share(100.0 * share),
+            Self::TakesOutNoise => {
+                "explains no more than what it takes out of the noise of the applied quantity"
+                    .to_owned()
+            }
             Self::ZeroParameter { name } => {
                 format!("its {name} is not significantly different from zero")
             }

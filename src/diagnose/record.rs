@@ -137,6 +137,11 @@ impl StandRecord {
         self.decay_to_range(mode) < DECAYED
     }
 
+    /// Whether enough of that motion is left to determine the state at the first sample.
+    pub fn sees_start(&self, mode: &Mode) -> bool {
+        self.decay_to_range(mode) < START_SEEN
+    }
+
     /// Time constants of a mode from the first sample to the range.
     fn decay_to_range(&self, mode: &Mode) -> f64 {
         mode.damping_ratio * mode.omega_rad_s / self.rate_hz() * self.range.start as f64
@@ -156,7 +161,7 @@ impl StandRecord {
         let rate_hz = self.rate_hz();
         if self.has_free_motion(mode) {
             nuisance.motion = Some(1);
-            nuisance.sees_start = self.decay_to_range(mode) < START_SEEN;
+            nuisance.sees_start = self.sees_start(mode);
             let slopes = slopes.as_ref().and_then(|slopes| slopes.motion.clone());
             let free = || {
                 let free = Chain::new(*mode, 1.0).free_motion(rate_hz, self.range.end);

@@ -58,7 +58,10 @@ impl Records {
 
     /// Whether nothing acts in any of them.
     pub fn are_free(&self) -> bool {
-        self.train.iter().chain(&self.holdout).all(StandRecord::is_free)
+        self.train
+            .iter()
+            .chain(&self.holdout)
+            .all(StandRecord::is_free)
     }
 
     fn all(&mut self) -> impl Iterator<Item = &mut StandRecord> {

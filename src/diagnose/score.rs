@@ -23,6 +23,8 @@ pub struct ScoredModel {
     pub train: Arc<[RecordResidual]>,
     /// Residuals on the records on which models are compared: these, or the held-out ones if the records have any.
     pub compared: Arc<[RecordResidual]>,
+    /// Rms of what the uncertainty of the constants leaves on these; zero while something is chosen.
+    pub uncertain_rms: f64,
 }
 
 /// A parameter of an effect, as it is reported.
@@ -66,6 +68,7 @@ impl ScoredModel {
             fitted,
             compared: train.clone(),
             train,
+            uncertain_rms: 0.0,
         };
         match records.holdout.is_empty() {
             true => Some(trained),
@@ -323,7 +326,9 @@ pub fn derivatives(
         model.shift = record.initial.preload;
         let mut residual = raw_residual(&model, record).ok()?;
         match rings {
-            true => record.nuisance(&model.free_mode(), terms, None).clear(&mut residual),
+            true => record
+                .nuisance(&model.free_mode(), terms, None)
+                .clear(&mut residual),
             false => nuisance.clear(&mut residual),
         }
         Some(residual)

@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 use torqcomp_model::effects::{EFFECTS, Effect};
 
+use super::applied_noise::NoisierRecords;
 use super::blocks::{Comparison, family_p_values};
 use super::fit::{FitEffort, FittedModel, fit};
 use super::reason::{Reason, Status};
@@ -91,6 +92,9 @@ const PROMISING: f64 = 0.5;
 const FIRST_FIT: FitEffort = FitEffort::brief(3);
 const SECOND_FIT: FitEffort = FitEffort::brief(5);
 const FULL_FIT: FitEffort = FitEffort::full(15);
+/// Most full fits in a row, and the sum of squares of one over that of the one before from which on no further one follows.
+const MOST_FULL_FITS: usize = 4;
+const FALLING: f64 = 0.9;
 
 /// How many forms go on from one stage of fitting to the next.
 pub struct SearchEffort {
@@ -157,7 +161,7 @@ pub fn try_effects(
         })
         .collect();
     set_p_values(&mut tried, &base.scored);
-    decide(&mut tried);
+    decide(&mut tried, base, NoisierRecords::of(records).as_ref());
     let fits = fits.into_iter().flatten().collect();
     Round { tried, fits }
 }
@@ -281,11 +285,29 @@ pub fn fit_all(
         .max(WORTHWHILE * base.scored.train_rms().powi(2));
     parallel(forms.len(), workers.threads, |k| {
         let fit = second[k].as_ref().filter(|f| gain(f) > 0.0)?;
-        let is_promising = gain(fit) >= least;
-        let full = is_promising.then(|| fit.refit(&records.train, FULL_FIT));
-        let full = full.and_then(Result::ok);
-        ScoredModel::of(full.unwrap_or_else(|| fit.clone()), records)
+        let full = match gain(fit) >= least {
+            true => to_the_end(fit, records),
+            false => fit.clone(),
+        };
+        ScoredModel::of(full, records)
     })
+}
+
+/// A fit carried on as long as the error falls much: where a light damping lets small errors of the frequency add up, it falls
+/// slowly at first.
+fn to_the_end(fit: &FittedModel, records: &Records) -> FittedModel {
+    let mut best = fit.clone();
+    for _ in 0..MOST_FULL_FITS {
+        let Ok(next) = best.refit(&records.train, FULL_FIT) else {
+            break;
+        };
+        let still_falls = !next.converged && next.train_sum < FALLING * best.train_sum;
+        best = next;
+        if !still_falls {
+            break;
+        }
+    }
+    best
 }
 
 impl BaseModel {
@@ -395,27 +417,41 @@ pub fn evidence(comparison: &Comparison, samples: usize, parameters: usize) -> f
 }
 
 /// Accepts the best of the candidates that nothing speaks against, and compares the others with it.
-fn decide(tried: &mut [CandidateFit]) {
-    let passing: Vec<usize> = (0..tried.len())
-        .filter(|k| tried[*k].reason == Reason::Best)
-        .collect();
-    let best = passing.iter().copied();
-    let Some(best) = best.min_by(|a, b| criterion(tried, *a).total_cmp(&criterion(tried, *b)))
-    else {
-        return;
+fn decide(tried: &mut [CandidateFit], base: &BaseModel, noisier: Option<&NoisierRecords>) {
+    let (chosen, tied) = loop {
+        let Some((chosen, tied)) = choose(tried) else {
+            return;
+        };
+        let model = tried[chosen].model.as_ref();
+        if model
+            .zip(noisier)
+            .is_none_or(|(model, noisier)| noisier.bear_out(&base.scored, model))
+        {
+            break (chosen, tied);
+        }
+        tried[chosen].reason = Reason::TakesOutNoise;
     };
-    let tied: Vec<usize> = passing
-        .iter()
-        .copied()
-        .filter(|k| is_tied(tried, *k, best))
-        .collect();
-    let chosen = simplest(tried, &tied).unwrap_or(best);
-    for k in passing.into_iter().filter(|k| *k != chosen) {
+    for k in passing(tried).filter(|k| *k != chosen).collect::<Vec<_>>() {
         if let Some(reason) = behind(&tried[k], &tried[chosen], tied.contains(&k)) {
             tried[k].reason = reason;
         }
     }
     tried.swap(0, chosen);
+}
+
+/// The candidates that nothing speaks against.
+fn passing(tried: &[CandidateFit]) -> impl Iterator<Item = usize> + '_ {
+    (0..tried.len()).filter(|k| tried[*k].reason == Reason::Best)
+}
+
+/// The best of the candidates that nothing speaks against, and those that are no worse.
+fn choose(tried: &[CandidateFit]) -> Option<(usize, Vec<usize>)> {
+    let best =
+        passing(tried).min_by(|a, b| criterion(tried, *a).total_cmp(&criterion(tried, *b)))?;
+    let tied: Vec<usize> = passing(tried)
+        .filter(|k| is_tied(tried, *k, best))
+        .collect();
+    Some((simplest(tried, &tied).unwrap_or(best), tied))
 }
 
 /// Whether an effect is not significantly worse than the best one.

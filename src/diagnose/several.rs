@@ -2,6 +2,7 @@
 //! laws beside the list may speak against what is left.
 
 use super::SearchState;
+use super::applied_noise::NoisierRecords;
 use super::exchange::MANY;
 use super::guard_models::GuardModel;
 use super::noise_floor::NoiseFloorSource;
@@ -120,7 +121,13 @@ impl SearchState {
             return single.cloned().into_iter().collect();
         }
         let mut starts = best_pairs(base, &round.fits, &self.records, workers);
-        starts.retain(|pair| refusal(pair, model).is_none());
+        let noisier = NoisierRecords::of(&self.records);
+        let is_borne_out = |pair: &ScoredModel| {
+            noisier
+                .as_ref()
+                .is_none_or(|noisier| noisier.bear_out(model, pair))
+        };
+        starts.retain(|pair| refusal(pair, model).is_none() && is_borne_out(pair));
         if let Some(single) = single {
             // Beside the best effect all others are compared, ties included.
             let name = single.effect_names()[0];
@@ -230,10 +237,14 @@ impl SearchState {
     /// The effect that is missed least, if its absence does not show.
     fn needless(&self, without: &[Option<ScoredModel>]) -> Option<usize> {
         let (after, excess) = (&self.after, self.excess());
+        let noisier = NoisierRecords::of(&self.records);
         let is_needless = |less: &ScoredModel| {
             no_gain(after, less).is_some()
                 || after.criterion() >= less.criterion()
                 || excess.is_too_small(less, after)
+                || noisier
+                    .as_ref()
+                    .is_some_and(|noisier| !noisier.bear_out(less, after))
         };
         let all = without.iter().enumerate();
         let models = all.filter_map(|(k, less)| Some((k, less.as_ref()?)));

@@ -29,6 +29,9 @@ impl PlainStand {
     }
 }
 
+/// Turns of a line in the longest record from which on it is looked for.
+const FEWEST_TURNS: f64 = 3.0;
+
 /// What all models of a diagnosis share.
 #[derive(Clone)]
 pub struct FitContext {
@@ -43,6 +46,8 @@ pub struct FitContext {
     pub units: ChannelUnits,
     /// Of a body without a spring: what holds it.
     pub held: Option<HeldBody>,
+    /// Whether free motion from the start of a record is seen in it.
+    pub rings_at_start: bool,
 }
 
 impl FitContext {
@@ -59,9 +64,11 @@ impl FitContext {
         }
     }
 
-    /// Whether an effect in that form is looked for: beside a spring that only holds a free body, not all mean something.
+    /// Whether an effect in that form is looked for: beside a spring that only holds a free body, not all mean something, and
+    /// a part of a turn of a line is a drift.
     pub fn allows(&self, effect: &EffectForm) -> bool {
-        self.held.is_none() || effect.needs_no_spring()
+        (self.held.is_none() || effect.needs_no_spring())
+            && effect.most_turns(&self.scales) >= FEWEST_TURNS
     }
 
     /// Number of parameters of the plain stand.
@@ -111,6 +118,14 @@ impl EffectForm {
         let parameters = self.form.parameters.iter().take(self.moved());
         let mut sizes = parameters.map(|p| p.lower <= 0.0 && p.upper >= 0.0);
         sizes.position(|is_size| is_size && !self.is_line())
+    }
+
+    /// Most turns of its line in a record; any number where it has none.
+    fn most_turns(&self, scales: &RecordScales) -> f64 {
+        match self.form.parameters.first() {
+            Some(hz) if self.is_line() => hz.upper * hz.size(scales) * scales.duration_s,
+            _ => f64::INFINITY,
+        }
     }
 
     /// Whether it adds what does not come from the input: it may be in one record and not in another.
@@ -244,9 +259,10 @@ impl Structure {
                 _ => links.push(link),
             }
         }
-        let chain = Chain::new(mode, gain)
+        let mut chain = Chain::new(mode, gain)
             .with_recorder(self.context.recorder.clone(), false)
             .with_links(links);
+        chain.begins_at_start = self.context.rings_at_start && chain.distorts();
         (chain, terms)
     }
 }

@@ -46,6 +46,8 @@ const NAMED: f64 = 0.5;
 const CLEARLY_ABOVE: f64 = 1.05;
 /// Error over the noise floor above which a remaining dependence on the input counts.
 const ABOVE: f64 = 1.005;
+/// Standard uncertainties of the constants within which their error lies in 95 % of all cases.
+const CERTAIN: f64 = 2.0;
 /// Minimum part of the initial excess error power that a further effect must explain to be named.
 const SECOND: f64 = 0.02;
 /// The same for one that explains more than half of what is left above the noise.
@@ -103,6 +105,13 @@ impl PlainExcess<'_> {
     }
 }
 
+impl ScoredModel {
+    /// Noise, and what the constants leave uncertain beside it with 95 % certainty.
+    fn with_uncertain(&self, noise_rms: f64) -> f64 {
+        noise_rms.hypot(CERTAIN * self.uncertain_rms)
+    }
+}
+
 /// The noise as far as it is known.
 pub fn noise_rms(floor: Option<NoiseFloor>) -> f64 {
     floor.map_or(0.0, |f| f.rms)
@@ -120,7 +129,7 @@ pub fn remains(model: &ScoredModel, tests: &ResidualTests, floor: Option<NoiseFl
     let Some(floor) = floor else {
         return is_dependent;
     };
-    let ratio = model.compared_rms() / floor.rms;
+    let ratio = model.compared_rms() / model.with_uncertain(floor.rms);
     let is_enough = match floor.from {
         NoiseFloorSource::Periods => true,
         NoiseFloorSource::OutOfBand => is_dependent || ratio > FAR_ABOVE && !tests.white,
@@ -155,7 +164,8 @@ impl SearchState {
     /// Whether the residual after is above the noise, coloured, and depends on the input, small as it may be.
     fn follows_input(&self) -> bool {
         let error = self.after.compared_rms();
-        let is_above = self.noise_floor.is_some_and(|f| error > ABOVE * f.rms);
+        let is_above = |f: NoiseFloor| error > ABOVE * self.after.with_uncertain(f.rms);
+        let is_above = self.noise_floor.is_some_and(is_above);
         is_above && !self.tests.white && !self.tests.independent_of_input
     }
 

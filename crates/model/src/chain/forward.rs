@@ -36,11 +36,11 @@ impl Signal {
 impl Chain {
     /// The record for an input. Lines are not in it: their phase belongs to a record.
     ///
-    /// With torques in the stand the motion starts from `start`; without, from the steady state of what
+    /// A motion that [is integrated](Self::is_integrated) starts from `start`; any other from the steady state of what
     /// continues the record backwards. Samples after the motion has left all bounds are NaN.
     #[must_use]
     pub fn simulate(&self, input: &Excitation, start: MotionState) -> Vec<f64> {
-        let moved = if self.has_torques() {
+        let moved = if self.is_integrated() {
             let samples = self.integrated(input, start);
             if samples.last().is_none_or(|x| !x.is_finite()) {
                 return samples;
@@ -87,6 +87,19 @@ impl Chain {
     #[must_use]
     pub fn has_torques(&self) -> bool {
         !self.torques().is_empty()
+    }
+
+    /// Whether the motion is integrated in time.
+    #[must_use]
+    pub fn is_integrated(&self) -> bool {
+        self.begins_at_start || self.has_torques()
+    }
+
+    /// Whether something changes samples behind the stand.
+    #[must_use]
+    pub fn distorts(&self) -> bool {
+        let mut actions = self.links.iter().map(|link| &link.action);
+        actions.any(|action| matches!(action, Action::Distortion(_)))
     }
 
     /// The mode in which the stand moves freely in small motions, with the stiffness `k` that torques add, relative to its

@@ -52,6 +52,9 @@ pub struct Chain {
     /// Displacement, in units of the record, by a load that does not change and is not in the input: torques of
     /// the stand see it; what the gage shows of it is left to the record's own constant.
     pub shift: f64,
+    /// Whether the motion is integrated from a start although no torque of the stand needs it: a change of the samples
+    /// behind the stand sees the free motion from there as well.
+    pub begins_at_start: bool,
     /// In the order from torque to record.
     links: Vec<Link>,
 }
@@ -150,6 +153,7 @@ impl Chain {
             stand: stand.into(),
             gain,
             shift: 0.0,
+            begins_at_start: false,
             links: Vec::new(),
         }
     }

@@ -1,0 +1,91 @@
+//! Effects that only take out of a model what noise on the applied quantity does in it.
+//!
+//! The record has the motion under what acted, the model that under what was recorded of it, noise included. A gap, or friction
+//! that holds still what is smaller than it, lets less of this noise through: the error falls although the stand has nothing of
+//! the kind. With twice the noise it falls by as much again, which an effect of the stand does not cause: as in simulation
+//! extrapolation (J. R. Cook, L. A. Stefanski, J. Am. Stat. Assoc. 89 (1994), 1314).
+
+use std::sync::Arc;
+
+use torqcomp_model::simulate::Excitation;
+
+use super::blocks::SplitMix64;
+use super::noise_floor::noise_of_input;
+use super::record::StandRecord;
+use super::records::Records;
+use super::score::ScoredModel;
+use torqcomp_dsp::dot;
+
+/// Part of a gain from which on it is that of the noise.
+const MOSTLY: f64 = 0.5;
+
+/// The records on which models are compared with the noise on their applied quantity doubled: once with further noise added, once
+/// with it taken off, so that its products with the noise that is there cancel.
+pub struct NoisierRecords {
+    added: Vec<StandRecord>,
+    taken_off: Vec<StandRecord>,
+    /// Whether they are the training records, of which each model has the initial states.
+    are_fitted: bool,
+}
+
+impl NoisierRecords {
+    /// `None` if the applied quantity has no noise, as far as that is seen.
+    pub fn of(records: &Records) -> Option<Self> {
+        let are_fitted = records.holdout.is_empty();
+        let compared = match are_fitted {
+            true => &records.train,
+            false => &records.holdout,
+        };
+        let mut random = SplitMix64(0xA5A5_1F3D_66E4_9B27);
+        let mut found = Self {
+            added: Vec::new(),
+            taken_off: Vec::new(),
+            are_fitted,
+        };
+        let mut has_noise = false;
+        for record in compared {
+            let std = noise_of_input(record.input.samples()).sqrt();
+            has_noise |= std > 0.0;
+            let count = record.input.samples().len();
+            let noise: Vec<f64> = (0..count).map(|_| std * random.normal()).collect();
+            found.added.push(with_noise(record, &noise, 1.0));
+            found.taken_off.push(with_noise(record, &noise, -1.0));
+        }
+        has_noise.then_some(found)
+    }
+
+    /// Whether a model explains more than another one does beyond what it takes out of the noise on the applied quantity.
+    pub fn bear_out(&self, before: &ScoredModel, after: &ScoredModel) -> bool {
+        let [Some(noisy_before), Some(noisy_after)] = [before, after].map(|m| self.left_by(m))
+        else {
+            return true;
+        };
+        let gain = after.against(before).gain();
+        let of_noise = (noisy_before - noisy_after) - gain;
+        of_noise <= MOSTLY * gain
+    }
+
+    /// Mean sum of squares that a model leaves of both; `None` if the motion diverges.
+    fn left_by(&self, model: &ScoredModel) -> Option<f64> {
+        let sum = |records: &[StandRecord]| -> Option<f64> {
+            let records = match self.are_fitted {
+                true => model.fitted.with_initial_states(records),
+                false => records.to_vec(),
+            };
+            let left = records.iter().map(|r| model.fitted.residual(r));
+            left.map(|r| r.map(|r| dot(&r.samples, &r.samples))).sum()
+        };
+        Some(0.5 * (sum(&self.added)? + sum(&self.taken_off)?))
+    }
+}
+
+fn with_noise(record: &StandRecord, noise: &[f64], sign: f64) -> StandRecord {
+    let input = &record.input;
+    let samples = input.samples().iter().zip(noise);
+    let samples = samples.map(|(u, e)| u + sign * e).collect();
+    let noisier = Excitation::new(samples, input.rate_hz(), input.start_s(), input.substeps());
+    StandRecord {
+        input: Arc::new(noisier.with_between(input.between())),
+        ..record.clone()
+    }
+}
