@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::case::Answer;
+use crate::conditions;
 use crate::torque::Torque;
 
 /// One case on one line.
@@ -63,6 +64,8 @@ pub fn markdown(answers: &[Answer], failures: bool) -> String {
     marks(&mut text, answers);
     by_effect(&mut text, answers);
     confusion(&mut text, answers);
+    conditions::table(&mut text, answers);
+    conditions::wrong(&mut text, answers);
     if failures {
         text.push_str("\n## What went wrong\n\n");
         for answer in answers.iter().filter(|answer| !answer.is_right()) {
@@ -86,7 +89,11 @@ fn listed(answers: &[Answer]) -> impl Iterator<Item = &Answer> {
         .filter(|answer| answer.case.effects() == [answer.case.effect()])
 }
 
-fn count<'a>(answers: impl Iterator<Item = &'a Answer>, hit: impl Fn(&Answer) -> bool) -> String {
+/// How many are hit, of how many.
+pub fn count<'a>(
+    answers: impl Iterator<Item = &'a Answer>,
+    hit: impl Fn(&Answer) -> bool,
+) -> String {
     let (mut hits, mut all) = (0, 0);
     for answer in answers {
         all += 1;
@@ -136,6 +143,11 @@ fn marks(text: &mut String, answers: &[Answer]) {
             count(of(name), |a| a.verdict() == "explained" && !a.is_right())
         );
     }
+    let _ = writeln!(
+        text,
+        "| unlisted beside listed: any verdict but `explained` | most | {} |",
+        count(of("mixed"), right)
+    );
     let _ = writeln!(
         text,
         "| none: `nothing-missing` | 95 % | {} |",
