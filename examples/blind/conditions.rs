@@ -9,8 +9,11 @@ use crate::report::count;
 /// Samples of a record that does not say how many.
 const SAMPLES: f64 = 32_000.0;
 
+/// The row that a case belongs to.
+type Row = fn(&Case) -> String;
+
 /// What the table has a row for each of.
-const CONDITIONS: [(&str, fn(&Case) -> String); 6] = [
+const CONDITIONS: [(&str, Row); 6] = [
     ("natural frequency", natural),
     ("damping ratio", damping),
     ("input", input),
