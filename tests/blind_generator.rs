@@ -9,6 +9,7 @@ use crate::blind::excitation::{Excitation, Input, Line, RATE_HZ};
 use crate::blind::integrate::run;
 use crate::blind::plain_fit::{PlainConstants, answer, rms};
 use crate::blind::plant::{Built, Constants, Plain, Scene};
+use crate::blind::span::Span;
 use crate::blind::{catalogue, friction, linear, record, several, sizing};
 
 fn sines(lines: &[(f64, f64, f64)]) -> Excitation {
@@ -34,6 +35,8 @@ fn scene() -> Scene {
         speed_rms: 0.1,
         applied_rms: 2.0,
         top_hz: 1500.0,
+        span: Span::THESIS,
+        filtered: false,
     }
 }
 

@@ -10,6 +10,7 @@ mod batch;
 #[allow(dead_code)] // the example writes and scores what the tests only look into
 mod blind;
 mod blind_generator;
+mod blind_wide;
 mod clean;
 mod compensate;
 mod detection;

@@ -1,7 +1,7 @@
 //! Makes blind records and scores `torqcomp diagnose` on them.
 //!
 //! ```text
-//! cargo run --release --example blind -- make DIR [--per-effect 20] [--seed 1] [--only EFFECT]
+//! cargo run --release --example blind -- make DIR [--wide] [--per-effect 20] [--seed 1] [--only EFFECT]
 //! cargo run --release --example blind -- score DIR --binary PATH [--out docs/blind-records.md]
 //! cargo run --release --example blind -- recover DIR --binary PATH
 //! ```
@@ -9,6 +9,7 @@
 #[path = "../../tests/blind/mod.rs"]
 mod blind;
 mod case;
+mod conditions;
 mod make;
 mod parallel;
 mod recover;

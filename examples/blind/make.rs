@@ -3,6 +3,7 @@
 use std::io;
 use std::path::PathBuf;
 
+use crate::blind::setting::Asked;
 use crate::blind::{catalogue, record, several, write};
 use crate::parallel::each;
 
@@ -20,20 +21,47 @@ pub struct Make {
     /// Another seed gives other records.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Only these effects; "two" and "three" are records with so many of them at once.
+    /// Only these effects; "two" and "three" are records with so many of them at once, "mixed" one with an effect that
+    /// is not listed beside one that is.
     #[arg(long)]
     only: Vec<String>,
+    /// Stands from 0.5 Hz to 5 kHz, hardly to strongly damped, with inputs and recorders of several kinds, instead of the
+    /// stand of the thesis.
+    #[arg(long)]
+    wide: bool,
+    /// Least and largest strength, as in 0.3..25.
+    #[arg(long, value_parser = range)]
+    strength: Option<(f64, f64)>,
     /// Threads.
     #[arg(long, default_value_t = 2)]
     threads: usize,
 }
 
+/// Two positive numbers, the second no smaller.
+fn range(text: &str) -> Result<(f64, f64), String> {
+    let wrong = || format!("`{text}` is not a range of two positive numbers such as 0.3..25");
+    let (least, most) = text.split_once("..").ok_or_else(wrong)?;
+    match (least.parse::<f64>(), most.parse::<f64>()) {
+        (Ok(least), Ok(most)) if 0.0 < least && least <= most && most.is_finite() => {
+            Ok((least, most))
+        }
+        _ => Err(wrong()),
+    }
+}
+
 /// Makes the records, number by number, so that a set that is cut short still has every effect in it.
 pub fn make(arguments: &Make) -> io::Result<()> {
+    let asked = (arguments.wide || arguments.strength.is_some()).then_some(Asked {
+        wide: arguments.wide,
+        strength: arguments.strength,
+    });
+    // Only where asked for with the stand of the thesis.
+    let with_mixed = arguments.wide || arguments.only.iter().any(|only| only == several::MIXED);
     let several = several::SEVERAL.iter().map(|(name, _)| *name);
     let wanted: Vec<&str> = catalogue::effects()
         .into_iter()
         .chain(several)
+        .chain(with_mixed.then_some(several::MIXED))
         .filter(|name| arguments.only.is_empty() || arguments.only.iter().any(|only| only == name))
         .collect();
     let numbers = arguments.first..arguments.first + arguments.per_effect;
@@ -41,8 +69,11 @@ pub fn make(arguments: &Make) -> io::Result<()> {
         .flat_map(|number| wanted.iter().map(move |name| (*name, number)))
         .collect();
     let done = each(&cases, arguments.threads, |(effect, number)| {
-        let case = record::make(arguments.seed, effect, *number)
-            .ok_or_else(|| io::Error::other(format!("no effect is called {effect}")))?;
+        let case = match &asked {
+            Some(asked) => record::make_as(asked, arguments.seed, effect, *number),
+            None => record::make(arguments.seed, effect, *number),
+        };
+        let case = case.ok_or_else(|| io::Error::other(format!("no effect is called {effect}")))?;
         let folder = arguments.folder.join(effect).join(format!("{number:03}"));
         write::write(&case, &folder)?;
         let number_of = |section: &str, key: &str| case.truth[section][key].as_f64();

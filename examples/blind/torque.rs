@@ -5,7 +5,6 @@ use std::f64::consts::PI;
 use std::path::Path;
 use std::process::Command;
 
-use crate::blind::excitation::RATE_HZ;
 use crate::case::{Answer, Case};
 
 /// Errors of the recovered torque, rms in N m.
@@ -51,7 +50,10 @@ fn floor(case: &Case) -> f64 {
             edge * edge * ((1.0 - r * r).powi(2) + (2.0 * ratio * r).powi(2))
         })
         .sum();
-    case.floor() * (sum * 1.2 / f64::from(steps) * band_hz / (RATE_HZ / 2.0)).sqrt()
+    let rate_hz = case.truth["records"]["rate_hz"]
+        .as_f64()
+        .unwrap_or(f64::NAN);
+    case.floor() * (sum * 1.2 / f64::from(steps) * band_hz / (rate_hz / 2.0)).sqrt()
 }
 
 fn recovered(case: &Case, binary: &Path, stand: &Path) -> Result<f64, String> {

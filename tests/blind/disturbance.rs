@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::draw::Draw;
-use super::excitation::{LENGTH_S, RATE_HZ};
+use super::excitation::RATE_HZ;
 use super::plant::{Built, Place, Scene};
 
 /// A sum of sines with phases drawn for each record.
@@ -40,7 +40,21 @@ pub fn mains_harmonics(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
 }
 
 fn hum(scene: &Scene, size: f64, shares: [f64; 3], draw: &mut Draw) -> Built {
-    let base_hz = draw.one_of(&[50.0, 60.0]) + draw.between(-0.02, 0.02);
+    let written_hz = draw.one_of(&[50.0, 60.0]) + draw.between(-0.02, 0.02);
+    let base_hz = written_hz * scene.span.slower;
+    // What lies above half the sampling rate does not reach a recorder.
+    let reach = |order: f64, share: f64| {
+        if order * base_hz < 0.45 * RATE_HZ {
+            share
+        } else {
+            0.0
+        }
+    };
+    let shares = [
+        reach(2.0, shares[0]),
+        reach(3.0, shares[1]),
+        reach(5.0, shares[2]),
+    ];
     let amplitude = size * scene.shown_rms;
     let parts = vec![
         (base_hz, amplitude),
@@ -73,14 +87,19 @@ pub fn rotor_twice(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
 }
 
 fn rotor_with(scene: &Scene, size: f64, second: f64, draw: &mut Draw) -> Built {
+    let span = &scene.span;
+    let apart_hz = (1.2 / (span.length_s() * span.slower)).max(0.8);
     // Away from the mains, its half and its harmonics, which would make both names right.
     let near = |f: f64| {
         [25.0, 30.0, 50.0, 60.0, 100.0, 120.0]
             .iter()
-            .any(|mains| (f - mains).abs() < 0.8)
+            .any(|mains| (f / span.slower - mains).abs() < apart_hz)
     };
+    // Four turns a record at least.
+    let low_hz = (10.0 * span.faster).max(4.0 / span.length_s());
+    let high_hz = (58.0 * span.faster).max(3.0 * low_hz);
     let frequency_hz = loop {
-        let frequency_hz = draw.between(10.0, 58.0);
+        let frequency_hz = draw.between(low_hz, high_hz);
         if !near(frequency_hz) {
             break frequency_hz;
         }
@@ -128,14 +147,14 @@ fn course(
 
 /// Zero that runs away evenly; the zero at the start of a record is part of it.
 pub fn drift_linear(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
-    let rate = size * scene.shown_rms * draw.sign() / LENGTH_S;
+    let rate = size * scene.shown_rms * draw.sign() / scene.span.length_s();
     course(scene, move |t| rate * t, &[("n_m_per_s", rate)])
 }
 
 /// Zero that approaches another value.
 pub fn drift_exponential(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     let range = size * scene.shown_rms * draw.sign();
-    let time_s = draw.log_between(0.2, 3.0);
+    let time_s = draw.log_between(0.2, 3.0) * scene.span.longer();
     course(
         scene,
         move |t| range * (1.0 - (-t / time_s).exp()),
@@ -146,11 +165,12 @@ pub fn drift_exponential(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
 /// Zero that wanders: steps at random through two low-passes of 0.25 s, another course in each record.
 pub fn drift_random(scene: &Scene, size: f64, _: &mut Draw) -> Built {
     let range = size * scene.shown_rms;
+    let (longer, length_s) = (scene.span.longer(), scene.span.length_s());
     let change = move |place: &mut Place, samples: &mut [f64]| {
-        let keep = (-1.0 / (0.25 * RATE_HZ)).exp();
+        let keep = (-1.0 / (0.25 * longer * RATE_HZ)).exp();
         let (mut walk, mut first, mut second) = (0.0, 0.0, 0.0);
         for sample in samples {
-            walk += place.draw.normal() / (LENGTH_S * RATE_HZ).sqrt();
+            walk += place.draw.normal() / (length_s * RATE_HZ).sqrt();
             first = keep * first + (1.0 - keep) * walk;
             second = keep * second + (1.0 - keep) * first;
             *sample += range * 2.0 * second;

@@ -1,4 +1,4 @@
-//! The applied torque as a function of continuous time: sums of sines and sweeps.
+//! The applied torque as a function of continuous time: sums of sines and sweeps, and those of [kinds](super::kinds).
 //!
 //! Both are known in closed form with two derivatives. They are put on a grid eight times finer than
 //! the samples; between its points a polynomial of fifth degree takes values and both derivatives from
@@ -6,7 +6,10 @@
 
 use std::f64::consts::TAU;
 
+use super::anti_alias::AntiAlias;
 use super::draw::Draw;
+use super::kinds::{Hits, Random, Steps};
+use super::span::Span;
 
 /// Samples per second of a record.
 pub const RATE_HZ: f64 = 20_000.0;
@@ -16,8 +19,6 @@ pub const SAMPLES: usize = 32_000;
 pub const LENGTH_S: f64 = SAMPLES as f64 / RATE_HZ;
 /// Points of the grid per sample.
 pub const FINER: usize = 8;
-/// The stand has settled to 1e-11 after this time.
-const SETTLING_S: f64 = 0.12;
 /// A multisine goes on for this time after the record and fades over the second half of it.
 const AFTER_S: f64 = 0.25;
 
@@ -47,6 +48,12 @@ pub enum Excitation {
         logarithmic: bool,
         fade_s: f64,
     },
+    /// Noise of a band.
+    Random(Random),
+    /// Plateaus.
+    Steps(Steps),
+    /// Single pulses.
+    Hits(Hits),
 }
 
 impl Excitation {
@@ -102,6 +109,9 @@ impl Excitation {
                 lines.iter_mut().for_each(|line| line.amplitude *= level);
             }
             Self::Sweep { amplitude, .. } => *amplitude *= level,
+            Self::Random(random) => random.rms *= level,
+            Self::Steps(steps) => steps.scale(level),
+            Self::Hits(hits) => hits.scale(level),
         }
         other
     }
@@ -111,20 +121,49 @@ impl Excitation {
         match self {
             Self::Multisine { lines, .. } => lines.last().map_or(0.0, |line| line.frequency_hz),
             Self::Sweep { from_hz, to_hz, .. } => from_hz.max(*to_hz),
+            Self::Random(random) => random.top_hz,
+            Self::Steps(steps) => steps.top_hz,
+            Self::Hits(hits) => hits.top_hz,
         }
     }
 
-    /// What it is, for people.
-    pub fn describe(&self) -> String {
+    /// Its kind in a word.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Multisine { .. } => "multisine",
+            Self::Sweep { .. } => "sweep",
+            Self::Random(_) => "random",
+            Self::Steps(_) => "steps",
+            Self::Hits(_) => "hits",
+        }
+    }
+
+    /// Whether the stand has settled before the record begins.
+    fn is_settled(&self) -> bool {
+        match self {
+            Self::Multisine { settled, .. } => *settled,
+            Self::Random(random) => random.settled,
+            Self::Steps(steps) => steps.settled,
+            Self::Sweep { .. } | Self::Hits(_) => false,
+        }
+    }
+
+    /// What it is, for people; frequencies and times as they are written.
+    pub fn describe(&self, span: &Span) -> String {
+        // A stand of half a hertz needs more digits.
+        let hz = |frequency_hz: f64| match span.slower == 1.0 {
+            true => format!("{frequency_hz:.0}"),
+            false => format!("{:.3}", span.written_hz(frequency_hz)),
+        };
         match self {
             Self::Multisine {
                 lines,
                 second_half,
                 settled,
             } => format!(
-                "multisine, {} lines to {:.0} Hz, rms {:.3} N m, second half times {second_half}, {}",
+                "multisine, {} lines to {} Hz, rms {:.3} N m, second half times {second_half}, {}",
                 lines.len(),
-                self.top_hz(),
+                hz(self.top_hz()),
                 (lines.iter().map(|line| line.amplitude.powi(2)).sum::<f64>() / 2.0).sqrt(),
                 if *settled { "settled" } else { "from rest" }
             ),
@@ -135,59 +174,88 @@ impl Excitation {
                 logarithmic,
                 fade_s,
             } => format!(
-                "{} sweep {from_hz:.0} to {to_hz:.0} Hz, amplitude {amplitude:.3} N m, fade {fade_s} s",
+                "{} sweep {} to {} Hz, amplitude {amplitude:.3} N m, fade {} s",
                 if *logarithmic {
                     "logarithmic"
                 } else {
                     "linear"
+                },
+                hz(*from_hz),
+                hz(*to_hz),
+                fade_s * span.slower
+            ),
+            Self::Random(random) => format!(
+                "random to {} Hz, rms {:.3} N m, {}",
+                hz(random.top_hz),
+                random.rms,
+                if random.settled {
+                    "settled"
+                } else {
+                    "from rest"
                 }
             ),
+            Self::Steps(steps) => steps.describe(),
+            Self::Hits(hits) => hits.describe(),
         }
     }
 
-    /// The torque on the fine grid.
+    /// The torque on the fine grid over a record of the thesis' stand.
     pub fn input(&self) -> Input {
-        let settled = matches!(self, Self::Multisine { settled: true, .. });
-        let before = if settled {
-            (SETTLING_S * RATE_HZ) as usize * FINER
+        self.input_over(&Span::THESIS)
+    }
+
+    /// The torque on the fine grid.
+    pub fn input_over(&self, span: &Span) -> Input {
+        let length_s = span.length_s();
+        let before = if self.is_settled() {
+            (span.settling_s * RATE_HZ) as usize * FINER
         } else {
             0
         };
-        let multisine = matches!(self, Self::Multisine { .. });
-        let after_s = if multisine { AFTER_S } else { 0.0 };
-        let points = before + (SAMPLES + (after_s * RATE_HZ) as usize + 8) * FINER;
+        let goes_on = matches!(self, Self::Multisine { .. } | Self::Random(_));
+        let after_s = if goes_on { AFTER_S } else { 0.0 };
+        let points = before + (span.samples + (after_s * RATE_HZ) as usize + 8) * FINER;
         let mut input = Input {
             before,
+            samples: span.samples,
             step_s: 1.0 / (RATE_HZ * FINER as f64),
             nodes: vec![[0.0; 3]; points],
+            ends: None,
         };
         match self {
             Self::Multisine {
                 lines, second_half, ..
             } => {
                 lines.iter().for_each(|line| line.add_to(&mut input));
-                input.shape(|time_s| step(1.0, *second_half, time_s - LENGTH_S / 2.0, 0.01));
-                let fade_s = AFTER_S / 4.0;
-                input.shape(|time_s| step(1.0, 0.0, time_s - LENGTH_S - 3.0 * fade_s, fade_s));
-                if settled {
-                    let start_s = input.time_s(0);
-                    input.shape(|time_s| step(0.0, 1.0, time_s - start_s - 0.01, 0.01));
-                }
+                input.shape(|time_s| step(1.0, *second_half, time_s - length_s / 2.0, 0.01));
+                input.fade_around(length_s, self.is_settled());
+            }
+            Self::Random(random) => {
+                input.nodes = random.nodes(points, input.step_s);
+                input.fade_around(length_s, random.settled);
+            }
+            Self::Steps(steps) => {
+                input.nodes = steps.nodes(points);
+                input.ends = Some(input.nodes.clone());
+            }
+            Self::Hits(hits) => {
+                let (nodes, ends) = hits.nodes(points, input.step_s);
+                (input.nodes, input.ends) = (nodes, Some(ends));
             }
             Self::Sweep { fade_s, .. } => {
                 for index in 0..points {
-                    input.nodes[index] = self.sweep_at(input.time_s(index));
+                    input.nodes[index] = self.sweep_at(input.time_s(index), length_s);
                 }
                 input.shape(|time_s| step(0.0, 1.0, time_s - fade_s / 2.0, fade_s / 2.0));
                 input
-                    .shape(|time_s| step(1.0, 0.0, time_s - LENGTH_S + fade_s / 2.0, fade_s / 2.0));
+                    .shape(|time_s| step(1.0, 0.0, time_s - length_s + fade_s / 2.0, fade_s / 2.0));
             }
         }
         input
     }
 
     /// A sweep's value and two derivatives, without its fades.
-    fn sweep_at(&self, time_s: f64) -> [f64; 3] {
+    fn sweep_at(&self, time_s: f64, length_s: f64) -> [f64; 3] {
         let Self::Sweep {
             amplitude,
             from_hz,
@@ -199,7 +267,7 @@ impl Excitation {
             return [0.0; 3];
         };
         let (phase, rate, change) = if *logarithmic {
-            let scale_s = LENGTH_S / (to_hz / from_hz).ln();
+            let scale_s = length_s / (to_hz / from_hz).ln();
             let rate = TAU * from_hz * (time_s / scale_s).exp();
             (
                 TAU * from_hz * scale_s * ((time_s / scale_s).exp() - 1.0),
@@ -207,7 +275,7 @@ impl Excitation {
                 rate / scale_s,
             )
         } else {
-            let change = TAU * (to_hz - from_hz) / LENGTH_S;
+            let change = TAU * (to_hz - from_hz) / length_s;
             (
                 TAU * from_hz * time_s + change * time_s * time_s / 2.0,
                 TAU * from_hz + change * time_s,
@@ -263,9 +331,14 @@ impl Line {
 pub struct Input {
     /// Nodes before the record begins.
     pub before: usize,
+    /// Samples of the record.
+    pub samples: usize,
     /// Time between nodes.
     pub step_s: f64,
     nodes: Vec<[f64; 3]>,
+    /// Where values or derivatives jump: what each piece from a node to the next ends with. `None` if nothing jumps: then
+    /// each piece ends with what the next node has.
+    ends: Option<Vec<[f64; 3]>>,
 }
 
 impl Input {
@@ -274,9 +347,27 @@ impl Input {
         (node as f64 - self.before as f64) * self.step_s
     }
 
+    /// What the piece that begins at a node ends with.
+    fn end(&self, node: usize) -> [f64; 3] {
+        match &self.ends {
+            Some(ends) => ends[node],
+            None => self.nodes[node + 1],
+        }
+    }
+
+    /// The same with what a filter makes of it.
+    pub fn filtered(&self, filter: &AntiAlias) -> Self {
+        let (nodes, ends) = filter.nodes(self, self.nodes.len() - 1);
+        Self {
+            nodes,
+            ends: self.ends.as_ref().map(|_| ends),
+            ..*self
+        }
+    }
+
     /// The torque at a part (0 to 1) of the way from a node to the next.
     pub fn between(&self, node: usize, part: f64) -> f64 {
-        let ([p0, v0, a0], [p1, v1, a1]) = (self.nodes[node], self.nodes[node + 1]);
+        let ([p0, v0, a0], [p1, v1, a1]) = (self.nodes[node], self.end(node));
         let h = self.step_s;
         let (d0, d1, c0, c1) = (h * v0, h * v1, h * h * a0 / 2.0, h * h * a1 / 2.0);
         // Coefficients of the polynomial of fifth degree through both ends.
@@ -289,7 +380,7 @@ impl Input {
 
     /// The torque at a node, halfway to the next, and there.
     pub fn around(&self, node: usize) -> [f64; 3] {
-        let ([p0, v0, a0], [p1, v1, a1]) = (self.nodes[node], self.nodes[node + 1]);
+        let ([p0, v0, a0], [p1, v1, a1]) = (self.nodes[node], self.end(node));
         let h = self.step_s;
         let middle = (p0 + p1) / 2.0 + h * (5.0 * (v0 - v1) + h / 2.0 * (a0 + a1)) / 32.0;
         [p0, middle, p1]
@@ -315,9 +406,19 @@ impl Input {
     }
 
     fn at_samples(&self, derivative: usize) -> Vec<f64> {
-        (0..SAMPLES)
+        (0..self.samples)
             .map(|sample| self.nodes[self.before + sample * FINER][derivative])
             .collect()
+    }
+
+    /// Lets it end after the record and, before a record of a stand that has settled, begin, within some time.
+    fn fade_around(&mut self, length_s: f64, settled: bool) {
+        let fade_s = AFTER_S / 4.0;
+        self.shape(|time_s| step(1.0, 0.0, time_s - length_s - 3.0 * fade_s, fade_s));
+        if settled {
+            let start_s = self.time_s(0);
+            self.shape(|time_s| step(0.0, 1.0, time_s - start_s - 0.01, 0.01));
+        }
     }
 
     /// Multiplies by an envelope given with two derivatives.

@@ -1,7 +1,7 @@
 //! Integration in time: the classical Runge-Kutta method of fourth order at 32 steps a sample, with
 //! switches located inside a step.
 
-use super::excitation::{FINER, Input, SAMPLES};
+use super::excitation::{FINER, Input};
 
 /// Most states that a system may have.
 pub const STATES: usize = 28;
@@ -48,6 +48,8 @@ pub trait Dynamics {
 pub struct Dense {
     /// Points before the record begins.
     pub before: usize,
+    /// Samples of the record.
+    pub samples: usize,
     /// Time between points.
     pub step_s: f64,
     pub values: Vec<f64>,
@@ -56,7 +58,7 @@ pub struct Dense {
 impl Dense {
     /// The signal at the samples, `later_s` after their times.
     pub fn samples(&self) -> Vec<f64> {
-        (0..SAMPLES)
+        (0..self.samples)
             .map(|sample| self.values[self.before + sample * DENSE])
             .collect()
     }
@@ -81,7 +83,7 @@ impl Dense {
 
 /// Integrates from rest over the whole input.
 pub fn run(system: &dyn Dynamics, input: &Input) -> Dense {
-    let nodes = input.before + SAMPLES * FINER + 4 * FINER;
+    let nodes = input.before + input.samples * FINER + 4 * FINER;
     let mut values = Vec::with_capacity(nodes * STEPS);
     let mut walk = Walk {
         system,
@@ -100,6 +102,7 @@ pub fn run(system: &dyn Dynamics, input: &Input) -> Dense {
     }
     Dense {
         before: input.before * STEPS,
+        samples: input.samples,
         step_s: input.step_s / STEPS as f64,
         values,
     }

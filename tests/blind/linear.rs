@@ -6,7 +6,7 @@ use num_complex::Complex64;
 
 use super::draw::Draw;
 use super::excitation::{RATE_HZ, SAMPLES};
-use super::integrate::{Dense, Dynamics, State};
+use super::integrate::{DENSE, Dense, Dynamics, State};
 use super::plant::{Built, Constants, Place, Plain, Scene};
 
 /// A second inertia on a spring and damper; torque acts on the first, which the gage sees.
@@ -45,7 +45,7 @@ impl Dynamics for Coupled {
 fn second_frequency_hz(scene: &Scene, draw: &mut Draw) -> f64 {
     let first = scene.constants.omega() / TAU;
     loop {
-        let frequency_hz = draw.log_between(150.0, 0.9 * scene.top_hz);
+        let frequency_hz = draw.log_between(150.0 * scene.span.faster, 0.9 * scene.top_hz);
         if !(0.8..1.25).contains(&(frequency_hz / first)) {
             return frequency_hz;
         }
@@ -187,7 +187,7 @@ fn complex_stiffness(constants: Constants, loss: f64, place: &Place) -> Vec<f64>
     inverse
         .process(&mut spectrum, &mut padded)
         .expect("lengths agree");
-    padded[before..before + SAMPLES].to_vec()
+    padded[before..before + place.input.samples].to_vec()
 }
 
 /// Springs and dampers in series, log-spaced in time constant, beside the spring: a loss factor that
@@ -303,29 +303,35 @@ fn filtered(scene: &Scene, filter: Filter, corner_hz: f64) -> Built {
     Built::dynamics(system, &[("corner_hz", corner_hz)])
 }
 
+/// The corner of a low-pass of size 1: that of the thesis' stand, lower with a slower stand. With a faster one it stays
+/// where it is, below half the sampling rate.
+fn corner_hz(scene: &Scene) -> f64 {
+    600.0 * scene.span.faster.min(1.0)
+}
+
 /// RC low-pass; size 1 puts its corner at 600 Hz.
 pub fn low_pass_1(scene: &Scene, size: f64, _: &mut Draw) -> Built {
-    filtered(scene, Filter::Low1, 600.0 / size)
+    filtered(scene, Filter::Low1, corner_hz(scene) / size)
 }
 
 /// Two RC low-passes.
 pub fn low_pass_twice(scene: &Scene, size: f64, _: &mut Draw) -> Built {
-    filtered(scene, Filter::Low1Twice, 600.0 / size)
+    filtered(scene, Filter::Low1Twice, corner_hz(scene) / size)
 }
 
 /// Butterworth of second order.
 pub fn low_pass_2(scene: &Scene, size: f64, _: &mut Draw) -> Built {
-    filtered(scene, Filter::Low2, 600.0 / size)
+    filtered(scene, Filter::Low2, corner_hz(scene) / size)
 }
 
 /// AC coupling; size 1 puts its corner at 5 Hz.
 pub fn ac_coupling(scene: &Scene, size: f64, _: &mut Draw) -> Built {
-    filtered(scene, Filter::High1, 5.0 * size)
+    filtered(scene, Filter::High1, 5.0 * size / scene.span.longer())
 }
 
 /// The drive couples into the signal leads: `c dT/dt` is added.
 pub fn feedthrough(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
-    let seconds = size * draw.sign() / (TAU * 1000.0);
+    let seconds = size * draw.sign() / (TAU * 1000.0 * scene.span.faster);
     let change = move |place: &mut Place, samples: &mut [f64]| {
         for (sample, rate) in samples.iter_mut().zip(place.input.rates()) {
             *sample += seconds * rate;
@@ -358,7 +364,7 @@ impl Dynamics for Leak {
 
 /// The drive couples in through capacitance and resistance.
 pub fn feedthrough_rc(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
-    let corner_hz = draw.log_between(1000.0, 8000.0);
+    let corner_hz = draw.log_between(1000.0, 8000.0) * scene.span.faster.min(1.0);
     let leak = Leak {
         inner: Plain(scene.constants),
         omega: TAU * corner_hz,
@@ -371,22 +377,24 @@ pub fn feedthrough_rc(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
 /// Everything comes later; size 1 is one sample.
 pub fn delay(scene: &Scene, size: f64, _: &mut Draw) -> Built {
     let delay_s = size / RATE_HZ;
-    let change = move |dense: Dense| stretched(&dense, move |time_s| time_s - delay_s);
+    let whole = scene.filtered;
+    let change = move |dense: Dense| stretched(&dense, whole, move |time_s| time_s - delay_s);
     Built::dense(scene, change, &[("delay_s", delay_s)])
 }
 
 /// The recorder's two channels have clocks of their own (not listed); size 1 is one sample in all.
 pub fn clock_drift(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
-    let rate = size * draw.sign() / SAMPLES as f64;
-    let change = move |dense: Dense| stretched(&dense, move |time_s| time_s * (1.0 + rate));
+    let rate = size * draw.sign() / scene.span.samples as f64;
+    let whole = scene.filtered;
+    let change = move |dense: Dense| stretched(&dense, whole, move |time_s| time_s * (1.0 + rate));
     Built::dense(scene, change, &[("relative_rate", rate)])
 }
 
-/// The signal read at other times.
-fn stretched(dense: &Dense, time: impl Fn(f64) -> f64) -> Dense {
+/// The signal read at other times; between the samples only where a filter follows.
+fn stretched(dense: &Dense, whole: bool, time: impl Fn(f64) -> f64) -> Dense {
     let values = (0..dense.values.len())
         .map(|point| {
-            if point % super::integrate::DENSE != dense.before % super::integrate::DENSE {
+            if !whole && point % DENSE != dense.before % DENSE {
                 return 0.0; // only the samples are read
             }
             dense.at(time((point as f64 - dense.before as f64) * dense.step_s))

@@ -7,6 +7,7 @@
 //! ([excitation](excitation)), the equations of motion are integrated at 32 steps a sample with every
 //! switch located ([integrate](integrate)).
 
+pub mod anti_alias;
 pub mod catalogue;
 pub mod chain;
 pub mod declared;
@@ -15,6 +16,7 @@ pub mod draw;
 pub mod excitation;
 pub mod friction;
 pub mod integrate;
+pub mod kinds;
 pub mod linear;
 pub mod plain_fit;
 pub mod plant;
@@ -23,6 +25,8 @@ pub mod restoring;
 pub mod setting;
 pub mod several;
 pub mod sizing;
+pub mod span;
 pub mod truth;
 pub mod unlisted;
+pub mod wide;
 pub mod write;

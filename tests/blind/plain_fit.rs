@@ -1,7 +1,7 @@
 //! The best plain fit: natural frequency, damping ratio, offset and initial state of
 //! `ÿ + 2ζω ẏ + ω² y = ω² T`, by Gauss and Newton, on a noise-free signal.
 
-use super::excitation::{FINER, Input, RATE_HZ, SAMPLES};
+use super::excitation::{FINER, Input, RATE_HZ};
 
 /// Constants of the plain stand.
 #[derive(Debug, Clone, Copy)]
@@ -19,8 +19,8 @@ pub fn answer(constants: PlainConstants, input: &Input) -> Vec<f64> {
     let rate = |y: f64, v: f64, u: f64| square * (u - y) - loss * v;
     let h = input.step_s;
     let (mut y, mut v) = (0.0, 0.0);
-    let mut samples = Vec::with_capacity(SAMPLES);
-    for node in 0..input.before + SAMPLES * FINER {
+    let mut samples = Vec::with_capacity(input.samples);
+    for node in 0..input.before + input.samples * FINER {
         if node >= input.before && (node - input.before).is_multiple_of(FINER) {
             samples.push(y);
         }
@@ -49,7 +49,7 @@ pub fn rms(values: &[f64]) -> f64 {
 /// What is left of a signal after offset and free decay are taken off: the columns are orthogonal
 /// enough for the normal equations.
 fn without_nuisance(constants: PlainConstants, residual: &[f64], more: &[Vec<f64>]) -> Fit {
-    let columns = nuisance(constants)
+    let columns = nuisance(constants, residual.len())
         .into_iter()
         .chain(more.iter().cloned())
         .collect::<Vec<_>>();
@@ -81,11 +81,11 @@ struct Fit {
     rms: f64,
 }
 
-fn nuisance(constants: PlainConstants) -> Vec<Vec<f64>> {
+fn nuisance(constants: PlainConstants, samples: usize) -> Vec<Vec<f64>> {
     let decay = constants.omega * constants.damping_ratio;
     let swing = constants.omega * (1.0 - constants.damping_ratio.powi(2)).max(1e-9).sqrt();
     let column = |value: &dyn Fn(f64) -> f64| {
-        (0..SAMPLES)
+        (0..samples)
             .map(|i| value(i as f64 / RATE_HZ))
             .collect::<Vec<f64>>()
     };

@@ -3,6 +3,7 @@
 use super::draw::Draw;
 use super::excitation::Input;
 use super::integrate::{Dense, Dynamics, State};
+use super::span::Span;
 
 /// Constants of a stand in SI units.
 #[derive(Debug, Clone, Copy)]
@@ -29,6 +30,15 @@ impl Constants {
     pub fn acceleration(&self, torque: f64, state: &State) -> f64 {
         (torque - self.damping_n_m_s * state[1] - self.stiffness_n_m * state[0])
             / self.inertia_kg_m2
+    }
+
+    /// The same in seconds as they are written.
+    pub fn written(&self, span: &Span) -> Self {
+        Self {
+            inertia_kg_m2: self.inertia_kg_m2 * span.slower * span.slower,
+            damping_n_m_s: self.damping_n_m_s * span.slower,
+            ..*self
+        }
     }
 
     /// Undamped angular frequency in rad/s.
@@ -95,6 +105,9 @@ pub struct Scene {
     pub applied_rms: f64,
     /// Highest frequency applied.
     pub top_hz: f64,
+    pub span: Span,
+    /// Whether a filter follows, which reads the signal between the samples, too.
+    pub filtered: bool,
 }
 
 impl Scene {

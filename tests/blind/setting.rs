@@ -1,8 +1,11 @@
 //! What a case is drawn from: constants, excitations, noise, strength.
 
+use super::anti_alias::AntiAlias;
 use super::draw::Draw;
 use super::excitation::{Excitation, Input};
+use super::plain_fit::rms;
 use super::plant::Constants;
+use super::span::Span;
 
 /// What a case is drawn from.
 pub struct Setting {
@@ -11,6 +14,53 @@ pub struct Setting {
     pub inputs: [Input; 2],
     pub noise: Noise,
     pub target: f64,
+    pub span: Span,
+    /// What the stand file says, if not the constants of the thesis.
+    pub declared: Option<Constants>,
+    /// The low-pass in front of the recorder, and what it makes of the inputs.
+    pub filter: Option<AntiAlias>,
+    pub filtered: Option<[Input; 2]>,
+    pub applied_noise: Option<AppliedNoise>,
+}
+
+impl Setting {
+    /// The applied torque as the recorder sees it, without noise.
+    pub fn recorded(&self, record: usize) -> &Input {
+        self.filtered
+            .as_ref()
+            .map_or(&self.inputs[record], |filtered| &filtered[record])
+    }
+
+    /// Noise of an rms on the measured torque, together with what the stand makes of that on the applied one.
+    pub fn whole_noise(&self, record: usize, measured_rms_n_m: f64) -> f64 {
+        self.applied_noise
+            .as_ref()
+            .map_or(measured_rms_n_m, |noise| {
+                measured_rms_n_m.hypot(noise.through_n_m[record])
+            })
+    }
+
+    /// The residual of a plain fit to a noise-free training record, over the noise.
+    pub fn strength(&self, left_n_m: f64, signal: &[f64]) -> f64 {
+        left_n_m / self.whole_noise(0, self.noise.share * rms(signal))
+    }
+}
+
+/// What is asked for besides effect and number.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Asked {
+    /// Stands, inputs and recorders of every kind instead of those of the thesis.
+    pub wide: bool,
+    /// Least and largest strength.
+    pub strength: Option<(f64, f64)>,
+}
+
+/// White noise on the recorded applied torque.
+pub struct AppliedNoise {
+    pub share_of_rms: f64,
+    pub samples: [Vec<f64>; 2],
+    /// Root mean square of what the true plain stand makes of it.
+    pub through_n_m: [f64; 2],
 }
 
 /// The noise of the recorder.
@@ -64,7 +114,7 @@ fn excitations(draw: &mut Draw, alike: bool) -> [Excitation; 2] {
 }
 
 /// Strengths from marginal to plain to see: the plain fit's noise-free residual over the noise.
-fn target(draw: &mut Draw, number: usize) -> f64 {
+pub fn target(draw: &mut Draw, number: usize) -> f64 {
     match number % 4 {
         0 => draw.log_between(0.3, 1.0),
         3 => draw.log_between(5.0, 25.0),
@@ -72,24 +122,11 @@ fn target(draw: &mut Draw, number: usize) -> f64 {
     }
 }
 
-/// Draws the setting of a case.
+/// Draws the setting of a case with the stand of the thesis.
 pub fn setting(seed: u64, number: usize, alike: bool) -> Setting {
     let mut draw = Draw::new(seed, "setting");
     let constants = constants(&mut draw);
-    let noise = Noise {
-        share: draw.log_between(0.001, 0.01),
-        absolute: draw.chance(0.7),
-        memory: if draw.chance(0.1) {
-            draw.between(0.2, 0.5)
-        } else {
-            0.0
-        },
-        quantum: if draw.chance(0.1) {
-            draw.between(0.3, 1.5)
-        } else {
-            0.0
-        },
-    };
+    let noise = Noise::drawn(&mut draw);
     let target = target(&mut draw, number);
     let excitations = excitations(&mut draw, alike);
     let inputs = [excitations[0].input(), excitations[1].input()];
@@ -99,10 +136,33 @@ pub fn setting(seed: u64, number: usize, alike: bool) -> Setting {
         inputs,
         noise,
         target,
+        span: Span::THESIS,
+        declared: None,
+        filter: None,
+        filtered: None,
+        applied_noise: None,
     }
 }
 
 impl Noise {
+    /// Mostly white and fine.
+    pub fn drawn(draw: &mut Draw) -> Self {
+        Self {
+            share: draw.log_between(0.001, 0.01),
+            absolute: draw.chance(0.7),
+            memory: if draw.chance(0.1) {
+                draw.between(0.2, 0.5)
+            } else {
+                0.0
+            },
+            quantum: if draw.chance(0.1) {
+                draw.between(0.3, 1.5)
+            } else {
+                0.0
+            },
+        }
+    }
+
     /// Adds noise of an rms and the steps of the recorder; the rms of both together.
     pub fn add(&self, samples: &mut [f64], rms_n_m: f64, draw: &mut Draw) -> f64 {
         let fresh = (1.0 - self.memory * self.memory).sqrt();

@@ -3,13 +3,16 @@
 use super::catalogue::{CATALOGUE, Variant};
 use super::draw::Draw;
 use super::integrate::{Dense, Dynamics, STATES, State};
-use super::plain_fit::{PlainConstants, fit, rms};
+use super::plain_fit::{PlainConstants, fit};
 use super::plant::{Built, Constants, OnDense, Scene};
 use super::setting::Setting;
-use super::sizing::{Fitted, noise_free, sized};
+use super::sizing::{Fitted, in_setting, sized};
 
 /// How many effects the records of a name have.
 pub const SEVERAL: [(&str, usize); 2] = [("two", 2), ("three", 3)];
+
+/// Records with an effect that no list has beside one that is listed.
+pub const MIXED: &str = "mixed";
 
 /// Definitions that act together, in the order of the chain from motion to record. Left out: those that switch the
 /// motion off (sticking) or replace the whole signal (a complex stiffness).
@@ -49,6 +52,9 @@ const COMPARABLE: [f64; 2] = [0.6, 1.7];
 
 /// Definitions of different effects, drawn; in the order of the chain.
 pub fn drawn(effect: &str, seed: u64) -> Option<Vec<&'static Variant>> {
+    if effect == MIXED {
+        return Some(mixed(&mut Draw::new(seed, "unlisted beside listed")));
+    }
     let (_, count) = SEVERAL.iter().find(|(name, _)| *name == effect)?;
     let mut draw = Draw::new(seed, "effects together");
     let indices: Vec<usize> = (0..TOGETHER.len()).collect();
@@ -73,6 +79,27 @@ pub fn drawn(effect: &str, seed: u64) -> Option<Vec<&'static Variant>> {
             .find(|v| v.effect == effect && v.name == name)
     });
     found.collect()
+}
+
+/// One that is listed and one that is not, whose laws can be added.
+fn mixed(draw: &mut Draw) -> Vec<&'static Variant> {
+    let unlisted: Vec<&Variant> = CATALOGUE
+        .iter()
+        // Sticking would have to know of the other torques.
+        .filter(|variant| variant.effect == "unlisted" && variant.name != "Stribeck")
+        .collect();
+    loop {
+        let (effect, name) = draw.one_of(TOGETHER);
+        let stranger = draw.one_of(&unlisted);
+        // Two contacts would each need a mode of its own.
+        if effect == "backlash" && stranger.name.ends_with("stop") {
+            continue;
+        }
+        let listed = CATALOGUE
+            .iter()
+            .find(|v| v.effect == effect && v.name == name);
+        return listed.into_iter().chain([stranger]).collect();
+    }
 }
 
 /// Each effect alone, in the size that gives it about the strength wanted.
@@ -113,16 +140,16 @@ pub fn together(
     }
     let parts = parts.into_iter().map(|part| part.built);
     let built = joined(setting.constants, variants, parts);
-    let signal = noise_free(&built, &setting.inputs[0], 0, seed);
+    let signal = in_setting(setting, &built, 0, seed);
     let start = PlainConstants {
         omega: setting.constants.omega(),
         damping_ratio: setting.constants.damping_ratio(),
     };
     let (plain, left) = match signal.iter().all(|value| value.is_finite()) {
-        true => fit(start, &setting.inputs[0], &signal),
+        true => fit(start, setting.recorded(0), &signal),
         false => (start, f64::INFINITY),
     };
-    let strength = left / (setting.noise.share * rms(&signal));
+    let strength = setting.strength(left, &signal);
     Fitted {
         size: f64::NAN,
         built,

@@ -3,7 +3,7 @@
 use super::catalogue::Variant;
 use super::draw::Draw;
 use super::excitation::Input;
-use super::integrate::run;
+use super::integrate::{Dense, run};
 use super::plain_fit::{PlainConstants, fit, rms};
 use super::plant::{Built, Place, Plain, Scene};
 use super::setting::Setting;
@@ -26,15 +26,37 @@ pub fn scene(setting: &Setting) -> Scene {
         top_hz: setting.excitations[0]
             .top_hz()
             .min(setting.excitations[1].top_hz()),
+        span: setting.span,
+        filtered: setting.filter.is_some(),
     }
 }
 
 /// The noise-free record of a stand with the effect.
 pub fn noise_free(built: &Built, input: &Input, record: usize, seed: u64) -> Vec<f64> {
-    let mut dense = run(built.dynamics.as_ref(), input);
-    if let Some(change) = &built.on_dense {
-        dense = change(dense);
+    sampled(built, input, shown(built, input), (record, seed))
+}
+
+/// The noise-free record of a setting's stand with the effect.
+pub fn in_setting(setting: &Setting, built: &Built, record: usize, seed: u64) -> Vec<f64> {
+    let acts = &setting.inputs[record];
+    let Some(filter) = &setting.filter else {
+        return noise_free(built, acts, record, seed);
+    };
+    // The filter is on both channels.
+    let dense = filter.signal(shown(built, acts));
+    sampled(built, setting.recorded(record), dense, (record, seed))
+}
+
+/// What the recorder is given.
+fn shown(built: &Built, input: &Input) -> Dense {
+    let dense = run(built.dynamics.as_ref(), input);
+    match &built.on_dense {
+        Some(change) => change(dense),
+        None => dense,
     }
+}
+
+fn sampled(built: &Built, input: &Input, dense: Dense, (record, seed): (usize, u64)) -> Vec<f64> {
     let mut samples = dense.samples();
     if let Some(change) = &built.on_samples {
         let draw = Draw::new(seed, if record == 0 { "train" } else { "holdout" });
@@ -61,13 +83,13 @@ fn try_size(
     (size, start): (f64, PlainConstants),
 ) -> Fitted {
     let built = (variant.build)(scene, size, &mut Draw::new(seed, "effect"));
-    let signal = noise_free(&built, &setting.inputs[0], 0, seed);
+    let signal = in_setting(setting, &built, 0, seed);
     let (plain, left) = if signal.iter().all(|value| value.is_finite()) {
-        fit(start, &setting.inputs[0], &signal)
+        fit(start, setting.recorded(0), &signal)
     } else {
         (start, f64::INFINITY)
     };
-    let strength = left / (setting.noise.share * rms(&signal));
+    let strength = setting.strength(left, &signal);
     Fitted {
         size,
         built,

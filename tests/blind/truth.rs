@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use super::catalogue::Variant;
-use super::excitation::{Excitation, RATE_HZ};
+use super::excitation::Excitation;
 use super::plain_fit::rms;
 use super::setting::Setting;
 use super::sizing::Fitted;
@@ -19,18 +19,20 @@ pub fn truth(
     sized: &Fitted,
     (held_left, noise_rms): (f64, [f64; 2]),
 ) -> Value {
+    let span = &setting.span;
     let parameters: serde_json::Map<String, Value> = sized
         .built
         .parameters
         .iter()
-        .map(|(name, value)| ((*name).to_owned(), json!(value)))
+        .map(|(name, value)| ((*name).to_owned(), json!(span.written(name, *value))))
         .collect();
     let names = variants.iter().map(|v| v.effect);
     let names: Vec<&str> = names
         .filter(|name| !["none", "unlisted"].contains(name))
         .collect();
-    let per_hz = std::f64::consts::TAU;
-    json!({
+    let hz = |omega: f64| span.written_hz(omega / std::f64::consts::TAU);
+    let constants = setting.constants.written(span);
+    let mut truth = json!({
         "effect": effect,
         "variant": described(variants),
         "effects": names,
@@ -51,24 +53,48 @@ pub fn truth(
             "quantum_over_rms": setting.noise.quantum,
         },
         "plain_fit": {
-            "natural_frequency_hz": sized.plain.omega / per_hz,
+            "natural_frequency_hz": hz(sized.plain.omega),
             "damping_ratio": sized.plain.damping_ratio,
             "holdout_rms_with_noise_n_m": held_left.hypot(noise_rms[1]),
         },
         "true_constants": {
-            "inertia_kg_m2": setting.constants.inertia_kg_m2,
-            "damping_n_m_s_per_rad": setting.constants.damping_n_m_s,
-            "stiffness_n_m_per_rad": setting.constants.stiffness_n_m,
-            "natural_frequency_hz": setting.constants.omega() / per_hz,
+            "inertia_kg_m2": constants.inertia_kg_m2,
+            "damping_n_m_s_per_rad": constants.damping_n_m_s,
+            "stiffness_n_m_per_rad": constants.stiffness_n_m,
+            "natural_frequency_hz": hz(setting.constants.omega()),
             "damping_ratio": setting.constants.damping_ratio(),
         },
         "records": {
-            "rate_hz": RATE_HZ,
-            "train": setting.excitations[0].describe(),
-            "holdout": setting.excitations[1].describe(),
+            "rate_hz": span.written_rate_hz(),
+            "train": setting.excitations[0].describe(span),
+            "holdout": setting.excitations[1].describe(span),
             "train_rms_n_m": rms(&sized.signal),
-            "top_hz": setting.excitations.iter().map(Excitation::top_hz).fold(0.0, f64::max),
+            "top_hz": span.written_hz(setting.excitations.iter().map(Excitation::top_hz).fold(0.0, f64::max)),
         },
+    });
+    if setting.declared.is_some() {
+        truth["wide"] = wide(setting);
+    }
+    truth
+}
+
+/// What only the records of other stands than that of the thesis have.
+fn wide(setting: &Setting) -> Value {
+    let span = &setting.span;
+    let noise = setting.applied_noise.as_ref();
+    json!({
+        "samples": span.samples,
+        "periods": span.length_s() * setting.constants.omega() / std::f64::consts::TAU,
+        "train": setting.excitations[0].kind(),
+        "holdout": setting.excitations[1].kind(),
+        "filter": setting.filter.map(|filter| json!({
+            "order": filter.order,
+            "corner_hz": span.written_hz(filter.corner_hz),
+        })),
+        "applied_noise": noise.map(|noise| json!({
+            "share_of_rms": noise.share_of_rms,
+            "through_the_stand_n_m": noise.through_n_m,
+        })),
     })
 }
 

@@ -3,17 +3,17 @@
 use std::f64::consts::TAU;
 
 use super::draw::Draw;
-use super::excitation::{LENGTH_S, RATE_HZ};
+use super::excitation::RATE_HZ;
 use super::integrate::{Dynamics, State};
 use super::plant::{Built, Place, Plain, Scene, With};
 
 /// Stiffness that changes in time: evenly over the record.
 pub fn softening_in_time(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     let share = size * draw.sign();
-    let stiffness = scene.constants.stiffness_n_m;
+    let (stiffness, length_s) = (scene.constants.stiffness_n_m, scene.span.length_s());
     let system = With {
         constants: scene.constants,
-        resists: move |t: f64, angle, _| share * stiffness * (t / LENGTH_S) * angle,
+        resists: move |t: f64, angle, _| share * stiffness * (t / length_s) * angle,
         in_gage: false,
     };
     Built::dynamics(system, &[("share_at_end", share)])
@@ -21,7 +21,10 @@ pub fn softening_in_time(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
 
 /// Stiffness that swings with a frequency of its own.
 pub fn swinging_stiffness(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
-    let frequency_hz = draw.log_between(1.5, 40.0);
+    // Some periods a record, slow beside the stand.
+    let low_hz = 1.5 / scene.span.longer();
+    let high_hz = (40.0 / scene.span.longer()).min(118.0 * scene.span.faster);
+    let frequency_hz = draw.log_between(low_hz, high_hz.max(1.2 * low_hz));
     let phase = draw.phase();
     let stiffness = scene.constants.stiffness_n_m;
     let system = With {
@@ -60,7 +63,7 @@ pub fn dead_zone(scene: &Scene, size: f64, _: &mut Draw) -> Built {
 
 /// Single samples far off.
 pub fn spikes(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
-    let count = draw.between(10.0, 80.0).floor();
+    let count = (draw.between(10.0, 80.0) * scene.span.longer().sqrt()).floor();
     let height = size * scene.shown_rms * 10.0;
     let change = move |place: &mut Place, samples: &mut [f64]| {
         for _ in 0..count as usize {
@@ -74,6 +77,7 @@ pub fn spikes(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
 /// The recorder holds its last value now and then.
 pub fn dropouts(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     let length = draw.between(10.0, 60.0).floor();
+    let length = length.min((scene.span.samples / 40) as f64);
     let count = (size * 1000.0).clamp(3.0, 60.0).floor();
     let change = move |place: &mut Place, samples: &mut [f64]| {
         for _ in 0..count as usize {
@@ -87,7 +91,7 @@ pub fn dropouts(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
 
 /// Noise that grows with the signal: a gain that trembles slowly.
 pub fn trembling_gain(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
-    let corner_hz = draw.log_between(2.0, 100.0);
+    let corner_hz = draw.log_between(2.0, 100.0) * scene.span.faster;
     let change = move |place: &mut Place, samples: &mut [f64]| {
         let keep = (-TAU * corner_hz / RATE_HZ).exp();
         let mut gain = 0.0;
@@ -112,9 +116,10 @@ pub fn multiplicative_noise(scene: &Scene, size: f64, _: &mut Draw) -> Built {
 /// The gain of the chain changes over the record.
 pub fn fading_gain(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     let share = size * draw.sign();
+    let length_s = scene.span.length_s();
     let change = move |_: &mut Place, samples: &mut [f64]| {
         for (index, sample) in samples.iter_mut().enumerate() {
-            *sample *= 1.0 + share * (index as f64 / RATE_HZ / LENGTH_S - 0.5);
+            *sample *= 1.0 + share * (index as f64 / RATE_HZ / length_s - 0.5);
         }
     };
     Built::samples(scene, change, &[("share", share)])

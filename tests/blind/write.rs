@@ -4,7 +4,6 @@ use std::fmt::Write as _;
 use std::io;
 use std::path::Path;
 
-use super::excitation::RATE_HZ;
 use super::plant::{Constants, FT_LBF};
 use super::record::{Case, Record};
 
@@ -37,6 +36,13 @@ pub fn measured_column(case: &Case) -> &'static str {
 
 /// A record as a table.
 pub fn table(record: &Record, volts: bool) -> String {
+    let rate_hz = record.span.written_rate_hz();
+    // A millionth of a step and finer, but for the rate of the thesis' stand, whose steps are whole in five.
+    let decimals = if record.span.slower == 1.0 {
+        5
+    } else {
+        7 + rate_hz.log10().ceil().max(0.0) as usize
+    };
     let (heading, scale, digits) = if volts {
         ("measured_V", 1.0 / (1.23e3 * FT_LBF), 11)
     } else {
@@ -49,11 +55,11 @@ pub fn table(record: &Record, volts: bool) -> String {
         .zip(&record.measured_n_m)
         .enumerate()
     {
-        let time_s = index as f64 / RATE_HZ;
+        let time_s = index as f64 / rate_hz;
         // Writing to a String cannot fail.
         let _ = writeln!(
             text,
-            "{time_s:.5},{applied:.8},{:.digits$}",
+            "{time_s:.decimals$},{applied:.8},{:.digits$}",
             measured * scale
         );
     }
@@ -63,13 +69,29 @@ pub fn table(record: &Record, volts: bool) -> String {
 /// The stand of the best plain fit: stiffness as declared, natural frequency and damping ratio fitted.
 fn plain_stand(case: &Case) -> String {
     let stiffness = Constants::hertel().stiffness_n_m;
-    let inertia = stiffness / case.plain.omega.powi(2);
+    let omega = case.plain.omega / case.train.span.slower;
+    let inertia = stiffness / omega.powi(2);
     let damping = 2.0 * case.plain.damping_ratio * (stiffness * inertia).sqrt();
     format!(
         "schema = \"torqcomp.stand/1\"\nname = \"best plain fit\"\n\n[mechanics]\n\
          inertia = \"{inertia:.12e} kg m^2\"\ndamping = \"{damping:.12e} N m s/rad\"\n\
          stiffness = \"{stiffness:.12e} N m/rad\"\n\n[calibration]\n\
          torque_per_volt = \"1.23e3 ft lbf/V\"\n"
+    )
+}
+
+/// The stand as it is declared.
+fn declared(case: &Case) -> String {
+    let Some(constants) = case.declared else {
+        return DECLARED.to_owned();
+    };
+    let constants = constants.written(&case.train.span);
+    format!(
+        "schema = \"torqcomp.stand/1\"\nname = \"blind stand\"\n\n[mechanics]\n\
+         inertia = \"{:.6e} kg m^2\"\ndamping = \"{:.6e} N m s/rad\"\n\
+         stiffness = \"8.1e4 ft lbf/rad\"\n\n[calibration]\n\
+         torque_per_volt = \"1.23e3 ft lbf/V\"\n",
+        constants.inertia_kg_m2, constants.damping_n_m_s
     )
 }
 
@@ -81,7 +103,7 @@ pub fn write(case: &Case, folder: &Path) -> io::Result<()> {
     truth["measured_column"] = measured_column(case).into();
     std::fs::write(folder.join("train.csv"), table(&case.train, volts))?;
     std::fs::write(folder.join("holdout.csv"), table(&case.holdout, volts))?;
-    std::fs::write(folder.join("stand.toml"), DECLARED)?;
+    std::fs::write(folder.join("stand.toml"), declared(case))?;
     std::fs::write(folder.join("plain.toml"), plain_stand(case))?;
     std::fs::write(folder.join("truth.json"), format!("{truth:#}\n"))
 }
