@@ -107,12 +107,16 @@ pub fn fit(
         free = structure.model(&found.values).0.free_mode();
     }
     if effort.corrects_start && !rings {
-        // That of a plain stand matters where it lasts: elsewhere the fits of its rivals would only start from another place.
-        let may_move = !integrates && (!structure.effects.is_empty() || lasts(&records, &free));
-        if may_move && moves_on(&structure, &found.values, &records, &free) {
-            let values = &found.values[..start.len()];
-            found = minimize(&structure, values, &mut records, None, effort)?;
+        if !integrates && moves_on(&structure, &found.values, &records, &free) {
+            // Where it is gone before the end of a plain stand's record, the mode that was found is near enough for it.
+            let follows = !structure.effects.is_empty() || lasts(&records, &free);
             free = structure.model(&found.values).0.free_mode();
+            let values = &found.values[..start.len()];
+            let fixed = (!follows).then_some(&free);
+            found = minimize(&structure, values, &mut records, fixed, effort)?;
+            if follows {
+                free = structure.model(&found.values).0.free_mode();
+            }
         }
         for _ in 0..MOST_STARTS {
             if !integrates || !correct_starts(&structure, &found.values, &mut records, &free) {

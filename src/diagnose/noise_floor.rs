@@ -118,8 +118,8 @@ pub fn noise_of_input(input: &[f64]) -> f64 {
         power[range].iter().sum::<f64>() / count
     };
     let [below, top] = [
-        mean(lines * 6 / 10..lines * 8 / 10),
-        mean(lines * 8 / 10..lines * 97 / 100),
+        mean(lines * 80 / 100..lines * 88 / 100),
+        mean(lines * 88 / 100..lines * 97 / 100),
     ];
     let is_flat = below < FLAT * top && top < FLAT * below;
     match is_flat && top < ONLY_NOISE * mean(0..lines) {

@@ -95,9 +95,7 @@ fn scan(
 ) -> Vec<(f64, PlainStand)> {
     let record = &records[0];
     let mut starts = starts(context, declared, record);
-    if record.is_free() {
-        starts.extend(from_ringing(context, record));
-    }
+    starts.extend(from_ringing(context, record));
     let starts = starts.into_iter();
     let mut found: Vec<(f64, PlainStand)> = starts
         .filter_map(|start| try_start(context, start, record))
@@ -136,7 +134,8 @@ pub fn starts(
     pairs.collect()
 }
 
-/// Plain stands at the strongest line of free ringing: between those of the grid a light damping fits none.
+/// Plain stands at the strongest line of a record, which is that of a lightly damped resonance: between those of the grid such
+/// a damping fits none.
 fn from_ringing(context: &FitContext, record: &StandRecord) -> Vec<PlainStand> {
     let y = without_mean(record.measured_in_range());
     let rate_hz = record.rate_hz();
