@@ -1,7 +1,7 @@
 //! Stands that lack nothing, integrated here and recorded in ways that have been taken for effects: noise that is not
 //! white, and few periods of a stand that rings longer than its record.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use serde_json::Value;
 
@@ -10,9 +10,22 @@ use crate::util::Folder;
 
 const NATURAL_HZ: f64 = 20.0;
 
+/// What is applied.
+#[derive(Clone, Copy)]
+enum Input {
+    /// Thirty sines.
+    Sines,
+    /// Levels that are held for three periods of the stand each.
+    Plateaus,
+    /// Smooth pulses half a period long, ten periods apart.
+    Hits,
+}
+
 /// A stand and the way it is recorded.
 #[derive(Clone, Copy)]
 struct Setting {
+    /// What is applied in the training record and in the held-out one.
+    inputs: [Input; 2],
     damping_ratio: f64,
     /// Length of the record in periods of the stand.
     periods: usize,
@@ -26,7 +39,7 @@ struct Setting {
 }
 
 /// Applied and recorded torque from rest: Runge and Kutta's method in steps of 1/400 period.
-fn record(setting: &Setting, noise: &mut Noise) -> (Vec<f64>, Vec<f64>) {
+fn record(setting: &Setting, input: Input, noise: &mut Noise) -> (Vec<f64>, Vec<f64>) {
     let lines: Vec<[f64; 2]> = (0..30)
         .map(|k| {
             let place = (f64::from(k) + noise.uniform()) / 30.0;
@@ -36,7 +49,15 @@ fn record(setting: &Setting, noise: &mut Noise) -> (Vec<f64>, Vec<f64>) {
             ]
         })
         .collect();
-    let torque = |t: f64| -> f64 { lines.iter().map(|[w, phase]| (w * t + phase).sin()).sum() };
+    let levels: Vec<f64> = (0..setting.periods).map(|_| noise.normal()).collect();
+    let torque = |t: f64| -> f64 {
+        let periods = t * NATURAL_HZ;
+        match input {
+            Input::Sines => lines.iter().map(|[w, phase]| (w * t + phase).sin()).sum(),
+            Input::Plateaus => levels[(periods / 3.0) as usize],
+            Input::Hits => (PI * (2.0 * (periods % 10.0)).min(1.0)).sin().powi(2),
+        }
+    };
     let omega = TAU * NATURAL_HZ;
     let fall = 2.0 * setting.damping_ratio * omega;
     let slope = |pull: f64, [x, v]: [f64; 2]| [v, omega * omega * (pull - x) - fall * v];
@@ -45,7 +66,8 @@ fn record(setting: &Setting, noise: &mut Noise) -> (Vec<f64>, Vec<f64>) {
     let (mut state, mut applied, mut shown) = ([0.0, 0.0], Vec::new(), Vec::new());
     for i in 0..setting.periods * setting.samples * steps {
         let t = i as f64 * step;
-        let [now, half, next] = [0.0, 0.5, 1.0].map(|part| torque(t + part * step));
+        // Within the step, on whose ends a level may change.
+        let [now, half, next] = [1e-6, 0.5, 1.0 - 1e-6].map(|part| torque(t + part * step));
         if i % steps == 0 {
             applied.push(now);
             shown.push(state[0]);
@@ -82,8 +104,8 @@ fn diagnosed(setting: &Setting, seed: u64) -> Value {
     let stand = format!("schema = \"torqcomp.stand/1\"\n[mechanics]\n{mechanics}\n");
     folder.write("stand.toml", stand);
     let mut noise = Noise(seed);
-    for name in ["train.csv", "holdout.csv"] {
-        let (applied, shown) = record(setting, &mut noise);
+    for (name, input) in ["train.csv", "holdout.csv"].into_iter().zip(setting.inputs) {
+        let (applied, shown) = record(setting, input, &mut noise);
         let rate_hz = NATURAL_HZ * setting.samples as f64;
         let rows = applied.iter().zip(&shown).enumerate();
         let rows = rows.map(|(i, (u, y))| format!("{:.9},{u:.9},{y:.9}\n", i as f64 / rate_hz));
@@ -121,6 +143,7 @@ fn answers(setting: &Setting) -> (usize, Vec<String>) {
 #[test]
 fn noise_that_is_not_white_is_no_missing_effect() {
     let setting = Setting {
+        inputs: [Input::Sines; 2],
         damping_ratio: 0.1,
         periods: 60,
         samples: 30,
@@ -137,6 +160,7 @@ fn noise_that_is_not_white_is_no_missing_effect() {
 #[test]
 fn a_stand_that_rings_longer_than_its_record_is_fitted() {
     let setting = Setting {
+        inputs: [Input::Sines; 2],
         damping_ratio: 0.004,
         periods: 20,
         samples: 24,
@@ -152,6 +176,7 @@ fn a_stand_that_rings_longer_than_its_record_is_fitted() {
 #[test]
 fn noise_on_the_applied_torque_is_no_missing_effect() {
     let setting = Setting {
+        inputs: [Input::Sines; 2],
         damping_ratio: 0.02,
         periods: 100,
         samples: 30,
@@ -161,4 +186,41 @@ fn noise_on_the_applied_torque_is_no_missing_effect() {
     };
     let (right, named) = answers(&setting);
     assert!(right >= 7 && named.is_empty(), "{right} of 8, {named:?}");
+}
+
+/// Each input has its own course between its samples: levels are held, sines are not.
+#[test]
+fn one_input_of_levels_and_one_of_sines() {
+    for inputs in [
+        [Input::Plateaus, Input::Sines],
+        [Input::Sines, Input::Plateaus],
+    ] {
+        let setting = Setting {
+            inputs,
+            damping_ratio: 0.05,
+            periods: 150,
+            samples: 20,
+            noise: 0.003,
+            memory: 0.0,
+            applied: 0.0,
+        };
+        let (right, named) = answers(&setting);
+        assert!(right >= 7 && named.is_empty(), "{right} of 8; {named:?}");
+    }
+}
+
+/// A gap or friction takes noise on the applied torque out of a model where that is quiet between hits.
+#[test]
+fn noise_on_the_torque_of_hits_is_no_gap() {
+    let setting = Setting {
+        inputs: [Input::Hits; 2],
+        damping_ratio: 0.15,
+        periods: 400,
+        samples: 20,
+        noise: 0.004,
+        memory: 0.0,
+        applied: 0.005,
+    };
+    let (right, named) = answers(&setting);
+    assert!(right >= 7 && named.is_empty(), "{right} of 8; {named:?}");
 }

@@ -13,6 +13,7 @@ mod blind_generator;
 mod blind_wide;
 mod clean;
 mod compensate;
+mod decays;
 mod detection;
 mod diagnose;
 #[cfg(debug_assertions)] // optimised builds have no faults on purpose

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use torqcomp_model::Chain;
 use torqcomp_model::Mode;
 use torqcomp_model::fit::{self, Differences, Fit, FitError, Options, Parameter};
+use torqcomp_model::simulate::MotionState;
 
 use super::record::{InitialState, Nuisance, NuisanceFit, NuisanceTerms, StandRecord, StateSlopes};
 use super::structure::{PlainStand, Structure};
@@ -72,6 +73,8 @@ impl FitEffort {
 const TOLERANCE: f64 = 1e-6;
 /// Largest displacement by a constant load, over the rms of the record.
 const LARGEST_PRELOAD: f64 = 0.5;
+/// Largest displacement at the start of free ringing, over the rms of the record.
+const LARGEST_STATE: f64 = 100.0;
 /// Step of the initial state for differences, over the rms of the record.
 const STATE_STEP: f64 = 1e-4;
 /// Correction of the motion at a record's start, over the rms of the residual, that makes a second fit worthwhile.
@@ -147,7 +150,8 @@ pub fn fit(
 }
 
 /// Minimises the residual without what belongs to the records; the free motion in it is in a given mode, which is faster, or
-/// in that of the parameters.
+/// in that of the parameters. The state at the start of free ringing that is integrated is found along with these: all of the
+/// motion follows from it, and not in proportion.
 fn minimize(
     structure: &Structure,
     start: &[f64],
@@ -155,25 +159,41 @@ fn minimize(
     free: Option<&Mode>,
     effort: FitEffort,
 ) -> Result<Fit, FitError> {
-    let size = structure.context.scales.rms;
     let own = structure.bounds().len();
-    let has_preload = structure.model(start).0.has_zero();
-    let parameters = parameters(structure, start, records, has_preload);
+    let start_model = structure.model(start).0;
+    let rings = |r: &StandRecord| start_model.is_integrated() && r.is_free();
+    let of_records = OwnOfRecords {
+        size: structure.context.scales.rms,
+        omega_rad_s: start_model.free_mode().omega_rad_s,
+        has_preload: start_model.has_zero(),
+        ringing: (0..records.len()).filter(|k| rings(&records[*k])).collect(),
+    };
+    let mut parameters = parameters(structure, start);
+    parameters.extend(of_records.parameters(records));
+    let nuisance =
+        |k: usize, record: &StandRecord, free: &Mode, terms: &NuisanceTerms| match of_records
+            .ringing
+            .contains(&k)
+        {
+            true => record.nuisance_beside_motion(terms),
+            false => record.nuisance(free, terms, None),
+        };
     // Without lines, the nuisance terms depend on the parameters by their mode alone.
     let fixed: Option<Vec<Nuisance>> = free.map(|free| {
-        let of = |r: &StandRecord| r.nuisance(free, &NuisanceTerms::NONE, None);
-        records.iter().map(of).collect()
+        let of = |(k, r): (usize, &StandRecord)| nuisance(k, r, free, &NuisanceTerms::NONE);
+        records.iter().enumerate().map(of).collect()
     });
     let problem = |values: &[f64], out: &mut Vec<f64>| {
-        let (mut model, terms) = structure.model(&values[..own]);
+        let (values, others) = values.split_at(own);
+        let (mut model, terms) = structure.model(values);
         let free = free.copied().unwrap_or_else(|| model.free_mode());
         for (k, record) in records.iter().enumerate() {
-            let preload = values.get(own + k).map(|s| s * size);
-            model.shift = preload.unwrap_or(record.initial.preload);
-            let mut residual = raw_residual(&model, record)?;
+            let record = of_records.set(k, record, others);
+            model.shift = record.initial.preload;
+            let mut residual = raw_residual(&model, &record)?;
             match &fixed {
                 Some(fixed) if terms.is_empty() => fixed[k].clear(&mut residual),
-                _ => record.nuisance(&free, &terms, None).clear(&mut residual),
+                _ => nuisance(k, &record, &free, &terms).clear(&mut residual),
             }
             out.append(&mut residual);
         }
@@ -186,34 +206,71 @@ fn minimize(
         ..Options::default()
     };
     let found = fit::minimize(&problem, &parameters, &options)?;
-    for (record, preload) in records.iter_mut().zip(&found.values[own..]) {
-        record.initial.preload = preload * size;
+    for (k, record) in records.iter_mut().enumerate() {
+        *record = of_records.set(k, record, &found.values[own..]);
     }
     Ok(found)
 }
 
-/// The structure's parameters, and the displacement by a constant load of each record where it matters.
-fn parameters(
-    structure: &Structure,
-    start: &[f64],
-    records: &[StandRecord],
+/// What a fit finds of each record: the displacement by a constant load where it matters, and the state at the start of free
+/// ringing that is integrated.
+struct OwnOfRecords {
+    /// Size of a displacement.
+    size: f64,
+    /// Frequency that makes a speed a displacement.
+    omega_rad_s: f64,
     has_preload: bool,
-) -> Vec<Parameter> {
-    let within = |start: f64, [lower, upper]: [f64; 2], scale: f64| {
-        Parameter::new("", start.clamp(lower, upper))
-            .at_least(lower)
-            .at_most(upper)
-            .scaled(scale)
-    };
-    let bounds = structure.bounds();
-    let own = start.iter().zip(bounds);
-    let own = own.map(|(s, bounds)| within(*s, bounds, s.abs().max(1e-4)));
-    let size = structure.context.scales.rms;
-    let preloads = records.iter().filter(|_| has_preload).map(|r| {
-        let bounds = [-LARGEST_PRELOAD, LARGEST_PRELOAD];
-        within(r.initial.preload / size, bounds, 0.1)
-    });
-    own.chain(preloads).collect()
+    /// Numbers of the records that ring.
+    ringing: Vec<usize>,
+}
+
+impl OwnOfRecords {
+    fn parameters(&self, records: &[StandRecord]) -> Vec<Parameter> {
+        let limit = LARGEST_PRELOAD;
+        let preload = |r: &StandRecord| within(r.initial.preload / self.size, [-limit, limit], 0.1);
+        let preloads = records.iter().filter(|_| self.has_preload).map(preload);
+        let states = self.ringing.iter().flat_map(|k| {
+            let motion = records[*k].initial.motion;
+            [motion.x, motion.speed / self.omega_rad_s]
+                .map(|x| within(x / self.size, [-LARGEST_STATE, LARGEST_STATE], 1.0))
+        });
+        preloads.chain(states).collect()
+    }
+
+    /// A record, by its number, with values of these parameters.
+    fn set(&self, k: usize, record: &StandRecord, values: &[f64]) -> StandRecord {
+        let mut record = record.clone();
+        let preloads = match self.has_preload {
+            true => values.len() - 2 * self.ringing.len(),
+            false => 0,
+        };
+        if let Some(preload) = values[..preloads].get(k) {
+            record.initial.preload = preload * self.size;
+        }
+        if let Some(place) = self.ringing.iter().position(|ringing| *ringing == k) {
+            let state = &values[preloads + 2 * place..];
+            record.initial.motion = MotionState {
+                x: state[0] * self.size,
+                speed: state[1] * self.size * self.omega_rad_s,
+            };
+        }
+        record
+    }
+}
+
+/// A parameter within bounds.
+fn within(start: f64, [lower, upper]: [f64; 2], scale: f64) -> Parameter {
+    Parameter::new("", start.clamp(lower, upper))
+        .at_least(lower)
+        .at_most(upper)
+        .scaled(scale)
+}
+
+/// The structure's parameters.
+fn parameters(structure: &Structure, start: &[f64]) -> Vec<Parameter> {
+    let own = start.iter().zip(structure.bounds());
+    own.map(|(s, bounds)| within(*s, bounds, s.abs().max(1e-4)))
+        .collect()
 }
 
 /// Measured less modelled over the range of a record, nuisance terms included.

@@ -1,6 +1,7 @@
 //! The errors on the held-out records. Everything was chosen by the training records; what the others do not show goes again.
 
 use super::SearchState;
+use super::guard_models::GuardModel;
 use super::ladder::Ladder;
 use super::noise_floor::NoiseFloor;
 use super::plain::set_starts;
@@ -52,6 +53,10 @@ impl SearchState {
             None => self.drop_all(&Reason::Diverges),
         }
         self.tests = super::tests(&self.after);
+        let after_rms = self.after.compared_rms();
+        // A law that leaves more of the held-out records is none that they bear out.
+        let is_borne_out = |guard: &GuardModel| guard.model.compared_rms() < after_rms;
+        self.suspected = self.suspected.take().filter(is_borne_out);
         self.lower_noise_floor();
         self.confirm(threads);
         for model in [&mut self.before, &mut self.after] {

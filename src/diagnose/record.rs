@@ -158,8 +158,8 @@ impl StandRecord {
         let mut nuisance = Nuisance::default();
         let columns = &mut nuisance.columns;
         columns.push(vec![1.0; self.count()]);
-        let rate_hz = self.rate_hz();
         if self.has_free_motion(mode) {
+            let rate_hz = self.rate_hz();
             nuisance.motion = Some(1);
             nuisance.sees_start = self.sees_start(mode);
             let slopes = slopes.as_ref().and_then(|slopes| slopes.motion.clone());
@@ -175,6 +175,19 @@ impl StandRecord {
             nuisance.preload = Some(columns.count());
             columns.push(column);
         }
+        self.with_terms(nuisance, terms)
+    }
+
+    /// What belongs to this record beside its motion: a constant and the given terms.
+    pub fn nuisance_beside_motion(&self, terms: &NuisanceTerms) -> Nuisance {
+        let mut nuisance = Nuisance::default();
+        nuisance.columns.push(vec![1.0; self.count()]);
+        self.with_terms(nuisance, terms)
+    }
+
+    fn with_terms(&self, mut nuisance: Nuisance, terms: &NuisanceTerms) -> Nuisance {
+        let columns = &mut nuisance.columns;
+        let rate_hz = self.rate_hz();
         let count = self.count();
         for wave in 1..=terms.drift_half_waves {
             let turn = PI * wave as f64 / count as f64;

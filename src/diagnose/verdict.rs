@@ -161,6 +161,13 @@ impl SearchState {
         round.is_some_and(|round| !round.iter().any(CandidateFit::is_confirmed))
     }
 
+    /// Whether nothing but white noise is left.
+    fn is_at_noise(&self) -> bool {
+        let is_white = self.tests.white && !self.tests.follows_anything();
+        let is_at = |f: NoiseFloor| self.after.compared_rms() <= AT_FLOOR * f.rms;
+        is_white && self.noise_floor.is_some_and(is_at)
+    }
+
     /// Whether the residual after is above the noise, coloured, and depends on the input, small as it may be.
     fn follows_input(&self) -> bool {
         let error = self.after.compared_rms();
@@ -172,7 +179,8 @@ impl SearchState {
     /// The verdict; rejects the effects where they explain too little.
     pub fn conclude(&mut self) -> Verdict {
         let is_suspected = self.suspected.is_some();
-        let is_known_left = !self.settled || is_suspected || self.is_outdone;
+        let is_unsettled = !self.settled && !self.is_at_noise();
+        let is_known_left = is_unsettled || is_suspected || self.is_outdone;
         let is_left = is_known_left || self.leaves(&self.after, &self.tests);
         if self.after.effect_names().is_empty() {
             let is_left = self.leaves(&self.before, &self.tests_before);

@@ -1,0 +1,228 @@
+//! `diagnose` of free ringing alone: no torque is measured, only the gage.
+//!
+//! The records are integrated here by Runge and Kutta's method (dry friction: as much of the speed as it can take in each of
+//! 40 steps from sample to sample).
+
+use std::f64::consts::{PI, TAU};
+
+use serde_json::Value;
+
+use crate::noise::Noise;
+use crate::util::Folder;
+
+const RATE_HZ: f64 = 2000.0;
+const SAMPLES: usize = 8000;
+const STEPS: usize = 40;
+/// Noise and zero of the gage, in V.
+const NOISE: f64 = 1e-3;
+const ZERO: f64 = 0.05;
+/// Beginning and length of a hit, in s.
+const HIT_S: [f64; 2] = [0.1, 0.003];
+
+/// `x'' + 2 ζ ω x' + ω² (x + c x³ + F sgn x') = ω² u`, `x` in V.
+struct Stand {
+    natural_hz: f64,
+    damping_ratio: f64,
+    cubic: f64,
+    friction: f64,
+}
+
+const PLAIN: Stand = Stand {
+    natural_hz: 20.0,
+    damping_ratio: 0.01,
+    cubic: 0.0,
+    friction: 0.0,
+};
+
+impl Stand {
+    /// A record of the gage after a hit that swings it to about so many volts.
+    fn hit(&self, volts: f64, seed: u64) -> String {
+        let omega = TAU * self.natural_hz;
+        let h = 1.0 / (RATE_HZ * STEPS as f64);
+        // The pulse takes the stand to the speed ω times the swing.
+        let top = volts * omega * PI / (2.0 * HIT_S[1]);
+        let push = |t: f64| {
+            let part = (t - HIT_S[0]) / HIT_S[1];
+            if (0.0..1.0).contains(&part) {
+                top * (PI * part).sin()
+            } else {
+                0.0
+            }
+        };
+        let slope = |t: f64, [x, v]: [f64; 2]| {
+            let spring = x + self.cubic * x.powi(3);
+            [
+                v,
+                push(t) - 2.0 * self.damping_ratio * omega * v - omega * omega * spring,
+            ]
+        };
+        let mut noise = Noise(seed);
+        let mut state = [0.0, 0.0];
+        let mut text = String::from("time_s,gage_V\n");
+        for i in 0..SAMPLES {
+            let seen = state[0] + ZERO + NOISE * noise.normal();
+            text += &format!("{:.6},{seen:.7}\n", i as f64 / RATE_HZ);
+            for step in 0..STEPS {
+                let t = (i * STEPS + step) as f64 * h;
+                let before = state;
+                let at = |d: [f64; 2], by: f64| [state[0] + by * d[0], state[1] + by * d[1]];
+                let a = slope(t, state);
+                let b = slope(t + 0.5 * h, at(a, 0.5 * h));
+                let c = slope(t + 0.5 * h, at(b, 0.5 * h));
+                let d = slope(t + h, at(c, h));
+                for j in 0..2 {
+                    state[j] += h / 6.0 * (a[j] + 2.0 * b[j] + 2.0 * c[j] + d[j]);
+                }
+                let most = h * self.friction * omega * omega;
+                state[1] -= state[1].clamp(-most, most);
+                if before[1] == 0.0 && state[1] == 0.0 {
+                    // It sticks.
+                    state[0] = before[0];
+                }
+            }
+        }
+        text
+    }
+
+    /// The diagnosis of two hits, the second held out.
+    fn diagnosed(&self, more: &[&str]) -> (Folder, Value) {
+        let folder = Folder::new();
+        folder.write("first.csv", self.hit(1.0, 1));
+        folder.write("second.csv", self.hit(0.6, 2));
+        let args = [
+            "diagnose",
+            "--decay",
+            "first.csv",
+            "--holdout-decay",
+            "second.csv",
+        ];
+        let channel = ["--measured", "gage_V", "--json"];
+        let report = folder.json(&[&args, &channel[..], more].concat());
+        (folder, report)
+    }
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().expect("a number")
+}
+
+/// A parameter of the accepted effect: value and standard uncertainty.
+fn parameter(report: &Value, effect: &str, name: &str) -> [f64; 2] {
+    let candidates = report["candidates"].as_array().expect("candidates");
+    let accepted = candidates
+        .iter()
+        .find(|c| c["effect"] == effect && c["status"] == "accepted")
+        .expect("an accepted effect");
+    let parameters = accepted["parameters"].as_array().expect("parameters");
+    let found = parameters.iter().find(|p| p["name"] == name);
+    let found = found.expect("the parameter");
+    [number(&found["value"]), number(&found["std"])]
+}
+
+#[test]
+fn a_linear_stand_lacks_nothing() {
+    let (_, report) = PLAIN.diagnosed(&[]);
+    assert_eq!(report["verdict"], "nothing-missing");
+    let error = number(&report["error"]["before"]["holdout_rms"]);
+    assert!((0.95..1.05).contains(&(error / NOISE)), "{error}");
+    for (constant, want) in [(0, 20.0), (1, 0.01)] {
+        let found = &report["constants"][constant];
+        let (value, std) = (number(&found["before"]), number(&found["before_std"]));
+        assert!(
+            (value - want).abs() < 4.0 * std && std < 1e-3 * want,
+            "{found}"
+        );
+    }
+}
+
+#[test]
+fn a_stiffness_that_grows_is_found_and_simulated_in_the_stand_file() {
+    let stand = Stand {
+        cubic: 0.05,
+        ..PLAIN
+    };
+    let (folder, report) = stand.diagnosed(&["-o", "refined.toml", "--html", "page.html"]);
+    assert_eq!(report["verdict"], "explained");
+    assert_eq!(report["effects"], serde_json::json!(["cubic-stiffness"]));
+    let after = number(&report["error"]["after"]["holdout_rms"]);
+    assert!((0.95..1.05).contains(&(after / NOISE)), "{after}");
+    let [value, std] = parameter(&report, "cubic-stiffness", "coefficient");
+    assert!(
+        (value - 0.05).abs() < 4.0 * std && std < 5e-4,
+        "{value} ± {std}"
+    );
+    assert!(
+        folder
+            .read("refined.toml")
+            .contains("kind = \"cubic-stiffness\"")
+    );
+    assert!(folder.read("page.html").contains("second.csv"));
+}
+
+#[test]
+fn dry_friction_is_found() {
+    let stand = Stand {
+        friction: 0.01,
+        ..PLAIN
+    };
+    let (_, report) = stand.diagnosed(&[]);
+    assert_eq!(report["effects"], serde_json::json!(["coulomb-friction"]));
+    let described = &report["residual"]["described"];
+    assert_eq!(
+        report["verdict"], "explained",
+        "{described} {}",
+        report["suspected"]
+    );
+    let [value, _] = parameter(&report, "coulomb-friction", "torque");
+    assert!((value / 0.01 - 1.0).abs() < 0.01, "{value}");
+}
+
+#[test]
+fn several_hits_in_one_record_are_several_decays() {
+    let folder = Folder::new();
+    let (first, second) = (PLAIN.hit(1.0, 1), PLAIN.hit(0.6, 2));
+    let values = |text: &str| -> Vec<String> {
+        let rows = text.lines().skip(1);
+        rows.map(|row| row.split(',').nth(1).expect("a value").to_owned())
+            .collect()
+    };
+    let both = [values(&first), values(&second)].concat();
+    let rows = both.iter().enumerate();
+    let rows: String = rows
+        .map(|(i, y)| format!("{:.6},{y}\n", i as f64 / RATE_HZ))
+        .collect();
+    folder.write("both.csv", format!("time_s,gage_V\n{rows}"));
+    let report = folder.json(&[
+        "diagnose",
+        "--decay",
+        "both.csv",
+        "--measured",
+        "gage_V",
+        "--json",
+    ]);
+    assert_eq!(report["verdict"], "nothing-missing");
+    let warnings = report["warnings"].as_array().expect("warnings");
+    let held_out = warnings.iter().find(|w| w["code"] == "no-record-held-out");
+    let message = held_out.expect("the warning")["message"].to_string();
+    assert!(message.contains("the last decay"), "{message}");
+}
+
+#[test]
+fn what_is_missing_is_said() {
+    let folder = Folder::new();
+    folder.write("hit.csv", PLAIN.hit(1.0, 1));
+    let diagnose = ["diagnose", "--measured", "gage_V"];
+    folder
+        .run(&[&diagnose[..], &["--decay", "hit.csv"]].concat())
+        .says(1, &["hit.csv", "one decay is fitted", "--holdout-decay"]);
+    folder
+        .run(&[&diagnose[..], &["--train", "hit.csv", "--decay", "hit.csv"]].concat())
+        .says(2, &["--applied"]);
+    let quiet: String = (0..2000)
+        .map(|i| format!("{:.4},0.0\n", f64::from(i) / 2000.0))
+        .collect();
+    folder.write("quiet.csv", format!("time_s,gage_V\n{quiet}"));
+    folder
+        .run(&[&diagnose[..], &["--decay", "quiet.csv"]].concat())
+        .says(1, &["quiet.csv", "no free decay"]);
+}
