@@ -355,7 +355,10 @@ fn is_same_file(other: &Path, path: &Path) -> bool {
 fn is_stdin(path: &Path) -> bool {
     let is_file = std::fs::metadata(path).is_ok_and(|meta| meta.is_file());
     is_file
-        && match (same_file::Handle::stdin(), same_file::Handle::from_path(path)) {
+        && match (
+            same_file::Handle::stdin(),
+            same_file::Handle::from_path(path),
+        ) {
             (Ok(stdin), Ok(file)) => stdin == file,
             _ => false,
         }
