@@ -142,7 +142,7 @@ struct Edge {
 }
 
 impl Edge {
-    /// The only one there is: to make it takes as long as to compensate some thousand samples.
+    /// The only one there is, made when it is first needed.
     fn shared() -> &'static Self {
         static EDGE: LazyLock<Edge> = LazyLock::new(Edge::new);
         &EDGE
