@@ -351,20 +351,17 @@ fn is_same_file(other: &Path, path: &Path) -> bool {
     }
 }
 
-#[cfg(unix)]
+/// Whether standard input is read from the file of that path. Only regular files are opened for that: a pipe would wait.
 fn is_stdin(path: &Path) -> bool {
-    use std::os::unix::fs::MetadataExt;
-    let id = |path: &Path| {
-        let meta = std::fs::metadata(path).ok().filter(|meta| meta.is_file());
-        meta.map(|meta| (meta.dev(), meta.ino()))
-    };
-    let stdin = id(Path::new("/dev/stdin"));
-    stdin.is_some() && stdin == id(path)
-}
-
-#[cfg(not(unix))]
-fn is_stdin(_: &Path) -> bool {
-    false
+    let is_file = std::fs::metadata(path).is_ok_and(|meta| meta.is_file());
+    is_file
+        && match (
+            same_file::Handle::stdin(),
+            same_file::Handle::from_path(path),
+        ) {
+            (Ok(stdin), Ok(file)) => stdin == file,
+            _ => false,
+        }
 }
 
 /// Whether anything was written to standard output: a second JSON document there could not be parsed.

@@ -138,12 +138,30 @@ pub(super) fn write(to: &mut impl Write, bytes: &[u8]) -> io::Result<usize> {
 /// Has the names in a folder on the disk, where the system can do that.
 pub(crate) fn sync_folder(folder: &Path) -> io::Result<()> {
     use io::ErrorKind::{InvalidInput, PermissionDenied, Unsupported};
-    match Stored::open(folder).and_then(|folder| sync(&folder.0)) {
+    match open_folder(folder).and_then(|folder| sync(&folder)) {
         Err(error) if matches!(error.kind(), InvalidInput | PermissionDenied | Unsupported) => {
             Ok(())
         }
         synced => synced,
     }
+}
+
+#[cfg(not(windows))]
+fn open_folder(folder: &Path) -> io::Result<File> {
+    Stored::open(folder).map(|folder| folder.0)
+}
+
+/// Windows opens a folder only with this flag, and syncs only what may be written.
+#[cfg(windows)]
+fn open_folder(folder: &Path) -> io::Result<File> {
+    use std::os::windows::fs::OpenOptionsExt;
+    const FILE_FLAG_BACKUP_SEMANTICS: u32 = 0x0200_0000;
+    check(Call::Open)?;
+    let mut options = File::options();
+    options
+        .write(true)
+        .custom_flags(FILE_FLAG_BACKUP_SEMANTICS)
+        .open(folder)
 }
 
 /// Has a file on the disk.

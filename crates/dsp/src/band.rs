@@ -9,6 +9,8 @@
 mod choice;
 mod lines;
 
+use std::sync::LazyLock;
+
 use crate::Error;
 
 pub use choice::{BandChoice, BandSearch, band_of_stand};
@@ -32,7 +34,7 @@ pub struct Band {
     sample_rate_hz: f64,
     top_hz: f64,
     end_hz: f64,
-    edge: Edge,
+    edge: &'static Edge,
 }
 
 impl Band {
@@ -78,7 +80,7 @@ impl Band {
             sample_rate_hz,
             top_hz,
             end_hz: Self::end_of(sample_rate_hz, top_hz),
-            edge: Edge::new(),
+            edge: Edge::shared(),
         })
     }
 
@@ -140,6 +142,12 @@ struct Edge {
 }
 
 impl Edge {
+    /// The only one there is, made when it is first needed.
+    fn shared() -> &'static Self {
+        static EDGE: LazyLock<Edge> = LazyLock::new(Edge::new);
+        &EDGE
+    }
+
     fn new() -> Self {
         let width = 1.0 / EDGE_NODES as f64;
         let mut cumulative = vec![0.0];

@@ -71,7 +71,7 @@ pub struct BandSearch {
     sums: Vec<[f64; 2]>,
     /// Whether the record holds more than noise.
     has_signal: bool,
-    edge: Edge,
+    edge: &'static Edge,
 }
 
 impl BandSearch {
@@ -107,7 +107,7 @@ impl BandSearch {
             power_gain,
             floor,
             sums: Vec::new(),
-            edge: Edge::new(),
+            edge: Edge::shared(),
         };
         search.sum();
         Some(search)

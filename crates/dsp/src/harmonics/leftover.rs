@@ -125,14 +125,23 @@ impl NearBins {
     fn close(&mut self, first: usize) {
         let (half, middle) = self.half_and_middle(first);
         let widest = *NEAR_BINS.end() as f64;
+        // `Σ_q m_q (j w)^q/q!`, w being the angle from the middle of the block to its end.
+        let (mut terms, mut factorial) = (self.moments, 1.0);
+        for (next, term) in (1..).zip(&mut terms) {
+            *term /= factorial;
+            factorial *= f64::from(next);
+        }
+        // From one bin to the next, the angle grows by the same step.
+        let bin = -TAU / self.length as f64;
+        let at_middle = bin * (middle - 0.5 * (self.length - 1) as f64);
+        let mut turn = Complex64::from_polar(1.0, -widest * at_middle);
+        let advance = Complex64::from_polar(1.0, at_middle);
         for (place, sum) in self.sums.iter_mut().enumerate() {
-            let step = -TAU * (place as f64 - widest) / self.length as f64;
-            let mut factor =
-                Complex64::from_polar(1.0, step * (middle - 0.5 * (self.length - 1) as f64));
-            for (power, moment) in (1..).zip(&self.moments) {
-                *sum += factor * moment;
-                factor *= Complex64::new(0.0, step * half / f64::from(power));
-            }
+            let w = bin * (place as f64 - widest) * half;
+            let times = |value: Complex64| Complex64::new(-w * value.im, w * value.re);
+            let series = terms.iter().rev();
+            *sum += turn * series.fold(Complex64::ZERO, |value, term| term + times(value));
+            turn *= advance;
         }
         self.moments = [Complex64::ZERO; TERMS];
     }

@@ -328,11 +328,11 @@ pub(super) fn nearest(symbol: &str) -> Option<&'static str> {
         .flat_map(|row| row.names.iter().chain(row.words))
         .map(|known| {
             let folded = strsim::damerau_levenshtein(&lower, &known.to_lowercase());
-            (folded, strsim::damerau_levenshtein(symbol, known), *known)
+            (folded, *known)
         })
-        .filter(|(folded, _, known)| *folded == 0 || (*folded <= limit && known.len() > 1))
-        .min_by_key(|(folded, exact, _)| (*folded, *exact))
-        .map(|(_, _, known)| known)
+        .filter(|(folded, known)| *folded == 0 || (*folded <= limit && known.len() > 1))
+        .min_by_key(|(folded, known)| (*folded, strsim::damerau_levenshtein(symbol, known)))
+        .map(|(_, known)| known)
 }
 
 #[cfg(test)]
