@@ -101,8 +101,10 @@ fn values(folder: &Folder, channel: &str) -> Vec<f64> {
     table(&ran.stdout).1.iter().map(|row| row[1]).collect()
 }
 
-/// A number of `count`, so many bytes wide, as every type of the format stores it.
-const TYPES: [(u32, fn(f64) -> Vec<u8>); 13] = [
+/// A type of the format, and how it stores a number.
+type Kind = (u32, fn(f64) -> Vec<u8>);
+
+const TYPES: [Kind; 13] = [
     (1, |v| (v as i8).to_le_bytes().to_vec()),
     (2, |v| (v as i16).to_le_bytes().to_vec()),
     (3, |v| (v as i32).to_le_bytes().to_vec()),
@@ -476,6 +478,9 @@ fn daqmx_scalers_lie_in_rows_of_buffers() {
         .says(1, &["DAQmx scaler"]);
 }
 
+/// Properties of a channel that are texts, those that are numbers, and what is said of them.
+type Case<'a> = (&'a [(&'a str, &'a str)], &'a [(&'a str, f64)], &'a str);
+
 #[test]
 fn scales_that_are_not_known_or_whole_are_named() {
     let folder = Folder::new();
@@ -493,7 +498,7 @@ fn scales_that_are_not_known_or_whole_are_named() {
         segment(14, 4713, &metadata, &[0; 48], false)
     };
     let count = ("NI_Number_Of_Scales", 1.0);
-    let cases: [(&[(&str, &str)], &[(&str, f64)], &str); 5] = [
+    let cases: [Case; 5] = [
         (
             &[("NI_Scale[0]_Scale_Type", "Rosette")],
             &[count],
