@@ -31,7 +31,7 @@ pub use messages::{Messages, ProgressMode};
 pub use pages::{Completions, Man, Schema};
 pub use simulate::Simulate;
 pub use values::{BandOption, Orders};
-use values::{band, digits, orders, percent, range, svg_file, warning_code};
+use values::{band, digits, orders, percent, range, result_file, svg_file, warning_code};
 pub(crate) use wrong::{is_json_asked, log_asked, wrong_usage};
 
 /// Version, commit and target of this build.
@@ -177,7 +177,7 @@ impl OneChannel {
 #[derive(Debug, Clone, Args)]
 pub struct OutputArgs {
     /// File to write, or - for standard output
-    #[arg(short, long, value_name = "OUT")]
+    #[arg(short, long, value_name = "OUT", value_parser = PathBufValueParser::new().try_map(result_file))]
     pub output: Option<PathBuf>,
     /// Replace the output if it exists
     #[arg(long)]

@@ -1,8 +1,8 @@
 //! Work that is shared among threads, with results that do not depend on how many there are.
 
 use std::ops::Range;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{LazyLock, Mutex};
 
 /// Threads beyond which sharing pays no more.
 const MOST_THREADS: usize = 8;
@@ -16,7 +16,10 @@ pub fn threads() -> usize {
 /// Cores that this process may use: as many as Slurm gives the task, and no more than the system (its cgroup included) has.
 #[must_use]
 pub fn cores() -> usize {
-    let system = std::thread::available_parallelism().map_or(1, usize::from);
+    // Linux reads files of the cgroup to tell.
+    static SYSTEM: LazyLock<usize> =
+        LazyLock::new(|| std::thread::available_parallelism().map_or(1, usize::from));
+    let system = *SYSTEM;
     let slurm = std::env::var("SLURM_CPUS_PER_TASK").ok();
     let slurm = slurm.and_then(|text| text.parse::<usize>().ok());
     slurm

@@ -16,6 +16,32 @@ fn folder() -> Folder {
 const COMPENSATE: [&str; 4] = ["compensate", "in.csv", "--stand", "stand.toml"];
 
 #[test]
+fn text_does_not_get_the_name_of_another_format() {
+    let folder = folder();
+    for (name, said) in [
+        ("out.parquet", "COPY (FROM 'out.csv') TO 'out.parquet'"),
+        ("out.Feather", "polars"),
+        ("out.xlsx", "name it out.csv"),
+    ] {
+        let args = [&COMPENSATE[..], &["-o", name]].concat();
+        folder.run(&args).says(2, &["text or MCAP", said]);
+        folder
+            .run(&["extract", "in.csv", "-o", name])
+            .says(2, &["name it out.csv"]);
+    }
+    let named = [
+        "extract",
+        "in.csv",
+        "-o",
+        "out/",
+        "--name",
+        "{stem}.parquet",
+    ];
+    folder.run(&named).says(2, &["name it {stem}.csv"]);
+    assert_eq!(folder.names(), ["in.csv", "stand.toml"]);
+}
+
+#[test]
 fn an_existing_output_is_kept_without_force() {
     let folder = folder();
     folder.write("out.csv", "precious\n");

@@ -51,6 +51,7 @@ mod simulate;
 mod standard_error;
 mod stated_std;
 mod table;
+mod tdms;
 mod text_tables;
 mod text_values;
 mod thesis;

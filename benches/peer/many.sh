@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Many short logs: one run of torqcomp over their folder, a shell loop over one-file runs of a Python reader, and one run of
-# torqcomp over one record of the same rows. See README.md.
+# torqcomp over one record of the same rows, both without waiting for the disk and with it. See README.md.
 set -euo pipefail
 
 usage() {
@@ -10,7 +10,7 @@ usage: benches/peer/many.sh [LOGS [ROWS [PAIRS]]] [-- FLAG ...]
   LOGS    number of logs [1000]
   ROWS    samples in each [20000]
   PAIRS   runs of torqcomp over the folder and over the one record, in turns [5]; the loop runs once
-  -- FLAG ...   more flags for torqcomp, such as --no-sync or --jobs 2
+  -- FLAG ...   more flags for torqcomp over the folder, such as --jobs 2
 
 environment
   TORQCOMP     the program [a release build]
@@ -68,12 +68,12 @@ tail -n +2 "$record" | heading=$heading split -l "$rows" -d -a 5 --additional-su
 
 # --- measure --------------------------------------------------------------------------------------
 
-# Runs a command and prints the seconds that it took.
+# Runs a command and prints the seconds that it took, by the clock and of the processors.
 seconds() {
     sync -f "$data"
-    local begun=$EPOCHREALTIME
-    "$@" >"$data/said" 2>&1 || { cat "$data/said" >&2; fail "$1 failed"; }
-    awk -v from="$begun" -v to="$EPOCHREALTIME" 'BEGIN { printf "%.3f\n", to - from }'
+    local TIMEFORMAT='%R %U %S'
+    { time "$@" >"$data/said" 2>&1; } 2>"$data/took" || { cat "$data/said" >&2; fail "$1 failed"; }
+    awk '{ printf "%.3f %.3f\n", $1, $2 + $3 }' "$data/took"
 }
 
 loop() {
@@ -85,25 +85,19 @@ loop() {
 
 folder() {
     rm -rf "$data/out"
-    "$torqcomp" compensate "$data/logs" --stand "$here/stand.toml" --band rated --quiet -o "$data/out/" "${flags[@]}"
+    "$torqcomp" compensate "$data/logs" --stand "$here/stand.toml" --band rated --quiet -o "$data/out/" "$@" "${flags[@]}"
 }
 
 one() {
-    local alone=()
-    for flag in "${flags[@]}"; do
-        [[ $flag == --no-sync ]] && alone+=("$flag")
-    done
-    "$torqcomp" compensate "$record" --stand "$here/stand.toml" --band rated --quiet --force -o "$data/one.csv" "${alone[@]}"
+    "$torqcomp" compensate "$record" --stand "$here/stand.toml" --band rated --quiet --force -o "$data/one.csv" "$@"
 }
 
 load=$(cut -d ' ' -f 1 /proc/loadavg)
 cat "$record" "$data"/logs/*.csv >/dev/null
 for ((pair = 1; pair <= pairs; pair++)); do
-    a=$(seconds folder)
-    b=$(seconds one)
-    echo "$a $b" >>"$data/pairs"
+    echo "$(seconds folder --no-sync) $(seconds one --no-sync) $(seconds folder) $(seconds one)" >>"$data/pairs"
 done
-looped=$(seconds loop)
+read -r looped _ < <(seconds loop)
 
 # The results of both ways agree, but for the ends of each log.
 first=$(find "$data/logs" -name '*.csv' | sort | head -n 1)
@@ -114,11 +108,16 @@ name=$(basename "$first" .csv)
 median() {
     sort -n | awk '{ v[NR] = $1 } END { printf "%.3f\n", NR % 2 ? v[(NR + 1) / 2] : (v[NR / 2] + v[NR / 2 + 1]) / 2 }'
 }
-folder_s=$(cut -d ' ' -f 1 "$data/pairs" | median)
-one_s=$(cut -d ' ' -f 2 "$data/pairs" | median)
-ratio=$(awk '{ print $1 / $2 }' "$data/pairs" | median)
+# Median of a column, or of the ratio of two.
+column() { awk -v of="$1" '{ print $of }' "$data/pairs" | median; }
+ratio() { awk -v a="$1" -v b="$2" '{ print $a / ($b > 0 ? $b : 0.001) }' "$data/pairs" | median; }
 bytes=$(stat -c %s "$record")
 echo "$logs logs of $rows rows, $((bytes / 1000000)) MB, on $(stat -f -c %T "$data"); $(nproc) cores, load average $load before"
-echo "one run over the folder:       $folder_s s (median of $pairs)  ${flags[*]}"
-echo "one run over one record:       $one_s s; the folder takes $ratio times as long (median of pairs)"
-echo "shell loop over Python runs:   $looped s, $(awk -v a="$looped" -v b="$folder_s" 'BEGIN { printf "%.1f", a / b }') times as long as the folder"
+echo "medians of $pairs pairs           folder s  one record s  ratio   processor time: folder s  one record s  ratio"
+print_pair() {
+    printf '%-30s %9s %13s %6.2f %25s %13s %6.2f\n' "$1" "$(column "$2")" "$(column $(($2 + 2)))" "$(ratio "$2" $(($2 + 2)))" \
+        "$(column $(($2 + 1)))" "$(column $(($2 + 3)))" "$(ratio $(($2 + 1)) $(($2 + 3)))"
+}
+print_pair "without waiting for the disk" 1
+print_pair "results durable" 5
+echo "shell loop over Python runs: $looped s, $(awk -v a="$looped" -v b="$(column 5)" 'BEGIN { printf "%.1f", a / b }') times as long as the folder with durable results"

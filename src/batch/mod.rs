@@ -153,8 +153,8 @@ pub(crate) fn run(
     manifest.append(print::json_line(&plan.begin()))?;
     let running = Running {
         on_one,
+        manifest,
         shared: Mutex::new(Shared {
-            manifest,
             progress: Progress::new(Task::Recordings),
             done: Amount::default(),
             failures: 0,
@@ -203,13 +203,13 @@ fn open_summary(task: &BatchTask) -> Result<Option<Output>, Failure> {
 struct Running<'a> {
     plan: &'a BatchPlan<'a>,
     on_one: &'a OnOne<'a>,
+    manifest: JsonLines,
     shared: Mutex<Shared>,
     all: Amount,
 }
 
 /// What the workers share.
 struct Shared {
-    manifest: JsonLines,
     progress: Progress,
     done: Amount,
     failures: u32,
@@ -243,7 +243,7 @@ impl Running<'_> {
                 Treated::Made(_) => None,
             });
         let end = RunEnd::new(skipped.collect());
-        shared.manifest.append(print::json_line(&end))
+        self.manifest.append(print::json_line(&end))
     }
 
     /// Does what is to be done with a recording; `None` if it is not begun.
@@ -319,11 +319,17 @@ impl Running<'_> {
 
     /// Adds a line to the manifest; whether that went well. Without it, no result gets its name.
     fn note(&self, entry: &ManifestEntry) -> bool {
+        let shared = self.lock();
+        let added = match shared.broken {
+            None => self.manifest.add(print::json_line(&entry)),
+            Some(_) => return false,
+        };
+        // The others add theirs while this one gets on the disk.
+        drop(shared);
+        let settled = added.and_then(|()| self.manifest.settle());
         let mut shared = self.lock();
-        if shared.broken.is_none()
-            && let Err(failure) = shared.manifest.append(print::json_line(&entry))
-        {
-            shared.broken = Some(failure);
+        if let Err(failure) = settled {
+            shared.broken.get_or_insert(failure);
         }
         shared.broken.is_none()
     }

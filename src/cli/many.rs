@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::OutputArgs;
+use super::values::result_file;
 use crate::io::sum;
 
 /// Many recordings, each read by itself.
@@ -141,6 +142,7 @@ pub(crate) fn template(text: &str) -> Result<String, String> {
             "expected a name without a folder: the folders are those of the recordings".to_owned(),
         );
     }
+    result_file(PathBuf::from(text))?;
     match text.contains("{stem}") || text.contains("{name}") {
         true => Ok(text.to_owned()),
         false => Err(
@@ -169,6 +171,11 @@ mod tests {
         assert!(template("torque.csv").unwrap_err().contains("{stem}"));
         assert!(template("{stam}.csv").unwrap_err().contains("braces"));
         assert!(template("a/{stem}.csv").unwrap_err().contains("folder"));
+        assert!(
+            template("{stem}.parquet")
+                .unwrap_err()
+                .contains("{stem}.csv")
+        );
         assert!(template("{ext}").is_err());
     }
 }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::failure::did_you_mean;
-use crate::file_name::{ShowPath, is_dash};
+use crate::file_name::{self, ShowPath, is_dash};
 use crate::io::digits::Digits;
 use crate::io::positive_frequency;
 use crate::warning::CODES;
@@ -73,6 +73,34 @@ pub fn svg_file(path: PathBuf) -> Result<PathBuf, String> {
     }
 }
 
+/// Endings of files of columns that polars, DuckDB and pandas read.
+const COLUMNS: [&str; 3] = ["parquet", "arrow", "feather"];
+/// Endings of other formats that no verb writes.
+const FOREIGN: [&str; 8] = ["xlsx", "mat", "h5", "hdf5", "npy", "tdms", "wav", "uff"];
+
+/// A file for a result: text must not stand under a name that says otherwise.
+pub fn result_file(path: PathBuf) -> Result<PathBuf, String> {
+    let end = path.extension().unwrap_or_default();
+    let is = |other: &&&str| end.eq_ignore_ascii_case(other);
+    let is_folder = file_name::ends_with_separator(&path);
+    if is_folder || !COLUMNS.iter().chain(&FOREIGN).any(|other| is(&other)) {
+        return Ok(path);
+    }
+    let as_text = path.with_extension("csv");
+    let advice = match COLUMNS.iter().find(is) {
+        Some(_) => format!(
+            ": polars and DuckDB read it as it is, and convert it: duckdb -c \"COPY (FROM '{}') TO '{}.parquet'\"",
+            as_text.shown(),
+            path.with_extension("").shown()
+        ),
+        None => String::new(),
+    };
+    Err(format!(
+        "results are written as text or MCAP; name it {}{advice}",
+        as_text.shown()
+    ))
+}
+
 /// A code that some warning has.
 pub fn warning_code(text: &str) -> Result<String, String> {
     let mut codes = CODES
@@ -135,6 +163,23 @@ mod tests {
                 .contains("x.tar.svg")
         );
         assert!(svg_file("-".into()).is_err());
+        for good in [
+            "-",
+            "out.csv",
+            "out.mcap",
+            "out/",
+            "parquet",
+            "a.parquet/b.txt",
+            "a.parquet/",
+        ] {
+            assert_eq!(result_file(good.into()), Ok(PathBuf::from(good)));
+        }
+        let refused = result_file("a/x.Parquet".into()).unwrap_err();
+        assert!(refused.contains("name it a/x.csv: ") && refused.contains("TO 'a/x.parquet'"));
+        assert_eq!(
+            result_file("x.xlsx".into()),
+            Err("results are written as text or MCAP; name it x.csv".to_owned())
+        );
         assert!(digits("0").is_err() && digits("16").is_err());
     }
 }

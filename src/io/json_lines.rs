@@ -59,12 +59,32 @@ impl JsonLines {
     /// # Errors
     /// If they cannot be written.
     pub(crate) fn append(&self, lines: String) -> Result<(), Failure> {
-        let written = self.write(lines);
-        let synced = written.and_then(|()| match self.sync {
+        self.add(lines)?;
+        self.settle()
+    }
+
+    /// Adds lines as [`JsonLines::append`] does; they are on the disk once they are settled. Threads add one at a time.
+    ///
+    /// # Errors
+    /// If they cannot be written.
+    pub(crate) fn add(&self, lines: String) -> Result<(), Failure> {
+        self.write(lines).map_err(|error| self.unwritable(&error))
+    }
+
+    /// Has all lines added so far on the disk; several threads may wait for that together.
+    ///
+    /// # Errors
+    /// If the system cannot do that.
+    pub(crate) fn settle(&self) -> Result<(), Failure> {
+        let synced = match self.sync {
             true => storage::sync(&self.file),
             false => Ok(()),
-        });
-        synced.map_err(|error| Failure::writing(&self.path.shown().to_string(), &error))
+        };
+        synced.map_err(|error| self.unwritable(&error))
+    }
+
+    fn unwritable(&self, error: &io::Error) -> Failure {
+        Failure::writing(&self.path.shown().to_string(), error)
     }
 
     fn write(&self, mut lines: String) -> io::Result<()> {

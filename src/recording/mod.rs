@@ -58,7 +58,7 @@ pub(crate) use validator::{StreamSummary, StreamValidator};
 pub struct Recording {
     /// Name of the file, for people.
     pub source: String,
-    /// `csv` for any text, `mcap`, `wav`, `uff`, `mat`.
+    /// `csv` for any text, `mcap`, `wav`, `uff`, `mat`, `tdms`.
     pub format: &'static str,
     /// How it is written, for people: `LabVIEW LVM, tab-separated, decimal point, 3 segments`.
     pub dialect: String,

@@ -34,7 +34,6 @@ pub struct Band {
     sample_rate_hz: f64,
     top_hz: f64,
     end_hz: f64,
-    edge: &'static Edge,
 }
 
 impl Band {
@@ -80,7 +79,6 @@ impl Band {
             sample_rate_hz,
             top_hz,
             end_hz: Self::end_of(sample_rate_hz, top_hz),
-            edge: Edge::shared(),
         })
     }
 
@@ -129,9 +127,12 @@ impl Band {
     #[must_use]
     pub fn gain(&self, frequency_hz: f64) -> f64 {
         let x = (frequency_hz.abs() - self.top_hz) / (self.end_hz - self.top_hz);
-        1.0 - self.edge.at(x)
+        1.0 - EDGE.at(x)
     }
 }
+
+/// The same for every band.
+static EDGE: LazyLock<Edge> = LazyLock::new(Edge::new);
 
 /// Smooth step from 0 at `x = 0` to 1 at `x = 1`: the running integral of a Kaiser window.
 #[derive(Debug, Clone, PartialEq)]
@@ -142,12 +143,6 @@ struct Edge {
 }
 
 impl Edge {
-    /// The only one there is, made when it is first needed.
-    fn shared() -> &'static Self {
-        static EDGE: LazyLock<Edge> = LazyLock::new(Edge::new);
-        &EDGE
-    }
-
     fn new() -> Self {
         let width = 1.0 / EDGE_NODES as f64;
         let mut cumulative = vec![0.0];
@@ -189,7 +184,8 @@ fn gauss3(a: f64, b: f64) -> f64 {
 /// Kaiser window on `[0, 1]`, scaled to 1 in the middle.
 fn kaiser(x: f64) -> f64 {
     let u = 2.0 * x - 1.0;
-    bessel_i0(EDGE_BETA * (1.0 - u * u).max(0.0).sqrt()) / bessel_i0(EDGE_BETA)
+    static MIDDLE: LazyLock<f64> = LazyLock::new(|| bessel_i0(EDGE_BETA));
+    bessel_i0(EDGE_BETA * (1.0 - u * u).max(0.0).sqrt()) / *MIDDLE
 }
 
 /// Modified Bessel function `I₀(x) = Σ ((x/2)^k / k!)²` (DLMF 10.25.2).

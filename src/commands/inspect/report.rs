@@ -39,7 +39,7 @@ pub(super) enum Inspected {
 pub(super) struct InspectedFile {
     /// Path of the recording.
     pub(super) file: String,
-    /// `csv` for any text, `mcap`, `wav`, `uff` (universal file), `mat` (MATLAB 5).
+    /// `csv` for any text, `mcap`, `wav`, `uff` (universal file), `mat` (MATLAB 5), `tdms` (LabVIEW).
     pub(super) format: &'static str,
     /// How the recording is written.
     pub(super) dialect: String,

@@ -1,4 +1,4 @@
-//! Files of other programs that are refused with the way to convert them: ROS 2 bags of SQLite, LabVIEW TDMS, and HDF5.
+//! Files of other programs that are refused with the way to convert them: ROS 2 bags of SQLite, and HDF5.
 
 use super::bytes::Bytes;
 use super::{Content, Format};
@@ -14,13 +14,12 @@ pub(super) const BAG: Format = Format {
 };
 
 const SQLITE: &[u8] = b"SQLite format 3\0";
-const TDMS: &[u8] = b"TDSm";
 const HDF5: &[u8] = b"\x89HDF\r\n\x1a\n";
 /// Where HDF5 begins in a file of MATLAB.
 const BEHIND_MATLAB: usize = 512;
 
 fn is(head: &[u8]) -> bool {
-    let begins = [SQLITE, TDMS, HDF5];
+    let begins = [SQLITE, HDF5];
     begins.iter().any(|begin| head.starts_with(begin)) || is_matlab_hdf5(head)
 }
 
@@ -35,9 +34,6 @@ fn read(bytes: &mut Bytes, _: &Reading) -> Result<Content, Failure> {
     let message = if head.starts_with(SQLITE) {
         "this is an SQLite database, as ROS 2 bags (.db3) are; convert the bag to MCAP with: mcap convert BAG.db3 BAG.mcap, or \
          with: ros2 bag convert -i BAG -o OUT.yaml (storage_id: mcap)"
-    } else if head.starts_with(TDMS) {
-        "this is a LabVIEW TDMS file, which torqcomp does not read; save it as text (LVM) in LabVIEW, or convert it with npTDMS \
-         and pandas in Python: TdmsFile.read('FILE.tdms').as_dataframe(time_index=True).to_csv('FILE.csv')"
     } else if is_matlab_hdf5(&head) {
         "this is a MATLAB file of version 7.3 (HDF5); save it with the flag -v7 in MATLAB: save('FILE.mat', 'NAME', '-v7')"
     } else {

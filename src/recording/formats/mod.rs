@@ -6,6 +6,7 @@
 mod bag;
 mod bytes;
 mod matlab;
+mod tdms;
 mod universal;
 mod wave;
 
@@ -34,10 +35,11 @@ pub(crate) struct Format {
 }
 
 /// All of them.
-const FORMATS: [&Format; 4] = [
+const FORMATS: [&Format; 5] = [
     &wave::WAVE,
     &universal::UNIVERSAL,
     &matlab::MATLAB,
+    &tdms::TDMS,
     &bag::BAG,
 ];
 

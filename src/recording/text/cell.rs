@@ -72,6 +72,10 @@ impl Cell {
 
 /// A number with the minus sign of typesetters (U+2212) or an en dash in its place: `−0.5`, `1.5e–03`.
 fn with_plain_minus(text: &str) -> Option<String> {
+    // As nearly every cell is.
+    if text.is_ascii() {
+        return None;
+    }
     let is_long = |c: char| matches!(c, '\u{2212}' | '\u{2013}');
     let is_number = |c: char| c.is_ascii_digit() || matches!(c, '.' | ',' | '∞');
     let mut plain = String::with_capacity(text.len());

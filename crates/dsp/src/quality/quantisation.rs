@@ -81,19 +81,22 @@ fn levels(samples: &[f64], same: f64) -> Vec<f64> {
     values
 }
 
-/// A step near a first guess that the distances are multiples of.
+/// A step near a first guess that the distances, which rise, are multiples of.
 fn refined(distances: &[f64], guess: f64) -> Option<f64> {
     let mut step = guess;
     for _ in 0..3 {
-        let usable = distances.iter().filter(|d| **d < MOST_STEPS * step);
-        let (sum, count) = usable.fold((0.0, 0.0), |(sum, count), d| {
-            let steps = (d / step).round();
-            if steps < 1.0 {
-                (sum, count)
-            } else {
-                (sum + d, count + steps)
-            }
-        });
+        // They rise.
+        let usable = distances.partition_point(|d| *d < MOST_STEPS * step);
+        let (sum, count) = distances[..usable]
+            .iter()
+            .fold((0.0, 0.0), |(sum, count), d| {
+                let steps = (d / step).round();
+                if steps < 1.0 {
+                    (sum, count)
+                } else {
+                    (sum + d, count + steps)
+                }
+            });
         if count == 0.0 {
             return None;
         }

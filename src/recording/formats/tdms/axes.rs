@@ -1,0 +1,299 @@
+//! Channels of a TDMS file, and how they lie in time.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use super::objects::{Properties, Property, TdmsObject, TdmsObjects};
+use super::scales;
+use crate::failure::{ErrorCode, Failure};
+use crate::io::{Reading, digits};
+use crate::recording::formats::{Content, channel, plausible_rate, stamped};
+use crate::recording::moment::{Moment, date_and_time};
+use crate::recording::text::is_time_name;
+use crate::recording::{TimeAxis, without_rounding};
+use crate::unit::NamedUnit;
+use crate::warning::Warning;
+
+/// Most channels that are named as left out, and most properties of the file that are told.
+const NAMED: usize = 10;
+const TOLD: usize = 50;
+
+/// A channel of numbers, or of times alone.
+struct ScaledChannel {
+    object: TdmsObject,
+    values: Vec<f64>,
+}
+
+impl ScaledChannel {
+    fn len(&self) -> usize {
+        self.values.len().max(self.object.times_ns.len())
+    }
+
+    fn group(&self) -> &str {
+        &self.object.path[0]
+    }
+
+    fn name(&self) -> String {
+        self.object.path.join("/")
+    }
+
+    fn is_times(&self) -> bool {
+        self.values.is_empty()
+    }
+
+    /// Whether its values can be the times of others.
+    fn is_time(&self) -> bool {
+        self.is_times()
+            || is_time_name(&self.object.path[1])
+                && self.object.number("wf_increment").is_none()
+                && self.values.windows(2).all(|pair| pair[1] >= pair[0])
+    }
+}
+
+/// Makes channels of the objects that have samples.
+///
+/// # Errors
+/// If options for the time do not fit.
+pub(super) fn channels(
+    objects: TdmsObjects,
+    reading: &Reading,
+    content: &mut Content,
+) -> Result<(), Failure> {
+    content.details = details(&objects);
+    let (found, mut left_out) = scaled(objects);
+    let starts = found.iter().filter_map(|f| f.object.time("wf_start_time"));
+    let first_ns = starts.min();
+    let times = GroupTimes::of(&found, reading)?;
+    let mut axes: HashMap<usize, TimeAxis> = HashMap::new();
+    let mut made = Vec::new();
+    for one in &found {
+        let is_column = reading.time_column.is_some();
+        let of_header = || of_waveform(&one.object, first_ns);
+        let stamps = times
+            .place(&found, one)
+            .filter(|_| is_column || of_header().is_none());
+        made.push(match stamps {
+            Some(place) => {
+                if let std::collections::hash_map::Entry::Vacant(entry) = axes.entry(place) {
+                    entry.insert(of_times(&found[place], reading)?);
+                }
+                axes.get(&place).cloned()
+            }
+            None => of_header(),
+        });
+    }
+    for (place, (one, axis)) in found.into_iter().zip(made).enumerate() {
+        if axes.contains_key(&place) {
+            continue;
+        }
+        let name = one.name();
+        if one.is_times() {
+            left_out.push(format!("\"{name}\" (times of no other channel)"));
+            continue;
+        }
+        content.warnings.extend(doubts(&one.object, &name));
+        let unit = ["unit_string", "NI_UnitDescription"];
+        let unit = unit.into_iter().find_map(|key| one.object.text(key));
+        let axis = axis.unwrap_or_default();
+        content
+            .channels
+            .push(channel(&name, unit, one.values, axis));
+    }
+    if !left_out.is_empty() {
+        let more = match left_out.len().saturating_sub(NAMED) {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        left_out.truncate(NAMED);
+        let message = format!("left out: {}{more}", left_out.join(", "));
+        content.warnings.push(Warning::new("left-out", message));
+    }
+    Ok(())
+}
+
+/// Channels with their scaled values, and those of which there are none.
+fn scaled(objects: TdmsObjects) -> (Vec<ScaledChannel>, Vec<String>) {
+    let (mut file, mut groups) = (Properties::new(), HashMap::new());
+    for object in &objects.all {
+        match object.path.as_slice() {
+            [] => file.clone_from(&object.properties),
+            [group] => drop(groups.insert(group.clone(), object.properties.clone())),
+            _ => {}
+        }
+    }
+    let (none, mut found, mut left_out) = (Properties::new(), Vec::new(), Vec::new());
+    for mut object in objects.all {
+        let [group, _] = object.path.as_slice() else {
+            continue;
+        };
+        let name = object.path.join("/");
+        if let Some(why) = object.left_out {
+            left_out.push(format!("\"{name}\" ({why})"));
+            continue;
+        }
+        if object.len() == 0 {
+            continue;
+        }
+        let series = std::mem::take(&mut object.series);
+        let levels = [
+            &object.properties,
+            groups.get(group).unwrap_or(&none),
+            &file,
+        ];
+        match scales::scaled(series, levels) {
+            Ok(values) => found.push(ScaledChannel { object, values }),
+            Err(why) => left_out.push(format!("\"{name}\" ({why})")),
+        }
+    }
+    (found, left_out)
+}
+
+/// Which channels are times of others, by their group.
+struct GroupTimes {
+    of_group: HashMap<String, Vec<usize>>,
+}
+
+impl GroupTimes {
+    fn of(found: &[ScaledChannel], reading: &Reading) -> Result<Self, Failure> {
+        let mut of_group: HashMap<String, Vec<usize>> = HashMap::new();
+        for (place, one) in found.iter().enumerate() {
+            let is = match &reading.time_column {
+                Some(wanted) => one.object.path[1] == *wanted || one.name() == *wanted,
+                None => one.is_time(),
+            };
+            if is {
+                let group = one.group().to_owned();
+                of_group.entry(group).or_default().push(place);
+            }
+        }
+        if let (Some(wanted), true) = (&reading.time_column, of_group.is_empty()) {
+            let names: Vec<String> = found.iter().take(NAMED).map(ScaledChannel::name).collect();
+            return Err(Failure::failed(
+                ErrorCode::ChannelNotFound,
+                format_args!(
+                    "there is no channel \"{wanted}\" for --time-column; the channels are {}",
+                    names.join(", ")
+                ),
+            ));
+        }
+        Ok(Self { of_group })
+    }
+
+    /// The only channel of the same group and length that has the times of one.
+    fn place(&self, found: &[ScaledChannel], one: &ScaledChannel) -> Option<usize> {
+        let places = self.of_group.get(one.group())?;
+        let mut fitting = places.iter().filter(|place| {
+            let times = &found[**place];
+            times.len() == one.len() && !std::ptr::eq(times, one)
+        });
+        match (fitting.next(), fitting.next()) {
+            (Some(place), None) if !places.iter().any(|p| std::ptr::eq(&found[*p], one)) => {
+                Some(*place)
+            }
+            _ => None,
+        }
+    }
+}
+
+/// What is doubtful about the time axis of a channel.
+fn doubts(object: &TdmsObject, name: &str) -> Option<Warning> {
+    if let Some(unit) = other_dimension(object) {
+        let message = format!(
+            "\"{name}\": the horizontal axis is in {unit}, not time: the samples have no rate"
+        );
+        return Some(Warning::new("no-time-axis", message));
+    }
+    match object.changed? {
+        "wf_increment" => Some(Warning::new(
+            "no-time-axis",
+            format!(
+                "\"{name}\": wf_increment changes within the file: the samples have no rate; save each part in a file of its own"
+            ),
+        )),
+        changed => Some(Warning::new(
+            "restarted",
+            format!(
+                "\"{name}\": {changed} changes within the file: the recording was restarted, and the samples lie as if it had not \
+                 been; save each part in a file of its own if the times matter"
+            ),
+        )),
+    }
+}
+
+/// The unit of the horizontal axis, if it is not one of time.
+fn other_dimension(object: &TdmsObject) -> Option<&str> {
+    let unit = object.text("wf_xunit_string")?;
+    let is_time = NamedUnit::parse(unit).is_some_and(|unit| unit.is_time());
+    (!is_time).then_some(unit)
+}
+
+/// The axis that the properties of a waveform give; times count from the first start in the file.
+fn of_waveform(object: &TdmsObject, first_ns: Option<i64>) -> Option<TimeAxis> {
+    if other_dimension(object).is_some() || object.changed == Some("wf_increment") {
+        return None;
+    }
+    let step_s = object.number("wf_increment").filter(|step| *step > 0.0)?;
+    let rate_hz = plausible_rate(without_rounding(1.0 / step_s))?;
+    let offset_s = object.number("wf_start_offset").filter(|s| s.is_finite());
+    let start_ns = object.time("wf_start_time");
+    let later_s = start_ns.map(|ns| ns.wrapping_sub(first_ns.unwrap_or(ns)) as f64 * 1e-9);
+    let start_s = match (later_s, offset_s) {
+        (None, None) => None,
+        (later, offset) => Some(later.unwrap_or(0.0) + offset.unwrap_or(0.0)),
+    };
+    let mut axis = TimeAxis::of_header("wf_increment", rate_hz, start_s);
+    axis.clock_ns = first_ns.filter(|_| start_ns.is_some());
+    axis.start_text = axis.clock_ns.and_then(|origin_ns| {
+        let after_s = start_s.unwrap_or(0.0);
+        Moment { origin_ns, after_s }.date()
+    });
+    Some(axis)
+}
+
+/// The axis that a channel of times gives.
+fn of_times(times: &ScaledChannel, reading: &Reading) -> Result<TimeAxis, Failure> {
+    let name = times.name();
+    if let (Some(first_ns), true) = (times.object.times_ns.first(), times.is_times()) {
+        let all = times.object.times_ns.iter();
+        let stamps = all.map(|ns| ns.wrapping_sub(*first_ns) as f64 * 1e-9);
+        let mut axis = TimeAxis::of_stamps(&name, Arc::new(stamps.collect()));
+        axis.clock_ns = Some(*first_ns);
+        axis.start_text = date_and_time(*first_ns);
+        return Ok(axis);
+    }
+    let of_name = times.object.path[1].rsplit_once('_').map(|(_, unit)| unit);
+    let known = |text: &str| NamedUnit::parse(text).filter(NamedUnit::is_time);
+    let unit = match &reading.time_unit {
+        Some(given) => Some(known(given).ok_or_else(|| {
+            Failure::usage(
+                ErrorCode::InvalidValue,
+                "--time-unit is no unit of time; expected s, ms, us or min",
+            )
+        })?),
+        None => {
+            (times.object.text("unit_string").and_then(known)).or_else(|| of_name.and_then(known))
+        }
+    };
+    let second = unit.map_or(1.0, |unit| unit.unit.factor());
+    Ok(stamped(
+        &name,
+        times.values.iter().map(|t| t * second).collect(),
+    ))
+}
+
+/// What the file says of itself.
+fn details(objects: &TdmsObjects) -> Vec<(String, String)> {
+    let file = objects.all.iter().find(|object| object.path.is_empty());
+    let properties = file.into_iter().flat_map(|file| &file.properties);
+    let of_people = properties.filter(|(key, _)| !key.starts_with("NI_"));
+    let told = of_people.filter_map(|(key, value)| {
+        let text = match value {
+            Property::Text(text) if text.trim().is_empty() => return None,
+            Property::Text(text) => text.trim().to_owned(),
+            Property::Number(value) => digits::text(*value, 12),
+            Property::Time(ns) => date_and_time(*ns)?,
+        };
+        Some((key.clone(), text))
+    });
+    told.take(TOLD).collect()
+}
