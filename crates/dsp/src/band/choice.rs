@@ -15,7 +15,7 @@
 //! `N` is white. It is taken from where the record is weakest: the mean of the three least medians of 16 equal parts
 //! between 2 and 98 % of half the rate.
 
-use super::{Band, Edge, FALLBACK_FRACTION};
+use super::{Band, EDGE, Edge, FALLBACK_FRACTION};
 use crate::compensate::Inverse;
 use crate::spectrum::{Density, welch_steep};
 
@@ -107,7 +107,7 @@ impl BandSearch {
             power_gain,
             floor,
             sums: Vec::new(),
-            edge: Edge::shared(),
+            edge: &EDGE,
         };
         search.sum();
         Some(search)
