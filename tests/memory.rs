@@ -46,8 +46,6 @@ fn record(rows: usize, channels: &[&str]) -> String {
                 }
                 "angle_rad" => write!(text, ",{angle:.7}"),
                 "turning_Nm" => write!(text, ",{:.5}", turning + 0.1 * applied),
-                "load_Nm" => write!(text, ",{}", i % 11),
-                "reading_V" => write!(text, ",{:.5}", 0.1 * (i % 11) as f64 + 0.001 * applied),
                 "noise_Nm" => write!(text, ",{applied:.5}"),
                 "answer_V" => write!(text, ",{answer:.5}"),
                 other => panic!("no channel {other}"),
@@ -90,7 +88,7 @@ fn peak_of(folder: &Folder, args: &[&str]) -> f64 {
 /// states.
 type Measured = (&'static str, &'static [&'static str], [usize; 2], f64);
 
-const VERBS: [Measured; 10] = [
+const VERBS: [Measured; 9] = [
     (
         "compensate LONG --stand stand.toml -o out.csv --force",
         &["bridge_V"],
@@ -141,12 +139,6 @@ const VERBS: [Measured; 10] = [
         &["angle_rad", "turning_Nm"],
         ROWS,
         170.0,
-    ),
-    (
-        "identify static LONG --load load --reading reading",
-        &["load_Nm", "reading_V"],
-        ROWS,
-        160.0,
     ),
 ];
 
