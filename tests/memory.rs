@@ -26,6 +26,10 @@ fn record(rows: usize, channels: &[&str]) -> String {
             .wrapping_add(1);
         let applied = (noise >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
         // A resonance at 0.3 rad a sample: 955 Hz.
+        let (slow, fast) = (18.0 * t, 47.0 * t);
+        let angle = slow.sin() + 0.2 * fast.sin();
+        // 0.01 θ'' + 0.5 θ', in N m.
+        let turning = 9.0 * slow.cos() - 3.24 * slow.sin() + 4.7 * fast.cos() - 4.418 * fast.sin();
         let answer = applied + 2.0 * 0.98 * 0.3_f64.cos() * ringing[0] - 0.98 * 0.98 * ringing[1];
         ringing = [answer, ringing[0]];
         let _ = write!(text, "{t:.5}");
@@ -40,6 +44,8 @@ fn record(rows: usize, channels: &[&str]) -> String {
                         (-20.0 * since).exp() * (3707.0 * since).cos()
                     )
                 }
+                "angle_rad" => write!(text, ",{angle:.7}"),
+                "turning_Nm" => write!(text, ",{:.5}", turning + 0.1 * applied),
                 "noise_Nm" => write!(text, ",{applied:.5}"),
                 "answer_V" => write!(text, ",{answer:.5}"),
                 other => panic!("no channel {other}"),
@@ -82,7 +88,7 @@ fn peak_of(folder: &Folder, args: &[&str]) -> f64 {
 /// states.
 type Measured = (&'static str, &'static [&'static str], [usize; 2], f64);
 
-const VERBS: [Measured; 8] = [
+const VERBS: [Measured; 9] = [
     (
         "compensate LONG --stand stand.toml -o out.csv --force",
         &["bridge_V"],
@@ -127,6 +133,12 @@ const VERBS: [Measured; 8] = [
         &["noise_Nm", "answer_V"],
         ROWS,
         100.0,
+    ),
+    (
+        "identify runup LONG --motion angle --torque turning",
+        &["angle_rad", "turning_Nm"],
+        ROWS,
+        170.0,
     ),
 ];
 

@@ -330,3 +330,39 @@ fn a_table_on_its_side_is_asked_about() {
         .run(&["extract", "many.csv", "--channel", "x"])
         .says(1, &["and 380 more"]);
 }
+
+/// Rows that are longer than what is looked at of a usual table: every verb takes the column that is asked for.
+#[test]
+fn tables_with_very_many_columns_are_read() {
+    const COLUMNS: usize = 40_000;
+    let folder = Folder::new();
+    let names: String = (0..COLUMNS).map(|c| format!(",c{c}_V")).collect();
+    let cell = |row: usize, column: usize| ((7 * row + 13 * column) % 1000) as f64 / 1000.0;
+    let rows: String = (0..64)
+        .map(|row| {
+            let cells: String = (0..COLUMNS)
+                .map(|column| format!(",{:.3}", cell(row, column)))
+                .collect();
+            format!("{:.3}{cells}\n", row as f64 * 1e-3)
+        })
+        .collect();
+    folder.write("wide.csv", format!("time_s{names}\n{rows}"));
+    let ran = folder.run(&[
+        "extract",
+        "wide.csv",
+        "--channel",
+        "c31234",
+        "-o",
+        "one.csv",
+    ]);
+    ran.says(0, &["1000 Hz from the uniform stamps"]);
+    let found = column(&folder.read("one.csv"), "c31234 [V]");
+    let want: Vec<f64> = (0..64).map(|row| cell(row, 31_234)).collect();
+    assert_eq!(found, want);
+    let stand = ["--stand", "stand.toml", "--band", "100", "-o", "out.csv"];
+    let of = ["compensate", "wide.csv", "--channel", "c31234"];
+    let ran = folder.run(&[&of[..], &stand].concat());
+    ran.says(0, &["64 samples at 1000 Hz"]);
+    let asked = folder.run(&["inspect", "wide.csv"]);
+    asked.says(1, &["64 rows and 40000 columns", "transpose"]);
+}

@@ -120,6 +120,151 @@ fn the_rate_of_epoch_stamps_is_exact_in_every_verb() {
     }
 }
 
+/// A record whose columns suit one verb each: torque and answer of a resonance at 0.2 rad a sample, an angle and the torque
+/// that moves it, a decay of 32 samples a period.
+fn record_of_all(hz: (u128, u128), heading: &str, spell: &dyn Fn(u128) -> String) -> String {
+    let (mut state, mut before) = (1_u64, [0.0; 2]);
+    let turn = std::f64::consts::TAU / 256.0;
+    let rows = (0..3000_u128).map(|i| {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        let applied = (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
+        let answer = 0.04 * applied + 1.96 * 0.2_f64.cos() * before[0] - 0.9604 * before[1];
+        before = [answer, before[0]];
+        let angles = [turn * i as f64, 3.3 * turn * i as f64 + 1.0];
+        let angle = angles[0].cos() + 0.4 * angles[1].cos();
+        let torque = -0.24 * angles[0].cos()
+            - 1.05 * angles[1].cos()
+            - 0.1 * angles[0].sin()
+            - 0.132 * angles[1].sin()
+            + 0.01 * applied;
+        let ringing = (-0.003 * i as f64).exp() * (std::f64::consts::TAU * i as f64 / 32.0).cos();
+        let ns = START_NS + (i * hz.1 * 1_000_000_000 + hz.0 / 2) / hz.0;
+        format!(
+            "{},{applied:.6},{answer:.6},{angle:.7},{torque:.6},{:.6}\n",
+            spell(ns),
+            ringing + 1e-4 * applied
+        )
+    });
+    let names = "applied [N m],answer [N m],angle [rad],torque [N m],ring [V]";
+    format!("{heading},{names}\n{}", rows.collect::<String>())
+}
+
+/// A stamp in ISO 8601 with that many digits of a second; the records are shorter than the rest of the month.
+fn iso(ns: u128, decimals: u32) -> String {
+    let text = seconds(ns, decimals);
+    let (whole, part) = text.split_once('.').expect("a part of a second");
+    let since: u64 = whole.parse().expect("seconds");
+    let since = since - 1_709_251_200;
+    let [day, hour] = [since / 86_400 + 1, since / 3600 % 24];
+    format!(
+        "2024-03-{day:02}T{hour:02}:{:02}:{:02}.{part}Z",
+        since / 60 % 60,
+        since % 60
+    )
+}
+
+/// The verbs that read a record as a whole, and `extract`, take the same rate, also from dates and from stamps that begin at
+/// zero.
+#[test]
+fn the_rate_is_the_same_in_every_verb_that_takes_a_record() {
+    let spellings: [(&str, Spelling); 7] = [
+        ("time [s]", |ns| seconds(ns, 6)),
+        ("time [s]", |ns| seconds(ns, 9)),
+        ("time [us]", |ns| ((ns + 500) / 1000).to_string()),
+        ("time [ns]", |ns| ns.to_string()),
+        ("time", |ns| iso(ns, 6)),
+        ("time", |ns| iso(ns, 9)),
+        ("time [s]", |ns| seconds(ns - START_NS, 9)),
+    ];
+    let folder = Folder::new();
+    let rates: [(u128, u128); 9] = [
+        (1, 100),
+        (1, 10),
+        (1, 1),
+        (2997, 50),
+        (25_600, 1),
+        (44_100, 1),
+        (51_200, 1),
+        (1_000_000, 1),
+        (10_000_000, 1),
+    ];
+    for hz in rates {
+        let rate_hz = hz.0 as f64 / hz.1 as f64;
+        let band = format!("{}..{}", 0.005 * rate_hz, 0.1 * rate_hz);
+        let fundamental = format!("{}", rate_hz / 32.0);
+        for (k, (heading, spell)) in spellings.into_iter().enumerate() {
+            let has_us = [0, 2, 4].contains(&k);
+            if has_us && rate_hz > 1e6 {
+                continue;
+            }
+            folder.write("record.csv", record_of_all(hz, heading, &spell));
+            let extract = [
+                "extract",
+                "record.csv",
+                "--channel",
+                "ring",
+                "-o",
+                "one.csv",
+                "--force",
+            ];
+            assert_eq!(folder.run(&extract).code, 0);
+            let runs: [&[&str]; 6] = [
+                &["inspect", "record.csv"],
+                &["inspect", "one.csv"],
+                &[
+                    "harmonics",
+                    "record.csv",
+                    "--channel",
+                    "ring",
+                    "--stand",
+                    "stand.toml",
+                    "--orders",
+                    "1",
+                    "--fundamental",
+                    &fundamental,
+                ],
+                &["identify", "decay", "record.csv", "--channel", "ring"],
+                &[
+                    "identify",
+                    "runup",
+                    "record.csv",
+                    "--motion",
+                    "angle",
+                    "--torque",
+                    "torque",
+                ],
+                &[
+                    "identify",
+                    "response",
+                    "record.csv",
+                    "--applied",
+                    "applied",
+                    "--measured",
+                    "answer",
+                    "--excitation",
+                    "random",
+                    "--modes",
+                    "1",
+                    "--band",
+                    &band,
+                ],
+            ];
+            for run in runs {
+                let report = json(&folder.run(&[run, &["--json"]].concat()));
+                let found = match run[0] {
+                    "inspect" => &report["channels"][0]["rate_hz"],
+                    _ => &report["rate_hz"],
+                };
+                let found_hz = found.as_f64().expect("a rate");
+                let what = format!("{rate_hz} Hz, {}: {run:?} {found_hz}", spell(START_NS));
+                assert!((found_hz / rate_hz - 1.0).abs() < 1e-9, "{what}");
+            }
+        }
+    }
+}
+
 /// 10 MHz needs nanoseconds, and a clock that counts from zero has them in any case.
 #[test]
 fn the_rate_of_fast_records_is_exact() {

@@ -5,55 +5,67 @@
 //! samples are still those of the lines at their own frequencies and decay rates, and only fewer. (R. G. Vaughan, N. L.
 //! Scott, D. R. White, IEEE Trans. Signal Process. 39 (1991), 1973.)
 
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 
 use crate::decimate::{Decimated, window_gain, windowed_sinc};
 use crate::{Error, dot};
 
-/// Half-length of the filter in samples of the result.
-const REACH: usize = 32;
-/// From the end of a band to where the filter passes nothing (80 dB), times the factor: Kaiser's 5.0 over twice the
-/// half-length.
-const EDGE: f64 = 5.0 / (2 * REACH) as f64;
+/// From the end of a band to where the filter passes nothing (80 dB), times the factor and twice the reach (J. F. Kaiser, in
+/// Kuo, Kaiser (eds.), System Analysis by Digital Computer, 1966).
+const EDGE: f64 = 5.0;
 
 /// Bands, in cycles per sample, and a factor for which their images lie apart.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Undersampling {
     /// Samples of the record per sample.
     pub factor: usize,
+    /// Half-length of the filter in samples of the result.
+    pub reach: usize,
     /// What is kept, by rising frequency.
     pub bands: Vec<Range<f64>>,
 }
 
 impl Undersampling {
-    /// The largest factor between two for which the images of bands, in cycles per sample, lie apart; `None` if there is none.
+    /// The largest of some factors for which the images of bands, in cycles per sample, lie apart, with a filter that reaches
+    /// so many samples of the result to either side: the longer, the narrower are its edges, and the more bands fit in. `None`
+    /// if there is none.
     ///
     /// ```
     /// use torqcomp_dsp::undersample::Undersampling;
     /// // With 5/64/100 for the edges of the filter, the band is 0.20022..0.20478: between 40/200 and 41/200.
-    /// assert_eq!(Undersampling::of(&[0.201..0.204], 2, 100).unwrap().factor, 100);
-    /// assert_eq!(Undersampling::of(&[0.0..0.4], 2, 100), None);
+    /// assert_eq!(Undersampling::of(&[0.201..0.204], 2..=100, 32).unwrap().factor, 100);
+    /// assert_eq!(Undersampling::of(&[0.0..0.4], 2..=100, 32), None);
     /// ```
     #[must_use]
-    pub fn of(bands: &[Range<f64>], least: usize, most: usize) -> Option<Self> {
-        let candidates = (least.max(2)..=most).rev();
+    pub fn of(bands: &[Range<f64>], factors: RangeInclusive<usize>, reach: usize) -> Option<Self> {
+        let candidates = (*factors.start().max(&2)..=*factors.end()).rev();
         candidates
-            .map(|factor| Self {
-                factor,
-                bands: joined(bands, 2.0 * EDGE / factor as f64),
+            .map(|factor| {
+                let mut of = Self {
+                    factor,
+                    reach,
+                    bands: Vec::new(),
+                };
+                of.bands = joined(bands, 2.0 * of.edge());
+                of
             })
             .find(Self::is_apart)
     }
 
     /// Samples that the filter reaches to either side.
     #[must_use]
-    pub fn reach(&self) -> usize {
-        REACH * self.factor
+    pub fn half(&self) -> usize {
+        self.reach * self.factor
+    }
+
+    /// From the end of a band to where the filter passes nothing.
+    fn edge(&self) -> f64 {
+        EDGE / (2 * self.half()) as f64
     }
 
     /// Whether the images of all bands, with the edges of the filter, lie apart.
     fn is_apart(&self) -> bool {
-        let edge = EDGE / self.factor as f64;
+        let edge = self.edge();
         let images = self.bands.iter().map(|band| {
             let wide = (band.start - edge).max(0.0)..band.end + edge;
             let zone = zone(wide.start, self.factor);
@@ -68,12 +80,12 @@ impl Undersampling {
         !images.is_empty() && images.windows(2).all(|pair| pair[0].end <= pair[1].start)
     }
 
-    /// The samples, filtered by a symmetrical filter that reaches 32 of them to either side, where it lies within the record.
+    /// The samples, filtered by a symmetrical filter, where it lies within the record.
     ///
     /// # Errors
     /// [`Error::TooShort`] if fewer than two samples would remain.
     pub fn apply(&self, samples: &[f64]) -> Result<Decimated, Error> {
-        let half = self.reach();
+        let half = self.half();
         let expected = 2 * half + 1 + self.factor;
         if samples.len() < expected {
             return Err(Error::TooShort {
@@ -93,7 +105,7 @@ impl Undersampling {
 
     /// The filter: a windowed difference of two low-passes for each band.
     fn taps(&self, half: usize) -> Vec<f64> {
-        let middle = 0.5 * EDGE / self.factor as f64;
+        let middle = 0.5 * self.edge();
         let mut taps = vec![0.0; 2 * half + 1];
         let mut add = |corner: f64, share: f64| {
             let low_pass = windowed_sinc(half, corner);
@@ -158,13 +170,15 @@ mod tests {
             .map(f64::from)
             .map(|t| low(t) + high(t) + beside(t))
             .collect();
-        let found = Undersampling::of(&bands, 2, 200).unwrap();
-        assert!(found.factor > 25 && found.bands == bands, "{found:?}");
-        let few = found.apply(&record).unwrap();
-        for (k, value) in few.samples.iter().enumerate() {
-            let t = (few.first + k * found.factor) as f64;
-            let want = low(t) + high(t);
-            assert!((value - want).abs() < 5e-4, "{k}: {value} {want}");
+        for (reach, least) in [(32, 25), (128, 60)] {
+            let found = Undersampling::of(&bands, 2..=200, reach).unwrap();
+            assert!(found.factor > least && found.bands == bands, "{found:?}");
+            let few = found.apply(&record).unwrap();
+            for (k, value) in few.samples.iter().enumerate() {
+                let t = (few.first + k * found.factor) as f64;
+                let want = low(t) + high(t);
+                assert!((value - want).abs() < 5e-4, "{k}: {value} {want}");
+            }
         }
     }
 
@@ -186,7 +200,7 @@ mod tests {
 
     #[test]
     fn short_records_are_refused() {
-        let found = Undersampling::of(&[0.1..0.101], 2, 30).unwrap();
+        let found = Undersampling::of(&[0.1..0.101], 2..=30, 32).unwrap();
         assert!(matches!(
             found.apply(&[0.0; 100]),
             Err(Error::TooShort { .. })

@@ -22,7 +22,8 @@ pub fn run(args: &Runup) -> Result<Outcome, Failure> {
         ChannelChoice::named(["--motion", "--motion-unit"], &args.motion, motion_unit),
         ChannelChoice::named(["--torque", "--torque-unit"], &args.torque, torque_unit),
     ];
-    let read = AlignedChannels::read(&Input::of(&args.input), &choices, &args.reading)?;
+    let mut read = AlignedChannels::read(&Input::of(&args.input), &choices, &args.reading)?;
+    let clipped = quality::clipped(&read);
     let (motion, torque) = (&read.channels[0], &read.channels[1]);
     let motion_unit = unit_or(motion.channel(), "--motion-unit")?;
     let (kind, turning) = Motion::of(motion_unit.unit.dimension()).ok_or_else(|| {
@@ -36,15 +37,19 @@ pub fn run(args: &Runup) -> Result<Outcome, Failure> {
             ),
         )
     })?;
-    let scaled =
-        |samples: &[f64], factor: f64| samples.iter().map(|v| v * factor).collect::<Vec<f64>>();
-    let positions = scaled(&motion.samples, motion_unit.unit.factor());
-    let efforts = scaled(&torque.samples, effort_factor(args, torque, turning)?);
+    let factors = [
+        motion_unit.unit.factor(),
+        effort_factor(args, torque, turning)?,
+    ];
+    for (channel, factor) in read.channels.iter_mut().zip(factors) {
+        channel.samples.iter_mut().for_each(|v| *v *= factor);
+    }
+    let [motion, effort] = [0, 1].map(|place| &read.channels[place].samples[..]);
     let run = FreeRun {
         rate_hz: read.rate_hz,
-        motion: &positions,
+        motion,
         kind,
-        effort: &efforts,
+        effort,
         body: if turning {
             Body::Turning
         } else {
@@ -60,10 +65,10 @@ pub fn run(args: &Runup) -> Result<Outcome, Failure> {
     let mut recorded = Recorded::default();
     recorded.add(
         &args.input,
-        positions.len(),
+        motion.len(),
         Some((read.rate_hz, read.rate_std_hz)),
     );
-    recorded.warn(quality::clipped(&read), false);
+    recorded.warn(clipped, false);
     recorded.warn(read.warnings, read.is_lossy);
     deliver(result, recorded, &args.findings, &entries)
 }

@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
+use torqcomp_dsp::peaks::Line;
 use torqcomp_dsp::quality::clipping::Clipping;
 use torqcomp_dsp::undersample::Undersampling;
 use torqcomp_dsp::{decimate, onset, peaks};
@@ -19,8 +20,14 @@ const MOST_SAMPLES: usize = 20_000;
 
 /// Samples left by decimation above which the stretches are undersampled.
 const MANY_SAMPLES: usize = 65_536;
-/// Lengths of the filter, to either side, that a stretch to be undersampled must have.
+/// Lengths of the filter, to either side, that a stretch to be undersampled must have …
 const LEAST_LENGTHS: usize = 16;
+/// … and the samples over which the line that rings for the shortest time is seen: what lies before the middle of the filter is
+/// not fitted.
+const LEAST_RINGING: usize = 32;
+/// Filters that are tried: half-length in samples of the result, and part of its frequency that is kept beside a line. Longer
+/// filters have narrower edges, so that more bands find room at a lower rate.
+const FILTERS: [(usize, f64); 4] = [(32, 0.01), (32, 0.003), (128, 0.01), (128, 0.003)];
 
 /// Most stretches that are used.
 const MOST_STRETCHES: usize = 12;
@@ -93,12 +100,29 @@ fn undersampling(cut: &[Cutout], factors: &[usize]) -> Option<(Undersampling, f6
     if !is_one || left.sum::<usize>() <= MANY_SAMPLES {
         return None;
     }
-    let bands = cut.iter().flat_map(|part| peaks::bands(part.values, WORTH));
-    let bands: Vec<Range<f64>> = bands.collect();
+    let lines: Vec<Vec<Line>> = cut
+        .iter()
+        .map(|part| peaks::lines(part.values, WORTH))
+        .collect();
+    let briefest = lines.iter().filter_map(|lines| peaks::briefest(lines));
+    let longest_half =
+        (lengths.clone().min()? / LEAST_LENGTHS).min(briefest.min()? / LEAST_RINGING);
+    let total: usize = lengths.sum();
     let least = factors.iter().max()? + 1;
-    let most = lengths.clone().sum::<usize>() / MOST_SAMPLES;
-    let found = Undersampling::of(&bands, least, most)?;
-    (lengths.min()? > LEAST_LENGTHS * found.reach()).then_some((found, rate_hz))
+    let mut best: Option<Undersampling> = None;
+    for (reach, beside) in FILTERS {
+        let bands = lines.iter().flatten().map(|line| line.band(beside));
+        let most = (total / MOST_SAMPLES).min(longest_half / reach);
+        let least = best.as_ref().map_or(least, |best| best.factor + 1);
+        best = Undersampling::of(&bands.collect::<Vec<_>>(), least..=most, reach).or(best);
+        if best
+            .as_ref()
+            .is_some_and(|best| total / best.factor <= MANY_SAMPLES)
+        {
+            break;
+        }
+    }
+    Some((best?, rate_hz))
 }
 
 /// A record, low-passed and decimated if a band is given.

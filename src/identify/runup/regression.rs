@@ -25,21 +25,10 @@ pub(super) struct Corrected {
     pub numbers: Estimates,
     /// Left side minus right side, of all rows.
     pub residuals: Vec<f64>,
-    columns: DMatrix<f64>,
-    right_norm: f64,
     /// Noise in a column, as a part of its power; the largest.
     pub noise_share: f64,
     /// Largest ratio of a standard uncertainty to that for white noise.
     pub coloured: f64,
-}
-
-impl Corrected {
-    /// Change of the left side from these parameters to those of another regression, over the right side.
-    pub fn change_to(&self, other: &Self) -> f64 {
-        let pairs = other.numbers.values().iter().zip(self.numbers.values());
-        let change = DVector::from_vec(pairs.map(|(a, b)| a - b).collect());
-        (&self.columns * change).norm() / self.right_norm
-    }
 }
 
 /// Solves `A x ≈ b` over the chosen rows, where the errors of the columns have a known covariance N in
@@ -56,9 +45,9 @@ pub(super) fn solve(
     let (all, count) = (right.len(), columns.len());
     // Rows that are not chosen become zeros, so that distances in time stay.
     let kept = |r: usize, v: f64| if chosen[r] { v } else { 0.0 };
-    let a = DMatrix::from_fn(all, count, |r, c| kept(r, columns[c][r]));
+    let mut scaled = DMatrix::from_fn(all, count, |r, c| kept(r, columns[c][r]));
     let b = DVector::from_fn(all, |r, _| kept(r, right[r]));
-    let sizes: Vec<f64> = a.column_iter().map(|c| c.norm()).collect();
+    let sizes: Vec<f64> = scaled.column_iter().map(|c| c.norm()).collect();
     if let Some(i) = sizes.iter().position(|s| *s == 0.0 || !s.is_finite()) {
         return Err(Failure::failed(
             ErrorCode::NotIdentifiable,
@@ -68,7 +57,9 @@ pub(super) fn solve(
             ),
         ));
     }
-    let scaled = DMatrix::from_fn(all, count, |r, c| a[(r, c)] / sizes[c]);
+    for (mut column, size) in scaled.column_iter_mut().zip(&sizes) {
+        column.unscale_mut(*size);
+    }
     let part = DMatrix::from_fn(count, count, |i, j| {
         rows as f64 * (errors.noise)(i, j) / (sizes[i] * sizes[j])
     });
@@ -81,19 +72,32 @@ pub(super) fn solve(
     let values: Vec<f64> = x.iter().zip(&sizes).map(|(x, s)| x / s).collect();
     let kept_residuals = &scaled * &x - &b;
     let (covariance, coloured) =
-        scatter::covariance(&scaled, &inverse, &kept_residuals, &values, rows, errors);
+        scatter::covariance(scaled, &inverse, &kept_residuals, &values, rows, errors);
     let unscaled = |i, j| covariance[(i, j)] / (sizes[i] * sizes[j]);
     let covariance = Covariance::of(DMatrix::from_fn(count, count, unscaled));
-    let full = DMatrix::from_fn(all, count, |r, c| columns[c][r]);
-    let model = &full * DVector::from_column_slice(&values);
     Ok(Corrected {
+        residuals: residuals(columns, &values, right),
         numbers: Estimates::new(values, covariance),
-        residuals: model.iter().zip(right).map(|(m, b)| m - b).collect(),
-        columns: full,
-        right_norm: right.iter().map(|v| v * v).sum::<f64>().sqrt(),
         noise_share,
         coloured,
     })
+}
+
+/// Left side minus right side of each row.
+fn residuals(columns: &[Vec<f64>], values: &[f64], right: &[f64]) -> Vec<f64> {
+    let mut left = left_side(columns, values);
+    left.iter_mut().zip(right).for_each(|(l, b)| *l -= b);
+    left
+}
+
+/// Left side of each row, for these parameters.
+pub(super) fn left_side(columns: &[Vec<f64>], values: &[f64]) -> Vec<f64> {
+    let mut left = vec![0.0; columns.first().map_or(0, Vec::len)];
+    for (column, value) in columns.iter().zip(values) {
+        let rows = left.iter_mut().zip(column);
+        rows.for_each(|(sum, term)| *sum += value * term);
+    }
+    left
 }
 
 fn not_identifiable() -> Failure {

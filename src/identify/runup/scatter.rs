@@ -16,7 +16,7 @@ use super::regression::Errors;
 
 /// Covariance of the (scaled) parameters, and the largest ratio of an uncertainty to that for white noise.
 pub(super) fn covariance(
-    a: &DMatrix<f64>,
+    a: DMatrix<f64>,
     inverse: &DMatrix<f64>,
     residuals: &DVector<f64>,
     values: &[f64],
@@ -27,10 +27,10 @@ pub(super) fn covariance(
     let freedom = rows as f64 / (rows - count) as f64;
     let power = residuals.norm_squared() / rows as f64;
     let shape = shape(power, values, errors);
-    let white = inverse * gathered(a, &shape) * inverse;
+    let white = inverse * gathered(&a, &shape) * inverse;
     // The residuals are smaller than the errors by what the fit absorbs; overlapping windows count less than
     // independent rows.
-    let mean: f64 = trace_of_fit(a, inverse, &shape) / (rows as f64 * shape[0]);
+    let mean: f64 = trace_of_fit(&a, inverse, &shape) / (rows as f64 * shape[0]);
     let white = white / (1.0 - mean).max(0.1);
     let coloured = inverse * scores(a, residuals, rows, errors.overlap) * inverse * freedom;
     let factors: Vec<f64> = (0..count)
@@ -81,9 +81,16 @@ fn trace_of_fit(a: &DMatrix<f64>, inverse: &DMatrix<f64>, shape: &[f64]) -> f64 
 }
 
 /// Covariance of Σ aᵢ rᵢ, with Bartlett's weights for neighbouring rows.
-fn scores(a: &DMatrix<f64>, residuals: &DVector<f64>, rows: usize, overlap: usize) -> DMatrix<f64> {
-    let (all, count) = a.shape();
-    let scores = DMatrix::from_fn(all, count, |r, c| a[(r, c)] * residuals[r]);
+fn scores(
+    mut scores: DMatrix<f64>,
+    residuals: &DVector<f64>,
+    rows: usize,
+    overlap: usize,
+) -> DMatrix<f64> {
+    let all = scores.nrows();
+    for mut column in scores.column_iter_mut() {
+        column.component_mul_assign(residuals);
+    }
     let lags = (4.0 * (rows as f64 / 100.0).powf(2.0 / 9.0)).floor() as usize + overlap;
     let lags = lags.min(rows / 4);
     let mut sum = scores.tr_mul(&scores);

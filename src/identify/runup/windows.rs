@@ -4,7 +4,7 @@ use statrs::distribution::{ContinuousCDF, Normal};
 use torqcomp_dsp::weak::{Window, white_noise_variance};
 
 use super::directions::Directions;
-use super::regression::{Corrected, Errors, solve};
+use super::regression::{Corrected, Errors, left_side, solve};
 use super::{COLOURED, FreeRun, LEAST_WINDOWS, SHORTEST_HALF};
 use crate::failure::{ErrorCode, Failure};
 use crate::identify::rms;
@@ -263,20 +263,52 @@ fn integral(samples: &[f64], rate_hz: f64) -> Vec<f64> {
 /// what the equation does not describe. Always found with one viscous friction.
 pub(super) fn plateau(run: &FreeRun, directions: &Directions) -> usize {
     let longest = (run.motion.len() / (LEAST_WINDOWS / 2 + 2)).max(SHORTEST_HALF);
-    let mut tried: Vec<(usize, Corrected)> = Vec::new();
+    let mut halves = Vec::new();
+    let mut changes: Vec<f64> = Vec::new();
+    let mut last: Option<Tried> = None;
     let mut half = SHORTEST_HALF;
     while half <= longest {
         let fitted = WindowRows::of(run, directions, half, false).and_then(WindowRows::fit);
         if let Ok(fitted) = fitted {
-            tried.push((half, fitted.fit));
+            let tried = Tried::of(fitted);
+            halves.push(half);
+            changes.extend(last.map(|last| last.change_to(&tried)));
+            last = Some(tried);
+            if let [.., before, change] = changes[..]
+                && before < change
+            {
+                return halves[changes.len() - 2];
+            }
         }
         half = half * 3 / 2;
     }
-    let changes: Vec<f64> = tried
-        .windows(2)
-        .map(|pair| pair[0].1.change_to(&pair[1].1))
-        .collect();
-    let first = changes.windows(2).position(|pair| pair[0] < pair[1]);
-    let best = first.unwrap_or(changes.len().saturating_sub(1));
-    tried.get(best).map_or(SHORTEST_HALF, |(half, _)| *half)
+    let best = changes.len().saturating_sub(1);
+    halves.get(best).copied().unwrap_or(SHORTEST_HALF)
+}
+
+/// What is kept of a fit to compare the next one with.
+struct Tried {
+    columns: Vec<Vec<f64>>,
+    values: Vec<f64>,
+    /// Norm of the right side.
+    right: f64,
+}
+
+impl Tried {
+    fn of(fitted: FittedRows) -> Self {
+        let squares = fitted.rows.right.iter().map(|v| v * v);
+        Self {
+            right: squares.sum::<f64>().sqrt(),
+            values: fitted.fit.numbers.values().to_vec(),
+            columns: fitted.rows.columns,
+        }
+    }
+
+    /// Change of the left side from these parameters to those of another fit, over the right side.
+    fn change_to(&self, other: &Self) -> f64 {
+        let pairs = other.values.iter().zip(&self.values);
+        let change: Vec<f64> = pairs.map(|(a, b)| a - b).collect();
+        let left = left_side(&self.columns, &change);
+        left.iter().map(|v| v * v).sum::<f64>().sqrt() / self.right
+    }
 }

@@ -1,7 +1,7 @@
 //! Channels of a file and how their messages are read.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use mcap::records::{self, Record, op};
 
@@ -28,7 +28,21 @@ pub struct DeclaredSchema {
     /// Language of the definition, as `ros2msg`.
     pub encoding: String,
     data: Vec<u8>,
+    parsed: Parsed,
 }
+
+/// What a definition says, read once for all the numbers that are chosen: one of a million fields takes 100 MB.
+#[derive(Debug, Clone, Default)]
+struct Parsed(OnceLock<Result<Arc<Schema>, String>>);
+
+impl PartialEq for Parsed {
+    /// It follows from the definition.
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+impl Eq for Parsed {}
 
 /// A channel and its schema.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -51,6 +65,7 @@ impl Channels {
                     name: header.name,
                     encoding: header.encoding,
                     data: data.into_owned(),
+                    parsed: Parsed::default(),
                 });
             }
             Some(Record::Channel(channel)) => self.add_channel(channel),
@@ -90,6 +105,21 @@ impl Channels {
     }
 }
 
+impl DeclaredSchema {
+    /// What a definition in a known language says.
+    fn read(&self) -> Result<Arc<Schema>, String> {
+        let text = || String::from_utf8_lossy(&self.data);
+        let read = match &*self.encoding {
+            "ros2msg" => ros2msg::read(&self.name, &text(), Generation::Ros2),
+            "ros1msg" => ros2msg::read(&self.name, &text(), Generation::Ros1),
+            "protobuf" => protobuf::read(&self.name, &self.data),
+            _ => ros2idl::read(&self.name, &text()),
+        };
+        read.map(Arc::new)
+            .map_err(|error| format!("schema \"{}\", {error}", self.name))
+    }
+}
+
 impl TopicChannel {
     /// How its messages are encoded, and what they are made of. JSON is told from a message.
     ///
@@ -112,22 +142,11 @@ impl TopicChannel {
                 id => format!("its schema {id} is not in the file"),
             });
         };
-        let text = || String::from_utf8_lossy(&schema.data);
         let pair = (&*record.message_encoding, &*schema.encoding);
-        let (encoding, read) = match pair {
-            ("cdr", "ros2msg") => {
-                let read = ros2msg::read(&schema.name, &text(), Generation::Ros2);
-                (Encoding::Cdr, read)
-            }
-            ("cdr", "ros2idl" | "omgidl") => (Encoding::Cdr, ros2idl::read(&schema.name, &text())),
-            ("ros1", "ros1msg") => {
-                let read = ros2msg::read(&schema.name, &text(), Generation::Ros1);
-                (Encoding::Ros1, read)
-            }
-            ("protobuf", "protobuf") => (
-                Encoding::Protobuf,
-                protobuf::read(&schema.name, &schema.data),
-            ),
+        let encoding = match pair {
+            ("cdr", "ros2msg" | "ros2idl" | "omgidl") => Encoding::Cdr,
+            ("ros1", "ros1msg") => Encoding::Ros1,
+            ("protobuf", "protobuf") => Encoding::Protobuf,
             (message, schema) => {
                 return Err(format!(
                     "message encoding \"{message}\" with schema encoding \"{schema}\" is not \
@@ -136,8 +155,8 @@ impl TopicChannel {
                 ));
             }
         };
-        read.map(|schema| (encoding, Arc::new(schema)))
-            .map_err(|error| format!("schema \"{}\", {error}", schema.name))
+        let parsed = schema.parsed.0.get_or_init(|| schema.read());
+        parsed.clone().map(|schema| (encoding, schema))
     }
 
     /// Whether its messages are of the same type as those of another channel.
@@ -173,6 +192,7 @@ mod tests {
                 name: "p/msg/M".to_owned(),
                 encoding: schema_encoding.to_owned(),
                 data: b"float64 x".to_vec(),
+                parsed: Parsed::default(),
             })),
         }
     }

@@ -3,6 +3,7 @@
 mod counts;
 mod warnings;
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::axes::{AxisPlan, Role, Sources, StampRule};
@@ -26,6 +27,10 @@ use counts::Counts;
 const SAMPLE: usize = 400;
 /// Bytes of rows by which the columns and their time are told.
 pub const FIRST_ROWS: usize = 1 << 16;
+/// Rows that these must be at least, of a table with many columns …
+const LEAST_ROWS: usize = 16;
+/// … unless they are longer than that.
+const MOST_BYTES: usize = 1 << 23;
 
 /// What is known beforehand of a maker's tables.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -80,6 +85,20 @@ pub struct ReadTable {
     pub next_line: usize,
     /// Whether a line there repeats a key of the head.
     pub begins_anew: bool,
+}
+
+/// The next bytes up to the end of the first rows, which begin at an offset, and whether there are no more.
+fn first_rows(chunks: &mut Chunks, offset: usize) -> Result<(&[u8], bool), Failure> {
+    let mut most = FIRST_ROWS;
+    while most < MOST_BYTES {
+        let (bytes, complete) = chunks.peek(offset + most)?;
+        let ends = memchr::memchr_iter(b'\n', &bytes[offset..]);
+        if complete || ends.take(LEAST_ROWS).count() == LEAST_ROWS {
+            break;
+        }
+        most *= 2;
+    }
+    chunks.peek(offset + most)
 }
 
 impl Layout {
@@ -143,7 +162,7 @@ impl Layout {
         hints: Hints,
         reading: &Reading,
     ) -> Result<(), Failure> {
-        let (bytes, complete) = chunks.peek(self.offset + FIRST_ROWS)?;
+        let (bytes, complete) = first_rows(chunks, self.offset)?;
         self.zeros_above = memchr::memchr_iter(0, &bytes[..self.offset]).count();
         let text = &bytes[self.offset..];
         let last = memchr::memrchr(b'\n', text).map_or(0, |place| place + 1);
@@ -323,6 +342,7 @@ impl Layout {
     pub fn channels(&self, mut rows: Rows) -> Vec<Channel> {
         self.fill_stamps(&mut rows);
         let mut channels: Vec<Channel> = Vec::new();
+        let stamps = self.stamp_places();
         let mut last: Option<(usize, TimeAxis)> = None;
         for (place, role) in self.axes.roles.iter().enumerate() {
             let Role::Channel(rule) = *role else {
@@ -336,7 +356,7 @@ impl Layout {
                 _ => self.axes.rules[rule].axis(&rows.columns),
             };
             last = Some((rule, axis.clone()));
-            let column = match self.is_stamp(place) {
+            let column = match stamps.contains(&place) {
                 true => rows.columns[place].clone(),
                 false => std::mem::take(&mut rows.columns[place]),
             };
@@ -355,17 +375,15 @@ impl Layout {
         }
     }
 
-    /// Whether stamps are made of a column.
-    fn is_stamp(&self, place: usize) -> bool {
-        let rules = self
-            .axes
-            .rules
-            .iter()
-            .filter_map(|rule| rule.stamps.as_ref());
-        let mut rules = rules.filter(|rule| {
-            rule.place == place || rule.parts.is_some_and(|parts| parts.place == place)
+    /// The columns that stamps are made of.
+    fn stamp_places(&self) -> BTreeSet<usize> {
+        let rules = self.axes.rules.iter();
+        let stamps = rules.filter_map(|rule| rule.stamps.as_ref());
+        let places = stamps.flat_map(|rule| {
+            let parts = rule.parts.map(|parts| parts.place);
+            std::iter::once(rule.place).chain(parts)
         });
-        rules.next().is_some()
+        places.collect()
     }
 
     /// Judges a last line that has no line end, and takes it away if the file was cut within it.
