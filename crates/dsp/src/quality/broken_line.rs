@@ -28,6 +28,8 @@ const COARSE: f64 = 0.25;
 const BETWEEN_BREAKS: usize = 50;
 /// Breaks that may come at once.
 const AT_ONCE: usize = 3;
+/// Relative difference within which steps are equal to that of the line, whose slope a few stamps leave open.
+const EQUAL: f64 = 0.05;
 /// Largest distance of the missing samples from a whole number.
 const WHOLE: f64 = 0.3;
 
@@ -64,7 +66,7 @@ impl BrokenLine {
         let is_coarse = steps[0] > 0.0 && COARSE * steps[1] < 1.0;
         // Mostly equal steps show each gap by themselves.
         let step = simplest(steps.map(|step| step * quantum_s)) / quantum_s;
-        let equal = |pair: &&[(f64, f64)]| ((pair[1].1 - pair[0].1) / step - 1.0).abs() <= 0.01;
+        let equal = |pair: &&[(f64, f64)]| ((pair[1].1 - pair[0].1) / step - 1.0).abs() <= EQUAL;
         let are_equal = 2 * points.windows(2).filter(equal).count() > points.len();
         if !is_coarse || are_equal {
             return None;
