@@ -45,6 +45,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["orders-above-nyquist", "orders above half the sampling rate were left out", "record at a higher rate"],
         ["speed-changes", "the speed changes over the record, so that the components are averages", "take a part of constant speed with --range"],
         ["phase-hidden", "the signal at the frequency of a line hides the line's phase, so that part of the line is left", "record without excitation at this frequency"],
+        ["resonance-elsewhere", "the record has a resonance near the declared one, which it does not show", "find the stand's constants with identify decay"],
         ["resonance-above-nyquist", "the resonance lies above half the sampling rate, so that its ringing folds into the record", "record faster, or behind a low-pass"],
         ["resampled-gaps", "gaps in the time stamps were bridged by straight lines", "look at these places, or cut the record there"],
         ["short-record", "every sample depends on the extrapolation beyond the record's ends", "record for longer"],
@@ -153,6 +154,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["stuck-channel", "the signal stands still for a while, or drops out", "check cables and transmitters, and leave that part out"],
     ]),
     ("Reading text", &[
+        ["cells-with-units", "cells hold a unit behind each number; their column was left out", "take the units off the cells and write one in the heading"],
         ["extra-cells", "rows have more cells than there are headings", "check the headings"],
         ["filled", "missing samples were filled in, as --fill asks", "do not trust the result there"],
         ["first-samples-only", "only the first samples were looked at", "cut the file into parts if the rest matters"],

@@ -521,3 +521,51 @@ fn what_happens_later_in_a_record_is_seen() {
     let ran = folder.run(&[&COMPENSATE[..], &["--force"]].concat());
     ran.says(0, &["in the first 65536 samples"]);
 }
+
+/// A cable that drops out late in a long record, whatever way the record goes.
+#[test]
+fn a_drop_out_is_found_behind_the_first_samples() {
+    let folder = Folder::new();
+    folder.write("stand.toml", stand(""));
+    let mut noise = crate::noise::Noise(11);
+    let mut sample = |i: usize| match i {
+        150_000..150_009 => 0.0,
+        _ => 5.0 + (TAU * 0.005 * i as f64).sin() + 0.01 * noise.normal(),
+    };
+    let rows: Vec<f64> = (0..300_000).map(&mut sample).collect();
+    folder.write("in.csv", sampled("T [N m]", 1000.0, 300_000, |i| rows[i]));
+    for more in [
+        &["--threads", "1"][..],
+        &["--threads", "2"],
+        &["--whole-record"],
+    ] {
+        let report = folder.json(&[&COMPENSATE[..], more, &["--force", "--json"]].concat());
+        let warnings = report["warnings"].to_string();
+        assert!(warnings.contains("from 150 s on, 9 samples"), "{warnings}");
+    }
+    let report = folder.json(&[&HARMONICS[..], &["5", "--orders", "1", "--json"]].concat());
+    assert!(codes(&report).contains(&"stuck-channel"), "{report}");
+}
+
+/// The stand rings at 59 Hz, its file says 45 Hz.
+#[test]
+fn ringing_at_another_frequency_than_the_declared_one_is_said() {
+    let mut noise = crate::noise::Noise(12);
+    let omega = TAU * 59.0;
+    let ring = |t: f64| (-0.02 * omega * t).exp() * (omega * t).sin();
+    let noise: Vec<f64> = (0..40_000).map(|_| 1e-3 * noise.normal()).collect();
+    let sample = |i: usize| 2.0 + ring((i as f64 * 1e-3) % 1.7) + noise[i];
+    let folder = Folder::new();
+    folder.write("in.csv", sampled("T [N m]", 1000.0, 40_000, sample));
+    for (declared_hz, is_said) in [(45.0, true), (52.0, true), (58.5, false), (59.0, false)] {
+        let stand = stand("").replace("60 Hz", &format!("{declared_hz} Hz"));
+        folder.write("stand.toml", stand);
+        let report = folder.json(&[&COMPENSATE[..], &["--json", "--force"]].concat());
+        let warnings = report["warnings"].to_string();
+        assert_eq!(
+            warnings.contains("resonance-elsewhere"),
+            is_said,
+            "{warnings}"
+        );
+    }
+}

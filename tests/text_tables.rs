@@ -1,6 +1,6 @@
 //! Text as recorders write it, all holding the same record.
 
-use crate::util::{Folder, column};
+use crate::util::{COMPENSATE, Folder, column};
 
 /// Twelve hundred samples at 10 kHz in a form of the caller's.
 fn rows(row: impl Fn(f64, f64) -> String) -> String {
@@ -365,4 +365,67 @@ fn tables_with_very_many_columns_are_read() {
     ran.says(0, &["64 samples at 1000 Hz"]);
     let asked = folder.run(&["inspect", "wide.csv"]);
     asked.says(1, &["64 rows and 40000 columns", "transpose"]);
+}
+
+/// 6 N m with 1 N m at 10 Hz around it, at 1 kHz.
+fn torque(i: usize) -> f64 {
+    6.0 + (std::f64::consts::TAU * 0.01 * i as f64).sin()
+}
+
+/// Two exports in one file, the second in other units under the same name of the time: no rows of one table.
+#[test]
+fn headings_in_other_units_among_the_rows_begin_another_table() {
+    let folder = Folder::new();
+    let rows = |range: std::ops::Range<usize>, scale: f64| -> String {
+        let row = |i: usize| format!("{:.3},{:.4}\n", 1e-3 * i as f64, scale * torque(i));
+        range.map(row).collect()
+    };
+    // Within the first rows that are looked at, and behind them.
+    for (count, said) in [
+        (2000, "of segment 2"),
+        (20_000, "line 20002: another table"),
+    ] {
+        let (first, second) = (rows(0..count, 1.0), rows(count..2 * count, 1e3));
+        for heading in ["time_s,torque (mNm)", "\"time_s\",\"torque (mNm)\""] {
+            folder.write(
+                "in.csv",
+                format!("time_s,torque (Nm)\n{first}{heading}\n{second}"),
+            );
+            let ran = folder.run(&[&COMPENSATE[..], &["--force"]].concat());
+            ran.says(1, &[said]);
+        }
+    }
+    // Another line of words among the rows is said.
+    folder.write(
+        "in.csv",
+        format!(
+            "time_s,torque (Nm)\n{}operator: lab\n{}",
+            rows(0..5000, 1.0),
+            rows(5000..9000, 1.0)
+        ),
+    );
+    let ran = folder.run(&[&COMPENSATE[..], &["--force"]].concat());
+    ran.says(0, &["lines-skipped", "operator: lab"]);
+}
+
+/// A clock of whole seconds beside their milliseconds, at a rate at which the first rows lie within one second.
+#[test]
+fn milliseconds_beside_a_clock_of_seconds_are_their_parts() {
+    let folder = Folder::new();
+    let row = |i: usize| {
+        let (s, ms) = (40 + i / 5000, (i % 5000) as f64 / 5.0);
+        format!(
+            "{},2024-03-12 13:26:{s:02},{ms:.1},{:.4}\n",
+            i + 1,
+            torque(i)
+        )
+    };
+    let rows: String = (0..12_000).map(row).collect();
+    folder.write(
+        "in.csv",
+        format!("Number,Date&Time,ms,CH1\nNO.,Time,ms,N m\n{rows}"),
+    );
+    folder
+        .run(&COMPENSATE)
+        .says(0, &["12000 samples at 5000 Hz"]);
 }

@@ -197,3 +197,51 @@ fn the_heading_of_a_single_column_may_have_spaces() {
     let report = folder.json(&["inspect", "in.csv", "--json"]);
     assert_eq!(report["channels"][0]["name"], "column 1");
 }
+
+/// Each cell of the channel with its unit, that of the time as well, in changing units, or beside another channel: never a torque.
+#[test]
+fn cells_with_units_are_refused_with_their_place() {
+    let folder = Folder::new();
+    folder.write("in.csv", table(|i| format!("{} N m", plain(i))));
+    let remedy = "write that in the heading: \"Torque [N m]\"";
+    folder
+        .run(&COMPENSATE)
+        .says(1, &["line 2", "column 2", "6.000000 N m", remedy]);
+    folder.write("in.csv", table(|i| format!("{:.3} mN m", 1e3 * torque(i))));
+    folder.run(&COMPENSATE).says(1, &["line 2", "column 2"]);
+    folder.write("in.csv", table(|i| format!("{} N m,{i}.5", plain(i))));
+    folder
+        .run(&COMPENSATE)
+        .says(1, &["line 2", "6.000000 N m", "--channel"]);
+    let rows: String = (0..2000)
+        .map(|i| format!("{i} ms,{} N m\n", plain(i)))
+        .collect();
+    folder.write("in.csv", format!("Time,Torque\n{rows}"));
+    folder
+        .run(&COMPENSATE)
+        .says(1, &["0 ms,6.000000 N m", "units beside its numbers"]);
+    // One cell among plain ones.
+    let cell = |i: usize| match i {
+        1500 => "6000 mN m".to_owned(),
+        _ => plain(i),
+    };
+    folder.write("in.csv", table(cell));
+    folder.run(&COMPENSATE).says(1, &["line 1502", "6000 mN m"]);
+}
+
+/// `ros2 topic echo --csv` writes no headings: seconds and nanoseconds of the stamp, the frame, and the fields of the message.
+#[test]
+fn rows_of_ros2_topic_echo_have_the_time_of_their_stamps() {
+    let folder = Folder::new();
+    let row = |i: usize| {
+        let ns = 1_710_250_000_000_000_000_u64 + 1_000_000 * i as u64;
+        let (s, ns) = (ns / 1_000_000_000, ns % 1_000_000_000);
+        format!("{s},{ns},base_link,motor,brake,{i}.5,0.0,{}\n", plain(i))
+    };
+    folder.write("in.csv", (0..2000).map(row).collect::<String>());
+    let channel = ["--channel", "column 8", "--unit", "N m"];
+    folder
+        .run(&[&COMPENSATE[..], &channel].concat())
+        .says(0, &["2000 samples at 1000 Hz", "2024-03-12T13:26:40"]);
+    folder.run(&COMPENSATE).says(1, &["--channel", "column 8"]);
+}

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::util::{Folder, Ran};
+use crate::util::{COMPENSATE, Folder, Ran};
 
 /// Nanoseconds since 1970 at which the records begin: 2024-03-12T13:26:40Z.
 const START_NS: u128 = 1_710_250_000_000_000_000;
@@ -803,4 +803,55 @@ fn a_rate_from_stamps_has_an_uncertainty() {
     // A uniform jitter of ± 50 µs has a standard deviation of 29 µs: √2 of it over 1 s, of 2000 Hz.
     let want = 2000.0 * 2.0_f64.sqrt() * 1e-4 / 12.0_f64.sqrt();
     assert!((stated / want - 1.0).abs() < 0.1, "{stated} {want}");
+}
+
+/// Samples lost between stamps that are rounded to the millisecond, or to the second, of which several share one.
+#[test]
+fn lost_samples_between_rounded_stamps_are_named_with_their_place() {
+    let folder = Folder::new();
+    // Rate, decimals, first lost sample, lost samples, and the stamps around them.
+    for (rate_hz, decimals, from, lost, between) in [
+        (2000.0, 3, 4000, 40, "between 2 s and 2.02 s"),
+        (5000.0, 3, 9000, 3, "between 1.8 s and 1.801 s"),
+        (1500.0, 3, 4000, 4, "between 2.666 s and 2.669 s"),
+        // No stamp of a second is missing.
+        (2000.0, 0, 20_003, 1000, "between 10 s and 11 s"),
+    ] {
+        let torque = |i: usize| (std::f64::consts::TAU * 5.0 * i as f64 / rate_hz).sin();
+        let row = |i: usize| {
+            let scale = 10_f64.powi(decimals as i32);
+            let stamp = (i as f64 / rate_hz * scale).round() / scale;
+            format!("{stamp:.decimals$},{:.6}\n", torque(i))
+        };
+        let kept = (0..3 * from).filter(|i| !(from..from + lost).contains(i));
+        let rows: String = kept.map(row).collect();
+        folder.write("in.csv", format!("time_s,torque_N m\n{rows}"));
+        let run = |more: &[&str]| folder.run(&[&COMPENSATE[..], more].concat());
+        let about = format!("about {lost} samples are missing {between}");
+        run(&[]).says(1, &[&about, "--fill linear"]);
+        let applied = ["--applied", "1", "-o", "out.csv"];
+        let simulate = ["simulate", "in.csv", "--stand", "stand.toml"];
+        folder
+            .run(&[&simulate[..], &applied].concat())
+            .says(1, &[&about]);
+        let rate = rate_hz.to_string();
+        run(&["--rate", &rate, "--force"]).says(
+            0,
+            &[
+                "rate-joins-gaps",
+                "in 1 gap",
+                &format!("(about {lost} samples)"),
+            ],
+        );
+        run(&["--fill", "linear", "--force"])
+            .says(0, &[&format!("{lost} missing samples at 1 place")]);
+        folder.run(&["inspect", "in.csv"]).says(0, &[]);
+        let inspected = json(&folder.run(&["inspect", "in.csv", "--json"]));
+        assert_eq!(inspected["channels"][0]["rate_hz"].as_f64(), Some(rate_hz));
+        let text = inspected["warnings"].to_string();
+        assert!(
+            text.contains("time-gaps") && text.contains(&format!("about {lost} ")),
+            "{text}"
+        );
+    }
 }

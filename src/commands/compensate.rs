@@ -15,6 +15,7 @@ use std::path::Path;
 
 use torqcomp_dsp::compensate::InverseFilter;
 use torqcomp_dsp::noise::NoiseGain;
+use torqcomp_dsp::quality::streamed::Faults;
 
 use self::band::{BandReport, Wanted};
 pub(super) use self::report::CompensateReport;
@@ -58,6 +59,8 @@ struct Seen {
     summary: StreamSummary,
     /// The first samples, converted, as they were recorded.
     excerpt: Vec<f64>,
+    /// What was looked for in all of them.
+    faults: Faults,
 }
 
 /// Compensates one record.
@@ -201,6 +204,7 @@ impl Plan {
             quantity: chain.applied.name,
             rated_torque: chain.rated_n_m.map(|rated| rated / chain.applied.factor),
             levels: chain.levels(),
+            modes: warnings::modes(&self.stand),
             rate_hz: stream.rate_hz,
             rate_std_hz: stream.time.rate_std_hz,
             filled: stream.filled.clone(),

@@ -12,6 +12,7 @@ use serde::Serialize;
 use torqcomp_dsp::Error;
 use torqcomp_dsp::compensate::Inverse;
 use torqcomp_dsp::harmonics::{self, Fundamental, refine_fundamental};
+use torqcomp_dsp::quality::streamed::StreamedFaults;
 use torqcomp_dsp::store::SampleStore;
 use torqcomp_model::{InverseUncertainty, UnitSystem};
 
@@ -326,6 +327,10 @@ fn of_quality(
 ) -> Result<Vec<Warning>, Failure> {
     let count = record.samples.count();
     let seen = record.samples.part(0..count.min(excerpt::OF_PASSES))?;
+    let mut faults = StreamedFaults::default();
+    record
+        .samples
+        .pass(0..count, &mut |_, piece| faults.push(piece))?;
     let of = excerpt::Of {
         name: channel,
         unit: &chain.applied.unit,
@@ -333,6 +338,7 @@ fn of_quality(
         rate_hz: record.rate_hz,
         start: record.start,
         samples: count,
+        faults: faults.finish(),
     };
     let levels = chain.levels().warnings(&seen, of.scale, of.unit);
     let mut found = excerpt::warnings(&seen, of);

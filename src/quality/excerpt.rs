@@ -1,5 +1,8 @@
 //! What is wrong with a record that a verb works on, told from as much of it as may be kept.
 
+use torqcomp_dsp::quality::streamed::Faults;
+
+use super::samples::Findings;
 use crate::recording::TimeAxis;
 use crate::recording::moment::Moment;
 use crate::warning::Warning;
@@ -24,33 +27,46 @@ pub struct Of<'a> {
     pub start: Moment,
     /// Samples in all.
     pub samples: usize,
+    /// Clipping and standstills of all of them.
+    pub faults: Faults,
 }
 
-/// The warnings of [`super::warnings`] about the first samples of a record; that it has more is said.
+/// The warnings of [`super::warnings`] about the first samples of a record, clipping and standstills in all of it; that it has
+/// more is said of the others.
 ///
 /// ```
 /// use torqcomp::recording::moment::Moment;
 /// use torqcomp::quality::excerpt::{Of, warnings};
-/// let of = Of { name: "bridge", unit: "V", scale: 1e3, rate_hz: 1000.0, start: Moment::default(), samples: 5000 };
-/// let samples: Vec<f64> = (0..1000).map(|i| (0.1 * f64::from(i)).sin().min(0.7) * 1e-3).collect();
-/// let found = warnings(&samples, of);
-/// assert_eq!(found[0].code, "clipped");
-/// assert!(found[0].message.ends_with("(the first 1000 of 5000 samples were looked at)"));
+/// use torqcomp_dsp::quality::streamed::StreamedFaults;
+/// let mut samples: Vec<f64> = (0..5000).map(|i| (5.0 + (0.1 * f64::from(i)).sin()) * 1e-3).collect();
+/// samples[3000..3010].fill(0.0);
+/// let mut faults = StreamedFaults::default();
+/// faults.push(&samples);
+/// let faults = faults.finish();
+/// let of = Of { name: "bridge", unit: "mV", scale: 1e3, rate_hz: 1e3, start: Moment::default(), samples: 5000, faults };
+/// let found = warnings(&samples[..1000], of);
+/// assert_eq!((found.len(), found[0].code), (1, "stuck-channel"));
+/// assert!(found[0].message.contains("from 3 s on, 10 samples"), "{}", found[0].message);
 /// ```
 #[must_use]
 pub fn warnings(samples: &[f64], of: Of) -> Vec<Warning> {
     let scaled: Vec<f64> = samples.iter().map(|sample| sample * of.scale).collect();
     let axis = TimeAxis::uniform(of.rate_hz, of.start);
-    let mut found = super::warnings(of.name, of.unit, &scaled, &axis);
+    let faults = of.faults.scaled(of.scale);
+    let findings = Findings::of(&scaled, axis.rate_hz).with(&faults);
+    let mut found = super::of_findings(of.name, of.unit, findings, &axis);
     if samples.len() < of.samples {
         let rest = format!(
             " (the first {} of {} samples were looked at)",
             samples.len(),
             of.samples
         );
-        found
-            .iter_mut()
-            .for_each(|warning| warning.message += &rest);
+        let in_all = |warning: &Warning| match warning.code {
+            "clipped" => faults.clipping.is_some(),
+            code => code == "stuck-channel",
+        };
+        let of_first = found.iter_mut().filter(|warning| !in_all(warning));
+        of_first.for_each(|warning| warning.message += &rest);
     }
     found
 }

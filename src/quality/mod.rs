@@ -33,8 +33,12 @@ pub use time::TimeFindings;
 /// ```
 #[must_use]
 pub fn warnings(name: &str, unit: &str, samples: &[f64], axis: &TimeAxis) -> Vec<Warning> {
+    of_findings(name, unit, Findings::of(samples, axis.rate_hz), axis)
+}
+
+/// The same of what is known of the samples.
+fn of_findings(name: &str, unit: &str, mut findings: Findings, axis: &TimeAxis) -> Vec<Warning> {
     let mut found = TimeFindings::of(axis).warnings(&format!("\"{name}\""), axis);
-    let mut findings = Findings::of(samples, axis.rate_hz);
     // Here the lines are what is measured, most likely: a machine in step with the mains makes even multiples, hum hardly any.
     let is_odd = |line: &MainsLine| line.order % 2 == 1;
     findings.mains = findings

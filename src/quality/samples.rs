@@ -5,6 +5,7 @@ use torqcomp_dsp::quality::finite::{NonFinite, non_finite};
 use torqcomp_dsp::quality::mains::{Mains, mains};
 use torqcomp_dsp::quality::quantisation::{Quantisation, quantisation};
 use torqcomp_dsp::quality::repeats::{Repeats, repeats};
+use torqcomp_dsp::quality::streamed::{Faults, Standstills};
 use torqcomp_dsp::quality::stuck::{constant, standstills};
 use torqcomp_dsp::quality::{Run, is_straight, range};
 
@@ -44,7 +45,7 @@ pub struct Findings {
     /// Where it is clipped.
     pub clipping: Option<Clipping>,
     /// Where it stands still.
-    pub standstills: Vec<Run>,
+    pub standstills: Option<Standstills>,
     /// How often samples repeat.
     pub repeats: Option<Repeats>,
     /// Its resolution.
@@ -72,11 +73,26 @@ impl Findings {
             is_straight: is_straight(samples),
             constant: constant(samples),
             clipping,
-            standstills,
+            standstills: Standstills::of(&standstills),
             repeats: repeats(samples),
             quantisation: quantisation(samples),
             mains: rate_hz.and_then(|rate_hz| mains(samples, rate_hz)),
         }
+    }
+
+    /// The first samples of a record, whose clipping and standstills were looked for in all of it.
+    #[must_use]
+    pub fn with(mut self, faults: &Faults) -> Self {
+        // A level under noise is looked for at the beginning only.
+        let is_noisy = |c: &Clipping| {
+            [c.low, c.high]
+                .iter()
+                .flatten()
+                .any(|rail| rail.spread > 0.0)
+        };
+        self.clipping = faults.clipping.or(self.clipping.filter(is_noisy));
+        self.standstills = faults.standstills;
+        self
     }
 
     /// The value of a channel that has only one, if it had the chance of having others.
@@ -111,7 +127,7 @@ impl Findings {
         );
         let clipping = self.clipping.iter();
         found.extend(clipping.flat_map(|c| clipped_ends(name, unit, c, axis)));
-        found.extend(stuck(name, unit, &self.standstills, axis));
+        found.extend(self.standstills.map(|s| stuck(name, unit, &s, axis)));
         found.extend(
             self.repeats
                 .filter(|r| r.unexplained == Some(true))
@@ -199,20 +215,19 @@ fn clipped(name: &str, unit: &str, end: &str, rail: &Rail, axis: &TimeAxis) -> W
     )
 }
 
-fn stuck(name: &str, unit: &str, runs: &[Run], axis: &TimeAxis) -> Option<Warning> {
-    let longest = runs.iter().max_by_key(|run| run.length)?;
-    let samples: usize = runs.iter().map(|run| run.length).sum();
-    Some(Warning::new(
+fn stuck(name: &str, unit: &str, found: &Standstills, axis: &TimeAxis) -> Warning {
+    let (samples, longest) = (found.samples, found.longest);
+    Warning::new(
         "stuck-channel",
         format!(
             "\"{name}\" stands still in {}, {samples} samples in all; the longest is at {} from {} on, {} samples: \
              at rest, or a cable, a transmitter or the recorder dropped out",
-            plural(runs.len(), "stretch"),
+            plural(found.count, "stretch"),
             with_unit(longest.value, unit, 6),
             place(axis, longest.start),
             longest.length
         ),
-    ))
+    )
 }
 
 fn repeated(name: &str, found: &Repeats, axis: &TimeAxis) -> Warning {

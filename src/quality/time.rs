@@ -1,9 +1,10 @@
 //! The time axis of a channel: what its stamps show.
 
+use torqcomp_dsp::quality::broken_line::BrokenLine;
 use torqcomp_dsp::quality::is_straight;
 use torqcomp_dsp::quality::rate::{Contradiction, contradiction};
 use torqcomp_dsp::quality::rounding::{Rounded, rounded};
-use torqcomp_dsp::quality::steps::{Event, Events, Steps, rounded_steps, steps};
+use torqcomp_dsp::quality::steps::{Event, Events, Steps, broken_steps, rounded_steps, steps};
 
 use crate::print::plural;
 use crate::print::rounded as number;
@@ -37,11 +38,15 @@ impl TimeFindings {
         let is_uniform = plain.as_ref().is_some_and(|found| {
             found.jitter.is_none_or(|j| j.peak <= UNIFORM) && found.repeated.count == 0
         });
-        let rounded = if is_uniform { None } else { rounded(stamps_s) };
-        let steps = match &rounded {
-            Some(r) => rounded_steps(stamps_s, r.step_s, r.quantum_s),
-            None => plain,
+        let mut rounded = if is_uniform { None } else { rounded(stamps_s) };
+        let may_be_broken = !is_uniform && rounded.is_none();
+        let broken = may_be_broken.then(|| BrokenLine::of(stamps_s)).flatten();
+        let steps = match (&rounded, &broken) {
+            (Some(r), _) => rounded_steps(stamps_s, r.step_s, r.quantum_s),
+            (None, Some(broken)) => broken_steps(stamps_s, broken),
+            (None, None) => plain,
         };
+        rounded = rounded.or(broken.map(|broken| broken.line));
         let contradiction = axis
             .header_rate_hz
             .zip(steps.as_ref())
@@ -83,7 +88,7 @@ impl TimeFindings {
         found.extend(gaps(whose, axis, steps));
         found.extend(match &self.rounded {
             Some(rounded) if rounded.quantum_s <= COARSE_STAMPS * rounded.step_s => None,
-            Some(rounded) => Some(rounded_stamps(whose, rounded, axis)),
+            Some(rounded) => Some(rounded_stamps(whose, rounded, axis, steps.gaps.count > 0)),
             None => jitter(whose, steps),
         });
         found
@@ -212,18 +217,23 @@ fn jitter(whose: &str, steps: &Steps) -> Option<Warning> {
     ))
 }
 
-fn rounded_stamps(whose: &str, rounded: &Rounded, axis: &TimeAxis) -> Warning {
+fn rounded_stamps(whose: &str, rounded: &Rounded, axis: &TimeAxis, has_gaps: bool) -> Warning {
     let ends = axis.stamps_s.as_ref().and_then(|stamps_s| {
         let (first, last) = (stamps_s.first()?, stamps_s.last()?);
         Some(last - first)
     });
+    let but_for = if has_gaps {
+        "that and the gaps"
+    } else {
+        "that"
+    };
     let allowed = ends.map_or_else(String::new, |span_s| {
         format!(" (they allow {})", rates_of(rounded.steps_over(span_s)))
     });
     Warning::new(
         "rounded-time-stamps",
         format!(
-            "{whose}: the time stamps are written in multiples of {} s; but for that they are \
+            "{whose}: the time stamps are written in multiples of {} s; but for {but_for} they are \
              uniform, and all of them together give {} Hz{allowed}{}",
             number(rounded.quantum_s, 3),
             number(1.0 / rounded.step_s, 9),

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use torqcomp_dsp::quality::broken_line::BrokenLine;
 use torqcomp_dsp::quality::rounding::{Rounded, uniform_line};
 
 use super::Hole;
@@ -255,6 +256,10 @@ pub(super) fn step_of(stamps_s: &[f64], origin_s: f64) -> Option<SampleStep> {
     };
     if let Some(found) = line(stamps_s) {
         return Some(found);
+    }
+    if let Some(broken) = BrokenLine::of(stamps_s) {
+        let span = stamps_s.last()? - stamps_s.first()?;
+        return Some(SampleStep::of_line(&broken.line, span));
     }
     let step = typical_step(stamps_s)?;
     let usual = SampleStep::of_mean(step, stamps_s);

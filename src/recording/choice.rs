@@ -3,9 +3,10 @@
 use torqcomp_dsp::quality::rate::{Contradiction, contradiction};
 use torqcomp_model::Unit;
 
-use super::axis::UNIFORM;
+use super::axis::{UNIFORM, step_of};
 use super::moment::Moment;
-use super::{Channel, RateFrom, Recording, TimeAxis, formats, typical_step};
+use super::text::CELLS_WITH_UNITS;
+use super::{Channel, RateFrom, Recording, TimeAxis, formats};
 use crate::failure::{ErrorCode, Failure, did_you_mean};
 use crate::io::{ChannelChoice, Reading, digits};
 use crate::print::{list, plural};
@@ -210,7 +211,7 @@ pub(crate) fn unit_of(
 /// A warning if a rate that was given is not that of the stamps.
 pub(crate) fn overridden(reading: &Reading, stamps_in: &str, stamps_s: &[f64]) -> Option<Warning> {
     let rate_hz = reading.rate_hz.filter(|_| !reading.resample)?;
-    let stamped_hz = 1.0 / typical_step(stamps_s)?;
+    let stamped_hz = 1.0 / step_of(stamps_s, 0.0)?.step;
     if (rate_hz / stamped_hz - 1.0).abs() <= UNIFORM {
         return None;
     }
@@ -332,7 +333,19 @@ impl Recording {
     pub(crate) fn place(&self, choice: &ChannelChoice) -> Result<usize, Failure> {
         let label = |channel| Channel::label(channel);
         let labels: Vec<Label> = self.channels.iter().map(label).collect();
-        choose(&labels, choice.channel.as_deref(), choice.flags.channel)
+        let place = choose(&labels, choice.channel.as_deref(), choice.flags.channel)?;
+        // What is wanted may be in a column that was left out.
+        let left_out = self.warnings.iter().find(|w| w.code == CELLS_WITH_UNITS);
+        match left_out.filter(|_| choice.channel.is_none()) {
+            Some(warning) => Err(Failure::failed(
+                ErrorCode::ChannelUnclear,
+                format_args!(
+                    "{}; or choose \"{}\" with {}",
+                    warning.message, self.channels[place].name, choice.flags.channel
+                ),
+            )),
+            None => Ok(place),
+        }
     }
 }
 

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use schemars::JsonSchema;
 use serde::Serialize;
+use torqcomp_dsp::quality::broken_line::BrokenLine;
 
 use super::memory_stream::used_stamps;
 use super::{Hole, HoleKind, Recording};
@@ -49,9 +50,15 @@ impl Recording {
         let is_stamped = used_stamps(channel, reading).is_some();
         let whole = std::mem::take(&mut channel.samples);
         let stamps = channel.axis.stamps_s.clone().filter(|_| is_stamped);
-        let time_s = |place: usize| match &stamps {
-            Some(stamps) => stamps[place],
-            None => channel.axis.start.unwrap_or_default().after_s + place as f64 / rate_hz,
+        // Rounding is no gap: coarse stamps are those of their line.
+        let on_line = stamps.as_ref().and_then(|stamps_s| {
+            let places = BrokenLine::of(stamps_s)?.places(stamps_s.len()).collect();
+            Some((stamps_s[0], places)) as Option<(f64, Vec<usize>)>
+        });
+        let time_s = |place: usize| match (&on_line, &stamps) {
+            (Some((first_s, places)), _) => first_s + places[place] as f64 / rate_hz,
+            (None, Some(stamps)) => stamps[place],
+            (None, None) => channel.axis.start.unwrap_or_default().after_s + place as f64 / rate_hz,
         };
         let good = (0..whole.len())
             .filter(|place| whole[*place].is_finite() && time_s(*place).is_finite());

@@ -1,7 +1,9 @@
 //! Breaks in time stamps whose rate the user gave: the samples before and behind them are joined.
 
+use torqcomp_dsp::quality::broken_line::BrokenLine;
+
 use super::axis::{SampleStep, rounding, step_of};
-use super::stamps::{IrregularStep, StampGrid, is_gap};
+use super::stamps::{IrregularStep, StampGrid, first_missing, is_gap};
 use super::{Channel, RateFrom, TimeAxis};
 use crate::io::{Reading, digits};
 use crate::print::plural;
@@ -60,6 +62,13 @@ impl JoinedBreaks {
         }
     }
 
+    /// Takes the breaks of stamps so coarse that single steps do not show them.
+    fn look_at_coarse(&mut self, grid: &StampGrid, broken: &BrokenLine, stamps: &[f64]) {
+        self.gaps = broken.breaks.len();
+        self.missing = broken.missing() as f64 * grid.step;
+        self.first_gap = first_missing(broken, stamps).map(|missing| missing.at);
+    }
+
     /// What is said of them.
     pub(super) fn warning(&self, source: &str, grid: &StampGrid) -> Option<Warning> {
         let time = |stamp: f64| grid.time_text(stamp);
@@ -107,7 +116,10 @@ impl Channel {
         };
         let grid = grid.beside_given_rate(stamps_s)?;
         let mut breaks = JoinedBreaks::default();
-        breaks.look(&grid, None, stamps_s);
+        match BrokenLine::of(stamps_s) {
+            Some(broken) => breaks.look_at_coarse(&grid, &broken, stamps_s),
+            None => breaks.look(&grid, None, stamps_s),
+        }
         breaks.warning(source, &grid)
     }
 }

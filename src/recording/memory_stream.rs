@@ -49,6 +49,7 @@ impl ChannelStream {
             },
         };
         if !reading.any_steps {
+            time.grid.iter().try_for_each(StampGrid::check_missing)?;
             time.check_rounding()?;
         }
         let mut warnings = recording.warnings.clone();

@@ -1,5 +1,7 @@
 //! Stamps of samples that pass as a stream: the grid that they lie on.
 
+use torqcomp_dsp::quality::broken_line::BrokenLine;
+
 use super::Channel;
 use super::axis::{RateFrom, TimeAxis, UNIFORM, rounding, step_of, without_rounding};
 use super::checkpoints::sharpened;
@@ -34,6 +36,17 @@ pub(crate) struct StampGrid {
     pub(crate) origin_ns: i64,
     /// What they are rounded to, in their unit, if that is all that is wrong with them; else 0.
     pub(super) quantum: f64,
+    /// Of stamps rounded so coarsely that single steps do not show it, the first place at which samples are missing.
+    pub(super) missing: Option<MissingSamples>,
+}
+
+/// Samples that the stamps leave out at a place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct MissingSamples {
+    /// The step over that place.
+    pub(super) at: IrregularStep,
+    /// How many.
+    pub(super) samples: usize,
 }
 
 /// Most copies of a row: more rows of one stamp are those of a coarse clock.
@@ -135,6 +148,7 @@ impl StampGrid {
             copied: false,
             origin_ns: 0,
             quantum: 0.0,
+            missing: None,
         }
     }
 
@@ -154,7 +168,12 @@ impl StampGrid {
         if self.first_irregular(None, stamps).is_some() {
             let origin = self.origin_ns as f64 * 1e-9 / self.seconds_per_unit;
             let rounded = rounding(stamps, self.step, origin).map(|line| line.quantum_s);
-            self.quantum = rounded.unwrap_or(0.0);
+            let broken = rounded.map_or_else(|| BrokenLine::of(stamps), |_| None);
+            self.missing = broken
+                .as_ref()
+                .and_then(|broken| first_missing(broken, stamps));
+            let broken = broken.map(|broken| broken.line.quantum_s);
+            self.quantum = rounded.or(broken).unwrap_or(0.0);
         }
     }
 
@@ -243,6 +262,39 @@ impl StampGrid {
         })
     }
 
+    /// Says where samples are missing, and what to do.
+    fn explain_missing(&self, missing: &MissingSamples) -> String {
+        let Self { unit, step, .. } = self;
+        let (before, after) = (missing.at.before, missing.at.after);
+        format!(
+            "about {} missing between {} and {}: there the time stamps, which are rounded to {} {unit}, leave the uniform \
+             line of {} Hz by {} {unit}; use --fill linear to bridge the gap, or --range to leave it out",
+            match missing.samples {
+                1 => "1 sample is".to_owned(),
+                samples => format!("{samples} samples are"),
+            },
+            self.time_text(before),
+            self.time_text(after),
+            digits::text(self.quantum, 3),
+            digits::text(1.0 / (step * self.seconds_per_unit), 6),
+            digits::text(missing.samples as f64 * step, 4),
+        )
+    }
+
+    /// The failure of samples that are missing between coarse stamps.
+    ///
+    /// # Errors
+    /// If there are any and the samples are placed by their stamps.
+    pub(super) fn check_missing(&self) -> Result<(), Failure> {
+        let Some(missing) = self.missing.filter(|_| !self.resampled) else {
+            return Ok(());
+        };
+        let failure = Failure::failed(ErrorCode::IrregularTime, self.explain_missing(&missing));
+        Err(failure.sample(missing.at.row + 1).with(|place| {
+            place.time_s = Some(self.time_s(missing.at.after));
+        }))
+    }
+
     /// The time of a stamp.
     fn moment(&self, stamp: f64) -> Moment {
         Moment {
@@ -303,6 +355,18 @@ impl StampGrid {
     }
 }
 
+/// The first place at which coarse stamps leave out samples.
+pub(super) fn first_missing(broken: &BrokenLine, stamps: &[f64]) -> Option<MissingSamples> {
+    broken.breaks.first().map(|gap| MissingSamples {
+        at: IrregularStep {
+            row: gap.index,
+            before: stamps[gap.index - 1],
+            after: stamps[gap.index],
+        },
+        samples: gap.missing,
+    })
+}
+
 /// Whether a step of so many usual ones, known to within `slack` of one, leaves out whole samples.
 pub(super) fn is_gap(length: f64, slack: f64) -> bool {
     length > 1.5 + slack && (length - length.round()).abs() < 0.1 + slack
@@ -320,10 +384,22 @@ pub(crate) fn rates_of([least_s, largest_s]: [f64; 2]) -> String {
 /// Whether stamps in seconds are uniform.
 pub(crate) fn is_uniform(stamps_s: &[f64], rate_hz: f64) -> bool {
     let grid = StampGrid::at_rate(rate_hz, 0, stamps_s);
-    grid.first_irregular(None, stamps_s).is_none()
+    grid.missing.is_none() && grid.first_irregular(None, stamps_s).is_none()
 }
 
 impl Channel {
+    /// Whether its stamps, if they place it or a given rate does in their stead, are rounded coarsely.
+    pub(super) fn has_coarse_stamps(&self) -> bool {
+        let of_stamps = matches!(self.axis.rate_from, RateFrom::Stamps(_) | RateFrom::Given);
+        let stamps_s = self.axis.stamps_s.as_ref().filter(|_| of_stamps);
+        let step =
+            stamps_s.and_then(|stamps_s| step_of(stamps_s, self.axis.origin_ns as f64 * 1e-9));
+        stamps_s.zip(step).is_some_and(|(stamps_s, found)| {
+            StampGrid::at_rate(1.0 / found.step, self.axis.origin_ns, stamps_s)
+                .is_rounded_coarsely()
+        })
+    }
+
     /// A warning if the stamps that it is placed by are rounded coarsely.
     pub(super) fn rounded_stamps(&self, source: &str, rate_hz: f64) -> Option<Warning> {
         let by_stamps = matches!(self.axis.rate_from, RateFrom::Stamps(_));
@@ -355,6 +431,9 @@ impl Channel {
         let by_stamps = matches!(self.axis.rate_from, RateFrom::Stamps(_));
         let stamps_s = self.axis.stamps_s.as_ref().filter(|_| by_stamps)?;
         let grid = StampGrid::at_rate(rate_hz, self.axis.origin_ns, stamps_s);
+        if let Err(missing) = grid.check_missing() {
+            return Some(missing);
+        }
         let found = grid.first_irregular(None, stamps_s)?;
         let failure = Failure::failed(
             ErrorCode::IrregularTime,
@@ -422,6 +501,7 @@ mod tests {
             copied: true,
             origin_ns: 0,
             quantum: 0.0,
+            missing: None,
         }
     }
 

@@ -120,11 +120,8 @@ impl ChannelStream {
         let place = first_rows.place(choice)?;
         let selection = first_rows.select_at(place, choice, reading)?;
         // Which sample has a stamp farther on cannot be counted where several share one.
-        let is_coarse = selection
-            .channel
-            .rounded_stamps("", selection.rate_hz)
-            .is_some();
-        if is_coarse && reading.rate_hz.is_none() {
+        let is_coarse = selection.channel.has_coarse_stamps();
+        if is_coarse {
             return Self::of_recording(file.read()?, choice, reading);
         }
         let of_first_rows = &selection.channel.axis;

@@ -3,6 +3,7 @@
 
 use torqcomp_dsp::compensate::whole_record;
 use torqcomp_dsp::noise::RecordNoise;
+use torqcomp_dsp::quality::streamed::StreamedFaults;
 use torqcomp_dsp::spectrum::{Density, StreamedPower};
 use torqcomp_dsp::store::SampleStore;
 
@@ -59,12 +60,17 @@ pub(super) fn run(
         }
         Some(undo) => refined::run(undo, (&stand, chain.std), &record, report, deliver)?,
     }
+    let mut faults = StreamedFaults::default();
+    record
+        .samples
+        .pass(0..count, &mut |_, piece| faults.push(piece))?;
     report.samples = count;
     report.result = sums.statistics(scale);
     report.resampled = record.resampled;
     Ok(Seen {
         summary: record.summary,
         excerpt: record.samples.part(0..count.min(excerpt::OF_PASSES))?,
+        faults: faults.finish(),
     })
 }
 

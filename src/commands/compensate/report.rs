@@ -51,9 +51,13 @@ pub(in crate::commands) struct CompensateReport {
     pub(super) rated_torque: Option<f64>,
     #[serde(skip)]
     pub(super) levels: RecordedLevels,
+    /// Natural frequency in Hz and damping ratio of the stand's modes.
+    #[serde(skip)]
+    pub(super) modes: Vec<(f64, f64)>,
     /// Number of samples.
     pub(super) samples: usize,
-    /// Number of samples, from the first on, in which clipping, dropouts and hum were looked for.
+    /// Number of samples, from the first on, in which hum, held samples, coarse resolution and clipping under noise were looked for; clipping
+    /// and drop-outs are looked for in all.
     pub(super) looked_at: usize,
     /// Sampling rate, in Hz.
     pub(super) rate_hz: f64,
@@ -253,7 +257,7 @@ impl CompensateReport {
         ]);
         if self.looked_at < self.samples {
             let looked_at = format!(
-                "clipping, dropouts and hum were looked for in the first {} samples; inspect looks at more",
+                "clipping and drop-outs were looked for throughout, hum and held values in the first {} samples; inspect looks at more",
                 self.looked_at
             );
             facts.push(fact("quality", looked_at));

@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use torqcomp_dsp::compensate::{BlockConvolver, InverseFilter, Windows};
 use torqcomp_dsp::noise::RecordNoise;
+use torqcomp_dsp::quality::streamed::StreamedFaults;
 use torqcomp_dsp::resample::{Resampled, Resampler};
 use torqcomp_dsp::spectrum::{Density, PowerSum, welch};
 
@@ -63,6 +64,8 @@ struct Gathered<'a> {
     /// The first samples as recorded: for the quality of the record, and for its noise where it is too short for a
     /// block of the estimate.
     first: Vec<f64>,
+    /// What is wrong with samples anywhere.
+    faults: StreamedFaults,
 }
 
 /// Runs the stages over the whole record.
@@ -99,6 +102,7 @@ pub(super) fn run(
         power: PowerSum::new(noise_block),
         sums: Sums::NONE,
         first: Vec::new(),
+        faults: StreamedFaults::default(),
     };
     let mut joiner = Joiner::new(grid, rate_hz, half_length);
     // Rows enough that a piece needs no more than the one after it.
@@ -122,6 +126,7 @@ pub(super) fn run(
     Ok(Seen {
         summary: validator.finish(blocks.as_mut())?,
         excerpt: gathered.first,
+        faults: gathered.faults.finish(),
     })
 }
 
@@ -147,6 +152,7 @@ impl Gathered<'_> {
         if let Some(part) = &job.sums {
             self.sums.join(part);
         }
+        self.faults.push(recorded);
         let missing = excerpt::OF_STREAM - self.first.len();
         self.first.extend(recorded.iter().take(missing));
         Ok(())

@@ -1,6 +1,7 @@
 //! What should be known about a compensated record.
 
 use torqcomp_dsp::noise::RecordNoise;
+use torqcomp_dsp::quality::resonance::other_resonance;
 use torqcomp_dsp::resample::Resampled;
 use torqcomp_model::Mode;
 
@@ -36,6 +37,7 @@ pub(super) fn add(report: &mut CompensateReport, seen: &Seen, traces: Option<&Tr
     );
     report.looked_at = seen.excerpt.len();
     more.extend(of_quality(report, seen));
+    more.extend(of_resonance(report, seen));
     let levels = &report.levels;
     more.extend(levels.warnings(&seen.excerpt, report.scale, &report.unit));
     let largest = report.result.largest.max(-report.result.smallest);
@@ -74,6 +76,31 @@ pub(super) fn of_ringing(stand: &Stand, rate_hz: f64) -> Option<Warning> {
     })
 }
 
+/// Natural frequency in Hz and damping ratio of a stand's modes.
+pub(super) fn modes(stand: &Stand) -> Vec<(f64, f64)> {
+    let modes = stand.modes().ok();
+    let parts = modes.iter().flat_map(|modes| modes.parts());
+    parts
+        .map(|part| (part.mode.natural_frequency_hz(), part.mode.damping_ratio))
+        .collect()
+}
+
+/// A warning if the record rings near, but not at, the declared natural frequency.
+fn of_resonance(report: &CompensateReport, seen: &Seen) -> Option<Warning> {
+    let found = other_resonance(&seen.excerpt, report.rate_hz, &report.modes)?;
+    Some(Warning::new(
+        "resonance-elsewhere",
+        format!(
+            "the record has a resonance at {} Hz (damping ratio about {}) and none at {} Hz, where the stand file says that the \
+             stand resonates: if it is the stand's, the result is wrong. Record a tap on the stand as it is and \
+             find its constants with identify decay; if the machine resonates there, nothing need be done",
+            rounded(found.frequency_hz, 3),
+            rounded(found.damping_ratio, 1),
+            rounded(report.modes[0].0, 4)
+        ),
+    ))
+}
+
 fn of_unknown_noise(report: &CompensateReport) -> Option<Warning> {
     let gain = report.noise.largest_gain;
     (gain > LARGE_GAIN && report.band.is_given()).then(|| {
@@ -96,6 +123,7 @@ fn of_quality(report: &CompensateReport, seen: &Seen) -> Vec<Warning> {
         rate_hz: report.rate_hz,
         start: report.start,
         samples: report.samples,
+        faults: seen.faults,
     };
     excerpt::warnings(&seen.excerpt, of)
 }

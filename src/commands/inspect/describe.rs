@@ -306,7 +306,7 @@ fn with_samples(channel: InspectedChannel, found: &Findings) -> InspectedChannel
         clipped: Some(found.clipping.map_or(0, |c| c.samples())),
         clipped_low: rail(|c| c.low.map(|r| r.value)),
         clipped_high: rail(|c| c.high.map(|r| r.value)),
-        stuck: Some(found.standstills.iter().map(|run| run.length).sum()),
+        stuck: Some(found.standstills.map_or(0, |found| found.samples)),
         constant: Some(found.constant.is_some()),
         non_finite: Some(found.non_finite.map_or(0, |f| f.count)),
         resolution: found.quantisation.map(|q| q.step),

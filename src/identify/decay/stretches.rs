@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use torqcomp_dsp::peaks::Line;
 use torqcomp_dsp::quality::clipping::Clipping;
+use torqcomp_dsp::quality::flat_tops::flat_tops;
 use torqcomp_dsp::undersample::Undersampling;
 use torqcomp_dsp::{decimate, onset, peaks};
 
@@ -187,7 +188,7 @@ fn cut<'a>(
     let (mut all, mut cuts) = (Vec::new(), Cuts::default());
     for record in records {
         check(record)?;
-        let clipped_s = clipped_times(record);
+        let clipped_s = clipped_times(record, result);
         let (values, of_mains) = without_mains(record.values, record.rate_hz);
         lines.extend(of_mains);
         let prepared = prepared(record, values, options, result)?;
@@ -283,9 +284,21 @@ fn parts(values: &[f64], rings: &Range<usize>, is_uniform: bool) -> Vec<Range<us
     parts.into_iter().map(within).collect()
 }
 
-/// Times of the samples that the recorder cut off.
-fn clipped_times(record: &Ringing) -> Vec<f64> {
-    let Some(found) = Clipping::of(record.values) else {
+/// Times of the samples that the recorder cut off, or an amplifier before it.
+fn clipped_times(record: &Ringing, result: &mut Identification) -> Vec<f64> {
+    let of_amplifier = || {
+        let found = flat_tops(record.values)?;
+        result.warn(
+            "clipped",
+            format!(
+                "{}: the first peaks of the decay are flat, as of an amplifier that was overdriven before its filter: the \
+                 decay is fitted behind them; tap more softly, or set a smaller gain",
+                record.name
+            ),
+        );
+        Some(found)
+    };
+    let Some(found) = Clipping::of(record.values).or_else(of_amplifier) else {
         return Vec::new();
     };
     let samples = record.times_s.iter().zip(record.values);

@@ -1,6 +1,7 @@
 //! Blocks of rows below each other: where one ends and the next begins.
 
 use super::axes::Role;
+use super::cell::Cell;
 use super::head::is_end;
 use super::header::Header;
 use super::keys::{self, Entry, Topic};
@@ -56,9 +57,25 @@ impl TableEnd {
     /// Whether a table ends before a line that is no plain row.
     pub fn is_at(&self, line: &str) -> bool {
         is_end(line)
-            || self.names.as_deref() == Some(line)
+            || self.are_names(line)
             || self.marks.iter().any(|mark| line.starts_with(mark))
             || self.begins_anew(line)
+    }
+
+    /// Whether a line heads the columns again, perhaps in other units: as many cells, of which the first is the same.
+    fn are_names(&self, line: &str) -> bool {
+        let Some(names) = self.names.as_deref() else {
+            return false;
+        };
+        if names == line {
+            return true;
+        }
+        let [names, cells] = [names, line].map(|line| self.dialect.cells(line));
+        let is_text = |cell: &String| Cell::read(cell, self.dialect.decimal) == Cell::Text;
+        names.len() > 1
+            && names.len() == cells.len()
+            && names[0] == cells[0]
+            && cells.iter().all(is_text)
     }
 
     /// Whether a line repeats a key of the head: there a block of its own begins, with its own head.

@@ -6,6 +6,8 @@
 
 use crate::recording::moment::date_and_time;
 
+/// Seconds since 1970 from 2001 to 2128.
+pub const EPOCH_S: std::ops::Range<f64> = 1e9..5e9;
 /// Nanoseconds of a second.
 const SECOND: i64 = 1_000_000_000;
 /// Nanoseconds of a day.

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::cell::Cell;
+use super::cells_with_units::unit_of_cell;
 use super::chunks::Chunks;
 use super::commas;
 use super::rows::cleaned;
@@ -450,6 +451,18 @@ fn no_table(head: &Head) -> String {
         };
     };
     let shown: String = first.text.trim().chars().take(60).collect();
+    let is_separator = |c: char| matches!(c, ',' | ';' | '\t');
+    let has_unit = |line: &&Line| {
+        let mut cells = line.text.split(is_separator);
+        cells.any(|cell| unit_of_cell(cell, b'.').is_some())
+    };
+    if let Some(line) = head.lines.iter().find(has_unit) {
+        return format!(
+            "no table of numbers found: \"{}\" holds units beside its numbers; only plain numbers are read. Take the units off \
+             the cells, bring each column to one unit, and write that in its heading: \"torque [N m]\"",
+            line.text.trim().chars().take(60).collect::<String>()
+        );
+    }
     format!(
         "no table of numbers found (the first line reads \"{shown}\"); expected at least two rows \
          of numbers, with or without headings above. Say how the cells are separated with \

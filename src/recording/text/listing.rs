@@ -1,6 +1,7 @@
 //! Lists of settings and of results, which look like tables and are no recordings.
 
 use super::cell::Cell;
+use super::clock::EPOCH_S;
 use super::head::{Head, Table};
 use super::rows::ColumnKind;
 use crate::failure::{ErrorCode, Failure};
@@ -46,7 +47,7 @@ pub fn refuse(head: &Head, table: &Table) -> Result<(), Failure> {
         ));
     }
     // Beside the time of each row, states such as those of alarms say nothing against a recording.
-    let has_time = (0..table.width).any(|place| is_clock(&read, place));
+    let has_time = (0..table.width).any(|place| is_clock(&read, place)) || begins_with_epoch(&read);
     let texts = (0..table.width)
         .filter(|place| is_text(&read, *place) && !(has_time && is_state(&rows, *place)))
         .count();
@@ -96,6 +97,15 @@ pub fn refuse_variables(head: &Head, table: &Table, kinds: &[ColumnKind]) -> Res
         .line(head.number(table.first))),
         None => Ok(()),
     }
+}
+
+/// Whether the first column holds whole seconds since 1970, as a stamp without a heading does.
+fn begins_with_epoch(rows: &[Vec<Cell>]) -> bool {
+    let is_epoch = |row: &Vec<Cell>| match row.first() {
+        Some(Cell::Number(s)) => s.fract() == 0.0 && EPOCH_S.contains(s),
+        _ => false,
+    };
+    rows.len() > 1 && rows.iter().all(is_epoch)
 }
 
 /// After how many rows the texts of a column come again in the same order, all of them different.

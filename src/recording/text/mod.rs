@@ -9,6 +9,7 @@ mod axes;
 mod axis_names;
 mod blocks;
 mod cell;
+mod cells_with_units;
 mod chunks;
 mod clock;
 mod commas;
@@ -39,8 +40,10 @@ use super::{AllSamples, Recording, Segment};
 use crate::failure::{ErrorCode, Failure};
 use crate::io::Reading;
 use crate::recording::text::dialect::decode_line;
+use crate::warning::Warning;
 
 pub use axis_names::is_time_name;
+pub(in crate::recording) use cells_with_units::CODE as CELLS_WITH_UNITS;
 pub use chunks::{Chunks, LONGEST_LINE, Piece, too_long_a_line};
 pub use clock::Clock;
 pub use clock::days_between;
@@ -138,13 +141,14 @@ impl TextFile {
         let Some(layout) = &file.layout else {
             return Ok(file);
         };
+        file.recording.warnings.extend(layout.with_units.clone());
         file.recording.dialect = file.describe(&layout.plan.dialect.describe());
         for channel in &mut file.recording.channels {
             channel.samples.clear();
             channel.holes.clear();
         }
         match file.recording.channels.is_empty() {
-            true => Err(no_channel()),
+            true => Err(no_channel(&file.recording.warnings)),
             false => Ok(file),
         }
     }
@@ -194,10 +198,10 @@ impl TextFile {
                 read.lost = read.lost.or_else(|| self.chunks.unended_line());
                 (read, Vec::new())
             }
-            (None, None) => return Err(no_channel()),
+            (None, None) => return Err(no_channel(&[])),
         };
         if read.channels.is_empty() {
-            return Err(no_channel());
+            return Err(no_channel(&read.warnings));
         }
         read.dialect = self.describe(&read.dialect);
         if read.segments.len() > 1 {
@@ -216,10 +220,12 @@ impl TextFile {
     }
 }
 
-fn no_channel() -> Failure {
+fn no_channel(warnings: &[Warning]) -> Failure {
+    let with_units = warnings.iter().find(|w| w.code == cells_with_units::CODE);
+    let why = with_units.map_or_else(String::new, |w| format!(". {}", w.message));
     Failure::failed(
         ErrorCode::NotARecording,
-        "there is no column besides the time; expected one with the signal",
+        format_args!("there is no column besides the time; expected one with the signal{why}"),
     )
 }
 

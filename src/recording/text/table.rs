@@ -15,7 +15,7 @@ use super::header::{self, Field, Header};
 use super::last_line::{LastLine, last_line};
 use super::rows::{Column, ColumnKind, Item, RowPlan, Rows, cleaned, items};
 use super::tail::Tail;
-use super::{listing, sparse, summary};
+use super::{cells_with_units, listing, sparse, summary};
 use crate::failure::Failure;
 use crate::io::{Reading, names_compensated};
 use crate::recording::text::dialect::{Dialect, decode_line, is_skipped};
@@ -50,6 +50,8 @@ pub struct Layout {
     pub plan: RowPlan,
     /// What its columns are.
     pub axes: AxisPlan,
+    /// Warnings of columns that hold a unit behind each number.
+    pub with_units: Vec<Warning>,
     /// Bytes before its first row.
     pub offset: usize,
     /// Line of its first row.
@@ -137,10 +139,10 @@ impl Layout {
             items: named_items(&head, &header, first, table.dialect),
             kinds,
         };
-        let offset = head.lines[first].offset;
         let mut found = Self {
             axes: AxisPlan::default(),
-            offset,
+            with_units: cells_with_units::left_out(&head, &table, first, &header),
+            offset: head.lines[first].offset,
             line: head.number(first),
             first_rows: Rows::default(),
             first_bytes: 0,
@@ -191,8 +193,8 @@ impl Layout {
             self.held_whole = Some("its time stands in two columns, or is the sum of steps");
         }
         self.keep_offsets_of_time(&mut rows);
-        let is_time = |role: &Role| *role == Role::Time;
-        self.plan.stamps = self.axes.roles.iter().position(is_time);
+        let mut roles = self.axes.roles.iter();
+        self.plan.stamps = roles.position(|role| *role == Role::Time);
         let stamps = self.plan.stamps.map(|place| &rows.columns[place].values);
         if let Some(spelling) = stamps.and_then(|stamps| foreign_spelling(stamps, text)) {
             self.held_whole = Some(spelling);

@@ -6,28 +6,34 @@
 //! | fault | where |
 //! |---|---|
 //! | jitter, gaps, time running backwards, repeated stamps, clock jumps | [`steps`](mod@steps) |
-//! | stamps that are rounded | [`rounding`] |
+//! | stamps that are rounded | [`rounding`], with samples missing [`broken_line`] |
 //! | a stated rate that the stamps contradict | [`rate`] |
 //! | cells that are no finite numbers | [`finite`] |
-//! | clipping | [`clipping`](mod@clipping), under noise [`pile_up`](mod@pile_up) |
+//! | clipping | [`clipping`](mod@clipping), under noise [`pile_up`](mod@pile_up), of a decay before a filter [`flat_tops`](mod@flat_tops) |
 //! | a channel that stands still | [`stuck`] |
+//! | both in a stream | [`streamed`] |
 //! | samples that repeat the one before | [`repeats`](mod@repeats) |
 //! | coarse resolution | [`quantisation`](mod@quantisation) |
 //! | mains hum | [`mains`](mod@mains) |
+//! | a resonance other than the declared one | [`resonance`] |
 //! | number, range, mean and spread of samples that are not kept | [`sums`] |
 //! | channels that are copies of each other | [`copies`](mod@copies) |
 
+pub mod broken_line;
 pub mod clipping;
 pub mod copies;
 pub mod finite;
+pub mod flat_tops;
 pub mod mains;
 pub mod pile_up;
 pub mod quantisation;
 pub mod rate;
 pub mod repeats;
+pub mod resonance;
 pub mod rounding;
 mod runs;
 pub mod steps;
+pub mod streamed;
 pub mod stuck;
 pub mod sums;
 #[cfg(test)]

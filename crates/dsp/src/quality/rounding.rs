@@ -37,7 +37,7 @@ impl Rounded {
 }
 
 /// Fewest stamps that a line is laid through.
-const FEWEST: usize = 8;
+pub(super) const FEWEST: usize = 8;
 /// Least quantum, as a part of the step, that is worth saying: below it, steps stay within 1 %.
 const COARSE: f64 = 0.01;
 /// Largest distance of a stamp from the line, in quanta, at which the stamps are the line.
@@ -182,18 +182,28 @@ fn whole(multiple: f64) -> f64 {
 /// Least and largest step of the lines that stay within one above each stamp (index and stamp, counted from the first),
 /// if there are any and all of them rise.
 fn explaining(points: &[(f64, f64)]) -> Option<[f64; 2]> {
-    // The first and the last stamp allow no more than these.
-    let &(steps, last) = points.last()?;
-    let low = bound(points, (last - 1.0) / steps)?;
-    let high = bound(points, (last + 1.0) / steps)?;
-    (low > 0.0 && low < high).then_some([low, high])
+    slopes(points, [f64::NEG_INFINITY, f64::INFINITY])
+        .filter(|[low, high]| *low > 0.0 && low < high)
 }
 
-/// The bound of the feasible slopes that is met from a slope outside or on it. For the slope `b` the worst
+/// Least and largest slope within a range of the lines that stay within one above each of several points.
+pub(super) fn slopes(points: &[(f64, f64)], [low, high]: [f64; 2]) -> Option<[f64; 2]> {
+    let (first, last) = (points.first()?, points.last()?);
+    let steps = last.0 - first.0;
+    // The first and the last point allow no more than these.
+    let outermost = [-1.0, 1.0].map(|one| (last.1 - first.1 + one) / steps);
+    let found = [
+        bound(points, low.max(outermost[0]), 1.0)?,
+        bound(points, high.min(outermost[1]), -1.0)?,
+    ];
+    (found[0] <= high && found[1] >= low).then_some(found)
+}
+
+/// The bound of the feasible slopes that is met from a slope below (`side` 1), above (−1) or on it. For the slope `b` the worst
 /// pair is the stamp that lies highest over `b i` and the upper end of the one that lies lowest; from `b`
 /// on to the slope that brings these two together, until no pair is apart. The function is convex and
-/// made of straight pieces, so that this ends after few steps.
-fn bound(points: &[(f64, f64)], mut slope: f64) -> Option<f64> {
+/// made of straight pieces, so that this ends after few steps; where it turns back, no slope is feasible.
+fn bound(points: &[(f64, f64)], mut slope: f64, side: f64) -> Option<f64> {
     for _ in 0..100 {
         let (mut highest, mut lowest) = ((f64::NEG_INFINITY, 0), (f64::INFINITY, 0));
         for (place, (i, stamp)) in points.iter().enumerate() {
@@ -210,10 +220,11 @@ fn bound(points: &[(f64, f64)], mut slope: f64) -> Option<f64> {
             return Some(slope);
         }
         let (above, below) = (points[highest.1], points[lowest.1]);
-        slope = (above.1 - below.1 - 1.0) / (above.0 - below.0);
-        if !slope.is_finite() {
+        let next = (above.1 - below.1 - 1.0) / (above.0 - below.0);
+        if !next.is_finite() || (next - slope) * side <= 0.0 {
             return None;
         }
+        slope = next;
     }
     None
 }
@@ -223,7 +234,7 @@ const DIGITS_LESS: usize = 2;
 
 /// Of the steps in the middle half of a range the one that takes the fewest digits, itself or as a rate; of all steps, if
 /// that takes clearly fewer.
-fn simplest([low_s, high_s]: [f64; 2]) -> f64 {
+pub(super) fn simplest([low_s, high_s]: [f64; 2]) -> f64 {
     let quarter = 0.25 * (high_s - low_s);
     let middle = 0.5 * (low_s + high_s);
     let digits =
@@ -243,7 +254,7 @@ fn simplest([low_s, high_s]: [f64; 2]) -> f64 {
 }
 
 /// The largest power of ten that all stamps are multiples of, from 1 s to 1 as; none if even these are too large.
-fn quantum(stamps_s: impl Iterator<Item = f64> + Clone) -> Option<f64> {
+pub(super) fn quantum(stamps_s: impl Iterator<Item = f64> + Clone) -> Option<f64> {
     (0..19).map(|power| 10_f64.powi(-power)).find(|q| {
         stamps_s.clone().all(|t| {
             let multiple = t / q;

@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::broken_line::BrokenLine;
 use super::median;
 
 /// A step longer than this many usual ones leaves out a sample.
@@ -118,6 +119,23 @@ pub fn steps(stamps_s: &[f64]) -> Option<Steps> {
 #[must_use]
 pub fn rounded_steps(stamps_s: &[f64], step_s: f64, quantum_s: f64) -> Option<Steps> {
     steps_about(stamps_s, Some((step_s, quantum_s)))
+}
+
+/// As [`steps`](fn@steps), of rounded stamps that leave out samples at known places.
+#[must_use]
+pub fn broken_steps(stamps_s: &[f64], broken: &BrokenLine) -> Option<Steps> {
+    let step_s = broken.line.step_s;
+    let mut found = steps_about(stamps_s, Some((step_s, broken.line.quantum_s)))?;
+    found.missing = broken.missing() as f64;
+    found.gaps = Events::default();
+    for gap in &broken.breaks {
+        found.gaps.push(Event {
+            index: gap.index,
+            from_s: stamps_s[gap.index - 1],
+            step_s: step_s * (gap.missing + 1) as f64,
+        });
+    }
+    Some(found)
 }
 
 fn steps_about(stamps_s: &[f64], rounded: Option<(f64, f64)>) -> Option<Steps> {

@@ -3,7 +3,7 @@
 use super::{Run, median, range, runs};
 
 /// Fewest samples of a standstill.
-const SHORTEST: usize = 20;
+pub(super) const SHORTEST: usize = 20;
 /// Part of the samples outside standstills that may repeat the one before; above it, standing still
 /// is what the channel does.
 const LIVELY: f64 = 0.5;

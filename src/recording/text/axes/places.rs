@@ -4,6 +4,7 @@ use super::stamps::seconds_of_step;
 use super::{Sources, is_counting};
 use crate::failure::Failure;
 use crate::recording::choice::{Label, choose};
+use crate::recording::text::clock::EPOCH_S;
 use crate::recording::text::header::Field;
 use crate::recording::text::rows::ColumnKind;
 use crate::recording::text::units;
@@ -173,6 +174,9 @@ impl Sources<'_> {
             return TimePlaces::sure(Vec::new());
         };
         let values = &self.columns[first].values;
+        if used.starts_with(&[0, 1]) && self.parts_of(0).is_some() {
+            return TimePlaces::sure(vec![0, 1]);
+        }
         let field = &self.fields[first];
         let is_axis = units::is_axis_name(&field.name) && field.unit.is_none();
         if is_axis && !is_counting(values) && mostly_rises(values) {
@@ -216,6 +220,20 @@ impl Sources<'_> {
             (Some(step), Some((_, hz))) => seconds_of_step(step, hz).is_some(),
             _ => false,
         }
+    }
+
+    /// Seconds per unit of the first two columns of a table without headings that begins with the whole seconds since 1970
+    /// and their nanoseconds, as `ros2 topic echo --csv` writes a stamp.
+    pub(super) fn stamp_without_heading(&self, place: usize) -> Option<f64> {
+        let (seconds, nanoseconds) = (self.columns.first()?, self.columns.get(1)?);
+        let origin = match self.kinds[0] {
+            ColumnKind::Offset(origin) => origin as f64,
+            _ => 0.0,
+        };
+        let is_epoch = EPOCH_S.contains(&(origin + seconds.values.first()?));
+        let are_nanoseconds = nanoseconds.values.iter().any(|part| *part >= 1e6);
+        let is_stamp = is_epoch && are_nanoseconds && self.is_unnamed(0) && self.is_unnamed(1);
+        [1.0, 1e-9].get(place).copied().filter(|_| is_stamp)
     }
 
     pub(super) fn is_clock(&self, place: usize) -> bool {

@@ -169,9 +169,14 @@ impl Sources<'_> {
             .find(|p| *p == place + 1)
             .filter(|p| {
                 let values = &self.columns[*p].values;
+                // Within the first second they rise.
+                let of_unit = self.fields[*p].unit.as_ref();
+                let is_named = || of_unit.is_some_and(|unit| unit.unit.factor() == 1e-3);
+                let seconds = &self.columns[place].values;
+                let is_one = || seconds.iter().all(|second| *second == seconds[0]);
                 !self.is_clock(*p)
                     && values.iter().all(|v| (0.0..1000.0).contains(v))
-                    && !rises(values)
+                    && (!rises(values) || is_named() && is_one())
             })
             .map(|place| Parts {
                 place,
@@ -217,11 +222,13 @@ impl Sources<'_> {
 
     /// The parts of the whole seconds that a column holds, in the column beside it.
     pub(super) fn parts_of(&self, place: usize) -> Option<Parts> {
-        let seconds_of = |place: usize| {
+        let seconds_of_name = |place: usize| {
             let field = self.fields.get(place)?;
             let unit = field.unit.as_ref().filter(|_| field.is_named_time())?;
             units::is_time(unit).then(|| unit.unit.factor())
         };
+        let seconds_of =
+            |place: usize| seconds_of_name(place).or_else(|| self.stamp_without_heading(place));
         let numbers = |place: usize| &self.columns[place].values;
         let are_whole = numbers(place).iter().all(|value| value.fract() == 0.0);
         if seconds_of(place) != Some(1.0) || !are_whole || self.is_clock(place) {

@@ -9,7 +9,8 @@ use crate::warning::Warning;
 impl Layout {
     /// What should be known of its lines, and of what was taken for granted; `rows` is their number.
     pub fn warnings(&self, notes: &LineNotes, rows: usize) -> Vec<Warning> {
-        let mut warnings: Vec<Warning> = of_lines(notes, notes.zeros + self.zeros_above);
+        let mut warnings: Vec<Warning> =
+            of_lines(notes, notes.zeros + self.zeros_above, self.line + rows);
         warnings.extend(self.assumptions());
         warnings.extend(self.axes.warnings.iter().cloned());
         warnings.extend(self.count_differs(rows));
@@ -44,7 +45,7 @@ impl Layout {
     }
 }
 
-fn of_lines(notes: &LineNotes, zeros: usize) -> Vec<Warning> {
+fn of_lines(notes: &LineNotes, zeros: usize, end: usize) -> Vec<Warning> {
     let mut warnings = Vec::new();
     if zeros > 0 {
         warnings.push(Warning::new(
@@ -52,9 +53,12 @@ fn of_lines(notes: &LineNotes, zeros: usize) -> Vec<Warning> {
             format!("{} in the text left out", plural(zeros, "zero byte")),
         ));
     }
-    // A last word such as EOF is no fault.
-    let is_footer = |text: &str| notes.odd_count == 1 && !text.chars().any(|c| c.is_ascii_digit());
-    if let Some((line, text)) = notes.odd.as_ref().filter(|(_, text)| !is_footer(text)) {
+    // A last word such as EOF, behind all rows, is no fault.
+    let is_footer = |line: usize, text: &str| {
+        notes.odd_count == 1 && line >= end && !text.chars().any(|c| c.is_ascii_digit())
+    };
+    let odd = notes.odd.as_ref();
+    if let Some((line, text)) = odd.filter(|(line, text)| !is_footer(*line, text)) {
         warnings.push(Warning::new(
             "lines-skipped",
             format!(

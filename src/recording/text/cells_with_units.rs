@@ -1,0 +1,78 @@
+//! Columns whose cells hold a unit behind each number: `0.53 V`, `12 mV`.
+
+use super::cell::Cell;
+use super::head::{Head, Table};
+use super::header::{Field, Header};
+use super::units;
+use crate::warning::Warning;
+
+/// Code of the warning that such a column was left out.
+pub(in crate::recording) const CODE: &str = "cells-with-units";
+
+/// The unit behind the number that a cell holds.
+///
+/// Only a unit that is known counts: `12 pieces` and `B12` are texts.
+pub fn unit_of_cell(cell: &str, decimal: u8) -> Option<&str> {
+    let cell = cell.trim();
+    let is_digit = |c: char| c.is_ascii_digit() || c == '.';
+    let ends = cell
+        .match_indices(is_digit)
+        .map(|(at, digit)| at + digit.len());
+    // The exponent belongs to the number, so that the longest one counts.
+    let end = ends
+        .rev()
+        .find(|end| Cell::read(cell[..*end].trim(), decimal).is_number())?;
+    let unit = cell[end..].trim();
+    (!unit.is_empty() && units::read(unit).is_some()).then_some(unit)
+}
+
+/// The warnings about the columns whose first cell is a number with its unit; `first` is the first row.
+pub fn left_out(head: &Head, table: &Table, first: usize, header: &Header) -> Vec<Warning> {
+    let cells = table.dialect.cells(&head.lines[first].text);
+    let fields = header.fields.iter().zip(&cells).enumerate();
+    let warning = |(place, (field, cell)): (usize, (&Field, &String))| {
+        let (heading, unit) = (&field.heading, unit_of_cell(cell, table.dialect.decimal)?);
+        Some(Warning::new(
+            CODE,
+            format!(
+                "line {}: column {} (\"{heading}\") reads \"{cell}\": only plain numbers are read, so that the column was \
+                 left out; take the units off its cells, bring all of them to one unit, and write that in the heading: \
+                 \"{} [{unit}]\"",
+                head.number(first),
+                place + 1,
+                field.name
+            ),
+        ))
+    };
+    fields.filter_map(warning).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::unit_of_cell;
+
+    #[test]
+    fn a_unit_behind_a_number_is_found() {
+        for (cell, unit) in [
+            ("0.53 V", "V"),
+            ("12mV", "mV"),
+            ("-1.2e-3 N m", "N m"),
+            ("1.2 kHz", "kHz"),
+            ("60.5 °C", "°C"),
+        ] {
+            assert_eq!(unit_of_cell(cell, b'.'), Some(unit), "{cell}");
+        }
+        assert_eq!(unit_of_cell("0,53 V", b','), Some("V"));
+        for cell in [
+            "0.53",
+            "B12",
+            "12 pieces",
+            "V",
+            "",
+            "3 of 4",
+            "2024-03-12 13:26",
+        ] {
+            assert_eq!(unit_of_cell(cell, b'.'), None, "{cell}");
+        }
+    }
+}
