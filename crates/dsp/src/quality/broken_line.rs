@@ -64,10 +64,13 @@ impl BrokenLine {
             steps = within(&points[piece.clone()], steps)?;
         }
         let is_coarse = steps[0] > 0.0 && COARSE * steps[1] < 1.0;
-        // Mostly equal steps show each gap by themselves.
+        // Mostly equal steps show each gap by themselves, and so do single ones among equal steps of one quantum.
         let step = simplest(steps.map(|step| step * quantum_s)) / quantum_s;
-        let equal = |pair: &&[(f64, f64)]| ((pair[1].1 - pair[0].1) / step - 1.0).abs() <= EQUAL;
-        let are_equal = 2 * points.windows(2).filter(equal).count() > points.len();
+        let others = |step: f64| {
+            let other = |pair: &&[(f64, f64)]| ((pair[1].1 - pair[0].1) / step - 1.0).abs() > EQUAL;
+            points.windows(2).filter(other).count()
+        };
+        let are_equal = 2 * others(step) + 2 < points.len() || others(1.0) < AT_ONCE;
         if !is_coarse || are_equal {
             return None;
         }
@@ -197,6 +200,13 @@ mod tests {
                 "{what}"
             );
         }
+    }
+
+    #[test]
+    fn one_gap_among_equal_steps_is_no_rounding() {
+        // Eleven of twelve stamps at 10 Hz: a rate of 9.1 Hz in tenths of a second has the same ones.
+        let lost = stamps(10.0, 1, 12, 5..6);
+        assert_eq!(BrokenLine::of(&lost), None);
     }
 
     #[test]
