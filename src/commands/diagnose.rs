@@ -1,5 +1,6 @@
 //! `diagnose`: what the stand lacks, and the error before and after it is added.
 
+mod decays;
 mod page;
 mod read;
 mod refined;

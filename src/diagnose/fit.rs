@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use torqcomp_model::Chain;
 use torqcomp_model::Mode;
 use torqcomp_model::fit::{self, Differences, Fit, FitError, Options, Parameter};
-use torqcomp_model::simulate::MotionState;
 
+use super::own_of_records::{OwnOfRecords, within};
 use super::record::{InitialState, Nuisance, NuisanceFit, NuisanceTerms, StandRecord, StateSlopes};
 use super::structure::{PlainStand, Structure};
 use torqcomp_dsp::dot;
@@ -71,10 +71,6 @@ impl FitEffort {
 
 /// Relative reduction of the sum of squares at which a fit has converged.
 const TOLERANCE: f64 = 1e-6;
-/// Largest displacement by a constant load, over the rms of the record.
-const LARGEST_PRELOAD: f64 = 0.5;
-/// Largest displacement at the start of free ringing, over the rms of the record.
-const LARGEST_STATE: f64 = 100.0;
 /// Step of the initial state for differences, over the rms of the record.
 const STATE_STEP: f64 = 1e-4;
 /// Correction of the motion at a record's start, over the rms of the residual, that makes a second fit worthwhile.
@@ -161,19 +157,12 @@ fn minimize(
 ) -> Result<Fit, FitError> {
     let own = structure.bounds().len();
     let start_model = structure.model(start).0;
-    let rings = |r: &StandRecord| start_model.is_integrated() && r.is_free();
-    let of_records = OwnOfRecords {
-        size: structure.context.scales.rms,
-        omega_rad_s: start_model.free_mode().omega_rad_s,
-        has_preload: start_model.has_zero(),
-        ringing: (0..records.len()).filter(|k| rings(&records[*k])).collect(),
-    };
+    let of_records = OwnOfRecords::of(&start_model, structure.context.scales.rms, records);
     let mut parameters = parameters(structure, start);
     parameters.extend(of_records.parameters(records));
     let nuisance =
         |k: usize, record: &StandRecord, free: &Mode, terms: &NuisanceTerms| match of_records
-            .ringing
-            .contains(&k)
+            .is_ringing(k)
         {
             true => record.nuisance_beside_motion(terms),
             false => record.nuisance(free, terms, None),
@@ -210,60 +199,6 @@ fn minimize(
         *record = of_records.set(k, record, &found.values[own..]);
     }
     Ok(found)
-}
-
-/// What a fit finds of each record: the displacement by a constant load where it matters, and the state at the start of free
-/// ringing that is integrated.
-struct OwnOfRecords {
-    /// Size of a displacement.
-    size: f64,
-    /// Frequency that makes a speed a displacement.
-    omega_rad_s: f64,
-    has_preload: bool,
-    /// Numbers of the records that ring.
-    ringing: Vec<usize>,
-}
-
-impl OwnOfRecords {
-    fn parameters(&self, records: &[StandRecord]) -> Vec<Parameter> {
-        let limit = LARGEST_PRELOAD;
-        let preload = |r: &StandRecord| within(r.initial.preload / self.size, [-limit, limit], 0.1);
-        let preloads = records.iter().filter(|_| self.has_preload).map(preload);
-        let states = self.ringing.iter().flat_map(|k| {
-            let motion = records[*k].initial.motion;
-            [motion.x, motion.speed / self.omega_rad_s]
-                .map(|x| within(x / self.size, [-LARGEST_STATE, LARGEST_STATE], 1.0))
-        });
-        preloads.chain(states).collect()
-    }
-
-    /// A record, by its number, with values of these parameters.
-    fn set(&self, k: usize, record: &StandRecord, values: &[f64]) -> StandRecord {
-        let mut record = record.clone();
-        let preloads = match self.has_preload {
-            true => values.len() - 2 * self.ringing.len(),
-            false => 0,
-        };
-        if let Some(preload) = values[..preloads].get(k) {
-            record.initial.preload = preload * self.size;
-        }
-        if let Some(place) = self.ringing.iter().position(|ringing| *ringing == k) {
-            let state = &values[preloads + 2 * place..];
-            record.initial.motion = MotionState {
-                x: state[0] * self.size,
-                speed: state[1] * self.size * self.omega_rad_s,
-            };
-        }
-        record
-    }
-}
-
-/// A parameter within bounds.
-fn within(start: f64, [lower, upper]: [f64; 2], scale: f64) -> Parameter {
-    Parameter::new("", start.clamp(lower, upper))
-        .at_least(lower)
-        .at_most(upper)
-        .scaled(scale)
 }
 
 /// The structure's parameters.
@@ -391,7 +326,7 @@ impl RecordModel {
         let mut record = found.record.clone();
         let motion = found.nuisance.motion.unwrap_or_default();
         record.initial.correct(motion.map(|x| part * x), &self.free);
-        let limit = LARGEST_PRELOAD * self.rms;
+        let limit = OwnOfRecords::LARGEST_PRELOAD * self.rms;
         let preload = record.initial.preload + part * found.nuisance.preload.unwrap_or(0.0);
         record.initial.preload = preload.clamp(-limit, limit);
         record

@@ -132,10 +132,7 @@ impl Reason {
                 )
             }
             Self::SmallShare { share } => small_share(100.0 * share),
-            Self::TakesOutNoise => {
-                "explains no more than what it takes out of the noise of the applied quantity"
-                    .to_owned()
-            }
+            Self::TakesOutNoise => TAKES_OUT_NOISE.to_owned(),
             Self::ZeroParameter { name } => {
                 format!("its {name} is not significantly different from zero")
             }
@@ -178,6 +175,10 @@ impl Reason {
         }
     }
 }
+
+/// An effect that explains what only the model has.
+const TAKES_OUT_NOISE: &str =
+    "explains little but the noise of the applied quantity, of which it lets less through";
 
 /// An effect that explains so many percent of the residual power only.
 fn small_share(percent: f64) -> String {

@@ -1,14 +1,13 @@
 //! Reading the records of a diagnosis.
 
-use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use torqcomp_dsp::onset;
 use torqcomp_model::effects::Fixed;
 use torqcomp_model::simulate::Excitation;
 use torqcomp_model::{Dimension, UnitSystem};
 
+use super::decays;
 use crate::cli::Diagnose;
 use crate::commands::convert;
 use crate::diagnose::{
@@ -25,7 +24,7 @@ use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
 
 /// Minimum number of samples of a record.
-const FEWEST: usize = 200;
+pub(super) const FEWEST: usize = 200;
 /// Steps of integration before the natural frequency is known.
 const FIRST_STEPS: usize = 2;
 /// Samples at the start that do not count until the natural frequency is known.
@@ -35,17 +34,17 @@ const PART_OF_DECAY: usize = 50;
 
 const TORQUE: Dimension = Dimension::new([1, 2, -2, 0, 0, 0]);
 
-struct Pair {
-    source: String,
+pub(super) struct Pair {
+    pub(super) source: String,
     /// Nothing acts on a stand that rings freely.
-    applied: Option<Vec<f64>>,
-    measured: Vec<f64>,
-    rate_hz: f64,
-    start_s: f64,
-    applied_unit: Option<NamedUnit>,
-    measured_unit: Option<NamedUnit>,
-    warnings: Vec<Warning>,
-    is_lossy: bool,
+    pub(super) applied: Option<Vec<f64>>,
+    pub(super) measured: Vec<f64>,
+    pub(super) rate_hz: f64,
+    pub(super) start_s: f64,
+    pub(super) applied_unit: Option<NamedUnit>,
+    pub(super) measured_unit: Option<NamedUnit>,
+    pub(super) warnings: Vec<Warning>,
+    pub(super) is_lossy: bool,
 }
 
 impl Pair {
@@ -61,22 +60,8 @@ impl Pair {
 
 /// Reads all records, and what the stand file declares of them; whether something of a record was lost.
 pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<(Case, bool), Failure> {
-    let pairs = |files: &[PathBuf], decays: &[PathBuf]| -> Result<Vec<Pair>, Failure> {
-        let mut all: Vec<Pair> = files
-            .iter()
-            .map(|file| pair(args, file))
-            .collect::<Result<_, _>>()?;
-        for file in decays {
-            all.extend(self::decays(args, file)?);
-        }
-        Ok(all)
-    };
-    let mut train = pairs(&args.train, &args.decay)?;
-    let mut holdout = pairs(&args.holdout, &args.holdout_decay)?;
-    let last_is_held_out = holdout.is_empty() && args.train.is_empty();
-    if last_is_held_out {
-        holdout.extend(last_decay(&mut train)?);
-    }
+    let (train, holdout) = pairs(args)?;
+    let last_is_held_out = args.train.is_empty() && args.held_out_files().is_empty();
     let first = &train[0];
     for other in train.iter().chain(&holdout) {
         check_same_kind(first, other)?;
@@ -133,6 +118,26 @@ pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<(Case, bool), Fail
         warnings,
     };
     Ok((case, is_lossy))
+}
+
+/// The training and the held-out records.
+fn pairs(args: &Diagnose) -> Result<(Vec<Pair>, Vec<Pair>), Failure> {
+    let all = |files: &[PathBuf], of_decays: &[PathBuf]| -> Result<Vec<Pair>, Failure> {
+        let mut all = Vec::new();
+        for file in files {
+            all.push(pair(args, file)?);
+        }
+        for file in of_decays {
+            all.extend(decays::decays(args, file)?);
+        }
+        Ok(all)
+    };
+    let mut train = all(&args.train, &args.decay)?;
+    let mut holdout = all(&args.holdout, &args.holdout_decay)?;
+    if holdout.is_empty() && args.train.is_empty() {
+        holdout.extend(decays::last(&mut train)?);
+    }
+    Ok((train, holdout))
 }
 
 /// The recorder as far as the stand file declares it.
@@ -203,53 +208,6 @@ fn pair(args: &Diagnose, file: &Path) -> Result<Pair, Failure> {
         warnings: read.warnings,
         is_lossy: read.is_lossy,
     })
-}
-
-/// The decays in a record of the measured quantity alone, each from its largest swing on.
-fn decays(args: &Diagnose, file: &Path) -> Result<Vec<Pair>, Failure> {
-    let choice = ChannelChoice::measured_alone(&args.measured, args.measured_unit.as_deref());
-    let read = AlignedChannels::read(&Input::of(file), &[choice], &args.reading)?;
-    let measured = read.channels.into_iter().next().ok_or_else(|| {
-        Failure::failed(ErrorCode::ChannelNotFound, "a channel is needed").at(&read.source)
-    })?;
-    measured.must_be_as_recorded(&read.source)?;
-    let ranges = onset::decays(&measured.samples).into_iter();
-    let long: Vec<Range<usize>> = ranges.filter(|range| range.len() >= FEWEST).collect();
-    if long.is_empty() {
-        return Err(Failure::failed(
-            ErrorCode::TooFewSamples,
-            format_args!(
-                "no free decay of at least {FEWEST} samples is found; try another channel or --range, or record for longer"
-            ),
-        )
-        .at(&read.source));
-    }
-    let mut warnings = read.warnings;
-    let pairs = long.into_iter().map(|range| Pair {
-        source: read.source.clone(),
-        applied: None,
-        measured: measured.samples[range.clone()].to_vec(),
-        rate_hz: read.rate_hz,
-        start_s: read.start.after_s + range.start as f64 / read.rate_hz,
-        applied_unit: None,
-        measured_unit: measured.unit.clone(),
-        warnings: std::mem::take(&mut warnings),
-        is_lossy: read.is_lossy,
-    });
-    Ok(pairs.collect())
-}
-
-/// The last decay, taken out of the training records, which must have another one.
-fn last_decay(train: &mut Vec<Pair>) -> Result<Option<Pair>, Failure> {
-    if let [only] = train.as_slice() {
-        return Err(Failure::failed(
-            ErrorCode::TooFewSamples,
-            "one decay is fitted, and none is left to check the result: record another one, better of another size, and give \
-             it with --holdout-decay",
-        )
-        .at(&only.source));
-    }
-    Ok(train.pop())
 }
 
 /// Refuses records at different rates or in different units.

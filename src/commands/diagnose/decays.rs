@@ -1,0 +1,59 @@
+//! Records of free ringing, of the measured quantity alone.
+
+use std::ops::Range;
+use std::path::Path;
+
+use torqcomp_dsp::onset;
+
+use super::read::{FEWEST, Pair};
+use crate::cli::Diagnose;
+use crate::failure::{ErrorCode, Failure};
+use crate::io::{ChannelChoice, Input};
+use crate::recording::AlignedChannels;
+
+/// The decays in a record of the measured quantity alone, each from its largest swing on.
+pub fn decays(args: &Diagnose, file: &Path) -> Result<Vec<Pair>, Failure> {
+    let choice = ChannelChoice::measured_alone(&args.measured, args.measured_unit.as_deref());
+    let read = AlignedChannels::read(&Input::of(file), &[choice], &args.reading)?;
+    let measured = read.channels.into_iter().next().ok_or_else(|| {
+        Failure::failed(ErrorCode::ChannelNotFound, "a channel is needed").at(&read.source)
+    })?;
+    measured.must_be_as_recorded(&read.source)?;
+    let ranges = onset::decays(&measured.samples).into_iter();
+    let long: Vec<Range<usize>> = ranges.filter(|range| range.len() >= FEWEST).collect();
+    if long.is_empty() {
+        return Err(Failure::failed(
+            ErrorCode::TooFewSamples,
+            format_args!(
+                "no free decay of at least {FEWEST} samples is found; try another channel or --range, or record for longer"
+            ),
+        )
+        .at(&read.source));
+    }
+    let mut warnings = read.warnings;
+    let pairs = long.into_iter().map(|range| Pair {
+        source: read.source.clone(),
+        applied: None,
+        measured: measured.samples[range.clone()].to_vec(),
+        rate_hz: read.rate_hz,
+        start_s: read.start.after_s + range.start as f64 / read.rate_hz,
+        applied_unit: None,
+        measured_unit: measured.unit.clone(),
+        warnings: std::mem::take(&mut warnings),
+        is_lossy: read.is_lossy,
+    });
+    Ok(pairs.collect())
+}
+
+/// The last decay, taken out of the training records, which must have another one.
+pub fn last(train: &mut Vec<Pair>) -> Result<Option<Pair>, Failure> {
+    if let [only] = train.as_slice() {
+        return Err(Failure::failed(
+            ErrorCode::TooFewSamples,
+            "one decay is fitted, and none is left to check the result: record another one, better of another size, and give \
+             it with --holdout-decay",
+        )
+        .at(&only.source));
+    }
+    Ok(train.pop())
+}

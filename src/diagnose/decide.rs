@@ -1,0 +1,104 @@
+//! Which of several candidates is accepted, and how the others compare with it.
+
+use super::applied_noise::NoisierRecords;
+use super::reason::Reason;
+use super::score::{BaseModel, ScoredModel};
+use super::search::{CandidateFit, SAME};
+
+/// Significance up to which one effect counts as no better than another.
+const TIED_SIGNIFICANCE: f64 = 2.33;
+/// Reduction of the sum of squares, in residual variances, up to which one effect counts as no better than
+/// another.
+const TIED_GAIN: f64 = 9.0;
+
+/// Accepts the best of the candidates that nothing speaks against, and compares the others with it.
+pub fn decide(tried: &mut [CandidateFit], base: &BaseModel, noisier: Option<&NoisierRecords>) {
+    let (chosen, tied) = loop {
+        let Some((chosen, tied)) = choose(tried) else {
+            return;
+        };
+        let model = tried[chosen].model.as_ref();
+        if model
+            .zip(noisier)
+            .is_none_or(|(model, noisier)| noisier.bear_out(&base.scored, model))
+        {
+            break (chosen, tied);
+        }
+        tried[chosen].reason = Reason::TakesOutNoise;
+    };
+    for k in passing(tried).filter(|k| *k != chosen).collect::<Vec<_>>() {
+        if let Some(reason) = behind(&tried[k], &tried[chosen], tied.contains(&k)) {
+            tried[k].reason = reason;
+        }
+    }
+    tried.swap(0, chosen);
+}
+
+/// The candidates that nothing speaks against.
+fn passing(tried: &[CandidateFit]) -> impl Iterator<Item = usize> + '_ {
+    (0..tried.len()).filter(|k| tried[*k].reason == Reason::Best)
+}
+
+/// The best of the candidates that nothing speaks against, and those that are no worse.
+fn choose(tried: &[CandidateFit]) -> Option<(usize, Vec<usize>)> {
+    let best =
+        passing(tried).min_by(|a, b| criterion(tried, *a).total_cmp(&criterion(tried, *b)))?;
+    let tied: Vec<usize> = passing(tried)
+        .filter(|k| is_tied(tried, *k, best))
+        .collect();
+    Some((simplest(tried, &tied).unwrap_or(best), tied))
+}
+
+/// Whether an effect is not significantly worse than the best one.
+fn is_tied(tried: &[CandidateFit], k: usize, best: usize) -> bool {
+    let (Some(one), Some(other)) = (&tried[k].model, &tried[best].model) else {
+        return false;
+    };
+    let comparison = other.against(one);
+    k == best
+        || comparison.significance() < TIED_SIGNIFICANCE
+        || comparison.gain() < TIED_GAIN * other.compared_rms().powi(2)
+}
+
+/// Of effects that the records cannot distinguish: those with the fewest parameters, as the criterion takes noise that rings for
+/// more evidence than it is; of these the one with the smallest criterion, or of those close to it the first in the list. So a line at the mains frequency is mains pickup rather than a
+/// shaft that happens to turn so fast, and a lag without a corner is a delay.
+fn simplest(tried: &[CandidateFit], tied: &[usize]) -> Option<usize> {
+    let count = |k: usize| {
+        let model = tried[k].model.as_ref();
+        model.map_or(usize::MAX, ScoredModel::parameter_count)
+    };
+    let fewest = tied.iter().map(|k| count(*k)).min()?;
+    let tied: Vec<usize> = tied
+        .iter()
+        .copied()
+        .filter(|k| count(*k) == fewest)
+        .collect();
+    let least = tied.iter().map(|k| criterion(tried, *k));
+    let least = least.fold(f64::INFINITY, f64::min);
+    // The candidates are in the order of the list.
+    let mut tied = tied.into_iter();
+    tied.find(|k| criterion(tried, *k) <= least + SAME)
+}
+
+fn criterion(tried: &[CandidateFit], k: usize) -> f64 {
+    let model = tried[k].model.as_ref();
+    model.map_or(f64::INFINITY, ScoredModel::criterion)
+}
+
+/// Why a candidate that passes is not the accepted one.
+fn behind(other: &CandidateFit, chosen: &CandidateFit, is_tied: bool) -> Option<Reason> {
+    let (model, accepted) = (other.model.as_ref()?, chosen.model.as_ref()?);
+    let best = chosen.effect.name;
+    let reason = if !is_tied {
+        let ratio = model.compared_rms() / accepted.compared_rms();
+        let best = best.to_owned();
+        Reason::Worse { ratio, best }
+    } else if model.parameter_count() > accepted.parameter_count() {
+        Reason::MoreParameters { best }
+    } else {
+        let experiment = other.effect.experiment;
+        Reason::Tied { best, experiment }
+    };
+    Some(reason)
+}

@@ -1,0 +1,88 @@
+//! Parameters of a fit that belong to a record and not to the stand.
+
+use torqcomp_model::Chain;
+use torqcomp_model::fit::Parameter;
+use torqcomp_model::simulate::MotionState;
+
+use super::record::StandRecord;
+
+/// What a fit finds of each record: the displacement by a constant load where it matters, and the state at the start of free
+/// ringing that is integrated.
+pub struct OwnOfRecords {
+    /// Size of a displacement.
+    size: f64,
+    /// Frequency that makes a speed a displacement.
+    omega_rad_s: f64,
+    has_preload: bool,
+    /// Numbers of the records that ring.
+    ringing: Vec<usize>,
+}
+
+impl OwnOfRecords {
+    /// Largest displacement by a constant load, over the rms of the record.
+    pub const LARGEST_PRELOAD: f64 = 0.5;
+    /// Largest displacement at the start of free ringing, over the rms of the record.
+    const LARGEST_STATE: f64 = 100.0;
+
+    /// For a model, and displacements of that size.
+    pub fn of(model: &Chain, size: f64, records: &[StandRecord]) -> Self {
+        let rings = |k: &usize| model.is_integrated() && records[*k].is_free();
+        Self {
+            size,
+            omega_rad_s: model.free_mode().omega_rad_s,
+            has_preload: model.has_zero(),
+            ringing: (0..records.len()).filter(rings).collect(),
+        }
+    }
+
+    /// Whether a record, by its number, rings freely and is integrated.
+    pub fn is_ringing(&self, k: usize) -> bool {
+        self.ringing.contains(&k)
+    }
+
+    /// The parameters, from what the records have.
+    pub fn parameters(&self, records: &[StandRecord]) -> Vec<Parameter> {
+        let limit = Self::LARGEST_PRELOAD;
+        let preload = |r: &StandRecord| within(r.initial.preload / self.size, [-limit, limit], 0.1);
+        let preloads = records.iter().filter(|_| self.has_preload).map(preload);
+        let states = self.ringing.iter().flat_map(|k| {
+            let motion = records[*k].initial.motion;
+            [motion.x, motion.speed / self.omega_rad_s].map(|x| {
+                within(
+                    x / self.size,
+                    [-Self::LARGEST_STATE, Self::LARGEST_STATE],
+                    1.0,
+                )
+            })
+        });
+        preloads.chain(states).collect()
+    }
+
+    /// A record, by its number, with values of these parameters.
+    pub fn set(&self, k: usize, record: &StandRecord, values: &[f64]) -> StandRecord {
+        let mut record = record.clone();
+        let preloads = match self.has_preload {
+            true => values.len() - 2 * self.ringing.len(),
+            false => 0,
+        };
+        if let Some(preload) = values[..preloads].get(k) {
+            record.initial.preload = preload * self.size;
+        }
+        if let Some(place) = self.ringing.iter().position(|ringing| *ringing == k) {
+            let state = &values[preloads + 2 * place..];
+            record.initial.motion = MotionState {
+                x: state[0] * self.size,
+                speed: state[1] * self.size * self.omega_rad_s,
+            };
+        }
+        record
+    }
+}
+
+/// A parameter within bounds.
+pub fn within(start: f64, [lower, upper]: [f64; 2], scale: f64) -> Parameter {
+    Parameter::new("", start.clamp(lower, upper))
+        .at_least(lower)
+        .at_most(upper)
+        .scaled(scale)
+}
