@@ -18,7 +18,7 @@ pub struct Diagnose {
     #[arg(long, value_name = "FILE", required_unless_present = "decay")]
     pub train: Vec<PathBuf>,
     /// Hold-out record; may be given several times [default: the last 30 % of each training record]
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", requires = "train")]
     pub holdout: Vec<PathBuf>,
     /// Record of free ringing to fit, of the measured quantity alone: after hits or a load that was let go; may be given
     /// several times

@@ -40,6 +40,9 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
     let provenance = html.as_ref().map(|_| provenance(args, stand.as_ref()));
     let provenance = provenance.transpose()?;
     let (case, is_lossy) = read::read(args, stand.as_ref().map(|(stand, _)| stand))?;
+    if refined.is_some() && stand.is_none() && args.train.is_empty() && !case.units.is_torque {
+        return Err(decays::no_gain());
+    }
     let fits = Progress::new(Task::Fits);
     let progress = |done: usize, of: usize| {
         fits.report(Amount::of_count(done), Some(Amount::of_count(of)));

@@ -96,7 +96,12 @@ fn dependence(tests: &ResidualTests) -> Option<String> {
 
 /// Whether the plain stand does worse on records with another level of excitation.
 fn level_dependence(levels: &ExcitationLevels) -> Option<String> {
-    let level = levels.holdout_applied_rms / levels.train_applied_rms;
+    let applied = [levels.holdout_applied_rms, levels.train_applied_rms];
+    if applied.contains(&0.0) {
+        // Free ringing has no level of excitation.
+        return None;
+    }
+    let level = applied[0] / applied[1];
     let error = levels.holdout_relative / levels.train_relative;
     let differ = |ratio: f64, factor: f64| ratio.ln().abs() > factor.ln();
     (differ(level, LEVELS_DIFFER) && differ(error, ERRORS_DIFFER)).then(|| {

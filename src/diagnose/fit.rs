@@ -463,6 +463,18 @@ impl FittedModel {
         self.structure.stand(&self.values)
     }
 
+    /// What belongs to a record. What the state at the start of free ringing that is integrated can change follows from the model.
+    pub fn nuisance(&self, record: &StandRecord, terms: &NuisanceTerms) -> Nuisance {
+        let slopes = || {
+            let mut model = RecordModel::of(&self.structure, &self.values, self.free);
+            model.chain.shift = record.initial.preload;
+            let residual = raw_residual(&model.chain, record).ok()?;
+            model.slopes(record, &residual)
+        };
+        let rings = record.is_free() && self.integrates();
+        record.nuisance(&self.free, terms, rings.then(slopes).flatten())
+    }
+
     /// What the fitted model leaves of a record: the record's own constants, initial state and phases are estimated,
     /// nothing else. `None` if the motion diverges.
     pub fn residual(&self, record: &StandRecord) -> Option<RecordResidual> {

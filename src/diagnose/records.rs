@@ -99,7 +99,8 @@ impl Records {
 
     /// Course of the input between its samples; of plateaus only where no training record has another input.
     pub fn between(&self) -> Between {
-        let other = self.train.iter().find(|r| !has_plateaus(&r.input));
+        let is_other = |r: &&StandRecord| !r.is_free() && !has_plateaus(&r.input);
+        let other = self.train.iter().find(is_other);
         other.unwrap_or(&self.train[0]).input.between()
     }
 

@@ -319,7 +319,7 @@ pub fn derivatives(
     record: &StandRecord,
     terms: &NuisanceTerms,
 ) -> (Option<Vec<Vec<f64>>>, Nuisance) {
-    let nuisance = record.nuisance(&fitted.free, terms, None);
+    let nuisance = fitted.nuisance(record, terms);
     let rings = record.is_free() && !fitted.integrates();
     let at = |values: &[f64]| {
         let (mut model, _) = fitted.structure.model(values);

@@ -106,9 +106,10 @@ impl PlainExcess<'_> {
 }
 
 impl ScoredModel {
-    /// Noise, and what the constants leave uncertain beside it with 95 % certainty.
+    /// Noise, and what the constants leave uncertain beside it with 95 % certainty: no more than the noise, or constants that are
+    /// not known would excuse everything.
     fn with_uncertain(&self, noise_rms: f64) -> f64 {
-        noise_rms.hypot(CERTAIN * self.uncertain_rms)
+        noise_rms.hypot((CERTAIN * self.uncertain_rms).min(noise_rms))
     }
 }
 

@@ -57,3 +57,12 @@ pub fn last(train: &mut Vec<Pair>) -> Result<Option<Pair>, Failure> {
     }
     Ok(train.pop())
 }
+
+/// A stand file of free ringing alone would lack the gain that its effects need.
+pub fn no_gain() -> Failure {
+    Failure::usage(
+        ErrorCode::MissingArgument,
+        "free ringing does not show the gain, without which a stand file cannot say what an effect in the unit of the record is as a \
+         torque: give --stand FILE with a static_gain or a [calibration], or leave -o out",
+    )
+}

@@ -251,14 +251,19 @@ fn refuse_same_samples(train: &[Pair], holdout: &[Pair]) -> Result<(), Failure> 
         .flat_map(|h| train.iter().map(move |t| (h, t)));
     match pairs.find(|(h, t)| is_same(h, t)) {
         None => Ok(()),
-        Some((h, t)) => Err(Failure::failed(
-            ErrorCode::RecordsDiffer,
-            format_args!(
-                "{} has the same samples as the training record {}; give another hold-out record, or omit --holdout \
-                 to hold out the last 30 % of each training record",
-                h.source, t.source
-            ),
-        )),
+        Some((h, t)) => {
+            let omit = match h.applied {
+                Some(_) => "omit --holdout to hold out the last 30 % of each training record",
+                None => "omit --holdout-decay to hold out the last of several decays",
+            };
+            Err(Failure::failed(
+                ErrorCode::RecordsDiffer,
+                format_args!(
+                    "{} has the same samples as the training record {}; give another hold-out record, or {omit}",
+                    h.source, t.source
+                ),
+            ))
+        }
     }
 }
 
