@@ -1,7 +1,10 @@
 //! Which of several candidates is accepted, and how the others compare with it.
 
+use std::cell::LazyCell;
+
 use super::applied_noise::NoisierRecords;
 use super::reason::Reason;
+use super::records::Records;
 use super::score::{BaseModel, ScoredModel};
 use super::search::{CandidateFit, SAME};
 
@@ -12,14 +15,15 @@ const TIED_SIGNIFICANCE: f64 = 2.33;
 const TIED_GAIN: f64 = 9.0;
 
 /// Accepts the best of the candidates that nothing speaks against, and compares the others with it.
-pub fn decide(tried: &mut [CandidateFit], base: &BaseModel, noisier: Option<&NoisierRecords>) {
+pub fn decide(tried: &mut [CandidateFit], base: &BaseModel, records: &Records) {
+    let noisier = LazyCell::new(|| NoisierRecords::of(records));
     let (chosen, tied) = loop {
         let Some((chosen, tied)) = choose(tried) else {
             return;
         };
         let model = tried[chosen].model.as_ref();
         if model
-            .zip(noisier)
+            .zip(noisier.as_ref())
             .is_none_or(|(model, noisier)| noisier.bear_out(&base.scored, model))
         {
             break (chosen, tied);

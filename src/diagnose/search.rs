@@ -6,7 +6,6 @@ use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 use torqcomp_model::effects::{EFFECTS, Effect};
 
-use super::applied_noise::NoisierRecords;
 use super::blocks::{Comparison, family_p_values};
 use super::fit::{FitEffort, FittedModel, fit};
 use super::reason::{Reason, Status};
@@ -156,7 +155,7 @@ pub fn try_effects(
         })
         .collect();
     set_p_values(&mut tried, &base.scored);
-    super::decide::decide(&mut tried, base, NoisierRecords::of(records).as_ref());
+    super::decide::decide(&mut tried, base, records);
     let fits = fits.into_iter().flatten().collect();
     Round { tried, fits }
 }

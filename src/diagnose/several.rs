@@ -1,6 +1,8 @@
 //! The way from the plain stand to one with effects: singles, pairs, one after the other; what is not needed goes again, and
 //! laws beside the list may speak against what is left.
 
+use std::cell::LazyCell;
+
 use super::SearchState;
 use super::applied_noise::NoisierRecords;
 use super::exchange::MANY;
@@ -121,7 +123,7 @@ impl SearchState {
             return single.cloned().into_iter().collect();
         }
         let mut starts = best_pairs(base, &round.fits, &self.records, workers);
-        let noisier = NoisierRecords::of(&self.records);
+        let noisier = LazyCell::new(|| NoisierRecords::of(&self.records));
         let is_borne_out = |pair: &ScoredModel| {
             noisier
                 .as_ref()
@@ -237,7 +239,7 @@ impl SearchState {
     /// The effect that is missed least, if its absence does not show.
     fn needless(&self, without: &[Option<ScoredModel>]) -> Option<usize> {
         let (after, excess) = (&self.after, self.excess());
-        let noisier = NoisierRecords::of(&self.records);
+        let noisier = LazyCell::new(|| NoisierRecords::of(&self.records));
         let is_needless = |less: &ScoredModel| {
             no_gain(after, less).is_some()
                 || after.criterion() >= less.criterion()

@@ -5,12 +5,13 @@ use std::io::Cursor;
 use std::sync::Arc;
 
 use super::bytes::{Bytes, Number, Order};
-use super::{Content, Format, channel, cut, damaged, is_time_name, plausible_rate, stamped};
+use super::{
+    Content, Format, channel, cut, damaged, is_time_name, names_left_out, plausible_rate, stamped,
+};
 use crate::failure::{ErrorCode, Failure};
 use crate::io::{Reading, digits};
 use crate::recording::TimeAxis;
 use crate::unit::NamedUnit;
-use crate::warning::Warning;
 
 pub(super) const MATLAB: Format = Format {
     name: "mat",
@@ -27,8 +28,6 @@ const MATRIX: u32 = 14;
 const COMPRESSED: u32 = 15;
 /// Bits of the flags of an array.
 const COMPLEX: u32 = 1 << 11;
-/// Most variables whose names are said.
-const NAMED: usize = 10;
 
 fn is(head: &[u8]) -> bool {
     let is_version = |end: &[u8]| end == b"\0\x01IM" || end == b"\x01\0MI";
@@ -200,15 +199,7 @@ fn read(bytes: &mut Bytes, reading: &Reading) -> Result<Content, Failure> {
         }
     }
     channels(variables, reading, &mut content, &mut left_out)?;
-    if !left_out.is_empty() {
-        let more = match left_out.len().saturating_sub(NAMED) {
-            0 => String::new(),
-            more => format!(" and {more} more"),
-        };
-        left_out.truncate(NAMED);
-        let message = format!("left out: {}{more}", left_out.join(", "));
-        content.warnings.push(Warning::new("left-out", message));
-    }
+    content.warnings.extend(names_left_out(left_out));
     Ok(content)
 }
 

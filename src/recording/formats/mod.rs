@@ -21,6 +21,23 @@ use crate::io::{ChannelChoice, Reading, names_compensated};
 use crate::unit::{NamedUnit, OF_FULL_SCALE};
 use crate::warning::Warning;
 
+/// Most channels that a warning names.
+const NAMED: usize = 10;
+
+/// Says which channels were left out, each with the reason, if any were.
+fn names_left_out(mut left_out: Vec<String>) -> Option<Warning> {
+    if left_out.is_empty() {
+        return None;
+    }
+    let more = match left_out.len().saturating_sub(NAMED) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    left_out.truncate(NAMED);
+    let message = format!("left out: {}{more}", left_out.join(", "));
+    Some(Warning::new("left-out", message))
+}
+
 /// A format.
 pub(crate) struct Format {
     /// As in the key `format` of a report.

@@ -7,15 +7,14 @@ use super::objects::{Properties, Property, TdmsObject, TdmsObjects};
 use super::scales;
 use crate::failure::{ErrorCode, Failure};
 use crate::io::{Reading, digits};
-use crate::recording::formats::{Content, channel, plausible_rate, stamped};
+use crate::recording::formats::{Content, NAMED, channel, names_left_out, plausible_rate, stamped};
 use crate::recording::moment::{Moment, date_and_time};
 use crate::recording::text::is_time_name;
 use crate::recording::{TimeAxis, without_rounding};
 use crate::unit::NamedUnit;
 use crate::warning::Warning;
 
-/// Most channels that are named as left out, and most properties of the file that are told.
-const NAMED: usize = 10;
+/// Most properties of the file that are told.
 const TOLD: usize = 50;
 
 /// A channel of numbers, or of times alone.
@@ -99,15 +98,7 @@ pub(super) fn channels(
             .channels
             .push(channel(&name, unit, one.values, axis));
     }
-    if !left_out.is_empty() {
-        let more = match left_out.len().saturating_sub(NAMED) {
-            0 => String::new(),
-            more => format!(" and {more} more"),
-        };
-        left_out.truncate(NAMED);
-        let message = format!("left out: {}{more}", left_out.join(", "));
-        content.warnings.push(Warning::new("left-out", message));
-    }
+    content.warnings.extend(names_left_out(left_out));
     Ok(())
 }
 
