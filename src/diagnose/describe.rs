@@ -10,6 +10,7 @@ use super::result::ExcitationLevels;
 use super::score::ScoredModel;
 use super::search::CandidateFit;
 use super::spectra::SpectralLine;
+use super::surface::ForceSurface;
 use super::verdict::Verdict;
 use crate::print::{self, relative, rounded};
 use crate::warning::Warning;
@@ -119,6 +120,7 @@ fn level_dependence(levels: &ExcitationLevels) -> Option<String> {
 pub fn next_experiment(
     found: &SearchState,
     suspected: Option<&GuardModel>,
+    surface: Option<&ForceSurface>,
     verdict: Verdict,
 ) -> Option<String> {
     if let Some(guard) = suspected {
@@ -134,6 +136,9 @@ pub fn next_experiment(
     if matches!(verdict, Verdict::Explained | Verdict::NothingMissing) {
         return None;
     }
+    if let Some(surface) = surface {
+        return Some(surface.experiment().to_owned());
+    }
     if found.tests.nonstationary().is_some() {
         return Some(
             "the same record twice, cold and after an hour of running, and once at half the level: do the constants or the \
@@ -143,18 +148,20 @@ pub fn next_experiment(
     }
     let follows = found.tests.dependence().map(|share| share.of);
     if let Some(of) = follows.filter(|of| *of != FROM_INPUT) {
-        let record = match of.contains("displacement") {
-            true => {
-                "a slow load and unload over the whole range, and the response at two more levels"
-            }
-            false => "free decays from several amplitudes, and the response at two more levels",
-        };
-        return Some(record.to_owned());
+        return Some(shows_torque(of.contains("displacement")).to_owned());
     }
     let fitted = found.rounds.last()?.iter().filter(|c| c.model.is_some());
     let error = |c: &CandidateFit| c.train_rms.unwrap_or(f64::INFINITY);
     let closest = fitted.min_by(|a, b| error(a).total_cmp(&error(b)));
     closest.map(|c| c.effect.experiment.to_owned())
+}
+
+/// The records that show a torque over the displacement, or one over the speed.
+pub fn shows_torque(over_displacement: bool) -> &'static str {
+    match over_displacement {
+        true => "a slow load and unload over the whole range, and the response at two more levels",
+        false => "free decays from several amplitudes, and the response at two more levels",
+    }
 }
 
 /// What limits the diagnosis.

@@ -40,6 +40,7 @@ mod spectra;
 mod starts;
 mod stationarity;
 mod structure;
+mod surface;
 #[cfg(test)]
 mod test_noise;
 mod units;
@@ -56,6 +57,7 @@ use ladder::Ladder;
 use noise_floor::NoiseFloor;
 use spectra::lines_of;
 use structure::FitContext;
+use surface::AskedSurface;
 use verdict::{noise_rms, remains};
 
 pub use declared::DeclaredForm;
@@ -74,6 +76,7 @@ pub use score::{EffectParameter, ScoredModel};
 pub use search::{CandidateFit, Workers};
 pub use spectra::SpectralLine;
 pub use structure::{EffectForm, PlainStand};
+pub use surface::{ForceSurface, SurfacePlace, SurfacePoint};
 pub use units::ChannelUnits;
 pub use verdict::Verdict;
 
@@ -115,6 +118,8 @@ struct SearchState {
     ladder: Ladder,
     /// A guard model that explains more than each candidate of the last round.
     suspected: Option<GuardModel>,
+    /// A surface over the motion that explains more than the model.
+    surface: Option<AskedSurface>,
     noise_floor: Option<NoiseFloor>,
     /// Tests of the residual before.
     tests_before: ResidualTests,
@@ -250,6 +255,7 @@ impl SearchState {
             path: Vec::new(),
             ladder: Ladder::default(),
             suspected: None,
+            surface: None,
             tests_before: tests.clone(),
             tests,
             settled: true,
@@ -259,6 +265,7 @@ impl SearchState {
         let coarse = found.records.substeps();
         found.build(coarse, workers);
         found.lower_noise_floor();
+        found.ask_surface(workers.threads);
         Ok(found)
     }
 

@@ -72,6 +72,10 @@ pub enum Reason {
         law: &'static str,
         equation: &'static str,
     },
+    /// A surface over the motion, with no law, leaves less: this one's error over that.
+    Surface {
+        ratio: f64,
+    },
     /// A further effect that explains less than this part of the initial excess error, or less than the second part although
     /// it explains this part of the rest.
     SmallSecond {
@@ -155,6 +159,10 @@ impl Reason {
                 law,
                 equation,
             } => beside_the_list(*ratio, law, equation),
+            Self::Surface { ratio } => format!(
+                "improves the fit, but its training error is {} that of a torque of no given law over displacement and speed",
+                times(*ratio)
+            ),
             Self::SmallSecond {
                 least,
                 least_of_rest,

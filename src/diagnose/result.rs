@@ -16,6 +16,7 @@ use super::score::{RmsErrors, ScoredModel};
 use super::search::CandidateFit;
 use super::spectra::SpectralLine;
 use super::structure::{FitContext, PlainStand};
+use super::surface::ForceSurface;
 use super::verdict::Verdict;
 use super::{Case, SearchState};
 use crate::warning::Warning;
@@ -58,6 +59,9 @@ pub struct Diagnosis {
     /// A law that is not offered as an effect and leaves less than each of the effects; named, not added. `null` if there
     /// is none.
     pub suspected: Option<GuardModel>,
+    /// For `partly-explained` and `unexplained`: the torque that follows from the motion beside what laws explain, whatever its
+    /// law. `null` where there is none, or it does not follow from the motion.
+    pub force_surface: Option<ForceSurface>,
     /// What the last model leaves of the hold-out records.
     pub residual: ResidualReport,
     /// What to record to tell the remaining candidates apart; `null` if nothing is needed.
@@ -162,6 +166,10 @@ impl Diagnosis {
             Verdict::NothingMissing => detection_limits(&found.after, &found.records, threads),
             _ => Vec::new(),
         };
+        let force_surface = match verdict {
+            Verdict::PartlyExplained | Verdict::Unexplained => found.judge_surface(threads),
+            _ => None,
+        };
         let error = ErrorTable::of(&found);
         let levels = ExcitationLevels::of(&found, &error.before);
         let residual = ResidualReport {
@@ -189,11 +197,17 @@ impl Diagnosis {
             error,
             explained: std::mem::take(&mut found.ladder),
             constants: constants(case.declared, &found),
-            next_experiment: describe::next_experiment(&found, suspected.as_ref(), verdict),
+            next_experiment: describe::next_experiment(
+                &found,
+                suspected.as_ref(),
+                force_surface.as_ref(),
+                verdict,
+            ),
             warnings: [case.warnings, describe::warnings(&found.before, verdict)].concat(),
             candidates: found.candidates(),
             detection_limits,
             suspected,
+            force_surface,
             residual,
             shows_all: false,
             before: found.before,

@@ -192,6 +192,23 @@ impl Structure {
         structure
     }
 
+    /// The same with some of its effects, by their numbers, and their part of parameter values.
+    pub fn reduced(&self, values: &[f64], keeps: impl Fn(usize) -> bool) -> (Self, Vec<f64>) {
+        let (plain, mut rest) = values.split_at(self.context.plain_count());
+        let mut kept = plain.to_vec();
+        let mut reduced = Self::plain(self.context.clone());
+        for (k, effect) in self.effects.iter().enumerate() {
+            let (own, others) = rest.split_at(effect.moved());
+            rest = others;
+            if keeps(k) {
+                kept.extend(own);
+                reduced.effects.push(*effect);
+                reduced.declared += usize::from(k < self.declared);
+            }
+        }
+        (reduced, kept)
+    }
+
     /// Lower and upper bound of each parameter that a fit moves.
     pub fn bounds(&self) -> Vec<[f64; 2]> {
         let mut all = PLAIN_BOUNDS[..self.context.plain_count()].to_vec();

@@ -8,7 +8,7 @@ use super::text::{
 };
 use crate::chart::{Chart, Page, Series};
 use crate::diagnose::{
-    CandidateFit, Diagnosis, MotionAxis, RecordResidual, Status, autocorrelation, binned, density,
+    CandidateFit, Diagnosis, MotionAxis, RecordResidual, Status, SurfacePoint, autocorrelation, binned, density,
     response,
 };
 use crate::print::{plural, rounded, short, unit_or_as_recorded};
@@ -44,6 +44,7 @@ pub fn page(diagnosis: &Diagnosis, provenance: &Provenance) -> String {
     page.residuals();
     page.candidates();
     page.remaining();
+    page.surface();
     page.page.html()
 }
 
@@ -358,6 +359,45 @@ impl Draft<'_> {
         if !self.diagnosis.detection_limits.is_empty() {
             self.page.text(&format!("{WOULD_SHOW}:"));
             self.page.table(&limit_rows(self.diagnosis));
+        }
+    }
+}
+
+impl Draft<'_> {
+    /// The torque that is missing, whatever its law, over displacement and over speed.
+    fn surface(&mut self) {
+        let Some(surface) = &self.diagnosis.force_surface else {
+            return;
+        };
+        self.page.heading("The torque that is missing, of no given law");
+        let shares = &surface.shares;
+        let mut rows = vec![cells(["it follows from", "share that nothing else explains"])];
+        rows.extend(
+            [
+                ("the displacement", shares.displacement),
+                ("the speed", shares.speed),
+                ("both together", shares.both),
+                ("the way that led there", shares.history),
+            ]
+            .map(|(of, share)| cells([of, &format!("{} %", rounded(100.0 * share, 2))])),
+        );
+        self.page.table(&rows);
+        for (name, per, points) in [
+            ("displacement", "", &surface.over_displacement),
+            ("speed", "/s", &surface.over_speed),
+        ] {
+            let band = |p: &SurfacePoint| (p.at, p.torque - 2.0 * p.std, p.torque + 2.0 * p.std);
+            let (x, y): (Vec<f64>, Vec<f64>) = points.iter().map(|p| (p.at, p.torque)).unzip();
+            let chart = Chart::new(
+                &format!("Over {name}, without its straight line; band: two standard uncertainties"),
+                &format!("{name}, {}{per}", self.unit),
+                &self.label("torque"),
+                vec![Series::line("torque", &x, &y)],
+            );
+            self.page.chart(&Chart {
+                band: points.iter().map(band).collect(),
+                ..chart
+            });
         }
     }
 }

@@ -4,7 +4,8 @@ use torqcomp_model::Estimate;
 use torqcomp_model::effects::Effect;
 
 use crate::diagnose::{
-    CandidateFit, Diagnosis, GuardModel, NoiseFloorSource, ShownSide, Status, Verdict,
+    CandidateFit, Diagnosis, ForceSurface, GuardModel, NoiseFloorSource, ShownSide, Status,
+    SurfacePlace, Verdict,
 };
 use crate::print::{
     Report, columns, enumeration, plural, relative, rounded, unit_or_as_recorded, with_std,
@@ -88,12 +89,46 @@ pub fn answer(diagnosis: &Diagnosis) -> Vec<String> {
         let suspected = format!("Suspected: {}.", suspected(guard));
         [suspected, explained(guard.effect, guard.equation)]
     });
+    let surface = diagnosis.force_surface.iter();
+    let surface = surface.flat_map(|surface| of_surface(surface, &diagnosis.error.unit));
     let next = diagnosis.next_experiment.iter().map(|next| {
         let end = if next.ends_with('?') { "" } else { "." };
         format!("Next experiment: {next}{end}")
     });
     let all = std::iter::once(verdict).chain(added).chain(guard);
-    all.chain(next).collect()
+    all.chain(surface).chain(next).collect()
+}
+
+/// What a surface over the motion says.
+fn of_surface(surface: &ForceSurface, unit: &str) -> Vec<String> {
+    let place = match surface.place {
+        SurfacePlace::Stand => "a torque in the stand",
+        SurfacePlace::GagePath => "a torque in the part that the gage sits on",
+        SurfacePlace::Gage => "a change in the gage or its amplifier",
+    };
+    let named = match surface.outdoes_laws {
+        true => " No law is named, as it explains far more than the best of them.",
+        false => "",
+    };
+    let nearest = match surface.nearest.as_slice() {
+        [] => String::new(),
+        some => format!(
+            " What comes nearest, as hypotheses: {}.",
+            enumeration(some, "and")
+        ),
+    };
+    vec![
+        format!(
+            "What is missing follows from the motion: {place} over displacement and speed, of no given law, leaves {} {} of the \
+             held-out records, by the motion that was measured there.{named}",
+            rounded(surface.holdout_rms, 4),
+            unit_or_as_recorded(unit)
+        ),
+        format!(
+            "It looks like {}.{nearest}",
+            enumeration(&surface.looks_like, "and")
+        ),
+    ]
 }
 
 /// An effect in two sentences with its equation.

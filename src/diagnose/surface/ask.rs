@@ -1,0 +1,95 @@
+//! Where a surface that knows no law is asked: something is left, and no law may be the cause of it.
+
+use super::{Surface, is_law};
+use crate::diagnose::fit::{FitEffort, fit};
+use crate::diagnose::reason::Reason;
+use crate::diagnose::record::StandRecord;
+use crate::diagnose::score::ScoredModel;
+use crate::diagnose::search::reject_all;
+use crate::diagnose::verdict::{noise_rms, remains};
+use crate::diagnose::{ForceSurface, SearchState};
+
+/// The fit of what is kept once laws are withdrawn.
+const REMAINING: FitEffort = FitEffort::full(15);
+
+/// A surface that explains more than the laws beside which it was fitted.
+pub struct AskedSurface {
+    pub surface: Surface,
+    /// The model with these laws.
+    model: ScoredModel,
+    /// Whether they are withdrawn for it.
+    pub outdoes_laws: bool,
+}
+
+impl SearchState {
+    /// Fits a surface where the model leaves something, keeps it if it explains more, and withdraws the laws of the model if it
+    /// explains far more than they do.
+    pub fn ask_surface(&mut self, threads: usize) {
+        let model = self.after.clone();
+        let is_open = remains(&model, &self.tests, self.noise_floor) || self.suspected.is_some();
+        if !is_open || !self.can_ask(&model) {
+            return;
+        }
+        let Some(surface) = Surface::fit(&model, threads).filter(|s| s.improves_on(&model)) else {
+            return;
+        };
+        let added = model.fitted.structure.added();
+        let has_laws = added.iter().any(|effect| is_law(effect.form.stage));
+        let outdoes_laws = has_laws && surface.outdoes(&model, noise_rms(self.noise_floor));
+        if outdoes_laws {
+            self.withdraw_laws(&surface);
+        }
+        self.surface = Some(AskedSurface {
+            surface,
+            model,
+            outdoes_laws,
+        });
+    }
+
+    /// Goes back to a model without the laws of the motion that were found.
+    fn withdraw_laws(&mut self, surface: &Surface) {
+        let ratio = self.after.train_rms() / surface.unseen_rms();
+        let structure = &self.after.fitted.structure;
+        let is_withdrawn = |k: usize| {
+            k >= structure.declared && is_law(structure.effects[k].form.stage)
+        };
+        let names: Vec<&str> = (0..structure.effects.len())
+            .filter(|k| is_withdrawn(*k))
+            .map(|k| structure.effects[k].effect.name)
+            .collect();
+        for round in &mut self.rounds {
+            for candidate in round.iter_mut().filter(|c| names.contains(&c.effect.name)) {
+                reject_all(std::slice::from_mut(candidate), |_| Reason::Surface { ratio });
+            }
+        }
+        let (reduced, values) = structure.reduced(&self.after.fitted.values, |k| !is_withdrawn(k));
+        let training = self.after.fitted.with_initial_states(&self.records.train);
+        let kept = (reduced.effects.len() > reduced.declared)
+            .then(|| fit(reduced, &values, &training, REMAINING).ok())
+            .flatten();
+        let kept = kept.and_then(|fitted| ScoredModel::of(fitted, &self.records));
+        self.after = kept.unwrap_or_else(|| self.before.clone());
+        self.tests = crate::diagnose::tests(&self.after);
+        self.without.clear();
+    }
+
+    /// The surface on the held-out records, where these bear it out; where no effect is named in the end, one in place of all.
+    pub fn judge_surface(&self, threads: usize) -> Option<ForceSurface> {
+        if let Some(asked) = &self.surface {
+            let model = asked.model.clone().compared_on_holdout(&self.records)?;
+            return asked.surface.report(&model, asked.outdoes_laws);
+        }
+        let model = &self.before;
+        if !self.after.effect_names().is_empty() || !self.can_ask(model) {
+            return None;
+        }
+        let surface = Surface::fit(model, threads).filter(|s| s.improves_on(model))?;
+        surface.report(model, false)
+    }
+
+    /// Whether the records may show a surface: there is a spring, and the torque is applied.
+    fn can_ask(&self, model: &ScoredModel) -> bool {
+        let is_held = model.fitted.structure.context.held.is_some();
+        !is_held && !self.records.train.iter().any(StandRecord::is_free)
+    }
+}

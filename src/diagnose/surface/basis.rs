@@ -1,0 +1,156 @@
+//! The functions of displacement, speed and history that a surface is made of.
+
+use super::motion::Motion;
+
+/// Knots over displacement and over speed.
+pub const KNOTS: [usize; 2] = [33, 17];
+/// Powers of displacement and speed in products.
+const PRODUCTS: [[i32; 2]; 6] = [[1, 1], [1, 2], [2, 1], [1, 3], [2, 2], [3, 1]];
+/// Thresholds of slipping elements, over the largest displacement.
+const SLIPS: [f64; 3] = [0.05, 0.15, 0.4];
+/// Corner of a slow memory over the natural frequency.
+const SLOW: f64 = 0.1;
+
+/// Knots of displacement and speed, for all records alike.
+pub struct Grid {
+    pub x: Knots,
+    pub speed: Knots,
+    largest: [f64; 2],
+}
+
+/// Places along an axis, and how much of the motion is near each.
+pub struct Knots {
+    pub at: Vec<f64>,
+    pub share: Vec<f64>,
+}
+
+/// Which part of a surface a function belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    Displacement,
+    Speed,
+    Both,
+    History,
+}
+
+impl Part {
+    pub const ALL: [Self; 4] = [Self::Displacement, Self::Speed, Self::Both, Self::History];
+}
+
+impl Grid {
+    pub fn of(motions: &[Motion]) -> Self {
+        let limits = |of: fn(&Motion) -> &[f64]| {
+            let all = motions.iter().flat_map(|m| of(m).iter());
+            all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| {
+                [low.min(*x), high.max(*x)]
+            })
+        };
+        let [low, high] = limits(|m| &m.x);
+        let [slow, fast] = limits(|m| &m.speed);
+        let place = |k: usize, count: usize| k as f64 / (count - 1) as f64;
+        let fastest = fast.max(-slow);
+        // Friction changes where the speed is small.
+        let curved = |u: f64| fastest * u * u.abs();
+        let [many, few] = KNOTS;
+        let x = (0..many).map(|k| low + (high - low) * place(k, many));
+        let speed = (0..few).map(|k| curved(2.0 * place(k, few) - 1.0));
+        Self {
+            x: Knots::of(x.collect(), motions.iter().map(|m| m.x.as_slice())),
+            speed: Knots::of(speed.collect(), motions.iter().map(|m| m.speed.as_slice())),
+            largest: [high.max(-low), fastest],
+        }
+    }
+
+    /// Size of the functions, in units of displacement.
+    pub fn size(&self) -> f64 {
+        self.largest[0]
+    }
+
+    /// Part of the surface of each function, in the order of [`Grid::functions`].
+    pub fn parts() -> Vec<Part> {
+        let [displacements, speeds] = KNOTS;
+        let mut parts = vec![Part::Displacement; displacements];
+        parts.extend(vec![Part::Speed; speeds]);
+        parts.extend([Part::Both; PRODUCTS.len()]);
+        parts.extend([Part::History; SLIPS.len() + 1]);
+        parts
+    }
+
+    /// Values of all functions along a motion, in units of displacement; `step` is the natural angular frequency over the rate.
+    pub fn functions(&self, motion: &Motion, step: f64) -> Vec<Vec<f64>> {
+        let [largest, fastest] = self.largest;
+        let mut all = hats(&self.x.at, &motion.x, largest);
+        all.extend(hats(&self.speed.at, &motion.speed, largest));
+        all.extend(PRODUCTS.map(|[i, j]| {
+            let pairs = motion.x.iter().zip(&motion.speed);
+            let product = |(x, v): (&f64, &f64)| {
+                largest * (x / largest).powi(i) * (v / fastest).powi(j)
+            };
+            pairs.map(product).collect()
+        }));
+        all.extend(SLIPS.map(|slip| slipping(&motion.x, slip * largest)));
+        all.push(relaxing(&motion.x, SLOW * step));
+        all
+    }
+}
+
+impl Knots {
+    fn of<'a>(at: Vec<f64>, motions: impl Iterator<Item = &'a [f64]>) -> Self {
+        let mut share = vec![0.0; at.len()];
+        let mut whole = 0.0;
+        for motion in motions {
+            for (share, hat) in share.iter_mut().zip(hats(&at, motion, 1.0)) {
+                *share += hat.iter().sum::<f64>();
+            }
+            whole += motion.len() as f64;
+        }
+        share.iter_mut().for_each(|s| *s /= whole);
+        Self { at, share }
+    }
+
+    /// What the torque at a knot, less the straight line that fits the torques along the motion best, is made of: weights of the
+    /// torques at all knots. The line is a matter of the stand's constants.
+    pub fn without_line(&self, k: usize) -> Vec<f64> {
+        let pairs = || self.at.iter().zip(&self.share);
+        let mean: f64 = pairs().map(|(x, s)| s * x).sum();
+        let square: f64 = pairs().map(|(x, s)| s * (x - mean).powi(2)).sum();
+        let line = |x: f64| 1.0 + (x - mean) * (self.at[k] - mean) / square;
+        let weight = |(j, (x, s)): (usize, (&f64, &f64))| f64::from(u8::from(j == k)) - s * line(*x);
+        pairs().enumerate().map(weight).collect()
+    }
+}
+
+/// Piecewise linear functions that are `size` at one knot and zero at all others; beyond the outer knots they go on straight.
+fn hats(knots: &[f64], at: &[f64], size: f64) -> Vec<Vec<f64>> {
+    let mut all = vec![vec![0.0; at.len()]; knots.len()];
+    for (i, x) in at.iter().enumerate() {
+        let right = knots.partition_point(|k| k < x).clamp(1, knots.len() - 1);
+        let (low, high) = (knots[right - 1], knots[right]);
+        let part = (x - low) / (high - low);
+        all[right - 1][i] = size * (1.0 - part);
+        all[right][i] = size * part;
+    }
+    all
+}
+
+/// A spring that slips where its force would exceed a threshold (Jenkin's element).
+fn slipping(x: &[f64], threshold: f64) -> Vec<f64> {
+    let (mut force, mut last) = (0.0, x.first().copied().unwrap_or(0.0));
+    let next = |x: &f64| {
+        force = (force + x - last).clamp(-threshold, threshold);
+        last = *x;
+        force
+    };
+    x.iter().map(next).collect()
+}
+
+/// A displacement that follows slowly: `z' = ω (x − z)`, `step = ω/f_s`.
+fn relaxing(x: &[f64], step: f64) -> Vec<f64> {
+    let share = 1.0 - (-step).exp();
+    let mut z = 0.0;
+    let next = |x: &f64| {
+        z += share * (x - z);
+        z
+    };
+    x.iter().map(next).collect()
+}

@@ -1,0 +1,236 @@
+//! A flexible rival that knows no law: the torque that the stand lacks as a surface over displacement and speed, with a
+//! memory (restoring-force surface; S. F. Masri, T. K. Caughey, J. Appl. Mech. 46 (1979), 433).
+//!
+//! With the linear stand `H` the record is `y = H G u − H n(x, x', z)`, and `n` a sum of functions ([`basis`]) of the motion
+//! that was measured, so that all coefficients follow from linear least squares ([`regression`]). Corrections of the constants
+//! of the stand are the columns `H x` and `H x'` among them. Where `n` bends the part that the gage sits on, its column is
+//! `n − H n`; where the gage itself is curved, `n`.
+
+mod ask;
+mod basis;
+mod motion;
+mod regression;
+mod report;
+mod shape;
+
+use std::sync::Arc;
+
+use num_complex::Complex64;
+use schemars::JsonSchema;
+use serde::Serialize;
+use torqcomp_dsp::dot;
+use torqcomp_model::Chain;
+use torqcomp_model::effects::Stage;
+use torqcomp_model::simulate::MotionState;
+
+use super::blocks::compare;
+use super::record::{NuisanceTerms, StandRecord};
+use super::score::ScoredModel;
+use super::structure::FitContext;
+use crate::parallel::parallel;
+use basis::{Grid, Part};
+use motion::{Motion, of_torque, through};
+use regression::{Regression, Solution};
+
+pub use ask::AskedSurface;
+pub use report::{ForceSurface, SurfacePoint};
+
+/// Where the torque that a surface describes sits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SurfacePlace {
+    /// In the stand, beside what the gage shows.
+    Stand,
+    /// In the part that the gage sits on.
+    GagePath,
+    /// In the gage or its amplifier, behind the motion.
+    Gage,
+}
+
+const PLACES: [SurfacePlace; 3] = [
+    SurfacePlace::Stand,
+    SurfacePlace::GagePath,
+    SurfacePlace::Gage,
+];
+
+/// Columns that stand for the plain stand: input, displacement, speed.
+const PLAIN: usize = 3;
+/// Minimum significance with which a surface leaves less than the best laws.
+const LEAST_SIGNIFICANCE: f64 = 3.0;
+/// Largest part of the laws' excess error power that a surface that outdoes them leaves.
+const LEFT: f64 = 0.5;
+
+/// A surface, fitted to the training records.
+pub struct Surface {
+    pub place: SurfacePlace,
+    grid: Grid,
+    solution: Solution,
+    /// What it leaves of each training sample, by coefficients that were found without it.
+    unseen: Vec<f64>,
+    /// What each part explains alone, over what all explain.
+    shares: [f64; Part::ALL.len()],
+}
+
+/// A model without the laws that a surface stands in for.
+struct Background<'a> {
+    model: &'a ScoredModel,
+    linear: Chain,
+    terms: NuisanceTerms,
+    place: SurfacePlace,
+}
+
+impl Surface {
+    /// The surface that explains the training records best in place of the laws of a model; `None` if none can be fitted.
+    pub fn fit(model: &ScoredModel, threads: usize) -> Option<Self> {
+        let fits = parallel(PLACES.len(), threads, |k| Self::at(PLACES[k], model));
+        let sum = |surface: &Self| dot(&surface.unseen, &surface.unseen);
+        let fits = fits.into_iter().flatten();
+        fits.min_by(|a, b| sum(a).total_cmp(&sum(b)))
+    }
+
+    fn at(place: SurfacePlace, model: &ScoredModel) -> Option<Self> {
+        let background = Background::of(model, place);
+        let records = || model.train.iter().map(|residual| &residual.record);
+        let motions = records().map(|record| background.motion(record));
+        let motions: Vec<Motion> = motions.collect::<Option<_>>()?;
+        let grid = Grid::of(&motions);
+        let both = records().zip(&motions);
+        let columns = both.map(|(record, motion)| background.columns(record, motion, &grid));
+        let regression = Regression::of(columns.collect(), PLAIN, model.train_rms().powi(2));
+        let (solution, unseen) = regression.solve()?;
+        let parts = Grid::parts();
+        let plain = regression.left_with(&solution, |k| k < PLAIN)?;
+        let whole = regression.left_with(&solution, |_| true)?;
+        let mut shares = [0.0; Part::ALL.len()];
+        for (share, part) in shares.iter_mut().zip(Part::ALL) {
+            let without =
+                regression.left_with(&solution, |k| k < PLAIN || parts[k - PLAIN] != part)?;
+            *share = ((without - whole) / (plain - whole).max(1e-300)).clamp(0.0, 1.0);
+        }
+        Some(Self {
+            place,
+            grid,
+            solution,
+            unseen,
+            shares,
+        })
+    }
+
+    /// Rms of what it leaves of training samples that it was not fitted to.
+    pub fn unseen_rms(&self) -> f64 {
+        rms(&self.unseen)
+    }
+
+    /// Whether it leaves significantly less of the training records than a model does, in samples that it was not fitted to.
+    pub fn improves_on(&self, model: &ScoredModel) -> bool {
+        let train: Vec<&[f64]> = model.train.iter().map(|r| r.samples.as_slice()).collect();
+        compare(&train.concat(), &self.unseen).significance() >= LEAST_SIGNIFICANCE
+    }
+
+    /// Whether it explains so much more than a model that no law of that is to be named.
+    pub fn outdoes(&self, model: &ScoredModel, noise_rms: f64) -> bool {
+        let excess = |rms: f64| rms.powi(2) - noise_rms.powi(2);
+        self.improves_on(model) && excess(self.unseen_rms()) <= LEFT * excess(model.train_rms())
+    }
+
+    /// What it leaves of the records on which a model is compared, by the motion that was measured there.
+    pub fn left_of_compared(&self, model: &ScoredModel) -> Option<Vec<f64>> {
+        let background = Background::of(model, self.place);
+        let left = model.compared.iter().map(|residual| {
+            let motion = background.motion(&residual.record)?;
+            let (columns, mut left) = background.columns(&residual.record, &motion, &self.grid);
+            self.solution.subtract(&columns, 0..left.len(), &mut left);
+            Some(left)
+        });
+        Some(left.collect::<Option<Vec<_>>>()?.concat())
+    }
+}
+
+pub fn rms(samples: &[f64]) -> f64 {
+    (dot(samples, samples) / samples.len().max(1) as f64).sqrt()
+}
+
+/// Whether an effect is a law of the motion: a surface stands in for it.
+pub fn is_law(stage: Stage) -> bool {
+    matches!(stage, Stage::Stand | Stage::Gage | Stage::Limit)
+}
+
+impl<'a> Background<'a> {
+    fn of(model: &'a ScoredModel, place: SurfacePlace) -> Self {
+        let (linear, terms) = reduced(model, |stage| !is_law(stage));
+        Self {
+            model,
+            linear,
+            terms,
+            place,
+        }
+    }
+
+    /// The motion along a record. What does not pass the stand has the noise of the record itself in it: there it is that of the
+    /// model.
+    fn motion(&self, record: &StandRecord) -> Option<Motion> {
+        let is_corrected = self.place == SurfacePlace::Stand;
+        Motion::along(self.model, record, is_corrected)
+    }
+
+    /// The columns of a record, and the record, both without what belongs to it.
+    fn columns(
+        &self,
+        record: &StandRecord,
+        motion: &Motion,
+        grid: &Grid,
+    ) -> (Vec<Vec<f64>>, Vec<f64>) {
+        let nuisance = record.nuisance(&self.model.fitted.free, &self.terms, None);
+        let cleared = |whole: &[f64]| {
+            let mut part = whole[record.range.clone()].to_vec();
+            nuisance.clear(&mut part);
+            part
+        };
+        let torque = of_torque(&self.linear);
+        let input = self.linear.simulate(&record.input, MotionState::default());
+        let mut columns = vec![cleared(&input)];
+        for linear in [&motion.x, &motion.speed] {
+            columns.push(cleared(&through(record, linear, |omega| -torque(omega))));
+        }
+        let step = self.model.fitted.mode().omega_rad_s / record.rate_hz();
+        columns.extend(grid.functions(motion, step).into_iter().map(|mut samples| {
+            if self.place != SurfacePlace::Stand {
+                // A straight line would be the record itself.
+                without_line(&mut samples, &motion.x);
+            }
+            cleared(&through(record, &samples, |omega| match self.place {
+                SurfacePlace::Stand => -torque(omega),
+                SurfacePlace::GagePath => Complex64::ONE - torque(omega),
+                SurfacePlace::Gage => Complex64::ONE,
+            }))
+        }));
+        (columns, cleared(&record.measured))
+    }
+}
+
+/// A model with the effects of some stages alone, the recorder where the chain is among them.
+fn reduced(model: &ScoredModel, keeps: impl Fn(Stage) -> bool) -> (Chain, NuisanceTerms) {
+    let structure = &model.fitted.structure;
+    let is_kept = |k: usize| keeps(structure.effects[k].form.stage);
+    let (mut reduced, values) = structure.reduced(&model.fitted.values, is_kept);
+    let recorder = structure.context.recorder.clone();
+    reduced.context = Arc::new(FitContext {
+        recorder: recorder.filter(|_| keeps(Stage::Chain)),
+        ..(*structure.context).clone()
+    });
+    reduced.model(&values)
+}
+
+/// Takes the straight line over the displacement that fits best out of a function.
+fn without_line(samples: &mut [f64], x: &[f64]) {
+    let count = x.len() as f64;
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / count;
+    let (mean_x, mean_y) = (mean(x), mean(samples));
+    let square: f64 = x.iter().map(|x| (x - mean_x).powi(2)).sum();
+    let pairs = x.iter().zip(&*samples);
+    let product: f64 = pairs.map(|(x, y)| (x - mean_x) * (y - mean_y)).sum();
+    let slope = product / square.max(1e-300);
+    for (y, x) in samples.iter_mut().zip(x) {
+        *y -= mean_y + slope * (x - mean_x);
+    }
+}

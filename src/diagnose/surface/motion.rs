@@ -1,0 +1,90 @@
+//! The motion along a record: what the model says, corrected by the slow part of what it leaves.
+
+use num_complex::Complex64;
+
+use crate::diagnose::record::{NuisanceTerms, StandRecord};
+use crate::diagnose::score::ScoredModel;
+use torqcomp_model::Chain;
+use torqcomp_model::effects::Stage;
+
+/// Frequency over the natural one up to which the residual is taken for motion: above it there is little but noise, which a
+/// speed would have too much of.
+const CORRECTED: f64 = 5.0;
+
+/// Displacement and speed at each sample of a record.
+pub struct Motion {
+    pub x: Vec<f64>,
+    /// Over the natural angular frequency, so that it has the size of the displacement.
+    pub speed: Vec<f64>,
+}
+
+impl Motion {
+    /// The motion along a record with the initial state that the model has there, corrected by what it leaves of the record, or
+    /// not; `None` if it diverges.
+    pub fn along(model: &ScoredModel, record: &StandRecord, is_corrected: bool) -> Option<Self> {
+        let fitted = &model.fitted;
+        let mut x = up_to_the_gage(model, record)?;
+        if is_corrected {
+            let (mut whole, terms) = fitted.structure.model(&fitted.values);
+            whole.shift = record.initial.preload;
+            let recorded = whole.simulate(&record.input, record.initial.motion);
+            let correction = slow_part(record, &recorded, &terms, whole.stand.highest_hz())?;
+            x.iter_mut().zip(correction).for_each(|(x, c)| *x += c);
+        }
+        let omega = fitted.mode().omega_rad_s;
+        let speed = through(record, &x, |at| Complex64::new(0.0, at / omega));
+        Some(Self { x, speed })
+    }
+}
+
+/// What the gage shows in the model, before the recorder.
+fn up_to_the_gage(model: &ScoredModel, record: &StandRecord) -> Option<Vec<f64>> {
+    let (mut chain, _) = super::reduced(model, |stage| stage <= Stage::Gage);
+    chain.shift = record.initial.preload;
+    let shown = chain.simulate(&record.input, record.initial.motion);
+    shown.last().is_some_and(|x| x.is_finite()).then_some(shown)
+}
+
+/// What a model leaves of a record, without what belongs to the record but the motion, and without the noise at high frequencies.
+fn slow_part(
+    record: &StandRecord,
+    recorded: &[f64],
+    terms: &NuisanceTerms,
+    natural_hz: f64,
+) -> Option<Vec<f64>> {
+    let pairs = record.measured.iter().zip(recorded);
+    let mut left: Vec<f64> = pairs.map(|(y, x)| y - x).collect();
+    if left.last().is_none_or(|r| !r.is_finite()) {
+        return None;
+    }
+    // Outside the range the terms of the record are not known.
+    let inside = &mut left[record.range.clone()];
+    record.nuisance_beside_motion(terms).clear(inside);
+    left[..record.range.start].fill(0.0);
+    left[record.range.end..].fill(0.0);
+    let corner = std::f64::consts::TAU * CORRECTED * natural_hz;
+    Some(through(record, &left, |at| {
+        Complex64::from(1.0 / (1.0 + (at / corner).powi(8)))
+    }))
+}
+
+/// Samples along a record through a response over the angular frequency.
+pub fn through(
+    record: &StandRecord,
+    samples: &[f64],
+    response: impl Fn(f64) -> Complex64,
+) -> Vec<f64> {
+    let mut spectrum = record.input.transform(samples);
+    for (line, value) in spectrum.iter_mut().enumerate() {
+        *value *= response(record.input.omega_rad_s(line));
+    }
+    record.input.samples_of(spectrum)
+}
+
+/// What a torque of unit gain at the gage adds to the record, by angular frequency.
+pub fn of_torque(chain: &Chain) -> impl Fn(f64) -> Complex64 + '_ {
+    |omega| {
+        let hz = omega / std::f64::consts::TAU;
+        chain.stand.response(omega) * chain.response_of(hz, |_| true)
+    }
+}

@@ -1,0 +1,219 @@
+//! Least squares with many columns, and what it leaves of samples that it has not seen.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
+use torqcomp_dsp::dot;
+
+/// Parts into which the samples are dealt out; each is predicted from the others.
+const FOLDS: usize = 8;
+/// Stretches of each record that are dealt out in turn.
+const STRETCHES: usize = 24;
+/// Standard deviations of a function's part of the record, over the rms of the record, that are tried as expectation before
+/// the data: a small one keeps small what few samples determine.
+const EXPECTED: [f64; 10] = [1.0, 0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 1e-5, 1e-8];
+/// What a coefficient of the plain stand costs, in noise powers: next to nothing.
+const FREE: f64 = 1e-6;
+
+/// Columns and what they are to explain, record by record.
+pub struct Regression {
+    records: Vec<(Vec<Vec<f64>>, Vec<f64>)>,
+    /// Gram matrix and products with what is to be explained, of each fold.
+    folds: Vec<(DMatrix<f64>, DVector<f64>)>,
+    /// The first columns, which are free.
+    free: usize,
+    noise_power: f64,
+}
+
+/// Coefficients of all columns.
+pub struct Solution {
+    pub coefficients: DVector<f64>,
+    /// Those found without one of the folds.
+    pub without: Vec<DVector<f64>>,
+    /// What the square of each coefficient costs.
+    ridge: DVector<f64>,
+}
+
+impl Regression {
+    pub fn of(
+        records: Vec<(Vec<Vec<f64>>, Vec<f64>)>,
+        free: usize,
+        noise_power: f64,
+    ) -> Self {
+        let count = records.first().map_or(0, |(columns, _)| columns.len());
+        let zero = || (DMatrix::zeros(count, count), DVector::zeros(count));
+        let mut folds: Vec<_> = (0..FOLDS).map(|_| zero()).collect();
+        for (columns, target) in &records {
+            for (stretch, range) in stretches(target.len()).enumerate() {
+                let (gram, right) = &mut folds[stretch % FOLDS];
+                for (i, one) in columns.iter().enumerate() {
+                    right[i] += dot(&one[range.clone()], &target[range.clone()]);
+                    for (j, other) in columns[..=i].iter().enumerate() {
+                        gram[(i, j)] += dot(&one[range.clone()], &other[range.clone()]);
+                        gram[(j, i)] = gram[(i, j)];
+                    }
+                }
+            }
+        }
+        Self {
+            records,
+            folds,
+            free,
+            noise_power,
+        }
+    }
+
+    /// The solution with the expectation that predicts unseen samples best, and what it leaves of these.
+    pub fn solve(&self) -> Option<(Solution, Vec<f64>)> {
+        let solved = EXPECTED.iter().filter_map(|std| {
+            let ridge = self.ridge(*std);
+            let without = (0..FOLDS).map(|fold| self.coefficients(Some(fold), &ridge));
+            let without: Vec<DVector<f64>> = without.collect::<Option<_>>()?;
+            let coefficients = self.coefficients(None, &ridge)?;
+            let unseen = self.unseen(&without);
+            let solution = Solution {
+                coefficients,
+                without,
+                ridge,
+            };
+            Some((solution, unseen))
+        });
+        let sum = |left: &[f64]| dot(left, left);
+        solved.min_by(|(_, a), (_, b)| sum(a).total_cmp(&sum(b)))
+    }
+
+    /// Sum of squares that is left with some of the columns.
+    pub fn left_with(&self, solution: &Solution, is_in: impl Fn(usize) -> bool) -> Option<f64> {
+        let (gram, right) = self.sums(None, &solution.ridge);
+        let kept: Vec<usize> = (0..right.len()).filter(|k| is_in(*k)).collect();
+        let gram = gram.select_rows(&kept).select_columns(&kept);
+        let right = right.select_rows(&kept);
+        let found = gram.cholesky()?.solve(&right);
+        let whole: f64 = self.records.iter().map(|(_, y)| dot(y, y)).sum();
+        Some(whole - found.dot(&right))
+    }
+
+    /// What the squares of the coefficients cost where a function is expected to give so much of the record.
+    fn ridge(&self, expected: f64) -> DVector<f64> {
+        let whole: f64 = self.records.iter().map(|(_, y)| dot(y, y)).sum();
+        let size = |k: usize| self.folds.iter().map(|(gram, _)| gram[(k, k)]).sum::<f64>();
+        let count = self.folds[0].1.len();
+        let cost = |k: usize| match k < self.free {
+            true => FREE * self.noise_power,
+            false => self.noise_power * size(k) / (whole * expected * expected),
+        };
+        DVector::from_fn(count, |k, _| cost(k).max(f64::MIN_POSITIVE))
+    }
+
+    fn sums(&self, without: Option<usize>, ridge: &DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
+        let mut sum = (DMatrix::from_diagonal(ridge), DVector::zeros(ridge.len()));
+        for (k, (gram, right)) in self.folds.iter().enumerate() {
+            if Some(k) != without {
+                sum.0 += gram;
+                sum.1 += right;
+            }
+        }
+        sum
+    }
+
+    fn coefficients(&self, without: Option<usize>, ridge: &DVector<f64>) -> Option<DVector<f64>> {
+        let (gram, right) = self.sums(without, ridge);
+        Some(gram.cholesky()?.solve(&right))
+    }
+
+    /// What is left of each sample by the coefficients that were found without it.
+    fn unseen(&self, without: &[DVector<f64>]) -> Vec<f64> {
+        let mut all = Vec::new();
+        for (columns, target) in &self.records {
+            let mut left = target.clone();
+            for (stretch, range) in stretches(target.len()).enumerate() {
+                subtract(&without[stretch % FOLDS], columns, range, &mut left);
+            }
+            all.extend(left);
+        }
+        all
+    }
+}
+
+impl Solution {
+    /// Takes what the columns explain out of samples.
+    pub fn subtract(&self, columns: &[Vec<f64>], range: Range<usize>, left: &mut [f64]) {
+        subtract(&self.coefficients, columns, range, left);
+    }
+
+    /// Standard uncertainty of a sum of the coefficients, from how it scatters between the folds (jackknife; B. Efron, *The
+    /// Jackknife, the Bootstrap and Other Resampling Plans* (1982), 3).
+    pub fn std(&self, weights: &DVector<f64>) -> f64 {
+        let values: Vec<f64> = self.without.iter().map(|c| c.dot(weights)).collect();
+        let count = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / count;
+        let square: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
+        ((count - 1.0) / count * square).sqrt()
+    }
+}
+
+fn subtract(
+    coefficients: &DVector<f64>,
+    columns: &[Vec<f64>],
+    range: Range<usize>,
+    left: &mut [f64],
+) {
+    for (column, c) in columns.iter().zip(coefficients.iter()) {
+        let column = &column[range.clone()];
+        let left = &mut left[range.clone()];
+        left.iter_mut().zip(column).for_each(|(l, x)| *l -= c * x);
+    }
+}
+
+/// Consecutive stretches of a record.
+fn stretches(count: usize) -> impl Iterator<Item = Range<usize>> {
+    (0..STRETCHES).map(move |k| k * count / STRETCHES..(k + 1) * count / STRETCHES)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `y = 2 a + 0.5 b` in noise of 0.1, beside 20 columns of noise.
+    fn made() -> Regression {
+        let mut state = 1_u64;
+        let mut noise = move || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        let records = (0..2).map(|_| {
+            let columns: Vec<Vec<f64>> =
+                (0..22).map(|_| (0..2000).map(|_| noise()).collect()).collect();
+            let y = (0..2000).map(|i| 2.0 * columns[0][i] + 0.5 * columns[1][i] + 0.35 * noise());
+            let y = y.collect();
+            (columns, y)
+        });
+        Regression::of(records.collect(), 1, 0.01)
+    }
+
+    #[test]
+    fn unseen_samples_are_predicted_to_the_noise() {
+        let regression = made();
+        let (solution, unseen) = regression.solve().unwrap();
+        let found = &solution.coefficients;
+        assert!((found[0] - 2.0).abs() < 0.03 && (found[1] - 0.5).abs() < 0.03);
+        // 0.35/√12 is 0.101.
+        let rms = (dot(&unseen, &unseen) / 4000.0).sqrt();
+        assert!((rms - 0.101).abs() < 0.003, "{rms}");
+        let weights = DVector::from_fn(22, |k, _| f64::from(u8::from(k == 1)));
+        // σ/√(Σ b²) = 0.101/√(4000/12).
+        assert!((0.002..0.012).contains(&solution.std(&weights)));
+    }
+
+    #[test]
+    fn what_is_left_out_is_missed() {
+        let regression = made();
+        let (solution, _) = regression.solve().unwrap();
+        let left = |without: usize| regression.left_with(&solution, |k| k != without).unwrap();
+        // 0.5² · 4000/12 = 83 more without the second column, nothing without one of noise.
+        assert!((left(1) - left(99) - 83.3).abs() < 12.0);
+        assert!(left(7) - left(99) < 1.0);
+    }
+}

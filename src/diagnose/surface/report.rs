@@ -1,0 +1,129 @@
+//! A surface as it is reported: its curves with their uncertainties, and what they look like.
+
+use nalgebra::DVector;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::basis::{KNOTS, Knots, Part};
+use super::shape::{Resemblance, of_displacement, of_speed};
+use super::{PLAIN, Surface, SurfacePlace, rms};
+use crate::diagnose::describe::shows_torque;
+use crate::diagnose::score::ScoredModel;
+
+/// Part of what the surface explains that a part of it must explain alone to be spoken of.
+const SPOKEN_OF: f64 = 0.1;
+
+/// The torque that the laws leave unexplained as a surface over displacement and speed, with a memory.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct ForceSurface {
+    /// Where it sits.
+    pub place: SurfacePlace,
+    /// Whether no law is named because it explains so much more than the best of them.
+    pub outdoes_laws: bool,
+    /// Rms that it leaves of training samples that it was not fitted to, by the motion that was measured there; in the unit of
+    /// `error`.
+    pub train_rms: f64,
+    /// Rms that it leaves of the hold-out records, by the motion that was measured there.
+    pub holdout_rms: f64,
+    pub shares: SurfaceShares,
+    /// Torque over displacement, both in the unit of `error`, without its straight line.
+    pub over_displacement: Vec<SurfacePoint>,
+    /// Torque over the rate of change of displacement per s, without its straight line.
+    pub over_speed: Vec<SurfacePoint>,
+    /// What its parts look like.
+    pub looks_like: Vec<String>,
+    /// Effects and laws that come nearest: hypotheses, not findings.
+    pub nearest: Vec<&'static str>,
+}
+
+/// What the parts explain that nothing else of the surface can, over what all explain.
+#[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
+pub struct SurfaceShares {
+    pub displacement: f64,
+    pub speed: f64,
+    /// Products of displacement and speed.
+    pub both: f64,
+    /// Elements that slip, and a slow one.
+    pub history: f64,
+}
+
+/// A point of a curve.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct SurfacePoint {
+    pub at: f64,
+    pub torque: f64,
+    /// Standard uncertainty of the torque.
+    pub std: f64,
+}
+
+impl ForceSurface {
+    /// The record that would decide between the laws that come nearest.
+    pub fn experiment(&self) -> &'static str {
+        let shares = &self.shares;
+        let of_displacement = shares.displacement.max(shares.history);
+        shows_torque(of_displacement >= shares.speed.max(shares.both))
+    }
+}
+
+impl Surface {
+    /// The surface on the records on which a model is compared; `None` if these do not bear it out.
+    pub fn report(&self, model: &ScoredModel, outdoes_laws: bool) -> Option<ForceSurface> {
+        let left = rms(&self.left_of_compared(model)?);
+        if left >= model.compared_rms() {
+            return None;
+        }
+        let unit = model.fitted.structure.context.units.per_printed;
+        let omega = model.fitted.mode().omega_rad_s;
+        let curve = |first: usize, knots: &Knots, scale: f64| -> Vec<SurfacePoint> {
+            let of_knot = |(k, at): (usize, &f64)| {
+                let mut weights = DVector::zeros(self.solution.coefficients.len());
+                for (j, weight) in knots.without_line(k).into_iter().enumerate() {
+                    weights[first + j] = self.grid.size() * weight;
+                }
+                SurfacePoint {
+                    at: at * scale / unit,
+                    torque: self.solution.coefficients.dot(&weights) / unit,
+                    std: self.solution.std(&weights) / unit,
+                }
+            };
+            knots.at.iter().enumerate().map(of_knot).collect()
+        };
+        let over_displacement = curve(PLAIN, &self.grid.x, 1.0);
+        let over_speed = curve(PLAIN + KNOTS[0], &self.grid.speed, omega);
+        let [displacement, speed, both, history] = self.shares;
+        let mut resemblances = Vec::new();
+        for (part, share) in Part::ALL.into_iter().zip(self.shares) {
+            let most = self.shares.iter().copied().fold(0.0, f64::max);
+            if share >= SPOKEN_OF.min(most) {
+                resemblances.push(match part {
+                    Part::Displacement => of_displacement(&over_displacement, self.place),
+                    Part::Speed => of_speed(&over_speed),
+                    Part::Both => Resemblance::damping_over_displacement(),
+                    Part::History => Resemblance::loop_of_history(),
+                });
+            }
+        }
+        let mut nearest: Vec<&'static str> = Vec::new();
+        for name in resemblances.iter().flat_map(|r| r.nearest) {
+            if !nearest.contains(name) {
+                nearest.push(name);
+            }
+        }
+        Some(ForceSurface {
+            place: self.place,
+            outdoes_laws,
+            train_rms: self.unseen_rms() / unit,
+            holdout_rms: left / unit,
+            shares: SurfaceShares {
+                displacement,
+                speed,
+                both,
+                history,
+            },
+            over_displacement,
+            over_speed,
+            looks_like: resemblances.into_iter().map(|r| r.words).collect(),
+            nearest,
+        })
+    }
+}
