@@ -5,6 +5,7 @@ use std::f64::consts::{PI, TAU};
 
 use serde_json::Value;
 
+use crate::motion;
 use crate::noise::Noise;
 use crate::util::Folder;
 
@@ -72,14 +73,14 @@ fn record(setting: &Setting, input: Input, noise: &mut Noise) -> (Vec<f64>, Vec<
             applied.push(now);
             shown.push(state[0]);
         }
-        let at = |from: [f64; 2], by: f64| [state[0] + by * from[0], state[1] + by * from[1]];
-        let a = slope(now, state);
-        let b = slope(half, at(a, 0.5 * step));
-        let c = slope(half, at(b, 0.5 * step));
-        let d = slope(next, at(c, step));
-        for j in 0..2 {
-            state[j] += step / 6.0 * (a[j] + 2.0 * b[j] + 2.0 * c[j] + d[j]);
-        }
+        let pull = |part: f64| match part {
+            0.0 => now,
+            0.5 => half,
+            _ => next,
+        };
+        state = motion::step(state, 0.0, 1.0, |part, state| {
+            slope(pull(part), state).map(|rate| step * rate)
+        });
     }
     let of_shown = (shown.iter().map(|x| x * x).sum::<f64>() / shown.len() as f64).sqrt();
     let fresh = (1.0 - setting.memory.powi(2)).sqrt();

@@ -7,6 +7,7 @@ use std::f64::consts::{PI, TAU};
 
 use serde_json::Value;
 
+use crate::motion;
 use crate::noise::Noise;
 use crate::util::Folder;
 
@@ -65,14 +66,7 @@ impl Stand {
             for step in 0..STEPS {
                 let t = (i * STEPS + step) as f64 * h;
                 let before = state;
-                let at = |d: [f64; 2], by: f64| [state[0] + by * d[0], state[1] + by * d[1]];
-                let a = slope(t, state);
-                let b = slope(t + 0.5 * h, at(a, 0.5 * h));
-                let c = slope(t + 0.5 * h, at(b, 0.5 * h));
-                let d = slope(t + h, at(c, h));
-                for j in 0..2 {
-                    state[j] += h / 6.0 * (a[j] + 2.0 * b[j] + 2.0 * c[j] + d[j]);
-                }
+                state = motion::step(state, t, h, &slope);
                 let most = h * self.friction * omega * omega;
                 state[1] -= state[1].clamp(-most, most);
                 if before[1] == 0.0 && state[1] == 0.0 {

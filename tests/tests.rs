@@ -33,8 +33,9 @@ mod memory;
 mod merge;
 mod messages;
 mod modes;
-mod mutations;
 #[cfg(all(unix, not(target_os = "macos")))] // file systems of macOS refuse other names
+mod motion;
+mod mutations;
 mod names;
 mod noise;
 mod once;
@@ -50,6 +51,7 @@ mod schema;
 mod simulate;
 mod standard_error;
 mod stated_std;
+mod surface;
 mod table;
 mod tdms;
 mod text_tables;

@@ -1,11 +1,14 @@
 //! Effects exchanged for others: one that was found first may only resemble another, or two others, beside those found later.
 
-use torqcomp_model::effects::{EFFECTS, Effect};
+use torqcomp_model::effects::{EFFECTS, Effect, Form};
 
 use super::SearchState;
+use super::fit::{FitEffort, fit};
 use super::pairs::best_pairs;
+use super::records::Records;
 use super::score::{BaseModel, ScoredModel};
 use super::search::{FOR_FIRST_EFFECT, SAME, SearchEffort, Workers, refusal, try_effects};
+use crate::parallel::parallel;
 
 /// Most exchanges.
 const MOST: usize = 3;
@@ -18,7 +21,10 @@ const FOR_EXCHANGE: SearchEffort = SearchEffort {
     first: 8,
     second: 0.1,
     full: 2,
+    promising: 0.5,
 };
+/// The fit of another form, which starts where the present one ended.
+const OTHER_FORM: FitEffort = FitEffort::full(15);
 /// Parameters of an effect from which on it may imitate two others.
 pub const MANY: usize = 3;
 
@@ -66,6 +72,9 @@ impl SearchState {
                 self.is_better(&model, effect, c.effect).then_some(model)
             });
             found.extend(singles);
+            let merged = less.in_other_forms(effect, &self.records, workers.threads);
+            let merged = merged.into_iter().filter(|m| passes(m));
+            found.extend(merged.filter(|m| m.criterion() < self.after.criterion() + SAME));
             if form.moved() >= MANY {
                 let alike = |e: &Effect| effect.resembles(e);
                 let round = try_effects(&base, alike, &FOR_FIRST_EFFECT, &self.records, silent);
@@ -88,6 +97,32 @@ impl SearchState {
         let place = |effect: &Effect| EFFECTS.iter().position(|e| e.name == effect.name);
         let difference = model.criterion() - self.after.criterion();
         difference < -SAME || difference < SAME && place(other) < place(present)
+    }
+}
+
+impl ScoredModel {
+    /// The model with each of its effects that another one resembles in its other forms of the same parameters, fitted: a second
+    /// mode that takes from the first what it adds is one effect, not a second mode and a gain.
+    fn in_other_forms(&self, other: &Effect, records: &Records, threads: usize) -> Vec<Self> {
+        let fitted = &self.fitted;
+        let mut structures = Vec::new();
+        for (k, present) in fitted.structure.effects.iter().enumerate() {
+            let names = |form: &Form| form.parameters.iter().map(|p| p.name).collect::<Vec<_>>();
+            let is_alike = present.effect.resembles(other) && k >= fitted.structure.declared;
+            let forms = present.effect.forms.iter().filter(|_| is_alike);
+            let forms = forms.filter(|form| form.name != present.form.name);
+            for form in forms.filter(|form| names(form) == names(present.form)) {
+                let mut structure = fitted.structure.clone();
+                structure.effects[k].form = form;
+                structures.push(structure);
+            }
+        }
+        let training = fitted.with_initial_states(&records.train);
+        let fits = parallel(structures.len(), threads, |k| {
+            let fitted = fit(structures[k].clone(), &fitted.values, &training, OTHER_FORM).ok()?;
+            Self::of(fitted, records)
+        });
+        fits.into_iter().flatten().collect()
     }
 }
 

@@ -55,19 +55,10 @@ pub struct Ladder {
 
 impl FittedModel {
     /// The model with some of the effects that were added to it, fitted again.
-    fn with_only(&self, keep: impl Fn(usize) -> bool, records: &Records) -> Option<Self> {
-        let mut structure = self.structure.clone();
-        let mut next = structure.context.plain_count();
-        let mut values = self.values[..next].to_vec();
-        structure.effects.clear();
-        for (k, effect) in self.structure.effects.iter().enumerate() {
-            let own = next..next + effect.moved();
-            next = own.end;
-            if k.checked_sub(self.structure.declared).is_none_or(&keep) {
-                values.extend(&self.values[own]);
-                structure.effects.push(*effect);
-            }
-        }
+    pub fn with_only(&self, keep: impl Fn(usize) -> bool, records: &Records) -> Option<Self> {
+        let declared = self.structure.declared;
+        let keeps = |k: usize| k.checked_sub(declared).is_none_or(&keep);
+        let (structure, values) = self.structure.reduced(&self.values, keeps);
         let train = self.with_initial_states(&records.train);
         fit(structure, &values, &train, REPEATED).ok()
     }

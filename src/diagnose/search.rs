@@ -80,8 +80,6 @@ const LINES: usize = 3;
 const PROMINENT: f64 = 12.0;
 /// Reduction of the training sum of squares, in residual variances, below which a fit is not continued.
 const WORTHWHILE: f64 = 5.0;
-/// Gain of the second fit, over the largest of all, from which on a fit is continued to its end.
-const PROMISING: f64 = 0.5;
 
 const FIRST_FIT: FitEffort = FitEffort::brief(3);
 const SECOND_FIT: FitEffort = FitEffort::brief(5);
@@ -98,18 +96,22 @@ pub struct SearchEffort {
     pub second: f64,
     /// Forms that get a full fit, ties aside.
     pub full: usize,
+    /// Gain of the second fit, over the largest of all, from which on such a fit follows.
+    pub promising: f64,
 }
 
 pub const FOR_FIRST_EFFECT: SearchEffort = SearchEffort {
     first: usize::MAX,
     second: 0.03,
     full: 12,
+    promising: 0.5,
 };
-/// Beside an accepted effect a fit costs more and finds less.
+/// Beside an accepted effect, what a first fit gains says less about the last one: all parameters must move together.
 const FOR_SECOND_EFFECT: SearchEffort = SearchEffort {
-    first: 12,
-    second: 0.1,
-    full: 4,
+    first: usize::MAX,
+    second: 0.02,
+    full: usize::MAX,
+    promising: 0.1,
 };
 
 /// Every effect added to a base model in turn.
@@ -275,7 +277,7 @@ pub fn fit_all(
         .get(limits.full)
         .copied()
         .unwrap_or(0.0)
-        .max(PROMISING * gains.first().copied().unwrap_or(0.0))
+        .max(limits.promising * gains.first().copied().unwrap_or(0.0))
         .max(WORTHWHILE * base.scored.train_rms().powi(2));
     parallel(forms.len(), workers.threads, |k| {
         let fit = second[k].as_ref().filter(|f| gain(f) > 0.0)?;

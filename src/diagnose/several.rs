@@ -12,7 +12,7 @@ use super::pairs::best_pairs;
 use super::reason::{Reason, Status};
 use super::residual_tests::ResidualTests;
 use super::score::{BaseModel, ScoredModel};
-use super::search::{self, CandidateFit, Round, Workers, no_gain, refusal, reject_all};
+use super::search::{self, CandidateFit, Round, SAME, Workers, no_gain, refusal, reject_all};
 use super::verdict::{PlainExcess, noise_rms, remains};
 
 /// Most effects that are added.
@@ -67,9 +67,13 @@ impl SearchState {
         if let Some(way) = best {
             self.arrive(way);
         }
-        if self.exchange(coarse, workers) {
-            // What only resembled an effect is gone: what it hid may show now.
+        // Where what only resembled an effect is gone, what it hid may show, and be exchanged in turn.
+        while self.exchange(coarse, workers) {
+            let count = self.after.effect_names().len();
             while self.has_room() && self.add_another(coarse, workers) {}
+            if self.after.effect_names().len() == count {
+                break;
+            }
         }
         self.eliminate(workers.threads);
         self.ask_guards(&base, workers);
@@ -129,7 +133,15 @@ impl SearchState {
                 .as_ref()
                 .is_none_or(|noisier| noisier.bear_out(model, pair))
         };
-        starts.retain(|pair| refusal(pair, model).is_none() && is_borne_out(pair));
+        // Of two descriptions that do as well, the one with fewer parameters: a pair may replace an effect with many.
+        let is_simpler = |pair: &ScoredModel| {
+            pair.parameter_count() < model.parameter_count()
+                && pair.criterion() < model.criterion() + SAME
+                && refusal(pair, &self.before).is_none()
+        };
+        starts.retain(|pair| {
+            is_simpler(pair) || refusal(pair, model).is_none() && is_borne_out(pair)
+        });
         if let Some(single) = single {
             // Beside the best effect all others are compared, ties included.
             let name = single.effect_names()[0];

@@ -181,8 +181,11 @@ impl SearchState {
     pub fn conclude(&mut self) -> Verdict {
         let is_suspected = self.suspected.is_some();
         let is_unsettled = !self.settled && !self.is_at_noise();
-        let is_outdone =
-            self.is_outdone || self.surface.as_ref().is_some_and(|asked| asked.outdoes_laws);
+        let is_outdone = self.is_outdone
+            || self
+                .surface
+                .as_ref()
+                .is_some_and(|asked| asked.outdoes_laws);
         let is_known_left = is_unsettled || is_suspected || is_outdone;
         let is_left = is_known_left || self.leaves(&self.after, &self.tests);
         if self.after.effect_names().is_empty() {

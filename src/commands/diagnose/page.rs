@@ -8,8 +8,8 @@ use super::text::{
 };
 use crate::chart::{Chart, Page, Series};
 use crate::diagnose::{
-    CandidateFit, Diagnosis, MotionAxis, RecordResidual, Status, SurfacePoint, autocorrelation, binned, density,
-    response,
+    CandidateFit, Diagnosis, MotionAxis, RecordResidual, Status, SurfacePoint, autocorrelation,
+    binned, density, response,
 };
 use crate::print::{plural, rounded, short, unit_or_as_recorded};
 use crate::provenance::Provenance;
@@ -369,9 +369,13 @@ impl Draft<'_> {
         let Some(surface) = &self.diagnosis.force_surface else {
             return;
         };
-        self.page.heading("The torque that is missing, of no given law");
+        self.page
+            .heading("The torque that is missing, of no given law");
         let shares = &surface.shares;
-        let mut rows = vec![cells(["it follows from", "share that nothing else explains"])];
+        let mut rows = vec![cells([
+            "it follows from",
+            "share that nothing else explains",
+        ])];
         rows.extend(
             [
                 ("the displacement", shares.displacement),
@@ -389,7 +393,9 @@ impl Draft<'_> {
             let band = |p: &SurfacePoint| (p.at, p.torque - 2.0 * p.std, p.torque + 2.0 * p.std);
             let (x, y): (Vec<f64>, Vec<f64>) = points.iter().map(|p| (p.at, p.torque)).unzip();
             let chart = Chart::new(
-                &format!("Over {name}, without its straight line; band: two standard uncertainties"),
+                &format!(
+                    "Over {name}, without its straight line; band: two standard uncertainties"
+                ),
                 &format!("{name}, {}{per}", self.unit),
                 &self.label("torque"),
                 vec![Series::line("torque", &x, &y)],

@@ -1,16 +1,13 @@
 //! Where a surface that knows no law is asked: something is left, and no law may be the cause of it.
 
 use super::{Surface, is_law};
-use crate::diagnose::fit::{FitEffort, fit};
 use crate::diagnose::reason::Reason;
 use crate::diagnose::record::StandRecord;
 use crate::diagnose::score::ScoredModel;
 use crate::diagnose::search::reject_all;
+use crate::diagnose::structure::EffectForm;
 use crate::diagnose::verdict::{noise_rms, remains};
 use crate::diagnose::{ForceSurface, SearchState};
-
-/// The fit of what is kept once laws are withdrawn.
-const REMAINING: FitEffort = FitEffort::full(15);
 
 /// A surface that explains more than the laws beside which it was fitted.
 pub struct AskedSurface {
@@ -49,23 +46,20 @@ impl SearchState {
     /// Goes back to a model without the laws of the motion that were found.
     fn withdraw_laws(&mut self, surface: &Surface) {
         let ratio = self.after.train_rms() / surface.unseen_rms();
-        let structure = &self.after.fitted.structure;
-        let is_withdrawn = |k: usize| {
-            k >= structure.declared && is_law(structure.effects[k].form.stage)
-        };
-        let names: Vec<&str> = (0..structure.effects.len())
-            .filter(|k| is_withdrawn(*k))
-            .map(|k| structure.effects[k].effect.name)
-            .collect();
+        let fitted = &self.after.fitted;
+        let is_withdrawn = |effect: &EffectForm| is_law(effect.form.stage);
+        let added = fitted.structure.added();
+        let withdrawn = added.iter().filter(|effect| is_withdrawn(effect));
+        let names: Vec<&str> = withdrawn.map(|effect| effect.effect.name).collect();
         for round in &mut self.rounds {
             for candidate in round.iter_mut().filter(|c| names.contains(&c.effect.name)) {
-                reject_all(std::slice::from_mut(candidate), |_| Reason::Surface { ratio });
+                reject_all(std::slice::from_mut(candidate), |_| Reason::Surface {
+                    ratio,
+                });
             }
         }
-        let (reduced, values) = structure.reduced(&self.after.fitted.values, |k| !is_withdrawn(k));
-        let training = self.after.fitted.with_initial_states(&self.records.train);
-        let kept = (reduced.effects.len() > reduced.declared)
-            .then(|| fit(reduced, &values, &training, REMAINING).ok())
+        let kept = (names.len() < added.len())
+            .then(|| fitted.with_only(|k| !is_withdrawn(&added[k]), &self.records))
             .flatten();
         let kept = kept.and_then(|fitted| ScoredModel::of(fitted, &self.records));
         self.after = kept.unwrap_or_else(|| self.before.clone());

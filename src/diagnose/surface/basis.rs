@@ -83,9 +83,8 @@ impl Grid {
         all.extend(hats(&self.speed.at, &motion.speed, largest));
         all.extend(PRODUCTS.map(|[i, j]| {
             let pairs = motion.x.iter().zip(&motion.speed);
-            let product = |(x, v): (&f64, &f64)| {
-                largest * (x / largest).powi(i) * (v / fastest).powi(j)
-            };
+            let product =
+                |(x, v): (&f64, &f64)| largest * (x / largest).powi(i) * (v / fastest).powi(j);
             pairs.map(product).collect()
         }));
         all.extend(SLIPS.map(|slip| slipping(&motion.x, slip * largest)));
@@ -115,7 +114,8 @@ impl Knots {
         let mean: f64 = pairs().map(|(x, s)| s * x).sum();
         let square: f64 = pairs().map(|(x, s)| s * (x - mean).powi(2)).sum();
         let line = |x: f64| 1.0 + (x - mean) * (self.at[k] - mean) / square;
-        let weight = |(j, (x, s)): (usize, (&f64, &f64))| f64::from(u8::from(j == k)) - s * line(*x);
+        let weight =
+            |(j, (x, s)): (usize, (&f64, &f64))| f64::from(u8::from(j == k)) - s * line(*x);
         pairs().enumerate().map(weight).collect()
     }
 }

@@ -35,11 +35,7 @@ pub struct Solution {
 }
 
 impl Regression {
-    pub fn of(
-        records: Vec<(Vec<Vec<f64>>, Vec<f64>)>,
-        free: usize,
-        noise_power: f64,
-    ) -> Self {
+    pub fn of(records: Vec<(Vec<Vec<f64>>, Vec<f64>)>, free: usize, noise_power: f64) -> Self {
         let count = records.first().map_or(0, |(columns, _)| columns.len());
         let zero = || (DMatrix::zeros(count, count), DVector::zeros(count));
         let mut folds: Vec<_> = (0..FOLDS).map(|_| zero()).collect();
@@ -184,8 +180,9 @@ mod tests {
             (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
         };
         let records = (0..2).map(|_| {
-            let columns: Vec<Vec<f64>> =
-                (0..22).map(|_| (0..2000).map(|_| noise()).collect()).collect();
+            let columns: Vec<Vec<f64>> = (0..22)
+                .map(|_| (0..2000).map(|_| noise()).collect())
+                .collect();
             let y = (0..2000).map(|i| 2.0 * columns[0][i] + 0.5 * columns[1][i] + 0.35 * noise());
             let y = y.collect();
             (columns, y)

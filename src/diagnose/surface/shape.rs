@@ -88,7 +88,11 @@ impl<'a> Curve<'a> {
         let square = sum(&|k| (at(k) - mean_x).powi(2)).max(1e-300);
         let slope = sum(&|k| (at(k) - mean_x) * (values[k] - mean_y)) / square;
         let line = |k: usize| mean_y + slope * (at(k) - mean_x);
-        values.iter().enumerate().map(|(k, y)| y - line(k)).collect()
+        values
+            .iter()
+            .enumerate()
+            .map(|(k, y)| y - line(k))
+            .collect()
     }
 
     /// The shape that explains most, if any explains enough: its index, amount and corner.
@@ -182,18 +186,20 @@ pub fn of_speed(points: &[SurfacePoint]) -> Resemblance {
     ]);
     match found.map(|(shape, amount, _)| (shape, amount > 0.0)) {
         Some((0, true)) => Resemblance::new("dry friction", &["coulomb-friction"]),
-        Some((3, true)) => Resemblance::new(
-            "friction that falls with the speed",
-            &["coulomb-friction"],
-        ),
+        Some((3, true)) => {
+            Resemblance::new("friction that falls with the speed", &["coulomb-friction"])
+        }
         Some((1 | 2, true)) => Resemblance::new(
             "damping that grows with the speed",
             &["quadratic-damping", "cubic-damping"],
         ),
-        Some((1 | 2, false)) => Resemblance::new(
-            "damping that falls with the speed",
-            &["coulomb-friction"],
+        Some((4, _)) => Resemblance::new(
+            "damping that differs between the two directions",
+            &["quadratic-damping"],
         ),
+        Some((1 | 2, false)) => {
+            Resemblance::new("damping that falls with the speed", &["coulomb-friction"])
+        }
         _ => Resemblance::new("a torque over the speed of no simple shape", &[]),
     }
 }

@@ -1,0 +1,167 @@
+//! Torques of no listed law: `diagnose` draws them over displacement and speed, and names no law.
+
+use std::f64::consts::TAU;
+
+use serde_json::Value;
+
+use crate::motion::step;
+use crate::noise::Noise;
+use crate::util::Folder;
+
+const NATURAL_HZ: f64 = 20.0;
+const DAMPING_RATIO: f64 = 0.05;
+const RATE_HZ: f64 = 800.0;
+const SAMPLES: usize = 12_000;
+/// Steps of the integration from sample to sample.
+const STEPS: usize = 16;
+/// Noise over the rms of the record.
+const NOISE: f64 = 0.003;
+
+/// A torque over displacement and over speed divided by `ω`, in N m, beside a spring of 1.
+type Law = fn(f64, f64) -> f64;
+
+/// Applied and recorded torque of a stand with such a torque, under forty sines, and the rms of the noise.
+fn record(law: Law, level: f64, noise: &mut Noise) -> (String, f64) {
+    let omega = TAU * NATURAL_HZ;
+    let lines: Vec<[f64; 2]> = (0..40)
+        .map(|k| {
+            let hz = 2.0 + 48.0 * (f64::from(k) + noise.uniform()) / 40.0;
+            [TAU * hz, TAU * noise.uniform()]
+        })
+        .collect();
+    let torque = |t: f64| -> f64 {
+        let lines = lines.iter();
+        level * lines.map(|[w, phase]| (w * t + phase).sin()).sum::<f64>()
+    };
+    let slope = |t: f64, [x, v]: [f64; 2]| {
+        let pull = torque(t) - x - law(x, v / omega);
+        [v, omega * omega * pull - 2.0 * DAMPING_RATIO * omega * v]
+    };
+    let h = 1.0 / (RATE_HZ * STEPS as f64);
+    let (mut state, mut motion) = ([0.0; 2], Vec::new());
+    for i in 0..SAMPLES * STEPS {
+        if i % STEPS == 0 {
+            motion.push(state[0]);
+        }
+        state = step(state, i as f64 * h, h, &slope);
+    }
+    let rms = (motion.iter().map(|x| x * x).sum::<f64>() / SAMPLES as f64).sqrt();
+    let mut text = String::from("time_s,applied_n_m,measured_n_m\n");
+    for (i, x) in motion.iter().enumerate() {
+        let t = i as f64 / RATE_HZ;
+        let seen = x + NOISE * rms * noise.normal();
+        text += &format!("{t:.6},{:.9},{seen:.9}\n", torque(t));
+    }
+    (text, NOISE * rms)
+}
+
+/// The diagnosis of two records, and the noise of the held-out one.
+fn diagnosed(law: Law, folder: &Folder, more: &[&str]) -> (Value, f64) {
+    let mut noise = Noise(7);
+    let (train, _) = record(law, 0.12, &mut noise);
+    let (holdout, rms) = record(law, 0.1, &mut noise);
+    folder
+        .write("train.csv", train)
+        .write("holdout.csv", holdout);
+    let records = ["--train", "train.csv", "--holdout", "holdout.csv"];
+    let channels = ["--applied", "applied_n_m", "--measured", "measured_n_m"];
+    let report = folder.json(&[&["diagnose", "--json"], &records[..], &channels, more].concat());
+    (report, rms)
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().expect("a number")
+}
+
+/// Points of a curve: place, torque, standard uncertainty.
+fn curve(report: &Value, name: &str) -> Vec<[f64; 3]> {
+    let points = report["force_surface"][name].as_array().expect("points");
+    let point = |p: &Value| ["at", "torque", "std"].map(|key| number(&p[key]));
+    points.iter().map(point).collect()
+}
+
+/// Largest difference of a curve from a law up to a straight line, over its standard uncertainty or a least one, in the inner part
+/// of its range.
+fn apart(points: &[[f64; 3]], inner: f64, least: f64, law: impl Fn(f64) -> f64) -> f64 {
+    let largest = points.iter().map(|p| p[0].abs()).fold(0.0, f64::max);
+    let inner: Vec<&[f64; 3]> = points
+        .iter()
+        .filter(|p| p[0].abs() < inner * largest)
+        .collect();
+    let count = inner.len() as f64;
+    let left = |p: &[f64; 3]| p[1] - law(p[0]);
+    let mean_x = inner.iter().map(|p| p[0]).sum::<f64>() / count;
+    let mean_y = inner.iter().map(|p| left(p)).sum::<f64>() / count;
+    let square: f64 = inner.iter().map(|p| (p[0] - mean_x).powi(2)).sum();
+    let product: f64 = inner
+        .iter()
+        .map(|p| (p[0] - mean_x) * (left(p) - mean_y))
+        .sum();
+    let line = |x: f64| mean_y + product / square * (x - mean_x);
+    let over = |p: &&[f64; 3]| (left(p) - line(p[0])).abs() / p[2].max(least);
+    inner.iter().map(over).fold(0.0, f64::max)
+}
+
+fn wavy(x: f64, _: f64) -> f64 {
+    0.06 * (2.5 * x).sin()
+}
+
+/// A spring with waves, as of a toothed coupling.
+#[test]
+fn a_wavy_spring_is_drawn_and_gets_no_name() {
+    let folder = Folder::new();
+    let (report, noise) = diagnosed(wavy, &folder, &["--html", "page.html"]);
+    let surface = &report["force_surface"];
+    println!("{} {} {surface}", report["verdict"], report["effects"]);
+    assert_eq!(report["verdict"], "unexplained");
+    assert_eq!(surface["place"], "stand");
+    let (before, left) = (
+        number(&report["error"]["before"]["holdout_rms"]),
+        number(&surface["holdout_rms"]),
+    );
+    // Straight lines between the knots leave some of the waves.
+    assert!(
+        before > 30.0 * noise && left < 2.0 * noise,
+        "{before} {left} {noise}"
+    );
+    assert!(number(&surface["shares"]["displacement"]) > 0.5);
+    let points = curve(&report, "over_displacement");
+    let apart = apart(&points, 0.6, 0.002, |x| wavy(x, 0.0));
+    assert!(apart < 4.0, "{apart} {points:?}");
+    let page = folder.read("page.html");
+    assert!(page.contains("The torque that is missing, of no given law"));
+}
+
+fn one_way(_: f64, v: f64) -> f64 {
+    0.05 * v.max(0.0).powi(2)
+}
+
+/// A damper with a valve that closes in one direction.
+#[test]
+fn damping_in_one_direction_is_drawn() {
+    let (report, noise) = diagnosed(one_way, &Folder::new(), &[]);
+    let surface = &report["force_surface"];
+    println!("{} {} {surface}", report["verdict"], report["effects"]);
+    assert_ne!(report["verdict"], "explained");
+    let left = number(&surface["holdout_rms"]);
+    assert!(left < 1.1 * noise, "{left} {noise}");
+    let words = surface["looks_like"].to_string();
+    assert!(
+        words.contains("differs between the two directions"),
+        "{words}"
+    );
+    // The rate of change in N m/s.
+    let points = curve(&report, "over_speed");
+    let law = |rate: f64| one_way(0.0, rate / (TAU * NATURAL_HZ));
+    let apart = apart(&points, 0.6, 0.002, law);
+    assert!(apart < 4.0, "{apart} {points:?}");
+}
+
+/// Where a law explains the records, there is nothing to draw.
+#[test]
+fn a_listed_law_needs_no_surface() {
+    let (report, _) = diagnosed(|x, _| 0.05 * x.powi(3), &Folder::new(), &[]);
+    assert_eq!(report["verdict"], "explained");
+    assert_eq!(report["effects"], serde_json::json!(["cubic-stiffness"]));
+    assert!(report["force_surface"].is_null());
+}
