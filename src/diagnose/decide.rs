@@ -59,8 +59,13 @@ fn is_tied(tried: &[CandidateFit], k: usize, best: usize) -> bool {
         return false;
     };
     let comparison = other.against(one);
+    // Each further parameter fits as much of the noise again.
+    let further = other
+        .parameter_count()
+        .saturating_sub(one.parameter_count());
+    let least = TIED_SIGNIFICANCE * (further.max(1) as f64).sqrt();
     k == best
-        || comparison.significance() < TIED_SIGNIFICANCE
+        || comparison.significance() < least
         || comparison.gain() < TIED_GAIN * other.compared_rms().powi(2)
 }
 

@@ -1,5 +1,6 @@
 //! From the applied quantity to the record.
 
+use std::f64::consts::TAU;
 use std::ops::Range;
 
 use num_complex::Complex64;
@@ -8,7 +9,8 @@ use super::{Chain, Link};
 use crate::effects::{Action, SampleClock, Stage};
 use crate::mode::Mode;
 use crate::simulate::{
-    Excitation, MotionProgress, MotionState, Torques, free_motion, integrate, integrate_modes,
+    Between, Excitation, MotionProgress, MotionState, Torques, free_motion, held_response,
+    integrate, integrate_modes,
 };
 
 /// A record on its way through the chain, in the domain that the last link left it in.
@@ -179,9 +181,24 @@ impl Chain {
     }
 
     fn respond(&self, input: &Excitation) -> Signal {
-        let line =
-            |(k, u): (usize, &Complex64)| u * self.gain * self.stand.response(input.omega_rad_s(k));
-        Signal::Spectrum(input.spectrum().iter().enumerate().map(line).collect())
+        let lines = input.spectrum().iter().enumerate();
+        let spectrum = match input.between() {
+            Between::Held => {
+                let held = held_response(&self.stand, 1.0 / input.rate_hz());
+                let line = |(k, u): (usize, &Complex64)| {
+                    // The spectrum is that of what acts; the samples' own goes to the sampled motion.
+                    let omega = input.omega_rad_s(k);
+                    let cycles = omega / (TAU * input.rate_hz());
+                    u / Between::Held.factor(cycles) * self.gain * held(omega)
+                };
+                lines.map(line).collect()
+            }
+            _ => {
+                let response = |k| self.stand.response(input.omega_rad_s(k));
+                lines.map(|(k, u)| u * self.gain * response(k)).collect()
+            }
+        };
+        Signal::Spectrum(spectrum)
     }
 
     /// What the links after the stand make of the motion.

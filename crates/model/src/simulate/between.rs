@@ -36,7 +36,7 @@ impl Between {
 
     /// What becomes of a line of the samples' spectrum, by its frequency in cycles a sample, `ν = f/f_s ≤ 1/2`: 1,
     /// `sinc² ν` or `e^{−jπν} sinc ν`, with `sinc ν = sin(πν)/(πν)`. The images above half the sampling rate are
-    /// left out: a stand that resonates far below passes next to nothing of them.
+    /// left out; what the stand makes of those of a held input is in its motion, by the exact response to steps.
     ///
     /// ```
     /// use torqcomp_model::simulate::Between;

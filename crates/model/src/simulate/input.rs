@@ -78,9 +78,13 @@ impl Excitation {
         for (line, value) in spectrum.iter_mut().enumerate() {
             *value *= between.factor(line as f64 / self.total as f64);
         }
+        let fine = match between {
+            Between::Held => self.staircase(substeps),
+            _ => self.refine(&spectrum, substeps),
+        };
         Self {
             samples: self.samples.clone(),
-            fine: self.refine(&spectrum, substeps),
+            fine,
             spectrum,
             forward: self.forward.clone(),
             backward: self.backward.clone(),
@@ -183,6 +187,26 @@ impl Excitation {
             .collect()
     }
 
+    /// What acts if each sample is held until the next one.
+    fn staircase(&self, substeps: usize) -> Vec<f64> {
+        let count = self.samples.len();
+        let at = |node: usize| match (node.checked_sub(1), self.lead) {
+            (None, 0) => self.samples[count - 1],
+            (None, _) => self.samples[0],
+            (Some(node), 0) => self.samples[node / substeps % count],
+            (Some(node), _) => self.samples[(node / substeps).min(count - 1)],
+        };
+        (0..self.nodes(substeps)).map(at).collect()
+    }
+
+    /// Nodes of the integration, from one step before the first sample to two after the last.
+    fn nodes(&self, substeps: usize) -> usize {
+        match self.lead {
+            0 => self.samples.len() * substeps + 3,
+            _ => (self.samples.len() - 1) * substeps + 4,
+        }
+    }
+
     /// Interpolation of what acts: its spectrum, padded with zeros.
     fn refine(&self, of: &[Complex64], substeps: usize) -> Vec<f64> {
         let long = self.total * substeps;
@@ -197,13 +221,12 @@ impl Excitation {
         let mut fine = plan.make_output_vec();
         let _ = plan.process(&mut spectrum, &mut fine);
         let scale = 1.0 / self.total as f64;
-        let steps = match self.lead {
-            0 => self.samples.len() * substeps,
-            _ => (self.samples.len() - 1) * substeps + 1,
-        };
         let first = (self.lead * substeps + long - 1) % long;
         let nodes = fine.iter().cycle().skip(first);
-        nodes.take(steps + 3).map(|x| x * scale).collect()
+        nodes
+            .take(self.nodes(substeps))
+            .map(|x| x * scale)
+            .collect()
     }
 }
 

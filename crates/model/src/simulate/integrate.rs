@@ -5,7 +5,11 @@
 //! splitting, SIAM J. Numer. Anal. 5 (1968), 506): second order in the step, stable for any size of the
 //! linear terms, and a torque that switches is switched by its own exact flow.
 
+use num_complex::Complex64;
+
+use super::between::Between;
 use crate::effects::Mode;
+use crate::modal::{ModalPart, ModalResponse};
 
 /// Displacement and speed, in units of the record.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -43,6 +47,8 @@ pub(super) struct LinearStep {
     b: f64,
     pub(super) c: f64,
     d: f64,
+    /// Whether the input stays as it is at a node until the next one.
+    is_held: bool,
     /// What inputs at the nodes −1, 0, 1, 2 add to `x` and `x'`.
     to_x: [f64; 4],
     to_speed: [f64; 4],
@@ -96,8 +102,20 @@ const GAUSS: [(f64, f64); 6] = [
 ];
 
 impl LinearStep {
-    pub(super) fn new(mode: &Mode, gain: f64, step_s: f64) -> Self {
+    pub(super) fn new(mode: &Mode, gain: f64, step_s: f64, between: Between) -> Self {
         let [a, b, c, d] = free(mode, step_s);
+        if between == Between::Held {
+            // Of a constant input, what is not yet there falls as the free motion does.
+            return Self {
+                a,
+                b,
+                c,
+                d,
+                is_held: true,
+                to_x: [0.0, gain * (1.0 - a), 0.0, 0.0],
+                to_speed: [0.0, -gain * c, 0.0, 0.0],
+            };
+        }
         let mut to_x = [0.0; 4];
         let mut to_speed = [0.0; 4];
         for (place, weight) in GAUSS {
@@ -113,6 +131,7 @@ impl LinearStep {
             b,
             c,
             d,
+            is_held: false,
             to_x,
             to_speed,
         }
@@ -126,6 +145,37 @@ impl LinearStep {
             x: self.a * state.x + (self.b * state.speed + force(&self.to_x)),
             speed: self.c * state.x + (self.d * state.speed + force(&self.to_speed)),
         }
+    }
+}
+
+impl LinearStep {
+    /// The input at a part of the step.
+    pub(super) fn input_at(&self, input: &[f64], part: f64) -> f64 {
+        match self.is_held {
+            true => input[1],
+            false => input[1] + part * (input[2] - input[1]),
+        }
+    }
+}
+
+/// Response of the sampled motion to a held input, at an angular frequency in rad/s up to half the sampling rate: the images
+/// of the steps above that are in it. With the free motion `A` over a sample and the step response `B = (1 − A) (1, 0)` of
+/// displacement and speed, that of each mode is `(z − A)⁻¹ B` at `z = e^{jωT}`.
+pub(crate) fn held_response(stand: &ModalResponse, step_s: f64) -> impl Fn(f64) -> Complex64 {
+    let parts = stand.parts().iter();
+    let parts: Vec<_> = parts
+        .map(|part| (*part, free(&part.mode, step_s)))
+        .collect();
+    let residual = stand.residual();
+    move |omega| {
+        let z = Complex64::from_polar(1.0, omega * step_s);
+        let of_part = |(part, [a, b, c, d]): &(ModalPart, [f64; 4])| {
+            let determinant = (z - a) * (z - d) - b * c;
+            let x = (z - d) * (1.0 - a) - b * c;
+            let speed = c * (1.0 - a) - (z - a) * c;
+            (part.residue * x + part.quadrature / part.mode.omega_rad_s * speed) / determinant
+        };
+        parts.iter().map(of_part).sum::<Complex64>() + residual
     }
 }
 

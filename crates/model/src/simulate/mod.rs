@@ -18,8 +18,8 @@ mod steady;
 
 pub use between::Between;
 pub use input::Excitation;
-pub(crate) use integrate::free_motion;
 pub use integrate::{MotionState, substeps};
+pub(crate) use integrate::{free_motion, held_response};
 pub(crate) use modes::integrate_modes;
 pub use pieces::{Diverges, Pieces};
 pub(crate) use run::{MotionProgress, Torques, integrate};

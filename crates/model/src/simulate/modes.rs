@@ -112,7 +112,7 @@ pub(crate) fn integrate_modes(
     let step_s = 1.0 / (input.rate_hz() * substeps as f64);
     let stepped = |(part, motion): (&ModalPart, &ModeMotion)| SteppedMode {
         part: *part,
-        step: LinearStep::new(&part.mode, gain, step_s),
+        step: LinearStep::new(&part.mode, gain, step_s, input.between()),
         free: free(&part.mode, step_s),
         at_gage: part.at_gage.unwrap_or(0.0),
         motion: *motion,

@@ -109,7 +109,7 @@ pub(crate) fn integrate(
     let mut run = Integrator {
         mode: *mode,
         gain,
-        step: LinearStep::new(mode, gain, step_s),
+        step: LinearStep::new(mode, gain, step_s, input.between()),
         step_s,
         impulse: mode.omega_rad_s * mode.omega_rad_s * step_s,
         acting: acting(torques).zip(memories).collect(),
@@ -194,7 +194,7 @@ impl Integrator<'_> {
         let before = (state.speed * self.direction).max(0.0);
         let part = before / (before + moved.speed.abs()).max(f64::MIN_POSITIVE);
         let turned = state.x + 0.5 * part * self.step_s * state.speed;
-        let input = window[1] + part * (window[2] - window[1]);
+        let input = self.step.input_at(window, part);
         let force = self.gain * input - turned - self.held(turned);
         let rest = MotionState {
             x: turned,

@@ -400,3 +400,45 @@ fn distortions_are_inverted() {
     }
     assert!(Stage::Stand < Stage::Dynamics && Stage::Gage < Stage::Chain);
 }
+
+/// Of levels that are held, the stand with three samples to a turn does exactly what the closed form of its steps says, in either
+/// way of computing.
+#[test]
+fn held_levels_give_the_closed_form() {
+    let (rate_hz, damping_ratio) = (100.0, 0.2);
+    let omega = TAU * 33.0;
+    let mode = Mode {
+        omega_rad_s: omega,
+        damping_ratio,
+    };
+    let levels: Vec<f64> = (0..600).map(|i| ((i * i) % 7) as f64 - 3.0).collect();
+    // Each change of level adds Δ (1 − e^{−σt} (cos ω_d t + σ/ω_d sin ω_d t)).
+    let (sigma, turning) = (
+        damping_ratio * omega,
+        omega * (1.0 - damping_ratio.powi(2)).sqrt(),
+    );
+    let step = |t: f64| {
+        let (sine, cosine) = (turning * t).sin_cos();
+        1.0 - (-sigma * t).exp() * (cosine + sigma / turning * sine)
+    };
+    let exact = |i: usize| -> f64 {
+        let jump = |k: usize| levels[k] - if k == 0 { 0.0 } else { levels[k - 1] };
+        (0..i)
+            .map(|k| jump(k) * step((i - k) as f64 / rate_hz))
+            .sum()
+    };
+    let input = Excitation::new(levels.clone(), rate_hz, 0.0, 4).with_between(Between::Held);
+    let chain = Chain::new(mode, 1.0);
+    let integrated = chain.simulate_from(&input, MotionState::default());
+    let responded = chain.simulate(&input, MotionState::default());
+    // The response sees what continues the record backwards, which has died out after ten turns.
+    for i in 60..560 {
+        let exact = exact(i);
+        assert!((integrated[i] - exact).abs() < 1e-11, "{i}");
+        assert!(
+            (responded[i] - exact).abs() < 1e-9,
+            "{i}: {} {exact}",
+            responded[i]
+        );
+    }
+}
