@@ -138,11 +138,7 @@ impl Reason {
             }
             Self::CriterionNotLower => "too small a gain for its extra parameters (BIC)".to_owned(),
             Self::Best => "largest significant reduction of the training error".to_owned(),
-            Self::Worse { ratio, best } if *ratio <= 1.0 => not_more_than(best),
-            Self::Worse { ratio, best } => format!(
-                "improves the fit, but its training error is {} that of {best}",
-                times(*ratio)
-            ),
+            Self::Worse { ratio, best } => worse(*ratio, best),
             Self::MoreParameters { best } => {
                 format!("no better than {best}, with more parameters")
             }
@@ -213,6 +209,17 @@ fn beside_the_list(ratio: f64, law: &str, equation: &str) -> String {
     format!(
         "improves the fit, but its training error is {} that of {law} ({equation}), a law that is not in the list of \
          effects",
+        times(ratio)
+    )
+}
+
+/// An effect that leaves more than the accepted ones.
+fn worse(ratio: f64, best: &str) -> String {
+    if ratio <= 1.0 {
+        return not_more_than(best);
+    }
+    format!(
+        "improves the fit, but its training error is {} that of {best}",
         times(ratio)
     )
 }
