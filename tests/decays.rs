@@ -176,6 +176,21 @@ fn a_stiffness_that_grows_is_found_and_simulated_in_the_stand_file() {
     assert_eq!(again["verdict"], "nothing-missing");
 }
 
+/// Over a long decay, the curved stiffness adds a turn to the ringing that no plain stand has.
+#[test]
+fn a_stiffness_that_grows_is_found_with_little_damping() {
+    let stand = Stand {
+        cubic: 0.05,
+        damping_ratio: 0.002,
+        ..PLAIN
+    };
+    let (_, report) = stand.diagnosed(&[]);
+    assert_eq!(report["verdict"], "explained");
+    assert_eq!(report["effects"], serde_json::json!(["cubic-stiffness"]));
+    let [value, std] = parameter(&report, "cubic-stiffness", "coefficient");
+    assert!((value - 0.05).abs() < 4.0 * std, "{value} ± {std}");
+}
+
 #[test]
 fn dry_friction_is_found() {
     let stand = Stand {

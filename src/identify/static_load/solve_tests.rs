@@ -57,7 +57,7 @@ fn table(series: impl Fn(usize) -> usize, position: impl Fn(usize) -> usize, kno
         Point {
             load,
             reading: 3.0 + zero + 0.2 * load + 0.01 * noise(&mut state),
-            std: known.then(|| 0.004 + 0.001 * (i % 3) as f64),
+            std: known.then_some(0.004 + 0.001 * (i % 3) as f64),
             series: series(i),
             position: position(i),
         }
