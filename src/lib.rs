@@ -23,6 +23,7 @@ mod provenance;
 pub mod quality;
 pub mod recording;
 pub mod stand;
+mod student;
 pub mod unit;
 pub mod warning;
 

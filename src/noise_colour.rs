@@ -32,7 +32,7 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-use statrs::distribution::{ContinuousCDF, StudentsT};
+use crate::student::student;
 
 /// Highest order of the autoregression, and fewest samples for each order.
 const MOST_ORDERS: usize = 40;
@@ -158,15 +158,6 @@ fn colours_of(
         middle = gathered(&colours);
     }
     (colours, middle)
-}
-
-/// Student's 97.5 % quantile over the normal one.
-pub fn student(freedom: f64) -> f64 {
-    if freedom.is_infinite() {
-        return 1.0;
-    }
-    let quantile = StudentsT::new(0.0, 1.0, freedom).map(|d| d.inverse_cdf(0.975));
-    quantile.map_or(1.0, |q| q / 1.959_963_984_540_054)
 }
 
 fn transformed(stretches: &[Vec<f64>], q: &DMatrix<f64>, size: usize) -> Vec<Transformed> {

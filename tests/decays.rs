@@ -170,6 +170,21 @@ fn a_stiffness_that_grows_is_found_and_simulated_in_the_stand_file() {
     assert_eq!(again["verdict"], "nothing-missing");
 }
 
+/// Over a long decay, the curved stiffness adds a turn to the ringing that no plain stand has.
+#[test]
+fn a_stiffness_that_grows_is_found_with_little_damping() {
+    let stand = Stand {
+        cubic: 0.05,
+        damping_ratio: 0.002,
+        ..PLAIN
+    };
+    let (_, report) = stand.diagnosed(&[]);
+    assert_eq!(report["verdict"], "explained");
+    assert_eq!(report["effects"], serde_json::json!(["cubic-stiffness"]));
+    let [value, std] = parameter(&report, "cubic-stiffness", "coefficient");
+    assert!((value - 0.05).abs() < 4.0 * std, "{value} ± {std}");
+}
+
 #[test]
 fn dry_friction_is_found() {
     let stand = Stand {
@@ -236,6 +251,64 @@ fn what_is_missing_is_said() {
     folder
         .run(&[&diagnose[..], &["--decay", "quiet.csv"]].concat())
         .says(1, &["quiet.csv", "no free decay"]);
+}
+
+#[test]
+fn arguments_that_do_not_go_together_are_refused() {
+    let folder = Folder::new();
+    folder.write("first.csv", PLAIN.hit(1.0, 1));
+    folder.write("second.csv", PLAIN.hit(0.6, 2));
+    let diagnose = ["diagnose", "--measured", "gage_V"];
+    let decays = ["--decay", "first.csv", "--holdout-decay", "second.csv"];
+    for (flag, value) in [("--applied", "force_N"), ("--applied-unit", "N")] {
+        folder
+            .run(&[&diagnose[..], &decays, &[flag, value]].concat())
+            .says(2, &[flag, "--decay", "omit", "--train"]);
+    }
+    folder
+        .run(&[&diagnose[..], &["--holdout-decay", "second.csv"]].concat())
+        .says(
+            2,
+            &["no record to fit is given", "--decay FILE", "--train FILE"],
+        );
+}
+
+#[test]
+fn noise_is_no_decay_and_a_hand_on_the_stand_is_warned_of() {
+    let folder = Folder::new();
+    let mut noise = Noise(7);
+    let rows = |value: &mut dyn FnMut(usize) -> f64| -> String {
+        let row = |i: usize| format!("{:.6},{:.7}\n", i as f64 / RATE_HZ, value(i));
+        let rows: String = (0..SAMPLES).map(row).collect();
+        format!("time_s,gage_V\n{rows}")
+    };
+    folder.write("first.csv", PLAIN.hit(1.0, 1));
+    folder.write("noise.csv", rows(&mut |_| ZERO + NOISE * noise.normal()));
+    // A hand stops the ringing after half a second.
+    let omega = TAU * PLAIN.natural_hz;
+    let stopped = |i: usize, noise: &mut Noise| {
+        let t = i as f64 / RATE_HZ;
+        let fading = PLAIN.damping_ratio * omega * t + 60.0 * (t - 0.5).max(0.0);
+        ZERO + (-fading).exp() * (omega * t).cos() + NOISE * noise.normal()
+    };
+    folder.write("stopped.csv", rows(&mut |i| stopped(i, &mut noise)));
+    let diagnose = ["diagnose", "--measured", "gage_V", "--decay", "first.csv"];
+    folder
+        .run(&[&diagnose[..], &["--decay", "noise.csv"]].concat())
+        .says(1, &["noise.csv", "no decaying sine", "--range"]);
+    folder
+        .run(&[&diagnose[..], &["--holdout-decay", "stopped.csv"]].concat())
+        .says(
+            0,
+            &[
+                "restart-in-decay",
+                "stopped.csv",
+                "a hand or a brake",
+                "--range",
+            ],
+        );
+    let quiet = folder.run(&[&diagnose[..], &["--holdout-decay", "first.csv"]].concat());
+    quiet.says(1, &["same samples"]);
 }
 
 /// The scatter of the coefficient over records is what its standard uncertainty says.

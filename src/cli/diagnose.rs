@@ -15,7 +15,7 @@ pub struct Diagnose {
     #[arg(long, value_name = "FILE")]
     pub stand: Option<PathBuf>,
     /// Record to fit; may be given several times
-    #[arg(long, value_name = "FILE", required_unless_present = "decay")]
+    #[arg(long, value_name = "FILE", required_unless_present_any = ["decay", "holdout_decay"])]
     pub train: Vec<PathBuf>,
     /// Hold-out record; may be given several times [default: the last 30 % of each training record]
     #[arg(long, value_name = "FILE", requires = "train")]
@@ -29,7 +29,7 @@ pub struct Diagnose {
     pub holdout_decay: Vec<PathBuf>,
     /// Channel with the applied quantity: its number as inspect gives it, heading or name; of an MCAP file topic and
     /// field, as '/joint_states.effort[name=motor]', or the field of --topic
-    #[arg(long, value_name = "COL", required_unless_present = "decay")]
+    #[arg(long, value_name = "COL", required_unless_present_any = ["decay", "holdout_decay"])]
     pub applied: Option<String>,
     /// Channel with the measured quantity
     #[arg(long, value_name = "COL")]

@@ -20,6 +20,7 @@ use crate::stand::{self, Stand};
 
 /// Runs the verb.
 pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
+    decays::check_arguments(args)?;
     let stand: Option<(Stand, String)> = match &args.stand {
         None => None,
         Some(path) => {

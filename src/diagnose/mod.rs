@@ -6,6 +6,7 @@
 
 mod alignment;
 mod applied_noise;
+mod backbone;
 mod blocks;
 mod coloured;
 mod columns;

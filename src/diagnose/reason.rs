@@ -142,10 +142,7 @@ impl Reason {
             }
             Self::CriterionNotLower => "too small a gain for its extra parameters (BIC)".to_owned(),
             Self::Best => "largest significant reduction of the training error".to_owned(),
-            Self::Worse { ratio, best } => format!(
-                "improves the fit, but its training error is {} that of {best}",
-                times(*ratio)
-            ),
+            Self::Worse { ratio, best } => worse(*ratio, best),
             Self::MoreParameters { best } => {
                 format!("no better than {best}, with more parameters")
             }
@@ -213,6 +210,10 @@ fn too_little([least, least_of_rest, rest]: [f64; 3]) -> String {
 
 /// An effect behind a law that is not in the list.
 fn beside_the_list(ratio: f64, law: &str, equation: &str) -> String {
+    if ratio <= 1.0 {
+        let law = format!("{law} ({equation}), a law that is not in the list of effects");
+        return not_more_than(&law);
+    }
     format!(
         "improves the fit, but its training error is {} that of {law} ({equation}), a law that is not in the list of \
          effects",
@@ -220,7 +221,23 @@ fn beside_the_list(ratio: f64, law: &str, equation: &str) -> String {
     )
 }
 
-/// A ratio of errors in words.
+/// An effect that leaves more than the accepted ones.
+fn worse(ratio: f64, best: &str) -> String {
+    if ratio <= 1.0 {
+        return not_more_than(best);
+    }
+    format!(
+        "improves the fit, but its training error is {} that of {best}",
+        times(ratio)
+    )
+}
+
+/// An effect that leaves no more than a plainer model, or one tied with a better one.
+fn not_more_than(model: &str) -> String {
+    format!("improves the fit, but not significantly more than {model}")
+}
+
+/// A ratio of errors, above 1, in words.
 fn times(ratio: f64) -> String {
     match rounded(ratio, 3).as_str() {
         "1" => "slightly more than".to_owned(),
@@ -258,6 +275,34 @@ impl From<Reason> for StatedReason {
         Self {
             status: reason.status(),
             why: reason.text(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A figure below 1 would contradict that the error is larger.
+    #[test]
+    fn an_error_is_said_to_be_larger_only_where_it_is() {
+        for ratio in [0.5, 0.872, 0.9999, 1.0, 1.0001, 1.2] {
+            let reasons = [
+                Reason::Worse {
+                    ratio,
+                    best: "backlash".to_owned(),
+                },
+                Reason::GuardModel {
+                    ratio,
+                    law: "stick",
+                    equation: "n = f",
+                },
+            ];
+            for text in reasons.map(|reason| reason.text()) {
+                let says_larger = text.contains("error is");
+                assert_eq!(says_larger, ratio > 1.0, "{ratio}: {text}");
+                assert!(!text.contains("0."), "{ratio}: {text}");
+            }
         }
     }
 }

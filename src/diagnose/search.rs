@@ -345,7 +345,8 @@ fn first_fits(
         let starts = starts[k].iter().filter(|_| chosen.contains(&k));
         let fits = starts.filter_map(|start| {
             let structure = structure.with(forms[k]);
-            fit(structure, &start.values, &training, FIRST_FIT).ok()
+            let records = start.in_records(&training);
+            fit(structure, &start.values, &records, FIRST_FIT).ok()
         });
         let fits = fits.collect();
         (workers.progress)(done.fetch_add(1, Ordering::Relaxed) + 1, forms.len());

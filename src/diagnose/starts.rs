@@ -1,10 +1,14 @@
 //! Where the fit of an effect starts: near the size that the residual suggests.
 
+use std::borrow::Cow;
+use std::f64::consts::TAU;
+
 use torqcomp_model::Chain;
 use torqcomp_model::effects::RecordScales;
 
+use super::backbone::Backbone;
 use super::fit::raw_residual;
-use super::record::StandRecord;
+use super::record::{InitialState, StandRecord};
 use super::score::BaseModel;
 use super::spectra::SpectralLine;
 use super::structure::{EffectForm, Structure};
@@ -22,12 +26,26 @@ const FACTORS: [f64; 2] = [1e-3, 4.0];
 pub struct Start {
     /// Values of all parameters.
     pub values: Vec<f64>,
+    /// State of each training record at its start, where it is not that of the base.
+    pub initial: Option<Vec<InitialState>>,
     /// Sum of squares of the residual.
     pub left: f64,
     /// Reduction of the sum of squares with the best size of what the start adds, to first order.
     reduction: f64,
     /// That size.
     factor: f64,
+}
+
+impl Start {
+    /// The training records with the states that the start has.
+    pub fn in_records<'r>(&self, training: &'r [StandRecord]) -> Cow<'r, [StandRecord]> {
+        let Some(initial) = &self.initial else {
+            return training.into();
+        };
+        let both = training.iter().zip(initial);
+        both.map(|(record, initial)| record.starting_from(*initial))
+            .collect()
+    }
 }
 
 /// The starts that leave least: each as it is and with the size that the residual suggests.
@@ -70,7 +88,37 @@ pub fn best_starts(
     }
     found.sort_by(|a, b| a.left.total_cmp(&b.left));
     found.truncate(FITTED);
+    found.extend(from_backbone(structure, plain, training));
     found
+}
+
+/// The effect whose size the backbone gives.
+const BENDS: &str = "cubic-stiffness";
+
+/// The start that the frequency of free ringing over its amplitude gives, for the first effect of a plain stand.
+fn from_backbone(structure: &Structure, plain: &[f64], training: &[StandRecord]) -> Option<Start> {
+    let [effect] = structure.effects.as_slice() else {
+        return None;
+    };
+    if effect.effect.name != BENDS || !training.iter().all(StandRecord::is_free) {
+        return None;
+    }
+    let each: Vec<Backbone> = training.iter().map(Backbone::of).collect::<Option<_>>()?;
+    let first = each.first()?;
+    let scales = &structure.context.scales;
+    let bounds = &effect.form.parameters[0];
+    let size = first.cubic / bounds.size(scales);
+    let mut values = plain.to_vec();
+    values[0] = first.omega_rad_s / TAU / scales.natural_hz;
+    values[1] = first.damping_ratio;
+    values.push(size.clamp(bounds.lower, bounds.upper));
+    Some(Start {
+        values,
+        initial: Some(each.iter().map(Backbone::initial).collect()),
+        left: f64::INFINITY,
+        reduction: 0.0,
+        factor: 0.0,
+    })
 }
 
 /// Start values of an effect's own parameters; for a line also the frequencies that stand out of the residual.
@@ -162,6 +210,7 @@ fn evaluate(
     };
     Some(Start {
         values,
+        initial: None,
         left,
         reduction,
         factor,

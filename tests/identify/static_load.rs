@@ -1,5 +1,7 @@
 //! Known loads.
 
+use std::time::Instant;
+
 use torqcomp::identify::static_load::{LoadUnits, Point, identify, series_of};
 
 use super::{Coverage, Noise, of, parameter};
@@ -208,4 +210,65 @@ fn readings_that_do_not_follow_the_load_are_refused() {
             .run(&[&args[..], &["-o", "new.toml"]].concat())
             .says(1, &["does not follow the load", "minus sign"]);
     }
+}
+
+/// Loops of a data logger at every tenth of the load, read five times each: series, mountings and a hysteresis.
+fn logged(rows: usize, noise: &mut Noise) -> Vec<Point> {
+    let point = |i: usize| {
+        let series = i / 100;
+        let step = (i % 100 / 5) as f64;
+        let part = 1.0 - (step - 10.0).abs() / 10.0;
+        let hysteresis = 0.01 * part * (1.0 - part) * (10.0 - step).signum();
+        let zero = 0.01 * (series % 7) as f64;
+        Point {
+            load: 100.0 * part,
+            reading: 0.1 + zero + 2.0 * part - hysteresis + 1e-3 * noise.normal(),
+            std: None,
+            series,
+            position: series / 2,
+        }
+    };
+    (0..rows).map(point).collect()
+}
+
+/// Ten times the rows, with ten times the series, take about ten times as long, not a hundred or a thousand times.
+#[test]
+fn time_grows_in_proportion_to_the_rows() {
+    let units = LoadUnits {
+        load: "N m".to_owned(),
+        reading: "V".to_owned(),
+    };
+    let mut noise = Noise(5);
+    let tables = [2_000, 20_000].map(|rows| logged(rows, &mut noise));
+    let seconds = |points: &[Point], times: usize| {
+        let start = Instant::now();
+        for _ in 0..times {
+            let found = identify(points, 1, &units).unwrap();
+            assert_close(of(&found, "sensitivity").value(), 0.02, 1e-3);
+        }
+        start.elapsed().as_secs_f64()
+    };
+    // The same number of rows for both, as other work on the machine then delays both alike.
+    let (small, large) = (seconds(&tables[0], 10), seconds(&tables[1], 1));
+    println!("10 times 2,000 rows {small:.3} s, 20,000 rows {large:.3} s");
+    assert!(large < 8.0 * small, "{small} s, {large} s");
+}
+
+/// Readings repeated at a load belong to the direction in which it was reached, and so does a load that scatters.
+#[test]
+fn the_hysteresis_of_repeated_readings_is_found() {
+    let units = LoadUnits {
+        load: "N m".to_owned(),
+        reading: "V".to_owned(),
+    };
+    let mut noise = Noise(6);
+    let mut points = logged(200, &mut noise);
+    for point in &mut points {
+        point.load += 0.01 * noise.normal();
+    }
+    let found = identify(&points, 1, &units).unwrap();
+    let hysteresis = found.terms.iter().find(|t| t.name == "hysteresis");
+    // At a tenth of the load: 2 · 0.01 · 0.1 · 0.9 V over 0.2 V; at the others less.
+    let percent = hysteresis.unwrap().percent.unwrap();
+    assert!((percent - 0.9).abs() < 0.4, "{percent} %");
 }

@@ -8,8 +8,10 @@ use torqcomp_dsp::onset;
 use super::read::{FEWEST, Pair};
 use crate::cli::Diagnose;
 use crate::failure::{ErrorCode, Failure};
+use crate::identify::decay::{self, Ringing};
 use crate::io::{ChannelChoice, Input};
 use crate::recording::AlignedChannels;
+use crate::warning::Warning;
 
 /// The decays in a record of the measured quantity alone, each from its largest swing on.
 pub fn decays(args: &Diagnose, file: &Path) -> Result<Vec<Pair>, Failure> {
@@ -30,7 +32,20 @@ pub fn decays(args: &Diagnose, file: &Path) -> Result<Vec<Pair>, Failure> {
         )
         .at(&read.source));
     }
+    let times_s = (0..measured.samples.len()).map(|i| read.start.after_s + i as f64 / read.rate_hz);
+    let ringing = Ringing {
+        name: &read.source,
+        times_s: &times_s.collect::<Vec<_>>(),
+        rate_hz: Some(read.rate_hz),
+        values: &measured.samples,
+    };
+    let doubts = decay::check(&ringing).map_err(|failure| failure.at(&read.source))?;
+    let named = doubts.into_iter().map(|doubt| {
+        let message = format!("{}: {}", read.source, doubt.message);
+        Warning::new(doubt.code, message)
+    });
     let mut warnings = read.warnings;
+    warnings.extend(named);
     let pairs = long.into_iter().map(|range| Pair {
         source: read.source.clone(),
         applied: None,
@@ -43,6 +58,32 @@ pub fn decays(args: &Diagnose, file: &Path) -> Result<Vec<Pair>, Failure> {
         is_lossy: read.is_lossy,
     });
     Ok(pairs.collect())
+}
+
+/// Refuses arguments that do not go with records of free ringing.
+pub fn check_arguments(args: &Diagnose) -> Result<(), Failure> {
+    if args.training_files().is_empty() {
+        return Err(Failure::usage(
+            ErrorCode::MissingArgument,
+            "--holdout-decay only checks what was fitted, and no record to fit is given: add one of free ringing with --decay \
+             FILE, or one with an applied quantity with --train FILE and --applied COL",
+        ));
+    }
+    let of_applied = [
+        ("--applied", &args.applied),
+        ("--applied-unit", &args.applied_unit),
+    ];
+    let given = of_applied.into_iter().find(|(_, value)| value.is_some());
+    match given {
+        Some((flag, _)) if args.train.is_empty() => Err(Failure::usage(
+            ErrorCode::ConflictingArguments,
+            format_args!(
+                "{flag} does not apply to --decay, as nothing acts on a stand that rings freely: omit {flag}, or give records with \
+                 an applied quantity with --train"
+            ),
+        )),
+        _ => Ok(()),
+    }
 }
 
 /// The last decay, taken out of the training records, which must have another one.

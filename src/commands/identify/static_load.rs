@@ -1,5 +1,7 @@
 //! `identify static`.
 
+use std::collections::HashMap;
+
 use torqcomp_model::{Dimension, Estimate, Kind, RatioOf, Unit};
 
 use super::{FORCE, Recorded, TORQUE, deliver, entry, quantity, unit_or};
@@ -323,16 +325,13 @@ fn reading_of(args: &Static, unit: &NamedUnit) -> Result<(f64, String), Failure>
 
 /// Numbers the different values from 0, by first appearance.
 fn ranks(values: &[f64]) -> Vec<usize> {
-    let mut seen: Vec<f64> = Vec::new();
-    values
-        .iter()
-        .map(|v| {
-            seen.iter().position(|s| s == v).unwrap_or_else(|| {
-                seen.push(*v);
-                seen.len() - 1
-            })
-        })
-        .collect()
+    let mut seen = HashMap::new();
+    let rank = |value: &f64| {
+        let next = seen.len();
+        // 0 and −0 are the same number with different bits.
+        *seen.entry((value + 0.0).to_bits()).or_insert(next)
+    };
+    values.iter().map(rank).collect()
 }
 
 /// The entries of the stand file: the calibration in the form of the readings' unit, and the zero.

@@ -12,6 +12,7 @@ mod turns;
 
 use super::{FitQuality, Identification, ModalPole, hum, rms};
 use crate::failure::Failure;
+use crate::warning::Warning;
 
 pub use laws::{Law, LawFit, envelope};
 use modes::ModesFit;
@@ -94,6 +95,22 @@ pub fn identify(
     present::draw(&mut result, &fit, &stretches);
     Ok((result, stretches))
 }
+
+/// Warns about a record that is hardly one free decay after each hit.
+///
+/// # Errors
+/// If nothing rings.
+pub fn check(record: &Ringing) -> Result<Vec<Warning>, Failure> {
+    let (found, _) = identify(std::slice::from_ref(record), &DecayOptions::default())?;
+    let mut doubts: Vec<Warning> = found.warnings;
+    doubts.retain(|doubt| doubt.code == "poor-fit");
+    doubts.extend(present::restart(&stretches::restarts_s(record), NOT_ONE));
+    Ok(doubts)
+}
+
+/// What a restart means where a decay is fitted as a whole.
+const NOT_ONE: &str = "a hand or a brake that was put on the stand would look the same, and the decay does not follow from one \
+                       state at its start; cut the record there with --range";
 
 /// The residual, over the swing about offset and drift.
 fn quality(fit: &ModesFit, stretches: &[Stretch]) -> FitQuality {

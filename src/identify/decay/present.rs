@@ -6,6 +6,7 @@ use crate::failure::{ErrorCode, Failure};
 use crate::identify::hum::{SteadyLine, listed};
 use crate::identify::{self, Identification};
 use crate::print::{plural, rounded};
+use crate::warning::Warning;
 
 /// Warns about what makes the fit doubtful.
 pub(super) fn fit_warnings(result: &mut Identification, fit: &ModesFit) {
@@ -58,10 +59,10 @@ pub(super) fn no_mode(lines: &[SteadyLine]) -> Failure {
 /// Restarts that are named.
 const NAMED: usize = 5;
 
-/// Warns about decays that start again in their midst.
-pub(super) fn restarts(result: &mut Identification, times_s: &[f64]) {
+/// The warning about decays that start again in their midst, and what follows from it.
+pub(super) fn restart(times_s: &[f64], consequence: &str) -> Option<Warning> {
     if times_s.is_empty() {
-        return;
+        return None;
     }
     let named = times_s.iter().take(NAMED).map(|t| rounded(*t, 5));
     let named: Vec<String> = named.collect();
@@ -69,14 +70,13 @@ pub(super) fn restarts(result: &mut Identification, times_s: &[f64]) {
         true => " and later",
         false => "",
     };
-    result.warn(
+    Some(Warning::new(
         "restart-in-decay",
         format!(
-            "the ringing starts again at {} s{more}: a second hit, lost samples, or the end of an overload; the parts before \
-             and after that are fitted as decays of their own; hit once and take your hand off the stand",
+            "the ringing starts again at {} s{more}: a second hit, lost samples, or the end of an overload; {consequence}",
             named.join(", ")
         ),
-    );
+    ))
 }
 
 /// Relative distance of modes that can be one mode of two stands.

@@ -242,7 +242,9 @@ impl Cuts {
     /// Says what was left out.
     fn describe(&self, result: &mut Identification) -> Result<(), Failure> {
         let (left_clipped, left_out, found) = (self.left_clipped, self.left_out, self.found);
-        present::restarts(result, &self.restarts_s);
+        result
+            .warnings
+            .extend(present::restart(&self.restarts_s, OWN_PARTS));
         if left_clipped > 0 {
             result.method.push(format!(
                 "each decay is fitted from its last clipped sample on; {left_clipped} samples before that are left out"
@@ -272,6 +274,22 @@ impl Cuts {
         }
         Ok(())
     }
+}
+
+/// What a restart means where its parts are decays of their own.
+const OWN_PARTS: &str = "the parts before and after that are fitted as decays of their own; hit once and take your hand off the \
+                         stand";
+
+/// Times at which a decay of a record starts again.
+pub(super) fn restarts_s(record: &Ringing) -> Vec<f64> {
+    let mut found = Vec::new();
+    for range in onset::decays(record.values) {
+        let rings = ringing(record.values, &range);
+        let parts = parts(record.values, &rings, record.rate_hz.is_some());
+        let later = parts.iter().filter(|part| part.start > rings.start);
+        found.extend(later.map(|part| record.times_s[part.start]));
+    }
+    found
 }
 
 /// A stretch cut where it starts again, if its samples are uniform.

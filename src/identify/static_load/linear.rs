@@ -4,6 +4,7 @@
 //! applied again with that error, whatever the characteristic is (lack of fit; N. R. Draper, H. Smith, Applied Regression
 //! Analysis, 3rd ed., 1998, 2.1).
 
+use super::steps::LoadSteps;
 use super::{NONE, Point, SAME, value_of};
 use crate::failure::{ErrorCode, Failure};
 use crate::identify::{Identification, rms};
@@ -27,12 +28,9 @@ const FEWEST: usize = 2;
 ///
 /// # Errors
 /// If it does.
-pub(super) fn refuse_two_ranges(
-    points: &[Point],
-    steps: &[f64],
-    largest: f64,
-) -> Result<(), Failure> {
-    let (empty, loaded): (Vec<&Point>, Vec<&Point>) =
+pub(super) fn refuse_two_ranges(points: &[Point], steps: &LoadSteps) -> Result<(), Failure> {
+    let largest = steps.largest;
+    let (empty, mut loaded): (Vec<&Point>, Vec<&Point>) =
         points.iter().partition(|p| p.load.abs() <= NONE * largest);
     if empty.is_empty() {
         return Ok(());
@@ -48,7 +46,9 @@ pub(super) fn refuse_two_ranges(
             .map(|p| (p.reading - zero - slope * p.load).powi(2));
         (slope, left.sum::<f64>())
     };
-    let mut sizes: Vec<f64> = steps.iter().map(|step| step.abs()).collect();
+    // So that the points below and above a load are those before and after it.
+    loaded.sort_by(|a, b| a.load.abs().total_cmp(&b.load.abs()));
+    let mut sizes: Vec<f64> = steps.loads.iter().map(|step| step.abs()).collect();
     sizes.retain(|size| *size > NONE * largest);
     sizes.sort_by(f64::total_cmp);
     sizes.dedup_by(|a, b| (*a - *b).abs() <= SAME * largest);
@@ -56,9 +56,9 @@ pub(super) fn refuse_two_ranges(
     let last = sizes.len().saturating_sub(FEWEST);
     let splits = sizes.get(FEWEST..=last).unwrap_or_default().iter();
     let with_split = |from: &f64| {
-        let is_below = |p: &&Point| p.load.abs() < from - SAME * largest;
-        let (below, above): (Vec<&Point>, Vec<&Point>) = loaded.iter().copied().partition(is_below);
-        let ((low, left), (high, more)) = (through_zero(&below), through_zero(&above));
+        let below = loaded.partition_point(|p| p.load.abs() < from - SAME * largest);
+        let (below, above) = loaded.split_at(below);
+        let ((low, left), (high, more)) = (through_zero(below), through_zero(above));
         (*from, high / low, left + more)
     };
     let best = splits.map(with_split).min_by(|a, b| a.2.total_cmp(&b.2));
@@ -84,16 +84,13 @@ pub(super) fn warn(
     result: &mut Identification,
     points: &[Point],
     curve: &[f64],
-    steps: &[f64],
-    largest: f64,
+    steps: &LoadSteps,
 ) {
-    let at = |step: f64| -> Vec<f64> {
-        let near = points
-            .iter()
-            .filter(|p| (p.load - step).abs() <= SAME * largest);
-        near.map(|p| p.reading - value_of(curve, p.load)).collect()
-    };
-    let groups: Vec<Vec<f64>> = steps.iter().map(|step| at(*step)).collect();
+    let left = |i: &usize| points[*i].reading - value_of(curve, points[*i].load);
+    let groups: Vec<Vec<f64>> = steps
+        .iter()
+        .map(|(_, rows)| rows.iter().map(left).collect())
+        .collect();
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     let means: Vec<f64> = groups.iter().map(|group| mean(group)).collect();
     let about: Vec<f64> = groups
@@ -101,18 +98,19 @@ pub(super) fn warn(
         .zip(&means)
         .flat_map(|(group, mean)| group.iter().map(move |v| v - mean))
         .collect();
-    let freedom = points.len().saturating_sub(steps.len());
-    if freedom == 0 || steps.len() < LEAST {
+    let count = steps.loads.len();
+    let freedom = points.len().saturating_sub(count);
+    if freedom == 0 || count < LEAST {
         return;
     }
     let scatter = rms(&about) * (about.len() as f64 / freedom as f64).sqrt();
-    let each = (points.len() as f64 / steps.len() as f64).sqrt();
+    let each = (points.len() as f64 / count as f64).sqrt();
     let off = rms(&means);
-    let deflection = (value_of(curve, largest) - curve[0]).abs();
+    let deflection = (value_of(curve, steps.largest) - curve[0]).abs();
     if off <= OFF.0 * scatter / each || off <= OFF.1 * deflection {
         return;
     }
-    let why = match limit(&means, curve, steps, largest) {
+    let why = match limit(&means, curve, steps) {
         Some(load) => format!(
             "the reading hardly rises beyond the load {}: amplifier or recorder is at its limit; leave out the loads beyond, and \
              choose a larger range",
@@ -133,16 +131,17 @@ pub(super) fn warn(
 }
 
 /// The load from which the reading hardly rises up to the largest one, if it does not; `means` are those of the residual.
-fn limit(means: &[f64], curve: &[f64], steps: &[f64], largest: f64) -> Option<f64> {
+fn limit(means: &[f64], curve: &[f64], steps: &LoadSteps) -> Option<f64> {
+    let loads = &steps.loads;
     let rises = |from: usize, to: usize| {
-        let rise = value_of(curve, steps[to]) - value_of(curve, steps[from]);
+        let rise = value_of(curve, loads[to]) - value_of(curve, loads[from]);
         (means[to] - means[from]) / rise + 1.0
     };
-    let count = steps.len();
+    let count = loads.len();
     let ends = [(count - 2, count - 1), (1, 0)];
     let mut loaded = ends
         .into_iter()
-        .filter(|(_, to)| steps[*to].abs() > 0.5 * largest);
+        .filter(|(_, to)| loads[*to].abs() > 0.5 * steps.largest);
     let (from, _) = loaded.find(|(from, to)| rises(*from, *to) < STANDS)?;
-    Some(steps[from])
+    Some(loads[from])
 }

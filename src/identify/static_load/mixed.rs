@@ -5,7 +5,7 @@
 //! ```
 //!
 //! x: load over the largest; c: the curve; d: even drift of the zero over the rows i; g_j: half the width of the hysteresis
-//! at load step j, plus in loading, minus in unloading; a_s: zero of series s; b_p: deviation of the sensitivity at
+//! at load step j, or in range j of the load if there are many steps, plus in loading, minus in unloading; a_s: zero of series s; b_p: deviation of the sensitivity at
 //! mounting p; w: uneven drift of the zero, a random walk over the rows; e: independent errors of the readings. d and g are
 //! estimated where they are significant; a, b and the steps of w are normal with variances that maximise the restricted
 //! likelihood. (H. D. Patterson, R. Thompson, Biometrika 58 (1971), 545; C. R. Henderson, Biometrics 31 (1975), 423.)
@@ -17,19 +17,26 @@
 //! Readings are rounded to their last digit d: however small the residual, e is taken as no smaller than d/√12, unless
 //! the readings come with uncertainties of their own (JCGM 100:2008, F.2.2.1).
 
-use nalgebra::{DMatrix, DVector};
+use std::collections::BTreeMap;
+
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use torqcomp_model::fit::FitError;
 
-use super::{Point, SAME, terms};
-use crate::noise_colour::student;
+use super::Point;
+use super::solve::{Mixed, VarianceRatios};
+use super::steps::LoadSteps;
+use crate::student::student;
 
 /// Significance level of the hysteresis.
 const CHANCE: f64 = 0.01;
+/// Ratio of variances beyond which it is taken as this, as its products would not be numbers.
+const LARGEST_RATIO: f64 = 1e100;
 /// Part of a column, in its sum of squares, that other columns may not explain.
 const APART: f64 = 0.05;
 /// Fewest degrees of freedom that the hysteresis leaves.
 const LEAST_FREEDOM: usize = 3;
+/// Most steps with a hysteresis of their own: the time of a fit grows with their square. Beyond, ranges of the load have one.
+const MOST_LOOPS: usize = 32;
 /// Variances, over that of a reading, that are tried first: powers of 10 from and to, in steps of a half.
 const TRIED: (i32, i32) = (-6, 16);
 /// Rounds over all variances, and halvings of the step after the first rounds.
@@ -69,66 +76,45 @@ pub(super) struct Spreads {
     pub sensitivity: f64,
 }
 
-/// Variances of drift, zeros and sensitivities, over that of a reading.
-type VarianceRatios = [f64; 3];
-
-/// The model's matrices.
-struct Mixed {
-    readings: Vec<f64>,
-    /// Curve, then even drift and hysteresis.
-    fixed: DMatrix<f64>,
-    /// Indicators of series; none if there is only one.
-    series: DMatrix<f64>,
-    /// Load by mounting; none if there is only one.
-    mountings: DMatrix<f64>,
-    /// Variance of each reading, known or 1.
-    variances: Vec<f64>,
-    is_known: bool,
-}
-
-/// The model solved for given variances.
-struct SolvedLoads {
-    /// −2 ln of the restricted likelihood.
-    deviance: f64,
-    values: DVector<f64>,
-    covariance: DMatrix<f64>,
-    /// Estimated variance of a reading, over the known one.
-    variance: f64,
-}
-
-/// Fits a curve of that degree; loads up to `largest`, in the given steps.
+/// Fits a curve of that degree over the load steps.
 ///
 /// # Errors
 /// [`FitError`] if there are fewer points than coefficients, or the loads do not determine them.
 pub(super) fn fit(
     points: &[Point],
     degree: usize,
-    (steps, largest): (&[f64], f64),
+    steps: &LoadSteps,
 ) -> Result<LoadCurve, FitError> {
+    let largest = steps.largest;
     let mut columns = Vec::new();
     let mut model = Mixed::of(points, degree, largest, &columns);
     // From −½ to ½, so that the zero is that of the middle row.
-    let row = |i: usize, _| (i as f64 + 0.5) / points.len() as f64 - 0.5;
-    let drift = DVector::from_fn(points.len(), row);
+    let row = |i: usize| (i as f64 + 0.5) / points.len() as f64 - 0.5;
+    let drift: Vec<f64> = (0..points.len()).map(row).collect();
     let mut has_even_drift = model.is_apart(&drift);
+    let mut ratios = None;
     if has_even_drift {
         let next = Mixed::of(points, degree, largest, std::slice::from_ref(&drift));
-        has_even_drift = next.is_better(&model, model.best_ratios());
+        let of_model = model.best_ratios();
+        has_even_drift = next.is_better(&model, of_model);
         if has_even_drift {
             (columns, model) = (vec![drift], next);
+        } else {
+            ratios = Some(of_model);
         }
     }
-    let mut loops = hysteresis(points, steps, largest);
+    let mut ratios = ratios.unwrap_or_else(|| model.best_ratios());
+    let mut loops = hysteresis(points.len(), steps);
     let mut has_hysteresis = !loops.is_empty();
     if has_hysteresis {
         columns.append(&mut loops);
         let next = Mixed::of(points, degree, largest, &columns);
-        has_hysteresis = next.is_better(&model, model.best_ratios());
+        has_hysteresis = next.is_better(&model, ratios);
         if has_hysteresis {
             model = next;
+            ratios = model.best_ratios();
         }
     }
-    let ratios = model.best_ratios();
     let mut found = model.fit(degree, ratios)?;
     if let Some(std) = over_mountings(points, degree, largest, ratios) {
         found.std[1] = Some(std);
@@ -148,17 +134,16 @@ fn over_mountings(
     largest: f64,
     ratios: VarianceRatios,
 ) -> Option<f64> {
-    let mut positions: Vec<usize> = points.iter().map(|p| p.position).collect();
-    positions.sort_unstable();
-    positions.dedup();
+    let mut mountings: BTreeMap<usize, Vec<Point>> = BTreeMap::new();
+    for point in points {
+        mountings.entry(point.position).or_default().push(*point);
+    }
     let [drift, zeros, _] = ratios;
-    let sensitivity = |position: &usize| {
-        let own = points.iter().filter(|p| p.position == *position);
-        let own: Vec<Point> = own.copied().collect();
-        let solved = Mixed::of(&own, degree, largest, &[]).solve([drift, zeros, 0.0])?;
+    let sensitivity = |own: &Vec<Point>| {
+        let solved = Mixed::of(own, degree, largest, &[]).solve([drift, zeros, 0.0])?;
         Some(solved.values[1])
     };
-    let each: Vec<f64> = positions.iter().map(sensitivity).collect::<Option<_>>()?;
+    let each: Vec<f64> = mountings.values().map(sensitivity).collect::<Option<_>>()?;
     let count = each.len() as f64;
     if each.len() < 2 {
         return None;
@@ -190,83 +175,55 @@ fn resolution(readings: &[f64]) -> Option<f64> {
     shown.into_iter().find(|digit| is_multiple(*digit))
 }
 
-/// A column for each load step that is read in both directions: 1 in loading, −1 in unloading.
-fn hysteresis(points: &[Point], steps: &[f64], largest: f64) -> Vec<DVector<f64>> {
-    let side = |step: f64, i: usize| match (points[i].load - step).abs() <= SAME * largest {
-        true if terms::rising(points, i) => 1.0,
-        true => -1.0,
-        false => 0.0,
+/// A column for each load step that is read in both directions, or for each range of the load if there are many: 1 in
+/// loading, −1 in unloading.
+fn hysteresis(count: usize, steps: &LoadSteps) -> Vec<Vec<f64>> {
+    let side = |i: &usize| if steps.is_rising[*i] { 1.0 } else { -1.0 };
+    let both = |rows: &&[usize]| {
+        let is_rising = |i: &usize| steps.is_rising[*i];
+        rows.iter().any(is_rising) && !rows.iter().all(is_rising)
     };
-    steps
-        .iter()
-        .map(|step| DVector::from_fn(points.len(), |i, _| side(*step, i)))
-        .filter(|column| column.min() < 0.0 && column.max() > 0.0)
-        .collect()
+    let at_steps: Vec<&[usize]> = steps.iter().map(|s| s.1).filter(both).collect();
+    let ranges = ranges_of_load(steps);
+    let classes = match at_steps.len() > MOST_LOOPS {
+        true => ranges.iter().map(Vec::as_slice).filter(both).collect(),
+        false => at_steps,
+    };
+    let column = |rows: &&[usize]| {
+        let mut column = vec![0.0; count];
+        rows.iter().for_each(|i| column[*i] = side(i));
+        column
+    };
+    classes.iter().map(column).collect()
 }
 
-/// Indicators of the different numbers, each times a factor of its row; none if there is only one number.
-fn indicators(numbers: &[usize], factor: impl Fn(usize) -> f64) -> DMatrix<f64> {
-    let mut different = numbers.to_vec();
-    different.sort_unstable();
-    different.dedup();
-    let count = if different.len() > 1 {
-        different.len()
-    } else {
-        0
+/// Rows in each of [`MOST_LOOPS`] equal ranges of the load.
+fn ranges_of_load(steps: &LoadSteps) -> Vec<Vec<usize>> {
+    let mut ranges = vec![Vec::new(); MOST_LOOPS];
+    let (Some(first), Some(last)) = (steps.loads.first(), steps.loads.last()) else {
+        return ranges;
     };
-    DMatrix::from_fn(numbers.len(), count, |i, j| {
-        if numbers[i] == different[j] {
-            factor(i)
-        } else {
-            0.0
-        }
-    })
+    for (load, rows) in steps.iter() {
+        let part = (load - first) / (last - first);
+        let range = (part * MOST_LOOPS as f64) as usize;
+        ranges[range.min(MOST_LOOPS - 1)].extend(rows);
+    }
+    ranges
 }
 
 impl Mixed {
-    fn of(points: &[Point], degree: usize, largest: f64, more: &[DVector<f64>]) -> Self {
-        let load = |i: usize| points[i].load / largest;
-        let curve = DMatrix::from_fn(points.len(), degree + 1, |i, k| load(i).powi(k as i32));
-        let mut columns: Vec<DVector<f64>> = curve.column_iter().map(|c| c.clone_owned()).collect();
-        columns.extend_from_slice(more);
-        let series: Vec<usize> = points.iter().map(|p| p.series).collect();
-        let positions: Vec<usize> = points.iter().map(|p| p.position).collect();
-        let is_known = points.iter().all(|p| p.std.is_some());
-        Self {
-            readings: points.iter().map(|p| p.reading).collect(),
-            fixed: DMatrix::from_columns(&columns),
-            series: indicators(&series, |_| 1.0),
-            mountings: indicators(&positions, load),
-            variances: match is_known {
-                true => points
-                    .iter()
-                    .map(|p| p.std.map_or(1.0, |s| s * s))
-                    .collect(),
-                false => vec![1.0; points.len()],
-            },
-            is_known,
-        }
-    }
-
-    fn freedom(&self) -> usize {
-        self.readings.len().saturating_sub(self.fixed.ncols())
-    }
-
     /// Whether a column differs enough from those of the model for its coefficient to be identifiable.
-    fn is_apart(&self, column: &DVector<f64>) -> bool {
-        let readings = column.as_slice().to_vec();
-        let variances = vec![1.0; readings.len()];
-        let fixed = self.fixed.clone();
-        let none = DMatrix::zeros(readings.len(), 0);
+    fn is_apart(&self, column: &[f64]) -> bool {
         let of_column = Self {
-            readings,
-            fixed,
-            series: none.clone(),
-            mountings: none,
-            variances,
+            readings: column.to_vec(),
+            fixed: self.fixed.clone(),
+            loads: self.loads.clone(),
+            series: self.series.clone(),
+            mountings: self.mountings.clone(),
+            variances: vec![1.0; column.len()],
             is_known: false,
         };
-        let mean = column.mean();
+        let mean = column.iter().sum::<f64>() / column.len() as f64;
         let all: f64 = column.iter().map(|v| (v - mean).powi(2)).sum();
         of_column
             .weighted([0.0; 3])
@@ -281,11 +238,11 @@ impl Mixed {
         let (Some(own), Some(others)) = (self.weighted(ratios), other.weighted(ratios)) else {
             return false;
         };
-        let more = (self.fixed.ncols() - other.fixed.ncols()) as f64;
+        let more = (self.fixed.len() - other.fixed.len()) as f64;
         let freedom = self.freedom() as f64;
         let ratio = (others - own) / more / (own / freedom);
-        let limit = FisherSnedecor::new(more, freedom).map(|d| d.inverse_cdf(1.0 - CHANCE));
-        limit.is_ok_and(|limit| ratio > limit)
+        let law = FisherSnedecor::new(more, freedom);
+        ratio > 0.0 && law.is_ok_and(|law| law.sf(ratio.min(LARGEST_RATIO)) < CHANCE)
     }
 
     /// Weighted sum of squares for given variances.
@@ -336,14 +293,14 @@ impl Mixed {
 
     /// Degrees of freedom of a coefficient's variance (Welch and Satterthwaite).
     fn freedom_of(&self, ratios: VarianceRatios, k: usize, variance: f64) -> f64 {
-        let groups = self.series.ncols() + self.mountings.ncols();
+        let groups = self.series.count() + self.mountings.count();
         let inner = self
             .readings
             .len()
-            .saturating_sub(self.fixed.ncols() + groups);
+            .saturating_sub(self.fixed.len() + groups);
         let mut rest = variance;
         let mut sum = 0.0;
-        for (place, columns) in [(1, self.series.ncols()), (2, self.mountings.ncols())] {
+        for (place, columns) in [(1, self.series.count()), (2, self.mountings.count())] {
             let mut without = ratios;
             without[place] = 0.0;
             let share = self
@@ -379,7 +336,7 @@ impl Mixed {
             .chain((TRIED.0..=TRIED.1).map(|k| unit * 10_f64.powf(0.5 * f64::from(k))))
             .collect();
         let mut least = plain.deviance;
-        let is_open = [true, self.series.ncols() > 0, self.mountings.ncols() > 0];
+        let is_open = [true, self.series.count() > 0, self.mountings.count() > 0];
         let mut attempt = |best: &mut VarianceRatios, place: usize, ratio: f64| {
             let mut next = *best;
             next[place] = ratio;
@@ -390,9 +347,14 @@ impl Mixed {
                 *best = next;
             }
         };
+        // Where nothing has changed since a variance was last searched, nothing better is found.
+        let mut searched = [None; 3];
         for _ in 0..ROUNDS.0 {
             for place in (0..3).filter(|p| is_open[*p]) {
-                coarse.iter().for_each(|r| attempt(&mut best, place, *r));
+                if searched[place] != Some(best) {
+                    coarse.iter().for_each(|r| attempt(&mut best, place, *r));
+                    searched[place] = Some(best);
+                }
             }
         }
         let mut factor = 10_f64.powf(0.25);
@@ -405,82 +367,5 @@ impl Mixed {
             factor = factor.sqrt();
         }
         best
-    }
-
-    /// Henderson's equations for given variances; `None` if they are singular.
-    fn solve(&self, [drift, zeros, sensitivities]: VarianceRatios) -> Option<SolvedLoads> {
-        let (count, fixed) = (self.readings.len(), self.fixed.ncols());
-        let mut all = DMatrix::zeros(count, fixed + self.series.ncols() + self.mountings.ncols());
-        all.columns_mut(0, fixed).copy_from(&self.fixed);
-        let series = all.ncols() - self.mountings.ncols();
-        all.columns_mut(fixed, self.series.ncols())
-            .copy_from(&(&self.series * zeros.sqrt()));
-        all.columns_mut(series, self.mountings.ncols())
-            .copy_from(&(&self.mountings * sensitivities.sqrt()));
-        let mut readings = DVector::from_column_slice(&self.readings);
-        let logarithm = self.whiten(drift, &mut all, &mut readings);
-        let mut equations = all.tr_mul(&all);
-        for i in fixed..all.ncols() {
-            equations[(i, i)] += 1.0;
-        }
-        let factor = equations.cholesky()?;
-        let mut solution = factor.solve(&all.tr_mul(&readings));
-        // What is left is summed, as a difference of sums would be that of rounding beside a large zero; so is its share in the
-        // solution, solved for once more.
-        let mut rest = &readings - &all * &solution;
-        let mut correction = all.tr_mul(&rest);
-        for i in fixed..all.ncols() {
-            correction[i] -= solution[i];
-        }
-        solution += factor.solve(&correction);
-        rest = readings - &all * &solution;
-        let random = solution.rows(fixed, all.ncols() - fixed);
-        let left = rest.norm_squared() + random.norm_squared();
-        let freedom = self.freedom();
-        let determinant = 2.0
-            * factor
-                .l_dirty()
-                .diagonal()
-                .iter()
-                .map(|d| d.ln())
-                .sum::<f64>();
-        let of_left = match self.is_known {
-            true => left,
-            false => freedom as f64 * left.max(f64::MIN_POSITIVE).ln(),
-        };
-        Some(SolvedLoads {
-            deviance: logarithm + determinant + of_left,
-            values: solution.rows(0, fixed).into(),
-            covariance: factor.inverse().view((0, 0), (fixed, fixed)).into(),
-            variance: left / freedom.max(1) as f64,
-        })
-    }
-
-    /// Makes the rows independent with variance 1, where the zero drifts as a random walk from the first row on
-    /// (Kalman's filter); ln of the determinant of their covariance.
-    fn whiten(&self, drift: f64, all: &mut DMatrix<f64>, readings: &mut DVector<f64>) -> f64 {
-        let mut variance = 0.0;
-        let mut levels = vec![0.0; all.ncols() + 1];
-        let mut logarithm = 0.0;
-        for (i, own) in self.variances.iter().enumerate() {
-            if i > 0 {
-                variance += drift;
-            }
-            let total = variance + own;
-            let gain = variance / total;
-            logarithm += total.ln();
-            let step = |value: &mut f64, level: &mut f64| {
-                let innovation = *value - *level;
-                *level += gain * innovation;
-                *value = innovation / total.sqrt();
-            };
-            let (last, others) = levels.split_last_mut().expect("there is one more");
-            for (value, level) in all.row_mut(i).iter_mut().zip(others) {
-                step(value, level);
-            }
-            step(&mut readings[i], last);
-            variance *= own / total;
-        }
-        logarithm
     }
 }

@@ -1,7 +1,11 @@
 //! Sensitivity and zero from known loads (Appendix C, IV), with the terms of the standards.
 
+mod filter;
+mod groups;
 mod linear;
 mod mixed;
+mod solve;
+mod steps;
 mod terms;
 
 use schemars::JsonSchema;
@@ -10,9 +14,10 @@ use serde::Serialize;
 use super::{FitQuality, Identification, NamedEstimate, rms};
 use crate::chart::{Chart, Series};
 use crate::failure::{ErrorCode, Failure};
-use crate::noise_colour::student;
 use crate::print::{self, plural, rounded};
+use crate::student::student;
 use mixed::LoadCurve;
+use steps::LoadSteps;
 
 /// One reading under a known load.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -98,10 +103,10 @@ pub fn identify(
     degree: usize,
     units: &LoadUnits,
 ) -> Result<Identification, Failure> {
-    let largest = points.iter().fold(0.0_f64, |m, p| m.max(p.load.abs()));
-    let steps = steps(points, largest);
-    let is_one_weight = degree == 1 && steps.len() == 2 && points.len() >= ONE_WEIGHT;
-    if steps.len() < degree + 2 && !is_one_weight {
+    let steps = LoadSteps::of(points);
+    let (largest, count) = (steps.largest, steps.loads.len());
+    let is_one_weight = degree == 1 && count == 2 && points.len() >= ONE_WEIGHT;
+    if count < degree + 2 && !is_one_weight {
         let or = match degree {
             1 => format!(", or one load on and off ({ONE_WEIGHT} rows or more)"),
             _ => String::new(),
@@ -111,7 +116,7 @@ pub fn identify(
             format_args!(
                 "{} in {} are too few for a curve of degree {degree} and its error; apply at least {}, the empty stand \
              included{or}",
-                plural(steps.len(), "different load"),
+                plural(count, "different load"),
                 plural(points.len(), "row"),
                 degree + 2
             ),
@@ -123,8 +128,9 @@ pub fn identify(
             "the reading does not change with load; check --reading and the bridge supply",
         ));
     }
-    linear::refuse_two_ranges(points, &steps, largest)?;
-    let mut fit = mixed::fit(points, degree, (&steps, largest))?;
+    groups::refuse_mixed(points)?;
+    linear::refuse_two_ranges(points, &steps)?;
+    let mut fit = mixed::fit(points, degree, &steps)?;
     walking_zero(&mut fit, points, largest);
     follows(points, &fit, largest)?;
     let unscale = |(k, v): (usize, &f64)| v / largest.powi(k as i32);
@@ -133,14 +139,14 @@ pub fn identify(
     result.parameters = constants(&fit, largest, units);
     let quality = quality(&curve, points, units);
     poor(&mut result, quality.relative);
-    linear::warn(&mut result, points, &curve, &steps, largest);
+    linear::warn(&mut result, points, &curve, &steps);
     contradicted(&mut result, &fit);
     result.fit = Some(quality);
     method(&mut result, &fit, points, &units.reading);
-    result.terms = terms::terms(points, &steps, &curve, largest);
-    result.steps = calibration_points(points, &steps, &fit, largest);
+    result.terms = terms::terms(points, &steps, &curve);
+    result.steps = calibration_points(points, &steps, &fit);
     draw(&mut result, points, &curve, units);
-    warnings(&mut result, points, (degree, largest));
+    warnings(&mut result, points, (degree, &steps));
     if is_one_weight {
         result.warn(
             "one-weight",
@@ -238,10 +244,10 @@ fn correlation(pairs: &[(f64, f64)]) -> f64 {
 /// Mean reading at each load, and the standard uncertainty of the load that the readings' scatter gives it.
 fn calibration_points(
     points: &[Point],
-    steps: &[f64],
+    steps: &LoadSteps,
     fit: &LoadCurve,
-    largest: f64,
 ) -> Vec<CalibrationStep> {
+    let largest = steps.largest;
     let count = fit.degrees_of_freedom.max(1) as f64;
     let square = |p: &Point| {
         let powers = (0i32..).zip(&fit.values);
@@ -250,14 +256,11 @@ fn calibration_points(
     };
     let scatter = (points.iter().map(square).sum::<f64>() / count).sqrt();
     let slope = (fit.values[1] / largest).abs();
-    let step = |load: &f64| {
-        let at = points
-            .iter()
-            .filter(|p| (p.load - load).abs() <= SAME * largest);
-        let readings: Vec<f64> = at.map(|p| p.reading).collect();
+    let step = |(load, rows): (f64, &[usize])| {
+        let readings: Vec<f64> = rows.iter().map(|i| points[*i].reading).collect();
         let number = readings.len() as f64;
         CalibrationStep {
-            load: *load,
+            load,
             reading: readings.iter().sum::<f64>() / number,
             load_std: scatter / (slope * number.sqrt()),
         }
@@ -374,14 +377,6 @@ fn draw(result: &mut Identification, points: &[Point], curve: &[f64], units: &Lo
     ]);
 }
 
-/// The different loads, none included, rising.
-fn steps(points: &[Point], largest: f64) -> Vec<f64> {
-    let mut loads: Vec<f64> = points.iter().map(|p| p.load).collect();
-    loads.sort_by(f64::total_cmp);
-    loads.dedup_by(|a, b| (*a - *b).abs() <= SAME * largest);
-    loads
-}
-
 /// Residual of a calibration, over the swing of the readings, above which the fit is poor.
 const POOR: f64 = 0.05;
 
@@ -399,9 +394,9 @@ fn poor(result: &mut Identification, relative: f64) {
 }
 
 /// Warns about terms that the record cannot show, and the validity of the constants.
-fn warnings(result: &mut Identification, points: &[Point], (degree, largest): (usize, f64)) {
+fn warnings(result: &mut Identification, points: &[Point], (degree, steps): (usize, &LoadSteps)) {
     if points.iter().all(|p| p.series == 0) {
-        let has_empty = points.iter().any(|p| p.load.abs() <= NONE * largest);
+        let has_empty = points.iter().any(|p| p.load.abs() <= NONE * steps.largest);
         result.warn(
             "one-series",
             match has_empty {
@@ -413,7 +408,7 @@ fn warnings(result: &mut Identification, points: &[Point], (degree, largest): (u
             },
         );
     }
-    if (0..points.len()).all(|i| terms::rising(points, i)) {
+    if steps.is_rising.iter().all(|is_rising| *is_rising) {
         result.warn(
             "no-unloading",
             "there are no readings during unloading: hysteresis is unknown",

@@ -15,38 +15,37 @@
 //! The largest value of each over loads or series, in per cent. ISO 376:2011 fits X_a to loading alone; here
 //! it is the curve through loading and unloading, as in case II of DIN 51309:2005.
 
-use super::{NONE, Point, SAME, Term};
+use std::collections::{HashMap, HashSet};
 
-/// Whether the load (in size) was raised to a point, not lowered.
-pub(super) fn rising(points: &[Point], i: usize) -> bool {
-    let before = (0..i).rev().find(|j| points[*j].series == points[i].series);
-    before.is_none_or(|j| points[i].load.abs() >= points[j].load.abs())
-}
+use super::steps::LoadSteps;
+use super::{NONE, Point, SAME, Term};
 
 /// Deflections of a set of points.
 struct Deflections<'a> {
     points: &'a [Point],
+    steps: &'a LoadSteps,
     /// Reading of the empty stand before each series, or the zero of the curve.
     zeros: Vec<f64>,
-    largest: f64,
 }
 
+/// Rows at a load.
+type Rows<'a> = &'a [usize];
+
 impl Deflections<'_> {
-    /// Series and deflection of each point at a load, during loading (`up`) or unloading, in the wanted series.
-    fn at(&self, step: f64, up: bool, wanted: &dyn Fn(usize) -> bool) -> Vec<(usize, f64)> {
-        (0..self.points.len())
-            .filter(|i| (self.points[*i].load - step).abs() <= SAME * self.largest)
-            .filter(|i| rising(self.points, *i) == up && wanted(self.points[*i].series))
+    /// Series and deflection of each of these rows, those of loading (`up`) or unloading, in the wanted series.
+    fn at(&self, rows: Rows, up: bool, wanted: &dyn Fn(usize) -> bool) -> Vec<(usize, f64)> {
+        rows.iter()
+            .filter(|i| self.steps.is_rising[**i] == up && wanted(self.points[**i].series))
             .map(|i| {
-                let point = &self.points[i];
+                let point = &self.points[*i];
                 (point.series, point.reading - self.zeros[point.series])
             })
             .collect()
     }
 
     /// The same with one value for each series: the mean if the load was applied repeatedly.
-    fn by_series(&self, step: f64, up: bool, wanted: &dyn Fn(usize) -> bool) -> Vec<(usize, f64)> {
-        let all = self.at(step, up, wanted);
+    fn by_series(&self, rows: Rows, up: bool, wanted: &dyn Fn(usize) -> bool) -> Vec<(usize, f64)> {
+        let all = self.at(rows, up, wanted);
         let of = |part: &[(usize, f64)]| {
             let values: Vec<f64> = part.iter().map(|p| p.1).collect();
             (part[0].0, mean(&values))
@@ -54,19 +53,22 @@ impl Deflections<'_> {
         all.chunk_by(|a, b| a.0 == b.0).map(of).collect()
     }
 
-    fn values(&self, step: f64, wanted: &dyn Fn(usize) -> bool) -> Vec<f64> {
-        let each = self.by_series(step, true, wanted);
+    fn values(&self, rows: Rows, wanted: &dyn Fn(usize) -> bool) -> Vec<f64> {
+        let each = self.by_series(rows, true, wanted);
         each.into_iter().map(|(_, value)| value).collect()
     }
 
     /// Mean over the series of |unloading − loading| over loading.
-    fn reversibility(&self, step: f64) -> Option<f64> {
-        let up = self.by_series(step, true, &|_| true);
-        let down = self.by_series(step, false, &|_| true);
+    fn reversibility(&self, rows: Rows) -> Option<f64> {
+        let up = self.by_series(rows, true, &|_| true);
+        let mut down = HashMap::new();
+        for (series, back) in self.by_series(rows, false, &|_| true) {
+            down.entry(series).or_insert(back);
+        }
         let pairs: Vec<f64> = up
             .iter()
             .filter_map(|(series, x)| {
-                let back = down.iter().find(|(other, _)| other == series)?.1;
+                let back = down.get(series)?;
                 Some(100.0 * (back - x).abs() / x.abs())
             })
             .collect();
@@ -75,31 +77,34 @@ impl Deflections<'_> {
 }
 
 /// Largest values over all loads, in per cent; `curve` are coefficients over powers of the load.
-pub(super) fn terms(points: &[Point], steps: &[f64], curve: &[f64], largest: f64) -> Vec<Term> {
+pub(super) fn terms(points: &[Point], steps: &LoadSteps, curve: &[f64]) -> Vec<Term> {
+    let largest = steps.largest;
     let around = zeros(points, largest);
     let deflections = Deflections {
         points,
+        steps,
         zeros: around.iter().map(|z| z.0.unwrap_or(curve[0])).collect(),
-        largest,
     };
-    let position = |series: usize| {
-        let of = points.iter().find(|p| p.series == series);
-        of.map_or(0, |p| p.position)
-    };
-    let first = position(points[0].series);
+    let mut positions = vec![0; around.len()];
+    for point in points.iter().rev() {
+        positions[point.series] = point.position;
+    }
+    let first = positions[points[0].series];
     // The first series of each mounting.
-    let opens = |series: usize| (0..series).all(|s| position(s) != position(series));
-    let loaded = || steps.iter().filter(|s| s.abs() > NONE * largest);
+    let mut seen = HashSet::new();
+    let opens: Vec<bool> = positions.iter().map(|p| seen.insert(*p)).collect();
+    let opens = |series: usize| opens[series];
+    let loaded = || steps.iter().filter(|s| s.0.abs() > NONE * largest);
     let value = |load: f64| -> f64 {
         let powers = curve.iter().enumerate().skip(1);
         powers.map(|(k, c)| c * load.powi(k as i32)).sum()
     };
     let spread_of = |wanted: &dyn Fn(usize) -> bool| {
-        worst(loaded().map(|s| spread(&deflections.values(*s, wanted))))
+        worst(loaded().map(|s| spread(&deflections.values(s.1, wanted))))
     };
-    let interpolation = worst(loaded().map(|s| {
-        let up = deflections.values(*s, &opens);
-        (!up.is_empty()).then(|| 100.0 * (mean(&up) - value(*s)).abs() / value(*s).abs())
+    let interpolation = worst(loaded().map(|(load, rows)| {
+        let up = deflections.values(rows, &opens);
+        (!up.is_empty()).then(|| 100.0 * (mean(&up) - value(load)).abs() / value(load).abs())
     }));
     let full = value(largest).abs();
     let zero_return = worst(around.iter().map(|(before, after)| match (before, after) {
@@ -107,9 +112,9 @@ pub(super) fn terms(points: &[Point], steps: &[f64], curve: &[f64], largest: f64
         _ => None,
     }));
     let percents = [
-        spread_of(&|s| position(s) == first),
+        spread_of(&|s| positions[s] == first),
         spread_of(&opens),
-        worst(loaded().map(|s| deflections.reversibility(*s))),
+        worst(loaded().map(|s| deflections.reversibility(s.1))),
         interpolation,
         zero_return,
         creep(points, largest, full),
@@ -157,17 +162,19 @@ const NAMES: [(&str, &str); 6] = [
 /// Readings of the empty stand before and after each series.
 fn zeros(points: &[Point], largest: f64) -> Vec<(Option<f64>, Option<f64>)> {
     let count = points.iter().map(|p| p.series).max().map_or(0, |m| m + 1);
-    (0..count)
-        .map(|series| {
-            let of: Vec<&Point> = points.iter().filter(|p| p.series == series).collect();
-            let empty = |p: &&&Point| p.load.abs() <= NONE * largest;
-            let before = of.first().filter(empty).map(|p| p.reading);
-            let after = (of.len() > 1)
-                .then(|| of.last().filter(empty).map(|p| p.reading))
-                .flatten();
-            (before, after)
-        })
-        .collect()
+    let mut of: Vec<Vec<&Point>> = vec![Vec::new(); count];
+    for point in points {
+        of[point.series].push(point);
+    }
+    let empty = |p: &&&Point| p.load.abs() <= NONE * largest;
+    let around = |of: Vec<&Point>| {
+        let before = of.first().filter(empty).map(|p| p.reading);
+        let after = (of.len() > 1)
+            .then(|| of.last().filter(empty).map(|p| p.reading))
+            .flatten();
+        (before, after)
+    };
+    of.into_iter().map(around).collect()
 }
 
 /// Difference between the first and the last of consecutive readings at the largest load.

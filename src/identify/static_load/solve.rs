@@ -1,0 +1,188 @@
+//! The mixed model solved for given variances, in a time that grows in proportion to the rows.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::Point;
+use super::filter::LevelFilter;
+use super::groups::Groups;
+
+/// Variances of drift, zeros and sensitivities, over that of a reading.
+pub(super) type VarianceRatios = [f64; 3];
+
+/// The model: readings, what is estimated of them, and which errors they have in common.
+pub(super) struct Mixed {
+    pub readings: Vec<f64>,
+    /// Columns whose coefficients are estimated: the curve, then even drift and hysteresis.
+    pub fixed: Vec<Vec<f64>>,
+    /// Load over the largest.
+    pub loads: Vec<f64>,
+    pub series: Groups,
+    pub mountings: Groups,
+    /// Variance of each reading, known or 1.
+    pub variances: Vec<f64>,
+    pub is_known: bool,
+}
+
+/// The model solved for given variances.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct SolvedLoads {
+    /// −2 ln of the restricted likelihood.
+    pub deviance: f64,
+    pub values: DVector<f64>,
+    pub covariance: DMatrix<f64>,
+    /// Estimated variance of a reading, over the known one.
+    pub variance: f64,
+}
+
+/// A level of the filter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Level {
+    Drift,
+    Zero(usize),
+    Sensitivity(usize),
+}
+
+impl Mixed {
+    /// The model of these points with more columns beside the curve.
+    pub fn of(points: &[Point], degree: usize, largest: f64, more: &[Vec<f64>]) -> Self {
+        let loads: Vec<f64> = points.iter().map(|p| p.load / largest).collect();
+        let power = |k: usize| loads.iter().map(|load| load.powi(k as i32)).collect();
+        let mut fixed: Vec<Vec<f64>> = (0..=degree).map(power).collect();
+        fixed.extend_from_slice(more);
+        let is_known = points.iter().all(|p| p.std.is_some());
+        let variance = |p: &Point| p.std.filter(|_| is_known).map_or(1.0, |s| s * s);
+        Self {
+            readings: points.iter().map(|p| p.reading).collect(),
+            fixed,
+            series: Groups::of(points.iter().map(|p| p.series)),
+            mountings: Groups::of(points.iter().map(|p| p.position)),
+            variances: points.iter().map(variance).collect(),
+            loads,
+            is_known,
+        }
+    }
+
+    /// Rows less estimated coefficients.
+    pub fn freedom(&self) -> usize {
+        self.readings.len().saturating_sub(self.fixed.len())
+    }
+
+    /// Generalised least squares for given variances; `None` if the columns do not determine their coefficients.
+    pub fn solve(&self, ratios: VarianceRatios) -> Option<SolvedLoads> {
+        let fixed = self.fixed.len();
+        if self.readings.len() < fixed {
+            return None;
+        }
+        let (rows, logarithm) = self.whitened(ratios);
+        let rows = || rows.chunks_exact(fixed + 1);
+        let mut equations = vec![0.0; fixed * fixed];
+        let mut products = DVector::zeros(fixed);
+        for row in rows() {
+            // Half of the symmetric matrix is all that its Cholesky factor needs.
+            for (j, column) in equations.chunks_exact_mut(fixed).enumerate() {
+                add(&mut column[j..], row[j], &row[j..fixed]);
+            }
+            add(products.as_mut_slice(), row[fixed], &row[..fixed]);
+        }
+        let factor = DMatrix::from_vec(fixed, fixed, equations).cholesky()?;
+        let mut values = factor.solve(&products);
+        let rest = |values: &DVector<f64>, row: &[f64]| {
+            let pairs = row.iter().zip(values.iter());
+            row[fixed] - pairs.map(|(x, c)| x * c).sum::<f64>()
+        };
+        // What is left is summed, as a difference of sums would be that of rounding beside a large zero; so is its share in
+        // the solution, solved for once more.
+        let mut correction = DVector::zeros(fixed);
+        for row in rows() {
+            add(correction.as_mut_slice(), rest(&values, row), &row[..fixed]);
+        }
+        values += factor.solve(&correction);
+        let left: f64 = rows().map(|row| rest(&values, row).powi(2)).sum();
+        let diagonal = factor.l_dirty().diagonal();
+        let determinant = 2.0 * diagonal.iter().map(|d| d.ln()).sum::<f64>();
+        let freedom = self.freedom();
+        let of_left = match self.is_known {
+            true => left,
+            false => freedom as f64 * left.max(f64::MIN_POSITIVE).ln(),
+        };
+        Some(SolvedLoads {
+            deviance: logarithm + determinant + of_left,
+            values,
+            covariance: factor.inverse(),
+            variance: left / freedom.max(1) as f64,
+        })
+    }
+
+    /// Rows of the columns and the reading, made independent with variance 1, one after the other; ln of the determinant of
+    /// their covariance.
+    fn whitened(&self, ratios: VarianceRatios) -> (Vec<f64>, f64) {
+        let [drift, zeros, sensitivities] = ratios.map(f64::sqrt);
+        let width = self.fixed.len() + 1;
+        let mut filter = LevelFilter::new(width);
+        let mut open = Vec::new();
+        if drift > 0.0 {
+            filter.open(0.0);
+            open.push(Level::Drift);
+        }
+        let mut all = Vec::with_capacity(self.readings.len() * width);
+        let mut logarithm = 0.0;
+        let mut factors = Vec::new();
+        for (i, own) in self.variances.iter().enumerate() {
+            if i > 0 && drift > 0.0 {
+                filter.step(drift);
+            }
+            let (series, mounting) = (self.series.of_row[i], self.mountings.of_row[i]);
+            let begins = |groups: &Groups, group: usize| {
+                groups.ranges.get(group).is_some_and(|range| range[0] == i)
+            };
+            if zeros > 0.0 && begins(&self.series, series) {
+                filter.open(zeros);
+                open.push(Level::Zero(series));
+            }
+            if sensitivities > 0.0 && begins(&self.mountings, mounting) {
+                filter.open(sensitivities);
+                open.push(Level::Sensitivity(mounting));
+            }
+            factors.clear();
+            factors.extend(open.iter().map(|level| match level {
+                Level::Drift => 1.0,
+                Level::Zero(of) => f64::from(u8::from(*of == series)),
+                Level::Sensitivity(of) if *of == mounting => self.loads[i],
+                Level::Sensitivity(_) => 0.0,
+            }));
+            let start = all.len();
+            all.extend(self.fixed.iter().map(|column| column[i]));
+            all.push(self.readings[i]);
+            let total = filter.whiten(&factors, own.sqrt(), &mut all[start..]);
+            logarithm += 2.0 * total.ln();
+            // From the last on, so that the places of those before stay.
+            for place in (0..open.len()).rev() {
+                if self.ends(open[place], i) {
+                    filter.close(place);
+                    open.remove(place);
+                }
+            }
+        }
+        (all, logarithm)
+    }
+
+    /// Whether no row after this one sees the level.
+    fn ends(&self, level: Level, row: usize) -> bool {
+        match level {
+            Level::Drift => false,
+            Level::Zero(series) => self.series.ranges[series][1] == row,
+            Level::Sensitivity(mounting) => self.mountings.ranges[mounting][1] == row,
+        }
+    }
+}
+
+/// Adds a multiple of numbers to sums.
+fn add(sums: &mut [f64], factor: f64, values: &[f64]) {
+    for (sum, value) in sums.iter_mut().zip(values) {
+        *sum += factor * value;
+    }
+}
+
+#[cfg(test)]
+#[path = "solve_tests.rs"]
+mod tests;
