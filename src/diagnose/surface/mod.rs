@@ -127,10 +127,12 @@ impl Surface {
         compare(&train.concat(), &self.unseen).significance() >= LEAST_SIGNIFICANCE
     }
 
-    /// Whether it explains so much more than a model that no law of that is to be named.
+    /// Whether it explains so much more than a model that no law of that is to be named: not where a law leaves little but noise.
     pub fn outdoes(&self, model: &ScoredModel, noise_rms: f64) -> bool {
         let excess = |rms: f64| rms.powi(2) - noise_rms.powi(2);
-        self.improves_on(model) && excess(self.unseen_rms()) <= LEFT * excess(model.train_rms())
+        let left = excess(model.train_rms());
+        let is_much = left >= noise_rms.powi(2);
+        is_much && self.improves_on(model) && excess(self.unseen_rms()) <= LEFT * left
     }
 
     /// What it leaves of the records on which a model is compared, by the motion that was measured there.

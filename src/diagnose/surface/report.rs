@@ -25,6 +25,7 @@ pub struct ForceSurface {
     pub train_rms: f64,
     /// Rms that it leaves of the hold-out records, by the motion that was measured there.
     pub holdout_rms: f64,
+    /// What each part of it explains.
     pub shares: SurfaceShares,
     /// Torque over displacement, both in the unit of `error`, without its straight line.
     pub over_displacement: Vec<SurfacePoint>,
@@ -39,7 +40,9 @@ pub struct ForceSurface {
 /// What the parts explain that nothing else of the surface can, over what all explain.
 #[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
 pub struct SurfaceShares {
+    /// Displacement.
     pub displacement: f64,
+    /// Speed.
     pub speed: f64,
     /// Products of displacement and speed.
     pub both: f64,
@@ -50,7 +53,9 @@ pub struct SurfaceShares {
 /// A point of a curve.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct SurfacePoint {
+    /// Displacement, or its rate of change.
     pub at: f64,
+    /// Torque there.
     pub torque: f64,
     /// Standard uncertainty of the torque.
     pub std: f64,
