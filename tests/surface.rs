@@ -126,7 +126,11 @@ fn a_wavy_spring_is_drawn_and_gets_no_name() {
     );
     let share = |part: &str| number(&surface["shares"][part]);
     let others = ["speed", "both", "history"].map(share);
-    assert!(others.iter().all(|other| 5.0 * other < share("displacement")));
+    assert!(
+        others
+            .iter()
+            .all(|other| 5.0 * other < share("displacement"))
+    );
     let points = curve(&report, "over_displacement");
     let apart = apart(&points, 0.6, 0.002, |x| wavy(x, 0.0));
     assert!(apart < 4.0, "{apart} {points:?}");

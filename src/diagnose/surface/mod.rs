@@ -182,7 +182,7 @@ impl<'a> Background<'a> {
         motion: &Motion,
         grid: &Grid,
     ) -> (Vec<Vec<f64>>, Vec<f64>) {
-        let nuisance = record.nuisance(&self.model.fitted.free, &self.terms, None);
+        let nuisance = record.nuisance(&self.linear.free_mode(), &self.terms, None);
         let cleared = |whole: &[f64]| {
             let mut part = whole[record.range.clone()].to_vec();
             nuisance.clear(&mut part);
