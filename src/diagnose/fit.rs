@@ -7,7 +7,8 @@ use torqcomp_model::Mode;
 use torqcomp_model::fit::{self, Differences, Fit, FitError, Options, Parameter};
 
 use super::own_of_records::{OwnOfRecords, within};
-use super::record::{InitialState, Nuisance, NuisanceFit, NuisanceTerms, StandRecord, StateSlopes};
+use super::record::{InitialState, Nuisance, NuisanceFit, NuisanceTerms, StandRecord};
+use super::record_model::RecordModel;
 use super::structure::{PlainStand, Structure};
 use torqcomp_dsp::dot;
 
@@ -71,17 +72,13 @@ impl FitEffort {
 
 /// Relative reduction of the sum of squares at which a fit has converged.
 const TOLERANCE: f64 = 1e-6;
-/// Step of the initial state for differences, over the rms of the record.
-const STATE_STEP: f64 = 1e-4;
 /// Correction of the motion at a record's start, over the rms of the residual, that makes a second fit worthwhile.
 const START_MATTERS: f64 = 0.05;
-/// Parts of a step to a better initial state that are tried.
-const STEPS: [f64; 3] = [1.0, 0.3, 0.1];
 /// Such steps, or fits after them, at most.
-const MOST_STARTS: usize = 8;
+pub(super) const MOST_STARTS: usize = 8;
 /// Relative reduction of the sum of squares by one that makes the next one worthwhile: a start that was fitted without the
 /// effect is corrected in part only, as long as the effect's size is wrong for it.
-const START_SETTLED: f64 = 0.01;
+pub(super) const START_SETTLED: f64 = 0.01;
 
 /// Fits a model from start values.
 ///
@@ -220,121 +217,8 @@ pub fn raw_residual(model: &Chain, record: &StandRecord) -> Result<Vec<f64>, Fit
     Ok(residual)
 }
 
-/// A model that is run on records, each with its own initial state.
-struct RecordModel {
-    chain: Chain,
-    terms: NuisanceTerms,
-    /// The mode of the free motion from a record's start.
-    free: Mode,
-    /// Rms of the training records.
-    rms: f64,
-}
-
-impl RecordModel {
-    fn of(structure: &Structure, values: &[f64], free: Mode) -> Self {
-        let (chain, terms) = structure.model(values);
-        Self {
-            chain,
-            terms,
-            free,
-            rms: structure.context.scales.rms,
-        }
-    }
-
-    /// How a record changes with its own initial state, by differences; `residual` is its raw residual.
-    fn slopes(&mut self, record: &StandRecord, residual: &[f64]) -> Option<StateSlopes> {
-        let step = STATE_STEP * self.rms;
-        let slope = |chain: &Chain, record: &StandRecord| {
-            let moved = raw_residual(chain, record).ok()?;
-            let pairs = residual.iter().zip(&moved);
-            Some(pairs.map(|(a, b)| (a - b) / step).collect::<Vec<_>>())
-        };
-        let along = |motion: [f64; 2]| {
-            let mut moved = record.clone();
-            moved.initial.correct(motion, &self.free);
-            slope(&self.chain, &moved)
-        };
-        let motion = match record.has_free_motion(&self.free) {
-            true => Some([along([step, 0.0])?, along([0.0, step])?]),
-            false => None,
-        };
-        let preload = match self.chain.has_zero() {
-            true => {
-                self.chain.shift += step;
-                let loaded = slope(&self.chain, record);
-                self.chain.shift -= step;
-                Some(loaded?)
-            }
-            false => None,
-        };
-        Some(StateSlopes { motion, preload })
-    }
-
-    /// The residual of a record with the initial state that it has; `None` if the motion diverges.
-    fn residual(&mut self, record: StandRecord) -> Option<RecordResidual> {
-        self.chain.shift = record.initial.preload;
-        let mut samples = raw_residual(&self.chain, &record).ok()?;
-        let slopes = match self.chain.is_integrated() {
-            true => Some(self.slopes(&record, &samples)?),
-            false => None,
-        };
-        let raw = samples.clone();
-        let nuisance = record.nuisance(&self.free, &self.terms, slopes);
-        let nuisance = nuisance.fit(&mut samples);
-        // Of a stand that rings freely, all motion follows from its state.
-        let left = if record.is_free() { &samples } else { &raw };
-        let pairs = record.measured_in_range().iter().zip(left);
-        let modelled = pairs.map(|(y, r)| y - r).collect();
-        Some(RecordResidual {
-            record,
-            samples,
-            modelled,
-            nuisance,
-        })
-    }
-
-    /// The residual of a record with the initial state that leaves least of it. A motion that is integrated depends on it in a
-    /// curved way: the search begins with the state that the record has and at rest, and goes on by Gauss's and Newton's steps
-    /// as long as they help. `None` if the motion diverges.
-    fn settled(&mut self, record: &StandRecord) -> Option<RecordResidual> {
-        if !self.chain.is_integrated() {
-            return self.residual(record.clone());
-        }
-        let starts = [record.initial, InitialState::default()];
-        let found = starts
-            .into_iter()
-            .filter_map(|initial| self.residual(record.starting_from(initial)))
-            .min_by(|a, b| a.sum_of_squares().total_cmp(&b.sum_of_squares()));
-        let mut found = found?;
-        for _ in 0..MOST_STARTS {
-            let sum = found.sum_of_squares();
-            let better = STEPS.into_iter().find_map(|part| {
-                let next = self.residual(self.stepped(&found, part))?;
-                (next.sum_of_squares() < sum).then_some(next)
-            });
-            let Some(next) = better else { break };
-            found = next;
-            if found.sum_of_squares() > (1.0 - START_SETTLED) * sum {
-                break;
-            }
-        }
-        Some(found)
-    }
-
-    /// A record with part of the correction of its initial state that its residual shows.
-    fn stepped(&self, found: &RecordResidual, part: f64) -> StandRecord {
-        let mut record = found.record.clone();
-        let motion = found.nuisance.motion.unwrap_or_default();
-        record.initial.correct(motion.map(|x| part * x), &self.free);
-        let limit = OwnOfRecords::LARGEST_PRELOAD * self.rms;
-        let preload = record.initial.preload + part * found.nuisance.preload.unwrap_or(0.0);
-        record.initial.preload = preload.clamp(-limit, limit);
-        record
-    }
-}
-
 impl RecordResidual {
-    fn sum_of_squares(&self) -> f64 {
+    pub(super) fn sum_of_squares(&self) -> f64 {
         dot(&self.samples, &self.samples)
     }
 }
@@ -428,7 +312,7 @@ fn line_amplitudes(
 
 impl InitialState {
     /// Adds a displacement, and a speed over the free motion's `ω₀`, to the motion at the first sample.
-    fn correct(&mut self, [x, speed]: [f64; 2], free: &Mode) {
+    pub(super) fn correct(&mut self, [x, speed]: [f64; 2], free: &Mode) {
         self.motion.x += x;
         self.motion.speed += speed * free.omega_rad_s;
     }

@@ -29,6 +29,7 @@ mod plain;
 mod plot_series;
 mod reason;
 mod record;
+mod record_model;
 mod records;
 mod refuse;
 mod residual_tests;

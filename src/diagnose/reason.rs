@@ -156,10 +156,7 @@ impl Reason {
                 law,
                 equation,
             } => beside_the_list(*ratio, law, equation),
-            Self::Surface { ratio } => format!(
-                "improves the fit, but its training error is {} that of a torque of no given law over displacement and speed",
-                times(*ratio)
-            ),
+            Self::Surface { ratio } => worse(*ratio, OF_NO_LAW),
             Self::SmallSecond {
                 least,
                 least_of_rest,
@@ -184,6 +181,9 @@ impl Reason {
 /// An effect that explains what only the model has.
 const TAKES_OUT_NOISE: &str =
     "explains little but the noise of the applied quantity, of which it lets less through";
+
+/// What a surface over the motion is.
+const OF_NO_LAW: &str = "a torque of no given law over displacement and speed";
 
 /// An effect that explains so many percent of the residual power only.
 fn small_share(percent: f64) -> String {
@@ -210,31 +210,19 @@ fn too_little([least, least_of_rest, rest]: [f64; 3]) -> String {
 
 /// An effect behind a law that is not in the list.
 fn beside_the_list(ratio: f64, law: &str, equation: &str) -> String {
-    if ratio <= 1.0 {
-        let law = format!("{law} ({equation}), a law that is not in the list of effects");
-        return not_more_than(&law);
-    }
-    format!(
-        "improves the fit, but its training error is {} that of {law} ({equation}), a law that is not in the list of \
-         effects",
-        times(ratio)
-    )
+    let law = format!("{law} ({equation}), a law that is not in the list of effects");
+    worse(ratio, &law)
 }
 
 /// An effect that leaves more than the accepted ones.
 fn worse(ratio: f64, best: &str) -> String {
     if ratio <= 1.0 {
-        return not_more_than(best);
+        return format!("improves the fit, but not significantly more than {best}");
     }
     format!(
         "improves the fit, but its training error is {} that of {best}",
         times(ratio)
     )
-}
-
-/// An effect that leaves no more than a plainer model, or one tied with a better one.
-fn not_more_than(model: &str) -> String {
-    format!("improves the fit, but not significantly more than {model}")
 }
 
 /// A ratio of errors, above 1, in words.

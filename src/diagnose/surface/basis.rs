@@ -1,6 +1,6 @@
 //! The functions of displacement, speed and history that a surface is made of.
 
-use super::motion::Motion;
+use super::motion::MeasuredMotion;
 
 /// Knots over displacement and over speed.
 pub const KNOTS: [usize; 2] = [33, 17];
@@ -26,20 +26,20 @@ pub struct Knots {
 
 /// Which part of a surface a function belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Part {
+pub enum SurfacePart {
     Displacement,
     Speed,
     Both,
     History,
 }
 
-impl Part {
+impl SurfacePart {
     pub const ALL: [Self; 4] = [Self::Displacement, Self::Speed, Self::Both, Self::History];
 }
 
 impl Grid {
-    pub fn of(motions: &[Motion]) -> Self {
-        let limits = |of: fn(&Motion) -> &[f64]| {
+    pub fn of(motions: &[MeasuredMotion]) -> Self {
+        let limits = |of: fn(&MeasuredMotion) -> &[f64]| {
             let all = motions.iter().flat_map(|m| of(m).iter());
             all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| {
                 [low.min(*x), high.max(*x)]
@@ -66,18 +66,18 @@ impl Grid {
         self.largest[0]
     }
 
-    /// Part of the surface of each function, in the order of [`Grid::functions`].
-    pub fn parts() -> Vec<Part> {
+    /// SurfacePart of the surface of each function, in the order of [`Grid::functions`].
+    pub fn parts() -> Vec<SurfacePart> {
         let [displacements, speeds] = KNOTS;
-        let mut parts = vec![Part::Displacement; displacements];
-        parts.extend(vec![Part::Speed; speeds]);
-        parts.extend([Part::Both; PRODUCTS.len()]);
-        parts.extend([Part::History; SLIPS.len() + 1]);
+        let mut parts = vec![SurfacePart::Displacement; displacements];
+        parts.extend(vec![SurfacePart::Speed; speeds]);
+        parts.extend([SurfacePart::Both; PRODUCTS.len()]);
+        parts.extend([SurfacePart::History; SLIPS.len() + 1]);
         parts
     }
 
     /// Values of all functions along a motion, in units of displacement; `step` is the natural angular frequency over the rate.
-    pub fn functions(&self, motion: &Motion, step: f64) -> Vec<Vec<f64>> {
+    pub fn functions(&self, motion: &MeasuredMotion, step: f64) -> Vec<Vec<f64>> {
         let [largest, fastest] = self.largest;
         let mut all = hats(&self.x.at, &motion.x, largest);
         all.extend(hats(&self.speed.at, &motion.speed, largest));

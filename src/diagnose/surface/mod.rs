@@ -28,8 +28,8 @@ use super::record::{NuisanceTerms, StandRecord};
 use super::score::ScoredModel;
 use super::structure::FitContext;
 use crate::parallel::parallel;
-use basis::{Grid, Part};
-use motion::{Motion, of_torque, through};
+use basis::{Grid, SurfacePart};
+use motion::{MeasuredMotion, of_torque, through};
 use regression::{Regression, Solution};
 
 pub use ask::AskedSurface;
@@ -68,7 +68,7 @@ pub struct Surface {
     /// What it leaves of each training sample, by coefficients that were found without it.
     unseen: Vec<f64>,
     /// What each part explains alone, over what all explain.
-    shares: [f64; Part::ALL.len()],
+    shares: [f64; SurfacePart::ALL.len()],
 }
 
 /// A model without the laws that a surface stands in for.
@@ -92,7 +92,7 @@ impl Surface {
         let background = Background::of(model, place);
         let records = || model.train.iter().map(|residual| &residual.record);
         let motions = records().map(|record| background.motion(record));
-        let motions: Vec<Motion> = motions.collect::<Option<_>>()?;
+        let motions: Vec<MeasuredMotion> = motions.collect::<Option<_>>()?;
         let grid = Grid::of(&motions);
         let both = records().zip(&motions);
         let columns = both.map(|(record, motion)| background.columns(record, motion, &grid));
@@ -101,8 +101,8 @@ impl Surface {
         let parts = Grid::parts();
         let plain = regression.left_with(&solution, |k| k < PLAIN)?;
         let whole = regression.left_with(&solution, |_| true)?;
-        let mut shares = [0.0; Part::ALL.len()];
-        for (share, part) in shares.iter_mut().zip(Part::ALL) {
+        let mut shares = [0.0; SurfacePart::ALL.len()];
+        for (share, part) in shares.iter_mut().zip(SurfacePart::ALL) {
             let without =
                 regression.left_with(&solution, |k| k < PLAIN || parts[k - PLAIN] != part)?;
             *share = ((without - whole) / (plain - whole).max(1e-300)).clamp(0.0, 1.0);
@@ -170,16 +170,16 @@ impl<'a> Background<'a> {
 
     /// The motion along a record. What does not pass the stand has the noise of the record itself in it: there it is that of the
     /// model.
-    fn motion(&self, record: &StandRecord) -> Option<Motion> {
+    fn motion(&self, record: &StandRecord) -> Option<MeasuredMotion> {
         let is_corrected = self.place == SurfacePlace::Stand;
-        Motion::along(self.model, record, is_corrected)
+        MeasuredMotion::along(self.model, record, is_corrected)
     }
 
     /// The columns of a record, and the record, both without what belongs to it.
     fn columns(
         &self,
         record: &StandRecord,
-        motion: &Motion,
+        motion: &MeasuredMotion,
         grid: &Grid,
     ) -> (Vec<Vec<f64>>, Vec<f64>) {
         let nuisance = record.nuisance(&self.linear.free_mode(), &self.terms, None);

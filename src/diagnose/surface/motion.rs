@@ -12,13 +12,13 @@ use torqcomp_model::effects::Stage;
 const CORRECTED: f64 = 5.0;
 
 /// Displacement and speed at each sample of a record.
-pub struct Motion {
+pub struct MeasuredMotion {
     pub x: Vec<f64>,
     /// Over the natural angular frequency, so that it has the size of the displacement.
     pub speed: Vec<f64>,
 }
 
-impl Motion {
+impl MeasuredMotion {
     /// The motion along a record with the initial state that the model has there, corrected by what it leaves of the record, or
     /// not; `None` if it diverges.
     pub fn along(model: &ScoredModel, record: &StandRecord, is_corrected: bool) -> Option<Self> {

@@ -4,13 +4,13 @@ use nalgebra::DVector;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::basis::{KNOTS, Knots, Part};
+use super::basis::{KNOTS, Knots, SurfacePart};
 use super::shape::{Resemblance, of_displacement, of_speed};
 use super::{PLAIN, Surface, SurfacePlace, rms};
 use crate::diagnose::describe::shows_torque;
 use crate::diagnose::score::ScoredModel;
 
-/// Part of what the surface explains that a part of it must explain alone to be spoken of.
+/// SurfacePart of what the surface explains that a part of it must explain alone to be spoken of.
 const SPOKEN_OF: f64 = 0.1;
 
 /// The torque that the laws leave unexplained as a surface over displacement and speed, with a memory.
@@ -97,14 +97,14 @@ impl Surface {
         let over_speed = curve(PLAIN + KNOTS[0], &self.grid.speed, omega);
         let [displacement, speed, both, history] = self.shares;
         let mut resemblances = Vec::new();
-        for (part, share) in Part::ALL.into_iter().zip(self.shares) {
+        for (part, share) in SurfacePart::ALL.into_iter().zip(self.shares) {
             let most = self.shares.iter().copied().fold(0.0, f64::max);
             if share >= SPOKEN_OF.min(most) {
                 resemblances.push(match part {
-                    Part::Displacement => of_displacement(&over_displacement, self.place),
-                    Part::Speed => of_speed(&over_speed),
-                    Part::Both => Resemblance::damping_over_displacement(),
-                    Part::History => Resemblance::loop_of_history(),
+                    SurfacePart::Displacement => of_displacement(&over_displacement, self.place),
+                    SurfacePart::Speed => of_speed(&over_speed),
+                    SurfacePart::Both => Resemblance::damping_over_displacement(),
+                    SurfacePart::History => Resemblance::loop_of_history(),
                 });
             }
         }

@@ -3,7 +3,7 @@
 use super::SurfacePlace;
 use super::report::SurfacePoint;
 
-/// Part of a curve's weighted power that a shape must explain to be named.
+/// SurfacePart of a curve's weighted power that a shape must explain to be named.
 const ALIKE: f64 = 0.75;
 /// Uncertainty of a point, over the largest torque of its curve, that is always allowed for.
 const BLUR: f64 = 0.05;
@@ -96,7 +96,7 @@ impl<'a> Curve<'a> {
     }
 
     /// The shape that explains most, if any explains enough: its index, amount and corner.
-    fn best(&self, shapes: &[Shape]) -> Option<(usize, f64, f64)> {
+    fn best(&self, shapes: &[CornerShape]) -> Option<(usize, f64, f64)> {
         let mut best = (0, 0.0, 0.0, ALIKE);
         for (k, (shape, corners)) in shapes.iter().enumerate() {
             for corner in corners.iter() {
@@ -111,7 +111,7 @@ impl<'a> Curve<'a> {
 }
 
 /// A curve with a corner, and the corners that are tried.
-type Shape<'a> = (&'a dyn Fn(f64, f64) -> f64, &'a [f64]);
+type CornerShape<'a> = (&'a dyn Fn(f64, f64) -> f64, &'a [f64]);
 
 /// What a torque over the displacement looks like.
 pub fn of_displacement(points: &[SurfacePoint], place: SurfacePlace) -> Resemblance {
