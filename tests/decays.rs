@@ -66,7 +66,7 @@ impl Stand {
             for step in 0..STEPS {
                 let t = (i * STEPS + step) as f64 * h;
                 let before = state;
-                state = motion::step(state, t, h, &slope);
+                state = motion::step(state, t, h, slope);
                 let most = h * self.friction * omega * omega;
                 state[1] -= state[1].clamp(-most, most);
                 if before[1] == 0.0 && state[1] == 0.0 {

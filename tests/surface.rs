@@ -43,7 +43,7 @@ fn record(law: Law, level: f64, noise: &mut Noise) -> (String, f64) {
         if i % STEPS == 0 {
             motion.push(state[0]);
         }
-        state = step(state, i as f64 * h, h, &slope);
+        state = step(state, i as f64 * h, h, slope);
     }
     let rms = (motion.iter().map(|x| x * x).sum::<f64>() / SAMPLES as f64).sqrt();
     let mut text = String::from("time_s,applied_n_m,measured_n_m\n");

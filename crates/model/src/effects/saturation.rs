@@ -32,7 +32,19 @@ pub(super) static EFFECT: Effect = Effect {
             law: "y = clamp(x, -L, L)",
             stage: Stage::Limit,
             parameters: &[LIMIT],
-            starts: &[&[0.99], &[0.7]],
+            // The limit is below the peak of the record by what noise adds to it; from farther below, a step past the peak
+            // sees no slope.
+            starts: &[
+                &[0.9998],
+                &[0.9995],
+                &[0.999],
+                &[0.998],
+                &[0.996],
+                &[0.99],
+                &[0.98],
+                &[0.96],
+                &[0.7],
+            ],
             build: |p| clipping(-p[0], p[0]),
         },
         Form {
@@ -43,7 +55,12 @@ pub(super) static EFFECT: Effect = Effect {
                 LIMIT,
                 EffectParameter::motion("lower_limit", 1, 0, -4.0, -0.05).by(ParameterScale::Peak),
             ],
-            starts: &[&[0.99, -0.99], &[0.7, -0.99], &[0.99, -0.7]],
+            starts: &[
+                &[0.998, -0.998],
+                &[0.99, -0.99],
+                &[0.7, -0.99],
+                &[0.99, -0.7],
+            ],
             build: |p| clipping(p[1], p[0]),
         },
         Form {
