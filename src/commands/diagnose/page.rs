@@ -372,10 +372,7 @@ impl Draft<'_> {
         self.page
             .heading("The torque that is missing, of no given law");
         let shares = &surface.shares;
-        let mut rows = vec![cells([
-            "it follows from",
-            "share that nothing else explains",
-        ])];
+        let mut rows = vec![cells(["it follows from", "share"])];
         rows.extend(
             [
                 ("the displacement", shares.displacement),

@@ -67,7 +67,7 @@ pub struct Surface {
     solution: Solution,
     /// What it leaves of each training sample, by coefficients that were found without it.
     unseen: Vec<f64>,
-    /// What each part explains alone, over what all explain.
+    /// What is missed without each part, over the sum of all four.
     shares: [f64; SurfacePart::ALL.len()],
 }
 
@@ -99,20 +99,19 @@ impl Surface {
         let regression = Regression::of(columns.collect(), PLAIN, model.train_rms().powi(2));
         let (solution, unseen) = regression.solve()?;
         let parts = Grid::parts();
-        let plain = regression.left_with(&solution, |k| k < PLAIN)?;
         let whole = regression.left_with(&solution, |_| true)?;
         let mut shares = [0.0; SurfacePart::ALL.len()];
         for (share, part) in shares.iter_mut().zip(SurfacePart::ALL) {
-            let without =
-                regression.left_with(&solution, |k| k < PLAIN || parts[k - PLAIN] != part)?;
-            *share = ((without - whole) / (plain - whole).max(1e-300)).clamp(0.0, 1.0);
+            let others = |k: usize| k < PLAIN || parts[k - PLAIN] != part;
+            *share = (regression.left_with(&solution, others)? - whole).max(0.0);
         }
+        let sum = shares.iter().sum::<f64>().max(f64::MIN_POSITIVE);
         Some(Self {
             place,
             grid,
             solution,
             unseen,
-            shares,
+            shares: shares.map(|share| share / sum),
         })
     }
 

@@ -37,7 +37,7 @@ pub struct ForceSurface {
     pub nearest: Vec<&'static str>,
 }
 
-/// What the parts explain that nothing else of the surface can, over what all explain.
+/// By how much the squared error grows without each part of the surface, over the sum of all four.
 #[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
 pub struct SurfaceShares {
     /// Displacement.
