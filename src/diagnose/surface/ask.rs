@@ -1,6 +1,6 @@
 //! Where a surface that knows no law is asked: something is left, and no law may be the cause of it.
 
-use super::{Surface, is_law};
+use super::{Surface, is_law, rms, seen};
 use crate::diagnose::reason::Reason;
 use crate::diagnose::record::StandRecord;
 use crate::diagnose::score::ScoredModel;
@@ -45,7 +45,7 @@ impl SearchState {
 
     /// Goes back to a model without the laws of the motion that were found.
     fn withdraw_laws(&mut self, surface: &Surface) {
-        let ratio = self.after.train_rms() / surface.unseen_rms();
+        let ratio = rms(&seen(&self.after.train)) / surface.unseen_rms();
         let fitted = &self.after.fitted;
         let is_withdrawn = |effect: &EffectForm| is_law(effect.form.stage);
         let added = fitted.structure.added();

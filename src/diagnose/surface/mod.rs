@@ -21,9 +21,10 @@ use serde::Serialize;
 use torqcomp_dsp::dot;
 use torqcomp_model::Chain;
 use torqcomp_model::effects::Stage;
-use torqcomp_model::simulate::MotionState;
+use torqcomp_model::simulate::{Excitation, MotionState};
 
 use super::blocks::compare;
+use super::fit::RecordResidual;
 use super::record::{NuisanceTerms, StandRecord};
 use super::score::ScoredModel;
 use super::structure::FitContext;
@@ -90,11 +91,12 @@ impl Surface {
 
     fn at(place: SurfacePlace, model: &ScoredModel) -> Option<Self> {
         let background = Background::of(model, place);
-        let records = || model.train.iter().map(|residual| &residual.record);
-        let motions = records().map(|record| background.motion(record));
+        let records = model.train.iter().map(|residual| cut(&residual.record));
+        let records: Vec<StandRecord> = records.collect();
+        let motions = records.iter().map(|record| background.motion(record));
         let motions: Vec<MeasuredMotion> = motions.collect::<Option<_>>()?;
         let grid = Grid::of(&motions);
-        let both = records().zip(&motions);
+        let both = records.iter().zip(&motions);
         let columns = both.map(|(record, motion)| background.columns(record, motion, &grid));
         let regression = Regression::of(columns.collect(), PLAIN, model.train_rms().powi(2));
         let (solution, unseen) = regression.solve()?;
@@ -122,14 +124,13 @@ impl Surface {
 
     /// Whether it leaves significantly less of the training records than a model does, in samples that it was not fitted to.
     pub fn improves_on(&self, model: &ScoredModel) -> bool {
-        let train: Vec<&[f64]> = model.train.iter().map(|r| r.samples.as_slice()).collect();
-        compare(&train.concat(), &self.unseen).significance() >= LEAST_SIGNIFICANCE
+        compare(&seen(&model.train), &self.unseen).significance() >= LEAST_SIGNIFICANCE
     }
 
     /// Whether it explains so much more than a model that no law of that is to be named: not where a law leaves little but noise.
     pub fn outdoes(&self, model: &ScoredModel, noise_rms: f64) -> bool {
         let excess = |rms: f64| rms.powi(2) - noise_rms.powi(2);
-        let left = excess(model.train_rms());
+        let left = excess(rms(&seen(&model.train)));
         let is_much = left >= noise_rms.powi(2);
         is_much && self.improves_on(model) && excess(self.unseen_rms()) <= LEFT * left
     }
@@ -138,12 +139,39 @@ impl Surface {
     pub fn left_of_compared(&self, model: &ScoredModel) -> Option<Vec<f64>> {
         let background = Background::of(model, self.place);
         let left = model.compared.iter().map(|residual| {
-            let motion = background.motion(&residual.record)?;
-            let (columns, mut left) = background.columns(&residual.record, &motion, &self.grid);
+            let record = cut(&residual.record);
+            let motion = background.motion(&record)?;
+            let (columns, mut left) = background.columns(&record, &motion, &self.grid);
             self.solution.subtract(&columns, 0..left.len(), &mut left);
             Some(left)
         });
         Some(left.collect::<Option<Vec<_>>>()?.concat())
+    }
+}
+
+/// Samples of a record that a surface is fitted to: more would take memory, and say little more.
+const MOST_SAMPLES: usize = 1 << 17;
+
+/// What a surface sees of the residuals of a model.
+pub fn seen(residuals: &[RecordResidual]) -> Vec<f64> {
+    let first = |r: &RecordResidual| r.samples[..r.samples.len().min(MOST_SAMPLES)].to_vec();
+    residuals.iter().flat_map(first).collect()
+}
+
+/// The beginning of a record that a surface sees.
+fn cut(record: &StandRecord) -> StandRecord {
+    let end = record.range.end.min(record.range.start + MOST_SAMPLES);
+    if end == record.range.end {
+        return record.clone();
+    }
+    let input = &record.input;
+    let samples = input.samples()[..end].to_vec();
+    let short = Excitation::new(samples, input.rate_hz(), input.start_s(), input.substeps());
+    StandRecord {
+        input: Arc::new(short.with_between(input.between())),
+        measured: Arc::new(record.measured[..end].to_vec()),
+        range: record.range.start..end,
+        ..record.clone()
     }
 }
 

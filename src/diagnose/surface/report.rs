@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::basis::{KNOTS, Knots, SurfacePart};
 use super::shape::{Resemblance, of_displacement, of_speed};
-use super::{PLAIN, Surface, SurfacePlace, rms};
+use super::{PLAIN, Surface, SurfacePlace, rms, seen};
 use crate::diagnose::describe::shows_torque;
 use crate::diagnose::score::ScoredModel;
 
@@ -74,7 +74,7 @@ impl Surface {
     /// The surface on the records on which a model is compared; `None` if these do not bear it out.
     pub fn report(&self, model: &ScoredModel, outdoes_laws: bool) -> Option<ForceSurface> {
         let left = rms(&self.left_of_compared(model)?);
-        if left >= model.compared_rms() {
+        if left >= rms(&seen(&model.compared)) {
             return None;
         }
         let unit = model.fitted.structure.context.units.per_printed;
