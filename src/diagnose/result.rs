@@ -59,8 +59,8 @@ pub struct Diagnosis {
     /// A law that is not offered as an effect and leaves less than each of the effects; named, not added. `null` if there
     /// is none.
     pub suspected: Option<GuardModel>,
-    /// For `partly-explained` and `unexplained`: the torque that follows from the motion beside what laws explain, whatever its
-    /// law. `null` where there is none, or it does not follow from the motion.
+    /// For `partly-explained` and `unexplained`: the torque that follows from the motion, whatever its law, that of accepted laws
+    /// included. `null` where there is none, or it does not follow from the motion.
     pub force_surface: Option<ForceSurface>,
     /// What the last model leaves of the hold-out records.
     pub residual: ResidualReport,

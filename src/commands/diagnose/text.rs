@@ -119,7 +119,7 @@ fn of_surface(surface: &ForceSurface, unit: &str) -> Vec<String> {
     };
     vec![
         format!(
-            "What is missing follows from the motion: {place} over displacement and speed, of no given law, leaves {} {} of the \
+            "Without an assumed law: {place} over displacement and speed, accepted effects included, leaves {} {} of the \
              held-out records, by the motion that was measured there.{named}",
             rounded(surface.holdout_rms, 4),
             unit_or_as_recorded(unit)

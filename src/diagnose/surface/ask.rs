@@ -67,6 +67,20 @@ impl SearchState {
         self.without.clear();
     }
 
+    /// Takes the laws back that a surface outdid where the held-out records do not bear it out.
+    pub fn restore_laws(&mut self) {
+        let is_refuted = self.surface.as_ref().is_some_and(|asked| {
+            let model = asked.model.clone().compared_on_holdout(&self.records);
+            let report = model.and_then(|model| asked.surface.report(&model, true));
+            asked.outdoes_laws && report.is_none()
+        });
+        if let Some(asked) = self.surface.take_if(|_| is_refuted) {
+            self.after = asked.model;
+            self.tests = crate::diagnose::tests(&self.after);
+            self.without.clear();
+        }
+    }
+
     /// The surface on the held-out records, where these bear it out; where no effect is named in the end, one in place of all.
     pub fn judge_surface(&self, threads: usize) -> Option<ForceSurface> {
         if let Some(asked) = &self.surface {
@@ -84,6 +98,7 @@ impl SearchState {
     /// Whether the records may show a surface: there is a spring, and the torque is applied.
     fn can_ask(&self, model: &ScoredModel) -> bool {
         let is_held = model.fitted.structure.context.held.is_some();
-        !is_held && !self.records.train.iter().any(StandRecord::is_free)
+        let mut records = self.records.train.iter().chain(&self.records.holdout);
+        !is_held && !records.any(StandRecord::is_free)
     }
 }

@@ -66,7 +66,7 @@ impl Grid {
         self.largest[0]
     }
 
-    /// SurfacePart of the surface of each function, in the order of [`Grid::functions`].
+    /// Part of the surface of each function, in the order of [`Grid::functions`].
     pub fn parts() -> Vec<SurfacePart> {
         let [displacements, speeds] = KNOTS;
         let mut parts = vec![SurfacePart::Displacement; displacements];
@@ -133,7 +133,7 @@ fn hats(knots: &[f64], at: &[f64], size: f64) -> Vec<Vec<f64>> {
     all
 }
 
-/// A spring that slips where its force would exceed a threshold (Jenkin's element).
+/// A spring that slips where its force would exceed a threshold (Jenkins element).
 fn slipping(x: &[f64], threshold: f64) -> Vec<f64> {
     let (mut force, mut last) = (0.0, x.first().copied().unwrap_or(0.0));
     let next = |x: &f64| {

@@ -68,6 +68,8 @@ pub struct Surface {
     solution: Solution,
     /// What it leaves of each training sample, by coefficients that were found without it.
     unseen: Vec<f64>,
+    /// The same of the columns of the plain stand alone: along a measured motion, these take with them some of what disturbs it.
+    unseen_by_plain: Vec<f64>,
     /// What is missed without each part, over the sum of all four.
     shares: [f64; SurfacePart::ALL.len()],
 }
@@ -113,6 +115,7 @@ impl Surface {
             grid,
             solution,
             unseen,
+            unseen_by_plain: regression.unseen_by_free_columns()?,
             shares: shares.map(|share| share / sum),
         })
     }
@@ -124,7 +127,9 @@ impl Surface {
 
     /// Whether it leaves significantly less of the training records than a model does, in samples that it was not fitted to.
     pub fn improves_on(&self, model: &ScoredModel) -> bool {
-        compare(&seen(&model.train), &self.unseen).significance() >= LEAST_SIGNIFICANCE
+        [&seen(&model.train), &self.unseen_by_plain]
+            .iter()
+            .all(|before| compare(before, &self.unseen).significance() >= LEAST_SIGNIFICANCE)
     }
 
     /// Whether it explains so much more than a model that no law of that is to be named: not where a law leaves little but noise.
@@ -132,7 +137,8 @@ impl Surface {
         let excess = |rms: f64| rms.powi(2) - noise_rms.powi(2);
         let left = excess(rms(&seen(&model.train)));
         let is_much = left >= noise_rms.powi(2);
-        is_much && self.improves_on(model) && excess(self.unseen_rms()) <= LEFT * left
+        let least = left.min(excess(rms(&self.unseen_by_plain)));
+        is_much && self.improves_on(model) && excess(self.unseen_rms()) <= LEFT * least
     }
 
     /// What it leaves of the records on which a model is compared, by the motion that was measured there.

@@ -12,6 +12,8 @@ const STRETCHES: usize = 24;
 /// Standard deviations of a function's part of the record, over the rms of the record, that are tried as expectation before
 /// the data: a small one keeps small what few samples determine.
 const EXPECTED: [f64; 10] = [1.0, 0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 1e-5, 1e-8];
+/// The same where the functions are to give nothing.
+const NOTHING: f64 = 1e-100;
 /// What a coefficient of the plain stand costs, in noise powers: next to nothing.
 const FREE: f64 = 1e-6;
 
@@ -78,7 +80,14 @@ impl Regression {
         solved.min_by(|(_, a), (_, b)| sum(a).total_cmp(&sum(b)))
     }
 
-    /// Sum of squares that is left with some of the columns.
+    /// What the free columns alone leave of samples that they have not seen.
+    pub fn unseen_by_free_columns(&self) -> Option<Vec<f64>> {
+        let ridge = self.ridge(NOTHING);
+        let without = (0..FOLDS).map(|fold| self.coefficients(Some(fold), &ridge));
+        Some(self.unseen(&without.collect::<Option<Vec<_>>>()?))
+    }
+
+    /// Sum of squares, and of what the coefficients cost, that is left with some of the columns.
     pub fn left_with(&self, solution: &Solution, is_in: impl Fn(usize) -> bool) -> Option<f64> {
         let (gram, right) = self.sums(None, &solution.ridge);
         let kept: Vec<usize> = (0..right.len()).filter(|k| is_in(*k)).collect();

@@ -10,10 +10,11 @@ use super::{PLAIN, Surface, SurfacePlace, rms, seen};
 use crate::diagnose::describe::shows_torque;
 use crate::diagnose::score::ScoredModel;
 
-/// SurfacePart of what the surface explains that a part of it must explain alone to be spoken of.
+/// Share from which on a part of the surface is spoken of.
 const SPOKEN_OF: f64 = 0.1;
 
-/// The torque that the laws leave unexplained as a surface over displacement and speed, with a memory.
+/// The torque that follows from the motion, that of accepted laws included, as a surface over displacement and speed, with a
+/// memory.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ForceSurface {
     /// Where it sits.
@@ -99,7 +100,7 @@ impl Surface {
         let mut resemblances = Vec::new();
         for (part, share) in SurfacePart::ALL.into_iter().zip(self.shares) {
             let most = self.shares.iter().copied().fold(0.0, f64::max);
-            if share >= SPOKEN_OF.min(most) {
+            if share > 0.0 && share >= SPOKEN_OF.min(most) {
                 resemblances.push(match part {
                     SurfacePart::Displacement => of_displacement(&over_displacement, self.place),
                     SurfacePart::Speed => of_speed(&over_speed),

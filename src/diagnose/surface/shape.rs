@@ -3,7 +3,7 @@
 use super::SurfacePlace;
 use super::report::SurfacePoint;
 
-/// SurfacePart of a curve's weighted power that a shape must explain to be named.
+/// Part of a curve's weighted power that a shape must explain to be named.
 const ALIKE: f64 = 0.75;
 /// Uncertainty of a point, over the largest torque of its curve, that is always allowed for.
 const BLUR: f64 = 0.05;
