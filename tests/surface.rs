@@ -21,11 +21,11 @@ const NOISE: f64 = 0.003;
 type Law = fn(f64, f64) -> f64;
 
 /// Applied and recorded torque of a stand with such a torque, under forty sines, and the rms of the noise.
-fn record(law: Law, level: f64, noise: &mut Noise) -> (String, f64) {
+fn record(law: Law, (level, to_hz): (f64, f64), noise: &mut Noise) -> (String, f64) {
     let omega = TAU * NATURAL_HZ;
     let lines: Vec<[f64; 2]> = (0..40)
         .map(|k| {
-            let hz = 2.0 + 48.0 * (f64::from(k) + noise.uniform()) / 40.0;
+            let hz = (0.04 + 0.96 * (f64::from(k) + noise.uniform()) / 40.0) * to_hz;
             [TAU * hz, TAU * noise.uniform()]
         })
         .collect();
@@ -58,8 +58,8 @@ fn record(law: Law, level: f64, noise: &mut Noise) -> (String, f64) {
 /// The diagnosis of two records, and the noise of the held-out one.
 fn diagnosed(law: Law, folder: &Folder, more: &[&str]) -> (Value, f64) {
     let mut noise = Noise(7);
-    let (train, _) = record(law, 0.12, &mut noise);
-    let (holdout, rms) = record(law, 0.08, &mut noise);
+    let (train, _) = record(law, (0.12, 50.0), &mut noise);
+    let (holdout, rms) = record(law, (0.08, 50.0), &mut noise);
     folder
         .write("train.csv", train)
         .write("holdout.csv", holdout);
@@ -170,4 +170,33 @@ fn a_listed_law_needs_no_surface() {
     assert_eq!(report["verdict"], "explained");
     assert_eq!(report["effects"], serde_json::json!(["cubic-stiffness"]));
     assert!(report["force_surface"].is_null());
+}
+
+/// What a slow input moves follows it nearly as it is, and so would a slow disturbance the measured motion.
+#[test]
+fn a_slow_disturbance_follows_from_no_motion() {
+    let folder = Folder::new();
+    let mut noise = Noise(11);
+    for (name, level) in [("train.csv", 0.12), ("holdout.csv", 0.08)] {
+        let (text, rms) = record(|_, _| 0.0, (level, 12.0), &mut noise);
+        let (mut lines, mut disturbance) = (text.lines(), 0.0);
+        let mut disturbed = format!("{}\n", lines.next().expect("a heading"));
+        for line in lines {
+            // A wandering zero with a memory of half a second.
+            disturbance += -disturbance / (0.5 * RATE_HZ) + 0.3 * rms * noise.normal();
+            let (rest, seen) = line.rsplit_once(',').expect("three columns");
+            let seen: f64 = seen.parse().expect("a number");
+            disturbed += &format!("{rest},{:.9}\n", seen + disturbance);
+        }
+        folder.write(name, disturbed);
+    }
+    let records = ["--train", "train.csv", "--holdout", "holdout.csv"];
+    let channels = ["--applied", "applied_n_m", "--measured", "measured_n_m"];
+    let report = folder.json(&[&["diagnose", "--json"], &records[..], &channels].concat());
+    println!("{} {}", report["verdict"], report["effects"]);
+    assert!(
+        report["force_surface"].is_null(),
+        "{}",
+        report["force_surface"]
+    );
 }
