@@ -55,6 +55,13 @@ fn record(law: Law, (level, to_hz): (f64, f64), noise: &mut Noise) -> (String, f
     (text, NOISE * rms)
 }
 
+/// The diagnosis of the two records in a folder.
+fn report(folder: &Folder, more: &[&str]) -> Value {
+    let records = ["--train", "train.csv", "--holdout", "holdout.csv"];
+    let channels = ["--applied", "applied_n_m", "--measured", "measured_n_m"];
+    folder.json(&[&["diagnose", "--json"], &records[..], &channels, more].concat())
+}
+
 /// The diagnosis of two records, and the noise of the held-out one.
 fn diagnosed(law: Law, folder: &Folder, more: &[&str]) -> (Value, f64) {
     let mut noise = Noise(7);
@@ -63,10 +70,7 @@ fn diagnosed(law: Law, folder: &Folder, more: &[&str]) -> (Value, f64) {
     folder
         .write("train.csv", train)
         .write("holdout.csv", holdout);
-    let records = ["--train", "train.csv", "--holdout", "holdout.csv"];
-    let channels = ["--applied", "applied_n_m", "--measured", "measured_n_m"];
-    let report = folder.json(&[&["diagnose", "--json"], &records[..], &channels, more].concat());
-    (report, rms)
+    (report(folder, more), rms)
 }
 
 fn number(value: &Value) -> f64 {
@@ -190,9 +194,7 @@ fn a_slow_disturbance_follows_from_no_motion() {
         }
         folder.write(name, disturbed);
     }
-    let records = ["--train", "train.csv", "--holdout", "holdout.csv"];
-    let channels = ["--applied", "applied_n_m", "--measured", "measured_n_m"];
-    let report = folder.json(&[&["diagnose", "--json"], &records[..], &channels].concat());
+    let report = report(&folder, &[]);
     println!("{} {}", report["verdict"], report["effects"]);
     assert!(
         report["force_surface"].is_null(),

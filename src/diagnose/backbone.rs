@@ -7,7 +7,8 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::{SMatrix, SVector};
+use nalgebra::DMatrix;
+use torqcomp_model::fit::linear::solve;
 use torqcomp_model::simulate::MotionState;
 
 use super::record::{InitialState, StandRecord};
@@ -118,17 +119,12 @@ fn least_squares<const N: usize>(
     rows: impl Iterator<Item = (f64, f64)>,
     columns: impl Fn(f64) -> [f64; N],
 ) -> Option<[f64; N]> {
-    let mut equations = SMatrix::<f64, N, N>::zeros();
-    let mut products = SVector::<f64, N>::zeros();
-    for (value, at) in rows {
-        let row = SVector::from(columns(at));
-        equations += row * row.transpose();
-        products += row * value;
-    }
-    let scale = equations.map_diagonal(|d| 1.0 / d.sqrt().max(f64::MIN_POSITIVE));
-    let scaled = SMatrix::from_diagonal(&scale) * equations * SMatrix::from_diagonal(&scale);
-    let solution = scaled.cholesky()?.solve(&products.component_mul(&scale));
-    Some(solution.component_mul(&scale).into())
+    let (values, rows): (Vec<f64>, Vec<[f64; N]>) =
+        rows.map(|(value, at)| (value, columns(at))).unzip();
+    let matrix = DMatrix::from_row_slice(rows.len(), N, rows.as_flattened());
+    let fit = solve(&matrix, &values, None, false).ok()?;
+    let is_determined = fit.undetermined.is_empty();
+    is_determined.then(|| fit.values.try_into().ok()).flatten()
 }
 
 #[cfg(test)]

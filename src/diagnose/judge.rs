@@ -30,7 +30,7 @@ impl SearchState {
                 "the plain stand cannot be run on the held-out records",
             )
         })?;
-        self.restore_laws();
+        self.judge_surface();
         self.declared = self.declared.as_ref().and_then(|m| self.held_out(m));
         self.judge_candidates(threads);
         self.suspected = self.suspected.take().and_then(|mut guard| {

@@ -7,7 +7,7 @@ use num_complex::Complex64;
 use super::fit::RecordResidual;
 use super::residual_tests::{autocorrelations, differences, without_mean};
 use super::spectra::spectra;
-use torqcomp_dsp::dot;
+use torqcomp_dsp::rms;
 
 impl RecordResidual {
     /// Time of each sample of the range.
@@ -32,7 +32,7 @@ impl RecordResidual {
     }
 
     pub fn rms(&self) -> f64 {
-        (dot(&self.samples, &self.samples) / self.samples.len().max(1) as f64).sqrt()
+        rms(&self.samples)
     }
 
     /// So many samples around the largest part of the residual.

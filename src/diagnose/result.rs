@@ -167,7 +167,7 @@ impl Diagnosis {
             _ => Vec::new(),
         };
         let force_surface = match verdict {
-            Verdict::PartlyExplained | Verdict::Unexplained => found.judge_surface(threads),
+            Verdict::PartlyExplained | Verdict::Unexplained => found.force_surface(threads),
             _ => None,
         };
         let error = ErrorTable::of(&found);

@@ -11,6 +11,7 @@ pub mod static_load;
 
 use schemars::JsonSchema;
 use serde::Serialize;
+use torqcomp_dsp::rms;
 use torqcomp_model::{Covariance, Estimate, Estimates, Kind, Measure, UnitSystem};
 
 use crate::chart::Chart;
@@ -286,12 +287,4 @@ impl Identification {
         let all = self.parameters.iter_mut().chain(compared);
         all.for_each(|constant| constant.convert(units));
     }
-}
-
-/// Root of the mean square; 0 for no values.
-fn rms(values: &[f64]) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
 }

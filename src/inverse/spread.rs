@@ -6,6 +6,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 use torqcomp_dsp::band::Band;
+use torqcomp_dsp::rms;
 
 use super::ChainInverse;
 use crate::failure::Failure;
@@ -181,8 +182,4 @@ fn per_sample(correlations: &[Vec<f64>], terms: &[Vec<f64>], count: usize) -> Ve
         combined(correlations, &each)
     };
     (0..count).map(at).collect()
-}
-
-fn rms(values: &[f64]) -> f64 {
-    (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }

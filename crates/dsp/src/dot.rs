@@ -20,3 +20,14 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     }
     sums.iter().sum::<f64>() + rest
 }
+
+/// Root of the mean square; 0 for no values.
+///
+/// ```
+/// // (9 + 16)/2 = 12.5
+/// assert_eq!(torqcomp_dsp::rms(&[3.0, -4.0]), 12.5_f64.sqrt());
+/// ```
+#[must_use]
+pub fn rms(values: &[f64]) -> f64 {
+    (dot(values, values) / values.len().max(1) as f64).sqrt()
+}

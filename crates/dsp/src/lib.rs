@@ -39,5 +39,5 @@ pub mod undersample;
 pub mod weak;
 pub mod zero_phase;
 
-pub use dot::dot;
+pub use dot::{dot, rms};
 pub use error::Error;

@@ -1,6 +1,8 @@
 //! Where a surface that knows no law is asked: something is left, and no law may be the cause of it.
 
-use super::{Surface, is_law, rms, seen};
+use torqcomp_dsp::rms;
+
+use super::{Surface, is_law, seen};
 use crate::diagnose::reason::Reason;
 use crate::diagnose::record::StandRecord;
 use crate::diagnose::score::ScoredModel;
@@ -11,11 +13,13 @@ use crate::diagnose::{ForceSurface, SearchState};
 
 /// A surface that explains more than the laws beside which it was fitted.
 pub struct AskedSurface {
-    pub surface: Surface,
+    surface: Surface,
     /// The model with these laws.
     model: ScoredModel,
     /// Whether they are withdrawn for it.
     pub outdoes_laws: bool,
+    /// What it says of the held-out records, once it is judged, if they bear it out.
+    report: Option<ForceSurface>,
 }
 
 impl SearchState {
@@ -40,6 +44,7 @@ impl SearchState {
             surface,
             model,
             outdoes_laws,
+            report: None,
         });
     }
 
@@ -67,25 +72,26 @@ impl SearchState {
         self.without.clear();
     }
 
-    /// Takes the laws back that a surface outdid where the held-out records do not bear it out.
-    pub fn restore_laws(&mut self) {
-        let is_refuted = self.surface.as_ref().is_some_and(|asked| {
-            let model = asked.model.clone().compared_on_holdout(&self.records);
-            let report = model.and_then(|model| asked.surface.report(&model, true));
-            asked.outdoes_laws && report.is_none()
-        });
-        if let Some(asked) = self.surface.take_if(|_| is_refuted) {
+    /// Puts the surface to the held-out records, and takes the laws back that it outdid where these do not bear it out.
+    pub fn judge_surface(&mut self) {
+        let Some(mut asked) = self.surface.take() else {
+            return;
+        };
+        let model = asked.model.clone().compared_on_holdout(&self.records);
+        asked.report = model.and_then(|m| asked.surface.report(&m, asked.outdoes_laws));
+        if asked.outdoes_laws && asked.report.is_none() {
             self.after = asked.model;
             self.tests = crate::diagnose::tests(&self.after);
             self.without.clear();
+        } else {
+            self.surface = Some(asked);
         }
     }
 
-    /// The surface on the held-out records, where these bear it out; where no effect is named in the end, one in place of all.
-    pub fn judge_surface(&self, threads: usize) -> Option<ForceSurface> {
+    /// The surface that the held-out records bear out; where no effect is named in the end, one in place of all.
+    pub fn force_surface(&self, threads: usize) -> Option<ForceSurface> {
         if let Some(asked) = &self.surface {
-            let model = asked.model.clone().compared_on_holdout(&self.records)?;
-            return asked.surface.report(&model, asked.outdoes_laws);
+            return asked.report.clone();
         }
         let model = &self.before;
         if !self.after.effect_names().is_empty() || !self.can_ask(model) {

@@ -106,18 +106,6 @@ impl Knots {
         share.iter_mut().for_each(|s| *s /= whole);
         Self { at, share }
     }
-
-    /// What the torque at a knot, less the straight line that fits the torques along the motion best, is made of: weights of the
-    /// torques at all knots. The line is a matter of the stand's constants.
-    pub fn without_line(&self, k: usize) -> Vec<f64> {
-        let pairs = || self.at.iter().zip(&self.share);
-        let mean: f64 = pairs().map(|(x, s)| s * x).sum();
-        let square: f64 = pairs().map(|(x, s)| s * (x - mean).powi(2)).sum();
-        let line = |x: f64| 1.0 + (x - mean) * (self.at[k] - mean) / square;
-        let weight =
-            |(j, (x, s)): (usize, (&f64, &f64))| f64::from(u8::from(j == k)) - s * line(*x);
-        pairs().enumerate().map(weight).collect()
-    }
 }
 
 /// Piecewise linear functions that are `size` at one knot and zero at all others; beyond the outer knots they go on straight.

@@ -8,6 +8,7 @@
 
 mod ask;
 mod basis;
+mod line;
 mod motion;
 mod regression;
 mod report;
@@ -18,7 +19,7 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use schemars::JsonSchema;
 use serde::Serialize;
-use torqcomp_dsp::dot;
+use torqcomp_dsp::{dot, rms};
 use torqcomp_model::Chain;
 use torqcomp_model::effects::Stage;
 use torqcomp_model::simulate::{Excitation, MotionState};
@@ -30,6 +31,7 @@ use super::score::ScoredModel;
 use super::structure::FitContext;
 use crate::parallel::parallel;
 use basis::{Grid, SurfacePart};
+use line::clear_line;
 use motion::{MeasuredMotion, of_torque, through};
 use regression::{Regression, Solution};
 
@@ -181,10 +183,6 @@ fn cut(record: &StandRecord) -> StandRecord {
     }
 }
 
-pub fn rms(samples: &[f64]) -> f64 {
-    (dot(samples, samples) / samples.len().max(1) as f64).sqrt()
-}
-
 /// Whether an effect is a law of the motion: a surface stands in for it.
 pub fn is_law(stage: Stage) -> bool {
     matches!(stage, Stage::Stand | Stage::Gage | Stage::Limit)
@@ -231,7 +229,7 @@ impl<'a> Background<'a> {
         columns.extend(grid.functions(motion, step).into_iter().map(|mut samples| {
             if self.place != SurfacePlace::Stand {
                 // A straight line would be the record itself.
-                without_line(&mut samples, &motion.x);
+                clear_line(&mut samples, &motion.x, |_| 1.0);
             }
             cleared(&through(record, &samples, |omega| match self.place {
                 SurfacePlace::Stand => -torque(omega),
@@ -254,18 +252,4 @@ fn reduced(model: &ScoredModel, keeps: impl Fn(Stage) -> bool) -> (Chain, Nuisan
         ..(*structure.context).clone()
     });
     reduced.model(&values)
-}
-
-/// Takes the straight line over the displacement that fits best out of a function.
-fn without_line(samples: &mut [f64], x: &[f64]) {
-    let count = x.len() as f64;
-    let mean = |values: &[f64]| values.iter().sum::<f64>() / count;
-    let (mean_x, mean_y) = (mean(x), mean(samples));
-    let square: f64 = x.iter().map(|x| (x - mean_x).powi(2)).sum();
-    let pairs = x.iter().zip(&*samples);
-    let product: f64 = pairs.map(|(x, y)| (x - mean_x) * (y - mean_y)).sum();
-    let slope = product / square.max(1e-300);
-    for (y, x) in samples.iter_mut().zip(x) {
-        *y -= mean_y + slope * (x - mean_x);
-    }
 }

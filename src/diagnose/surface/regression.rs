@@ -29,9 +29,9 @@ pub struct Regression {
 
 /// Coefficients of all columns.
 pub struct Solution {
-    pub coefficients: DVector<f64>,
+    coefficients: DVector<f64>,
     /// Those found without one of the folds.
-    pub without: Vec<DVector<f64>>,
+    without: Vec<DVector<f64>>,
     /// What the square of each coefficient costs.
     ridge: DVector<f64>,
 }
@@ -65,8 +65,7 @@ impl Regression {
     pub fn solve(&self) -> Option<(Solution, Vec<f64>)> {
         let solved = EXPECTED.iter().filter_map(|std| {
             let ridge = self.ridge(*std);
-            let without = (0..FOLDS).map(|fold| self.coefficients(Some(fold), &ridge));
-            let without: Vec<DVector<f64>> = without.collect::<Option<_>>()?;
+            let without = self.without_each_fold(&ridge)?;
             let coefficients = self.coefficients(None, &ridge)?;
             let unseen = self.unseen(&without);
             let solution = Solution {
@@ -82,9 +81,8 @@ impl Regression {
 
     /// What the free columns alone leave of samples that they have not seen.
     pub fn unseen_by_free_columns(&self) -> Option<Vec<f64>> {
-        let ridge = self.ridge(NOTHING);
-        let without = (0..FOLDS).map(|fold| self.coefficients(Some(fold), &ridge));
-        Some(self.unseen(&without.collect::<Option<Vec<_>>>()?))
+        let without = self.without_each_fold(&self.ridge(NOTHING))?;
+        Some(self.unseen(&without))
     }
 
     /// Sum of squares, and of what the coefficients cost, that is left with some of the columns.
@@ -126,6 +124,13 @@ impl Regression {
         Some(gram.cholesky()?.solve(&right))
     }
 
+    fn without_each_fold(&self, ridge: &DVector<f64>) -> Option<Vec<DVector<f64>>> {
+        let folds = 0..FOLDS;
+        folds
+            .map(|fold| self.coefficients(Some(fold), ridge))
+            .collect()
+    }
+
     /// What is left of each sample by the coefficients that were found without it.
     fn unseen(&self, without: &[DVector<f64>]) -> Vec<f64> {
         let mut all = Vec::new();
@@ -146,14 +151,18 @@ impl Solution {
         subtract(&self.coefficients, columns, range, left);
     }
 
-    /// Standard uncertainty of a sum of the coefficients, from how it scatters between the folds (jackknife; B. Efron, *The
-    /// Jackknife, the Bootstrap and Other Resampling Plans* (1982), 3).
-    pub fn std(&self, weights: &DVector<f64>) -> f64 {
-        let values: Vec<f64> = self.without.iter().map(|c| c.dot(weights)).collect();
-        let count = values.len() as f64;
-        let mean = values.iter().sum::<f64>() / count;
-        let square: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
-        ((count - 1.0) / count * square).sqrt()
+    /// Something that follows from the coefficients, each of its values with the standard uncertainty that it has by its scatter
+    /// between the folds (jackknife; B. Efron, *The Jackknife, the Bootstrap and Other Resampling Plans* (1982), 3).
+    pub fn with_std(&self, of: impl Fn(&DVector<f64>) -> Vec<f64>) -> Vec<[f64; 2]> {
+        let folds: Vec<Vec<f64>> = self.without.iter().map(&of).collect();
+        let count = folds.len() as f64;
+        let std = |k: usize| {
+            let mean = folds.iter().map(|f| f[k]).sum::<f64>() / count;
+            let square: f64 = folds.iter().map(|f| (f[k] - mean).powi(2)).sum();
+            ((count - 1.0) / count * square).sqrt()
+        };
+        let values = of(&self.coefficients).into_iter().enumerate();
+        values.map(|(k, value)| [value, std(k)]).collect()
     }
 }
 
@@ -178,16 +187,11 @@ fn stretches(count: usize) -> impl Iterator<Item = Range<usize>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::test_noise::noise;
 
     /// `y = 2 a + 0.5 b` in noise of 0.1, beside 20 columns of noise.
     fn made() -> Regression {
-        let mut state = 1_u64;
-        let mut noise = move || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-        };
+        let mut noise = noise(1);
         let records = (0..2).map(|_| {
             let columns: Vec<Vec<f64>> = (0..22)
                 .map(|_| (0..2000).map(|_| noise()).collect())
@@ -208,9 +212,9 @@ mod tests {
         // 0.35/√12 is 0.101.
         let rms = (dot(&unseen, &unseen) / 4000.0).sqrt();
         assert!((rms - 0.101).abs() < 0.003, "{rms}");
-        let weights = DVector::from_fn(22, |k, _| f64::from(u8::from(k == 1)));
+        let [_, std] = solution.with_std(|c| vec![c[1]])[0];
         // σ/√(Σ b²) = 0.101/√(4000/12).
-        assert!((0.002..0.012).contains(&solution.std(&weights)));
+        assert!((0.002..0.012).contains(&std));
     }
 
     #[test]

@@ -1,12 +1,13 @@
 //! A surface as it is reported: its curves with their uncertainties, and what they look like.
 
-use nalgebra::DVector;
 use schemars::JsonSchema;
 use serde::Serialize;
+use torqcomp_dsp::rms;
 
 use super::basis::{KNOTS, Knots, SurfacePart};
+use super::line::clear_line;
 use super::shape::{Resemblance, of_displacement, of_speed};
-use super::{PLAIN, Surface, SurfacePlace, rms, seen};
+use super::{PLAIN, Surface, SurfacePlace, seen};
 use crate::diagnose::describe::shows_torque;
 use crate::diagnose::score::ScoredModel;
 
@@ -81,18 +82,18 @@ impl Surface {
         let unit = model.fitted.structure.context.units.per_printed;
         let omega = model.fitted.mode().omega_rad_s;
         let curve = |first: usize, knots: &Knots, scale: f64| -> Vec<SurfacePoint> {
-            let of_knot = |(k, at): (usize, &f64)| {
-                let mut weights = DVector::zeros(self.solution.coefficients.len());
-                for (j, weight) in knots.without_line(k).into_iter().enumerate() {
-                    weights[first + j] = self.grid.size() * weight;
-                }
-                SurfacePoint {
-                    at: at * scale / unit,
-                    torque: self.solution.coefficients.dot(&weights) / unit,
-                    std: self.solution.std(&weights) / unit,
-                }
+            let torques = self.solution.with_std(|coefficients| {
+                let own = coefficients.rows(first, knots.at.len());
+                let mut torques: Vec<f64> = own.iter().map(|c| c * self.grid.size()).collect();
+                clear_line(&mut torques, &knots.at, |k| knots.share[k]);
+                torques
+            });
+            let point = |(at, [torque, std]): (&f64, [f64; 2])| SurfacePoint {
+                at: at * scale / unit,
+                torque: torque / unit,
+                std: std / unit,
             };
-            knots.at.iter().enumerate().map(of_knot).collect()
+            knots.at.iter().zip(torques).map(point).collect()
         };
         let over_displacement = curve(PLAIN, &self.grid.x, 1.0);
         let over_speed = curve(PLAIN + KNOTS[0], &self.grid.speed, omega);

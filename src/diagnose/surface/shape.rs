@@ -1,6 +1,7 @@
 //! What the curves of a surface look like.
 
 use super::SurfacePlace;
+use super::line::clear_line;
 use super::report::SurfacePoint;
 
 /// Part of a curve's weighted power that a shape must explain to be named.
@@ -63,9 +64,13 @@ impl<'a> Curve<'a> {
 
     /// Amount of a shape, and the part of the curve's power that it explains; of both only what is no straight line.
     fn alike(&self, shape: impl Fn(f64) -> f64) -> (f64, f64) {
-        let torque: Vec<f64> = self.points.iter().map(|p| p.torque).collect();
-        let shape: Vec<f64> = self.points.iter().map(|p| shape(p.at)).collect();
-        let (torque, shape) = (self.bent(&torque), self.bent(&shape));
+        let at: Vec<f64> = self.points.iter().map(|p| p.at).collect();
+        let bent = |of: &dyn Fn(&SurfacePoint) -> f64| {
+            let mut values: Vec<f64> = self.points.iter().map(of).collect();
+            clear_line(&mut values, &at, |k| self.weights[k]);
+            values
+        };
+        let (torque, shape) = (bent(&|p| p.torque), bent(&|p| shape(p.at)));
         let product = |a: &[f64], b: &[f64]| -> f64 {
             let all = self.weights.iter().zip(a).zip(b);
             all.map(|((w, a), b)| w * a * b).sum()
@@ -74,25 +79,6 @@ impl<'a> Curve<'a> {
         let along = product(&torque, &shape);
         let whole = product(&torque, &torque).max(1e-300);
         (along / own, along * along / (own * whole))
-    }
-
-    /// A curve less its straight line.
-    fn bent(&self, values: &[f64]) -> Vec<f64> {
-        let sum = |of: &dyn Fn(usize) -> f64| -> f64 {
-            let all = self.weights.iter().enumerate();
-            all.map(|(k, w)| w * of(k)).sum()
-        };
-        let at = |k: usize| self.points[k].at;
-        let count = sum(&|_| 1.0);
-        let (mean_x, mean_y) = (sum(&at) / count, sum(&|k| values[k]) / count);
-        let square = sum(&|k| (at(k) - mean_x).powi(2)).max(1e-300);
-        let slope = sum(&|k| (at(k) - mean_x) * (values[k] - mean_y)) / square;
-        let line = |k: usize| mean_y + slope * (at(k) - mean_x);
-        values
-            .iter()
-            .enumerate()
-            .map(|(k, y)| y - line(k))
-            .collect()
     }
 
     /// The shape that explains most, if any explains enough: its index, amount and corner.
