@@ -229,6 +229,37 @@ fn texts_beside_the_numbers() {
     );
 }
 
+/// 1.040 N mm between 789 and 1.012 is a thousand and forty; 1.040 between 0.789 and 1.012 is not.
+#[test]
+fn a_point_that_may_stand_between_thousands_is_asked_for() {
+    let folder = Folder::new();
+    let table = |row: &dyn Fn(i32) -> String| {
+        let rows: String = (0..400).map(|i| format!("{i};{}\n", row(i))).collect();
+        format!("Zeit [ms];Moment [N mm]\n{rows}")
+    };
+    let torque = |i: i32| 1000 + 3 * (i % 200) - 300;
+    let in_thousands = |i: i32| match torque(i) {
+        small @ ..1000 => small.to_string(),
+        large => format!("{}.{:03}", large / 1000, large % 1000),
+    };
+    folder.write("thousands.csv", table(&in_thousands));
+    let ran = folder.run(&["inspect", "thousands.csv"]);
+    ran.says(1, &["line 102", "between thousands", "--decimal , or --decimal ."]);
+    let mean = |arguments: &[&str]| {
+        let document = folder.json(&[&["inspect", "--json"], arguments].concat());
+        document["channels"][0]["mean"].as_f64().unwrap()
+    };
+    let expected = f64::from((0..400).map(torque).sum::<i32>()) / 400.0;
+    let read = mean(&["thousands.csv", "--decimal", ","]);
+    assert!((read - expected).abs() < 1e-9, "{read}");
+    folder.write("points.csv", table(&|i| format!("{:.3}", f64::from(torque(i)) / 1e3)));
+    folder.write("shortest.csv", table(&|i| format!("{}", f64::from(torque(i)) / 1e3)));
+    for name in ["points.csv", "shortest.csv"] {
+        let read = mean(&[name]);
+        assert!((read - expected / 1e3).abs() < 1e-9, "{name}: {read}");
+    }
+}
+
 #[test]
 fn a_comma_that_could_be_either_is_asked_for() {
     let folder = Folder::new();

@@ -8,6 +8,7 @@ use super::chunks::Chunks;
 use super::commas;
 use super::rows::cleaned;
 use super::table::FIRST_ROWS;
+use super::thousands;
 use super::upward;
 use crate::failure::{ErrorCode, Failure};
 use crate::io::DialectOverride;
@@ -370,7 +371,10 @@ fn unambiguous<'a>(head: &Head, found: &'a [Found], best: &'a Found) -> Result<&
         let line = best.table.first;
         (head.number(line), head.lines[line].text.trim())
     };
+    let others = found.iter().filter(equal).filter(|other| other.grouped > 0);
+    let others: Vec<&Table> = others.map(|other| &other.table).collect();
     if !text.contains(',') {
+        thousands::refuse(head, &best.table, &others)?;
         return Ok(best);
     }
     let shown: String = text.chars().take(60).collect();
@@ -397,23 +401,7 @@ fn unambiguous<'a>(head: &Head, found: &'a [Found], best: &'a Found) -> Result<&
         )
         .line(line));
     }
-    // 1,234 with a decimal comma or with a mark between thousands.
-    let dialect = best.table.dialect;
-    let thousands = found.iter().filter(equal).any(|f| {
-        f.table.dialect.delimiter == dialect.delimiter
-            && f.table.dialect.decimal != dialect.decimal
-            && f.grouped > 0
-    });
-    if dialect.decimal == b',' && thousands {
-        return Err(Failure::failed(
-            ErrorCode::TextUnclear,
-            format_args!(
-                "the comma in \"{shown}\" can be a decimal mark or stand between \
-             thousands; say which with --decimal , or --decimal ."
-            ),
-        )
-        .line(line));
-    }
+    thousands::refuse(head, &best.table, &others)?;
     Ok(best)
 }
 

@@ -30,6 +30,7 @@ mod stream;
 mod summary;
 mod table;
 mod tail;
+mod thousands;
 mod units;
 mod upward;
 mod vocabulary;

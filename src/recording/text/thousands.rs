@@ -1,0 +1,81 @@
+//! Marks between thousands that read as decimal marks too: `1,234` and `1.234`.
+
+use super::cell::Cell;
+use super::dialect::{Dialect, is_skipped};
+use super::head::{Head, Table};
+use crate::failure::{ErrorCode, Failure};
+
+/// Digits of a group.
+const GROUP: usize = 3;
+
+/// Refuses a table whose decimal mark may stand between thousands: a comma that reads both ways in all rows, or a point
+/// in a column beside whole numbers of up to three digits. `others` are the tables that read as many rows, with marks
+/// between thousands.
+///
+/// # Errors
+/// If the table is such a one.
+pub(super) fn refuse(head: &Head, table: &Table, others: &[&Table]) -> Result<(), Failure> {
+    let dialect = table.dialect;
+    let Some(other) = others.iter().map(|other| other.dialect).find(|other| {
+        other.delimiter == dialect.delimiter && other.decimal != dialect.decimal
+    }) else {
+        return Ok(());
+    };
+    let (place, name) = match dialect.decimal {
+        b',' => (table.first, "comma"),
+        _ => match grouped_place(head, table, other) {
+            Some(place) => (place, "point"),
+            None => return Ok(()),
+        },
+    };
+    let shown: String = head.lines[place].text.trim().chars().take(60).collect();
+    Err(Failure::failed(
+        ErrorCode::TextUnclear,
+        format_args!(
+            "the {name} in \"{shown}\" can be a decimal mark or stand between thousands; say which with --decimal , or \
+             --decimal ."
+        ),
+    )
+    .line(head.number(place)))
+}
+
+/// Where the first number of a column stands whose points look like those between thousands: each has three digits
+/// behind it and no zero before it, and the numbers without one are whole and have no more than three digits. Numbers
+/// with as many decimals each have a point in all of them, and those with as many as they need have other counts.
+fn grouped_place(head: &Head, table: &Table, other: Dialect) -> Option<usize> {
+    let mut columns = vec![Column::default(); table.width];
+    for (place, line) in head.lines.iter().enumerate().skip(table.first) {
+        if is_skipped(&line.text) {
+            continue;
+        }
+        for (column, text) in columns.iter_mut().zip(table.dialect.cells(&line.text)) {
+            column.add(place, &text, other.decimal);
+        }
+    }
+    let mut columns = columns.into_iter();
+    columns.find_map(|c| c.grouped.filter(|_| c.has_plain && !c.has_others))
+}
+
+/// What the numbers of a column look like.
+#[derive(Default, Clone)]
+struct Column {
+    /// The line of the first one with marks between thousands.
+    grouped: Option<usize>,
+    /// Whether some are whole and too small for a mark.
+    has_plain: bool,
+    /// Whether there is anything else.
+    has_others: bool,
+}
+
+impl Column {
+    fn add(&mut self, place: usize, text: &str, decimal: u8) {
+        let digits = text.trim_start_matches(['+', '-']);
+        let is_plain = digits.len() <= GROUP && digits.bytes().all(|b| b.is_ascii_digit());
+        match Cell::read(text, decimal) {
+            Cell::Empty | Cell::NonFinite => {}
+            Cell::Grouped(_) => self.grouped = self.grouped.or(Some(place)),
+            Cell::Number(_) if is_plain => self.has_plain = true,
+            _ => self.has_others = true,
+        }
+    }
+}
