@@ -19,6 +19,8 @@ fn orders_above_the_band_of_a_compensated_record_are_said() {
     for (band, said) in [
         ("300", Some("left of orders 4, 5, 6, 7, 8 and 9")),
         ("510", Some("left of orders 6, 7, 8 and 9")),
+        ("587", Some("left of orders 6, 7, 8 and 9")),
+        ("600", Some("left of orders 7, 8 and 9")),
         ("1000", None),
     ] {
         let compensate = ["compensate", "in.csv", "--stand", "stand.toml", "-q"];

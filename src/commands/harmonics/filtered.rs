@@ -9,20 +9,20 @@ use crate::print::{rounded, short};
 use crate::recording::{Spool, UniformRecord};
 use crate::warning::Warning;
 
-/// Most samples that are looked at, and samples of a block.
-const MOST: usize = 1 << 18;
-const BLOCK: usize = 4096;
-/// Fewest blocks, and bins of a part of the spectrum that is compared.
-const BLOCKS: usize = 8;
+/// Most samples that are looked at, in one block: an edge between two lines is narrow.
+const MOST: usize = 1 << 16;
+/// Fewest bins of a part of the spectrum that is compared.
 const BINS: usize = 5;
 /// The end of a band over its top: the edge between them is a fifth of the band wide.
 const EDGE: f64 = 1.2;
 /// Ratio of the frequencies that are tried.
-const STEP: f64 = 1.02;
-/// Frequencies over the top that was found up to which an order counts as within the band: the edge begins gently.
-const NEAR: f64 = 1.04;
+const STEP: f64 = 1.005;
 /// Density behind the end over that before the edge: no recorder's low-pass falls so far within one edge.
 const FALL: f64 = 1e-4;
+/// Where the edge has fallen so far, over the top: `(1 + cos πx)/2 = √FALL` at `x = 0.936` of the edge.
+const FALLEN: f64 = 1.187;
+/// Frequencies over the top that was found up to which an order counts as within the band: the edge takes 2 % there.
+const NEAR: f64 = 1.015;
 
 /// A warning if orders lie where the spectrum of the record has been cut off.
 pub(super) fn warning(
@@ -31,9 +31,8 @@ pub(super) fn warning(
     orders: &[f64],
 ) -> Option<Warning> {
     let count = record.samples.count().min(MOST);
-    let block = BLOCK.min(count / BLOCKS / 2 * 2);
     let samples = record.samples.part(0..count).ok()?;
-    let density = welch_steep(&samples, record.rate_hz, block).ok()?;
+    let density = welch_steep(&samples, record.rate_hz, count).ok()?;
     let top_hz = top(&density, 0.5 * record.rate_hz)?;
     let is_beyond = |order: &&f64| *order * fundamental_hz > NEAR * top_hz;
     let beyond = orders.iter().filter(is_beyond);
@@ -54,21 +53,26 @@ pub(super) fn warning(
     })
 }
 
-/// The top of the band, if the spectrum ends somewhere as if cut off.
+/// The top of the band, if the spectrum ends somewhere as if cut off, and all above is gone.
 fn top(density: &Density, nyquist_hz: f64) -> Option<f64> {
     let level = |from_hz: f64, to_hz: f64| {
         let mut values: Vec<f64> = density.between(from_hz, to_hz).map(|(_, v)| v).collect();
         median(&mut values).filter(|_| values.len() >= BINS)
     };
+    // The largest density of each bin and all above.
+    let mut largest = density.values.clone();
+    for bin in (1..largest.len()).rev() {
+        largest[bin - 1] = largest[bin - 1].max(largest[bin]);
+    }
     let count = ((nyquist_hz / density.step_hz).ln() / STEP.ln()) as i32;
     let mut ends = (0..=count).map(|k| density.step_hz * STEP.powi(k));
     let is_end = |end_hz: &f64| {
-        let top_hz = end_hz / EDGE;
-        let before = level(top_hz / EDGE, top_hz);
-        let behind = density.between(*end_hz, (EDGE * end_hz).min(nyquist_hz));
-        let behind: Vec<f64> = behind.map(|(_, v)| v).collect();
-        let is_low = |before: f64| behind.iter().all(|v| *v < FALL * before);
-        behind.len() >= BINS && before.is_some_and(is_low)
+        let bin = (end_hz / density.step_hz).ceil() as usize;
+        let behind = largest.get(bin).filter(|_| bin + BINS <= largest.len());
+        let top_hz = end_hz / FALLEN;
+        behind.is_some_and(|behind| {
+            level(top_hz / EDGE, top_hz).is_some_and(|before| *behind < FALL * before)
+        })
     };
-    Some(ends.find(is_end)? * STEP / EDGE)
+    Some(ends.find(is_end)? / FALLEN)
 }
