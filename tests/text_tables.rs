@@ -244,7 +244,14 @@ fn a_point_that_may_stand_between_thousands_is_asked_for() {
     };
     folder.write("thousands.csv", table(&in_thousands));
     let ran = folder.run(&["inspect", "thousands.csv"]);
-    ran.says(1, &["line 102", "between thousands", "--decimal , or --decimal ."]);
+    ran.says(
+        1,
+        &[
+            "line 102",
+            "between thousands",
+            "--decimal , or --decimal .",
+        ],
+    );
     let mean = |arguments: &[&str]| {
         let document = folder.json(&[&["inspect", "--json"], arguments].concat());
         document["channels"][0]["mean"].as_f64().unwrap()
@@ -252,8 +259,14 @@ fn a_point_that_may_stand_between_thousands_is_asked_for() {
     let expected = f64::from((0..400).map(torque).sum::<i32>()) / 400.0;
     let read = mean(&["thousands.csv", "--decimal", ","]);
     assert!((read - expected).abs() < 1e-9, "{read}");
-    folder.write("points.csv", table(&|i| format!("{:.3}", f64::from(torque(i)) / 1e3)));
-    folder.write("shortest.csv", table(&|i| format!("{}", f64::from(torque(i)) / 1e3)));
+    folder.write(
+        "points.csv",
+        table(&|i| format!("{:.3}", f64::from(torque(i)) / 1e3)),
+    );
+    folder.write(
+        "shortest.csv",
+        table(&|i| format!("{}", f64::from(torque(i)) / 1e3)),
+    );
     for name in ["points.csv", "shortest.csv"] {
         let read = mean(&[name]);
         assert!((read - expected / 1e3).abs() < 1e-9, "{name}: {read}");

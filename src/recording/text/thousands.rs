@@ -16,9 +16,11 @@ const GROUP: usize = 3;
 /// If the table is such a one.
 pub(super) fn refuse(head: &Head, table: &Table, others: &[&Table]) -> Result<(), Failure> {
     let dialect = table.dialect;
-    let Some(other) = others.iter().map(|other| other.dialect).find(|other| {
-        other.delimiter == dialect.delimiter && other.decimal != dialect.decimal
-    }) else {
+    let Some(other) = others
+        .iter()
+        .map(|other| other.dialect)
+        .find(|other| other.delimiter == dialect.delimiter && other.decimal != dialect.decimal)
+    else {
         return Ok(());
     };
     let (place, name) = match dialect.decimal {
