@@ -19,10 +19,10 @@ const EDGE: f64 = 1.2;
 const STEP: f64 = 1.005;
 /// Density behind the end over that before the edge: no recorder's low-pass falls so far within one edge.
 const FALL: f64 = 1e-4;
-/// Where the edge has fallen so far, over the top: `(1 + cos πx)/2 = √FALL` at `x = 0.936` of the edge.
-const FALLEN: f64 = 1.187;
-/// Frequencies over the top that was found up to which an order counts as within the band: the edge takes 2 % there.
-const NEAR: f64 = 1.015;
+/// Where the edge has fallen so far, over the top: the gain is `√FALL` at 0.72 of the edge's width (`torqcomp_dsp::Band::gain`).
+const FALLEN: f64 = 1.144;
+/// Frequencies over the top that was found up to which an order counts as within the band: the edge takes 1 % at 1.056.
+const NEAR: f64 = 1.05;
 
 /// A warning if orders lie where the spectrum of the record has been cut off.
 pub(super) fn warning(
@@ -43,7 +43,7 @@ pub(super) fn warning(
         Warning::new(
             "orders-beyond-band",
             format!(
-                "above about {} Hz the record was filtered, so that little or nothing is left of {}; compensate again with \
+                "above about {} Hz the record was filtered: part or all is gone of {}; compensate again with \
                  --band {} or more, or give harmonics the recorded channel and --stand",
                 rounded(top_hz, 2),
                 super::named(&names),
