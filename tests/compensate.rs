@@ -327,6 +327,16 @@ fn a_signal_above_the_band_and_an_unknown_noise_are_said() {
         "300",
     ]);
     ran.says(0, &["signal-above-band", "300 Hz"]);
+    // The edge of this band reaches to 630 Hz, and takes nearly all of the second line.
+    let edge = [
+        "compensate",
+        "in.csv",
+        "--stand",
+        "stand.toml",
+        "--band",
+        "525",
+    ];
+    folder.run(&edge).says(0, &["signal-above-band", "525 Hz"]);
     let ran = folder.run(&[
         "compensate",
         "in.csv",

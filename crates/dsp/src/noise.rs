@@ -78,7 +78,8 @@ pub struct RecordNoise {
     pub compensated_rms: f64,
     /// Rms of the record within the band, without its mean, noise included.
     pub in_band_rms: f64,
-    /// Rms of what the record has above the band beside its noise.
+    /// Rms of what the record has above the band beside its noise, in the band's edge as far as it is removed:
+    /// `√(∫(S − S₀)(1 − W)² df)`.
     pub above_band_rms: f64,
     /// Ranges within the band where the record does not rise 3 dB above the floor, in Hz.
     pub lost_hz: Vec<[f64; 2]>,
@@ -114,8 +115,8 @@ impl RecordNoise {
                 .sqrt()
         };
         let above_mean_square: f64 = density
-            .between(band.end_hz(), to_hz)
-            .map(|(_, v)| (v - floor_density) * density.step_hz)
+            .between(band.top_hz(), to_hz)
+            .map(|(f, v)| (v - floor_density) * (1.0 - band.gain(f)).powi(2) * density.step_hz)
             .sum();
         Some(Self {
             floor_per_root_hz: floor_density.sqrt(),
@@ -284,17 +285,16 @@ mod tests {
 
     #[test]
     fn a_signal_above_the_band_is_seen() {
-        let record: Vec<f64> = white(0.1, 100_000)
-            .iter()
-            .enumerate()
-            .map(|(i, n)| n + 2.0 * (std::f64::consts::TAU * 5000.0 * i as f64 / RATE).cos())
-            .collect();
-        let density = welch(&record, RATE, 4096).unwrap();
-        let found = RecordNoise::of(&filter(2400.0), &density).unwrap();
-        assert!(
-            (found.above_band_rms / 2.0_f64.sqrt() - 1.0).abs() < 0.02,
-            "{found:?}"
-        );
+        // The edge reaches from 2400 to 2880 Hz, and takes half of the amplitude in its middle.
+        for (frequency_hz, rms) in [(5000.0, 2.0_f64.sqrt()), (2640.0, 0.5_f64.sqrt())] {
+            let angle = |i: usize| std::f64::consts::TAU * frequency_hz * i as f64 / RATE;
+            let noise = white(0.1, 100_000);
+            let record = noise.iter().enumerate();
+            let record: Vec<f64> = record.map(|(i, n)| n + 2.0 * angle(i).cos()).collect();
+            let density = welch(&record, RATE, 4096).unwrap();
+            let found = RecordNoise::of(&filter(2400.0), &density).unwrap();
+            assert!((found.above_band_rms / rms - 1.0).abs() < 0.02, "{found:?}");
+        }
     }
 
     #[test]

@@ -14,9 +14,14 @@
 //!
 //! `N` is white. It is taken from where the record is weakest: the mean of the three least medians of 16 equal parts
 //! between 2 and 98 % of half the rate.
+//!
+//! Rounding to steps `q` adds `q²/12` (W. R. Bennett, *Bell Syst. Tech. J.* 27 (1948), 446), white where noise spreads it.
+//! Where a quiet record repeats itself, it stands in lines far above the noise instead. Lines above a frequency that all
+//! together have no more power than that are no signal there: `N` is then `q²/(6 f_s)`, and `P` no more.
 
 use super::{Band, EDGE, Edge, FALLBACK_FRACTION};
 use crate::compensate::Inverse;
+use crate::quality::quantisation::quantisation;
 use crate::spectrum::{Density, welch_steep};
 
 /// Frequencies of the grid a decade.
@@ -34,6 +39,8 @@ const FLOOR_RANGE: [f64; 2] = [0.02, 0.98];
 const BLOCKS: [usize; 2] = [64, 1 << 15];
 /// Blocks that a record is long, at least.
 const RECORD_BLOCKS: usize = 4;
+/// Power of lines over that of rounding up to which they may be due to it: an error of a few levels is not spread evenly.
+const ROUNDING: f64 = 2.0;
 /// Signal over its standard deviation from noise alone, below which a record holds none.
 const SIGNIFICANT: f64 = 6.0;
 /// Gain for noise up to which a band reaches that is chosen without a record.
@@ -85,7 +92,30 @@ impl BandSearch {
         }
         let block = (longest_here / 2 + 1).next_power_of_two().min(longest);
         let density = welch_steep(samples, rate_hz, block).ok()?;
-        Self::of_density(&density, rate_hz, inverse)
+        let mut search = Self::of_density(&density, rate_hz, inverse)?;
+        if let Some(found) = quantisation(samples) {
+            search.count_rounding(found.step.powi(2) / 12.0);
+            search.sum();
+        }
+        Some(search)
+    }
+
+    /// Counts lines that may be due to rounding as noise.
+    fn count_rounding(&mut self, rounding_power: f64) {
+        let lines = self.density.len();
+        let spread = rounding_power / (lines as f64 * self.step_hz);
+        let mut power = ROUNDING * (spread - self.floor) * lines as f64;
+        if power <= 0.0 {
+            return;
+        }
+        for value in self.density.iter_mut().rev() {
+            power -= (*value - self.floor).max(0.0);
+            if power < 0.0 {
+                break;
+            }
+            *value = spread;
+        }
+        self.floor = spread;
     }
 
     /// Of the density of a record. `None` if it has too few lines or no noise.
@@ -302,6 +332,24 @@ mod tests {
         assert_eq!(best(&flat(-1.0, |_| 0.0)), None);
         assert!(BandSearch::of_record(&[1.0; 10], RATE, &inverse()).is_none());
         assert!(BandSearch::of_record(&[1.0; 10_000], RATE, &inverse()).is_none());
+    }
+
+    /// Two sines of 3 and 1.5 steps at 50 and 150 Hz, rounded without noise to spread it: lines at all multiples of 50 Hz.
+    #[test]
+    fn lines_of_rounding_are_no_signal() {
+        let angle = |i: usize| std::f64::consts::TAU * 50.0 * i as f64 / RATE;
+        let sample = |i: usize| {
+            0.003 * (i as f64).sin() + 3.0 * angle(i).sin() + 1.5 * (3.0 * angle(i)).sin()
+        };
+        let record: Vec<f64> = (0..20_000).map(|i| sample(i).floor()).collect();
+        let found = BandSearch::of_record(&record, RATE, &inverse()).unwrap();
+        let found = found.best().unwrap();
+        assert!((130.0..500.0).contains(&found.top_hz), "{found:?}");
+        // Spread evenly: ∫ (1 + (f/100)²)² df / (6 f_s).
+        let f = found.top_hz;
+        let noise = (f + 2.0 * f.powi(3) / 3e4 + f.powi(5) / 5e8) / (6.0 * RATE);
+        let edge = found.noise_rms / noise.sqrt();
+        assert!((1.0..1.4).contains(&edge), "{found:?} {edge}");
     }
 
     #[test]
