@@ -167,6 +167,26 @@ fn damping_in_one_direction_is_drawn() {
     assert!(apart < 4.0, "{apart} {points:?}");
 }
 
+/// Friction that grows with the displacement, or changes along it, is no dry friction, and not nothing.
+#[test]
+fn friction_that_depends_on_the_place_is_neither_explained_nor_nothing() {
+    let laws: [(&str, Law); 2] = [
+        ("grows", |x, v| 0.02 * x.abs() * (20.0 * v).tanh()),
+        ("changes", |x, v| {
+            0.004 * (1.0 + 0.8 * (3.0 * x).sin()) * (20.0 * v).tanh()
+        }),
+    ];
+    for (name, law) in laws {
+        let (report, _) = diagnosed(law, &Folder::new(), &[]);
+        let (verdict, effects) = (&report["verdict"], &report["effects"]);
+        println!("{name} {verdict} {effects} {}", report["error"]);
+        assert!(
+            verdict == "unexplained" || verdict == "partly-explained",
+            "{name}: {verdict} {effects}"
+        );
+    }
+}
+
 /// Where a law explains the records, there is nothing to draw.
 #[test]
 fn a_listed_law_needs_no_surface() {

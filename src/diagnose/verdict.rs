@@ -163,7 +163,7 @@ impl SearchState {
     }
 
     /// Whether nothing but white noise is left.
-    fn is_at_noise(&self) -> bool {
+    pub(super) fn is_at_noise(&self) -> bool {
         let is_white = self.tests.white && !self.tests.follows_anything();
         let is_at = |f: NoiseFloor| self.after.compared_rms() <= AT_FLOOR * f.rms;
         is_white && self.noise_floor.is_some_and(is_at)
@@ -186,11 +186,12 @@ impl SearchState {
                 .surface
                 .as_ref()
                 .is_some_and(|asked| asked.outdoes_laws);
-        let is_known_left = is_unsettled || is_suspected || is_outdone;
+        let is_shown = self.surface.as_ref().is_some_and(|asked| asked.shows_lack);
+        let is_known_left = is_unsettled || is_suspected || is_outdone || is_shown;
         let is_left = is_known_left || self.leaves(&self.after, &self.tests);
         if self.after.effect_names().is_empty() {
             let is_left = self.leaves(&self.before, &self.tests_before);
-            let is_missing = is_suspected || is_left || self.is_refuted || is_outdone;
+            let is_missing = is_suspected || is_left || self.is_refuted || is_outdone || is_shown;
             return match is_missing {
                 true => Verdict::Unexplained,
                 false => Verdict::NothingMissing,

@@ -8,7 +8,7 @@ use crate::diagnose::record::StandRecord;
 use crate::diagnose::score::ScoredModel;
 use crate::diagnose::search::reject_all;
 use crate::diagnose::structure::EffectForm;
-use crate::diagnose::verdict::{noise_rms, remains};
+use crate::diagnose::verdict::noise_rms;
 use crate::diagnose::{ForceSurface, SearchState};
 
 /// A surface that explains more than the laws beside which it was fitted.
@@ -18,6 +18,8 @@ pub struct AskedSurface {
     model: ScoredModel,
     /// Whether they are withdrawn for it.
     pub outdoes_laws: bool,
+    /// Whether it shows that they are not all.
+    pub shows_lack: bool,
     /// What it says of the held-out records, once it is judged, if they bear it out.
     report: Option<ForceSurface>,
 }
@@ -27,7 +29,7 @@ impl SearchState {
     /// explains far more than they do.
     pub fn ask_surface(&mut self, threads: usize) {
         let model = self.after.clone();
-        let is_open = remains(&model, &self.tests, self.noise_floor) || self.suspected.is_some();
+        let is_open = !self.is_at_noise() || self.suspected.is_some();
         if !is_open || !self.can_ask(&model) {
             return;
         }
@@ -41,6 +43,7 @@ impl SearchState {
             self.withdraw_laws(&surface);
         }
         self.surface = Some(AskedSurface {
+            shows_lack: surface.shows_lack(&model, threads),
             surface,
             model,
             outdoes_laws,
@@ -80,12 +83,12 @@ impl SearchState {
         let model = asked.model.clone().compared_on_holdout(&self.records);
         asked.report = model.and_then(|m| asked.surface.report(&m, asked.outdoes_laws));
         if asked.outdoes_laws && asked.report.is_none() {
-            self.after = asked.model;
+            asked.outdoes_laws = false;
+            self.after = asked.model.clone();
             self.tests = crate::diagnose::tests(&self.after);
             self.without.clear();
-        } else {
-            self.surface = Some(asked);
         }
+        self.surface = Some(asked);
     }
 
     /// The surface that the held-out records bear out; where no effect is named in the end, one in place of all.

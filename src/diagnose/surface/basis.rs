@@ -6,6 +6,13 @@ use super::motion::MeasuredMotion;
 pub const KNOTS: [usize; 2] = [33, 17];
 /// Powers of displacement and speed in products.
 const PRODUCTS: [[i32; 2]; 6] = [[1, 1], [1, 2], [2, 1], [1, 3], [2, 2], [3, 1]];
+/// Knots over displacement of what turns round with the direction of motion.
+const TURNING: usize = 11;
+/// Speed over the largest from which on the direction of motion counts in full.
+const TURNED: f64 = 1.0 / 64.0;
+/// Part of the samples, and fewest of them, that lie beyond the outer knots at each end.
+const OUTSIDE: f64 = 1e-3;
+const FEWEST: usize = 16;
 /// Thresholds of slipping elements, over the largest displacement.
 const SLIPS: [f64; 3] = [0.05, 0.15, 0.4];
 /// Corner of a slow memory over the natural frequency.
@@ -39,14 +46,8 @@ impl SurfacePart {
 
 impl Grid {
     pub fn of(motions: &[MeasuredMotion]) -> Self {
-        let limits = |of: fn(&MeasuredMotion) -> &[f64]| {
-            let all = motions.iter().flat_map(|m| of(m).iter());
-            all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| {
-                [low.min(*x), high.max(*x)]
-            })
-        };
-        let [low, high] = limits(|m| &m.x);
-        let [slow, fast] = limits(|m| &m.speed);
+        let [low, high] = reached(motions, |m| &m.x);
+        let [slow, fast] = reached(motions, |m| &m.speed);
         let place = |k: usize, count: usize| k as f64 / (count - 1) as f64;
         let fastest = fast.max(-slow);
         // Friction changes where the speed is small.
@@ -71,7 +72,7 @@ impl Grid {
         let [displacements, speeds] = KNOTS;
         let mut parts = vec![SurfacePart::Displacement; displacements];
         parts.extend(vec![SurfacePart::Speed; speeds]);
-        parts.extend([SurfacePart::Both; PRODUCTS.len()]);
+        parts.extend([SurfacePart::Both; PRODUCTS.len() + TURNING]);
         parts.extend([SurfacePart::History; SLIPS.len() + 1]);
         parts
     }
@@ -83,14 +84,44 @@ impl Grid {
         all.extend(hats(&self.speed.at, &motion.speed, largest));
         all.extend(PRODUCTS.map(|[i, j]| {
             let pairs = motion.x.iter().zip(&motion.speed);
-            let product =
-                |(x, v): (&f64, &f64)| largest * (x / largest).powi(i) * (v / fastest).powi(j);
+            let part = |value: &f64, largest: f64| (value / largest).clamp(-1.0, 1.0);
+            let product = |(x, v): (&f64, &f64)| {
+                largest * part(x, largest).powi(i) * part(v, fastest).powi(j)
+            };
             pairs.map(product).collect()
         }));
+        all.extend(self.turning(motion));
         all.extend(SLIPS.map(|slip| slipping(&motion.x, slip * largest)));
         all.push(relaxing(&motion.x, SLOW * step));
         all
     }
+
+    /// Functions of displacement that change sign with the direction of motion: friction that depends on the place.
+    fn turning(&self, motion: &MeasuredMotion) -> Vec<Vec<f64>> {
+        let [largest, fastest] = self.largest;
+        let (first, last) = (self.x.at[0], self.x.at[self.x.at.len() - 1]);
+        let knot = |k: usize| first + (last - first) * k as f64 / (TURNING - 1) as f64;
+        let knots: Vec<f64> = (0..TURNING).map(knot).collect();
+        let mut all = hats(&knots, &motion.x, largest);
+        for hat in &mut all {
+            for (value, speed) in hat.iter_mut().zip(&motion.speed) {
+                *value *= (speed / (TURNED * fastest)).clamp(-1.0, 1.0);
+            }
+        }
+        all
+    }
+}
+
+/// The range of a motion but for its outermost values: what few samples tell of a place beyond must not be carried on to where
+/// another record goes.
+fn reached(motions: &[MeasuredMotion], of: fn(&MeasuredMotion) -> &[f64]) -> [f64; 2] {
+    let mut all: Vec<f64> = motions.iter().flat_map(of).copied().collect();
+    let outside = (OUTSIDE * all.len() as f64).ceil() as usize;
+    let outside = outside.max(FEWEST).min((all.len() - 1) / 2);
+    let last = all.len() - 1 - outside;
+    let low = *all.select_nth_unstable_by(outside, f64::total_cmp).1;
+    let high = *all.select_nth_unstable_by(last, f64::total_cmp).1;
+    [low, high]
 }
 
 impl Knots {

@@ -19,6 +19,7 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use schemars::JsonSchema;
 use serde::Serialize;
+use statrs::statistics::Statistics;
 use torqcomp_dsp::{dot, rms};
 use torqcomp_model::Chain;
 use torqcomp_model::effects::Stage;
@@ -60,6 +61,13 @@ const PLACES: [SurfacePlace; 3] = [
 const PLAIN: usize = 3;
 /// Minimum significance with which a surface leaves less than the best laws.
 const LEAST_SIGNIFICANCE: f64 = 3.0;
+/// Largest part of a model's error power that a surface leaves where it shows that the model lacks something: what a step of
+/// integration or an interpolated input takes from a right law is less.
+const SHOWN: f64 = 0.95;
+/// Shifts of the residuals against the motion, and how far what a surface leaves must be below what it leaves of them, over
+/// the scatter of that.
+const SHIFTS: usize = 19;
+const LEAST_OVER_SHIFTED: f64 = 4.0;
 /// Largest part of the laws' excess error power that a surface that outdoes them leaves.
 const LEFT: f64 = 0.5;
 
@@ -76,12 +84,21 @@ pub struct Surface {
     shares: [f64; SurfacePart::ALL.len()],
 }
 
+/// Where the motion is taken from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum MotionSource {
+    /// The record, along what passes the stand. What does not has the noise of the record itself in it: there it is the model.
+    Record,
+    Model,
+}
+
 /// A model without the laws that a surface stands in for.
 struct Background<'a> {
     model: &'a ScoredModel,
     linear: Chain,
     terms: NuisanceTerms,
     place: SurfacePlace,
+    source: MotionSource,
 }
 
 impl Surface {
@@ -94,15 +111,7 @@ impl Surface {
     }
 
     fn at(place: SurfacePlace, model: &ScoredModel) -> Option<Self> {
-        let background = Background::of(model, place);
-        let records = model.train.iter().map(|residual| cut(&residual.record));
-        let records: Vec<StandRecord> = records.collect();
-        let motions = records.iter().map(|record| background.motion(record));
-        let motions: Vec<MeasuredMotion> = motions.collect::<Option<_>>()?;
-        let grid = Grid::of(&motions);
-        let both = records.iter().zip(&motions);
-        let columns = both.map(|(record, motion)| background.columns(record, motion, &grid));
-        let regression = Regression::of(columns.collect(), PLAIN, model.train_rms().powi(2));
+        let (grid, regression) = regression(MotionSource::Record, place, model)?;
         let (solution, unseen) = regression.solve()?;
         let parts = Grid::parts();
         let whole = regression.left_with(&solution, |_| true)?;
@@ -134,6 +143,36 @@ impl Surface {
             .all(|before| compare(before, &self.unseen).significance() >= LEAST_SIGNIFICANCE)
     }
 
+    /// Whether a surface at its place shows that a model lacks something in the training records, in samples that it was not
+    /// fitted to.
+    ///
+    /// It goes along the motion of the model, with which noise that the stand answers does not come in. It must leave far
+    /// less than of the same residuals shifted against the motion: what rings for long is predicted from what is beside it.
+    pub fn shows_lack(&self, model: &ScoredModel, threads: usize) -> bool {
+        let along_model = regression(MotionSource::Model, self.place, model);
+        let Some((_, regression)) = along_model else {
+            return false;
+        };
+        let left = |regression: &Regression| Some(regression.solve()?.1);
+        let Some((unseen, plain)) = left(&regression).zip(regression.unseen_by_free_columns())
+        else {
+            return false;
+        };
+        let is_shown = [&seen(&model.train), &plain]
+            .iter()
+            .all(|before| shows(before, &unseen));
+        is_shown && {
+            let shifted = parallel(SHIFTS, threads, |k| {
+                let part = (k + 1) as f64 / (SHIFTS + 1) as f64;
+                left(&regression.of_others(shifted(&regression, model, part)))
+            });
+            let sum = |left: Vec<f64>| dot(&left, &left);
+            let shifted: Vec<f64> = shifted.into_iter().flatten().map(sum).collect();
+            let (mean, std) = (shifted.iter().mean(), shifted.iter().std_dev());
+            mean - sum(unseen) > LEAST_OVER_SHIFTED * std
+        }
+    }
+
     /// Whether it explains so much more than a model that no law of that is to be named: not where a law leaves little but noise.
     pub fn outdoes(&self, model: &ScoredModel, noise_rms: f64) -> bool {
         let excess = |rms: f64| rms.powi(2) - noise_rms.powi(2);
@@ -145,7 +184,7 @@ impl Surface {
 
     /// What it leaves of the records on which a model is compared, by the motion that was measured there.
     pub fn left_of_compared(&self, model: &ScoredModel) -> Option<Vec<f64>> {
-        let background = Background::of(model, self.place);
+        let background = Background::of(model, self.place, MotionSource::Record);
         let left = model.compared.iter().map(|residual| {
             let record = cut(&residual.record);
             let motion = background.motion(&record)?;
@@ -155,6 +194,44 @@ impl Surface {
         });
         Some(left.collect::<Option<Vec<_>>>()?.concat())
     }
+}
+
+/// The columns of a surface, and the training records that these are to explain.
+fn regression(
+    source: MotionSource,
+    place: SurfacePlace,
+    model: &ScoredModel,
+) -> Option<(Grid, Regression)> {
+    let background = Background::of(model, place, source);
+    let records = model.train.iter().map(|residual| cut(&residual.record));
+    let records: Vec<StandRecord> = records.collect();
+    let motions = records.iter().map(|record| background.motion(record));
+    let motions: Vec<MeasuredMotion> = motions.collect::<Option<_>>()?;
+    let grid = Grid::of(&motions);
+    let both = records.iter().zip(&motions);
+    let columns = both.map(|(record, motion)| background.columns(record, motion, &grid));
+    let regression = Regression::of(columns.collect(), PLAIN, model.train_rms().powi(2));
+    Some((grid, regression))
+}
+
+/// Training records with the residuals of a model shifted in a circle by a part of their length.
+fn shifted(regression: &Regression, model: &ScoredModel, part: f64) -> Vec<Vec<f64>> {
+    let both = regression.targets().iter().zip(model.train.iter());
+    let shifted = |(target, residual): (&Vec<f64>, &RecordResidual)| {
+        let left = &residual.samples[..target.len()];
+        let by = (part * left.len() as f64) as usize;
+        let others = left[by..].iter().chain(&left[..by]);
+        let samples = target.iter().zip(left).zip(others);
+        samples.map(|((y, r), other)| y - r + other).collect()
+    };
+    both.map(shifted).collect()
+}
+
+/// Whether a surface leaves so much less than a model that the model lacks something.
+fn shows(before: &[f64], left: &[f64]) -> bool {
+    let compared = compare(before, left);
+    let [power, left] = compared.sums();
+    left <= SHOWN * power && compared.significance() >= LEAST_SIGNIFICANCE
 }
 
 /// Samples of a record that a surface is fitted to: more would take memory, and say little more.
@@ -189,20 +266,20 @@ pub fn is_law(stage: Stage) -> bool {
 }
 
 impl<'a> Background<'a> {
-    fn of(model: &'a ScoredModel, place: SurfacePlace) -> Self {
+    fn of(model: &'a ScoredModel, place: SurfacePlace, source: MotionSource) -> Self {
         let (linear, terms) = reduced(model, |stage| !is_law(stage));
         Self {
             model,
             linear,
             terms,
             place,
+            source,
         }
     }
 
-    /// The motion along a record. What does not pass the stand has the noise of the record itself in it: there it is that of the
-    /// model.
+    /// The motion along a record.
     fn motion(&self, record: &StandRecord) -> Option<MeasuredMotion> {
-        let is_corrected = self.place == SurfacePlace::Stand;
+        let is_corrected = self.source == MotionSource::Record && self.place == SurfacePlace::Stand;
         MeasuredMotion::along(self.model, record, is_corrected)
     }
 

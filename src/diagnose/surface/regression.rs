@@ -1,6 +1,7 @@
 //! Least squares with many columns, and what it leaves of samples that it has not seen.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 use torqcomp_dsp::dot;
@@ -14,14 +15,18 @@ const STRETCHES: usize = 24;
 const EXPECTED: [f64; 10] = [1.0, 0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 1e-5, 1e-8];
 /// The same where the functions are to give nothing.
 const NOTHING: f64 = 1e-100;
+/// Torque over the largest of the spring that is expected of a function at most, however few samples there are to tell.
+const LARGEST: f64 = 10.0;
 /// What a coefficient of the plain stand costs, in noise powers: next to nothing.
 const FREE: f64 = 1e-6;
 
 /// Columns and what they are to explain, record by record.
 pub struct Regression {
-    records: Vec<(Vec<Vec<f64>>, Vec<f64>)>,
-    /// Gram matrix and products with what is to be explained, of each fold.
-    folds: Vec<(DMatrix<f64>, DVector<f64>)>,
+    columns: Arc<Vec<Vec<Vec<f64>>>>,
+    targets: Vec<Vec<f64>>,
+    /// Gram matrix of each fold, and the products of its columns with what is to be explained.
+    grams: Arc<Vec<DMatrix<f64>>>,
+    products: Vec<DVector<f64>>,
     /// The first columns, which are free.
     free: usize,
     noise_power: f64,
@@ -38,14 +43,14 @@ pub struct Solution {
 
 impl Regression {
     pub fn of(records: Vec<(Vec<Vec<f64>>, Vec<f64>)>, free: usize, noise_power: f64) -> Self {
-        let count = records.first().map_or(0, |(columns, _)| columns.len());
-        let zero = || (DMatrix::zeros(count, count), DVector::zeros(count));
-        let mut folds: Vec<_> = (0..FOLDS).map(|_| zero()).collect();
-        for (columns, target) in &records {
-            for (stretch, range) in stretches(target.len()).enumerate() {
-                let (gram, right) = &mut folds[stretch % FOLDS];
+        let (columns, targets): (Vec<_>, Vec<_>) = records.into_iter().unzip();
+        let count = columns.first().map_or(0, |columns: &Vec<_>| columns.len());
+        let mut grams = vec![DMatrix::zeros(count, count); FOLDS];
+        for columns in &columns {
+            let length = columns.first().map_or(0, Vec::len);
+            for (stretch, range) in stretches(length).enumerate() {
+                let gram = &mut grams[stretch % FOLDS];
                 for (i, one) in columns.iter().enumerate() {
-                    right[i] += dot(&one[range.clone()], &target[range.clone()]);
                     for (j, other) in columns[..=i].iter().enumerate() {
                         gram[(i, j)] += dot(&one[range.clone()], &other[range.clone()]);
                         gram[(j, i)] = gram[(i, j)];
@@ -53,12 +58,35 @@ impl Regression {
                 }
             }
         }
+        let (columns, grams) = (Arc::new(columns), Arc::new(grams));
         Self {
-            records,
-            folds,
+            products: products(&columns, &targets, count),
+            columns,
+            targets,
+            grams,
             free,
             noise_power,
         }
+    }
+
+    /// The same columns, which are to explain something else.
+    pub fn of_others(&self, others: Vec<Vec<f64>>) -> Self {
+        Self {
+            columns: Arc::clone(&self.columns),
+            products: products(&self.columns, &others, self.count()),
+            targets: others,
+            grams: Arc::clone(&self.grams),
+            ..*self
+        }
+    }
+
+    pub fn targets(&self) -> &[Vec<f64>] {
+        &self.targets
+    }
+
+    /// Number of columns.
+    fn count(&self) -> usize {
+        self.grams[0].nrows()
     }
 
     /// The solution with the expectation that predicts unseen samples best, and what it leaves of these.
@@ -92,25 +120,31 @@ impl Regression {
         let gram = gram.select_rows(&kept).select_columns(&kept);
         let right = right.select_rows(&kept);
         let found = gram.cholesky()?.solve(&right);
-        let whole: f64 = self.records.iter().map(|(_, y)| dot(y, y)).sum();
-        Some(whole - found.dot(&right))
+        Some(self.power() - found.dot(&right))
     }
 
     /// What the squares of the coefficients cost where a function is expected to give so much of the record.
     fn ridge(&self, expected: f64) -> DVector<f64> {
-        let whole: f64 = self.records.iter().map(|(_, y)| dot(y, y)).sum();
-        let size = |k: usize| self.folds.iter().map(|(gram, _)| gram[(k, k)]).sum::<f64>();
-        let count = self.folds[0].1.len();
+        let whole = self.power();
+        let size = |k: usize| self.grams.iter().map(|gram| gram[(k, k)]).sum::<f64>();
         let cost = |k: usize| match k < self.free {
             true => FREE * self.noise_power,
-            false => self.noise_power * size(k) / (whole * expected * expected),
+            false => {
+                let of_record = size(k) / (whole * expected * expected);
+                self.noise_power * of_record.max(1.0 / (LARGEST * LARGEST))
+            }
         };
-        DVector::from_fn(count, |k, _| cost(k).max(f64::MIN_POSITIVE))
+        DVector::from_fn(self.count(), |k, _| cost(k).max(f64::MIN_POSITIVE))
+    }
+
+    /// Sum of squares of what is to be explained.
+    fn power(&self) -> f64 {
+        self.targets.iter().map(|target| dot(target, target)).sum()
     }
 
     fn sums(&self, without: Option<usize>, ridge: &DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
         let mut sum = (DMatrix::from_diagonal(ridge), DVector::zeros(ridge.len()));
-        for (k, (gram, right)) in self.folds.iter().enumerate() {
+        for (k, (gram, right)) in self.grams.iter().zip(&self.products).enumerate() {
             if Some(k) != without {
                 sum.0 += gram;
                 sum.1 += right;
@@ -134,7 +168,7 @@ impl Regression {
     /// What is left of each sample by the coefficients that were found without it.
     fn unseen(&self, without: &[DVector<f64>]) -> Vec<f64> {
         let mut all = Vec::new();
-        for (columns, target) in &self.records {
+        for (columns, target) in self.columns.iter().zip(&self.targets) {
             let mut left = target.clone();
             for (stretch, range) in stretches(target.len()).enumerate() {
                 subtract(&without[stretch % FOLDS], columns, range, &mut left);
@@ -164,6 +198,20 @@ impl Solution {
         let values = of(&self.coefficients).into_iter().enumerate();
         values.map(|(k, value)| [value, std(k)]).collect()
     }
+}
+
+/// Products of the columns with targets in each fold.
+fn products(columns: &[Vec<Vec<f64>>], targets: &[Vec<f64>], count: usize) -> Vec<DVector<f64>> {
+    let mut products = vec![DVector::zeros(count); FOLDS];
+    for (columns, target) in columns.iter().zip(targets) {
+        for (stretch, range) in stretches(target.len()).enumerate() {
+            let product = &mut products[stretch % FOLDS];
+            for (sum, column) in product.iter_mut().zip(columns) {
+                *sum += dot(&column[range.clone()], &target[range.clone()]);
+            }
+        }
+    }
+    products
 }
 
 fn subtract(

@@ -30,8 +30,8 @@ impl Resemblance {
 
     pub fn damping_over_displacement() -> Self {
         Self::new(
-            "damping that depends on the displacement",
-            &["squeezed-damping"],
+            "friction or damping that depends on the displacement",
+            &["squeezed-damping", "coulomb-friction"],
         )
     }
 
