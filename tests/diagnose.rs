@@ -186,11 +186,14 @@ fn is_unexplained(report: &serde_json::Value, says: &str) {
 #[test]
 fn spikes_are_neither_noise_nor_an_effect() {
     let case = make(7, "none", 1).expect("the catalogue has it");
-    let height = 40.0 * noise_rms(&case);
-    let report = changed(&case, |_, row, y| {
-        y + if row % 613 == 300 { height } else { 0.0 }
-    });
-    is_unexplained(&report, "spikes");
+    // The last are weak, and so many that a line at their rate explains some of them.
+    for (spacing, height) in [(613, 40.0), (83, 7.0)] {
+        let height = height * noise_rms(&case);
+        let report = changed(&case, |_, row, y| {
+            y + if row % spacing == 30 { height } else { 0.0 }
+        });
+        is_unexplained(&report, "spikes");
+    }
 }
 
 #[test]

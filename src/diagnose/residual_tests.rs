@@ -18,8 +18,8 @@ const CONFIDENCE: f64 = 0.99;
 const COLOUR_LAGS: usize = 400;
 const COLOUR_PART: usize = 4;
 /// Share of a residual's power in its largest hundredth of samples above which it has spikes: 8 % of that of normal noise is
-/// there, 15 % of that of double-exponential noise.
-const SPIKES: f64 = 0.5;
+/// there, 16 % of that of double-exponential noise.
+const SPIKES: f64 = 0.2;
 /// Share of a residual's power, and standard deviations from zero, above which it depends on something.
 const DEPENDENT: [f64; 2] = [0.04, 4.0];
 /// Share of a residual's power above which the constants change, the zero drifts, or the noise follows the signal or its

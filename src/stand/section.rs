@@ -7,6 +7,17 @@ use torqcomp_model::{Estimate, Kind};
 
 use super::keys::{self, Takes};
 use crate::failure::{ErrorCode, Failure, did_you_mean};
+use crate::print::rounded;
+
+/// Names under which damping is known, and the damping ratio of each.
+const DAMPING_TERMS: [(&[&str], fn(f64) -> f64); 3] = [
+    (&["Q", "quality_factor", "quality"], |q| 0.5 / q),
+    (
+        &["log_decrement", "logarithmic_decrement", "decrement"],
+        |d| d / d.hypot(std::f64::consts::TAU),
+    ),
+    (&["loss_factor"], |eta| 0.5 * eta),
+];
 
 /// The text of a stand file and its name.
 pub struct SourceText<'a> {
@@ -235,11 +246,31 @@ impl<'a> Section<'a> {
             .find(|other| strsim::jaro_winkler(other, key) > 0.85);
         match misspelt {
             Some(other) => self.fail(other, format_args!("unknown key; did you mean \"{key}\"?")),
-            None => self.fail(
-                "",
-                format_args!("{key} is missing; write {key} = \"{}\"", kind.example()),
-            ),
+            None => {
+                let missing = format!("{key} is missing; write {key} = ");
+                match self.in_other_terms(key) {
+                    Some((other, value)) => self.fail(
+                        other,
+                        format_args!("{missing}\"{}\" in place of {other}", rounded(value, 4)),
+                    ),
+                    None => self.fail("", format_args!("{missing}\"{}\"", kind.example())),
+                }
+            }
         }
+    }
+
+    /// A number under a name that is no key, and what it is as a key that is.
+    fn in_other_terms(&self, key: &str) -> Option<(&'a str, f64)> {
+        let ratio = |(name, item): (&'a str, &'a Item)| {
+            let number = item.as_float().or(item.as_integer().map(|n| n as f64));
+            let number = number.or_else(|| item.as_str()?.trim().parse().ok())?;
+            DAMPING_TERMS
+                .iter()
+                .find(|(names, _)| names.iter().any(|n| n.eq_ignore_ascii_case(name)))
+                .map(|(_, as_ratio)| (name, as_ratio(number)))
+        };
+        let is_damping = key == "damping_ratio";
+        self.table.iter().filter(|_| is_damping).find_map(ratio)
     }
 
     /// A quantity that must be there and greater than zero.

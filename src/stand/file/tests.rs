@@ -110,6 +110,15 @@ fn missing_and_contradicting_entries_are_refused() {
         static_gain = \"1 V/V\"\n[calibration]\ntorque_per_volt = \"1 N m/V\"\n";
     assert!(message(twice).contains("keep one"));
     assert!(message("name = \"x\"\n").contains("schema"));
+    // 1/(2 Q) and δ/√(4π² + δ²).
+    for (other, ratio) in [
+        ("Q = 14", "0.03571"),
+        ("log_decrement = \"0.22\"", "0.03499"),
+    ] {
+        let decay = twice.replace("damping_ratio = 0.07", other);
+        let wanted = format!("write damping_ratio = \"{ratio}\" in place of");
+        assert!(message(&decay).contains(&wanted), "{other}");
+    }
     let effect = format!("{MECHANICS}[[effects]]\nkind = \"cubic-stiffness\"\n");
     assert!(message(&effect).contains("coefficient is missing"));
 }

@@ -181,12 +181,14 @@ pub(super) const SYMBOLS: &[Symbol] = &[
         FORCE,
     ),
     unit(&["cN"], &["centinewton", "centinewtons"], 1e-2, FORCE),
+    unit(&["daN"], &["decanewton", "decanewtons"], 10.0, FORCE),
     unit(&["dyn"], &["dyne", "dynes"], 1e-5, FORCE),
     // Torque, written as one word.
     unit(&["Nm"], &[], 1.0, TORQUE),
     unit(&["uNm"], &[], 1e-6, TORQUE),
     unit(&["mNm", "Nmm"], &[], 1e-3, TORQUE),
     unit(&["Ncm", "cNm"], &[], 1e-2, TORQUE),
+    unit(&["daNm"], &[], 10.0, TORQUE),
     unit(&["kgfm", "kpm"], &[], GRAVITY, TORQUE),
     unit(&["kgfcm", "kpcm"], &[], 1e-2 * GRAVITY, TORQUE),
     unit(&["gfcm"], &[], 1e-5 * GRAVITY, TORQUE),
@@ -318,8 +320,25 @@ pub(super) fn find(symbol: &str) -> Option<&'static Symbol> {
     })
 }
 
+/// Torques written as one word with what may be a mass, and the same with a force.
+const OF_WEIGHTS: [(&str, &str); 9] = [
+    ("kgm", "kgf m"),
+    ("kgcm", "kgf cm"),
+    ("gcm", "gf cm"),
+    ("lbin", "lbf in"),
+    ("inlb", "in lbf"),
+    ("lbft", "lbf ft"),
+    ("ftlb", "ft lbf"),
+    ("ozin", "ozf in"),
+    ("inoz", "in ozf"),
+];
+
 /// Known spelling nearest to an unknown one, if it is close enough to be meant.
 pub(super) fn nearest(symbol: &str) -> Option<&'static str> {
+    let is_it = |(word, _): &&(&str, &str)| symbol.eq_ignore_ascii_case(word);
+    if let Some((_, with_force)) = OF_WEIGHTS.iter().find(is_it) {
+        return Some(with_force);
+    }
     // Two letters of three wrong is no resemblance; a wrong case alone always is one.
     let limit = 1 + symbol.chars().count() / 4;
     let lower = symbol.to_lowercase();
@@ -374,5 +393,8 @@ mod tests {
         assert_eq!(nearest("lbff"), Some("lbf"));
         assert_eq!(nearest("newtns"), Some("newtons"));
         assert_eq!(nearest("xyzzy"), None);
+        // By spelling alone, "kgcm" is nearest to "kgfm", a hundred times as much.
+        assert_eq!(nearest("kgcm"), Some("kgf cm"));
+        assert_eq!(nearest("OzIn"), Some("ozf in"));
     }
 }
