@@ -10,7 +10,7 @@ use crate::failure::{ErrorCode, Failure, did_you_mean};
 use crate::print::rounded;
 
 /// Names under which damping is known, and the damping ratio of each.
-const DAMPING_TERMS: [(&[&str], fn(f64) -> f64); 3] = [
+const DAMPING_TERMS: [(&[&str], AsRatio); 3] = [
     (&["Q", "quality_factor", "quality"], |q| 0.5 / q),
     (
         &["log_decrement", "logarithmic_decrement", "decrement"],
@@ -18,6 +18,9 @@ const DAMPING_TERMS: [(&[&str], fn(f64) -> f64); 3] = [
     ),
     (&["loss_factor"], |eta| 0.5 * eta),
 ];
+
+/// A number in another term as a damping ratio.
+type AsRatio = fn(f64) -> f64;
 
 /// The text of a stand file and its name.
 pub struct SourceText<'a> {
