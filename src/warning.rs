@@ -109,6 +109,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["one-series", "the loads were applied once, so that the repeatability is unknown", "repeat the series"],
         ["one-weight", "one load beside no load shows no curve", "apply other loads as well"],
         ["poor-fit", "the model leaves much of the data unexplained", "check the columns; choose another range, band or degree"],
+        ["zero-drifts", "the reading without load drifts over the test", "warm up for longer, and read the zero of each record"],
         ["restart-in-decay", "the ringing starts again within a decay", "hit once, and check for lost samples and overload"],
         ["second-stroke", "the hammer struck twice; the recorded force includes both strokes", "repeat the hit if the coherence is low"],
         ["short-pulse", "pulses of the hammer are so short for the rate that frequencies above half of it fold into their spectrum", "record faster, or hit with a softer tip"],

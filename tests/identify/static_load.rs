@@ -161,6 +161,31 @@ fn the_last_digit_of_a_display_is_part_of_the_uncertainty() {
     assert!((value - 1.0 / 0.0488).abs() < 2.0 * std.unwrap(), "{value}");
 }
 
+/// 0.05 mV from row to row, beside 8 mV at the largest load; without it, nothing is said.
+#[test]
+fn a_zero_that_drifts_is_said() {
+    for (drift, is_said) in [(5e-5, true), (0.0, false)] {
+        let mut noise = Noise(5);
+        let loads = [0.0, 5.0, 10.0, 15.0, 20.0, 15.0, 10.0, 5.0, 0.0].repeat(3);
+        let mut row = |(i, load): (usize, &f64)| {
+            let reading = 1e-4 + 4e-4 * load + drift * i as f64 + 1e-6 * noise.normal();
+            format!("{load},{reading:.7}\n")
+        };
+        let rows: String = loads.iter().enumerate().map(&mut row).collect();
+        let folder = Folder::new();
+        folder.write("loads.csv", format!("load (N m),reading (V)\n{rows}"));
+        let args = "identify static loads.csv --load load --reading reading";
+        let ran = folder.run(&args.split(' ').collect::<Vec<_>>());
+        assert_eq!(
+            ran.stderr
+                .contains("[zero-drifts]: without load the reading went from 0.00009"),
+            is_said,
+            "{}",
+            ran.stderr
+        );
+    }
+}
+
 /// The square of such a reading is no number, nor is any residual.
 #[test]
 fn a_reading_beyond_all_instruments_is_refused() {

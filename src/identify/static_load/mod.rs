@@ -141,6 +141,7 @@ pub fn identify(
     poor(&mut result, quality.relative);
     linear::warn(&mut result, points, &curve, &steps);
     contradicted(&mut result, &fit);
+    drifting_zero(&mut result, &fit, points, &units.reading);
     result.fit = Some(quality);
     method(&mut result, &fit, points, &units.reading);
     result.terms = terms::terms(points, &steps, &curve);
@@ -173,6 +174,34 @@ fn walking_zero(fit: &mut LoadCurve, points: &[Point], largest: f64) {
         _ => rms(&about) / (count - 1.0).sqrt() * student(count - 1.0),
     };
     fit.std[0] = Some(std.max(of_readings));
+}
+
+/// Change of the reading without load over the largest deflection from which on the zero is said to drift.
+const DRIFTS: f64 = 5e-3;
+
+/// Warns of a zero that is another one at the end of the test.
+fn drifting_zero(result: &mut Identification, fit: &LoadCurve, points: &[Point], unit: &str) {
+    let largest = points.iter().map(|p| p.load.abs()).fold(0.0, f64::max);
+    let mut empty = points.iter().filter(|p| p.load.abs() <= NONE * largest);
+    let Some((first, last)) = empty.next().zip(empty.next_back()) else {
+        return;
+    };
+    let deflection = points.iter().map(|p| (p.reading - first.reading).abs());
+    let part = (last.reading - first.reading).abs() / deflection.fold(0.0, f64::max);
+    let is_walk = fit.has_even_drift || fit.spreads.drift > 0.0;
+    if is_walk && part > DRIFTS {
+        result.warn(
+            "zero-drifts",
+            format!(
+                "without load the reading went from {} to {} {unit} over the test, by {} of the largest deflection: the zero \
+                 is that of the middle of the test, and no other record has it; warm up for longer, and read the zero of each \
+                 record",
+                rounded(first.reading, 4),
+                rounded(last.reading, 4),
+                print::relative(part, 2)
+            ),
+        );
+    }
 }
 
 /// Scatter of the readings over their given uncertainty below, or above, which these are doubtful.
