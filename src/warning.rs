@@ -60,6 +60,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["zero-far-from-record", "the given record at no load is more than 10 times as large as anything in the record", "check the zero and its unit"],
         ["zero-not-used", "the record at no load is given in another quantity than the record's, and was not subtracted", "give it in the record's unit"],
         ["gain-not-used", "a calibration of recorded volts does not need the gain that is given", "leave the gain out, or divide the calibration by it"],
+        ["low-pass-order-assumed", "the order of the recorder's low-pass is not given; 1 was assumed", "add low_pass_order"],
         ["gain-assumed", "the gain between bridge and record is not given; 1 was assumed", "add [recorder] gain"],
         ["gage-factor-unusual", "the gage factor is that of no usual gage", "check it: metal foil has about 2"],
         ["modulus-unusual", "the elastic modulus is that of no usual beam", "check its unit: steel has 200 GPa"],

@@ -238,6 +238,8 @@ fn recorder_low_pass_and_delay_are_divided_out() {
         .collect();
     folder.write("in.csv", record(&shown, rate));
     let ran = folder.run(&["compensate", "in.csv", "--stand", "stand.toml", "-q"]);
+    // The stand file does not say that the low-pass is of first order.
+    ran.says(0, &["[low-pass-order-assumed]"]);
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     let torque = column(&ran.stdout, "compensated_torque_n_m");
     assert!(largest_difference(&torque[600..19_400], &acted[600..19_400]) < 1e-8);

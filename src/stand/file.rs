@@ -133,7 +133,22 @@ fn oddities(stand: &Stand) -> Vec<Warning> {
         .and_then(|m| m.much_left(&stand.file));
     let factor = stand.gage.as_ref().and_then(unusual_gage_factor);
     let gage = modulus.into_iter().chain(factor);
-    overdamped.chain(gage).chain(left).collect()
+    let order = assumed_order(stand);
+    overdamped.chain(gage).chain(left).chain(order).collect()
+}
+
+/// A warning if a low-pass is taken for an RC one.
+fn assumed_order(stand: &Stand) -> Option<Warning> {
+    stand.recorder.is_order_assumed.then(|| {
+        Warning::new(
+            "low-pass-order-assumed",
+            format!(
+                "{}: [recorder] low_pass does not say its order: 1, an RC low-pass, was assumed; give low_pass_order (filters \
+                 against aliasing have 2 to 8)",
+                stand.file
+            ),
+        )
+    })
 }
 
 /// What would convert the record twice, or give its zero twice.

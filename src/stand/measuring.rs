@@ -156,6 +156,7 @@ pub(super) fn recorder(section: Option<&Section>) -> Result<RecorderData, Failur
             cutoff_std_hz: None,
             delay_std_s: None,
             has_gain: false,
+            is_order_assumed: false,
             gain_relative_std: None,
             input_resistance_ohm: None,
             zero: None,
@@ -175,13 +176,13 @@ pub(super) fn recorder(section: Option<&Section>) -> Result<RecorderData, Failur
             "say where the low-pass is: low_pass = \"5 kHz\"",
         ));
     }
-    let order = u32::try_from(order.unwrap_or(1))
+    let poles = u32::try_from(order.unwrap_or(1))
         .map_err(|_| section.fail("low_pass_order", "expected a whole number from 1 to 16"))?;
     let delay = section.quantity("delay", Kind::Time)?;
     let delay_s = delay.as_ref().map_or(0.0, Estimate::value);
     let low_pass = cutoff.as_ref().map(|cutoff| LowPass {
         cutoff_hz: cutoff.value(),
-        order,
+        order: poles,
     });
     let recorder = Recorder::new(
         given.as_ref().map_or(1.0, Estimate::value),
@@ -198,6 +199,7 @@ pub(super) fn recorder(section: Option<&Section>) -> Result<RecorderData, Failur
         cutoff_std_hz: cutoff.and_then(|cutoff| cutoff.std_uncertainty()),
         delay_std_s: delay.and_then(|delay| delay.std_uncertainty()),
         has_gain: given.is_some(),
+        is_order_assumed: low_pass.is_some() && order.is_none(),
         gain_relative_std: given.and_then(|gain| gain.relative_std()),
         input_resistance_ohm,
         zero,

@@ -242,6 +242,8 @@ pub struct RecorderData {
     pub delay_std_s: Option<f64>,
     /// Whether the file gives the gain.
     pub has_gain: bool,
+    /// Whether the order of the low-pass is not in the file.
+    pub is_order_assumed: bool,
     /// Relative standard uncertainty of the gain, if known.
     pub gain_relative_std: Option<f64>,
     /// Input resistance in Ω that loads the bridge.
