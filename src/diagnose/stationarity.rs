@@ -212,6 +212,11 @@ fn shifted(values: &[f64], shift: usize) -> Vec<f64> {
         0 => 0,
         _ => (part * values.len() as f64) as usize,
     };
+    in_a_circle(values, by)
+}
+
+/// Values shifted by so many in a circle.
+pub(super) fn in_a_circle(values: &[f64], by: usize) -> Vec<f64> {
     [&values[by..], &values[..by]].concat()
 }
 

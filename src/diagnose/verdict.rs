@@ -181,17 +181,14 @@ impl SearchState {
     pub fn conclude(&mut self) -> Verdict {
         let is_suspected = self.suspected.is_some();
         let is_unsettled = !self.settled && !self.is_at_noise();
-        let is_outdone = self.is_outdone
-            || self
-                .surface
-                .as_ref()
-                .is_some_and(|asked| asked.outdoes_laws);
-        let is_shown = self.surface.as_ref().is_some_and(|asked| asked.shows_lack);
-        let is_known_left = is_unsettled || is_suspected || is_outdone || is_shown;
+        let surface = self.surface.as_ref();
+        let is_outdone =
+            self.is_outdone || surface.is_some_and(|asked| asked.outdoes_laws || asked.shows_lack);
+        let is_known_left = is_unsettled || is_suspected || is_outdone;
         let is_left = is_known_left || self.leaves(&self.after, &self.tests);
         if self.after.effect_names().is_empty() {
             let is_left = self.leaves(&self.before, &self.tests_before);
-            let is_missing = is_suspected || is_left || self.is_refuted || is_outdone || is_shown;
+            let is_missing = is_suspected || is_left || self.is_refuted || is_outdone;
             return match is_missing {
                 true => Verdict::Unexplained,
                 false => Verdict::NothingMissing,

@@ -33,6 +33,33 @@ pub(crate) fn takes(title: &str, name: &str) -> Option<Takes> {
     Some(*takes)
 }
 
+/// A conversion to the value of a key.
+type Convert = fn(f64) -> f64;
+
+/// Keys that are known by other names, and their value from those of that name.
+const OTHER_TERMS: [(&str, &[&str], Convert); 3] = [
+    ("damping_ratio", &["Q", "quality_factor", "quality"], |q| {
+        0.5 / q
+    }),
+    (
+        "damping_ratio",
+        &["log_decrement", "logarithmic_decrement", "decrement"],
+        |d| d / d.hypot(std::f64::consts::TAU),
+    ),
+    ("damping_ratio", &["loss_factor"], |eta| 0.5 * eta),
+];
+
+/// How the value of a key follows from what stands under another name.
+pub(super) fn from_other_term(key: &str, name: &str) -> Option<Convert> {
+    let is_it = |(of, names, _): &&(&str, &[&str], Convert)| {
+        *of == key && names.iter().any(|known| known.eq_ignore_ascii_case(name))
+    };
+    OTHER_TERMS
+        .iter()
+        .find(is_it)
+        .map(|(_, _, convert)| *convert)
+}
+
 use Takes::{Quantity, RecordQuantity, Section, Text, Whole, Word};
 
 /// All sections, in the order in which a stand file usually has them.

@@ -9,19 +9,6 @@ use super::keys::{self, Takes};
 use crate::failure::{ErrorCode, Failure, did_you_mean};
 use crate::print::rounded;
 
-/// Names under which damping is known, and the damping ratio of each.
-const DAMPING_TERMS: [(&[&str], AsRatio); 3] = [
-    (&["Q", "quality_factor", "quality"], |q| 0.5 / q),
-    (
-        &["log_decrement", "logarithmic_decrement", "decrement"],
-        |d| d / d.hypot(std::f64::consts::TAU),
-    ),
-    (&["loss_factor"], |eta| 0.5 * eta),
-];
-
-/// A number in another term as a damping ratio.
-type AsRatio = fn(f64) -> f64;
-
 /// The text of a stand file and its name.
 pub struct SourceText<'a> {
     /// Name of the file.
@@ -264,16 +251,12 @@ impl<'a> Section<'a> {
 
     /// A number under a name that is no key, and what it is as a key that is.
     fn in_other_terms(&self, key: &str) -> Option<(&'a str, f64)> {
-        let ratio = |(name, item): (&'a str, &'a Item)| {
+        let as_key = |(name, item): (&'a str, &'a Item)| {
             let number = item.as_float().or(item.as_integer().map(|n| n as f64));
             let number = number.or_else(|| item.as_str()?.trim().parse().ok())?;
-            DAMPING_TERMS
-                .iter()
-                .find(|(names, _)| names.iter().any(|n| n.eq_ignore_ascii_case(name)))
-                .map(|(_, as_ratio)| (name, as_ratio(number)))
+            keys::from_other_term(key, name).map(|convert| (name, convert(number)))
         };
-        let is_damping = key == "damping_ratio";
-        self.table.iter().filter(|_| is_damping).find_map(ratio)
+        self.table.iter().find_map(as_key)
     }
 
     /// A quantity that must be there and greater than zero.

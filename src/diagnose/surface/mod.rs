@@ -29,6 +29,7 @@ use super::blocks::compare;
 use super::fit::RecordResidual;
 use super::record::{NuisanceTerms, StandRecord};
 use super::score::ScoredModel;
+use super::stationarity::in_a_circle;
 use super::structure::FitContext;
 use crate::parallel::parallel;
 use basis::{Grid, SurfacePart};
@@ -217,14 +218,13 @@ fn regression(
 /// Training records with the residuals of a model shifted in a circle by a part of their length.
 fn shifted(regression: &Regression, model: &ScoredModel, part: f64) -> Vec<Vec<f64>> {
     let both = regression.targets().iter().zip(model.train.iter());
-    let shifted = |(target, residual): (&Vec<f64>, &RecordResidual)| {
+    let with_shifted = |(target, residual): (&Vec<f64>, &RecordResidual)| {
         let left = &residual.samples[..target.len()];
-        let by = (part * left.len() as f64) as usize;
-        let others = left[by..].iter().chain(&left[..by]);
+        let others = in_a_circle(left, (part * left.len() as f64) as usize);
         let samples = target.iter().zip(left).zip(others);
         samples.map(|((y, r), other)| y - r + other).collect()
     };
-    both.map(shifted).collect()
+    both.map(with_shifted).collect()
 }
 
 /// Whether a surface leaves so much less than a model that the model lacks something.

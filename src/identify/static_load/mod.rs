@@ -7,6 +7,7 @@ mod mixed;
 mod solve;
 mod steps;
 mod terms;
+mod zero;
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -15,7 +16,6 @@ use super::{FitQuality, Identification, NamedEstimate, rms};
 use crate::chart::{Chart, Series};
 use crate::failure::{ErrorCode, Failure};
 use crate::print::{self, plural, rounded};
-use crate::student::student;
 use mixed::LoadCurve;
 use steps::LoadSteps;
 
@@ -131,7 +131,7 @@ pub fn identify(
     groups::refuse_mixed(points)?;
     linear::refuse_two_ranges(points, &steps)?;
     let mut fit = mixed::fit(points, degree, &steps)?;
-    walking_zero(&mut fit, points, largest);
+    zero::walking(&mut fit, points, largest);
     follows(points, &fit, largest)?;
     let unscale = |(k, v): (usize, &f64)| v / largest.powi(k as i32);
     let curve: Vec<f64> = fit.values.iter().enumerate().map(unscale).collect();
@@ -141,7 +141,7 @@ pub fn identify(
     poor(&mut result, quality.relative);
     linear::warn(&mut result, points, &curve, &steps);
     contradicted(&mut result, &fit);
-    drifting_zero(&mut result, &fit, points, &units.reading);
+    zero::drifting(&mut result, &fit, points, (largest, &units.reading));
     result.fit = Some(quality);
     method(&mut result, &fit, points, &units.reading);
     result.terms = terms::terms(points, &steps, &curve);
@@ -156,52 +156,6 @@ pub fn identify(
         );
     }
     Ok(result)
-}
-
-/// Makes the uncertainty of a zero that walks from reading to reading no less than that of the mean of its readings: it is
-/// known only while it is read.
-fn walking_zero(fit: &mut LoadCurve, points: &[Point], largest: f64) {
-    let Some(std) = fit.std[0].filter(|_| fit.spreads.drift > 0.0) else {
-        return;
-    };
-    let empty = points.iter().filter(|p| p.load.abs() <= NONE * largest);
-    let readings: Vec<f64> = empty.map(|p| p.reading).collect();
-    let count = readings.len() as f64;
-    let mean = readings.iter().sum::<f64>() / count;
-    let about: Vec<f64> = readings.iter().map(|r| r - mean).collect();
-    let of_readings = match readings.len() {
-        0 | 1 => fit.spreads.drift,
-        _ => rms(&about) / (count - 1.0).sqrt() * student(count - 1.0),
-    };
-    fit.std[0] = Some(std.max(of_readings));
-}
-
-/// Change of the reading without load over the largest deflection from which on the zero is said to drift.
-const DRIFTS: f64 = 5e-3;
-
-/// Warns of a zero that is another one at the end of the test.
-fn drifting_zero(result: &mut Identification, fit: &LoadCurve, points: &[Point], unit: &str) {
-    let largest = points.iter().map(|p| p.load.abs()).fold(0.0, f64::max);
-    let mut empty = points.iter().filter(|p| p.load.abs() <= NONE * largest);
-    let Some((first, last)) = empty.next().zip(empty.next_back()) else {
-        return;
-    };
-    let deflection = points.iter().map(|p| (p.reading - first.reading).abs());
-    let part = (last.reading - first.reading).abs() / deflection.fold(0.0, f64::max);
-    let is_walk = fit.has_even_drift || fit.spreads.drift > 0.0;
-    if is_walk && part > DRIFTS {
-        result.warn(
-            "zero-drifts",
-            format!(
-                "without load the reading went from {} to {} {unit} over the test, by {} of the largest deflection: the zero \
-                 is that of the middle of the test, and no other record has it; warm up for longer, and read the zero of each \
-                 record",
-                rounded(first.reading, 4),
-                rounded(last.reading, 4),
-                print::relative(part, 2)
-            ),
-        );
-    }
 }
 
 /// Scatter of the readings over their given uncertainty below, or above, which these are doubtful.
@@ -233,10 +187,7 @@ fn follows(points: &[Point], fit: &LoadCurve, largest: f64) -> Result<(), Failur
     if slope > FOLLOWS * std && slope > 1e-12 * size {
         return Ok(());
     }
-    let empty: Vec<&Point> = points
-        .iter()
-        .filter(|p| p.load.abs() <= NONE * largest)
-        .collect();
+    let empty: Vec<&Point> = zero::without_load(points, largest).collect();
     let zero = empty.iter().map(|p| p.reading).sum::<f64>() / empty.len().max(1) as f64;
     let unsigned = points
         .iter()

@@ -95,7 +95,6 @@ impl BandSearch {
         let mut search = Self::of_density(&density, rate_hz, inverse)?;
         if let Some(found) = quantisation(samples) {
             search.count_rounding(found.step.powi(2) / 12.0);
-            search.sum();
         }
         Some(search)
     }
@@ -116,6 +115,7 @@ impl BandSearch {
             *value = spread;
         }
         self.floor = spread;
+        self.sum();
     }
 
     /// Of the density of a record. `None` if it has too few lines or no noise.

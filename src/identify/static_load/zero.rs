@@ -1,0 +1,66 @@
+//! What the readings without load say of the zero.
+
+use super::mixed::LoadCurve;
+use super::{NONE, Point};
+use crate::identify::{Identification, rms};
+use crate::print::{self, rounded};
+use crate::student::student;
+
+/// Makes the uncertainty of a zero that walks from reading to reading no less than that of the mean of its readings: it is
+/// known only while it is read.
+pub(super) fn walking(fit: &mut LoadCurve, points: &[Point], largest: f64) {
+    let Some(std) = fit.std[0].filter(|_| fit.spreads.drift > 0.0) else {
+        return;
+    };
+    let readings: Vec<f64> = without_load(points, largest).map(|p| p.reading).collect();
+    let count = readings.len() as f64;
+    let mean = readings.iter().sum::<f64>() / count;
+    let about: Vec<f64> = readings.iter().map(|r| r - mean).collect();
+    let of_readings = match readings.len() {
+        0 | 1 => fit.spreads.drift,
+        _ => rms(&about) / (count - 1.0).sqrt() * student(count - 1.0),
+    };
+    fit.std[0] = Some(std.max(of_readings));
+}
+
+/// Change of the reading without load over the largest deflection from which on the zero is said to drift.
+const DRIFTS: f64 = 5e-3;
+
+/// Warns of a zero that is another one at the end of the test.
+pub(super) fn drifting(
+    result: &mut Identification,
+    fit: &LoadCurve,
+    points: &[Point],
+    (largest, unit): (f64, &str),
+) {
+    let mut empty = without_load(points, largest);
+    let Some((first, last)) = empty.next().zip(empty.next_back()) else {
+        return;
+    };
+    let deflection = points.iter().map(|p| (p.reading - first.reading).abs());
+    let part = (last.reading - first.reading).abs() / deflection.fold(0.0, f64::max);
+    let is_walk = fit.has_even_drift || fit.spreads.drift > 0.0;
+    if is_walk && part > DRIFTS {
+        result.warn(
+            "zero-drifts",
+            format!(
+                "without load the reading went from {} to {} {unit} over the test, by {} of the largest deflection: the zero \
+                 is that of the middle of the test, and no other record has it; warm up for longer, and read the zero of each \
+                 record",
+                rounded(first.reading, 4),
+                rounded(last.reading, 4),
+                print::relative(part, 2)
+            ),
+        );
+    }
+}
+
+/// The points without load, in the order in which they were read.
+pub(super) fn without_load(
+    points: &[Point],
+    largest: f64,
+) -> impl DoubleEndedIterator<Item = &Point> {
+    points
+        .iter()
+        .filter(move |p| p.load.abs() <= NONE * largest)
+}
