@@ -98,7 +98,7 @@ pub fn coulomb_smooth(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     )
 }
 
-/// Friction that is larger at rest (not listed).
+/// Friction that is larger at rest, and sticks.
 pub fn stribeck(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     let sliding_n_m = size * scene.applied_rms;
     let dry = Dry {

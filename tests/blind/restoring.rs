@@ -149,12 +149,12 @@ fn partial_gap(scene: &Scene, size: f64, left: f64, draw: &mut Draw) -> Built {
     )
 }
 
-/// Stops that the beam hits on both sides (not listed).
+/// Stops that the beam hits on both sides.
 pub fn end_stop(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     stop(scene, size, draw.between(5.0, 40.0), true, draw)
 }
 
-/// A stop on one side only (not listed).
+/// A stop on one side only.
 pub fn one_sided_stop(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     stop(scene, size, draw.between(5.0, 40.0), false, draw)
 }

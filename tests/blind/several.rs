@@ -85,21 +85,14 @@ pub fn drawn(effect: &str, seed: u64) -> Option<Vec<&'static Variant>> {
 fn mixed(draw: &mut Draw) -> Vec<&'static Variant> {
     let unlisted: Vec<&Variant> = CATALOGUE
         .iter()
-        // Sticking would have to know of the other torques.
-        .filter(|variant| variant.effect == "unlisted" && variant.name != "Stribeck")
+        .filter(|variant| variant.effect == "unlisted")
         .collect();
-    loop {
-        let (effect, name) = draw.one_of(TOGETHER);
-        let stranger = draw.one_of(&unlisted);
-        // Two contacts would each need a mode of its own.
-        if effect == "backlash" && stranger.name.ends_with("stop") {
-            continue;
-        }
-        let listed = CATALOGUE
-            .iter()
-            .find(|v| v.effect == effect && v.name == name);
-        return listed.into_iter().chain([stranger]).collect();
-    }
+    let (effect, name) = draw.one_of(TOGETHER);
+    let stranger = draw.one_of(&unlisted);
+    let listed = CATALOGUE
+        .iter()
+        .find(|v| v.effect == effect && v.name == name);
+    listed.into_iter().chain([stranger]).collect()
 }
 
 /// Each effect alone, in the size that gives it about the strength wanted.

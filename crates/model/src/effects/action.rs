@@ -151,8 +151,8 @@ pub trait Torque: Send + Sync {
         0.0
     }
 
-    /// The size of a sharp dry friction: the integration then looks for the moments in which it switches and does not
-    /// call [`Torque::kick`].
+    /// The size of a sharp dry friction in it: the integration looks for the moments in which that switches. [`Torque::kick`]
+    /// is then what the rest of the torque does, which is smooth and zero at rest.
     fn dry(&self) -> Option<f64> {
         None
     }

@@ -21,6 +21,7 @@ pub(super) static EFFECT: Effect = Effect {
     source: "C. A. Coulomb, Theorie des machines simples (1781)",
     validity: "where sliding is full",
     mistaken_for: &[
+        "stribeck-friction",
         "bouc-wen-hysteresis",
         "quadratic-damping",
         "structural-damping",
@@ -59,9 +60,10 @@ pub(super) static EFFECT: Effect = Effect {
     ],
 };
 
-struct Friction {
-    torque: f64,
-    speed: f64,
+/// Friction of constant size, smoothed over a range of speeds.
+pub(super) struct Friction {
+    pub(super) torque: f64,
+    pub(super) speed: f64,
 }
 
 impl Torque for Friction {
@@ -93,6 +95,10 @@ impl Torque for Friction {
     }
 
     fn kick(&self, _: &mut Memory, _: f64, speed: f64, change: f64, impulse: f64) -> f64 {
+        if self.speed == 0.0 {
+            // All of it is the dry friction that the integration looks after.
+            return speed;
+        }
         let width = self.speed.max(0.5 * change.abs());
         let loss = impulse * self.torque;
         let size = speed.abs();

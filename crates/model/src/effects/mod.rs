@@ -26,6 +26,7 @@ mod bouc_wen_hysteresis;
 mod capacitive_coupling;
 mod coulomb_friction;
 mod cubic_stiffness;
+mod end_stop;
 mod gage_nonlinearity;
 mod gain_error;
 mod mains_pickup;
@@ -35,6 +36,7 @@ mod recorder_lowpass;
 mod rotor_imbalance;
 mod saturation;
 mod second_mode;
+mod stribeck_friction;
 mod structural_damping;
 mod thermal_drift;
 mod time_delay;
@@ -65,6 +67,8 @@ pub const EFFECTS: &[&Effect] = &[
     &cubic_stiffness::EFFECT,
     &quadratic_stiffness::EFFECT,
     &coulomb_friction::EFFECT,
+    &stribeck_friction::EFFECT,
+    &end_stop::EFFECT,
     &backlash::EFFECT,
     &bouc_wen_hysteresis::EFFECT,
     &quadratic_damping::EFFECT,

@@ -14,7 +14,7 @@ use std::ops::Range;
 
 use super::input::Excitation;
 use super::integrate::{LinearStep, MotionState, free};
-use super::run::{Acting, MotionProgress, Torques, acting, kicked, shown};
+use super::run::{Acting, MotionProgress, Torques, kicked, shown};
 use crate::modal::{ModalPart, ModalResponse};
 
 /// Where a mode stands.
@@ -131,7 +131,7 @@ pub(crate) fn integrate_modes(
         gain,
         shift,
         step_s,
-        acting: acting(torques).zip(memories).collect(),
+        acting: torques.iter().copied().zip(memories).collect(),
         dry: torques.iter().filter_map(|(t, _)| t.dry()).sum(),
     };
     let mut samples = Vec::with_capacity(range.len());

@@ -19,7 +19,7 @@ struct Integrator<'a> {
     step_s: f64,
     /// What a torque of one changes the speed by at a node.
     impulse: f64,
-    /// Torques that act at the nodes, with what they remember: all but sharp dry friction.
+    /// What acts at the nodes, sharp dry friction left out, and what it remembers.
     acting: Acting<'a>,
     /// Displacement by a constant load.
     shift: f64,
@@ -48,7 +48,8 @@ impl MotionProgress {
     ) -> Self {
         Self {
             state: start,
-            memories: acting(torques)
+            memories: torques
+                .iter()
                 .map(|(torque, _)| torque.begin(start.x + shift))
                 .collect(),
             direction: match start.speed == 0.0 {
@@ -58,12 +59,6 @@ impl MotionProgress {
             modes: modes::begin(stand, start),
         }
     }
-}
-
-/// All torques but sharp dry friction.
-pub(super) fn acting<'a>(torques: &Torques<'a>) -> impl Iterator<Item = (&'a dyn Torque, bool)> {
-    let acting = torques.iter().filter(|(torque, _)| torque.dry().is_none());
-    acting.copied()
 }
 
 /// The torques that act, whether the gage shows them, and what they remember.
@@ -112,7 +107,7 @@ pub(crate) fn integrate(
         step: LinearStep::new(mode, gain, step_s, input.between()),
         step_s,
         impulse: mode.omega_rad_s * mode.omega_rad_s * step_s,
-        acting: acting(torques).zip(memories).collect(),
+        acting: torques.iter().copied().zip(memories).collect(),
         shift,
         dry: torques.iter().filter_map(|(t, _)| t.dry()).sum(),
         direction: progress.direction,

@@ -5,7 +5,6 @@
 
 mod changing_gain;
 mod cubic_damping;
-mod end_stop;
 mod quintic_stiffness;
 mod squeezed_damping;
 
@@ -13,7 +12,6 @@ use super::Effect;
 
 /// All of them.
 pub const RIVALS: &[&Effect] = &[
-    &end_stop::EFFECT,
     &quintic_stiffness::EFFECT,
     &cubic_damping::EFFECT,
     &squeezed_damping::EFFECT,
