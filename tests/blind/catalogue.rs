@@ -314,6 +314,21 @@ pub const CATALOGUE: &[Variant] = &[
         (0.0, 0.005, 0.3),
     ),
     variant(
+        "position-dependent-friction",
+        "spot",
+        1,
+        friction::spot,
+        (0.0, 0.01, 0.5),
+    ),
+    variant(
+        "position-dependent-friction",
+        "wedge",
+        1,
+        friction::wedge,
+        (0.0, 0.01, 0.5),
+    ),
+    variant("gage-creep", "lag", 1, linear::creep, (0.0, 0.01, 0.3)),
+    variant(
         "unlisted",
         "quintic stiffness",
         1,

@@ -115,6 +115,44 @@ pub fn stribeck(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     Built::dynamics(dry, &parameters)
 }
 
+/// A spot that rubs: dry friction, smooth over a low speed, about one angle.
+pub fn spot(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
+    let friction = size * scene.applied_rms;
+    let speed = scene.speed_rms * draw.log_between(0.01, 0.05);
+    let at = scene.peak_rad() * draw.between(-0.5, 0.5);
+    let width = scene.peak_rad() * draw.between(0.1, 0.4);
+    let system = With {
+        constants: scene.constants,
+        resists: move |_, angle: f64, v: f64| {
+            friction * (-((angle - at) / width).powi(2)).exp() * (v / speed).tanh()
+        },
+        in_gage: false,
+    };
+    let parameters = [
+        ("friction_n_m", friction),
+        ("at_rad", at),
+        ("width_rad", width),
+        ("over_speed_rad_s", speed),
+    ];
+    Built::dynamics(system, &parameters)
+}
+
+/// A wedge: friction in proportion to the angle.
+pub fn wedge(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
+    let coefficient = size * scene.constants.stiffness_n_m;
+    let speed = scene.speed_rms * draw.log_between(0.01, 0.05);
+    let system = With {
+        constants: scene.constants,
+        resists: move |_, angle: f64, v: f64| coefficient * angle.abs() * (v / speed).tanh(),
+        in_gage: false,
+    };
+    let parameters = [
+        ("coefficient_n_m_rad", coefficient),
+        ("over_speed_rad_s", speed),
+    ];
+    Built::dynamics(system, &parameters)
+}
+
 /// `c |θ̇| θ̇`.
 pub fn quadratic(scene: &Scene, size: f64, _: &mut Draw) -> Built {
     let coefficient = size * scene.constants.damping_n_m_s / scene.speed_rms;

@@ -252,6 +252,8 @@ enum Filter {
     Low2,
     /// One RC high-pass (AC coupling).
     High1,
+    /// A share of the signal comes late, through one RC low-pass.
+    Creep(f64),
 }
 
 struct Filtered {
@@ -272,7 +274,7 @@ impl Dynamics for Filtered {
         let signal = self.inner.shown(mode, time_s, torque, state);
         let (w, a, b) = (self.omega, state[FIRST], state[FIRST + 1]);
         match self.filter {
-            Filter::Low1 | Filter::High1 => rates[FIRST] = w * (signal - a),
+            Filter::Low1 | Filter::High1 | Filter::Creep(_) => rates[FIRST] = w * (signal - a),
             Filter::Low1Twice => {
                 rates[FIRST] = w * (signal - a);
                 rates[FIRST + 1] = w * (a - b);
@@ -290,6 +292,7 @@ impl Dynamics for Filtered {
             Filter::Low1 | Filter::Low2 => state[FIRST],
             Filter::Low1Twice => state[FIRST + 1],
             Filter::High1 => signal - state[FIRST],
+            Filter::Creep(share) => signal + share * state[FIRST],
         }
     }
 }
@@ -327,6 +330,15 @@ pub fn low_pass_2(scene: &Scene, size: f64, _: &mut Draw) -> Built {
 /// AC coupling; size 1 puts its corner at 5 Hz.
 pub fn ac_coupling(scene: &Scene, size: f64, _: &mut Draw) -> Built {
     filtered(scene, Filter::High1, 5.0 * size / scene.span.longer())
+}
+
+/// The gage goes on moving after the load.
+pub fn creep(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
+    let corner_hz = draw.log_between(2.0, 20.0) / scene.span.longer();
+    let share = size * draw.sign();
+    let mut built = filtered(scene, Filter::Creep(share), corner_hz);
+    built.parameters.push(("share", share));
+    built
 }
 
 /// The drive couples into the signal leads: `c dT/dt` is added.

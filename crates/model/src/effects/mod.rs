@@ -27,9 +27,11 @@ mod capacitive_coupling;
 mod coulomb_friction;
 mod cubic_stiffness;
 mod end_stop;
+mod gage_creep;
 mod gage_nonlinearity;
 mod gain_error;
 mod mains_pickup;
+mod position_dependent_friction;
 mod quadratic_damping;
 mod quadratic_stiffness;
 mod recorder_lowpass;
@@ -68,11 +70,13 @@ pub const EFFECTS: &[&Effect] = &[
     &quadratic_stiffness::EFFECT,
     &coulomb_friction::EFFECT,
     &stribeck_friction::EFFECT,
+    &position_dependent_friction::EFFECT,
     &end_stop::EFFECT,
     &backlash::EFFECT,
     &bouc_wen_hysteresis::EFFECT,
     &quadratic_damping::EFFECT,
     &gage_nonlinearity::EFFECT,
+    &gage_creep::EFFECT,
     &saturation::EFFECT,
 ];
 
