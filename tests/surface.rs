@@ -4,56 +4,12 @@ use std::f64::consts::TAU;
 
 use serde_json::Value;
 
-use crate::motion::step;
 use crate::noise::Noise;
+use crate::one_mode::{NATURAL_HZ, RATE_HZ, record};
 use crate::util::Folder;
-
-const NATURAL_HZ: f64 = 20.0;
-const DAMPING_RATIO: f64 = 0.05;
-const RATE_HZ: f64 = 800.0;
-const SAMPLES: usize = 6_000;
-/// Steps of the integration from sample to sample.
-const STEPS: usize = 16;
-/// Noise over the rms of the record.
-const NOISE: f64 = 0.003;
 
 /// A torque over displacement and over speed divided by `ω`, in N m, beside a spring of 1.
 type Law = fn(f64, f64) -> f64;
-
-/// Applied and recorded torque of a stand with such a torque, under forty sines, and the rms of the noise.
-fn record(law: Law, (level, to_hz): (f64, f64), noise: &mut Noise) -> (String, f64) {
-    let omega = TAU * NATURAL_HZ;
-    let lines: Vec<[f64; 2]> = (0..40)
-        .map(|k| {
-            let hz = (0.04 + 0.96 * (f64::from(k) + noise.uniform()) / 40.0) * to_hz;
-            [TAU * hz, TAU * noise.uniform()]
-        })
-        .collect();
-    let torque = |t: f64| -> f64 {
-        let lines = lines.iter();
-        level * lines.map(|[w, phase]| (w * t + phase).sin()).sum::<f64>()
-    };
-    let slope = |t: f64, [x, v]: [f64; 2]| {
-        let pull = torque(t) - x - law(x, v / omega);
-        [v, omega * omega * pull - 2.0 * DAMPING_RATIO * omega * v]
-    };
-    let h = 1.0 / (RATE_HZ * STEPS as f64);
-    let (mut state, mut motion) = ([0.0; 2], Vec::new());
-    for i in 0..SAMPLES * STEPS {
-        if i % STEPS == 0 {
-            motion.push(state[0]);
-        }
-        state = step(state, i as f64 * h, h, slope);
-    }
-    let rms = (motion.iter().map(|x| x * x).sum::<f64>() / SAMPLES as f64).sqrt();
-    let mut text = String::from("time_s,applied_n_m,measured_n_m\n");
-    for (i, x) in motion.iter().enumerate() {
-        let t = i as f64 / RATE_HZ;
-        let seen = x + NOISE * rms * noise.normal();
-        text += &format!("{t:.6},{:.9},{seen:.9}\n", torque(t));
-    }
-    (text, NOISE * rms)
-}
 
 /// The diagnosis of the two records in a folder.
 fn report(folder: &Folder, more: &[&str]) -> Value {
@@ -65,8 +21,8 @@ fn report(folder: &Folder, more: &[&str]) -> Value {
 /// The diagnosis of two records, and the noise of the held-out one.
 fn diagnosed(law: Law, folder: &Folder, more: &[&str]) -> (Value, f64) {
     let mut noise = Noise(7);
-    let (train, _) = record(law, (0.12, 50.0), &mut noise);
-    let (holdout, rms) = record(law, (0.08, 50.0), &mut noise);
+    let (train, _) = record(|_, x, v| law(x, v), (0.12, 50.0), &mut noise);
+    let (holdout, rms) = record(|_, x, v| law(x, v), (0.08, 50.0), &mut noise);
     folder
         .write("train.csv", train)
         .write("holdout.csv", holdout);
@@ -167,24 +123,33 @@ fn damping_in_one_direction_is_drawn() {
     assert!(apart < 4.0, "{apart} {points:?}");
 }
 
-/// Friction that grows with the displacement, or changes along it, is no dry friction, and not nothing.
+/// Friction that changes along the displacement is no dry friction, and not nothing; if it grows with the displacement, it has a
+/// name.
 #[test]
-fn friction_that_depends_on_the_place_is_neither_explained_nor_nothing() {
-    let laws: [(&str, Law); 2] = [
-        ("grows", |x, v| 0.02 * x.abs() * (20.0 * v).tanh()),
-        ("changes", |x, v| {
-            0.004 * (1.0 + 0.8 * (3.0 * x).sin()) * (20.0 * v).tanh()
-        }),
-    ];
-    for (name, law) in laws {
-        let (report, _) = diagnosed(law, &Folder::new(), &[]);
-        let (verdict, effects) = (&report["verdict"], &report["effects"]);
-        println!("{name} {verdict} {effects} {}", report["error"]);
-        assert!(
-            verdict == "unexplained" || verdict == "partly-explained",
-            "{name}: {verdict} {effects}"
-        );
-    }
+fn friction_that_depends_on_the_place_is_no_dry_friction() {
+    let waves: Law = |x, v| 0.004 * (1.0 + 0.8 * (3.0 * x).sin()) * (20.0 * v).tanh();
+    let (report, _) = diagnosed(waves, &Folder::new(), &[]);
+    let (verdict, effects) = (&report["verdict"], &report["effects"]);
+    println!("{verdict} {effects} {}", report["error"]);
+    assert!(
+        verdict == "unexplained" || verdict == "partly-explained",
+        "{verdict} {effects}"
+    );
+    let wedge: Law = |x, v| 0.02 * x.abs() * (20.0 * v).tanh();
+    let (report, _) = diagnosed(wedge, &Folder::new(), &[]);
+    assert_eq!(report["verdict"], "explained");
+    let named = serde_json::json!(["position-dependent-friction"]);
+    assert_eq!(report["effects"], named);
+    let parameters = &report["candidates"][0]["parameters"];
+    let coefficient = (
+        number(&parameters[0]["value"]),
+        number(&parameters[0]["std"]),
+    );
+    let apart = (coefficient.0 - 0.02).abs();
+    assert!(
+        apart < 4.0 * coefficient.1 && apart < 0.002,
+        "{coefficient:?}"
+    );
 }
 
 /// Where a law explains the records, there is nothing to draw.
@@ -202,7 +167,7 @@ fn a_slow_disturbance_follows_from_no_motion() {
     let folder = Folder::new();
     let mut noise = Noise(11);
     for (name, level) in [("train.csv", 0.12), ("holdout.csv", 0.08)] {
-        let (text, rms) = record(|_, _| 0.0, (level, 12.0), &mut noise);
+        let (text, rms) = record(|_, _, _| 0.0, (level, 12.0), &mut noise);
         let (mut lines, mut disturbance) = (text.lines(), 0.0);
         let mut disturbed = format!("{}\n", lines.next().expect("a heading"));
         for line in lines {

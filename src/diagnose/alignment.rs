@@ -4,7 +4,6 @@
 //! of the channels, and its growth along the record the difference of their clocks.
 
 use std::f64::consts::PI;
-use std::ops::Range;
 use std::sync::Arc;
 
 use super::Case;
@@ -301,22 +300,6 @@ fn correlation(x: &[f64], y: &[f64]) -> Vec<f64> {
 }
 
 impl StandRecord {
-    /// A part of a record as a record of its own.
-    fn part(&self, samples: Range<usize>) -> Self {
-        let input = &self.input;
-        let applied = input.samples()[samples.clone()].to_vec();
-        let (rate_hz, start_s) = (input.rate_hz(), input.start_s());
-        let substeps = input.substeps();
-        Self {
-            input: Arc::new(torqcomp_model::simulate::Excitation::new(
-                applied, rate_hz, start_s, substeps,
-            )),
-            range: 0..samples.len(),
-            measured: Arc::new(self.measured[samples].to_vec()),
-            ..self.clone()
-        }
-    }
-
     /// The record with its measured channel brought onto the instants of the applied one; samples that lie beyond the record
     /// then do not count.
     fn aligned(&self, shift: Shift) -> Self {

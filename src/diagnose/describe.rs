@@ -156,6 +156,10 @@ pub fn next_experiment(
     closest.map(|c| c.effect.experiment.to_owned())
 }
 
+/// What to record where the stand has changed.
+pub const AFTER_A_CHANGE: &str =
+    "look at clamps, bolts and what else may have moved at that moment, then record the same again";
+
 /// The records that show a torque over the displacement, or one over the speed.
 pub fn shows_torque(over_displacement: bool) -> &'static str {
     match over_displacement {

@@ -132,6 +132,25 @@ impl StandRecord {
         }
     }
 
+    /// A part of a record as a record of its own.
+    pub fn part(&self, samples: Range<usize>) -> Self {
+        let input = &self.input;
+        let applied = input.samples()[samples.clone()].to_vec();
+        let (rate_hz, start_s) = (input.rate_hz(), input.start_s());
+        let input = Excitation::new(applied, rate_hz, start_s, input.substeps())
+            .with_between(input.between());
+        Self {
+            input: Arc::new(input),
+            range: 0..samples.len(),
+            initial: match samples.start {
+                0 => self.initial,
+                _ => InitialState::default(),
+            },
+            measured: Arc::new(self.measured[samples].to_vec()),
+            ..self.clone()
+        }
+    }
+
     /// Whether free motion of a mode from before the range is left in it.
     pub fn has_free_motion(&self, mode: &Mode) -> bool {
         self.decay_to_range(mode) < DECAYED

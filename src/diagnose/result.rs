@@ -8,6 +8,7 @@ use super::detection::{DetectionLimit, detection_limits};
 use super::guard_models::GuardModel;
 use super::held::HeldBody;
 use super::ladder::Ladder;
+use super::moment::ChangedStand;
 use super::noise_floor::NoiseFloorSource;
 use super::reason::Status;
 use super::record::StandRecord;
@@ -62,6 +63,9 @@ pub struct Diagnosis {
     /// For `partly-explained` and `unexplained`: the torque that follows from the motion, whatever its law, that of accepted laws
     /// included. `null` where there is none, or it does not follow from the motion.
     pub force_surface: Option<ForceSurface>,
+    /// For `partly-explained` and `unexplained`: the moment at which constants of the stand changed within a record, if that
+    /// explains nearly all of what is left of it; `null` otherwise.
+    pub changed_stand: Option<ChangedStand>,
     /// What the last model leaves of the hold-out records.
     pub residual: ResidualReport,
     /// What to record to tell the remaining candidates apart; `null` if nothing is needed.
@@ -166,10 +170,15 @@ impl Diagnosis {
             Verdict::NothingMissing => detection_limits(&found.after, &found.records, threads),
             _ => Vec::new(),
         };
-        let force_surface = match verdict {
-            Verdict::PartlyExplained | Verdict::Unexplained => found.force_surface(threads),
-            _ => None,
-        };
+        let is_open = matches!(verdict, Verdict::PartlyExplained | Verdict::Unexplained);
+        let changed_stand = is_open.then(|| found.find_change()).flatten();
+        if changed_stand.is_some() {
+            // What one stand leaves is no law of the motion then.
+            found.suspected = None;
+        }
+        let force_surface = (is_open && changed_stand.is_none())
+            .then(|| found.force_surface(threads))
+            .flatten();
         let error = ErrorTable::of(&found);
         let levels = ExcitationLevels::of(&found, &error.before);
         let residual = ResidualReport {
@@ -197,17 +206,21 @@ impl Diagnosis {
             error,
             explained: std::mem::take(&mut found.ladder),
             constants: constants(case.declared, &found),
-            next_experiment: describe::next_experiment(
-                &found,
-                suspected.as_ref(),
-                force_surface.as_ref(),
-                verdict,
-            ),
+            next_experiment: match &changed_stand {
+                Some(_) => Some(describe::AFTER_A_CHANGE.to_owned()),
+                None => describe::next_experiment(
+                    &found,
+                    suspected.as_ref(),
+                    force_surface.as_ref(),
+                    verdict,
+                ),
+            },
             warnings: [case.warnings, describe::warnings(&found.before, verdict)].concat(),
             candidates: found.candidates(),
             detection_limits,
             suspected,
             force_surface,
+            changed_stand,
             residual,
             shows_all: false,
             before: found.before,

@@ -4,8 +4,8 @@ use torqcomp_model::Estimate;
 use torqcomp_model::effects::Effect;
 
 use crate::diagnose::{
-    CandidateFit, Diagnosis, ForceSurface, GuardModel, NoiseFloorSource, ShownSide, Status,
-    SurfacePlace, Verdict,
+    CandidateFit, ChangedStand, Diagnosis, ForceSurface, GuardModel, NoiseFloorSource, ShownSide,
+    Status, SurfacePlace, Verdict,
 };
 use crate::print::{
     Report, columns, enumeration, plural, relative, rounded, unit_or_as_recorded, with_std,
@@ -89,6 +89,7 @@ pub fn answer(diagnosis: &Diagnosis) -> Vec<String> {
         let suspected = format!("Suspected: {}.", suspected(guard));
         [suspected, explained(guard.effect, guard.equation)]
     });
+    let change = diagnosis.changed_stand.iter().map(of_change);
     let surface = diagnosis.force_surface.iter();
     let surface = surface.flat_map(|surface| of_surface(surface, &diagnosis.error.unit));
     let next = diagnosis.next_experiment.iter().map(|next| {
@@ -96,7 +97,34 @@ pub fn answer(diagnosis: &Diagnosis) -> Vec<String> {
         format!("Next experiment: {next}{end}")
     });
     let all = std::iter::once(verdict).chain(added).chain(guard);
-    all.chain(surface).chain(next).collect()
+    all.chain(change).chain(surface).chain(next).collect()
+}
+
+/// The moment at which the stand changed.
+fn of_change(change: &ChangedStand) -> String {
+    let constants = change.constants.iter().filter(|c| c.is_significant());
+    let constants: Vec<String> = constants
+        .map(|c| {
+            let share = relative((c.after - c.before) / c.before, 2);
+            let values = [c.before, c.after].map(|value| rounded(value, 5));
+            let [before, after] = values;
+            let unit = if c.unit.is_empty() { "" } else { " " };
+            format!(
+                "{} from {before} to {after}{unit}{} ({share})",
+                c.name, c.unit
+            )
+        })
+        .collect();
+    format!(
+        "The stand changed {} s after the first sample of {}: {}. With one stand before that moment and another after it, {} {} of \
+         that record are left, in place of {} with one stand throughout.",
+        rounded(change.time_s, 5),
+        change.record,
+        enumeration(&constants, "and"),
+        rounded(change.two_stands_rms, 4),
+        unit_or_as_recorded(&change.unit),
+        rounded(change.one_stand_rms, 4),
+    )
 }
 
 /// What a surface over the motion says.

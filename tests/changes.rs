@@ -1,0 +1,83 @@
+//! A stand that changes within a record: `diagnose` says when and what, and names no effect.
+
+use serde_json::Value;
+
+use crate::noise::Noise;
+use crate::one_mode::{DAMPING_RATIO, NATURAL_HZ, RATE_HZ, SAMPLES, record};
+use crate::util::Folder;
+
+const MOMENT_S: f64 = 2.9;
+
+/// The diagnosis of a record with a torque, another part of the same record being held out.
+fn diagnosed(law: impl Fn(f64, f64, f64) -> f64) -> (Value, f64) {
+    let (train, noise_rms) = record(law, (0.12, 50.0), &mut Noise(11));
+    let folder = Folder::new();
+    folder.write("train.csv", train);
+    let channels = ["--applied", "applied_n_m", "--measured", "measured_n_m"];
+    let command = ["diagnose", "--json", "--train", "train.csv"];
+    (folder.json(&[&command[..], &channels].concat()), noise_rms)
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().expect("a number")
+}
+
+/// A spring that loses 4 % of its stiffness: the natural frequency falls by `1 − √0.96`, the static gain grows by `1/0.96`.
+#[test]
+fn a_joint_that_comes_loose() {
+    let loose = |t: f64, x: f64, _: f64| if t > MOMENT_S { -0.04 * x } else { 0.0 };
+    let (report, noise_rms) = diagnosed(loose);
+    let change = &report["changed_stand"];
+    assert_eq!(report["verdict"], "unexplained", "{change}");
+    assert_eq!(change["record"], "train.csv");
+    assert!(
+        (number(&change["time_s"]) - MOMENT_S).abs() < 6.0 / RATE_HZ,
+        "{change}"
+    );
+    let root = 0.96_f64.sqrt();
+    let expected = [
+        ("natural_frequency", NATURAL_HZ, NATURAL_HZ * root),
+        ("damping_ratio", DAMPING_RATIO, DAMPING_RATIO / root),
+        ("static_gain", 1.0, 1.0 / 0.96),
+    ];
+    for (constant, (name, before, after)) in
+        change["constants"].as_array().unwrap().iter().zip(expected)
+    {
+        assert_eq!(constant["name"], name);
+        for (side, truth) in [("before", before), ("after", after)] {
+            let (value, std) = (
+                number(&constant[side]),
+                number(&constant[format!("{side}_std")]),
+            );
+            assert!(
+                (value - truth).abs() < 4.0 * std.max(1e-4 * truth),
+                "{name} {side}: {value} ± {std}, {truth}"
+            );
+        }
+    }
+    let left = number(&change["two_stands_rms"]);
+    assert!(
+        left < 1.2 * noise_rms && number(&change["one_stand_rms"]) > 10.0 * noise_rms,
+        "{change}"
+    );
+}
+
+/// Damping that grows evenly, and a wavy spring: no moment is named.
+#[test]
+fn what_does_not_happen_at_a_moment() {
+    let length_s = SAMPLES as f64 / RATE_HZ;
+    let (report, _) = diagnosed(|t, _, v| 0.06 * t / length_s * v);
+    assert_eq!(report["verdict"], "unexplained");
+    assert!(
+        report["changed_stand"].is_null(),
+        "{}",
+        report["changed_stand"]
+    );
+    let (report, _) = diagnosed(|_, x, _| 0.06 * (2.5 * x).sin());
+    assert_eq!(report["verdict"], "unexplained");
+    assert!(
+        report["changed_stand"].is_null(),
+        "{}",
+        report["changed_stand"]
+    );
+}

@@ -1,0 +1,55 @@
+//! Records of a stand of one mode with any torque beside it.
+
+use std::f64::consts::TAU;
+
+use crate::motion::step;
+use crate::noise::Noise;
+
+pub const NATURAL_HZ: f64 = 20.0;
+pub const DAMPING_RATIO: f64 = 0.05;
+pub const RATE_HZ: f64 = 800.0;
+pub const SAMPLES: usize = 6_000;
+/// Steps of the integration from sample to sample.
+const STEPS: usize = 16;
+/// Noise over the rms of the record.
+const NOISE: f64 = 0.003;
+
+/// Applied and recorded torque of a stand with a torque in N m over time, displacement and speed divided by `ω`, beside a spring
+/// of 1, under forty sines; and the rms of the noise.
+pub fn record(
+    law: impl Fn(f64, f64, f64) -> f64,
+    (level, to_hz): (f64, f64),
+    noise: &mut Noise,
+) -> (String, f64) {
+    let omega = TAU * NATURAL_HZ;
+    let lines: Vec<[f64; 2]> = (0..40)
+        .map(|k| {
+            let hz = (0.04 + 0.96 * (f64::from(k) + noise.uniform()) / 40.0) * to_hz;
+            [TAU * hz, TAU * noise.uniform()]
+        })
+        .collect();
+    let torque = |t: f64| -> f64 {
+        let lines = lines.iter();
+        level * lines.map(|[w, phase]| (w * t + phase).sin()).sum::<f64>()
+    };
+    let slope = |t: f64, [x, v]: [f64; 2]| {
+        let pull = torque(t) - x - law(t, x, v / omega);
+        [v, omega * omega * pull - 2.0 * DAMPING_RATIO * omega * v]
+    };
+    let h = 1.0 / (RATE_HZ * STEPS as f64);
+    let (mut state, mut motion) = ([0.0; 2], Vec::new());
+    for i in 0..SAMPLES * STEPS {
+        if i % STEPS == 0 {
+            motion.push(state[0]);
+        }
+        state = step(state, i as f64 * h, h, slope);
+    }
+    let rms = (motion.iter().map(|x| x * x).sum::<f64>() / SAMPLES as f64).sqrt();
+    let mut text = String::from("time_s,applied_n_m,measured_n_m\n");
+    for (i, x) in motion.iter().enumerate() {
+        let t = i as f64 / RATE_HZ;
+        let seen = x + NOISE * rms * noise.normal();
+        text += &format!("{t:.6},{:.9},{seen:.9}\n", torque(t));
+    }
+    (text, NOISE * rms)
+}
