@@ -43,7 +43,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["order-or-mains", "an order of the shaft coincides with a line of the mains", "record at another speed"],
         ["orders-beyond-band", "orders lie where a compensated record was filtered", "compensate with a higher --band, or give the recorded channel and --stand"],
         ["orders-above-nyquist", "orders above half the sampling rate were left out", "record at a higher rate"],
-        ["speed-changes", "the speed changes over the record, so that the components are averages", "take a part of constant speed with --range"],
+        ["speed-changes", "the speed changes over the record or sways, so that the components are averages", "take a part of constant speed with --range"],
         ["phase-hidden", "the signal at the frequency of a line hides the line's phase, so that part of the line is left", "record without excitation at this frequency"],
         ["resonance-elsewhere", "the record has a resonance near the declared one, which it does not show", "find the stand's constants with identify decay"],
         ["resonance-above-nyquist", "the resonance lies above half the sampling rate, so that its ringing folds into the record", "record faster, or behind a low-pass"],

@@ -34,6 +34,8 @@ const FAR_FROM_ZERO: f64 = 10.0;
 
 /// Orders of the mains that are looked at.
 const MAINS_LINES: f64 = 5.0;
+/// Frequencies of the mains.
+const GRIDS_HZ: [f64; 2] = [50.0, 60.0];
 
 /// Component torques at a fundamental and its orders.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -312,10 +314,13 @@ fn of_orders(
     let is_given = fundamental.std_hz.is_none();
     let off = is_given.then(|| speed::off(record, hz, orders)).flatten();
     let changing = speed::warning(record, hz, orders);
+    let sways = (off.is_none() && changing.is_none())
+        .then(|| speed::sways(record, hz, orders))
+        .flatten();
     let load = speed::load_changes(record, hz, orders);
     let is_compensated = way.stand.is_none();
     let beyond = is_compensated.then(|| filtered::warning(record, hz, orders));
-    let all = [off, changing, load, beyond.flatten()];
+    let all = [off, changing, sways, load, beyond.flatten()];
     all.into_iter().flatten().collect()
 }
 
@@ -423,13 +428,25 @@ fn component(fitted: &harmonics::Component, printed: f64, way: &WayBack) -> Comp
     }
 }
 
-/// Orders of a slower shaft that lie where lines of the mains lie: one record cannot tell them apart.
+/// Orders that lie where lines of the mains lie: one record cannot tell them apart. Of a fundamental that is the mains' own it is
+/// said once.
 fn mains_warning(components: &[ComponentTorque], duration_s: f64) -> Option<Warning> {
+    let fundamental_hz = components.first().map(|c| c.frequency_hz / c.order)?;
+    let of_grid = |grid_hz: &f64| (fundamental_hz - grid_hz).abs() < 1.0 / duration_s;
+    if let Some(grid_hz) = GRIDS_HZ.into_iter().find(of_grid) {
+        return Some(Warning::new(
+            "order-or-mains",
+            format!(
+                "the fundamental is that of {grid_hz} Hz mains, and so all orders may contain what a cable picks up: record once with the \
+                 motor off and the supply on, and subtract what is there"
+            ),
+        ));
+    }
     let doubtful: Vec<String> = components
         .iter()
         .filter(|c| c.order > 1.0 && c.torque > 5.0 * c.std)
         .filter(|c| {
-            [50.0, 60.0].iter().any(|grid_hz| {
+            GRIDS_HZ.iter().any(|grid_hz| {
                 let line = (c.frequency_hz / grid_hz).round().clamp(1.0, MAINS_LINES) * grid_hz;
                 let slower = c.frequency_hz / c.order < 0.9 * grid_hz;
                 slower && (c.frequency_hz - line).abs() < 1.0 / duration_s

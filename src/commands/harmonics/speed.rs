@@ -25,8 +25,10 @@ const TURNS: f64 = 0.2;
 
 /// Most samples from which the speed is found.
 const FIRST: usize = 1 << 17;
-/// Part of the components' power that a wrong speed loses before it is worth saying.
-const LOST: f64 = 0.05;
+/// Energy that a wrong speed loses, over the power of what the right one leaves in a sample, that is none by chance.
+const LOST: f64 = 50.0;
+/// Change of a component by another speed, over the component, that is worth saying.
+const CHANGED: f64 = 0.02;
 /// Amplitude over its uncertainty from which a component is surely there.
 const THERE: f64 = 10.0;
 
@@ -44,23 +46,21 @@ pub(super) fn off(
     let samples = record.samples.part(0..length).ok()?;
     let rate_hz = record.rate_hz;
     let of = |fundamental| fit(&samples[..], rate_hz, 0.0, fundamental, orders).ok();
-    let power = |fitted: &Harmonics| {
-        let of_each = |c: &Component| 0.5 * c.phasor.norm_sqr();
-        fitted.components.iter().map(of_each).sum::<f64>()
-    };
     let given: Harmonics = of(Fundamental::given(fundamental_hz))?;
-    if given.residual_rms.powi(2) <= LOST * power(&given) {
-        return None;
-    }
     let is_sure = |c: &Component| c.phasor.norm() > THERE * c.std_amplitude;
     let within = |span: f64| {
         let found = refine_fundamental(&samples[..], rate_hz, fundamental_hz, span, orders).ok()?;
         let better = of(Fundamental::given(found.frequency_hz))?;
         let is_there = better.components.iter().any(is_sure);
-        let lost = given.residual_rms.powi(2) - better.residual_rms.powi(2);
+        let rest = better.residual_rms.powi(2);
+        let lost = given.residual_rms.powi(2) - rest;
         let shift_hz = (found.frequency_hz - fundamental_hz).abs();
-        let turns = shift_hz * highest(orders) * length as f64 / rate_hz;
-        let matters = lost > LOST * power(&better) && turns > TURNS;
+        let pairs = given.components.iter().zip(&better.components);
+        let changes = pairs
+            .filter(|(_, better)| is_sure(better))
+            .map(|(given, better)| (given.phasor - better.phasor).norm() / better.phasor.norm());
+        let changed = changes.fold(0.0, f64::max) > CHANGED;
+        let matters = changed && lost * length as f64 > LOST * rest;
         let is_off = is_there && matters && shift_hz > SIGNIFICANT * found.std_hz?;
         is_off.then_some((found, shift_hz, span))
     };
@@ -78,7 +78,7 @@ pub(super) fn off(
             "fundamental-off",
             format!(
                 "the record fits a fundamental of {digits} Hz better than {} Hz, at which components come out too \
-                 small: add {refine}, or give --fundamental {digits}",
+                 small and with wrong phases: add {refine}, or give --fundamental {digits}",
                 rounded(fundamental_hz, 7)
             ),
         )
@@ -137,6 +137,90 @@ pub(super) fn warning(
             ),
         )
     })
+}
+
+/// Most windows in which the angle of the shaft is looked at, and fewest.
+const MOST_WINDOWS: usize = 128;
+const FEWEST_WINDOWS: usize = 8;
+/// Variance of the angle over that by noise from which on the shaft sways.
+const SWAYS: f64 = 4.0;
+/// Angle in rad, rms, by which the highest order that is there sways before it is worth saying: it then comes out 2 % too small.
+const SWAY_RAD: f64 = 0.2;
+
+/// A warning if the angle of the shaft sways about that of a steady rotation: the speed is right on average, and the higher orders
+/// are smeared out. The angle is what the phases of the orders have in common, each divided by its order, from window to window.
+pub(super) fn sways(
+    record: &UniformRecord<Spool>,
+    fundamental_hz: f64,
+    orders: &[f64],
+) -> Option<Warning> {
+    let rate_hz = record.rate_hz;
+    let count = record.samples.count().min(FIRST);
+    let lowest = orders.iter().copied().fold(1.0, f64::min);
+    let shortest = (FEWEST * rate_hz / (lowest * fundamental_hz)).ceil() as usize;
+    let windows = (count / shortest).min(MOST_WINDOWS);
+    if windows < FEWEST_WINDOWS {
+        return None;
+    }
+    let samples = record.samples.part(0..count).ok()?;
+    let fundamental = Fundamental::given(fundamental_hz);
+    let whole = fit(&samples[..], rate_hz, 0.0, fundamental, orders).ok()?;
+    let length = count / windows;
+    let angles = (0..windows).map(|window| {
+        let start = window * length;
+        let part = &samples[start..start + length];
+        let here = fit(part, rate_hz, start as f64 / rate_hz, fundamental, orders).ok()?;
+        let pairs = whole.components.iter().zip(&here.components);
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for (mean, here) in
+            pairs.filter(|(_, here)| here.phasor.norm() > THERE * here.std_amplitude)
+        {
+            let turned = (here.phasor * mean.phasor.conj()).arg();
+            let weight = (here.phasor.norm() / here.std_amplitude).powi(2);
+            sum += weight * here.order * turned;
+            weights += weight * here.order.powi(2);
+        }
+        (weights > 0.0).then(|| [sum / weights, 1.0 / weights])
+    });
+    let angles: Vec<[f64; 2]> = angles.collect::<Option<_>>()?;
+    let variance = without_line(&angles);
+    let noise = angles.iter().map(|[_, variance]| variance).sum::<f64>() / windows as f64;
+    let sways_rad = (variance - noise).max(0.0).sqrt();
+    let there = whole
+        .components
+        .iter()
+        .filter(|c| c.phasor.norm() > THERE * c.std_amplitude);
+    let highest = there.map(|c| c.order).fold(0.0, f64::max);
+    (variance > SWAYS * noise && highest * sways_rad > SWAY_RAD).then(|| {
+        let loss = -(-0.5 * (highest * sways_rad).powi(2)).exp_m1();
+        Warning::new(
+            "speed-changes",
+            format!(
+                "the speed is not steady: the angle of the shaft sways by {} degrees (rms) about an even rotation, so that \
+                 components are averages that come out too small, order {} by about {} %; take a shorter part with --range",
+                rounded(sways_rad.to_degrees(), 2),
+                rounded(highest, 4),
+                rounded(100.0 * loss, 2)
+            ),
+        )
+    })
+}
+
+/// Variance of values about a straight line.
+fn without_line(values: &[[f64; 2]]) -> f64 {
+    let count = values.len() as f64;
+    let middle = 0.5 * (count - 1.0);
+    let mean = values.iter().map(|[y, _]| y).sum::<f64>() / count;
+    let (mut products, mut squares) = (0.0, 0.0);
+    for (i, [y, _]) in values.iter().enumerate() {
+        let x = i as f64 - middle;
+        products += x * (y - mean);
+        squares += x * x;
+    }
+    let slope = products / squares;
+    let left = values.iter().enumerate();
+    let left = left.map(|(i, [y, _])| (y - mean - slope * (i as f64 - middle)).powi(2));
+    left.sum::<f64>() / (count - 2.0)
 }
 
 /// Pieces of the record whose mean torques are compared.
