@@ -44,6 +44,11 @@ pub fn check(case: &Case, context: &FitContext) -> Result<Option<Alignment>, Fai
     let alignment = (as_given >= LARGE_ERROR)
         .then(|| Alignment::find(case, context, as_given))
         .flatten();
+    if as_given >= LARGE_ERROR {
+        // Half a period late is nearly upside down: the sign is the simpler of the two.
+        let shifted = alignment.as_ref().map(|a| a.errors[1]);
+        refuse_sign_or_unit(case, context, shifted.unwrap_or(as_given).min(as_given))?;
+    }
     if let Some(alignment) = &alignment {
         shift::refuse(case, alignment)?;
     }
@@ -51,7 +56,6 @@ pub fn check(case: &Case, context: &FitContext) -> Result<Option<Alignment>, Fai
         .as_ref()
         .is_some_and(|a| a.errors[1] < ANOTHER_UNIT * as_given);
     if as_given >= LARGE_ERROR && !is_shifted {
-        refuse_sign_or_unit(case, context, as_given)?;
         // Swapped channels fit any frequency, which may make them look too short.
         refuse_swapped(case, context, as_given)?;
     }

@@ -246,21 +246,40 @@ fn bracket(text: &str) -> Option<(String, &str)> {
     None
 }
 
-/// Seconds of a unit of time with a factor in a heading: 0.01 of `Zeit [1/100 s]` and of `Zeit x10ms`.
+/// Seconds of a unit of time with a factor in a heading: 0.01 of `Zeit [1/100 s]`, `Zeit x10ms` and `Time (s) x1e-2`.
 #[must_use]
 pub fn scaled_time(heading: &str) -> Option<f64> {
-    let inside = heading.split(['[', '(', ']', ')']).nth(1).or_else(|| {
-        heading
-            .split_whitespace()
-            .find_map(|word| word.strip_prefix('x'))
-    })?;
-    let end = inside.find(|c: char| !(c.is_ascii_digit() || c == '.' || c == '/'))?;
-    let (number, unit) = (&inside[..end], read(&inside[end..])?);
-    let factor = match number.split_once('/') {
-        Some((above, below)) => above.parse::<f64>().ok()? / below.parse::<f64>().ok()?,
-        None => number.parse().ok()?,
+    let mut parts = heading.split(['[', '(', ']', ')']).skip(1);
+    let (inside, behind) = (parts.next(), parts.next());
+    let word = || {
+        let mut words = heading.split_whitespace();
+        words.find(|word| word.starts_with(['x', '×']) && word.len() > 1)
     };
-    (is_time(&unit) && factor > 0.0 && factor.is_finite()).then(|| factor * unit.unit.factor())
+    let unit_of = |text: &str| read(text).filter(is_time).map(|unit| unit.unit.factor());
+    if let Some((factor, unit)) = inside.or_else(word).and_then(factor) {
+        return Some(factor * unit_of(unit)?);
+    }
+    let behind = behind?.trim();
+    if !behind.starts_with(['x', '×', '*']) {
+        return None;
+    }
+    let (factor, rest) = factor(behind)?;
+    (rest.is_empty()).then_some(factor * unit_of(inside?)?)
+}
+
+/// The factor that a text begins with, and the rest: `1/100 s`, `x10ms`, `1e-3 s`, `10^-3 s`.
+fn factor(text: &str) -> Option<(f64, &str)> {
+    let text = text.trim().trim_start_matches(['x', '×', '*']).trim_start();
+    let is_part =
+        |c: char| c.is_ascii_digit() || matches!(c, '.' | '/' | 'e' | 'E' | '^' | '-' | '+');
+    let end = text.find(|c: char| !is_part(c)).unwrap_or(text.len());
+    let (number, rest) = text.split_at(end);
+    let factor: f64 = match (number.split_once('/'), number.split_once('^')) {
+        (Some((above, below)), _) => above.parse::<f64>().ok()? / below.parse::<f64>().ok()?,
+        (_, Some((base, power))) => base.parse::<f64>().ok()?.powi(power.parse().ok()?),
+        _ => number.parse().ok()?,
+    };
+    (factor > 0.0 && factor.is_finite()).then(|| (factor, rest.trim()))
 }
 
 /// Whether it is a unit of time.
@@ -276,6 +295,34 @@ mod tests {
     fn told(text: &str) -> (String, Option<String>, bool) {
         let heading = heading(text);
         (heading.name, heading.unit_text, heading.unit.is_some())
+    }
+
+    #[test]
+    fn factors_of_units_of_time() {
+        for (heading, seconds) in [
+            ("Zeit [1/100 s]", 0.01),
+            ("Zeit x10ms", 0.01),
+            ("Time (50 us)", 50e-6),
+            ("Time (1e-3 s)", 1e-3),
+            ("Time (x1e-3 s)", 1e-3),
+            ("Time (10^-3 s)", 1e-3),
+            ("Time (1/20000 s)", 5e-5),
+            ("Time (0.1 ms)", 1e-4),
+            ("Time (s) x1e-3", 1e-3),
+        ] {
+            let found = scaled_time(heading).unwrap_or_else(|| panic!("{heading}"));
+            assert!((found / seconds - 1.0).abs() < 1e-12, "{heading}: {found}");
+        }
+        for heading in [
+            "Time (s)",
+            "time_ms",
+            "Time [1/s]",
+            "t (run 2)",
+            "Time (s) x",
+            "Zeit [s] 2",
+        ] {
+            assert_eq!(scaled_time(heading), None, "{heading}");
+        }
     }
 
     #[test]

@@ -47,6 +47,16 @@ pub(super) fn readings_of_weight(text: &str) -> Option<[String; 2]> {
     found.then_some(readings)
 }
 
+/// Whether a unit has a minute in it that is not that of a speed.
+pub(super) fn has_bare_minute(text: &str) -> bool {
+    let plain = plain_signs(text.trim());
+    let is_speed = ["1/min", "min^-1", "min-1"]
+        .iter()
+        .any(|speed| plain.contains(speed));
+    let mut words = plain.split(|c: char| !is_letter(c));
+    !is_speed && words.any(|word| ["min", "minute", "minutes"].contains(&word))
+}
+
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Token {
     Symbol(&'static Symbol),
@@ -67,6 +77,9 @@ pub(super) fn read(text: &str) -> Result<Unit, QuantityError> {
     if PER_MINUTE.contains(&plain.as_str()) {
         // Turns a minute: no angle is counted in rad per minute.
         plain = "rpm".to_owned();
+    }
+    for speed in ["/(1/min)", "/(min^-1)", "/min^-1", "/min-1"] {
+        plain = plain.replace(speed, "/rpm");
     }
     let tokens = Lexer { text, rest: &plain }.tokens()?;
     if tokens.is_empty() {

@@ -168,6 +168,9 @@ impl Kind {
     /// use torqcomp_model::Kind;
     /// // 12 in lbf = 1 ft lbf = 1.355817948 N m.
     /// assert!((Kind::Torque.parse("12 in lbf")? - 1.355817948).abs() < 1e-9);
+    /// // 1 N m over one turn a minute: 60/2π = 9.5493 N m s/rad.
+    /// assert!((Kind::AngularDamping.parse("1 N m/(1/min)")? - 9.549297).abs() < 1e-6);
+    /// assert!(Kind::AngularDamping.parse("1 N m min").is_err());
     /// // 3700 rad/s are 3700/2π = 588.873 Hz.
     /// assert!((Kind::Frequency.parse("3700 rad/s")? - 588.873).abs() < 1e-3);
     /// assert!(Kind::AngularStiffness.parse("8.1e4").is_err());
@@ -289,6 +292,13 @@ impl Kind {
             });
         }
         let unit = Unit::parse(unit_text)?;
+        if self == Self::AngularDamping && grammar::has_bare_minute(unit_text) {
+            return Err(QuantityError::UnitSyntax {
+                unit: unit_text.to_owned(),
+                problem: "a minute may count turns or radians; write \"N m/rpm\" for a torque over turns a minute, or \
+                          \"N m s/rad\"",
+            });
+        }
         let accepts = self.row().accepts;
         let fits = |unit: &Unit| accepts.iter().find(|(d, _)| *d == unit.dimension());
         if self != Self::Mass

@@ -213,9 +213,10 @@ fn doubts(object: &TdmsObject, name: &str) -> Option<Warning> {
 
 /// The unit of the horizontal axis, if it is not one of time.
 fn other_dimension(object: &TdmsObject) -> Option<&str> {
-    let unit = object.text("wf_xunit_string")?;
-    let is_time = NamedUnit::parse(unit).is_some_and(|unit| unit.is_time());
-    (!is_time).then_some(unit)
+    match object.time_unit_s() {
+        Some(_) => None,
+        None => object.text("wf_xunit_string"),
+    }
 }
 
 /// The axis that the properties of a waveform give; times count from the first start in the file.
@@ -223,9 +224,11 @@ fn of_waveform(object: &TdmsObject, first_ns: Option<i64>) -> Option<TimeAxis> {
     if other_dimension(object).is_some() || object.changed == Some("wf_increment") {
         return None;
     }
-    let step_s = object.number("wf_increment").filter(|step| *step > 0.0)?;
+    let unit_s = object.time_unit_s()?;
+    let step_s = unit_s * object.number("wf_increment").filter(|step| *step > 0.0)?;
     let rate_hz = plausible_rate(without_rounding(1.0 / step_s))?;
-    let offset_s = object.number("wf_start_offset").filter(|s| s.is_finite());
+    let offset = object.number("wf_start_offset").filter(|s| s.is_finite());
+    let offset_s = offset.map(|offset| unit_s * offset);
     let start_ns = object.time("wf_start_time");
     let later_s = start_ns.map(|ns| ns.wrapping_sub(first_ns.unwrap_or(ns)) as f64 * 1e-9);
     let start_s = match (later_s, offset_s) {

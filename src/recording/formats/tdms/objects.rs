@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, HashMap};
 use super::super::bytes::{Number, Order};
 use super::super::damaged;
 use crate::failure::{ErrorCode, Failure};
+use crate::unit::NamedUnit;
 
 /// Identifier of data that no DAQmx scaler made, and input of a scale that takes the data as they are stored.
 pub(super) const RAW: u32 = u32::MAX;
@@ -109,6 +110,15 @@ impl TdmsObject {
         }
     }
 
+    /// The unit of the horizontal axis in s, which is usual; `None` if it is no unit of time.
+    pub(super) fn time_unit_s(&self) -> Option<f64> {
+        let Some(unit) = self.text("wf_xunit_string") else {
+            return Some(1.0);
+        };
+        let unit = NamedUnit::parse(unit).filter(NamedUnit::is_time)?;
+        Some(unit.unit.factor())
+    }
+
     pub(super) fn text(&self, key: &str) -> Option<&str> {
         match self.properties.get(key)? {
             Property::Text(text) => Some(text.trim()).filter(|text| !text.is_empty()),
@@ -131,7 +141,8 @@ impl TdmsObject {
         let fixed = fixed.into_iter().find(|fixed| *fixed == key);
         let before = self.properties.get(&key);
         if let (Some(fixed), Some(before), true) = (fixed, before, count > 0) {
-            let step_s = self.number("wf_increment").unwrap_or(0.0);
+            let unit_s = self.time_unit_s().unwrap_or(1.0);
+            let step_s = unit_s * self.number("wf_increment").unwrap_or(0.0);
             let is_next = match (before, &value) {
                 // Each waveform may state its own start.
                 (Property::Time(first), Property::Time(now)) => {

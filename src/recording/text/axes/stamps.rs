@@ -306,11 +306,11 @@ impl Sources<'_> {
             }
             return Ok(Some((unit.factor(), None)));
         }
-        if let Some(unit) = field.unit.as_ref().filter(|unit| units::is_time(unit)) {
-            return Ok(Some((unit.unit.factor(), None)));
-        }
         if let Some(seconds) = units::scaled_time(&field.heading) {
             return Ok(Some((seconds, None)));
+        }
+        if let Some(unit) = field.unit.as_ref().filter(|unit| units::is_time(unit)) {
+            return Ok(Some((unit.unit.factor(), None)));
         }
         let values = &self.columns[place].values;
         if let (Some(step), Some(hz)) = (typical_step(values), header_hz) {
