@@ -18,6 +18,8 @@ const ORDER: usize = 16;
 const A_PERIOD: f64 = 20.0;
 /// Averaged samples before a moment that it is compared with.
 const BEFORE: usize = 160;
+/// Averaged samples at the start of a stretch among which those before the decay are looked for, with the order.
+const LEAD: usize = 4 * ORDER;
 /// What is left at a restart, over the largest before it …
 const JUMP: f64 = 5.0;
 /// … in standard deviations of all that is left …
@@ -50,6 +52,32 @@ pub(super) fn parts(values: &[f64], least: usize) -> Vec<Range<usize>> {
     all
 }
 
+/// Samples at the start of a stretch that are not of the decay yet, as of a preload that is let go a little later: the recursion
+/// fails until the last of them is behind it, and holds from there on.
+pub(super) fn lead(values: &[f64]) -> usize {
+    let factor = averaged(values);
+    let few: Cow<[f64]> = match factor {
+        1 => values.into(),
+        _ => values.chunks_exact(factor).map(mean).collect(),
+    };
+    let Some((left, noise)) = unpredicted(&few, LEAD).map(with_noise) else {
+        return 0;
+    };
+    let settled = LEAD.min(left.len())..(LEAD + BEFORE).min(left.len());
+    let later = left[settled].iter().copied().fold(0.0, f64::max);
+    // To take a sample too many for the preload costs little.
+    let least = (0.5 * NOISE * noise).max(1.5 * later);
+    let mut at_start = ORDER..LEAD.min(left.len());
+    let last = at_start.rfind(|i| left[*i] > least);
+    last.map_or(0, |last| factor * (last + 1 - ORDER))
+}
+
+/// With the standard deviation of most of what is left.
+fn with_noise(left: Vec<f64>) -> (Vec<f64>, f64) {
+    let noise = quality::median(&mut left[ORDER..].to_vec()).unwrap_or(0.0) / 0.674_489_75;
+    (left, noise)
+}
+
 fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
@@ -74,10 +102,9 @@ fn averaged(values: &[f64]) -> usize {
 
 /// From each restart to where the recursion holds again.
 fn restarts(values: &[f64]) -> Vec<Range<usize>> {
-    let Some(left) = unpredicted(values) else {
+    let Some((left, noise)) = unpredicted(values, 0).map(with_noise) else {
         return Vec::new();
     };
-    let noise = quality::median(&mut left[ORDER..].to_vec()).unwrap_or(0.0) / 0.674_489_75;
     let least = (NOISE * noise).max(SIZE * swing(values));
     let largest = |range: Range<usize>| left[range].iter().copied().fold(0.0, f64::max);
     let mut found = Vec::new();
@@ -100,13 +127,14 @@ fn restarts(values: &[f64]) -> Vec<Range<usize>> {
     found
 }
 
-/// Size of what the recursion leaves at each sample, from the first that it predicts on; `None` if there are too few.
-fn unpredicted(values: &[f64]) -> Option<Vec<f64>> {
-    let rows = values.len().checked_sub(ORDER)?;
+/// Size of what the recursion, fitted from a sample on, leaves at each sample, from the first that it predicts on; `None` if there
+/// are too few.
+fn unpredicted(values: &[f64], fitted_from: usize) -> Option<Vec<f64>> {
+    let rows = values.len().checked_sub(fitted_from + ORDER)?;
     if rows < 4 * ORDER {
         return None;
     }
-    let (mut equations, right) = equations(values);
+    let (mut equations, right) = equations(&values[fitted_from..]);
     for i in 0..=ORDER {
         equations[(i, i)] *= 1.0 + RIDGE;
     }
@@ -193,6 +221,22 @@ mod tests {
             // Its sine is still zero at the hit.
             assert!(found[0].end.abs_diff(at) < 3, "{found:?}");
             assert!((at..at + 40).contains(&found[1].start), "{found:?}");
+        }
+    }
+
+    #[test]
+    fn a_preload_before_its_release_is_no_decay() {
+        for noise in [1e-4, 1e-3] {
+            for before in [0, 4, 20] {
+                let mut released = decays(&[(0, 1.0)], noise, 3000);
+                // cos instead of sin: a quarter of a period later.
+                released.drain(..8);
+                let first = released[0];
+                let held = decays(&[(0, 0.0)], noise, before);
+                released.splice(0..0, held.iter().map(|x| x + first));
+                let found = lead(&released);
+                assert!(found.abs_diff(before) < 3, "{noise} {before}: {found}");
+            }
         }
     }
 

@@ -226,7 +226,7 @@ impl Cuts {
         }
         self.left_clipped += clipped;
         let range = range.start + clipped..range.end;
-        let rings = ringing(values, &range);
+        let rings = ringing(values, &range, record.rate_hz.is_some());
         self.left_out += range.end - rings.end;
         for part in parts(values, &rings, record.rate_hz.is_some()) {
             if part.start > rings.start {
@@ -284,7 +284,7 @@ const OWN_PARTS: &str = "the parts before and after that are fitted as decays of
 pub(super) fn restarts_s(record: &Ringing) -> Vec<f64> {
     let mut found = Vec::new();
     for range in onset::decays(record.values) {
-        let rings = ringing(record.values, &range);
+        let rings = ringing(record.values, &range, record.rate_hz.is_some());
         let parts = parts(record.values, &rings, record.rate_hz.is_some());
         let later = parts.iter().filter(|part| part.start > rings.start);
         found.extend(later.map(|part| record.times_s[part.start]));
@@ -333,13 +333,18 @@ fn clipped_at_start(clipped_s: &[f64], times_s: &[f64]) -> usize {
     last.map_or(0, |last| times_s.partition_point(|t| t <= last))
 }
 
-/// The part of a long stretch that rings, and as much noise behind it.
-fn ringing(values: &[f64], range: &Range<usize>) -> Range<usize> {
+/// The part of a stretch that rings, of a long one with as much noise behind it.
+fn ringing(values: &[f64], range: &Range<usize>, is_uniform: bool) -> Range<usize> {
     let kept = match range.len() > MOST_SAMPLES {
         true => onset::until_noise(&values[range.clone()]),
         false => range.len(),
     };
-    range.start..range.start + kept
+    let rings = range.start..range.start + kept;
+    let lead = match is_uniform {
+        true => restart::lead(&values[rings.clone()]),
+        false => 0,
+    };
+    rings.start + lead..rings.end
 }
 
 /// Refuses a record that is too short or has holes.
