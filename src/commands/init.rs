@@ -14,8 +14,7 @@ use crate::file_name::{ShowPath, is_dash};
 use torqcomp_model::Kind;
 
 use crate::failure::{ErrorCode, Failure};
-use crate::print::rounded;
-use crate::stand;
+use crate::stand::{self, TransducerSignal};
 
 /// Sections as the file has them, each with the line above it.
 const SECTIONS: [(&str, &str); 6] = [
@@ -150,42 +149,27 @@ fn compose<R: BufRead, W: Write>(
     Ok(page(args, from, &answers))
 }
 
-/// Outputs that reach no farther, with a little room: what they are called, their kind, and the largest value.
-const LOOPS: [(&str, Kind, f64); 2] = [
-    ("4 to 20 mA", Kind::Current, 0.021),
-    ("0 to 10 V", Kind::Voltage, 10.5),
-];
-
 /// Refuses an output at rated torque that is written in the place of its change.
 fn beyond_loop(answers: &[Answer]) -> Result<(), Failure> {
     let text = |key: &str| {
         let found = answers.iter().find(|a| a.question.key == key);
-        found.map(|a| a.value.as_str())
+        found.map(|answer| answer.value.as_str())
     };
     let (Some(output), Some(zero)) = (text("sensitivity"), text("zero")) else {
         return Ok(());
     };
-    for (name, kind, largest) in LOOPS {
-        let both = [output, zero].map(|text| kind.parse(text));
-        let [Ok(change), Ok(offset)] = both else {
+    let kinds = [
+        (TransducerSignal::Current, Kind::Current),
+        (TransducerSignal::Voltage, Kind::Voltage),
+    ];
+    for (signal, kind) in kinds {
+        let [Ok(change), Ok(offset)] = [output, zero].map(|text| kind.parse(text)) else {
             continue;
         };
-        if offset != 0.0 && change.abs() <= largest && (offset + change).abs() > largest {
-            let unit = if kind == Kind::Current {
-                ("mA", 1e3)
-            } else {
-                ("V", 1.0)
-            };
-            let [at_rated, right] =
-                [change + offset, change - offset].map(|v| rounded(v * unit.1, 6));
+        if let Some(why) = signal.beyond_loop(change, offset) {
             return Err(Failure::usage(
                 ErrorCode::InvalidValue,
-                format_args!(
-                    "--sensitivity {output} beside --zero {zero}: at rated torque the output would be {at_rated} {}, which none of \
-                     {name} reaches; the sensitivity is the change from no load to rated torque: write \"{right} {}\" if {output} is \
-                     the output at rated torque",
-                    unit.0, unit.0
-                ),
+                format_args!("--sensitivity {output} beside --zero {zero}: {why}"),
             ));
         }
     }

@@ -64,6 +64,8 @@ impl ChannelStream {
         let heading = messages::clock(&chosen.time);
         let time = blocks.axis(&heading, &later, reading);
         let time = time.map_err(|failure| failure.at(&name))?;
+        let stamps_s: Vec<f64> = blocks.relative()?.iter().map(|ns| 1e-9 * ns).collect();
+        let overridden = choice::overridden(reading, &heading, &stamps_s);
         Ok(Self {
             source: name,
             dialect: format!("MCAP, {}", messages::describe(&chosen)),
@@ -74,7 +76,7 @@ impl ChannelStream {
             rate_hz: time.rate_hz.unwrap_or(f64::NAN),
             start: time.start.unwrap_or_default(),
             time,
-            warnings: warning.into_iter().collect(),
+            warnings: warning.into_iter().chain(overridden).collect(),
             any_steps: reading.any_steps,
             filled: Vec::new(),
             origin: Some(MessageOrigin {

@@ -7,7 +7,7 @@ use torqcomp_model::Unit;
 
 use super::drawing::{beam, friction, part, unusual_modulus};
 use super::effects::effect;
-use super::measured::calibration;
+use super::measured::{MeasuredCalibration, calibration};
 use super::measuring::{bridge, gage, recorder, unusual_gage_factor};
 use super::mechanics::mechanics;
 use super::section::{Section, SourceText};
@@ -167,6 +167,16 @@ fn one_calibration(top: &Section, stand: &Stand) -> Result<(), Failure> {
         return Err(top.fail(
             "recorder",
             "zero and zero_frequency of [calibration] both give the record at no load; keep one of them",
+        ));
+    }
+    let change = of_calibration.and_then(MeasuredCalibration::change_at_rated);
+    if let (Some((signal, change)), Some((of, zero))) = (change, of_recorder)
+        && signal == *of
+        && let Some(why) = signal.beyond_loop(change, zero.value())
+    {
+        return Err(top.fail(
+            "calibration",
+            format_args!("the sensitivity does not go with the zero of [recorder]: {why}"),
         ));
     }
     Ok(())

@@ -46,6 +46,16 @@ impl MeasuredCalibration {
         }
     }
 
+    /// The change of the signal from no load to rated torque in SI units, without sign, if both are known.
+    #[must_use]
+    pub fn change_at_rated(&self) -> Option<(TransducerSignal, f64)> {
+        let CalibrationLaw::Constant(constant) = &self.law else {
+            return None;
+        };
+        let change = self.rated_n_m? / constant.value().abs();
+        Some((self.signal, change))
+    }
+
     /// The calibration in words.
     #[must_use]
     pub fn described(&self, units: UnitSystem) -> String {

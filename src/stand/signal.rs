@@ -6,6 +6,7 @@ use torqcomp_model::{Dimension, Estimate, Kind, RatioOf, Unit, UnitSystem};
 
 use super::section::Section;
 use crate::failure::Failure;
+use crate::print::rounded;
 
 /// The quantity that a transducer or its amplifier gives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -102,6 +103,27 @@ impl TransducerSignal {
             Self::Strain => ("ustrain", 1e-6),
             Self::Force => ("N", 1.0),
         }
+    }
+
+    /// Why a change of the output from no load to rated torque cannot be right beside an output at no load, if it would leave what
+    /// such outputs reach; both in SI units.
+    #[must_use]
+    pub fn beyond_loop(self, change: f64, zero: f64) -> Option<String> {
+        let (name, largest) = match self {
+            Self::Current => ("4 to 20 mA", 0.021),
+            Self::Voltage => ("0 to 10 V", 10.5),
+            _ => return None,
+        };
+        let is_beyond = change.abs() <= largest && (zero + change).abs() > largest;
+        (zero != 0.0 && is_beyond).then(|| {
+            let (unit, factor) = self.usual_unit();
+            let [at_rated, right, change] =
+                [change + zero, change - zero, change].map(|v| rounded(v / factor, 6));
+            format!(
+                "at rated torque the output would be {at_rated} {unit}, which none of {name} reaches; the sensitivity is the change \
+                 from no load to rated torque: write \"{right} {unit}\" if {change} {unit} is the output at rated torque"
+            )
+        })
     }
 
     /// The unit of torque per signal, and SI units of torque per signal in it.

@@ -18,7 +18,7 @@ impl LeafReport {
 
 impl ChannelReport {
     /// The numbers that a part of a name can choose, as topic and field: those of lists only by the names of their items,
-    /// since without them any item could be meant.
+    /// since without them any item could be meant. What describes a list (`layout` of the `MultiArray` messages of ROS) is none.
     #[must_use]
     pub fn choosable(&self) -> Vec<[String; 2]> {
         let one = |leaf: &LeafReport| -> Vec<String> {
@@ -31,7 +31,10 @@ impl ChannelReport {
                 }
             }
         };
-        let numbers = self.leaves.iter().filter(|leaf| !leaf.is_stamp);
+        let has_lists = self.leaves.iter().any(|leaf| leaf.path.contains('['));
+        let describes = |leaf: &LeafReport| has_lists && leaf.path.starts_with("layout.");
+        let numbers = self.leaves.iter();
+        let numbers = numbers.filter(|leaf| !leaf.is_stamp && !describes(leaf));
         let fields = numbers.flat_map(one);
         fields.map(|field| [self.topic.clone(), field]).collect()
     }
