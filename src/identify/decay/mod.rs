@@ -60,7 +60,7 @@ pub fn identify(
         most: MOST_MODES,
         band_hz: options.band_hz.unwrap_or((0.0, f64::INFINITY)),
     };
-    let (fit, more) = search::search(&mut stretches, &wanted)?;
+    let (fit, more) = search::search(&mut stretches, &wanted, &lines)?;
     lines.extend(more);
     if fit.poles.is_empty() {
         return Err(present::no_mode(&lines));

@@ -20,6 +20,8 @@ const A_PERIOD: f64 = 20.0;
 const BEFORE: usize = 160;
 /// Averaged samples at the start of a stretch among which those before the decay are looked for, with the order.
 const LEAD: usize = 4 * ORDER;
+/// Swing of such a start, over that of the whole, below which it is at rest.
+const AT_REST: f64 = 0.3;
 /// What is left at a restart, over the largest before it …
 const JUMP: f64 = 5.0;
 /// … in standard deviations of all that is left …
@@ -69,7 +71,11 @@ pub(super) fn lead(values: &[f64]) -> usize {
     let least = (0.5 * NOISE * noise).max(1.5 * later);
     let mut at_start = ORDER..LEAD.min(left.len());
     let last = at_start.rfind(|i| left[*i] > least);
-    last.map_or(0, |last| factor * (last + 1 - ORDER))
+    let lead = last.map_or(0, |last| factor * (last + 1 - ORDER));
+    match swing(&values[..lead]) < AT_REST * swing(values) {
+        true => lead,
+        false => 0,
+    }
 }
 
 /// With the standard deviation of most of what is left.

@@ -35,6 +35,10 @@ const OFF_HZ: f64 = 0.3;
 /// Part of its amplitude, as an exponent, that a steady line may seem to lose over a record.
 const STEADY: f64 = 0.3;
 
+/// What is left of a line that was taken off: so many turns from it over the stretch, and so much of its amplitude.
+const LEFT_NEAR: f64 = 2.0;
+const LEFT_SHARE: f64 = 0.3;
+
 /// Standard uncertainties by which the decay rate of a steady line may differ from zero.
 const STEADY_STD: f64 = 3.0;
 
@@ -46,14 +50,15 @@ const STEADY_STD: f64 = 3.0;
 pub(super) fn search(
     stretches: &mut Vec<Stretch>,
     wanted: &ModeSearch,
+    taken_off: &[SteadyLine],
 ) -> Result<(ModesFit, Vec<SteadyLine>), FitError> {
     let recorded = stretches.clone();
-    let found = attempt(stretches, wanted, false)?;
+    let found = attempt(stretches, wanted, taken_off, false)?;
     if !found.has_tone {
         return Ok((found.fit, found.lines));
     }
     let mut without = recorded;
-    let other = attempt(&mut without, wanted, true)?;
+    let other = attempt(&mut without, wanted, taken_off, true)?;
     if !decays_clearly(&other.fit, &without) {
         return Ok((found.fit, found.lines));
     }
@@ -90,11 +95,13 @@ struct Attempt {
 fn attempt(
     stretches: &mut [Stretch],
     wanted: &ModeSearch,
+    taken_off: &[SteadyLine],
     takes_tones: bool,
 ) -> Result<Attempt, FitError> {
     let mut lines = Vec::new();
     let mut tones: Vec<usize> = Vec::new();
     let mut has_tone = false;
+    let mut leftovers = 0;
     let mut best = fit(stretches, &[])?;
     let resolved = RESOLVED * best.fit.sum_of_squares;
     while best.poles.len() - tones.len() < wanted.count.unwrap_or(wanted.most) {
@@ -114,6 +121,16 @@ fn attempt(
         {
             take_off(stretches, &next, last);
             lines.push(line);
+            best = fit(stretches, &best.poles)?;
+            continue;
+        }
+        // A line that was fitted before the decay beside it is not all of it.
+        let is_left = [taken_off, &lines]
+            .iter()
+            .any(|lines| is_left_of(lines, &next, last, stretches));
+        if leftovers < MOST_LINES && is_left {
+            take_off(stretches, &next, last);
+            leftovers += 1;
             best = fit(stretches, &best.poles)?;
             continue;
         }
@@ -201,6 +218,17 @@ fn steady(found: &ModesFit, place: usize, stretches: &[Stretch]) -> Option<Stead
         frequency_hz,
         amplitude: largest(found, place, stretches),
         is_of_mains,
+    })
+}
+
+/// Whether a mode of a fit is what is left of a line that was taken off before: near it and much smaller.
+fn is_left_of(lines: &[SteadyLine], found: &ModesFit, mode: usize, stretches: &[Stretch]) -> bool {
+    let near_hz = LEFT_NEAR / length_s(stretches);
+    let frequency_hz = found.poles[mode].frequency_hz();
+    let amplitude = largest(found, mode, stretches);
+    lines.iter().any(|line| {
+        (line.frequency_hz - frequency_hz).abs() < near_hz
+            && amplitude < LEFT_SHARE * line.amplitude
     })
 }
 
