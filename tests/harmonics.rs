@@ -105,3 +105,52 @@ fn orders_that_cannot_be_seen_are_said() {
         .run(&[&HARMONICS[..], &["55", "--refine", "--orders", "1"]].concat())
         .says(1, &["could not be refined"]);
 }
+
+/// Torque at three orders of a shaft whose angle sways by `sway_rad` at 2 Hz, at an exact mean speed.
+fn swaying(frequency_hz: f64, sway_rad: f64, hum: f64) -> String {
+    let mut noise = Noise(9);
+    let samples: Vec<f64> = (0..40_000)
+        .map(|i| {
+            let t = f64::from(i) / 10_000.0;
+            let turn = std::f64::consts::TAU * t;
+            let angle = frequency_hz * turn + sway_rad * (2.0 * turn).sin();
+            let orders = [(1.0, 1.0), (2.0, 0.5), (7.0, 0.1)];
+            let torque: f64 = orders.iter().map(|(k, a)| a * (k * angle).cos()).sum();
+            torque + hum * (50.0 * turn).cos() + 0.02 * (noise.uniform() - 0.5)
+        })
+        .collect();
+    record(&samples, 10_000.0)
+}
+
+/// What is wrong with the speed is said where it changes a component, and only there.
+#[test]
+fn a_speed_that_sways_or_is_off_is_said() {
+    let folder = Folder::new();
+    let codes = |text: String, fundamental: &str| -> Vec<String> {
+        folder.write("in.csv", text);
+        let report = folder.json(
+            &[
+                &HARMONICS[..],
+                &[fundamental, "--orders", "1,2,7", "--json"],
+            ]
+            .concat(),
+        );
+        let warnings = report["warnings"].as_array().expect("a list");
+        let of_speed = ["speed-changes", "fundamental-off", "order-or-mains"];
+        let codes = warnings.iter().filter_map(|w| w["code"].as_str());
+        codes
+            .filter(|code| of_speed.contains(code))
+            .map(str::to_owned)
+            .collect()
+    };
+    assert!(codes(swaying(47.3, 0.0, 0.0), "47.3").is_empty());
+    // The seventh order comes out by J0(0.7), 12 %, too small; for 0.01 rad by 0.1 %.
+    assert_eq!(codes(swaying(47.3, 0.1, 0.0), "47.3"), ["speed-changes"]);
+    assert!(codes(swaying(47.3, 0.01, 0.0), "47.3").is_empty());
+    // In 4 s the seventh order turns by 0.14 of a turn against 47.305 Hz.
+    assert_eq!(
+        codes(swaying(47.3, 0.0, 0.0), "47.305"),
+        ["fundamental-off"]
+    );
+    assert_eq!(codes(swaying(50.0, 0.0, 0.2), "50"), ["order-or-mains"]);
+}

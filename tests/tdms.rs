@@ -559,6 +559,7 @@ fn a_start_that_changes_and_another_dimension_are_told() {
             Some(10.0),
         ),
         (of(0.2, 3_790_000_004, "s"), "s", Some("no-time-axis"), None),
+        (of(0.1, 3_790_000_000, "ms"), "ms", None, Some(10_000.0)),
         (
             of(0.1, 3_790_000_004, "Hz"),
             "Hz",

@@ -299,7 +299,10 @@ pub fn error_sentences(diagnosis: &Diagnosis) -> Vec<String> {
         _ => None,
     };
     let course = course.map(|course| {
-        format!("The applied quantity behaves as if {course}; all errors are for that.")
+        format!(
+            "The applied quantity behaves as if {course}; all errors are for that: run \"simulate\" with --between {}.",
+            diagnosis.input_between_samples
+        )
     });
     let all = improvement.into_iter().chain([floor]).chain(course);
     all.collect()
