@@ -1,6 +1,7 @@
 //! `harmonics`: component torques at a fundamental and its orders.
 
 mod filtered;
+mod mains;
 mod speed;
 mod text;
 
@@ -31,11 +32,6 @@ use crate::warning::Warning;
 
 /// Distance of the record from time zero, in its own lengths, up to which phases refer to zero.
 const FAR_FROM_ZERO: f64 = 10.0;
-
-/// Orders of the mains that are looked at.
-const MAINS_LINES: f64 = 5.0;
-/// Frequencies of the mains.
-const GRIDS_HZ: [f64; 2] = [50.0, 60.0];
 
 /// Component torques at a fundamental and its orders.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -275,7 +271,7 @@ fn fit(
     warnings.extend(off_rated(largest, rated, &chain.applied.unit));
     warnings.extend(of_orders(way, record, &fundamental, &orders));
     warnings.extend(lost_warning(&components));
-    warnings.extend(mains_warning(&components, duration_s));
+    warnings.extend(mains::warning(&components, duration_s));
     warnings.extend(of_quality(record, channel, chain)?);
     Ok(HarmonicsReport {
         input: source.to_owned(),
@@ -312,12 +308,14 @@ fn of_orders(
 ) -> Vec<Warning> {
     let hz = fundamental.frequency_hz;
     let is_given = fundamental.std_hz.is_none();
-    let off = is_given.then(|| speed::off(record, hz, orders)).flatten();
+    let load = speed::load_changes(record, hz, orders);
+    // A load step leaves slow parts that bias the speed a little.
+    let off = is_given.then(|| speed::off(record, hz, orders, load.is_some()));
+    let off = off.flatten();
     let changing = speed::warning(record, hz, orders);
     let sways = (off.is_none() && changing.is_none())
         .then(|| speed::sways(record, hz, orders))
         .flatten();
-    let load = speed::load_changes(record, hz, orders);
     let is_compensated = way.stand.is_none();
     let beyond = is_compensated.then(|| filtered::warning(record, hz, orders));
     let all = [off, changing, sways, load, beyond.flatten()];
@@ -426,44 +424,6 @@ fn component(fitted: &harmonics::Component, printed: f64, way: &WayBack) -> Comp
         std_response: std.response.as_ref().map(of_torque),
         phase_std_stand_deg: std.response.map(|u| u.phase_rad.to_degrees()),
     }
-}
-
-/// Orders that lie where lines of the mains lie: one record cannot tell them apart. Of a fundamental that is the mains' own it is
-/// said once.
-fn mains_warning(components: &[ComponentTorque], duration_s: f64) -> Option<Warning> {
-    let fundamental_hz = components.first().map(|c| c.frequency_hz / c.order)?;
-    let of_grid = |grid_hz: &f64| (fundamental_hz - grid_hz).abs() < 1.0 / duration_s;
-    if let Some(grid_hz) = GRIDS_HZ.into_iter().find(of_grid) {
-        return Some(Warning::new(
-            "order-or-mains",
-            format!(
-                "the fundamental is that of {grid_hz} Hz mains, and so all orders may contain what a cable picks up: record once with the \
-                 motor off and the supply on, and subtract what is there"
-            ),
-        ));
-    }
-    let doubtful: Vec<String> = components
-        .iter()
-        .filter(|c| c.order > 1.0 && c.torque > 5.0 * c.std)
-        .filter(|c| {
-            GRIDS_HZ.iter().any(|grid_hz| {
-                let line = (c.frequency_hz / grid_hz).round().clamp(1.0, MAINS_LINES) * grid_hz;
-                let slower = c.frequency_hz / c.order < 0.9 * grid_hz;
-                slower && (c.frequency_hz - line).abs() < 1.0 / duration_s
-            })
-        })
-        .map(|c| format!("{} ({:.2} Hz)", short(c.order), c.frequency_hz))
-        .collect();
-    (!doubtful.is_empty()).then(|| {
-        Warning::new(
-            "order-or-mains",
-            format!(
-                "mains lines coincide with {} and cannot be separated at one speed: record at another speed, where orders \
-                 move and mains lines stay",
-                named(&doubtful)
-            ),
-        )
-    })
 }
 
 /// `order 3` or `orders 2, 3 and 5`.

@@ -2,6 +2,7 @@
 
 use super::SearchState;
 use super::guard_models::GuardModel;
+use super::moment::ChangedStand;
 use super::noise_floor::NoiseFloorSource;
 use super::reason::Status;
 use super::refuse::plain_stands_apart;
@@ -120,9 +121,12 @@ fn level_dependence(levels: &ExcitationLevels) -> Option<String> {
 pub fn next_experiment(
     found: &SearchState,
     suspected: Option<&GuardModel>,
-    surface: Option<&ForceSurface>,
+    (change, surface): (Option<&ChangedStand>, Option<&ForceSurface>),
     verdict: Verdict,
 ) -> Option<String> {
+    if change.is_some() {
+        return Some(AFTER_A_CHANGE.to_owned());
+    }
     if let Some(guard) = suspected {
         return Some(guard.effect.experiment.to_owned());
     }
@@ -157,7 +161,7 @@ pub fn next_experiment(
 }
 
 /// What to record where the stand has changed.
-pub const AFTER_A_CHANGE: &str =
+const AFTER_A_CHANGE: &str =
     "look at clamps, bolts and what else may have moved at that moment, then record the same again";
 
 /// The records that show a torque over the displacement, or one over the speed.

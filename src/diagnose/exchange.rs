@@ -18,7 +18,7 @@ const MOST_OPEN: usize = 3;
 const FINEST_OPEN: usize = 2;
 /// Forms that are fitted in the place of an effect.
 const FOR_EXCHANGE: SearchEffort = SearchEffort {
-    first: 8,
+    first: 12,
     second: 0.1,
     full: 2,
     promising: 0.5,

@@ -124,8 +124,8 @@ fn parts(record: &StandRecord, at: usize) -> [StandRecord; 2] {
 }
 
 impl SearchState {
-    /// The change that explains most of what one stand leaves of a record.
-    pub(super) fn find_change(&self) -> Option<ChangedStand> {
+    /// The change that explains most of what one stand leaves of a record; that is then no law of the motion.
+    pub(super) fn find_change(&mut self) -> Option<ChangedStand> {
         let plain = &self.before.fitted;
         let context = &plain.structure.context;
         if context.held.is_some() {
@@ -150,7 +150,9 @@ impl SearchState {
                 found = Some((share, change));
             }
         }
-        Some(found?.1)
+        let change = found?.1;
+        self.suspected = None;
+        Some(change)
     }
 }
 

@@ -172,10 +172,6 @@ impl Diagnosis {
         };
         let is_open = matches!(verdict, Verdict::PartlyExplained | Verdict::Unexplained);
         let changed_stand = is_open.then(|| found.find_change()).flatten();
-        if changed_stand.is_some() {
-            // What one stand leaves is no law of the motion then.
-            found.suspected = None;
-        }
         let force_surface = (is_open && changed_stand.is_none())
             .then(|| found.force_surface(threads))
             .flatten();
@@ -206,15 +202,12 @@ impl Diagnosis {
             error,
             explained: std::mem::take(&mut found.ladder),
             constants: constants(case.declared, &found),
-            next_experiment: match &changed_stand {
-                Some(_) => Some(describe::AFTER_A_CHANGE.to_owned()),
-                None => describe::next_experiment(
-                    &found,
-                    suspected.as_ref(),
-                    force_surface.as_ref(),
-                    verdict,
-                ),
-            },
+            next_experiment: describe::next_experiment(
+                &found,
+                suspected.as_ref(),
+                (changed_stand.as_ref(), force_surface.as_ref()),
+                verdict,
+            ),
             warnings: [case.warnings, describe::warnings(&found.before, verdict)].concat(),
             candidates: found.candidates(),
             detection_limits,

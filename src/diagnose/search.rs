@@ -70,6 +70,8 @@ const LEAST_SHARE: f64 = 0.005;
 /// Minimum significance of the reduction over the blocks of the records; times the root of the number of effects that
 /// reduce it together, as they fit more of the noise.
 const LEAST_SIGNIFICANCE: f64 = 3.0;
+/// Parameters of an effect up to which that holds; where noise rings, those with more find more of it.
+const FEW_PARAMETERS: f64 = 3.0;
 /// Standard deviations that a normal quantity exceeds in 95 % of all cases.
 const CERTAIN: f64 = 1.645;
 /// Difference of the criterion that counts as none.
@@ -385,7 +387,9 @@ pub fn no_gain(model: &ScoredModel, before: &ScoredModel) -> Option<Reason> {
     }
     let count = |m: &ScoredModel| m.effect_names().len();
     let added = count(model).saturating_sub(count(before)).max(1) as f64;
-    let least = LEAST_SIGNIFICANCE * added.sqrt();
+    let last = model.fitted.structure.effects.last();
+    let parameters = last.map_or(0, EffectForm::moved) as f64;
+    let least = LEAST_SIGNIFICANCE * added.sqrt() * (parameters / FEW_PARAMETERS).max(1.0);
     if gain < LEAST_GAIN * variance || comparison.significance() < least {
         return Some(Reason::NotSignificant { change });
     }

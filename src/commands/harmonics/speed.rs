@@ -27,6 +27,8 @@ const TURNS: f64 = 0.2;
 const FIRST: usize = 1 << 17;
 /// Energy that a wrong speed loses, over the power of what the right one leaves in a sample, that is none by chance.
 const LOST: f64 = 50.0;
+/// The same over the power of the components, where the load changes.
+const LOST_OF_POWER: f64 = 0.05;
 /// Change of a component by another speed, over the component, that is worth saying.
 const CHANGED: f64 = 0.02;
 /// Amplitude over its uncertainty from which a component is surely there.
@@ -38,6 +40,7 @@ pub(super) fn off(
     record: &UniformRecord<Spool>,
     fundamental_hz: f64,
     orders: &[f64],
+    load_changes: bool,
 ) -> Option<Warning> {
     let length = record.samples.count().min(FIRST);
     if (length as f64) * fundamental_hz < FEWEST * record.rate_hz {
@@ -60,7 +63,11 @@ pub(super) fn off(
             .filter(|(_, better)| is_sure(better))
             .map(|(given, better)| (given.phasor - better.phasor).norm() / better.phasor.norm());
         let changed = changes.fold(0.0, f64::max) > CHANGED;
-        let matters = changed && lost * length as f64 > LOST * rest;
+        let phasors = better.components.iter().map(|c| c.phasor.norm_sqr());
+        let power = 0.5 * phasors.sum::<f64>();
+        let matters = changed
+            && lost * length as f64 > LOST * rest
+            && (!load_changes || lost > LOST_OF_POWER * power);
         let is_off = is_there && matters && shift_hz > SIGNIFICANT * found.std_hz?;
         is_off.then_some((found, shift_hz, span))
     };

@@ -98,10 +98,8 @@ fn attempt(
     taken_off: &[SteadyLine],
     takes_tones: bool,
 ) -> Result<Attempt, FitError> {
-    let mut lines = Vec::new();
-    let mut tones: Vec<usize> = Vec::new();
-    let mut has_tone = false;
-    let mut leftovers = 0;
+    let (mut lines, mut tones) = (Vec::new(), Vec::<usize>::new());
+    let (mut has_tone, mut taken) = (false, 0);
     let mut best = fit(stretches, &[])?;
     let resolved = RESOLVED * best.fit.sum_of_squares;
     while best.poles.len() - tones.len() < wanted.count.unwrap_or(wanted.most) {
@@ -116,21 +114,12 @@ fn attempt(
         let next = fit(stretches, &starts)?;
         let last = best.poles.len();
         let line = steady(&next, last, stretches);
-        if let Some(line) = line.filter(|line| line.is_of_mains)
-            && lines.len() < MOST_LINES
-        {
+        let of_mains = line.filter(|line| line.is_of_mains);
+        let known = taken_off.iter().chain(&lines);
+        if taken < MOST_LINES && (of_mains.is_some() || is_left_of(known, &next, last, stretches)) {
             take_off(stretches, &next, last);
-            lines.push(line);
-            best = fit(stretches, &best.poles)?;
-            continue;
-        }
-        // A line that was fitted before the decay beside it is not all of it.
-        let is_left = [taken_off, &lines]
-            .iter()
-            .any(|lines| is_left_of(lines, &next, last, stretches));
-        if leftovers < MOST_LINES && is_left {
-            take_off(stretches, &next, last);
-            leftovers += 1;
+            lines.extend(of_mains);
+            taken += 1;
             best = fit(stretches, &best.poles)?;
             continue;
         }
@@ -221,12 +210,18 @@ fn steady(found: &ModesFit, place: usize, stretches: &[Stretch]) -> Option<Stead
     })
 }
 
-/// Whether a mode of a fit is what is left of a line that was taken off before: near it and much smaller.
-fn is_left_of(lines: &[SteadyLine], found: &ModesFit, mode: usize, stretches: &[Stretch]) -> bool {
+/// Whether a mode of a fit is what is left of a line that was taken off before: near it and much smaller. One that was fitted
+/// before the decay beside it is not taken off whole.
+fn is_left_of<'l>(
+    mut lines: impl Iterator<Item = &'l SteadyLine>,
+    found: &ModesFit,
+    mode: usize,
+    stretches: &[Stretch],
+) -> bool {
     let near_hz = LEFT_NEAR / length_s(stretches);
     let frequency_hz = found.poles[mode].frequency_hz();
     let amplitude = largest(found, mode, stretches);
-    lines.iter().any(|line| {
+    lines.any(|line| {
         (line.frequency_hz - frequency_hz).abs() < near_hz
             && amplitude < LEFT_SHARE * line.amplitude
     })

@@ -282,6 +282,18 @@ impl Kind {
         Ok((finite(text, number)?, unit.trim_start()))
     }
 
+    /// Refuses a minute in a damping that may count turns or radians.
+    fn refuse_bare_minute(self, unit_text: &str) -> Result<(), QuantityError> {
+        if self != Self::AngularDamping || !grammar::has_bare_minute(unit_text) {
+            return Ok(());
+        }
+        Err(QuantityError::UnitSyntax {
+            unit: unit_text.to_owned(),
+            problem: "a minute may count turns or radians; write \"N m/rpm\" for a torque over turns a minute, or \
+                      \"N m s/rad\"",
+        })
+    }
+
     /// Factor and zero from a unit to the SI unit of this kind.
     fn scale(self, text: &str, unit_text: &str) -> Result<Scale, QuantityError> {
         if unit_text.is_empty() && !matches!(self, Self::Ratio | Self::Gain) {
@@ -292,13 +304,7 @@ impl Kind {
             });
         }
         let unit = Unit::parse(unit_text)?;
-        if self == Self::AngularDamping && grammar::has_bare_minute(unit_text) {
-            return Err(QuantityError::UnitSyntax {
-                unit: unit_text.to_owned(),
-                problem: "a minute may count turns or radians; write \"N m/rpm\" for a torque over turns a minute, or \
-                          \"N m s/rad\"",
-            });
-        }
+        self.refuse_bare_minute(unit_text)?;
         let accepts = self.row().accepts;
         let fits = |unit: &Unit| accepts.iter().find(|(d, _)| *d == unit.dimension());
         if self != Self::Mass

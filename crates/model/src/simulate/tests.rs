@@ -233,12 +233,12 @@ fn laws_beside_the_list() {
     against(&model, |s| 1e-12 * s[1].powi(3), 2e-4, 1e-5);
     let model = rival("squeezed-damping", "square", &[2e-5]);
     against(&model, |s| 2e-5 * s[0] * s[0] * s[1], 2e-4, 1e-5);
-    let model = rival("end-stop", "both", &[0.8, 1.5]);
+    let model = self::model("end-stop", "both", &[0.8, 1.5]);
     let stop = |s: [f64; 3]| 0.8 * (s[0] - s[0].clamp(-1.5, 1.5));
     against(&model, stop, 2e-3, 3e-4);
-    let model = rival("end-stop", "above", &[0.5, 1.2]);
+    let model = self::model("end-stop", "above", &[0.5, 1.2]);
     against(&model, |s| 0.5 * (s[0] - 1.2).max(0.0), 2e-3, 3e-4);
-    let model = rival("end-stop", "below", &[0.5, 1.2]);
+    let model = self::model("end-stop", "below", &[0.5, 1.2]);
     against(&model, |s| 0.5 * (s[0] + 1.2).min(0.0), 2e-3, 3e-4);
 }
 

@@ -1,0 +1,48 @@
+//! Orders that cannot be told from lines of the mains.
+
+use super::{ComponentTorque, named};
+use crate::print::short;
+use crate::warning::Warning;
+
+/// Orders of the mains that are looked at.
+const MAINS_LINES: f64 = 5.0;
+/// Frequencies of the mains.
+const GRIDS_HZ: [f64; 2] = [50.0, 60.0];
+
+/// Orders that lie where lines of the mains lie: one record cannot tell them apart. Of a fundamental that is the mains' own it is
+/// said once.
+pub(super) fn warning(components: &[ComponentTorque], duration_s: f64) -> Option<Warning> {
+    let fundamental_hz = components.first().map(|c| c.frequency_hz / c.order)?;
+    let of_grid = |grid_hz: &f64| (fundamental_hz - grid_hz).abs() < 1.0 / duration_s;
+    if let Some(grid_hz) = GRIDS_HZ.into_iter().find(of_grid) {
+        return Some(Warning::new(
+            "order-or-mains",
+            format!(
+                "the fundamental is that of {grid_hz} Hz mains, and so all orders may contain what a cable picks up: record once with the \
+                 motor off and the supply on, and subtract what is there"
+            ),
+        ));
+    }
+    let doubtful: Vec<String> = components
+        .iter()
+        .filter(|c| c.order > 1.0 && c.torque > 5.0 * c.std)
+        .filter(|c| {
+            GRIDS_HZ.iter().any(|grid_hz| {
+                let line = (c.frequency_hz / grid_hz).round().clamp(1.0, MAINS_LINES) * grid_hz;
+                let slower = c.frequency_hz / c.order < 0.9 * grid_hz;
+                slower && (c.frequency_hz - line).abs() < 1.0 / duration_s
+            })
+        })
+        .map(|c| format!("{} ({:.2} Hz)", short(c.order), c.frequency_hz))
+        .collect();
+    (!doubtful.is_empty()).then(|| {
+        Warning::new(
+            "order-or-mains",
+            format!(
+                "mains lines coincide with {} and cannot be separated at one speed: record at another speed, where orders \
+                 move and mains lines stay",
+                named(&doubtful)
+            ),
+        )
+    })
+}
