@@ -125,7 +125,7 @@ fn parts(record: &StandRecord, at: usize) -> [StandRecord; 2] {
 
 impl SearchState {
     /// The change that explains most of what one stand leaves of a record; that is then no law of the motion.
-    pub(super) fn find_change(&mut self) -> Option<ChangedStand> {
+    pub(super) fn settle_change(&mut self) -> Option<ChangedStand> {
         let plain = &self.before.fitted;
         let context = &plain.structure.context;
         if context.held.is_some() {
@@ -134,23 +134,19 @@ impl SearchState {
         let mut context = FitContext::clone(&context.at(plain.stand()));
         context.gain_is_free = true;
         let context = Arc::new(context);
-        let mut found: Option<(f64, ChangedStand)> = None;
-        let mut seen: Vec<&str> = Vec::new();
+        let noise_rms = noise_rms(self.noise_floor);
+        let mut records: Vec<&StandRecord> = Vec::new();
         for record in self.records.train.iter().chain(&self.records.holdout) {
-            if seen.contains(&record.source.as_str()) || record.is_free() {
-                continue;
-            }
-            seen.push(&record.source);
-            let whole = record.part(0..record.measured.len());
-            let Some((share, change)) = change_in(&context, &whole, noise_rms(self.noise_floor))
-            else {
-                continue;
-            };
-            if found.as_ref().is_none_or(|(least, _)| share < *least) {
-                found = Some((share, change));
+            let is_seen = records.iter().any(|seen| seen.source == record.source);
+            if !is_seen && !record.is_free() {
+                records.push(record);
             }
         }
-        let change = found?.1;
+        let changes = records.into_iter().filter_map(|record| {
+            let whole = record.part(0..record.measured.len());
+            change_in(&context, &whole, noise_rms)
+        });
+        let (_, change) = changes.min_by(|a, b| a.0.total_cmp(&b.0))?;
         self.suspected = None;
         Some(change)
     }

@@ -171,7 +171,7 @@ impl Diagnosis {
             _ => Vec::new(),
         };
         let is_open = matches!(verdict, Verdict::PartlyExplained | Verdict::Unexplained);
-        let changed_stand = is_open.then(|| found.find_change()).flatten();
+        let changed_stand = is_open.then(|| found.settle_change()).flatten();
         let force_surface = (is_open && changed_stand.is_none())
             .then(|| found.force_surface(threads))
             .flatten();

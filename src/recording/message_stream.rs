@@ -64,8 +64,7 @@ impl ChannelStream {
         let heading = messages::clock(&chosen.time);
         let time = blocks.axis(&heading, &later, reading);
         let time = time.map_err(|failure| failure.at(&name))?;
-        let stamps_s: Vec<f64> = blocks.relative()?.iter().map(|ns| 1e-9 * ns).collect();
-        let overridden = choice::overridden(reading, &heading, &stamps_s);
+        let overridden = blocks.overridden(&heading, reading)?;
         Ok(Self {
             source: name,
             dialect: format!("MCAP, {}", messages::describe(&chosen)),
@@ -145,6 +144,15 @@ impl MessageBlocks {
             axis.check_rounding()?;
         }
         Ok(axis)
+    }
+
+    /// A warning if a rate that was given is not that of the first messages.
+    fn overridden(&self, heading: &str, reading: &Reading) -> Result<Option<Warning>, Failure> {
+        if reading.rate_hz.is_none() {
+            return Ok(None);
+        }
+        let stamps_s: Vec<f64> = self.relative()?.iter().map(|ns| 1e-9 * ns).collect();
+        Ok(choice::overridden(reading, heading, &stamps_s))
     }
 
     fn relative(&self) -> Result<Vec<f64>, Failure> {

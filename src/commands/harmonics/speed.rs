@@ -50,7 +50,6 @@ pub(super) fn off(
     let rate_hz = record.rate_hz;
     let of = |fundamental| fit(&samples[..], rate_hz, 0.0, fundamental, orders).ok();
     let given: Harmonics = of(Fundamental::given(fundamental_hz))?;
-    let is_sure = |c: &Component| c.phasor.norm() > THERE * c.std_amplitude;
     let within = |span: f64| {
         let found = refine_fundamental(&samples[..], rate_hz, fundamental_hz, span, orders).ok()?;
         let better = of(Fundamental::given(found.frequency_hz))?;
@@ -179,9 +178,7 @@ pub(super) fn sways(
         let here = fit(part, rate_hz, start as f64 / rate_hz, fundamental, orders).ok()?;
         let pairs = whole.components.iter().zip(&here.components);
         let (mut sum, mut weights) = (0.0, 0.0);
-        for (mean, here) in
-            pairs.filter(|(_, here)| here.phasor.norm() > THERE * here.std_amplitude)
-        {
+        for (mean, here) in pairs.filter(|(_, here)| is_sure(here)) {
             let turned = (here.phasor * mean.phasor.conj()).arg();
             let weight = (here.phasor.norm() / here.std_amplitude).powi(2);
             sum += weight * here.order * turned;
@@ -193,10 +190,7 @@ pub(super) fn sways(
     let variance = without_line(&angles);
     let noise = angles.iter().map(|[_, variance]| variance).sum::<f64>() / windows as f64;
     let sways_rad = (variance - noise).max(0.0).sqrt();
-    let there = whole
-        .components
-        .iter()
-        .filter(|c| c.phasor.norm() > THERE * c.std_amplitude);
+    let there = whole.components.iter().filter(|c| is_sure(c));
     let highest = there.map(|c| c.order).fold(0.0, f64::max);
     (variance > SWAYS * noise && highest * sways_rad > SWAY_RAD).then(|| {
         let loss = -(-0.5 * (highest * sways_rad).powi(2)).exp_m1();
@@ -211,6 +205,11 @@ pub(super) fn sways(
             ),
         )
     })
+}
+
+/// Whether a component is there without doubt.
+fn is_sure(component: &Component) -> bool {
+    component.phasor.norm() > THERE * component.std_amplitude
 }
 
 /// Variance of values about a straight line.

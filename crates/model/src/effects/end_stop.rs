@@ -15,7 +15,7 @@ const UPPER: EffectParameter =
     EffectParameter::motion("gap", 1, 0, -1.0, 2.0).by(ParameterScale::Peak);
 const STIFFNESS: EffectParameter = EffectParameter::number("stiffness_ratio", 0.0, 1e4);
 const DAMPING: EffectParameter = EffectParameter::motion("contact_damping", 0, 1, 0.0, 20.0);
-const LOWER: EffectParameter = EffectParameter {
+const BELOW: EffectParameter = EffectParameter {
     name: "gap_below",
     ..GAP
 };
@@ -90,7 +90,7 @@ pub(super) static EFFECT: Effect = Effect {
             name: "uneven-damped",
             law: "n = k (x - clamp(x, -g1, g2)), and c x' beyond them",
             stage: Stage::Stand,
-            parameters: &[STIFFNESS, LOWER, DAMPING, ABOVE],
+            parameters: &[STIFFNESS, BELOW, DAMPING, ABOVE],
             starts: &[
                 &[0.3, 0.5, 0.1, 0.5],
                 &[1.0, 0.85, 0.1, 0.85],
@@ -136,9 +136,7 @@ impl Stop {
             ..Self::both(p)
         }
     }
-}
 
-impl Stop {
     /// How far a displacement is beyond the stop.
     fn beyond(&self, x: f64) -> f64 {
         x - x.clamp(self.lower, self.upper)

@@ -221,10 +221,10 @@ fn other_dimension(object: &TdmsObject) -> Option<&str> {
 
 /// The axis that the properties of a waveform give; times count from the first start in the file.
 fn of_waveform(object: &TdmsObject, first_ns: Option<i64>) -> Option<TimeAxis> {
-    if other_dimension(object).is_some() || object.changed == Some("wf_increment") {
+    let unit_s = object.time_unit_s()?;
+    if object.changed == Some("wf_increment") {
         return None;
     }
-    let unit_s = object.time_unit_s()?;
     let step_s = unit_s * object.number("wf_increment").filter(|step| *step > 0.0)?;
     let rate_hz = plausible_rate(without_rounding(1.0 / step_s))?;
     let offset = object.number("wf_start_offset").filter(|s| s.is_finite());
