@@ -2,14 +2,14 @@
 
 use std::f64::consts::TAU;
 
-use torqcomp_model::Chain;
-use torqcomp_model::Mode;
 use torqcomp_model::fit::{self, Differences, Fit, FitError, Options, Parameter};
+use torqcomp_model::{Chain, Mode};
 
 use super::own_of_records::{OwnOfRecords, within};
 use super::record::{InitialState, Nuisance, NuisanceFit, NuisanceTerms, StandRecord};
 use super::record_model::RecordModel;
 use super::structure::{PlainStand, Structure};
+use super::unexplained::{Unexplained, raw_residual};
 use torqcomp_dsp::dot;
 
 /// A model with fitted values.
@@ -157,34 +157,7 @@ fn minimize(
     let of_records = OwnOfRecords::of(&start_model, structure.context.scales.rms, records);
     let mut parameters = parameters(structure, start);
     parameters.extend(of_records.parameters(records));
-    let nuisance =
-        |k: usize, record: &StandRecord, free: &Mode, terms: &NuisanceTerms| match of_records
-            .is_ringing(k)
-        {
-            true => record.nuisance_beside_motion(terms),
-            false => record.nuisance(free, terms, None),
-        };
-    // Without lines, the nuisance terms depend on the parameters by their mode alone.
-    let fixed: Option<Vec<Nuisance>> = free.map(|free| {
-        let of = |(k, r): (usize, &StandRecord)| nuisance(k, r, free, &NuisanceTerms::NONE);
-        records.iter().enumerate().map(of).collect()
-    });
-    let problem = |values: &[f64], out: &mut Vec<f64>| {
-        let (values, others) = values.split_at(own);
-        let (mut model, terms) = structure.model(values);
-        let free = free.copied().unwrap_or_else(|| model.free_mode());
-        for (k, record) in records.iter().enumerate() {
-            let record = of_records.set(k, record, others);
-            model.shift = record.initial.preload;
-            let mut residual = raw_residual(&model, &record)?;
-            match &fixed {
-                Some(fixed) if terms.is_empty() => fixed[k].clear(&mut residual),
-                _ => nuisance(k, &record, &free, &terms).clear(&mut residual),
-            }
-            out.append(&mut residual);
-        }
-        Ok(())
-    };
+    let problem = Unexplained::of(structure, records, &of_records, free);
     let options = Options {
         differences: Differences::Forward,
         tolerance: TOLERANCE,
@@ -205,18 +178,6 @@ fn parameters(structure: &Structure, start: &[f64]) -> Vec<Parameter> {
         .collect()
 }
 
-/// Measured less modelled over the range of a record, nuisance terms included.
-pub fn raw_residual(model: &Chain, record: &StandRecord) -> Result<Vec<f64>, FitError> {
-    let modelled = model.simulate(&record.input, record.initial.motion);
-    let pairs = record.measured_in_range().iter();
-    let pairs = pairs.zip(&modelled[record.range.clone()]);
-    let residual: Vec<f64> = pairs.map(|(y, x)| y - x).collect();
-    if residual.last().is_none_or(|r| !r.is_finite()) {
-        return Err(FitError::Model("the motion diverges".to_owned()));
-    }
-    Ok(residual)
-}
-
 impl RecordResidual {
     pub(super) fn sum_of_squares(&self) -> f64 {
         dot(&self.samples, &self.samples)
@@ -225,11 +186,10 @@ impl RecordResidual {
 
 /// Mean square of the raw residual of a record, and the nuisance terms in it.
 fn nuisance_of(
-    (model, terms): &mut (Chain, NuisanceTerms),
+    (model, terms): &(Chain, NuisanceTerms),
     record: &StandRecord,
     free: &Mode,
 ) -> Option<(f64, NuisanceFit)> {
-    model.shift = record.initial.preload;
     let mut residual = raw_residual(model, record).ok()?;
     let mean_square = dot(&residual, &residual) / residual.len() as f64;
     let nuisance = record.nuisance(free, terms, None);
@@ -243,7 +203,7 @@ fn correct_starts(
     records: &mut [StandRecord],
     free: &Mode,
 ) -> bool {
-    let mut model = RecordModel::of(structure, values, *free);
+    let model = RecordModel::of(structure, values, *free);
     let mut matters = false;
     for record in records {
         let old = record.initial.motion;
@@ -262,12 +222,12 @@ fn correct_starts(
 /// Whether the free motion after the start of a record differs by more than the residual allows from one in the mode that
 /// the parameters have by now: ten thousand turns in the plain stand's mode are not those in a mode 1 % beside it.
 fn moves_on(structure: &Structure, values: &[f64], records: &[StandRecord], free: &Mode) -> bool {
-    let mut model = structure.model(values);
+    let model = structure.model(values);
     let now = model.0.free_mode();
     let fade = |mode: &Mode| mode.damping_ratio * mode.omega_rad_s;
     let apart = (now.omega_rad_s - free.omega_rad_s).hypot(fade(&now) - fade(free));
     records.iter().any(|record| {
-        let Some((mean_square, found)) = nuisance_of(&mut model, record, free) else {
+        let Some((mean_square, found)) = nuisance_of(&model, record, free) else {
             return false;
         };
         let Some([x, speed]) = found.motion else {
@@ -294,13 +254,13 @@ fn line_amplitudes(
     records: &[StandRecord],
     free: &Mode,
 ) -> Vec<f64> {
-    let mut model = structure.model(values);
+    let model = structure.model(values);
     let mut sums = vec![0.0; model.1.lines_hz.len()];
     if sums.is_empty() {
         return sums;
     }
     for record in records {
-        let Some((_, found)) = nuisance_of(&mut model, record, free) else {
+        let Some((_, found)) = nuisance_of(&model, record, free) else {
             continue;
         };
         for (sum, [c, s]) in sums.iter_mut().zip(&found.lines) {
@@ -350,10 +310,8 @@ impl FittedModel {
     /// What belongs to a record. What the state at the start of free ringing that is integrated can change follows from the model.
     pub fn nuisance(&self, record: &StandRecord, terms: &NuisanceTerms) -> Nuisance {
         let slopes = || {
-            let mut model = RecordModel::of(&self.structure, &self.values, self.free);
-            model.chain.shift = record.initial.preload;
-            let residual = raw_residual(&model.chain, record).ok()?;
-            model.slopes(record, &residual)
+            let model = RecordModel::of(&self.structure, &self.values, self.free);
+            Some(model.residual_and_slopes(record)?.1)
         };
         let rings = record.is_free() && self.integrates();
         record.nuisance(&self.free, terms, rings.then(slopes).flatten())
@@ -362,7 +320,7 @@ impl FittedModel {
     /// What the fitted model leaves of a record: the record's own constants, initial state and phases are estimated,
     /// nothing else. `None` if the motion diverges.
     pub fn residual(&self, record: &StandRecord) -> Option<RecordResidual> {
-        let mut model = RecordModel::of(&self.structure, &self.values, self.free);
+        let model = RecordModel::of(&self.structure, &self.values, self.free);
         let mut found = model.settled(record)?;
         self.restore_amplitudes(&model.terms, &mut found);
         Some(found)

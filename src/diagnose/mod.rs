@@ -46,6 +46,7 @@ mod structure;
 mod surface;
 #[cfg(test)]
 mod test_noise;
+mod unexplained;
 mod units;
 mod verdict;
 

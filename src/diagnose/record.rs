@@ -4,9 +4,8 @@ use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 use std::sync::Arc;
 
-use torqcomp_model::Chain;
-use torqcomp_model::Mode;
 use torqcomp_model::simulate::{Excitation, MotionState};
+use torqcomp_model::{Chain, Mode, Run};
 
 use super::columns::Columns;
 
@@ -16,6 +15,17 @@ pub struct InitialState {
     pub motion: MotionState,
     /// Displacement by a constant load that is not in the input.
     pub preload: f64,
+}
+
+impl InitialState {
+    /// A stand on its way from there.
+    pub fn run_of(self, chain: &Chain) -> Run<'_> {
+        Run {
+            chain,
+            start: self.motion,
+            shift: self.preload,
+        }
+    }
 }
 
 /// One record, or the part of it that is fitted or held out.
@@ -123,6 +133,11 @@ impl StandRecord {
     /// The measured quantity over the range.
     pub fn measured_in_range(&self) -> &[f64] {
         &self.measured[self.range.clone()]
+    }
+
+    /// A stand on its way through the record.
+    pub fn run_of<'a>(&self, chain: &'a Chain) -> Run<'a> {
+        self.initial.run_of(chain)
     }
 
     pub fn starting_from(&self, initial: InitialState) -> Self {

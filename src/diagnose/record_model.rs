@@ -1,11 +1,12 @@
 //! A model that is run on records, and the state at their start that leaves least of them.
 
-use torqcomp_model::{Chain, Mode};
+use torqcomp_model::{Chain, Mode, Run};
 
-use super::fit::{MOST_STARTS, RecordResidual, START_SETTLED, raw_residual};
+use super::fit::{MOST_STARTS, RecordResidual, START_SETTLED};
 use super::own_of_records::OwnOfRecords;
 use super::record::{InitialState, NuisanceTerms, StandRecord, StateSlopes};
 use super::structure::Structure;
+use super::unexplained::{raw_residual, raw_residuals};
 
 /// Step of the initial state for differences, over the rms of the record.
 const STATE_STEP: f64 = 1e-4;
@@ -33,42 +34,52 @@ impl RecordModel {
         }
     }
 
-    /// How a record changes with its own initial state, by differences; `residual` is its raw residual.
-    pub fn slopes(&mut self, record: &StandRecord, residual: &[f64]) -> Option<StateSlopes> {
+    /// The raw residual of a record, and how the record changes with its own initial state, by differences; `None` if the motion
+    /// diverges.
+    pub fn residual_and_slopes(&self, record: &StandRecord) -> Option<(Vec<f64>, StateSlopes)> {
         let step = STATE_STEP * self.rms;
-        let slope = |chain: &Chain, record: &StandRecord| {
-            let moved = raw_residual(chain, record).ok()?;
+        let moves = record.has_free_motion(&self.free);
+        let motions = [[step, 0.0], [0.0, step]].into_iter().filter(|_| moves);
+        let moved = motions.map(|motion| {
+            let mut initial = record.initial;
+            initial.correct(motion, &self.free);
+            initial
+        });
+        let mut initial: Vec<InitialState> = std::iter::once(record.initial).chain(moved).collect();
+        if self.chain.has_zero() {
+            initial.push(InitialState {
+                preload: record.initial.preload + step,
+                ..record.initial
+            });
+        }
+        let run = |initial: &InitialState| initial.run_of(&self.chain);
+        let runs: Vec<Run> = initial.iter().map(run).collect();
+        let mut residuals = raw_residuals(&runs, record).into_iter();
+        let residual = residuals.next()?.ok()?;
+        let mut slope = || {
+            let moved = residuals.next()?.ok()?;
             let pairs = residual.iter().zip(&moved);
             Some(pairs.map(|(a, b)| (a - b) / step).collect::<Vec<_>>())
         };
-        let along = |motion: [f64; 2]| {
-            let mut moved = record.clone();
-            moved.initial.correct(motion, &self.free);
-            slope(&self.chain, &moved)
-        };
-        let motion = match record.has_free_motion(&self.free) {
-            true => Some([along([step, 0.0])?, along([0.0, step])?]),
+        let motion = match moves {
+            true => Some([slope()?, slope()?]),
             false => None,
         };
         let preload = match self.chain.has_zero() {
-            true => {
-                self.chain.shift += step;
-                let loaded = slope(&self.chain, record);
-                self.chain.shift -= step;
-                Some(loaded?)
-            }
+            true => Some(slope()?),
             false => None,
         };
-        Some(StateSlopes { motion, preload })
+        Some((residual, StateSlopes { motion, preload }))
     }
 
     /// The residual of a record with the initial state that it has; `None` if the motion diverges.
-    fn residual(&mut self, record: StandRecord) -> Option<RecordResidual> {
-        self.chain.shift = record.initial.preload;
-        let mut samples = raw_residual(&self.chain, &record).ok()?;
-        let slopes = match self.chain.is_integrated() {
-            true => Some(self.slopes(&record, &samples)?),
-            false => None,
+    fn residual(&self, record: StandRecord) -> Option<RecordResidual> {
+        let (mut samples, slopes) = match self.chain.is_integrated() {
+            true => {
+                let (samples, slopes) = self.residual_and_slopes(&record)?;
+                (samples, Some(slopes))
+            }
+            false => (raw_residual(&self.chain, &record).ok()?, None),
         };
         let raw = samples.clone();
         let nuisance = record.nuisance(&self.free, &self.terms, slopes);
@@ -88,7 +99,7 @@ impl RecordModel {
     /// The residual of a record with the initial state that leaves least of it. A motion that is integrated depends on it in a
     /// curved way: the search begins with the state that the record has and at rest, and goes on by Gauss's and Newton's steps
     /// as long as they help. `None` if the motion diverges.
-    pub fn settled(&mut self, record: &StandRecord) -> Option<RecordResidual> {
+    pub fn settled(&self, record: &StandRecord) -> Option<RecordResidual> {
         if !self.chain.is_integrated() {
             return self.residual(record.clone());
         }

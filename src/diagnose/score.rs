@@ -5,14 +5,15 @@ use std::sync::Arc;
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use torqcomp_model::Estimate;
+use torqcomp_model::{Chain, Estimate, Run};
 
 use super::blocks::{Comparison, compare};
 use super::columns::Columns;
-use super::fit::{FitEffort, FittedModel, RecordResidual, raw_residual};
+use super::fit::{FitEffort, FittedModel, RecordResidual};
 use super::record::{Nuisance, NuisanceTerms, StandRecord};
 use super::records::Records;
 use super::structure::EffectForm;
+use super::unexplained::{raw_residual, raw_residuals};
 use torqcomp_dsp::dot;
 
 /// A fitted model with its residuals.
@@ -254,9 +255,8 @@ fn rms(residuals: &[RecordResidual]) -> f64 {
 impl FittedModel {
     /// Rms by which a training record changes with half the step of integration.
     pub fn step_change(&self, first: &StandRecord) -> Option<f64> {
-        let (mut model, _) = self.structure.model(&self.values);
+        let (model, _) = self.structure.model(&self.values);
         let mut record = first.starting_from(*self.initial.first()?);
-        model.shift = record.initial.preload;
         let coarse = raw_residual(&model, &record).ok()?;
         record.input = Arc::new(record.input.with_substeps(2 * record.input.substeps()));
         let fine = raw_residual(&model, &record).ok()?;
@@ -321,27 +321,30 @@ pub fn derivatives(
 ) -> (Option<Vec<Vec<f64>>>, Nuisance) {
     let nuisance = fitted.nuisance(record, terms);
     let rings = record.is_free() && !fitted.integrates();
-    let at = |values: &[f64]| {
-        let (mut model, _) = fitted.structure.model(values);
-        model.shift = record.initial.preload;
-        let mut residual = raw_residual(&model, record).ok()?;
+    let step = |k: usize| STEP * fitted.values[k].abs().max(1e-3);
+    let mut points = vec![fitted.values.clone(); fitted.values.len() + 1];
+    for (k, point) in points[1..].iter_mut().enumerate() {
+        point[k] += step(k);
+    }
+    let chains: Vec<Chain> = points.iter().map(|p| fitted.structure.model(p).0).collect();
+    let runs: Vec<Run> = chains.iter().map(|chain| record.run_of(chain)).collect();
+    let residuals = raw_residuals(&runs, record).into_iter().zip(&chains);
+    let cleared = residuals.map(|(residual, chain)| {
+        let mut residual = residual.ok()?;
         match rings {
             true => record
-                .nuisance(&model.free_mode(), terms, None)
+                .nuisance(&chain.free_mode(), terms, None)
                 .clear(&mut residual),
             false => nuisance.clear(&mut residual),
         }
         Some(residual)
-    };
-    let along = |k: usize, here: &[f64]| {
-        let mut values = fitted.values.clone();
-        let step = STEP * values[k].abs().max(1e-3);
-        values[k] += step;
-        let there = at(&values)?;
-        let pairs = there.iter().zip(here);
-        Some(pairs.map(|(a, b)| (a - b) / step).collect())
-    };
-    let all = at(&fitted.values)
-        .and_then(|here| (0..fitted.values.len()).map(|k| along(k, &here)).collect());
+    });
+    let all = cleared.collect::<Option<Vec<_>>>().map(|residuals| {
+        let along = |(k, there): (usize, &Vec<f64>)| {
+            let pairs = there.iter().zip(&residuals[0]);
+            pairs.map(|(a, b)| (a - b) / step(k)).collect()
+        };
+        residuals[1..].iter().enumerate().map(along).collect()
+    });
     (all, nuisance)
 }

@@ -7,11 +7,11 @@ use torqcomp_model::Chain;
 use torqcomp_model::effects::RecordScales;
 
 use super::backbone::Backbone;
-use super::fit::raw_residual;
 use super::record::{InitialState, StandRecord};
 use super::score::BaseModel;
 use super::spectra::SpectralLine;
 use super::structure::{EffectForm, Structure};
+use super::unexplained::raw_residual;
 use torqcomp_dsp::dot;
 
 /// Starts that are fitted.

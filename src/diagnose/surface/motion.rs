@@ -25,9 +25,8 @@ impl MeasuredMotion {
         let fitted = &model.fitted;
         let mut x = up_to_the_gage(model, record)?;
         if is_corrected {
-            let (mut whole, terms) = fitted.structure.model(&fitted.values);
-            whole.shift = record.initial.preload;
-            let recorded = whole.simulate(&record.input, record.initial.motion);
+            let (whole, terms) = fitted.structure.model(&fitted.values);
+            let recorded = record.run_of(&whole).simulate(&record.input);
             let correction = slow_part(record, &recorded, &terms, whole.stand.highest_hz())?;
             x.iter_mut().zip(correction).for_each(|(x, c)| *x += c);
         }
@@ -39,9 +38,8 @@ impl MeasuredMotion {
 
 /// What the gage shows in the model, before the recorder.
 fn up_to_the_gage(model: &ScoredModel, record: &StandRecord) -> Option<Vec<f64>> {
-    let (mut chain, _) = super::reduced(model, |stage| stage <= Stage::Gage);
-    chain.shift = record.initial.preload;
-    let shown = chain.simulate(&record.input, record.initial.motion);
+    let (chain, _) = super::reduced(model, |stage| stage <= Stage::Gage);
+    let shown = record.run_of(&chain).simulate(&record.input);
     shown.last().is_some_and(|x| x.is_finite()).then_some(shown)
 }
 

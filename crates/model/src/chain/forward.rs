@@ -9,8 +9,8 @@ use super::{Chain, Link};
 use crate::effects::{Action, SampleClock, Stage};
 use crate::mode::Mode;
 use crate::simulate::{
-    Between, Excitation, MotionProgress, MotionState, Torques, free_motion, held_response,
-    integrate, integrate_modes,
+    Between, Excitation, Motion, MotionProgress, MotionState, Torques, free_motion, held_response,
+    integrate,
 };
 
 /// A record on its way through the chain, in the domain that the last link left it in.
@@ -35,6 +35,56 @@ impl Signal {
     }
 }
 
+/// A stand that is simulated.
+#[derive(Clone, Copy)]
+pub struct Run<'a> {
+    /// The stand.
+    pub chain: &'a Chain,
+    /// Its motion at the first sample.
+    pub start: MotionState,
+    /// Displacement by a constant load, in the place of [that of the stand](Chain::shift).
+    pub shift: f64,
+}
+
+impl<'a> Run<'a> {
+    /// A stand as it is.
+    #[must_use]
+    pub fn of(chain: &'a Chain, start: MotionState) -> Self {
+        Self {
+            chain,
+            start,
+            shift: chain.shift,
+        }
+    }
+
+    /// Its record for an input, as of [`Chain::simulate`].
+    #[must_use]
+    pub fn simulate(self, input: &Excitation) -> Vec<f64> {
+        Chain::simulate_all(&[self], input)
+            .pop()
+            .unwrap_or_default()
+    }
+}
+
+/// What the gage shows of motions that are integrated in time.
+fn integrate_all<'a>(runs: impl Iterator<Item = &'a Run<'a>>, input: &Excitation) -> Vec<Vec<f64>> {
+    let begun = runs.map(|run| {
+        let torques = run.chain.torques();
+        let progress = MotionProgress::begin(&torques, (&run.chain.stand, run.start), run.shift);
+        (run, torques, progress)
+    });
+    let mut begun: Vec<_> = begun.collect();
+    let motions = begun.iter_mut().map(|(run, torques, progress)| Motion {
+        stand: &run.chain.stand,
+        gain: run.chain.gain,
+        shift: run.shift,
+        torques,
+        progress,
+    });
+    let mut motions: Vec<_> = motions.collect();
+    integrate(&mut motions, input, 0..input.samples().len())
+}
+
 impl Chain {
     /// The record for an input. Lines are not in it: their phase belongs to a record.
     ///
@@ -42,26 +92,37 @@ impl Chain {
     /// continues the record backwards. Samples after the motion has left all bounds are NaN.
     #[must_use]
     pub fn simulate(&self, input: &Excitation, start: MotionState) -> Vec<f64> {
-        let moved = if self.is_integrated() {
-            let samples = self.integrated(input, start);
-            if samples.last().is_none_or(|x| !x.is_finite()) {
-                return samples;
-            }
-            Signal::Samples(samples)
-        } else {
-            self.respond(input)
+        Run::of(self, start).simulate(input)
+    }
+
+    /// The records of several stands for one input, each as of [`simulate`](Self::simulate); motions that are integrated take
+    /// their steps in turn, which is faster than one after the other.
+    #[must_use]
+    pub fn simulate_all(runs: &[Run<'_>], input: &Excitation) -> Vec<Vec<f64>> {
+        let integrated = runs.iter().filter(|run| run.chain.is_integrated());
+        let mut shown = integrate_all(integrated, input).into_iter();
+        let record = |run: &Run| match run.chain.is_integrated() {
+            true => run
+                .chain
+                .recorded_if_finite(shown.next().unwrap_or_default(), input),
+            false => run.chain.record(run.chain.respond(input), input),
         };
-        self.record(moved, input)
+        runs.iter().map(record).collect()
     }
 
     /// The record for an input when the stand is at rest before it, by integration in time.
     #[must_use]
     pub fn simulate_from(&self, input: &Excitation, start: MotionState) -> Vec<f64> {
-        let samples = self.integrated(input, start);
-        if samples.last().is_none_or(|x| !x.is_finite()) {
-            return samples;
+        let mut shown = integrate_all([Run::of(self, start)].iter(), input);
+        self.recorded_if_finite(shown.pop().unwrap_or_default(), input)
+    }
+
+    /// What the links after the stand make of what the gage shows, as long as that is in bounds.
+    fn recorded_if_finite(&self, shown: Vec<f64>, input: &Excitation) -> Vec<f64> {
+        match shown.last().is_some_and(|x| x.is_finite()) {
+            true => self.recorded(shown, input),
+            false => shown,
         }
-        self.recorded(samples, input)
     }
 
     /// Records of the free motion from a unit displacement and from a unit speed over `ω₀`.
@@ -145,12 +206,6 @@ impl Chain {
         self.torques().iter().any(|(torque, _)| torque.has_zero())
     }
 
-    /// What the gage shows of the motion, integrated in time.
-    fn integrated(&self, input: &Excitation, start: MotionState) -> Vec<f64> {
-        let mut progress = self.begin(start);
-        self.integrated_over(input, 0..input.samples().len(), &mut progress)
-    }
-
     /// A motion that begins.
     pub(crate) fn begin(&self, start: MotionState) -> MotionProgress {
         MotionProgress::begin(&self.torques(), (&self.stand, start), self.shift)
@@ -163,12 +218,15 @@ impl Chain {
         range: Range<usize>,
         progress: &mut MotionProgress,
     ) -> Vec<f64> {
-        let torques = self.torques();
-        let (gain, shift) = (self.gain, self.shift);
-        match self.stand.only() {
-            Some(mode) => integrate((&mode, gain, shift), &torques, input, range, progress),
-            None => integrate_modes((&self.stand, gain, shift), &torques, input, range, progress),
-        }
+        let motion = Motion {
+            stand: &self.stand,
+            gain: self.gain,
+            shift: self.shift,
+            torques: &self.torques(),
+            progress,
+        };
+        let shown = integrate(&mut [motion], input, range);
+        shown.into_iter().flatten().collect()
     }
 
     /// What the links after the stand make of what the gage shows.

@@ -1,8 +1,5 @@
 //! Derivatives of the residuals, from the problem or by differences.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::thread;
-
 use nalgebra::DMatrix;
 
 use super::problem::Evaluated;
@@ -14,8 +11,13 @@ pub(super) struct Derivatives<'a> {
     /// Indices of the parameters that are not fixed.
     pub free: &'a [usize],
     pub differences: Differences,
-    pub threads: usize,
 }
+
+/// Points at which the residuals are evaluated together.
+const AT_ONCE: usize = 4;
+
+/// A column, and the evaluations that it took.
+type Column = (Vec<f64>, usize);
 
 /// Columns of the free parameters, and the number of evaluations.
 pub(super) fn jacobian(
@@ -54,81 +56,71 @@ fn finite(matrix: DMatrix<f64>) -> Result<DMatrix<f64>, FitError> {
     }
 }
 
-type Column = (Vec<f64>, usize);
+/// Where the residuals are evaluated for one column, and what it is divided by.
+struct Ends {
+    points: Vec<Vec<f64>>,
+    width: f64,
+}
 
-/// All columns; each depends only on its index, so the result does not depend on the threads.
+/// All columns; points are evaluated some at a time, for all of them together may take much memory.
 fn columns(
     evaluated: &Evaluated,
     how: &Derivatives,
     values: &[f64],
     at: &[f64],
 ) -> Result<Vec<Column>, FitError> {
-    let one = |index: usize| column(evaluated, how, values, at, index);
-    let workers = how.threads.clamp(1, how.free.len().max(1));
-    if workers == 1 {
-        return how.free.iter().map(|index| one(*index)).collect();
-    }
-    let next = AtomicUsize::new(0);
-    let work = || {
-        let mut done = Vec::new();
-        loop {
-            let j = next.fetch_add(1, Ordering::Relaxed);
-            match how.free.get(j) {
-                Some(index) => done.push((j, one(*index))),
-                None => return done,
-            }
-        }
+    let ends: Vec<Ends> = how
+        .free
+        .iter()
+        .map(|index| how.ends(values, *index))
+        .collect();
+    let points: Vec<Vec<f64>> = ends.iter().flat_map(|e| e.points.clone()).collect();
+    let some = points.chunks(AT_ONCE);
+    let mut residuals = some.flat_map(|some| evaluated.residuals_of_each(some));
+    let mut column = |ends: &Ends| {
+        let mut next = || residuals.next().expect("one for each point");
+        let above = next()?;
+        let below = match ends.points.len() {
+            1 => None,
+            _ => Some(next()?),
+        };
+        let below = below.as_deref().unwrap_or(at);
+        let slope = above.iter().zip(below).map(|(a, b)| (a - b) / ends.width);
+        Ok((slope.collect(), ends.points.len()))
     };
-    let mut found: Vec<(usize, Result<Column, FitError>)> = thread::scope(|scope| {
-        let handles: Vec<_> = (0..workers).map(|_| scope.spawn(work)).collect();
-        handles
-            .into_iter()
-            .flat_map(|handle| handle.join().expect("a worker does not panic"))
-            .collect()
-    });
-    found.sort_by_key(|(j, _)| *j);
-    found.into_iter().map(|(_, column)| column).collect()
+    ends.iter().map(&mut column).collect()
 }
 
-/// ∂r/∂p of one parameter, by a step that stays within its bounds.
-fn column(
-    evaluated: &Evaluated,
-    how: &Derivatives,
-    values: &[f64],
-    at: &[f64],
-    index: usize,
-) -> Result<Column, FitError> {
-    let parameter = &how.parameters[index];
-    let value = values[index];
-    let size = value.abs().max(parameter.scale * 1e-3);
-    let relative = match how.differences {
-        Differences::Forward => f64::EPSILON.sqrt(),
-        Differences::Central => f64::EPSILON.cbrt(),
-    };
-    let step = relative * size;
-    let moved = |to: f64| {
-        let mut there = values.to_vec();
-        there[index] = to;
-        evaluated.residuals(&there)
-    };
-    let (up, down) = (value + step, value - step);
-    let room_up = up <= parameter.upper;
-    let room_down = down >= parameter.lower;
-    if how.differences == Differences::Central && room_up && room_down {
-        let (above, below) = (moved(up)?, moved(down)?);
-        let width = up - down;
-        let slope = above.iter().zip(&below).map(|(a, b)| (a - b) / width);
-        return Ok((slope.collect(), 2));
+impl Derivatives<'_> {
+    /// For ∂r/∂p of one parameter: a step that stays within its bounds, to both sides or to one.
+    fn ends(&self, values: &[f64], index: usize) -> Ends {
+        let parameter = &self.parameters[index];
+        let value = values[index];
+        let size = value.abs().max(parameter.scale * 1e-3);
+        let moved = |to: f64| {
+            let mut there = values.to_vec();
+            there[index] = to;
+            there
+        };
+        if self.differences == Differences::Central {
+            let step = f64::EPSILON.cbrt() * size;
+            let (up, down) = (value + step, value - step);
+            if up <= parameter.upper && down >= parameter.lower {
+                return Ends {
+                    points: vec![moved(up), moved(down)],
+                    width: up - down,
+                };
+            }
+        }
+        // At a bound, or forward differences: one-sided, with a suitable step.
+        let step = f64::EPSILON.sqrt() * size;
+        let to = match value + step <= parameter.upper {
+            true => value + step,
+            false => (value - step).max(parameter.lower),
+        };
+        Ends {
+            points: vec![moved(to)],
+            width: to - value,
+        }
     }
-    // At a bound, or forward differences: one-sided, with a suitable step.
-    let step = f64::EPSILON.sqrt() * size;
-    let to = if value + step <= parameter.upper {
-        value + step
-    } else {
-        (value - step).max(parameter.lower)
-    };
-    let width = to - value;
-    let there = moved(to)?;
-    let slope = there.iter().zip(at).map(|(a, b)| (a - b) / width);
-    Ok((slope.collect(), 1))
 }

@@ -14,8 +14,6 @@ use super::{Differences, Fit, FitError, Parameter, Residuals, StopReason};
 pub struct Options {
     /// Differences for problems without derivatives.
     pub differences: Differences,
-    /// Threads for differences.
-    pub threads: usize,
     /// Most evaluations of the residuals.
     pub most_evaluations: usize,
     /// Relative reduction of the sum of squares, and relative step, below which the fit has converged.
@@ -30,7 +28,6 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             differences: Differences::Central,
-            threads: 1,
             most_evaluations: 20_000,
             tolerance: 1e-12,
             weights: None,
@@ -119,7 +116,6 @@ impl<'a> State<'a> {
             parameters,
             free,
             differences: options.differences,
-            threads: options.threads,
         };
         let (matrix, count) = jacobian(&evaluated, &how, &values, &residuals)?;
         let mut state = Self {

@@ -8,8 +8,7 @@
 //! [`minimize`] is Levenberg's and Marquardt's method with Moré's scaling (J. J. Moré, The
 //! Levenberg-Marquardt algorithm: implementation and theory, Lecture Notes in Mathematics 630, 1978)
 //! and Nielsen's rule for the damping (H. B. Nielsen, IMM-REP-1999-05), on a problem reduced by
-//! orthogonal transformations. Bounds are kept by an active set. Results do not depend on the number
-//! of threads.
+//! orthogonal transformations. Bounds are kept by an active set.
 //!
 //! ```
 //! use torqcomp_model::fit::{Options, Parameter, minimize};
@@ -30,19 +29,15 @@ mod error;
 mod jacobian;
 pub mod linear;
 mod minimize;
-mod multistart;
 mod parameter;
 mod problem;
 mod reduce;
 mod result;
-mod robust;
 mod step;
 
 pub use covariance::Undetermined;
 pub use error::FitError;
 pub use minimize::{Options, minimize};
-pub use multistart::{MultiStart, multi_start};
 pub use parameter::Parameter;
 pub use problem::{Differences, Residuals, WithJacobian};
 pub use result::{Fit, StopReason};
-pub use robust::{Loss, Robust, minimize_robust};

@@ -14,6 +14,18 @@ pub trait Residuals: Sync {
     /// [`FitError::Model`] where the model cannot be evaluated: the fit then takes a smaller step.
     fn residuals(&self, values: &[f64], out: &mut Vec<f64>) -> Result<(), FitError>;
 
+    /// The residuals at several points, as differences need them: one after the other, unless a model has a faster way.
+    ///
+    /// # Errors
+    /// At each point as [`Residuals::residuals`].
+    fn residuals_of_each(&self, points: &[Vec<f64>]) -> Vec<Result<Vec<f64>, FitError>> {
+        let one = |values: &Vec<f64>| {
+            let mut out = Vec::new();
+            self.residuals(values, &mut out).map(|()| out)
+        };
+        points.iter().map(one).collect()
+    }
+
     /// Whether [`Residuals::jacobian`] is implemented; otherwise differences are used.
     fn has_jacobian(&self) -> bool {
         false
@@ -87,6 +99,17 @@ impl Evaluated<'_> {
     pub fn residuals(&self, values: &[f64]) -> Result<Vec<f64>, FitError> {
         let mut out = Vec::with_capacity(self.expected.unwrap_or(0));
         self.problem.residuals(values, &mut out)?;
+        self.checked(out)
+    }
+
+    /// The same at several points.
+    pub fn residuals_of_each(&self, points: &[Vec<f64>]) -> Vec<Result<Vec<f64>, FitError>> {
+        let each = self.problem.residuals_of_each(points).into_iter();
+        each.map(|residuals| residuals.and_then(|r| self.checked(r)))
+            .collect()
+    }
+
+    fn checked(&self, mut out: Vec<f64>) -> Result<Vec<f64>, FitError> {
         let expected = self.weights.map(<[f64]>::len).or(self.expected);
         if let Some(expected) = expected.filter(|n| *n != out.len()) {
             return Err(FitError::Length {

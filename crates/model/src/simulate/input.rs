@@ -130,6 +130,11 @@ impl Excitation {
         self.start_s
     }
 
+    /// Time between steps of integration in s.
+    pub(super) fn step_s(&self) -> f64 {
+        1.0 / (self.rate_hz * self.substeps as f64)
+    }
+
     /// Steps of integration from sample to sample.
     #[must_use]
     pub fn substeps(&self) -> usize {

@@ -14,15 +14,16 @@ mod integrate;
 mod modes;
 mod pieces;
 mod run;
+mod side_by_side;
 mod steady;
 
 pub use between::Between;
 pub use input::Excitation;
 pub use integrate::{MotionState, substeps};
 pub(crate) use integrate::{free_motion, held_response};
-pub(crate) use modes::integrate_modes;
 pub use pieces::{Diverges, Pieces};
-pub(crate) use run::{MotionProgress, Torques, integrate};
+pub(crate) use run::{MotionProgress, Torques};
+pub(crate) use side_by_side::{Motion, integrate};
 pub use steady::{NoSteadyAnswer, steady_answer};
 
 #[cfg(test)]

@@ -10,11 +10,10 @@
 //! constant over a step: as much as stops the gage at its end, and no more than its size (J. J. Moreau, *Numerical aspects
 //! of the sweeping process*, Comput. Methods Appl. Mech. Eng. 177 (1999), 329).
 
-use std::ops::Range;
-
 use super::input::Excitation;
 use super::integrate::{LinearStep, MotionState, free};
-use super::run::{Acting, MotionProgress, Torques, kicked, shown};
+use super::run::{Acting, MotionProgress, kicked, remembered, shown};
+use super::side_by_side::{Motion, Stepped};
 use crate::modal::{ModalPart, ModalResponse};
 
 /// Where a mode stands.
@@ -86,7 +85,7 @@ impl SteppedMode {
 }
 
 /// The stand on its way through a record.
-struct ModalIntegrator<'a> {
+pub(super) struct ModalIntegrator<'a> {
     modes: Vec<SteppedMode>,
     /// `c G`.
     direct: f64,
@@ -100,57 +99,58 @@ struct ModalIntegrator<'a> {
     dry: f64,
 }
 
-/// What the gage shows at some samples of the input, as [`integrate`](super::integrate) does for one mode.
-pub(crate) fn integrate_modes(
-    (stand, gain, shift): (&ModalResponse, f64, f64),
-    torques: &Torques<'_>,
-    input: &Excitation,
-    range: Range<usize>,
-    progress: &mut MotionProgress,
-) -> Vec<f64> {
-    let substeps = input.substeps();
-    let step_s = 1.0 / (input.rate_hz() * substeps as f64);
-    let stepped = |(part, motion): (&ModalPart, &ModeMotion)| SteppedMode {
-        part: *part,
-        step: LinearStep::new(&part.mode, gain, step_s, input.between()),
-        free: free(&part.mode, step_s),
-        at_gage: part.at_gage.unwrap_or(0.0),
-        motion: *motion,
-    };
-    let modes: Vec<SteppedMode> = stand
-        .parts()
-        .iter()
-        .zip(&progress.modes)
-        .map(stepped)
-        .collect();
-    let memories = progress.memories.iter().copied();
-    let mut run = ModalIntegrator {
-        impulse: step_s * modes.iter().map(SteppedMode::pushed_by).sum::<f64>(),
-        modes,
-        direct: stand.residual() * gain,
-        gain,
-        shift,
-        step_s,
-        acting: torques.iter().copied().zip(memories).collect(),
-        dry: torques.iter().filter_map(|(t, _)| t.dry()).sum(),
-    };
-    let mut samples = Vec::with_capacity(range.len());
-    let nodes = input.fine().windows(4).skip(range.start * substeps);
-    let mut state = None;
-    for (node, window) in nodes.take(range.len() * substeps).enumerate() {
-        let now = state.unwrap_or_else(|| run.begin(window));
-        if node % substeps == 0 {
-            if !now.x.is_finite() {
-                break;
-            }
-            samples.push(now.x + shown(&mut run.acting, now, shift));
-        }
-        state = Some(run.advance(now, window));
+impl<'a> Stepped<'a> for ModalIntegrator<'a> {
+    fn resume(motion: &Motion<'a>, input: &Excitation, window: &[f64]) -> (Self, MotionState) {
+        let (gain, step_s) = (motion.gain, input.step_s());
+        let stepped = |(part, at): (&ModalPart, &ModeMotion)| SteppedMode {
+            part: *part,
+            step: LinearStep::new(&part.mode, gain, step_s, input.between()),
+            free: free(&part.mode, step_s),
+            at_gage: part.at_gage.unwrap_or(0.0),
+            motion: *at,
+        };
+        let parts = motion.stand.parts().iter();
+        let modes: Vec<SteppedMode> = parts.zip(&motion.progress.modes).map(stepped).collect();
+        let memories = motion.progress.memories.iter().copied();
+        let run = Self {
+            impulse: step_s * modes.iter().map(SteppedMode::pushed_by).sum::<f64>(),
+            modes,
+            direct: motion.stand.residual() * gain,
+            gain,
+            shift: motion.shift,
+            step_s,
+            acting: motion.torques.iter().copied().zip(memories).collect(),
+            dry: motion.torques.iter().filter_map(|(t, _)| t.dry()).sum(),
+        };
+        let state = run.begin(window);
+        (run, state)
     }
-    samples.resize(range.len(), f64::NAN);
-    progress.modes = run.modes.iter().map(|mode| mode.motion).collect();
-    progress.memories = run.acting.iter().map(|(_, memory)| *memory).collect();
-    samples
+
+    /// A step, and what the torques do at its end.
+    fn step(&mut self, state: MotionState, window: &[f64]) -> MotionState {
+        let driving = self.gain * window[2];
+        let mut parts = std::mem::take(&mut self.modes);
+        let advanced = parts.iter_mut().map(|mode| mode.advance(window, driving));
+        let moved = self.whole(
+            advanced,
+            window[2],
+            (window[3] - window[1]) / (2.0 * self.step_s),
+        );
+        self.modes = parts;
+        let kicked = self.kick(moved, moved.speed - state.speed);
+        self.rub(kicked)
+    }
+
+    fn shown(&mut self, state: MotionState) -> f64 {
+        state.x + shown(&mut self.acting, state, self.shift)
+    }
+
+    fn end(self, _: MotionState) -> MotionProgress {
+        MotionProgress::of_modes(
+            remembered(&self.acting),
+            self.modes.iter().map(|mode| mode.motion).collect(),
+        )
+    }
 }
 
 impl ModalIntegrator<'_> {
@@ -174,21 +174,6 @@ impl ModalIntegrator<'_> {
             x: sum.x + part.x,
             speed: sum.speed + part.speed,
         })
-    }
-
-    /// A step, and what the torques do at its end.
-    fn advance(&mut self, state: MotionState, window: &[f64]) -> MotionState {
-        let driving = self.gain * window[2];
-        let mut parts = std::mem::take(&mut self.modes);
-        let advanced = parts.iter_mut().map(|mode| mode.advance(window, driving));
-        let moved = self.whole(
-            advanced,
-            window[2],
-            (window[3] - window[1]) / (2.0 * self.step_s),
-        );
-        self.modes = parts;
-        let kicked = self.kick(moved, moved.speed - state.speed);
-        self.rub(kicked)
     }
 
     fn kick(&mut self, moved: MotionState, change: f64) -> MotionState {

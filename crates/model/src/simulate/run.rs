@@ -1,10 +1,9 @@
 //! The motion with the torques of the stand, node by node.
 
-use std::ops::Range;
-
 use super::input::Excitation;
 use super::integrate::{LinearStep, MotionState, free};
 use super::modes::{self, ModeMotion};
+use super::side_by_side::{Motion, Stepped};
 use crate::effects::{Memory, Mode, Torque};
 use crate::modal::ModalResponse;
 
@@ -12,7 +11,7 @@ use crate::modal::ModalResponse;
 pub(crate) type Torques<'a> = Vec<(&'a dyn Torque, bool)>;
 
 /// The stand on its way through a record.
-struct Integrator<'a> {
+pub(super) struct Integrator<'a> {
     mode: Mode,
     gain: f64,
     step: LinearStep,
@@ -39,6 +38,16 @@ pub(crate) struct MotionProgress {
 }
 
 impl MotionProgress {
+    /// Where the modes of a stand are, which is all that its motion depends on.
+    pub(super) fn of_modes(memories: Vec<Memory>, modes: Vec<ModeMotion>) -> Self {
+        Self {
+            state: MotionState::default(),
+            memories,
+            direction: 0.0,
+            modes,
+        }
+    }
+
     /// A motion that begins. A load that does not change, and so is not in the input, shifts the displacement that the
     /// torques see.
     pub(crate) fn begin(
@@ -63,6 +72,11 @@ impl MotionProgress {
 
 /// The torques that act, whether the gage shows them, and what they remember.
 pub(super) type Acting<'a> = Vec<((&'a dyn Torque, bool), Memory)>;
+
+/// What they remember by now.
+pub(super) fn remembered(acting: &Acting<'_>) -> Vec<Memory> {
+    acting.iter().map(|(_, memory)| *memory).collect()
+}
 
 /// A motion at a node after what the torques do there: each changes the speed, of which `change` came with the step, by itself
 /// times `impulse`.
@@ -89,53 +103,47 @@ pub(super) fn shown(acting: &mut Acting<'_>, state: MotionState, shift: f64) -> 
         .sum()
 }
 
-/// What the gage shows at some samples of the input; `progress` is that at the first of them, and afterwards that at the
-/// sample behind the last. Once the motion is not finite the rest is NaN.
-pub(crate) fn integrate(
-    (mode, gain, shift): (&Mode, f64, f64),
-    torques: &Torques<'_>,
-    input: &Excitation,
-    range: Range<usize>,
-    progress: &mut MotionProgress,
-) -> Vec<f64> {
-    let substeps = input.substeps();
-    let step_s = 1.0 / (input.rate_hz() * substeps as f64);
-    let memories = progress.memories.iter().copied();
-    let mut run = Integrator {
-        mode: *mode,
-        gain,
-        step: LinearStep::new(mode, gain, step_s, input.between()),
-        step_s,
-        impulse: mode.omega_rad_s * mode.omega_rad_s * step_s,
-        acting: torques.iter().copied().zip(memories).collect(),
-        shift,
-        dry: torques.iter().filter_map(|(t, _)| t.dry()).sum(),
-        direction: progress.direction,
-    };
-    let mut state = progress.state;
-    let mut samples = Vec::with_capacity(range.len());
-    let nodes = input.fine().windows(4).skip(range.start * substeps);
-    for (node, window) in nodes.take(range.len() * substeps).enumerate() {
-        if node % substeps == 0 {
-            if !state.x.is_finite() {
-                break;
-            }
-            samples.push(state.x + run.shown(state));
-        }
-        state = match (run.dry > 0.0, run.direction == 0.0) {
-            (false, _) => run.advance(state, window),
-            (true, true) => run.stick(state, window),
-            (true, false) => run.slide(state, window),
+impl<'a> Stepped<'a> for Integrator<'a> {
+    fn resume(motion: &Motion<'a>, input: &Excitation, _: &[f64]) -> (Self, MotionState) {
+        let mode = motion.stand.first();
+        let step_s = input.step_s();
+        let memories = motion.progress.memories.iter().copied();
+        let run = Self {
+            mode,
+            gain: motion.gain,
+            step: LinearStep::new(&mode, motion.gain, step_s, input.between()),
+            step_s,
+            impulse: mode.omega_rad_s * mode.omega_rad_s * step_s,
+            acting: motion.torques.iter().copied().zip(memories).collect(),
+            shift: motion.shift,
+            dry: motion.torques.iter().filter_map(|(t, _)| t.dry()).sum(),
+            direction: motion.progress.direction,
         };
+        (run, motion.progress.state)
     }
-    samples.resize(range.len(), f64::NAN);
-    *progress = MotionProgress {
-        state,
-        memories: run.acting.iter().map(|(_, memory)| *memory).collect(),
-        direction: run.direction,
-        modes: Vec::new(),
-    };
-    samples
+
+    #[inline]
+    fn step(&mut self, state: MotionState, window: &[f64]) -> MotionState {
+        match (self.dry > 0.0, self.direction == 0.0) {
+            (false, _) => self.advance(state, window),
+            (true, true) => self.stick(state, window),
+            (true, false) => self.slide(state, window),
+        }
+    }
+
+    #[inline]
+    fn shown(&mut self, state: MotionState) -> f64 {
+        state.x + shown(&mut self.acting, state, self.shift)
+    }
+
+    fn end(self, state: MotionState) -> MotionProgress {
+        MotionProgress {
+            state,
+            memories: remembered(&self.acting),
+            direction: self.direction,
+            modes: Vec::new(),
+        }
+    }
 }
 
 impl Integrator<'_> {
@@ -211,10 +219,5 @@ impl Integrator<'_> {
         }
         self.direction = -self.direction;
         back
-    }
-
-    /// Torques that the gage shows beside the displacement.
-    fn shown(&mut self, state: MotionState) -> f64 {
-        shown(&mut self.acting, state, self.shift)
     }
 }

@@ -1,0 +1,130 @@
+//! What a model leaves of the records, as the residuals of a fit.
+
+use torqcomp_model::fit::{FitError, Residuals};
+use torqcomp_model::{Chain, Mode, Run};
+
+use super::own_of_records::OwnOfRecords;
+use super::record::{Nuisance, NuisanceTerms, StandRecord};
+use super::structure::Structure;
+
+/// What a structure leaves of the records, what belongs to these taken out.
+pub struct Unexplained<'a> {
+    structure: &'a Structure,
+    records: &'a [StandRecord],
+    of_records: &'a OwnOfRecords,
+    /// The mode of the free motion, where that of the parameters is not taken.
+    free: Option<&'a Mode>,
+    /// The nuisance terms of each record in that mode.
+    fixed: Option<Vec<Nuisance>>,
+}
+
+impl<'a> Unexplained<'a> {
+    pub fn of(
+        structure: &'a Structure,
+        records: &'a [StandRecord],
+        of_records: &'a OwnOfRecords,
+        free: Option<&'a Mode>,
+    ) -> Self {
+        let mut problem = Self {
+            structure,
+            records,
+            of_records,
+            free,
+            fixed: None,
+        };
+        // Without lines, the nuisance terms depend on the parameters by their mode alone.
+        problem.fixed = free.map(|free| {
+            let of =
+                |(k, r): (usize, &StandRecord)| problem.nuisance(k, r, free, &NuisanceTerms::NONE);
+            records.iter().enumerate().map(of).collect()
+        });
+        problem
+    }
+
+    fn nuisance(
+        &self,
+        k: usize,
+        record: &StandRecord,
+        free: &Mode,
+        terms: &NuisanceTerms,
+    ) -> Nuisance {
+        match self.of_records.is_ringing(k) {
+            true => record.nuisance_beside_motion(terms),
+            false => record.nuisance(free, terms, None),
+        }
+    }
+}
+
+impl Residuals for Unexplained<'_> {
+    fn residuals(&self, values: &[f64], out: &mut Vec<f64>) -> Result<(), FitError> {
+        let one = self.residuals_of_each(&[values.to_vec()]).into_iter();
+        out.append(&mut one.last().expect("one for the point")?);
+        Ok(())
+    }
+
+    fn residuals_of_each(&self, points: &[Vec<f64>]) -> Vec<Result<Vec<f64>, FitError>> {
+        let own = self.structure.bounds().len();
+        let split = points.iter().map(|values| values.split_at(own));
+        let models = split.map(|(values, others)| (self.structure.model(values), others));
+        let models: Vec<_> = models.collect();
+        let of_record = |k: usize| self.of_record(k, &models).into_iter();
+        let mut records: Vec<_> = (0..self.records.len()).map(of_record).collect();
+        let each = points.iter().map(|_| {
+            let of_records = records.iter_mut().filter_map(Iterator::next);
+            let parts = of_records.collect::<Result<Vec<_>, _>>()?;
+            Ok(parts.concat())
+        });
+        each.collect()
+    }
+}
+
+impl Unexplained<'_> {
+    /// What models leave of a record, by its number, each with values of what belongs to the records.
+    fn of_record(
+        &self,
+        k: usize,
+        models: &[((Chain, NuisanceTerms), &[f64])],
+    ) -> Vec<Result<Vec<f64>, FitError>> {
+        let set = models
+            .iter()
+            .map(|(_, others)| self.of_records.set(k, &self.records[k], others));
+        let records: Vec<StandRecord> = set.collect();
+        let both = || models.iter().zip(&records);
+        let runs: Vec<Run> = both()
+            .map(|(((chain, _), _), record)| record.run_of(chain))
+            .collect();
+        let mut residuals = raw_residuals(&runs, &self.records[k]);
+        for (residual, (((chain, terms), _), record)) in residuals.iter_mut().zip(both()) {
+            let Ok(residual) = residual else { continue };
+            match &self.fixed {
+                Some(fixed) if terms.is_empty() => fixed[k].clear(residual),
+                _ => {
+                    let free = self.free.copied().unwrap_or_else(|| chain.free_mode());
+                    self.nuisance(k, record, &free, terms).clear(residual);
+                }
+            }
+        }
+        residuals
+    }
+}
+
+/// Measured less modelled over the range of a record, nuisance terms included.
+pub fn raw_residual(model: &Chain, record: &StandRecord) -> Result<Vec<f64>, FitError> {
+    let residual = raw_residuals(&[record.run_of(model)], record).into_iter();
+    residual.last().expect("one for the model")
+}
+
+/// The same of several models.
+pub fn raw_residuals(runs: &[Run], record: &StandRecord) -> Vec<Result<Vec<f64>, FitError>> {
+    let residual = |modelled: Vec<f64>| {
+        let pairs = record.measured_in_range().iter();
+        let pairs = pairs.zip(&modelled[record.range.clone()]);
+        let residual: Vec<f64> = pairs.map(|(y, x)| y - x).collect();
+        match residual.last().is_some_and(|r| r.is_finite()) {
+            true => Ok(residual),
+            false => Err(FitError::Model("the motion diverges".to_owned())),
+        }
+    };
+    let modelled = Chain::simulate_all(runs, &record.input).into_iter();
+    modelled.map(residual).collect()
+}
