@@ -253,6 +253,9 @@ fn failures_end_the_run_where_asked() {
     let all = folder.run(&with(&MANY, &["--jobs", "1", "--max-failures", "4"]));
     all.says(1, &["3 of 6 recordings failed; the others are done"]);
     assert_eq!(results(&folder).len(), 3);
+    let bad = ["compensate", "logs/0.csv", "logs/1.csv"];
+    let none = folder.run(&with(&bad, &MANY[2..]));
+    none.says(1, &["2 of 2 recordings failed\n"]);
 }
 
 /// How many recordings a run with `--skip-existing` made and skipped.

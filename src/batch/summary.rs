@@ -253,16 +253,16 @@ pub(super) fn ended<'a>(
     let failed = failed(entries.clone());
     if failed > 0 {
         let count = entries.count() + not_begun;
+        let others = match not_begun {
+            _ if failed == count => String::new(),
+            0 => "; the others are done".to_owned(),
+            count => format!(", {count} were not begun"),
+        };
         return Err(Failure::failed(
             ErrorCode::RecordingsFailed,
             format_args!(
-                "{} of {} failed{}",
-                failed,
-                plural(count as u64, "recording"),
-                match not_begun {
-                    0 => "; the others are done".to_owned(),
-                    count => format!(", {count} were not begun"),
-                }
+                "{failed} of {} failed{others}",
+                plural(count as u64, "recording")
             ),
         ));
     }

@@ -195,10 +195,11 @@ pub(super) fn clock(used: &TimeUsed) -> String {
 
 /// `cdr sensor_msgs/msg/JointState, time: header.stamp (the messages carry their own time stamp)`.
 pub(super) fn describe(chosen: &SelectedSignal) -> String {
+    let kind = format!("{} {}", chosen.encoding, chosen.schema);
     format!(
-        "{} {}, time: {} ({})",
-        chosen.encoding,
-        chosen.schema,
+        "{}, time: {} ({})",
+        // JSON may come without a schema.
+        kind.trim_end(),
         clock(&chosen.time),
         chosen.time.why
     )
