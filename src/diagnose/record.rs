@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use torqcomp_model::simulate::{Excitation, MotionState};
-use torqcomp_model::{Chain, Mode, Run};
+use torqcomp_model::{Chain, Mode, StandRun};
 
 use super::columns::Columns;
 
@@ -19,8 +19,8 @@ pub struct InitialState {
 
 impl InitialState {
     /// A stand on its way from there.
-    pub fn run_of(self, chain: &Chain) -> Run<'_> {
-        Run {
+    pub fn run_of(self, chain: &Chain) -> StandRun<'_> {
+        StandRun {
             chain,
             start: self.motion,
             shift: self.preload,
@@ -136,7 +136,7 @@ impl StandRecord {
     }
 
     /// A stand on its way through the record.
-    pub fn run_of<'a>(&self, chain: &'a Chain) -> Run<'a> {
+    pub fn run_of<'a>(&self, chain: &'a Chain) -> StandRun<'a> {
         self.initial.run_of(chain)
     }
 

@@ -1,6 +1,6 @@
 //! A model that is run on records, and the state at their start that leaves least of them.
 
-use torqcomp_model::{Chain, Mode, Run};
+use torqcomp_model::{Chain, Mode, StandRun};
 
 use super::fit::{MOST_STARTS, RecordResidual, START_SETTLED};
 use super::own_of_records::OwnOfRecords;
@@ -53,7 +53,7 @@ impl RecordModel {
             });
         }
         let run = |initial: &InitialState| initial.run_of(&self.chain);
-        let runs: Vec<Run> = initial.iter().map(run).collect();
+        let runs: Vec<StandRun> = initial.iter().map(run).collect();
         let mut residuals = raw_residuals(&runs, record).into_iter();
         let residual = residuals.next()?.ok()?;
         let mut slope = || {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use torqcomp_model::{Chain, Estimate, Run};
+use torqcomp_model::{Chain, Estimate, StandRun};
 
 use super::blocks::{Comparison, compare};
 use super::columns::Columns;
@@ -327,7 +327,7 @@ pub fn derivatives(
         point[k] += step(k);
     }
     let chains: Vec<Chain> = points.iter().map(|p| fitted.structure.model(p).0).collect();
-    let runs: Vec<Run> = chains.iter().map(|chain| record.run_of(chain)).collect();
+    let runs: Vec<StandRun> = chains.iter().map(|chain| record.run_of(chain)).collect();
     let residuals = raw_residuals(&runs, record).into_iter().zip(&chains);
     let cleared = residuals.map(|(residual, chain)| {
         let mut residual = residual.ok()?;

@@ -1,7 +1,7 @@
 //! What a model leaves of the records, as the residuals of a fit.
 
 use torqcomp_model::fit::{FitError, Residuals};
-use torqcomp_model::{Chain, Mode, Run};
+use torqcomp_model::{Chain, Mode, StandRun};
 
 use super::own_of_records::OwnOfRecords;
 use super::record::{Nuisance, NuisanceTerms, StandRecord};
@@ -90,7 +90,7 @@ impl Unexplained<'_> {
             .map(|(_, others)| self.of_records.set(k, &self.records[k], others));
         let records: Vec<StandRecord> = set.collect();
         let both = || models.iter().zip(&records);
-        let runs: Vec<Run> = both()
+        let runs: Vec<StandRun> = both()
             .map(|(((chain, _), _), record)| record.run_of(chain))
             .collect();
         let mut residuals = raw_residuals(&runs, &self.records[k]);
@@ -115,7 +115,7 @@ pub fn raw_residual(model: &Chain, record: &StandRecord) -> Result<Vec<f64>, Fit
 }
 
 /// The same of several models.
-pub fn raw_residuals(runs: &[Run], record: &StandRecord) -> Vec<Result<Vec<f64>, FitError>> {
+pub fn raw_residuals(runs: &[StandRun], record: &StandRecord) -> Vec<Result<Vec<f64>, FitError>> {
     let residual = |modelled: Vec<f64>| {
         let pairs = record.measured_in_range().iter();
         let pairs = pairs.zip(&modelled[record.range.clone()]);

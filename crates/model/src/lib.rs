@@ -69,7 +69,7 @@ pub mod simulate;
 pub mod uncertainty;
 
 pub use beam::{Beam, Compliance, Segment};
-pub use chain::{Chain, Link, Run};
+pub use chain::{Chain, Link, StandRun};
 pub use damping::FreeDecay;
 pub use error::ModelError;
 pub use inertia::Part;

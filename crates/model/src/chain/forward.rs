@@ -9,8 +9,8 @@ use super::{Chain, Link};
 use crate::effects::{Action, SampleClock, Stage};
 use crate::mode::Mode;
 use crate::simulate::{
-    Between, Excitation, Motion, MotionProgress, MotionState, Torques, free_motion, held_response,
-    integrate,
+    Between, Excitation, MotionProgress, MotionState, OngoingMotion, Torques, free_motion,
+    held_response, integrate,
 };
 
 /// A record on its way through the chain, in the domain that the last link left it in.
@@ -37,7 +37,7 @@ impl Signal {
 
 /// A stand that is simulated.
 #[derive(Clone, Copy)]
-pub struct Run<'a> {
+pub struct StandRun<'a> {
     /// The stand.
     pub chain: &'a Chain,
     /// Its motion at the first sample.
@@ -46,7 +46,7 @@ pub struct Run<'a> {
     pub shift: f64,
 }
 
-impl<'a> Run<'a> {
+impl<'a> StandRun<'a> {
     /// A stand as it is.
     #[must_use]
     pub fn of(chain: &'a Chain, start: MotionState) -> Self {
@@ -67,20 +67,25 @@ impl<'a> Run<'a> {
 }
 
 /// What the gage shows of motions that are integrated in time.
-fn integrate_all<'a>(runs: impl Iterator<Item = &'a Run<'a>>, input: &Excitation) -> Vec<Vec<f64>> {
+fn integrate_all<'a>(
+    runs: impl Iterator<Item = &'a StandRun<'a>>,
+    input: &Excitation,
+) -> Vec<Vec<f64>> {
     let begun = runs.map(|run| {
         let torques = run.chain.torques();
         let progress = MotionProgress::begin(&torques, (&run.chain.stand, run.start), run.shift);
         (run, torques, progress)
     });
     let mut begun: Vec<_> = begun.collect();
-    let motions = begun.iter_mut().map(|(run, torques, progress)| Motion {
-        stand: &run.chain.stand,
-        gain: run.chain.gain,
-        shift: run.shift,
-        torques,
-        progress,
-    });
+    let motions = begun
+        .iter_mut()
+        .map(|(run, torques, progress)| OngoingMotion {
+            stand: &run.chain.stand,
+            gain: run.chain.gain,
+            shift: run.shift,
+            torques,
+            progress,
+        });
     let mut motions: Vec<_> = motions.collect();
     integrate(&mut motions, input, 0..input.samples().len())
 }
@@ -92,16 +97,16 @@ impl Chain {
     /// continues the record backwards. Samples after the motion has left all bounds are NaN.
     #[must_use]
     pub fn simulate(&self, input: &Excitation, start: MotionState) -> Vec<f64> {
-        Run::of(self, start).simulate(input)
+        StandRun::of(self, start).simulate(input)
     }
 
     /// The records of several stands for one input, each as of [`simulate`](Self::simulate); motions that are integrated take
     /// their steps in turn, which is faster than one after the other.
     #[must_use]
-    pub fn simulate_all(runs: &[Run<'_>], input: &Excitation) -> Vec<Vec<f64>> {
+    pub fn simulate_all(runs: &[StandRun<'_>], input: &Excitation) -> Vec<Vec<f64>> {
         let integrated = runs.iter().filter(|run| run.chain.is_integrated());
         let mut shown = integrate_all(integrated, input).into_iter();
-        let record = |run: &Run| match run.chain.is_integrated() {
+        let record = |run: &StandRun| match run.chain.is_integrated() {
             true => run
                 .chain
                 .recorded_if_finite(shown.next().unwrap_or_default(), input),
@@ -113,7 +118,7 @@ impl Chain {
     /// The record for an input when the stand is at rest before it, by integration in time.
     #[must_use]
     pub fn simulate_from(&self, input: &Excitation, start: MotionState) -> Vec<f64> {
-        let mut shown = integrate_all([Run::of(self, start)].iter(), input);
+        let mut shown = integrate_all([StandRun::of(self, start)].iter(), input);
         self.recorded_if_finite(shown.pop().unwrap_or_default(), input)
     }
 
@@ -218,7 +223,7 @@ impl Chain {
         range: Range<usize>,
         progress: &mut MotionProgress,
     ) -> Vec<f64> {
-        let motion = Motion {
+        let motion = OngoingMotion {
             stand: &self.stand,
             gain: self.gain,
             shift: self.shift,

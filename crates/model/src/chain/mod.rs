@@ -20,7 +20,7 @@ use num_complex::Complex64;
 use crate::effects::{Action, Effect, Fixed, Form, Stage, Torque};
 use crate::modal::ModalResponse;
 
-pub use forward::Run;
+pub use forward::StandRun;
 pub use gage_path::{GagePath, GageState};
 
 /// Frequency, over the natural one, that is next to rest.

@@ -23,7 +23,7 @@ pub use integrate::{MotionState, substeps};
 pub(crate) use integrate::{free_motion, held_response};
 pub use pieces::{Diverges, Pieces};
 pub(crate) use run::{MotionProgress, Torques};
-pub(crate) use side_by_side::{Motion, integrate};
+pub(crate) use side_by_side::{OngoingMotion, integrate};
 pub use steady::{NoSteadyAnswer, steady_answer};
 
 #[cfg(test)]

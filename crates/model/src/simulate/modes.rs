@@ -13,7 +13,7 @@
 use super::input::Excitation;
 use super::integrate::{LinearStep, MotionState, free};
 use super::run::{Acting, MotionProgress, kicked, remembered, shown};
-use super::side_by_side::{Motion, Stepped};
+use super::side_by_side::{OngoingMotion, Stepped};
 use crate::modal::{ModalPart, ModalResponse};
 
 /// Where a mode stands.
@@ -100,7 +100,11 @@ pub(super) struct ModalIntegrator<'a> {
 }
 
 impl<'a> Stepped<'a> for ModalIntegrator<'a> {
-    fn resume(motion: &Motion<'a>, input: &Excitation, window: &[f64]) -> (Self, MotionState) {
+    fn resume(
+        motion: &OngoingMotion<'a>,
+        input: &Excitation,
+        window: &[f64],
+    ) -> (Self, MotionState) {
         let (gain, step_s) = (motion.gain, input.step_s());
         let stepped = |(part, at): (&ModalPart, &ModeMotion)| SteppedMode {
             part: *part,

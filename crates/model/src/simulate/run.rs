@@ -3,7 +3,7 @@
 use super::input::Excitation;
 use super::integrate::{LinearStep, MotionState, free};
 use super::modes::{self, ModeMotion};
-use super::side_by_side::{Motion, Stepped};
+use super::side_by_side::{OngoingMotion, Stepped};
 use crate::effects::{Memory, Mode, Torque};
 use crate::modal::ModalResponse;
 
@@ -104,7 +104,7 @@ pub(super) fn shown(acting: &mut Acting<'_>, state: MotionState, shift: f64) -> 
 }
 
 impl<'a> Stepped<'a> for Integrator<'a> {
-    fn resume(motion: &Motion<'a>, input: &Excitation, _: &[f64]) -> (Self, MotionState) {
+    fn resume(motion: &OngoingMotion<'a>, input: &Excitation, _: &[f64]) -> (Self, MotionState) {
         let mode = motion.stand.first();
         let step_s = input.step_s();
         let memories = motion.progress.memories.iter().copied();

@@ -12,7 +12,7 @@ use super::run::{Integrator, MotionProgress, Torques};
 use crate::modal::ModalResponse;
 
 /// A stand, and where its motion stands.
-pub(crate) struct Motion<'a> {
+pub(crate) struct OngoingMotion<'a> {
     pub(crate) stand: &'a ModalResponse,
     pub(crate) gain: f64,
     /// Displacement by a constant load.
@@ -24,7 +24,11 @@ pub(crate) struct Motion<'a> {
 /// A motion on its way from node to node.
 pub(super) trait Stepped<'a>: Sized {
     /// Goes on from where a motion stands, at the node in the second place of a window; with its state there.
-    fn resume(motion: &Motion<'a>, input: &Excitation, window: &[f64]) -> (Self, MotionState);
+    fn resume(
+        motion: &OngoingMotion<'a>,
+        input: &Excitation,
+        window: &[f64],
+    ) -> (Self, MotionState);
 
     /// The state at the next node.
     fn step(&mut self, state: MotionState, window: &[f64]) -> MotionState;
@@ -39,14 +43,14 @@ pub(super) trait Stepped<'a>: Sized {
 /// What the gage shows of each motion at some samples of the input; its progress is that at the first of them, and afterwards
 /// that at the sample behind the last. Once a motion is not finite the rest of it is NaN.
 pub(crate) fn integrate(
-    motions: &mut [Motion<'_>],
+    motions: &mut [OngoingMotion<'_>],
     input: &Excitation,
     range: Range<usize>,
 ) -> Vec<Vec<f64>> {
     if range.is_empty() {
         return vec![Vec::new(); motions.len()];
     }
-    let is_single = |motion: &Motion| motion.stand.only().is_some();
+    let is_single = |motion: &OngoingMotion| motion.stand.only().is_some();
     let alike = motions.chunk_by_mut(|a, b| is_single(a) == is_single(b));
     let shown = alike.flat_map(|some| match is_single(&some[0]) {
         true => in_turn::<Integrator>(some, input, &range),
@@ -57,7 +61,7 @@ pub(crate) fn integrate(
 
 /// The same of motions of one kind, four at a time as long as there are so many.
 fn in_turn<'a, S: Stepped<'a>>(
-    motions: &mut [Motion<'a>],
+    motions: &mut [OngoingMotion<'a>],
     input: &Excitation,
     range: &Range<usize>,
 ) -> Vec<Vec<f64>> {
@@ -76,7 +80,7 @@ fn in_turn<'a, S: Stepped<'a>>(
 
 /// The same of so many motions.
 fn together<'a, S: Stepped<'a>, const N: usize>(
-    motions: &mut [Motion<'a>; N],
+    motions: &mut [OngoingMotion<'a>; N],
     input: &Excitation,
     range: &Range<usize>,
 ) -> [Vec<f64>; N] {
@@ -121,7 +125,7 @@ fn together<'a, S: Stepped<'a>, const N: usize>(
 mod tests {
     use super::super::MotionState;
     use super::super::tests::{MODE, RATE_HZ, chain};
-    use crate::chain::{Chain, Run};
+    use crate::chain::{Chain, StandRun};
     use crate::effects::Mode;
     use crate::modal::{ModalPart, ModalResponse};
     use crate::simulate::Excitation;
@@ -162,7 +166,10 @@ mod tests {
             x: 0.3,
             speed: 20.0,
         };
-        let runs: Vec<Run> = chains.iter().map(|chain| Run::of(chain, start)).collect();
+        let runs: Vec<StandRun> = chains
+            .iter()
+            .map(|chain| StandRun::of(chain, start))
+            .collect();
         let together = Chain::simulate_all(&runs, &input);
         let bits = |record: &[f64]| record.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
         for (run, record) in runs.iter().zip(&together) {
