@@ -123,23 +123,18 @@ fn damping_in_one_direction_is_drawn() {
     assert!(apart < 4.0, "{apart} {points:?}");
 }
 
-/// Friction that changes along the displacement is not dry friction alone, and not nothing; if it grows with the displacement, it
-/// has a name.
+/// Friction that changes along the displacement is no dry friction, and not nothing; if it grows with the displacement, it has a
+/// name.
 #[test]
 fn friction_that_depends_on_the_place_is_no_dry_friction() {
     let waves: Law = |x, v| 0.004 * (1.0 + 0.8 * (3.0 * x).sin()) * (20.0 * v).tanh();
-    let (report, noise) = diagnosed(waves, &Folder::new(), &[]);
-    let (verdict, effects) = (&report["verdict"], report["effects"].to_string());
+    let (report, _) = diagnosed(waves, &Folder::new(), &[]);
+    let (verdict, effects) = (&report["verdict"], &report["effects"]);
     println!("{verdict} {effects} {}", report["error"]);
-    let left = number(&report["error"]["after"]["holdout_rms"]);
-    match verdict.as_str() {
-        Some("unexplained" | "partly-explained") => {}
-        // Dry friction and more of it at some places, which is what it is.
-        _ => assert!(
-            effects.contains("position-dependent-friction") && left < 1.2 * noise,
-            "{verdict} {effects} {left} {noise}"
-        ),
-    }
+    assert!(
+        verdict == "unexplained" || verdict == "partly-explained",
+        "{verdict} {effects}"
+    );
     let wedge: Law = |x, v| 0.02 * x.abs() * (20.0 * v).tanh();
     let (report, _) = diagnosed(wedge, &Folder::new(), &[]);
     assert_eq!(report["verdict"], "explained");

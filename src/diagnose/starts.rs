@@ -171,7 +171,12 @@ pub fn change(
 
 /// What a model changes in a training record, by its number.
 fn change_of(base: &BaseModel, model: &Chain, record: &StandRecord, k: usize) -> Option<Vec<f64>> {
-    let mut moved = raw_residual(model, record).ok()?;
+    // The constant load of the record is left to the fit.
+    let unloaded = InitialState {
+        preload: 0.0,
+        ..record.initial
+    };
+    let mut moved = raw_residual(model, &record.starting_from(unloaded)).ok()?;
     base.nuisance[k].clear(&mut moved);
     let pairs = base.scored.train[k].samples.iter().zip(&moved);
     let mut change: Vec<f64> = pairs.map(|(b, m)| b - m).collect();

@@ -230,8 +230,8 @@ impl Chain {
             torques: &self.torques(),
             progress,
         };
-        let shown = integrate(&mut [motion], input, range);
-        shown.into_iter().flatten().collect()
+        let mut shown = integrate(&mut [motion], input, range);
+        shown.pop().unwrap_or_default()
     }
 
     /// What the links after the stand make of what the gage shows.
