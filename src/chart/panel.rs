@@ -1,6 +1,7 @@
 //! One chart drawn into its part of a picture: axes, marks, bands, lines and dots.
 
 use std::fmt::Write;
+use torqcomp_dsp::sort_by_number;
 
 use maud::{Markup, html};
 
@@ -159,7 +160,7 @@ impl<'a> Panel<'a> {
                 .filter(is_drawn)
                 .map(place)
                 .collect();
-            all.sort_by(|a, b| a.0.total_cmp(&b.0));
+            sort_by_number(&mut all, |(start, _)| *start);
             // What overlaps or nearly does is one.
             all.dedup_by(|later, first| {
                 let joins = later.0 <= first.1 + CLOSE;

@@ -50,6 +50,7 @@ mod unexplained;
 mod units;
 mod verdict;
 
+use torqcomp_dsp::sort_by_number;
 use torqcomp_model::effects::{Fixed, RecordScales};
 use torqcomp_model::simulate::Between;
 
@@ -302,7 +303,7 @@ impl SearchState {
             .flatten()
             .filter_map(|c| c.model.as_ref())
             .collect();
-        alone.sort_by(|a, b| a.criterion().total_cmp(&b.criterion()));
+        sort_by_number(&mut alone, |model| model.criterion());
         // If nothing is left, only a course in place of effects could say more.
         let is_left = remains(&self.after, &self.tests, floor);
         let count = self.after.effect_names().len();

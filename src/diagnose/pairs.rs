@@ -6,7 +6,7 @@ use super::score::{BaseModel, ScoredModel};
 use super::search::Workers;
 use super::structure::{EffectForm, Structure};
 use crate::parallel::parallel;
-use torqcomp_dsp::dot;
+use torqcomp_dsp::{dot, sort_by_number};
 
 /// Forms of a pair of effects that are fitted.
 const FORMS: usize = 2;
@@ -63,7 +63,7 @@ pub fn best_pairs(
         let criterion = |fit: &FittedModel| {
             samples * fit.train_sum.ln() + fit.values.len() as f64 * samples.ln()
         };
-        fits.sort_by(|a, b| criterion(a).total_cmp(&criterion(b)));
+        sort_by_number(&mut fits, criterion);
         fits.truncate(count);
         let again = parallel(fits.len(), workers.threads, |k| {
             fits[k].refit(&records.train, effort).ok()
@@ -78,7 +78,7 @@ pub fn best_pairs(
     let mut scored: Vec<ScoredModel> = fits
         .filter_map(|fit| ScoredModel::of(fit, records))
         .collect();
-    scored.sort_by(|a, b| a.criterion().total_cmp(&b.criterion()));
+    sort_by_number(&mut scored, ScoredModel::criterion);
     scored
 }
 
@@ -155,7 +155,7 @@ fn pairs(changes: &[Change], residual: &[f64]) -> Vec<EffectPair> {
             });
         }
     }
-    found.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
+    sort_by_number(&mut found, |pair| pair.criterion);
     let names = |pair: &EffectPair| pair.members.map(|k| changes[k].effect.effect.name);
     let mut seen = Vec::new();
     found.retain(|pair| {

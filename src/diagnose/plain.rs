@@ -11,7 +11,7 @@ use super::record::{NuisanceTerms, StandRecord};
 use super::residual_tests::without_mean;
 use super::structure::{FitContext, PlainStand, Structure};
 use crate::failure::{ErrorCode, Failure};
-use torqcomp_dsp::{dot, peaks};
+use torqcomp_dsp::{dot, peaks, sort_by_number};
 
 /// Natural frequencies tried per decade where none is declared.
 const PER_DECADE: f64 = 24.0;
@@ -100,7 +100,7 @@ fn scan(
     let mut found: Vec<(f64, PlainStand)> = starts
         .filter_map(|start| try_start(context, start, record))
         .collect();
-    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    sort_by_number(&mut found, |(left, _)| *left);
     found
 }
 

@@ -2,6 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::Serialize;
+use torqcomp_dsp::sort_by_number;
 
 use super::describe;
 use super::detection::{DetectionLimit, detection_limits};
@@ -232,12 +233,11 @@ impl SearchState {
     fn candidates(&mut self) -> Vec<CandidateFit> {
         let mut all = Vec::new();
         for mut round in std::mem::take(&mut self.rounds) {
-            round.sort_by(|a, b| {
-                let first = |c: &CandidateFit| c.status() != Status::Accepted;
-                let by_error = a.holdout_error().total_cmp(&b.holdout_error());
-                first(a).cmp(&first(b)).then(by_error)
-            });
-            all.extend(round);
+            sort_by_number(&mut round, CandidateFit::holdout_error);
+            let (accepted, others): (Vec<_>, Vec<_>) = round
+                .into_iter()
+                .partition(|c| c.status() == Status::Accepted);
+            all.extend(accepted.into_iter().chain(others));
         }
         all
     }

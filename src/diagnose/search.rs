@@ -1,6 +1,7 @@
 //! The search: every effect is fitted, the best is accepted if it reduces the error significantly.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
+use torqcomp_dsp::sort_by_number;
 
 use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
@@ -274,7 +275,7 @@ pub fn fit_all(
         .iter()
         .map(|f| f.as_ref().map_or(0.0, gain))
         .collect();
-    gains.sort_by(|a, b| b.total_cmp(a));
+    sort_by_number(&mut gains, |gain| -gain);
     let least = gains
         .get(limits.full)
         .copied()
@@ -340,7 +341,7 @@ fn first_fits(
         left.fold(f64::INFINITY, f64::min)
     };
     let mut chosen: Vec<usize> = (0..forms.len()).collect();
-    chosen.sort_by(|a, b| left(*a).total_cmp(&left(*b)));
+    sort_by_number(&mut chosen, |k| left(*k));
     chosen.truncate(limits.first);
     let done = AtomicUsize::new(0);
     parallel(forms.len(), workers.threads, |k| {

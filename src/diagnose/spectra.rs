@@ -1,6 +1,7 @@
 //! Spectra of residuals: power, coherence with an input, lines.
 
 use std::f64::consts::TAU;
+use torqcomp_dsp::sort_by_number;
 
 use num_complex::Complex64;
 use schemars::JsonSchema;
@@ -174,7 +175,7 @@ pub fn lines_of(residuals: &[RecordResidual], to_hz: f64, count: usize) -> Vec<S
         .filter(is_peak)
         .map(|k| line_at(&power, k, step))
         .collect();
-    lines.sort_by(|a, b| b.amplitude.total_cmp(&a.amplitude));
+    sort_by_number(&mut lines, |line| -line.amplitude);
     lines.truncate(count);
     lines
 }

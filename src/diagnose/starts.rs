@@ -12,7 +12,7 @@ use super::score::BaseModel;
 use super::spectra::SpectralLine;
 use super::structure::{EffectForm, Structure};
 use super::unexplained::raw_residual;
-use torqcomp_dsp::dot;
+use torqcomp_dsp::{dot, sort_by_number};
 
 /// Starts that are fitted.
 const FITTED: usize = 2;
@@ -71,7 +71,7 @@ pub fn best_starts(
         .into_iter()
         .filter_map(|own| evaluated(&own).map(|start| (own, start)))
         .collect();
-    starts.sort_by(|(_, a), (_, b)| b.reduction.total_cmp(&a.reduction));
+    sort_by_number(&mut starts, |(_, start)| -start.reduction);
     let mut found: Vec<Start> = starts.iter().map(|(_, start)| start.clone()).collect();
     if let Some(size) = effect.size() {
         let bounds = &effect.form.parameters[size];
@@ -86,7 +86,7 @@ pub fn best_starts(
             evaluated(&own)
         }));
     }
-    found.sort_by(|a, b| a.left.total_cmp(&b.left));
+    sort_by_number(&mut found, |start| start.left);
     found.truncate(FITTED);
     found.extend(from_backbone(structure, plain, training));
     found

@@ -1,6 +1,7 @@
 //! Writing what was found into a stand file, leaving the rest of it as it is.
 
 use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value, value};
+use torqcomp_dsp::sort_by_number;
 use torqcomp_model::{Estimate, Kind};
 
 use crate::failure::{ErrorCode, Failure};
@@ -284,7 +285,7 @@ fn by_frequency(tables: Option<&ArrayOfTables>) -> Vec<&Table> {
     let read = tables.into_iter().flat_map(ArrayOfTables::iter);
     let read: Option<Vec<(f64, &Table)>> = read.map(|table| Some((hertz(table)?, table))).collect();
     let mut read = read.unwrap_or_default();
-    read.sort_by(|a, b| a.0.total_cmp(&b.0));
+    sort_by_number(&mut read, |(hertz, _)| *hertz);
     read.into_iter().map(|(_, table)| table).collect()
 }
 

@@ -1,6 +1,7 @@
 //! A calibration curve: applied quantity over recorded quantity, from points or as a polynomial.
 
 use crate::conversion::ConversionError;
+use crate::sort_by_number;
 
 /// Part of the calibrated range by which a curve is continued beyond either end, along its tangent there.
 pub const CONTINUED: f64 = 0.2;
@@ -46,7 +47,7 @@ impl CalibrationCurve {
     /// ```
     pub fn through(points: &[(f64, f64)]) -> Result<Self, ConversionError> {
         let mut points = points.to_vec();
-        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        sort_by_number(&mut points, |(x, _)| *x);
         let steps = || {
             points
                 .windows(2)

@@ -29,6 +29,7 @@ pub mod gage;
 pub mod harmonics;
 pub mod noise;
 pub mod onset;
+mod order;
 pub mod peaks;
 pub mod quality;
 pub mod recorder;
@@ -41,3 +42,4 @@ pub mod zero_phase;
 
 pub use dot::{dot, rms};
 pub use error::Error;
+pub use order::sort_by_number;

@@ -8,7 +8,7 @@
 use std::ops::{Range, RangeInclusive};
 
 use crate::decimate::{Decimated, window_gain, windowed_sinc};
-use crate::{Error, dot};
+use crate::{Error, dot, sort_by_number};
 
 /// From the end of a band to where the filter passes nothing (80 dB), times the factor and twice the reach (J. F. Kaiser, in
 /// Kuo, Kaiser (eds.), System Analysis by Digital Computer, 1966).
@@ -76,7 +76,7 @@ impl Undersampling {
         let Some(mut images) = images.collect::<Option<Vec<_>>>() else {
             return false;
         };
-        images.sort_by(|a, b| a.start.total_cmp(&b.start));
+        sort_by_number(&mut images, |image| image.start);
         !images.is_empty() && images.windows(2).all(|pair| pair[0].end <= pair[1].start)
     }
 
@@ -143,7 +143,7 @@ pub fn folded(band: &Range<f64>) -> (Range<f64>, impl Fn(f64) -> f64 + use<>) {
 /// Bands by rising frequency; those that are closer than that are one.
 fn joined(bands: &[Range<f64>], closest: f64) -> Vec<Range<f64>> {
     let mut sorted = bands.to_vec();
-    sorted.sort_by(|a, b| a.start.total_cmp(&b.start));
+    sort_by_number(&mut sorted, |band| band.start);
     let mut out: Vec<Range<f64>> = Vec::new();
     for band in sorted {
         match out.last_mut() {

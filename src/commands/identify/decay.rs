@@ -2,6 +2,7 @@
 
 use std::path::Path;
 use std::sync::Arc;
+use torqcomp_dsp::sort_by_number;
 
 use torqcomp_dsp::quality::clipping::Clipping;
 
@@ -183,8 +184,7 @@ fn entries(args: &Decay, result: &mut Identification) -> Result<Vec<Entry>, Fail
 fn modes(result: &mut Identification, source: &str) -> Entry {
     result.warn("residues-unknown", NO_RESIDUES);
     let mut all = result.modes.clone();
-    let omega = |mode: &ModalPole| mode.pole().omega_rad_per_s;
-    all.sort_by(|a, b| omega(a).total_cmp(&omega(b)));
+    sort_by_number(&mut all, |mode| mode.pole().omega_rad_per_s);
     let entries = |mode: &ModalPole| {
         let names = ["natural_frequency", "damping_ratio"];
         let constants = mode.modal_constants().of_mode((0, 1), &names);

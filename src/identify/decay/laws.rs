@@ -14,6 +14,7 @@
 use nalgebra::DMatrix;
 use schemars::JsonSchema;
 use serde::Serialize;
+use torqcomp_dsp::sort_by_number;
 use torqcomp_model::fit::{Fit, FitError, Options, Parameter, WithJacobian, minimize};
 
 use super::modes::Stretch;
@@ -257,7 +258,7 @@ pub(super) fn compare(stretch: &Stretch, viscous: &ViscousFit) -> Result<Vec<Law
             all.push(fitted);
         }
     }
-    all.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
+    sort_by_number(&mut all, |law| law.criterion);
     Ok(all)
 }
 

@@ -8,6 +8,7 @@
 //! and drift belong to each stretch. Uncertainties allow for the colour of the noise ([`crate::noise_colour`]).
 
 use std::ops::Range;
+use torqcomp_dsp::sort_by_number;
 
 use nalgebra::DMatrix;
 use torqcomp_dsp::peaks::{self, Peak};
@@ -393,7 +394,7 @@ impl ModesFit {
                 / self.poles[k].rate_per_s.max(1e-12)
         };
         let mut order: Vec<usize> = (0..self.poles.len()).collect();
-        order.sort_by(|a, b| energy(*b).total_cmp(&energy(*a)));
+        sort_by_number(&mut order, |k| -energy(*k));
         order
     }
 }

@@ -9,6 +9,7 @@
 //! (variable projection: G. H. Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973), 413).
 
 use std::sync::Mutex;
+use torqcomp_dsp::sort_by_number;
 
 use nalgebra::DMatrix;
 use num_complex::Complex64;
@@ -431,8 +432,7 @@ impl Modal {
         let mut places: Vec<usize> = (0..self.poles.len())
             .filter(|k| self.foreign[*k].is_none())
             .collect();
-        let omega = |k: &usize| self.poles[*k].omega_rad_per_s;
-        places.sort_by(|a, b| omega(a).total_cmp(&omega(b)));
+        sort_by_number(&mut places, |k| self.poles[*k].omega_rad_per_s);
         places
     }
 

@@ -9,6 +9,7 @@ use super::{NONE, Point, SAME, value_of};
 use crate::failure::{ErrorCode, Failure};
 use crate::identify::{Identification, rms};
 use crate::print::rounded;
+use torqcomp_dsp::sort_by_number;
 
 /// Distance of the means from the curve over what their scatter explains, and over the deflection at the largest load, from
 /// which there is a warning.
@@ -47,7 +48,7 @@ pub(super) fn refuse_two_ranges(points: &[Point], steps: &LoadSteps) -> Result<(
         (slope, left.sum::<f64>())
     };
     // So that the points below and above a load are those before and after it.
-    loaded.sort_by(|a, b| a.load.abs().total_cmp(&b.load.abs()));
+    sort_by_number(&mut loaded, |point| point.load.abs());
     let mut sizes: Vec<f64> = steps.loads.iter().map(|step| step.abs()).collect();
     sizes.retain(|size| *size > NONE * largest);
     sizes.sort_by(f64::total_cmp);

@@ -11,6 +11,7 @@ mod zero;
 
 use schemars::JsonSchema;
 use serde::Serialize;
+use torqcomp_dsp::sort_by_number;
 
 use super::{FitQuality, Identification, NamedEstimate, rms};
 use crate::chart::{Chart, Series};
@@ -339,7 +340,7 @@ fn constants(fit: &LoadCurve, largest: f64, units: &LoadUnits) -> Vec<NamedEstim
 /// Readings with the curve through them, and the residual.
 fn draw(result: &mut Identification, points: &[Point], curve: &[f64], units: &LoadUnits) {
     let mut points = points.to_vec();
-    points.sort_by(|a, b| a.load.total_cmp(&b.load));
+    sort_by_number(&mut points, |point| point.load);
     let loads: Vec<f64> = points.iter().map(|p| p.load).collect();
     let readings: Vec<f64> = points.iter().map(|p| p.reading).collect();
     let fitted: Vec<f64> = loads.iter().map(|load| value_of(curve, *load)).collect();
