@@ -103,6 +103,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["mode-out-of-reach", "a fitted mode lies above all frequencies of the records and was left out", "check for a shift between the channels, or choose fewer --modes"],
         ["undamped-left-out", "a mode without a damping that the records show was left out", "choose fewer --modes, or record for longer"],
         ["residues-unknown", "a decay shows several modes, but not their parts in the response to a torque", "add the residues, or use identify response"],
+        ["no-torques-tried", "the stand file does not tell what torques in the stand do to the record, so that diagnose left them out", "give shapes in place of residues, or record the displacement"],
         ["not-anchored", "only ratios of the constants are determined", "declare the inertia or the stiffness"],
         ["not-converged", "the fit stopped before its minimum", "check the result, or choose another start"],
         ["not-viscous", "another law of damping fits the envelope better than viscous damping", "look for the cause with diagnose"],

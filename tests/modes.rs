@@ -8,8 +8,8 @@ use num_complex::Complex64;
 use crate::noise::Noise;
 use crate::util::{Folder, SIMULATE, assert_close, column, table};
 
-const RATE_HZ: f64 = 20_000.0;
-const COUNT: usize = 8000;
+pub const RATE_HZ: f64 = 20_000.0;
+pub const COUNT: usize = 8000;
 /// Samples over which the torque acts.
 const ACTS: usize = 6000;
 /// Samples at either end that depend on what was before the record or comes behind it.
@@ -25,12 +25,12 @@ fn turn(k: usize) -> f64 {
     (2 * k + 1) as f64 * PI / 7.0
 }
 
-fn omega(k: usize) -> f64 {
+pub fn omega(k: usize) -> f64 {
     2.0 * OMEGA * (0.5 * turn(k)).sin()
 }
 
 /// The stand file of the row, with the torque on one of its inertias (1 to 3) and the gage at the spring that holds it.
-fn stand(load: usize) -> String {
+pub fn stand(load: usize) -> String {
     let mut text = "schema = \"torqcomp.stand/1\"\n".to_owned();
     for k in 0..3 {
         let shape = |place: usize| (place as f64 * turn(k)).sin();
@@ -71,6 +71,15 @@ fn row(load: usize, beside: impl Fn(f64, f64) -> f64) -> Vec<f64> {
 
 /// The same with so many steps from sample to sample.
 fn row_in_steps(fine: usize, load: usize, beside: impl Fn(f64, f64) -> f64) -> Vec<f64> {
+    row_under(applied, (fine, load), beside)
+}
+
+/// The same under another torque over the time.
+pub fn row_under(
+    applied: impl Fn(f64) -> f64,
+    (fine, load): (usize, usize),
+    beside: impl Fn(f64, f64) -> f64,
+) -> Vec<f64> {
     let rates = |t: f64, s: [f64; 6]| -> [f64; 6] {
         let twist = |i: usize| match i {
             0 => s[0] + BETA_S * s[3],
@@ -321,20 +330,7 @@ fn harmonics_divide_by_the_response_of_the_sum() {
 
 #[test]
 fn what_several_modes_cannot_do_is_said() {
-    let measured = row(1, |_, _| 0.0);
-    let folder = folder(1, "", &measured);
-    let args = [
-        "diagnose",
-        "--stand",
-        "stand.toml",
-        "--train",
-        "record.csv",
-        "--applied",
-        "applied_n_m",
-        "--measured",
-        "measured_n_m",
-    ];
-    folder.run(&args).says(1, &["several modes", "second-mode"]);
+    let folder = folder(1, "", &row(1, |_, _| 0.0));
     let text = stand(1).replacen('\n', "\n[mechanics]\nmeasures = \"acceleration\"\n", 1);
     folder.write("faster.toml", text);
     let args = [

@@ -34,6 +34,7 @@ mod memory;
 mod merge;
 mod messages;
 mod modes;
+mod modes_diagnosed;
 #[cfg(all(unix, not(target_os = "macos")))] // file systems of macOS refuse other names
 mod motion;
 mod mutations;

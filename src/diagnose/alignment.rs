@@ -216,9 +216,9 @@ fn with_shift(
 
 /// What a plain stand makes of the applied quantity over a record's range.
 fn answer(context: &FitContext, stand: &PlainStand, record: &StandRecord) -> Vec<f64> {
-    let model = torqcomp_model::Chain::new(stand.mode(), stand.gain)
-        .with_recorder(context.recorder.clone(), false);
-    let modelled = model.simulate(&record.input, Default::default());
+    let modelled = context
+        .chain(stand)
+        .simulate(&record.input, Default::default());
     modelled[record.range.clone()].to_vec()
 }
 

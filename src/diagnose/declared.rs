@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use super::fit::FittedModel;
+use super::several_modes::SeveralModes;
 use super::structure::{EffectForm, FitContext, PlainStand, Structure};
 
 /// An effect of the stand file.
@@ -16,6 +18,8 @@ pub struct DeclaredForm {
 #[derive(Clone, Copy)]
 pub struct DeclaredStand<'a> {
     pub plain: PlainStand,
+    /// All modes of a stand that has several.
+    pub several: Option<&'a SeveralModes>,
     pub effects: &'a [DeclaredForm],
 }
 
@@ -40,6 +44,23 @@ impl DeclaredStand<'_> {
             values.extend(own.map(|(p, value)| p.moved(*value, &context.scales)));
         }
         values
+    }
+
+    /// The stand as it is declared, in the place of one that was fitted.
+    pub fn model(&self, fitted: &FittedModel) -> FittedModel {
+        let context = FitContext {
+            several: self.several.cloned(),
+            ..(*fitted.structure.context).clone()
+        };
+        let values = self.values(&context);
+        let structure = fitted.structure.clone().in_context(Arc::new(context));
+        FittedModel {
+            free: structure.model(&values).0.free_mode(),
+            structure,
+            values,
+            amplitudes: self.amplitudes(),
+            ..fitted.clone()
+        }
     }
 
     /// Amplitudes of all lines.

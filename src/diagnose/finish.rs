@@ -3,9 +3,10 @@
 
 use torqcomp_model::effects::Form;
 
-use super::fit::{FitEffort, FittedModel, fit};
+use super::fit::{FitEffort, FittedModel};
 use super::records::Records;
 use super::score::ScoredModel;
+use super::several_modes::fit_with_modes;
 use super::structure::Structure;
 use crate::parallel::parallel;
 
@@ -16,14 +17,14 @@ const LAST_FIT: FitEffort = FitEffort::full(8);
 const FINEST: usize = 8;
 
 impl ScoredModel {
-    /// The model fitted once more to the training records, and the records with the steps for it; `None` if the steps are
-    /// fine enough already. While effects are compared, the integration may err by a tenth of the residual. That is more
+    /// The model fitted once more to the training records, with all numbers of all modes, and the records with the steps for it;
+    /// `None` if the steps are fine enough already and there is one mode. While effects are compared, the integration may err by a tenth of the residual. That is more
     /// than long records leave uncertain of a model with few parameters, and it would bias them.
     pub fn finished(&self, records: &Records, threads: usize) -> Option<(Self, Records)> {
         let fine = self.fine_enough(records)?;
         let last = |structure: Structure, values: &[f64]| {
             let train = self.fitted.with_initial_states(&fine.train);
-            let fitted = fit(structure, values, &train, LAST_FIT).ok()?;
+            let fitted = fit_with_modes(structure, values, &train, LAST_FIT).ok()?;
             Self::of(fitted, &fine.training())
         };
         let mut forms = vec![(self.fitted.structure.clone(), self.fitted.values.clone())];
@@ -37,7 +38,7 @@ impl ScoredModel {
     }
 
     /// The records with steps so fine that the integration errs by less than the standard uncertainty of the modelled
-    /// record, `σ √(p/n)`; `None` if they are so already.
+    /// record, `σ √(p/n)`; `None` if they are so already, and no further modes are left to be fitted in full.
     fn fine_enough(&self, records: &Records) -> Option<Records> {
         let count: usize = self.train.iter().map(|r| r.samples.len()).sum();
         let uncertain = self.train_rms() * (self.parameter_count() as f64 / count as f64).sqrt();
@@ -49,7 +50,8 @@ impl ScoredModel {
             }
             fine.set_substeps(2 * fine.substeps());
         }
-        (fine.substeps() > present).then_some(fine)
+        let has_several = self.fitted.structure.context.several.is_some();
+        (has_several || fine.substeps() > present).then_some(fine)
     }
 }
 

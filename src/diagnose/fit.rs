@@ -85,7 +85,7 @@ pub(super) const START_SETTLED: f64 = 0.01;
 /// # Errors
 /// If the model cannot be evaluated at the start.
 pub fn fit(
-    structure: Structure,
+    mut structure: Structure,
     start: &[f64],
     records: &[StandRecord],
     effort: FitEffort,
@@ -98,7 +98,7 @@ pub fn fit(
     // Of a plain stand that rings freely, the mode of that motion is all there is to fit.
     let rings = !integrates && records.iter().any(StandRecord::is_free);
     let fixed = (!rings).then_some(&free);
-    let mut found = minimize(&structure, start, &mut records, fixed, effort)?;
+    let (mut found, mut modes_move) = minimize(&mut structure, start, &mut records, fixed, effort)?;
     if rings {
         free = structure.model(&found.values).0.free_mode();
     }
@@ -109,17 +109,21 @@ pub fn fit(
             free = structure.model(&found.values).0.free_mode();
             let values = &found.values[..start.len()];
             let fixed = (!follows).then_some(&free);
-            found = minimize(&structure, values, &mut records, fixed, effort)?;
+            (found, modes_move) = minimize(&mut structure, values, &mut records, fixed, effort)?;
             if follows {
                 free = structure.model(&found.values).0.free_mode();
             }
         }
         for _ in 0..MOST_STARTS {
-            if !integrates || !correct_starts(&structure, &found.values, &mut records, &free) {
+            let starts_move =
+                integrates && correct_starts(&structure, &found.values, &mut records, &free);
+            if !starts_move && !modes_move {
                 break;
             }
             let values = &found.values[..start.len()];
-            let next = minimize(&structure, values, &mut records, Some(&free), effort)?;
+            let next;
+            (next, modes_move) =
+                minimize(&mut structure, values, &mut records, Some(&free), effort)?;
             let has_settled = next.sum_of_squares > (1.0 - START_SETTLED) * found.sum_of_squares;
             found = next;
             if has_settled {
@@ -146,18 +150,18 @@ pub fn fit(
 /// in that of the parameters. The state at the start of free ringing that is integrated is found along with these: all of the
 /// motion follows from it, and not in proportion.
 fn minimize(
-    structure: &Structure,
+    structure: &mut Structure,
     start: &[f64],
     records: &mut [StandRecord],
     free: Option<&Mode>,
     effort: FitEffort,
-) -> Result<Fit, FitError> {
+) -> Result<(Fit, bool), FitError> {
     let own = structure.bounds().len();
     let start_model = structure.model(start).0;
     let of_records = OwnOfRecords::of(&start_model, structure.context.scales.rms, records);
     let mut parameters = parameters(structure, start);
     parameters.extend(of_records.parameters(records));
-    let problem = Unexplained::of(structure, records, &of_records, free);
+    let problem = Unexplained::of((structure, start), records, &of_records, free);
     let options = Options {
         differences: Differences::Forward,
         tolerance: TOLERANCE,
@@ -165,10 +169,15 @@ fn minimize(
         ..Options::default()
     };
     let found = fit::minimize(&problem, &parameters, &options)?;
+    let corrected = problem.corrected_modes(&found.values);
     for (k, record) in records.iter_mut().enumerate() {
         *record = of_records.set(k, record, &found.values[own..]);
     }
-    Ok(found)
+    let modes_move = corrected.as_ref().is_some_and(|(_, matters)| *matters);
+    if let Some((modes, _)) = corrected {
+        *structure = structure.clone().with_modes(modes);
+    }
+    Ok((found, modes_move))
 }
 
 /// The structure's parameters.

@@ -19,6 +19,7 @@ use super::structure::{EffectForm, FitContext};
 use super::units::ChannelUnits;
 use super::{Case, scales};
 use crate::failure::Failure;
+use crate::identify::Motion;
 use crate::print::{rounded, unit_or_as_recorded};
 use crate::warning::Warning;
 
@@ -89,7 +90,9 @@ pub fn hold(case: &Case, unscaled: &FitContext) -> Result<Option<(Case, FitConte
         gain_is_declared: true,
         sources: case.sources.clone(),
         declared: None,
+        several: None,
         declared_effects: Vec::new(),
+        measures: Motion::Displacement,
         recorder: None,
         warnings: [case.warnings.clone(), vec![warning(&context, stiffness)]].concat(),
     };

@@ -10,6 +10,7 @@ mod backbone;
 mod blocks;
 mod coloured;
 mod columns;
+mod constants;
 mod decide;
 mod declared;
 mod describe;
@@ -38,6 +39,7 @@ mod result;
 mod score;
 mod search;
 mod several;
+mod several_modes;
 mod shift;
 mod spectra;
 mod starts;
@@ -55,9 +57,9 @@ use torqcomp_model::effects::{Fixed, RecordScales};
 use torqcomp_model::simulate::Between;
 
 use crate::failure::{ErrorCode, Failure};
+use crate::identify::Motion;
 use crate::warning::Warning;
 use declared::DeclaredStand;
-use fit::FittedModel;
 use ladder::Ladder;
 use noise_floor::NoiseFloor;
 use spectra::lines_of;
@@ -80,6 +82,7 @@ pub use residual_tests::ResidualTests;
 pub use result::{Diagnosis, SourceFiles};
 pub use score::{EffectParameter, ScoredModel};
 pub use search::{CandidateFit, Workers};
+pub use several_modes::SeveralModes;
 pub use spectra::SpectralLine;
 pub use structure::{EffectForm, PlainStand};
 pub use surface::{ForceSurface, SurfacePlace, SurfacePoint};
@@ -92,10 +95,14 @@ pub struct Case {
     pub records: Records,
     /// The plain stand that the stand file declares.
     pub declared: Option<PlainStand>,
+    /// All modes of a stand that has several.
+    pub several: Option<SeveralModes>,
     /// The effects that it declares.
     pub declared_effects: Vec<DeclaredForm>,
     /// Whether the gain is part of the declaration, not of the fit.
     pub gain_is_declared: bool,
+    /// What is recorded of the stand's motion.
+    pub measures: Motion,
     /// The recorder as declared.
     pub recorder: Option<Fixed>,
     pub units: ChannelUnits,
@@ -179,7 +186,9 @@ pub fn run(mut case: Case, workers: Workers) -> Result<Diagnosis, Failure> {
             damping_ratio: 0.0,
             gain: case.declared.map_or(1.0, |d| d.gain),
         },
+        several: case.several.clone(),
         gain_is_free: !case.gain_is_declared,
+        measures: case.measures,
         recorder: case.recorder.clone(),
         units: case.units.clone(),
         held: None,
@@ -187,17 +196,20 @@ pub fn run(mut case: Case, workers: Workers) -> Result<Diagnosis, Failure> {
     };
     let mut context = plain::find_plain(&unscaled, case.declared, &case.records.train)?;
     if !case.records.are_free()
+        && context.several.is_none()
+        && context.measures == Motion::Displacement
         && refuse::is_short(&case, &context)
         && let Some(held) = held::hold(&case, &unscaled)?
     {
         (case, context) = held;
     }
     let alignment = refuse::check(&case, &context)?;
-    case.records.prepare_for(&context.plain);
+    case.records.prepare_for(&context);
     let mode = context.plain.mode();
     context.rings_at_start = case.records.train.iter().any(|r| r.sees_start(&mode));
     let declared = case.declared.map(|plain| DeclaredStand {
         plain,
+        several: case.several.as_ref(),
         effects: &case.declared_effects,
     });
     let training = case.records.training();
@@ -232,16 +244,8 @@ impl SearchState {
         let mut plain = plain::refine_plain(context.clone(), declared, &records.train)?;
         plain::set_starts(&plain, &mut records.train);
         plain.initial = records.train.iter().map(|r| r.initial).collect();
-        let declared = declared.and_then(|declared| {
-            let values = declared.values(&plain.structure.context);
-            let declared = FittedModel {
-                free: plain.structure.model(&values).0.free_mode(),
-                values,
-                amplitudes: declared.amplitudes(),
-                ..plain.clone()
-            };
-            ScoredModel::of(declared, &records)
-        });
+        let declared =
+            declared.and_then(|declared| ScoredModel::of(declared.model(&plain), &records));
         let before = ScoredModel::of(plain, &records).ok_or_else(|| {
             Failure::failed(
                 ErrorCode::NotIdentifiable,

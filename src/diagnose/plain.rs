@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use torqcomp_model::Chain;
 use torqcomp_model::simulate::MotionState;
 
 use super::declared::DeclaredStand;
-use super::fit::{FitEffort, FittedModel, fit};
+use super::fit::{FitEffort, FittedModel};
 use super::record::{NuisanceTerms, StandRecord};
 use super::residual_tests::without_mean;
+use super::several_modes::fit_with_modes;
 use super::structure::{FitContext, PlainStand, Structure};
 use crate::failure::{ErrorCode, Failure};
 use torqcomp_dsp::{dot, peaks, sort_by_number};
@@ -36,11 +36,15 @@ pub fn find_plain(
     declared: Option<PlainStand>,
     records: &[StandRecord],
 ) -> Result<FitContext, Failure> {
-    let starts = scan(context, declared, records);
+    let of_several = declared.filter(|_| context.several.is_some());
+    let starts = match of_several {
+        Some(declared) => vec![(0.0, declared)],
+        None => scan(context, declared, records),
+    };
     let fits = starts.into_iter().take(FULL).filter_map(|(_, start)| {
         let context = Arc::new(context.at(start));
         let values = context.plain_values(&start);
-        fit(Structure::plain(context), &values, records, SEARCH).ok()
+        fit_with_modes(Structure::plain(context), &values, records, SEARCH).ok()
     });
     let best = fits.min_by(|a, b| a.train_sum.total_cmp(&b.train_sum));
     let best = best.ok_or_else(|| {
@@ -49,7 +53,11 @@ pub fn find_plain(
             "the plain stand could not be fitted to the training records",
         )
     })?;
-    Ok(context.at(best.stand()))
+    let found = FitContext {
+        several: best.structure.context.several.clone(),
+        ..context.clone()
+    };
+    Ok(found.at(best.stand()))
 }
 
 /// The plain stand of a context, fitted again with the samples and steps that the records have now; with the effects of the
@@ -67,7 +75,7 @@ pub fn refine_plain(
     let Some(declared) = declared else {
         let values = context.plain_values(&context.plain);
         let structure = Structure::plain(context);
-        return fit(structure, &values, train, REFINEMENT)
+        return fit_with_modes(structure, &values, train, REFINEMENT)
             .map_err(Failure::of(ErrorCode::NotIdentifiable));
     };
     // The declared constants belong to the effects; those of a plain stand without effects may be nearer.
@@ -77,7 +85,7 @@ pub fn refine_plain(
     };
     let fits = [declared, fitted].map(|stand| {
         let values = stand.values(&context);
-        fit(stand.structure(context.clone()), &values, train, REFINEMENT)
+        fit_with_modes(stand.structure(context.clone()), &values, train, REFINEMENT)
     });
     let [declared, fitted] = fits;
     match (declared, fitted) {
@@ -164,9 +172,12 @@ fn try_start(
         return Some((dot(&left, &left), start));
     }
     let is_free = context.gain_is_free;
-    let gain = if is_free { 1.0 } else { start.gain };
-    let model = Chain::new(start.mode(), gain).with_recorder(context.recorder.clone(), false);
-    let modelled = model.simulate(&record.input, MotionState::default());
+    if is_free {
+        start.gain = 1.0;
+    }
+    let modelled = context
+        .chain(&start)
+        .simulate(&record.input, MotionState::default());
     let x = without_mean(&modelled[record.range.clone()]);
     let y = without_mean(record.measured_in_range());
     let (xx, xy, yy) = (dot(&x, &x), dot(&x, &y), dot(&y, &y));
@@ -187,11 +198,16 @@ pub fn set_starts(plain: &FittedModel, records: &mut [StandRecord]) {
         let Some(found) = plain.residual(record) else {
             continue;
         };
+        if model.is_integrated() {
+            record.initial.motion = found.record.initial.motion;
+            continue;
+        }
         let [x, speed] = model.state_at_start(&record.input);
         let [dx, dspeed] = found.nuisance.motion.unwrap_or_default();
+        let of_modes = found.nuisance.of_modes;
         record.initial.motion = MotionState {
-            x: x + dx,
-            speed: speed + dspeed * plain.free.omega_rad_s,
+            x: x + dx + of_modes.x,
+            speed: speed + dspeed * plain.free.omega_rad_s + of_modes.speed,
         };
     }
 }

@@ -53,6 +53,8 @@ pub struct NuisanceTerms {
     pub drift_half_waves: usize,
     /// Rates at which a state from before the record decays, per s.
     pub decays_per_s: Vec<f64>,
+    /// Modes of the stand beside the plain stand's, which swing freely from the record's start.
+    pub modes: Vec<Mode>,
 }
 
 impl NuisanceTerms {
@@ -60,8 +62,10 @@ impl NuisanceTerms {
         lines_hz: Vec::new(),
         drift_half_waves: 0,
         decays_per_s: Vec::new(),
+        modes: Vec::new(),
     };
 
+    /// Whether there are none but those of the modes, which are the same in all models.
     pub fn is_empty(&self) -> bool {
         !self.disturb() && self.decays_per_s.is_empty()
     }
@@ -90,6 +94,8 @@ pub struct Nuisance {
     sees_start: bool,
     /// Index of the column of a constant load.
     preload: Option<usize>,
+    /// Index of the first of the two columns of each further mode that swings freely, with its `ω₀`.
+    modes: Vec<(usize, f64)>,
     /// Index of the first column of the lines.
     lines: usize,
 }
@@ -181,6 +187,12 @@ impl StandRecord {
         mode.damping_ratio * mode.omega_rad_s / self.rate_hz() * self.range.start as f64
     }
 
+    /// The motion of a mode over the range from a unit displacement at the first sample, and from a unit speed over `ω₀`.
+    fn free_motion(&self, mode: &Mode) -> [Vec<f64>; 2] {
+        let free = Chain::new(*mode, 1.0).free_motion(self.rate_hz(), self.range.end);
+        free.map(|column| column[self.range.clone()].to_vec())
+    }
+
     /// What belongs to this record: a constant, the free motion of the plain stand after the record's start, and the
     /// given terms. `slopes` replace that motion where the stand's effects change it.
     pub fn nuisance(
@@ -193,15 +205,10 @@ impl StandRecord {
         let columns = &mut nuisance.columns;
         columns.push(vec![1.0; self.count()]);
         if self.has_free_motion(mode) {
-            let rate_hz = self.rate_hz();
             nuisance.motion = Some(1);
             nuisance.sees_start = self.sees_start(mode);
             let slopes = slopes.as_ref().and_then(|slopes| slopes.motion.clone());
-            let free = || {
-                let free = Chain::new(*mode, 1.0).free_motion(rate_hz, self.range.end);
-                free.map(|column| column[self.range.clone()].to_vec())
-            };
-            for column in slopes.unwrap_or_else(free) {
+            for column in slopes.unwrap_or_else(|| self.free_motion(mode)) {
                 columns.push(column);
             }
         }
@@ -228,6 +235,12 @@ impl StandRecord {
             let cosine = |i| (turn * (i as f64 + 0.5)).cos();
             columns.push((0..count).map(cosine).collect());
         }
+        for mode in terms.modes.iter().filter(|m| self.has_free_motion(m)) {
+            nuisance.modes.push((columns.count(), mode.omega_rad_s));
+            for column in self.free_motion(mode) {
+                columns.push(column);
+            }
+        }
         for rate_per_s in &terms.decays_per_s {
             let step = rate_per_s / rate_hz;
             columns.push((0..count).map(|i| (-step * i as f64).exp()).collect());
@@ -250,6 +263,8 @@ pub struct NuisanceFit {
     pub offset: f64,
     /// Displacement, and speed over `ω₀`, at the start of the record, where the range determines them.
     pub motion: Option<[f64; 2]>,
+    /// Displacement and speed there of further modes.
+    pub of_modes: MotionState,
     /// Displacement by the constant load.
     pub preload: Option<f64>,
     /// Cosine and sine part of each line.
@@ -269,6 +284,13 @@ impl Nuisance {
         NuisanceFit {
             offset: raw[0],
             motion: motion.map(|k| [raw[k], raw[k + 1]]),
+            of_modes: self
+                .modes
+                .iter()
+                .fold(MotionState::default(), |sum, (k, omega)| MotionState {
+                    x: sum.x + raw[*k],
+                    speed: sum.speed + omega * raw[k + 1],
+                }),
             preload: self.preload.map(|k| raw[k]),
             lines: raw[self.lines..]
                 .chunks_exact(2)

@@ -6,7 +6,7 @@ use torqcomp_model::simulate::{Between, Excitation, substeps};
 
 use super::intersample::{from_inputs, noise_on_plateaus};
 use super::record::StandRecord;
-use super::structure::PlainStand;
+use super::structure::FitContext;
 
 #[derive(Clone)]
 pub struct Records {
@@ -140,10 +140,10 @@ impl Records {
         }
     }
 
-    /// Sets the steps of integration and the samples that count for a plain stand.
-    pub fn prepare_for(&mut self, plain: &PlainStand) {
+    /// Sets the steps of integration and the samples that count for the plain stand of a context.
+    pub fn prepare_for(&mut self, context: &FitContext) {
         let rate_hz = self.rate_hz();
-        let mode = plain.mode();
+        let mode = context.plain.mode();
         let decay = mode.damping_ratio * mode.omega_rad_s / rate_hz;
         // Of a decay all counts: its state is estimated, and nothing acts beyond it.
         for record in self.all().filter(|record| !record.is_free()) {
@@ -157,7 +157,7 @@ impl Records {
                 record.range.end = count - last;
             }
         }
-        let steps = substeps(plain.natural_hz, rate_hz);
+        let steps = substeps(context.highest_hz(), rate_hz);
         if steps != self.substeps() {
             self.set_substeps(steps);
         }

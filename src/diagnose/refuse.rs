@@ -7,7 +7,7 @@ use torqcomp_model::simulate::{Excitation, MotionState};
 
 use super::alignment::Alignment;
 use super::plain::find_plain;
-use super::record::{NuisanceTerms, StandRecord};
+use super::record::StandRecord;
 use super::residual_tests::without_mean;
 use super::score::ScoredModel;
 use super::structure::{FitContext, PlainStand, Structure};
@@ -153,6 +153,7 @@ fn refuse_swapped(case: &Case, context: &FitContext, as_given: f64) -> Result<()
     let other = FitContext {
         scales: scales(&swapped),
         recorder: None,
+        several: None,
         ..context.at(plain)
     };
     let Ok(other) = find_plain(&other, case.declared, &swapped) else {
@@ -197,7 +198,7 @@ pub fn relative_error(context: &FitContext, records: &[StandRecord]) -> f64 {
         let measured = record.measured_in_range();
         let pairs = measured.iter().zip(&modelled[record.range.clone()]);
         let mut residual: Vec<f64> = pairs.map(|(y, x)| y - x).collect();
-        let nuisance = record.nuisance(&plain.mode(), &NuisanceTerms::NONE, None);
+        let nuisance = record.nuisance(&plain.mode(), &context.terms(), None);
         nuisance.clear(&mut residual);
         let measured = without_mean(measured);
         error += dot(&residual, &residual);

@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use torqcomp_dsp::sort_by_number;
 
+use super::constants::{StandConstant, constants};
 use super::describe;
 use super::detection::{DetectionLimit, detection_limits};
 use super::guard_models::GuardModel;
@@ -17,7 +18,7 @@ use super::residual_tests::ResidualTests;
 use super::score::{RmsErrors, ScoredModel};
 use super::search::CandidateFit;
 use super::spectra::SpectralLine;
-use super::structure::{FitContext, PlainStand};
+use super::structure::FitContext;
 use super::surface::ForceSurface;
 use super::verdict::Verdict;
 use super::{Case, SearchState};
@@ -111,25 +112,6 @@ pub struct ModelErrors {
     pub holdout_relative: f64,
 }
 
-/// A constant of the plain stand.
-#[derive(Debug, Serialize, JsonSchema)]
-pub struct StandConstant {
-    /// Name of the constant.
-    pub name: &'static str,
-    /// Unit of the values.
-    pub unit: String,
-    /// Value in the stand file; `null` if not given.
-    pub declared: Option<f64>,
-    /// Value in the plain stand, refitted.
-    pub before: f64,
-    /// Standard uncertainty of `before`; `null` if unknown.
-    pub before_std: Option<f64>,
-    /// Value with the accepted effects.
-    pub after: f64,
-    /// Standard uncertainty of `after`; `null` if unknown.
-    pub after_std: Option<f64>,
-}
-
 /// What the model leaves of the held-out records.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct ResidualReport {
@@ -191,7 +173,6 @@ impl Diagnosis {
             guard.with.clone_from(&effects);
         }
         Self {
-            sources: case.sources,
             verdict,
             effects,
             declared_effects: case
@@ -202,7 +183,8 @@ impl Diagnosis {
             input_between_samples: found.records.between().name(),
             error,
             explained: std::mem::take(&mut found.ladder),
-            constants: constants(case.declared, &found),
+            constants: constants(&case, &found),
+            sources: case.sources,
             next_experiment: describe::next_experiment(
                 &found,
                 suspected.as_ref(),
@@ -302,47 +284,4 @@ fn applied_rms(records: &[StandRecord]) -> f64 {
     let count: usize = records.iter().map(StandRecord::count).sum();
     let all = records.iter().flat_map(StandRecord::acting_in_range);
     (all.map(|u| u * u).sum::<f64>() / count as f64).sqrt()
-}
-
-/// The constants of the plain stand: declared, refitted, and refitted with the effects.
-fn constants(declared: Option<PlainStand>, found: &SearchState) -> Vec<StandConstant> {
-    let context = &found.before.fitted.structure.context;
-    let (gain_unit, gain_scale) = context.units.gain();
-    let named = [
-        ("natural_frequency", "Hz".to_owned(), 1.0),
-        ("damping_ratio", String::new(), 1.0),
-        ("static_gain", gain_unit, gain_scale),
-    ];
-    let declared = declared.map(|d| [d.natural_hz, d.damping_ratio, d.gain]);
-    let (before, after) = (found.before.constants(), found.after.constants());
-    if let Some(held) = &context.held {
-        let [before, after] = [before, after].map(|[hz, ratio, _]| held.constants([&hz, &ratio]));
-        let all = ["inertia", "damping"]
-            .into_iter()
-            .zip(before.into_iter().zip(after));
-        return all
-            .map(|(name, (before, after))| StandConstant {
-                name,
-                unit: after.unit().to_owned(),
-                declared: None,
-                before: before.value(),
-                before_std: before.std_uncertainty(),
-                after: after.value(),
-                after_std: after.std_uncertainty(),
-            })
-            .collect();
-    }
-    let all = named.into_iter().zip(before).zip(after).enumerate();
-    let all = all.map(
-        |(k, (((name, unit, scale), before), after))| StandConstant {
-            name,
-            unit,
-            declared: declared.map(|d| d[k] * scale),
-            before: before.value() * scale,
-            before_std: before.std_uncertainty().map(|s| s * scale),
-            after: after.value() * scale,
-            after_std: after.std_uncertainty().map(|s| s * scale),
-        },
-    );
-    all.take(context.plain_count()).collect()
 }

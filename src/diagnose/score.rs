@@ -12,6 +12,7 @@ use super::columns::Columns;
 use super::fit::{FitEffort, FittedModel, RecordResidual};
 use super::record::{Nuisance, NuisanceTerms, StandRecord};
 use super::records::Records;
+use super::several_modes::slopes_of_modes;
 use super::structure::EffectForm;
 use super::unexplained::{raw_residual, raw_residuals};
 use torqcomp_dsp::dot;
@@ -199,7 +200,7 @@ impl ScoredModel {
         let fitted = &self.fitted;
         let plain = fitted.stand();
         let values = [plain.natural_hz, plain.damping_ratio, plain.gain];
-        let count = fitted.structure.context.plain_count();
+        let count = fitted.structure.context.constant_count();
         std::array::from_fn(|k| {
             // The fit moves multiples of the constants.
             let moved = fitted.values[..count].get(k).zip(fitted.std.get(k));
@@ -304,10 +305,16 @@ impl BaseModel {
 
 /// Derivatives of a record's residual with respect to the parameters, and the nuisance terms removed from it.
 fn slopes(fitted: &FittedModel, record: &StandRecord) -> (Columns, Nuisance) {
-    let (derivatives, nuisance) = derivatives(fitted, record, &NuisanceTerms::NONE);
+    let terms = fitted.structure.context.terms();
+    let (derivatives, nuisance) = derivatives(fitted, record, &terms);
     let mut slopes = Columns::default();
     for derivative in derivatives.into_iter().flatten() {
         slopes.push(derivative);
+    }
+    let of_modes = slopes_of_modes(&fitted.structure, &fitted.values, record);
+    for mut slope in of_modes.into_iter().flatten() {
+        nuisance.clear(&mut slope);
+        slopes.push(slope);
     }
     (slopes, nuisance)
 }

@@ -196,7 +196,8 @@ impl SearchState {
 
     /// Makes a model the one with the effects found so far.
     pub(super) fn take(&mut self, next: &ScoredModel, coarse: usize) {
-        (self.after, self.settled) = next.clone().refine_step(&mut self.records, coarse);
+        let next = next.with_modes_fitted(&self.records);
+        (self.after, self.settled) = next.refine_step(&mut self.records, coarse);
         self.tests = super::tests(&self.after);
         self.path.push(self.after.clone());
     }

@@ -3,13 +3,16 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use torqcomp_model::Mode;
 use torqcomp_model::effects::{Action, Effect, Fixed, Form, RecordScales, Stage, Unit};
 use torqcomp_model::{Chain, Link};
+use torqcomp_model::{ModalResponse, Mode};
 
 use super::held::HeldBody;
 use super::record::NuisanceTerms;
+use super::several_modes::SeveralModes;
 use super::units::ChannelUnits;
+use crate::identify::Motion;
+use crate::stand::derivative;
 
 /// The plain stand: one mode and a static gain.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,8 +42,12 @@ pub struct FitContext {
     pub scales: RecordScales,
     /// The fitted plain stand: scale of natural frequency and gain, and the mode of the free motion in the residuals.
     pub plain: PlainStand,
+    /// All modes of a stand that has several.
+    pub several: Option<SeveralModes>,
     /// Whether the gain is a parameter of the plain stand.
     pub gain_is_free: bool,
+    /// What is recorded of the stand's motion.
+    pub measures: Motion,
     /// The recorder, as declared in the stand file.
     pub recorder: Option<Fixed>,
     pub units: ChannelUnits,
@@ -67,13 +74,68 @@ impl FitContext {
     /// Whether an effect in that form is looked for: beside a spring that only holds a free body, not all mean something, and
     /// a part of a turn of a line is a drift.
     pub fn allows(&self, effect: &EffectForm) -> bool {
+        let acts_at_gage = effect.form.stage == Stage::Stand;
         (self.held.is_none() || effect.needs_no_spring())
+            && (!acts_at_gage || self.sees_torques())
             && effect.most_turns(&self.scales) >= FEWEST_TURNS
     }
 
-    /// Number of parameters of the plain stand.
-    pub fn plain_count(&self) -> usize {
+    /// Whether it is known how a torque at the gage moves it, and that is what is recorded.
+    pub fn sees_torques(&self) -> bool {
+        let known = |several: &SeveralModes| several.show_torques();
+        self.measures == Motion::Displacement && self.several.as_ref().is_none_or(known)
+    }
+
+    /// Number of constants that are moved in any fit.
+    pub fn constant_count(&self) -> usize {
         2 + usize::from(self.gain_is_free)
+    }
+
+    /// Number of parameters of the plain stand, with those of further modes where a fit moves them.
+    pub fn plain_count(&self) -> usize {
+        self.constant_count() + self.several.as_ref().map_or(0, SeveralModes::count)
+    }
+
+    /// The same with all modes to be fitted.
+    pub fn with_modes_free(&self) -> Self {
+        let mut free = self.clone();
+        if let Some(several) = &mut free.several {
+            several.are_free = true;
+        }
+        free
+    }
+
+    /// Modes that swing freely from the start of a record, beside that of the plain stand.
+    pub fn terms(&self) -> NuisanceTerms {
+        let further = self.several.iter().flat_map(SeveralModes::further);
+        NuisanceTerms {
+            modes: further.collect(),
+            ..NuisanceTerms::NONE
+        }
+    }
+
+    /// Highest natural frequency of the stand, in Hz.
+    pub fn highest_hz(&self) -> f64 {
+        let further = self.several.iter().flat_map(SeveralModes::further);
+        further
+            .map(|mode| mode.natural_frequency_hz())
+            .fold(self.plain.natural_hz, f64::max)
+    }
+
+    /// The chain of a plain stand.
+    pub fn chain(&self, plain: &PlainStand) -> Chain {
+        let response = match &self.several {
+            Some(several) => several.response(plain.mode(), &several.values()),
+            None => plain.mode().into(),
+        };
+        self.chain_of(response, plain.gain)
+    }
+
+    /// The chain of a stand without effects.
+    fn chain_of(&self, response: ModalResponse, gain: f64) -> Chain {
+        Chain::new(response, gain)
+            .with_recorder(self.recorder.clone(), false)
+            .with_links(derivative(self.measures))
     }
 
     /// Parameter values of a plain stand.
@@ -83,6 +145,7 @@ impl FitContext {
         if self.gain_is_free {
             values.push(plain.gain / self.plain.gain);
         }
+        values.extend(self.several.iter().flat_map(SeveralModes::values));
         values
     }
 }
@@ -211,7 +274,9 @@ impl Structure {
 
     /// Lower and upper bound of each parameter that a fit moves.
     pub fn bounds(&self) -> Vec<[f64; 2]> {
-        let mut all = PLAIN_BOUNDS[..self.context.plain_count()].to_vec();
+        let context = &self.context;
+        let mut all = PLAIN_BOUNDS[..context.constant_count()].to_vec();
+        all.extend(context.several.iter().flat_map(SeveralModes::bounds));
         for effect in &self.effects {
             let own = effect.form.parameters.iter().take(effect.moved());
             all.extend(own.map(|p| [p.lower, p.upper]));
@@ -230,6 +295,11 @@ impl Structure {
             false => self.context.plain.gain,
         };
         (mode, gain)
+    }
+
+    /// The values of further modes, where a fit moves them.
+    fn values_of_modes<'a>(&self, values: &'a [f64]) -> &'a [f64] {
+        &values[self.context.constant_count()..self.context.plain_count()]
     }
 
     /// The plain stand of parameter values.
@@ -261,7 +331,11 @@ impl Structure {
     /// The model of parameter values, and what it adds that belongs to a record.
     pub fn model(&self, values: &[f64]) -> (Chain, NuisanceTerms) {
         let (mode, gain) = self.mode(values);
-        let mut terms = NuisanceTerms::NONE;
+        let response = match &self.context.several {
+            Some(several) => several.response(mode, self.values_of_modes(values)),
+            None => mode.into(),
+        };
+        let mut terms = self.context.terms();
         let mut links = Vec::new();
         for (effect, own) in self.effects.iter().zip(self.effect_values(values)) {
             let corners = effect.form.parameters.iter().zip(&own);
@@ -276,9 +350,7 @@ impl Structure {
                 _ => links.push(link),
             }
         }
-        let mut chain = Chain::new(mode, gain)
-            .with_recorder(self.context.recorder.clone(), false)
-            .with_links(links);
+        let mut chain = self.context.chain_of(response, gain).with_links(links);
         chain.begins_at_start = self.context.rings_at_start && chain.distorts();
         (chain, terms)
     }

@@ -5,6 +5,7 @@ use torqcomp_model::{Chain, Mode, StandRun};
 
 use super::own_of_records::OwnOfRecords;
 use super::record::{Nuisance, NuisanceTerms, StandRecord};
+use super::several_modes::{ModeSlopes, SeveralModes};
 use super::structure::Structure;
 
 /// What a structure leaves of the records, what belongs to these taken out.
@@ -16,11 +17,13 @@ pub struct Unexplained<'a> {
     free: Option<&'a Mode>,
     /// The nuisance terms of each record in that mode.
     fixed: Option<Vec<Nuisance>>,
+    /// What modes that the fit does not move change of all residuals.
+    modes: Option<ModeSlopes>,
 }
 
 impl<'a> Unexplained<'a> {
     pub fn of(
-        structure: &'a Structure,
+        (structure, start): (&'a Structure, &[f64]),
         records: &'a [StandRecord],
         of_records: &'a OwnOfRecords,
         free: Option<&'a Mode>,
@@ -31,13 +34,16 @@ impl<'a> Unexplained<'a> {
             of_records,
             free,
             fixed: None,
+            modes: None,
         };
         // Without lines, the nuisance terms depend on the parameters by their mode alone.
         problem.fixed = free.map(|free| {
-            let of =
-                |(k, r): (usize, &StandRecord)| problem.nuisance(k, r, free, &NuisanceTerms::NONE);
+            let terms = structure.context.terms();
+            let of = |(k, r): (usize, &StandRecord)| problem.nuisance(k, r, free, &terms);
             records.iter().enumerate().map(of).collect()
         });
+        let fixed = problem.fixed.as_deref().unwrap_or_default();
+        problem.modes = ModeSlopes::of(structure, start, records, fixed);
         problem
     }
 
@@ -63,6 +69,25 @@ impl Residuals for Unexplained<'_> {
     }
 
     fn residuals_of_each(&self, points: &[Vec<f64>]) -> Vec<Result<Vec<f64>, FitError>> {
+        self.of_all_records(points, true)
+    }
+}
+
+impl Unexplained<'_> {
+    /// The modes that leave least of the residuals, and whether they leave so much less that they are worth another fit; `None` if
+    /// there are none that the fit does not move, or the motion diverges.
+    pub fn corrected_modes(&self, values: &[f64]) -> Option<(SeveralModes, bool)> {
+        let modes = self.modes.as_ref()?;
+        let residuals = self.of_all_records(&[values.to_vec()], false).pop()?;
+        Some(modes.modes(&mut residuals.ok()?))
+    }
+
+    /// The residuals of all records, with or without what other modes would take out of them.
+    fn of_all_records(
+        &self,
+        points: &[Vec<f64>],
+        clears_modes: bool,
+    ) -> Vec<Result<Vec<f64>, FitError>> {
         let own = self.structure.bounds().len();
         let split = points.iter().map(|values| values.split_at(own));
         let models = split.map(|(values, others)| (self.structure.model(values), others));
@@ -72,13 +97,15 @@ impl Residuals for Unexplained<'_> {
         let each = points.iter().map(|_| {
             let of_records = records.iter_mut().filter_map(Iterator::next);
             let parts = of_records.collect::<Result<Vec<_>, _>>()?;
-            Ok(parts.concat())
+            let mut whole = parts.concat();
+            if let Some(modes) = self.modes.as_ref().filter(|_| clears_modes) {
+                modes.clear(&mut whole);
+            }
+            Ok(whole)
         });
         each.collect()
     }
-}
 
-impl Unexplained<'_> {
     /// What models leave of a record, by its number, each with values of what belongs to the records.
     fn of_record(
         &self,

@@ -34,17 +34,17 @@ impl DeclaredEffect {
     }
 }
 
-/// What makes speed or acceleration of the displacement: `(jω)^m`.
-fn derivative(measures: Motion) -> Link {
+/// What makes speed or acceleration of the displacement: `(jω)^m`; `None` where that is recorded.
+pub fn derivative(measures: Motion) -> Option<Link> {
     let order = measures.order();
-    Link {
+    (order > 0).then(|| Link {
         effect: measures.name(),
         form: "",
         stage: Stage::Gage,
         action: Action::Factor(Box::new(move |_, omega| {
             Complex64::new(0.0, omega).powi(order)
         })),
-    }
+    })
 }
 
 /// Reads one effect; its parameters are in powers of the unit that the mechanics move the record by.
@@ -157,11 +157,10 @@ impl Stand {
         let modes = self.modes()?;
         self.refuse_unknown_shapes(&modes)?;
         let measures = self.mechanics()?.measures;
-        let derivative = (measures != Motion::Displacement).then(|| derivative(measures));
         Ok(Chain::new(modes, self.gain())
             .with_shift(self.diagnosed.shift)
             .with_recorder(Some(response), is_ideal)
-            .with_links(derivative)
+            .with_links(derivative(measures))
             .with_links(self.effects.iter().map(DeclaredEffect::link)))
     }
 

@@ -29,7 +29,7 @@ use crate::identify::Motion;
 use crate::warning::Warning;
 
 pub use calibration::{Applied, Calibration, RecordedLevels, applied_by_unit};
-pub use effects::DeclaredEffect;
+pub use effects::{DeclaredEffect, derivative};
 pub use file::{parse, read, text};
 pub use measured::{CalibrationLaw, MeasuredCalibration};
 pub use modes::{DeclaredMode, MODE_CORRELATIONS};

@@ -29,6 +29,8 @@ pub struct DeclaredMode {
     correlations: [f64; 6],
     /// Its part in what a torque at the gage moves the gage by, if that is known.
     at_gage: Option<f64>,
+    /// Whether its parts follow from its shape at load and gage.
+    has_shape: bool,
 }
 
 /// A mode as it is read, before its part of the whole is known.
@@ -83,6 +85,7 @@ fn by_shapes(read: &mut [ReadMode]) -> Result<(), Failure> {
     for (mode, part) in read.iter_mut().zip(parts) {
         mode.mode.values[2] = part[0] / residues;
         mode.mode.at_gage = Some(part[1] / at_gage);
+        mode.mode.has_shape = true;
         let relative = mode
             .shape
             .iter()
@@ -151,6 +154,7 @@ impl<'a> ReadMode<'a> {
             ],
             correlations,
             at_gage: None,
+            has_shape: false,
         };
         Ok(Self {
             section,
@@ -183,6 +187,11 @@ impl DeclaredMode {
             quadrature,
             at_gage: self.at_gage,
         }
+    }
+
+    /// Whether its parts in the response follow from its shape at load and gage.
+    pub fn has_shape(&self) -> bool {
+        self.has_shape
     }
 
     /// Standard uncertainties of its numbers.

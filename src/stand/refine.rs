@@ -4,8 +4,8 @@ use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, value};
 
 use torqcomp_model::Estimate;
 
-use super::update::{COMMON, CORRELATIONS};
-use super::{Given, Stand};
+use super::update::{COMMON, CORRELATIONS, MODES};
+use super::{Given, MODE_CORRELATIONS, Stand};
 use crate::failure::{ErrorCode, Failure};
 use crate::io::digits;
 
@@ -20,6 +20,8 @@ pub struct Refined<'a> {
     pub natural_hz: (f64, Option<f64>),
     /// Damping ratio, and its standard uncertainty.
     pub damping_ratio: (f64, Option<f64>),
+    /// Of a stand with several modes what was fitted of each, by the keys of its table.
+    pub modes: Vec<Vec<(&'static str, Estimate)>>,
     /// Recorded per applied quantity at rest, in SI units, where it is part of the fit.
     pub gain: Option<f64>,
     /// Units of record and applied quantity in SI.
@@ -106,15 +108,41 @@ impl Refined<'_> {
         const GAIN: &str = "static_gain";
         let kept = mechanics.get(GAIN).cloned();
         let mut table = Table::new();
-        table["natural_frequency"] = self.quantity(self.natural_hz, "Hz");
-        table["damping_ratio"] = self.quantity(self.damping_ratio, "");
+        if self.modes.is_empty() {
+            table["natural_frequency"] = self.quantity(self.natural_hz, "Hz");
+            table["damping_ratio"] = self.quantity(self.damping_ratio, "");
+        } else if let Some(measures) = mechanics.get("measures") {
+            table["measures"] = measures.clone();
+        }
         if let Some(gain) = self.gain {
             table[GAIN] = value(self.static_gain(gain));
             document.remove("calibration");
         } else if let Some(kept) = kept {
             table[GAIN] = kept;
         }
-        document["mechanics"] = Item::Table(table);
+        match table.is_empty() {
+            true => drop(document.remove("mechanics")),
+            false => document["mechanics"] = Item::Table(table),
+        }
+        self.write_modes(document);
+    }
+
+    /// Puts what was fitted of each mode into its table.
+    fn write_modes(&self, document: &mut DocumentMut) {
+        let tables = document
+            .get_mut(MODES)
+            .and_then(Item::as_array_of_tables_mut);
+        let tables = tables.into_iter().flat_map(ArrayOfTables::iter_mut);
+        for (table, mode) in tables.zip(&self.modes) {
+            for (key, estimate) in mode {
+                let number = (estimate.value(), estimate.std_uncertainty());
+                table[*key] = self.quantity(number, estimate.unit());
+            }
+            for (key, _) in MODE_CORRELATIONS {
+                table.remove(key);
+            }
+            table.remove("source");
+        }
     }
 
     fn write_effects(&self, document: &mut DocumentMut) {

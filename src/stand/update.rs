@@ -140,7 +140,7 @@ pub const CORRELATIONS: [&str; 3] = [
     "correlation_damping_stiffness",
 ];
 /// Section of several modes.
-const MODES: &str = "modes";
+pub const MODES: &str = "modes";
 /// Keys of a mode that a decay does not tell.
 const SHARES: [&str; 4] = ["residue", "quadrature", "shape_at_load", "shape_at_gage"];
 /// Keys that exclude those in turn.

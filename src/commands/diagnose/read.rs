@@ -11,15 +11,18 @@ use super::decays;
 use crate::cli::Diagnose;
 use crate::commands::convert;
 use crate::diagnose::{
-    Case, ChannelUnits, DeclaredForm, EffectForm, InitialState, PlainStand, Records, SourceFiles,
-    StandRecord,
+    Case, ChannelUnits, DeclaredForm, EffectForm, InitialState, PlainStand, Records, SeveralModes,
+    SourceFiles, StandRecord,
 };
 use crate::failure::{ErrorCode, Failure};
 use crate::file_name::{ShowPath, texts};
+use crate::identify::Motion;
 use crate::io::{ChannelChoice, Input};
 use crate::print::short;
 use crate::recording::AlignedChannels;
-use crate::stand::{Calibration, DeclaredEffect, Stand, TransducerSignal, si_unit};
+use crate::stand::{
+    Calibration, DeclaredEffect, DeclaredMode, Given, Stand, TransducerSignal, si_unit,
+};
 use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
 
@@ -102,6 +105,9 @@ pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<(Case, bool), Fail
             "no hold-out record was given; the last 30 % of each training record are held out instead",
         ));
     }
+    let several = stand.map(several).transpose()?.flatten();
+    let measures = stand.map_or(Ok(Motion::Displacement), measures)?;
+    warnings.extend(torques_unknown(several.as_ref(), measures));
     let case = Case {
         sources: SourceFiles {
             stand: args.stand.as_ref().map(|p| p.shown().to_string()),
@@ -110,9 +116,11 @@ pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<(Case, bool), Fail
         },
         records,
         declared,
+        several,
         declared_effects: declared_effects(stand),
         // Free ringing does not show the gain.
         gain_is_declared: gain.is_some() && static_gain(stand).is_none() || args.train.is_empty(),
+        measures,
         recorder: stand.and_then(recorder),
         units,
         warnings,
@@ -326,19 +334,53 @@ fn declared_gain(stand: Option<&Stand>, units: &ChannelUnits) -> Option<f64> {
 }
 
 fn declared(stand: &Stand, gain: f64) -> Result<PlainStand, Failure> {
-    let mode = stand.modes()?.only().ok_or_else(|| {
-        Failure::failed(
-            ErrorCode::InvalidStand,
-            "it has several modes, and diagnose finds what one mode lacks; leave --stand out, and the further modes \
-             count as the effect second-mode, or refit the modes with identify response",
-        )
-        .at(&stand.file)
-    })?;
+    let mode = stand.modes()?.first();
     Ok(PlainStand {
         natural_hz: mode.omega_rad_s / std::f64::consts::TAU,
         damping_ratio: mode.damping_ratio,
         gain,
     })
+}
+
+/// What is recorded of the stand's motion.
+fn measures(stand: &Stand) -> Result<Motion, Failure> {
+    Ok(stand.mechanics()?.measures)
+}
+
+/// Says that no torques in the stand are looked for where their effect on the record is not known.
+fn torques_unknown(several: Option<&SeveralModes>, measures: Motion) -> Option<Warning> {
+    let (why, remedy) = match (measures, several) {
+        (Motion::Displacement, None) => return None,
+        (Motion::Displacement, Some(several)) if several.show_torques() => return None,
+        (Motion::Displacement, Some(_)) => (
+            "how far they move each mode there does not follow from residues of both signs"
+                .to_owned(),
+            "give shape_at_load and shape_at_gage of [[modes]] in place of residue",
+        ),
+        (measures, _) => (
+            format!(
+                "the record is of the {}, they go with the displacement",
+                measures.name()
+            ),
+            "record the displacement, strain or torque",
+        ),
+    };
+    Some(Warning::new(
+        "no-torques-tried",
+        format!(
+            "friction, play, springs that bend and other torques in the stand were not looked for: {why}; {remedy}"
+        ),
+    ))
+}
+
+/// All modes of a stand that has several.
+fn several(stand: &Stand) -> Result<Option<SeveralModes>, Failure> {
+    let mechanics = stand.mechanics()?;
+    let Given::Modes(modes) = &mechanics.given else {
+        return Ok(None);
+    };
+    let has_shapes = modes.iter().any(DeclaredMode::has_shape);
+    Ok(SeveralModes::of(&stand.modes()?, has_shapes))
 }
 
 /// The record of two channels in SI units; `calibrated` is the stand that converts the measured one to torque.

@@ -3,8 +3,11 @@
 use torqcomp_model::Estimate;
 use torqcomp_model::effects::Unit;
 
-use crate::diagnose::{Diagnosis, EffectForm, EffectParameter, HeldBody, RecordResidual};
+use crate::diagnose::{
+    Diagnosis, EffectForm, EffectParameter, HeldBody, RecordResidual, ScoredModel,
+};
 use crate::failure::Failure;
+use crate::identify::MODE_NUMBERS;
 use crate::io::digits;
 use crate::stand::{self, Refined, Stand};
 
@@ -43,6 +46,7 @@ pub fn stand_file(
     let refined = Refined {
         natural_hz: both(natural_hz),
         damping_ratio: both(damping_ratio),
+        modes: modes(model),
         gain: (context.gain_is_free || held.is_some()).then_some(gain.value()),
         units: (&units.diagnosed, &stand::si_unit(&units.applied)),
         measured_unit: match units.measured.as_str() {
@@ -58,6 +62,22 @@ pub fn stand_file(
         verdict: diagnosis.verdict.name(),
     };
     stand::refine(declared, &refined)
+}
+
+/// What was fitted of each mode of a stand with several: shapes stay as they are.
+fn modes(model: &ScoredModel) -> Vec<Vec<(&'static str, Estimate)>> {
+    let several = &model.fitted.structure.context.several;
+    let has_shapes = several.as_ref().is_some_and(|several| several.has_shapes);
+    let of_mode = |numbers: [Estimate; 4]| {
+        let all = MODE_NUMBERS.into_iter().zip(numbers);
+        let is_moved = |(key, number): &(&str, Estimate)| match *key {
+            "residue" => !has_shapes,
+            "quadrature" => number.value() != 0.0,
+            _ => true,
+        };
+        all.filter(is_moved).collect()
+    };
+    model.modes().into_iter().map(of_mode).collect()
 }
 
 /// The parameters of an effect on a free body beside the weak spring of its stand file.

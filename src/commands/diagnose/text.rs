@@ -345,10 +345,13 @@ pub fn limit_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
 pub fn constant_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
     let mut rows = vec![cells(["constant", "declared", "before", "after"])];
     rows.extend(diagnosis.constants.iter().map(|c| {
-        let name = match c.unit.as_str() {
-            "" => c.name.to_owned(),
-            unit => format!("{}, {unit}", c.name),
-        };
+        let mut name = c.name.to_owned();
+        if let Some(mode) = c.mode {
+            name = format!("mode {mode} {name}");
+        }
+        if !c.unit.is_empty() {
+            name = format!("{name}, {}", c.unit);
+        }
         let declared = c.declared.map(|v| rounded(v, 6));
         cells([
             &name,

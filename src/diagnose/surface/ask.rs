@@ -106,8 +106,9 @@ impl SearchState {
 
     /// Whether the records may show a surface: there is a spring, and the torque is applied.
     fn can_ask(&self, model: &ScoredModel) -> bool {
-        let is_held = model.fitted.structure.context.held.is_some();
+        let context = &model.fitted.structure.context;
+        let is_held = context.held.is_some();
         let mut records = self.records.train.iter().chain(&self.records.holdout);
-        !is_held && !records.any(StandRecord::is_free)
+        !is_held && context.sees_torques() && !records.any(StandRecord::is_free)
     }
 }

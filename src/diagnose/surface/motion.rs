@@ -81,8 +81,9 @@ pub fn through(
 
 /// What a torque of unit gain at the gage adds to the record, by angular frequency.
 pub fn of_torque(chain: &Chain) -> impl Fn(f64) -> Complex64 + '_ {
-    |omega| {
+    let at_gage = chain.stand.at_gage();
+    move |omega| {
         let hz = omega / std::f64::consts::TAU;
-        chain.stand.response(omega) * chain.response_of(hz, |_| true)
+        at_gage.as_ref().unwrap_or(&chain.stand).response(omega) * chain.response_of(hz, |_| true)
     }
 }

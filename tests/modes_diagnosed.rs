@@ -1,0 +1,189 @@
+//! The diagnosis of stands with several modes, on records of a row of three inertias that shares no code with the solver.
+
+use std::f64::consts::TAU;
+use std::fmt::Write;
+
+use serde_json::Value;
+
+use crate::modes::{COUNT, RATE_HZ, omega, row_under, stand};
+use crate::noise::Noise;
+use crate::util::{Folder, column};
+
+/// Noise on the record, in N m.
+const NOISE_N_M: f64 = 0.01;
+
+/// Tones every 22.5 Hz up to 900 Hz, with phases of their own.
+fn tones(seed: u64, size: f64) -> impl Fn(f64) -> f64 {
+    let mut random = Noise(seed);
+    let phases: Vec<f64> = (0..40).map(|_| TAU * random.uniform()).collect();
+    move |time_s| {
+        let tones = phases.iter().enumerate();
+        let tone = |(k, phase): (usize, &f64)| (TAU * 22.5 * (k + 1) as f64 * time_s + phase).sin();
+        size * tones.map(tone).sum::<f64>()
+    }
+}
+
+/// A training and a held-out record of the row with a torque beside the gage, and its stand file with frequencies that are up to
+/// 2 % wrong. The load is on one of its inertias (1 to 3).
+fn bench(load: usize, beside: impl Fn(f64, f64) -> f64) -> Folder {
+    let folder = Folder::new();
+    let mut text = stand(load);
+    for (k, part) in [1.01, 0.985, 1.02].into_iter().enumerate() {
+        let hz = omega(k) / TAU;
+        text = text.replace(&format!("\"{hz} Hz\""), &format!("\"{} Hz\"", part * hz));
+    }
+    folder.write("stand.toml", text);
+    for (name, seed, size) in [("train.csv", 11, 0.2), ("holdout.csv", 12, 0.12)] {
+        let applied = tones(seed, size);
+        let mut noise = Noise(seed + 100);
+        let mut text = String::from("time_s,applied_n_m,measured_n_m\n");
+        for (i, y) in row_under(&applied, (8, load), &beside).iter().enumerate() {
+            let time_s = i as f64 / RATE_HZ;
+            let y = y + NOISE_N_M * noise.normal();
+            let _ = writeln!(text, "{time_s:.6},{:.9},{y:.9}", applied(time_s));
+        }
+        folder.write(name, text);
+    }
+    folder
+}
+
+const DIAGNOSE: [&str; 14] = [
+    "diagnose",
+    "--stand",
+    "stand.toml",
+    "--train",
+    "train.csv",
+    "--holdout",
+    "holdout.csv",
+    "--applied",
+    "applied_n_m",
+    "--measured",
+    "measured_n_m",
+    "-o",
+    "refined.toml",
+    "--json",
+];
+
+/// The number of a constant of a mode with the effects.
+fn constant(report: &Value, mode: usize, name: &str) -> [f64; 2] {
+    let constants = report["constants"].as_array().unwrap();
+    let is_it = |c: &&Value| c["mode"] == mode && c["name"] == name;
+    let found = constants.iter().find(is_it).unwrap();
+    ["after", "after_std"].map(|key| found[key].as_f64().unwrap())
+}
+
+/// Checks the frequencies of all modes and the error on the held-out record. The integration may err by as much as the noise
+/// leaves uncertain.
+fn check_stand(report: &Value) {
+    for k in 0..3 {
+        let [hz, std] = constant(report, k + 1, "natural_frequency");
+        let off = (hz - omega(k) / TAU).abs();
+        let is_right = off < 4.0 * std + 3e-5 * hz && std < 2e-4 * hz;
+        assert!(is_right, "mode {}: {hz} ± {std}", k + 1);
+    }
+    let after = report["error"]["after"]["holdout_rms"].as_f64().unwrap();
+    assert!(after < 1.1 * NOISE_N_M, "{after}");
+}
+
+#[test]
+fn nothing_is_missing_beside_three_modes() {
+    for load in [1, 3] {
+        let folder = bench(load, |_, _| 0.0);
+        let report = folder.json(&DIAGNOSE);
+        assert_eq!(report["verdict"], "nothing-missing", "{report}");
+        check_stand(&report);
+    }
+}
+
+/// A spring that stiffens beside the gage. The refined stand answers a torque that it has not seen.
+#[test]
+fn a_spring_that_stiffens_beside_three_modes() {
+    for load in [1, 3] {
+        let folder = bench(load, |x, _| 0.004 * x.powi(3));
+        let report = folder.json(&DIAGNOSE);
+        assert_eq!(report["verdict"], "explained", "{report}");
+        assert_eq!(report["effects"], serde_json::json!(["cubic-stiffness"]));
+        check_stand(&report);
+        let candidates = report["candidates"].as_array().unwrap();
+        let mut accepted = candidates.iter().filter(|c| c["status"] == "accepted");
+        let found = &accepted.next().unwrap()["parameters"][0];
+        let [value, std] = ["value", "std"].map(|key| found[key].as_f64().unwrap());
+        assert!((value - 0.004).abs() < 8e-6 && std < 4e-6, "{found}");
+
+        let args = [
+            "simulate",
+            "holdout.csv",
+            "--stand",
+            "refined.toml",
+            "--applied",
+            "applied_n_m",
+            "-o",
+            "answer.csv",
+            "--force",
+        ];
+        folder.run(&args).says(0, &[]);
+        let answer = column(&folder.read("answer.csv"), "measured");
+        let record = column(&folder.read("holdout.csv"), "measured_n_m");
+        let both = answer.iter().zip(&record).take(COUNT - 100);
+        let left = both.map(|(a, b)| (a - b).powi(2)).sum::<f64>() / (COUNT - 100) as f64;
+        assert!(left.sqrt() < 1.1 * NOISE_N_M, "{}", left.sqrt());
+    }
+}
+
+#[test]
+fn dry_friction_beside_three_modes() {
+    let folder = bench(1, |_, speed| 0.05 * (speed / 20.0).tanh());
+    let report = folder.json(&DIAGNOSE);
+    assert_eq!(report["verdict"], "explained", "{report}");
+    assert_eq!(report["effects"], serde_json::json!(["coulomb-friction"]));
+    check_stand(&report);
+}
+
+/// Residues of both signs do not tell how far a torque at the gage moves it: what is not looked for is said, what comes behind
+/// the stand is found.
+#[test]
+fn without_shapes_only_the_chain_is_looked_at() {
+    let folder = bench(3, |_, _| 0.0);
+    let shapes: Vec<[f64; 2]> = folder
+        .read("stand.toml")
+        .split("[[modes]]")
+        .skip(1)
+        .map(|mode| ["shape_at_load = ", "shape_at_gage = "].map(|key| number(mode, key)))
+        .collect();
+    let squares: Vec<f64> = (0..3).map(|k| omega(k).powi(2)).collect();
+    let parts: Vec<f64> = shapes
+        .iter()
+        .zip(&squares)
+        .map(|([a, b], w)| a * b / w)
+        .collect();
+    let sum: f64 = parts.iter().sum();
+    let mut text = String::from("schema = \"torqcomp.stand/1\"\n");
+    for (k, part) in parts.iter().enumerate() {
+        let _ = write!(
+            text,
+            "[[modes]]\nnatural_frequency = \"{} Hz\"\ndamping_ratio = 0.02\nresidue = {}\n",
+            omega(k) / TAU,
+            part / sum
+        );
+    }
+    folder.write("stand.toml", text);
+    let report = folder.json(&DIAGNOSE);
+    let warnings = report["warnings"].as_array().unwrap();
+    let said = warnings.iter().find(|w| w["code"] == "no-torques-tried");
+    let message = said.unwrap()["message"].as_str().unwrap();
+    assert!(message.contains("shape_at_load"), "{message}");
+    let candidates = report["candidates"].as_array().unwrap();
+    let tried = |name: &str| candidates.iter().any(|c| c["effect"] == name);
+    assert!(
+        tried("time-delay") && !tried("coulomb-friction"),
+        "{report}"
+    );
+    assert_eq!(report["verdict"], "nothing-missing", "{report}");
+    check_stand(&report);
+}
+
+/// The number behind a key of a mode's table.
+fn number(table: &str, key: &str) -> f64 {
+    let line = table.lines().find_map(|line| line.strip_prefix(key));
+    line.unwrap().parse().unwrap()
+}
