@@ -85,6 +85,13 @@ fn check_stand(report: &Value) {
     assert!(after < 1.1 * NOISE_N_M, "{after}");
 }
 
+fn print_errors(report: &Value) {
+    let [before, after] =
+        ["before", "after"].map(|key| report["error"][key]["holdout_rms"].as_f64());
+    let [before, after] = [before, after].map(|rms| rms.unwrap() / NOISE_N_M);
+    println!("before {before:.1}, after {after:.3} times the noise");
+}
+
 #[test]
 fn nothing_is_missing_beside_three_modes() {
     for load in [1, 3] {
@@ -109,6 +116,8 @@ fn a_spring_that_stiffens_beside_three_modes() {
         let found = &accepted.next().unwrap()["parameters"][0];
         let [value, std] = ["value", "std"].map(|key| found[key].as_f64().unwrap());
         assert!((value - 0.004).abs() < 8e-6 && std < 4e-6, "{found}");
+        print_errors(&report);
+        println!("coefficient {value:.6} ± {std:.6}, true 0.004");
 
         let args = [
             "simulate",
@@ -137,6 +146,7 @@ fn dry_friction_beside_three_modes() {
     assert_eq!(report["verdict"], "explained", "{report}");
     assert_eq!(report["effects"], serde_json::json!(["coulomb-friction"]));
     check_stand(&report);
+    print_errors(&report);
 }
 
 /// Residues of both signs do not tell how far a torque at the gage moves it: what is not looked for is said, what comes behind

@@ -1,6 +1,7 @@
 //! `diagnose`: what the stand lacks, and the error before and after it is added.
 
 mod decays;
+mod declared;
 mod page;
 mod read;
 mod refined;

@@ -3,26 +3,21 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use torqcomp_model::effects::Fixed;
 use torqcomp_model::simulate::Excitation;
 use torqcomp_model::{Dimension, UnitSystem};
 
 use super::decays;
+use super::declared::{declared, declared_effects, measures, recorder, several, torques_unknown};
 use crate::cli::Diagnose;
 use crate::commands::convert;
-use crate::diagnose::{
-    Case, ChannelUnits, DeclaredForm, EffectForm, InitialState, PlainStand, Records, SeveralModes,
-    SourceFiles, StandRecord,
-};
+use crate::diagnose::{Case, ChannelUnits, InitialState, Records, SourceFiles, StandRecord};
 use crate::failure::{ErrorCode, Failure};
 use crate::file_name::{ShowPath, texts};
 use crate::identify::Motion;
 use crate::io::{ChannelChoice, Input};
 use crate::print::short;
 use crate::recording::AlignedChannels;
-use crate::stand::{
-    Calibration, DeclaredEffect, DeclaredMode, Given, Stand, TransducerSignal, si_unit,
-};
+use crate::stand::{Calibration, Stand, TransducerSignal, si_unit};
 use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
 
@@ -92,19 +87,7 @@ pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<(Case, bool), Fail
         train: convert(train)?,
         holdout: convert(holdout)?,
     };
-    if last_is_held_out {
-        warnings.push(Warning::new(
-            "no-record-held-out",
-            "no hold-out record was given; the last decay is held out instead",
-        ));
-    }
-    if records.holdout.is_empty() {
-        records.hold_out_ends();
-        warnings.push(Warning::new(
-            "no-record-held-out",
-            "no hold-out record was given; the last 30 % of each training record are held out instead",
-        ));
-    }
+    warnings.extend(held_out_instead(&mut records, last_is_held_out));
     let several = stand.map(several).transpose()?.flatten();
     let measures = stand.map_or(Ok(Motion::Displacement), measures)?;
     warnings.extend(torques_unknown(several.as_ref(), measures));
@@ -128,6 +111,23 @@ pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<(Case, bool), Fail
     Ok((case, is_lossy))
 }
 
+/// Holds out the ends of the training records where no record is held out; says what is held out in place of a record that was
+/// given for it.
+fn held_out_instead(records: &mut Records, last_is_held_out: bool) -> Option<Warning> {
+    let instead = match (last_is_held_out, records.holdout.is_empty()) {
+        (true, _) => "the last decay is",
+        (false, true) => {
+            records.hold_out_ends();
+            "the last 30 % of each training record are"
+        }
+        (false, false) => return None,
+    };
+    Some(Warning::new(
+        "no-record-held-out",
+        format!("no hold-out record was given; {instead} held out instead"),
+    ))
+}
+
 /// The training and the held-out records.
 fn pairs(args: &Diagnose) -> Result<(Vec<Pair>, Vec<Pair>), Failure> {
     let all = |files: &[PathBuf], of_decays: &[PathBuf]| -> Result<Vec<Pair>, Failure> {
@@ -146,27 +146,6 @@ fn pairs(args: &Diagnose) -> Result<(Vec<Pair>, Vec<Pair>), Failure> {
         holdout.extend(decays::last(&mut train)?);
     }
     Ok((train, holdout))
-}
-
-/// The recorder as far as the stand file declares it.
-fn recorder(stand: &Stand) -> Option<Fixed> {
-    let recorder = stand.recorder.recorder.clone();
-    let is_ideal = recorder.is_ideal();
-    let response: Fixed = Arc::new(move |hz| recorder.response(hz));
-    (!is_ideal).then_some(response)
-}
-
-/// The effects of the stand file.
-fn declared_effects(stand: Option<&Stand>) -> Vec<DeclaredForm> {
-    let effects = stand.map_or(&[][..], |stand| &stand.effects);
-    let form = |declared: &DeclaredEffect| DeclaredForm {
-        effect: EffectForm {
-            effect: declared.effect,
-            form: declared.form,
-        },
-        values: declared.values.clone(),
-    };
-    effects.iter().map(form).collect()
 }
 
 fn pair(args: &Diagnose, file: &Path) -> Result<Pair, Failure> {
@@ -331,56 +310,6 @@ fn units(pair: &Pair, stand: Option<&Stand>) -> (ChannelUnits, bool) {
 /// The static gain as far as it is declared: 1 from torque to torque.
 fn declared_gain(stand: Option<&Stand>, units: &ChannelUnits) -> Option<f64> {
     static_gain(stand).or(units.is_torque.then_some(1.0))
-}
-
-fn declared(stand: &Stand, gain: f64) -> Result<PlainStand, Failure> {
-    let mode = stand.modes()?.first();
-    Ok(PlainStand {
-        natural_hz: mode.omega_rad_s / std::f64::consts::TAU,
-        damping_ratio: mode.damping_ratio,
-        gain,
-    })
-}
-
-/// What is recorded of the stand's motion.
-fn measures(stand: &Stand) -> Result<Motion, Failure> {
-    Ok(stand.mechanics()?.measures)
-}
-
-/// Says that no torques in the stand are looked for where their effect on the record is not known.
-fn torques_unknown(several: Option<&SeveralModes>, measures: Motion) -> Option<Warning> {
-    let (why, remedy) = match (measures, several) {
-        (Motion::Displacement, None) => return None,
-        (Motion::Displacement, Some(several)) if several.show_torques() => return None,
-        (Motion::Displacement, Some(_)) => (
-            "how far they move each mode there does not follow from residues of both signs"
-                .to_owned(),
-            "give shape_at_load and shape_at_gage of [[modes]] in place of residue",
-        ),
-        (measures, _) => (
-            format!(
-                "the record is of the {}, they go with the displacement",
-                measures.name()
-            ),
-            "record the displacement, strain or torque",
-        ),
-    };
-    Some(Warning::new(
-        "no-torques-tried",
-        format!(
-            "friction, play, springs that bend and other torques in the stand were not looked for: {why}; {remedy}"
-        ),
-    ))
-}
-
-/// All modes of a stand that has several.
-fn several(stand: &Stand) -> Result<Option<SeveralModes>, Failure> {
-    let mechanics = stand.mechanics()?;
-    let Given::Modes(modes) = &mechanics.given else {
-        return Ok(None);
-    };
-    let has_shapes = modes.iter().any(DeclaredMode::has_shape);
-    Ok(SeveralModes::of(&stand.modes()?, has_shapes))
 }
 
 /// The record of two channels in SI units; `calibrated` is the stand that converts the measured one to torque.

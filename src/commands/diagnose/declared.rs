@@ -1,0 +1,83 @@
+//! What the stand file of a diagnosis declares.
+
+use std::sync::Arc;
+
+use torqcomp_model::effects::Fixed;
+
+use crate::diagnose::{DeclaredForm, EffectForm, PlainStand, SeveralModes};
+use crate::failure::Failure;
+use crate::identify::Motion;
+use crate::stand::{DeclaredEffect, DeclaredMode, Given, Stand};
+use crate::warning::Warning;
+
+/// The plain stand of a stand file.
+pub(super) fn declared(stand: &Stand, gain: f64) -> Result<PlainStand, Failure> {
+    let mode = stand.modes()?.first();
+    Ok(PlainStand {
+        natural_hz: mode.omega_rad_s / std::f64::consts::TAU,
+        damping_ratio: mode.damping_ratio,
+        gain,
+    })
+}
+
+/// All modes of a stand that has several.
+pub(super) fn several(stand: &Stand) -> Result<Option<SeveralModes>, Failure> {
+    let mechanics = stand.mechanics()?;
+    let Given::Modes(modes) = &mechanics.given else {
+        return Ok(None);
+    };
+    let has_shapes = modes.iter().any(DeclaredMode::has_shape);
+    Ok(SeveralModes::of(&stand.modes()?, has_shapes))
+}
+
+/// What is recorded of the stand's motion.
+pub(super) fn measures(stand: &Stand) -> Result<Motion, Failure> {
+    Ok(stand.mechanics()?.measures)
+}
+
+/// Says that no torques in the stand are looked for where their effect on the record is not known.
+pub(super) fn torques_unknown(several: Option<&SeveralModes>, measures: Motion) -> Option<Warning> {
+    let (why, remedy) = match (measures, several) {
+        (Motion::Displacement, None) => return None,
+        (Motion::Displacement, Some(several)) if several.show_torques() => return None,
+        (Motion::Displacement, Some(_)) => (
+            "how far they move each mode there does not follow from residues of both signs"
+                .to_owned(),
+            "give shape_at_load and shape_at_gage of [[modes]] in place of residue",
+        ),
+        (measures, _) => (
+            format!(
+                "the record is of the {}, they go with the displacement",
+                measures.name()
+            ),
+            "record the displacement, strain or torque",
+        ),
+    };
+    Some(Warning::new(
+        "no-torques-tried",
+        format!(
+            "friction, play, springs that bend and other torques in the stand were not looked for: {why}; {remedy}"
+        ),
+    ))
+}
+
+/// The effects of the stand file.
+pub(super) fn declared_effects(stand: Option<&Stand>) -> Vec<DeclaredForm> {
+    let effects = stand.map_or(&[][..], |stand| &stand.effects);
+    let form = |declared: &DeclaredEffect| DeclaredForm {
+        effect: EffectForm {
+            effect: declared.effect,
+            form: declared.form,
+        },
+        values: declared.values.clone(),
+    };
+    effects.iter().map(form).collect()
+}
+
+/// The recorder as far as the stand file declares it.
+pub(super) fn recorder(stand: &Stand) -> Option<Fixed> {
+    let recorder = stand.recorder.recorder.clone();
+    let is_ideal = recorder.is_ideal();
+    let response: Fixed = Arc::new(move |hz| recorder.response(hz));
+    (!is_ideal).then_some(response)
+}
