@@ -3,11 +3,12 @@
 use std::f64::consts::TAU;
 use std::fmt::Write;
 
+use num_complex::Complex64;
 use serde_json::Value;
 
 use crate::modes::{COUNT, RATE_HZ, omega, row_under, stand};
 use crate::noise::Noise;
-use crate::util::{Folder, column};
+use crate::util::{Folder, assert_close, column};
 
 /// Noise on the record, in N m.
 const NOISE_N_M: f64 = 0.01;
@@ -190,6 +191,57 @@ fn without_shapes_only_the_chain_is_looked_at() {
     );
     assert_eq!(report["verdict"], "nothing-missing", "{report}");
     check_stand(&report);
+}
+
+/// The acceleration of one mode under tones, by its response over frequency: the frequency that was 2 % wrong is found, and the
+/// refined file says what is recorded.
+#[test]
+fn an_acceleration_is_diagnosed_as_one() {
+    let folder = Folder::new();
+    let (hz, ratio, gain) = (400.0, 0.02, 2e-6);
+    let stand = "schema = \"torqcomp.stand/1\"\n[mechanics]\nmeasures = \"acceleration\"\nnatural_frequency = \"408 Hz\"\n\
+                 damping_ratio = 0.03\nstatic_gain = \"2.1e-6 (m/s^2)/N\"\n";
+    folder.write("stand.toml", stand);
+    for (name, seed) in [("train.csv", 21), ("holdout.csv", 22)] {
+        let mut random = Noise(seed);
+        let phases: Vec<f64> = (0..60).map(|_| TAU * random.uniform()).collect();
+        let mut text = String::from("time_s,applied_N,measured_m/s^2\n");
+        for i in 0..COUNT {
+            let time_s = i as f64 / RATE_HZ;
+            let tones = phases.iter().enumerate().map(|(k, phase)| {
+                let omega = TAU * 15.0 * (k + 1) as f64;
+                let w = omega / (TAU * hz);
+                let response = -gain * omega * omega / Complex64::new(1.0 - w * w, 2.0 * ratio * w);
+                let tone = Complex64::cis(omega * time_s + phase);
+                [tone.im, (response * tone).im]
+            });
+            let [force, y] = tones.fold([0.0; 2], |sum, tone| [sum[0] + tone[0], sum[1] + tone[1]]);
+            let _ = writeln!(
+                text,
+                "{time_s:.6},{force:.9},{:.9}",
+                y + 0.5 * random.normal()
+            );
+        }
+        folder.write(name, text);
+    }
+    let args = DIAGNOSE.map(|arg| match arg {
+        "applied_n_m" => "applied_N",
+        "measured_n_m" => "measured_m/s^2",
+        arg => arg,
+    });
+    let report = folder.json(&args);
+    assert_eq!(report["verdict"], "nothing-missing", "{report}");
+    let found = |k: usize| report["constants"][k]["after"].as_f64().unwrap();
+    assert_close(found(0), hz, 1e-4);
+    assert_close(found(1), ratio, 1e-3);
+    assert_close(found(2), gain, 1e-3);
+    let refined = folder.read("refined.toml");
+    assert!(refined.contains("measures = \"acceleration\""), "{refined}");
+    let warnings = report["warnings"].to_string();
+    assert!(
+        warnings.contains("they go with the displacement"),
+        "{warnings}"
+    );
 }
 
 /// The number behind a key of a mode's table.

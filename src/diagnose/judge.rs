@@ -38,7 +38,7 @@ impl SearchState {
             guard.errors = guard.model.errors();
             Some(guard)
         });
-        self.noise_floor = NoiseFloor::of(&self.before.compared, &self.before.fitted.stand());
+        self.noise_floor = NoiseFloor::of(&self.before.compared, &self.before.fitted.passage());
         self.tests_before = super::tests(&self.before);
         let without = std::mem::take(&mut self.without);
         self.without = parallel(without.len(), threads, |k| {

@@ -256,7 +256,7 @@ impl SearchState {
         let mut found = Self {
             records,
             declared,
-            noise_floor: NoiseFloor::of(&before.compared, &before.fitted.stand()),
+            noise_floor: NoiseFloor::of(&before.compared, &before.fitted.passage()),
             after: before.clone(),
             before,
             without: Vec::new(),
@@ -285,8 +285,8 @@ impl SearchState {
             let old = self.noise_floor;
             old.is_some_and(|old| old.from == NoiseFloorSource::Periods && new.rms < old.rms)
         };
-        let plain = self.after.fitted.stand();
-        let new = NoiseFloor::of_residuals(&self.after.compared, &plain);
+        let passage = self.after.fitted.passage();
+        let new = NoiseFloor::of_residuals(&self.after.compared, &passage);
         if let Some(new) = new.filter(is_lower) {
             self.noise_floor = Some(new);
         }

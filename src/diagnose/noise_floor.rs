@@ -1,17 +1,15 @@
 //! The noise floor: what the best model of the stand must leave.
 
-use std::f64::consts::PI;
-
 use schemars::JsonSchema;
 use serde::Serialize;
-use torqcomp_model::Mode;
+use torqcomp_model::{ModalPart, ModalResponse, Mode};
 
-use super::fit::RecordResidual;
+use super::fit::{FittedModel, RecordResidual};
 use super::intersample::noise_on_plateaus;
 use super::record::{DECAYED, StandRecord};
 use super::residual_tests::without_mean;
 use super::spectra::{ONLY_NOISE, spectra};
-use super::structure::PlainStand;
+use crate::identify::Motion;
 use torqcomp_dsp::dot;
 
 /// The noise of the held-out records.
@@ -49,41 +47,82 @@ const MOST_PASSED: f64 = 10.0;
 /// Mean square of the noise, and the number of samples it is taken from.
 type MeanSquare = (f64, usize);
 
+/// What a stand does to noise.
+pub struct NoisePassage {
+    first: Mode,
+    /// Of each mode the part of white noise that it passes on, over the rate, and its factor.
+    modes: Vec<[f64; 2]>,
+}
+
+impl NoisePassage {
+    /// Of a stand; of its displacement, speed or acceleration.
+    pub fn of(stand: &ModalResponse, gain: f64, measures: Motion) -> Self {
+        let of_mode = |part: &ModalPart| {
+            let Mode {
+                omega_rad_s,
+                damping_ratio,
+            } = part.mode;
+            let factor = gain * part.residue * omega_rad_s.powi(measures.order());
+            [omega_rad_s / (4.0 * damping_ratio), factor * factor]
+        };
+        Self {
+            first: stand.first(),
+            modes: stand.parts().iter().map(of_mode).collect(),
+        }
+    }
+
+    /// Power of noise behind the stand, over that of white noise at a rate `f_s` before it: of each mode
+    /// `g² r² ω^2m π f₀ / (2 ζ f_s)`, as `∫ |H|² df = π f₀ / (4 ζ)` from 0 on, with `m` for the derivative of the displacement
+    /// that is recorded.
+    fn passed(&self, rate_hz: f64) -> f64 {
+        let modes = self.modes.iter();
+        modes
+            .map(|[width_hz, factor]| factor * (width_hz / rate_hz).min(MOST_PASSED))
+            .sum()
+    }
+}
+
+impl FittedModel {
+    /// What its plain stand does to noise.
+    pub fn passage(&self) -> NoisePassage {
+        let context = &self.structure.context;
+        let chain = context.chain(&self.stand());
+        NoisePassage::of(&chain.stand, chain.gain, context.measures)
+    }
+}
+
 impl NoiseFloor {
     /// The noise of records: from the differences of periods where every input repeats, otherwise from the top of the
     /// spectrum, where the plain stand's modelled record says that there is no signal. To either the noise on the applied
     /// quantity is added as the stand passes it on: the records do not have it, what a model makes of the applied quantity has.
-    pub fn of(residuals: &[RecordResidual], plain: &PlainStand) -> Option<Self> {
-        let mode = plain.mode();
+    pub fn of(residuals: &[RecordResidual], passage: &NoisePassage) -> Option<Self> {
+        let mode = &passage.first;
         let periods = residuals.iter().map(|r| {
             let record = &r.record;
-            of_periods(record, record.measured_in_range(), &mode)
+            of_periods(record, record.measured_in_range(), mode)
         });
         let measured = Self::pooled(periods, NoiseFloorSource::Periods).or_else(|| {
             let found = residuals.iter().filter_map(out_of_band);
             Self::pooled(found.map(Some), NoiseFloorSource::OutOfBand)
         });
-        measured.map(|floor| floor.with_applied(residuals, plain))
+        measured.map(|floor| floor.with_applied(residuals, passage))
     }
 
     /// The noise in the residuals of a model, from differences of periods: disturbances that do not repeat with the input,
     /// such as mains pickup, are not in it if the model has them.
-    pub fn of_residuals(residuals: &[RecordResidual], plain: &PlainStand) -> Option<Self> {
-        let mode = plain.mode();
+    pub fn of_residuals(residuals: &[RecordResidual], passage: &NoisePassage) -> Option<Self> {
         let found = residuals.iter();
-        let found = found.map(|r| of_periods(&r.record, &r.samples, &mode));
+        let found = found.map(|r| of_periods(&r.record, &r.samples, &passage.first));
         let floor = Self::pooled(found, NoiseFloorSource::Periods)?;
-        Some(floor.with_applied(residuals, plain))
+        Some(floor.with_applied(residuals, passage))
     }
 
-    /// Adds the noise on the applied quantity. White noise of variance `σ²` at the rate `f_s` leaves the stand with
-    /// `σ² g² π f₀ / (2 ζ f_s)`, as `∫ |H|² df = g² π f₀ / (4 ζ)` from 0 on.
-    fn with_applied(self, residuals: &[RecordResidual], plain: &PlainStand) -> Self {
+    /// Adds the noise on the applied quantity, as the stand passes it on.
+    fn with_applied(self, residuals: &[RecordResidual], passage: &NoisePassage) -> Self {
         let passed = |residual: &RecordResidual| {
             let record = &residual.record;
-            let width_hz = PI * plain.natural_hz / (2.0 * plain.damping_ratio);
-            let passed = (width_hz / record.rate_hz()).min(MOST_PASSED);
-            let mean_square = noise_of_input(record.input.samples()) * plain.gain.powi(2) * passed;
+            let noise = noise_of_input(record.input.samples());
+            let mean_square = noise * passage.passed(record.rate_hz());
             Some((mean_square, residual.samples.len()))
         };
         let applied = Self::pooled(residuals.iter().map(passed), self.from);
@@ -198,23 +237,49 @@ fn out_of_band(residual: &RecordResidual) -> Option<MeanSquare> {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use super::*;
 
     const RATE_HZ: f64 = 1000.0;
     const NOISE: f64 = 1e-3;
 
     /// A stand at 2 Hz: its time constant is 1.6 s.
-    fn stand() -> PlainStand {
-        PlainStand {
-            natural_hz: 2.0,
+    fn mode() -> Mode {
+        Mode {
+            omega_rad_s: 4.0 * PI,
             damping_ratio: 0.05,
-            gain: 1.0,
         }
+    }
+
+    fn passage() -> NoisePassage {
+        NoisePassage::of(&mode().into(), 1.0, Motion::Displacement)
+    }
+
+    #[test]
+    fn noise_through_a_stand() {
+        // π f₀/(2 ζ f_s) = π 2/(0.1 · 1000), and a second mode of half the part at 6 Hz, ζ = 0.1: a quarter of π 6/(0.2 · 1000).
+        let one = PI * 2.0 / 100.0;
+        assert!((passage().passed(RATE_HZ) - one).abs() < 1e-12);
+        let part = |mode: Mode, residue| ModalPart {
+            mode,
+            residue,
+            quadrature: 0.0,
+            at_gage: None,
+        };
+        let second = Mode {
+            omega_rad_s: 12.0 * PI,
+            damping_ratio: 0.1,
+        };
+        let stand = ModalResponse::new(vec![part(mode(), 1.0), part(second, 0.5)]);
+        let both = NoisePassage::of(&stand.expect("modes"), 1.0, Motion::Displacement);
+        let want = one + 0.25 * PI * 6.0 / 200.0;
+        assert!((both.passed(RATE_HZ) - want).abs() < 1e-12);
     }
 
     /// The stand's answer to steps of ±1 at these times: `1 − e^(−ζωt) (cos ω_d t + ζω/ω_d sin ω_d t)` for each.
     fn steps(times_s: &[f64], count: usize) -> RecordResidual {
-        let mode = stand().mode();
+        let mode = mode();
         let decay = mode.damping_ratio * mode.omega_rad_s;
         let swing = mode.omega_rad_s * (1.0 - mode.damping_ratio.powi(2)).sqrt();
         let answer = |t: f64| {
@@ -242,7 +307,7 @@ mod tests {
     fn the_floor_after_a_step_is_the_noise() {
         // The plateaus are constant, the stand swings on them for 20 s.
         for times_s in [&[5.0][..], &[5.0, 20.0], &[1.0, 9.0, 17.0, 25.0]] {
-            let floor = NoiseFloor::of(&[steps(times_s, 32_000)], &stand()).expect("a floor");
+            let floor = NoiseFloor::of(&[steps(times_s, 32_000)], &passage()).expect("a floor");
             let ratio = floor.rms / NOISE;
             assert!((0.9..1.1).contains(&ratio), "{times_s:?}: {ratio}");
         }
@@ -268,7 +333,7 @@ mod tests {
     fn steps_that_repeat_give_the_noise_once_the_stand_has_settled() {
         // From the second period on the input has repeated; 12 time constants, 19.1 s, later the motion has, too.
         let times_s: Vec<f64> = (0..40).map(|k| 1.5 * f64::from(k)).collect();
-        let floor = NoiseFloor::of(&[steps(&times_s, 64_000)], &stand()).expect("a floor");
+        let floor = NoiseFloor::of(&[steps(&times_s, 64_000)], &passage()).expect("a floor");
         assert_eq!(floor.from, NoiseFloorSource::Periods);
         assert!((0.9..1.1).contains(&(floor.rms / NOISE)), "{}", floor.rms);
     }

@@ -106,13 +106,16 @@ impl Refined<'_> {
             return;
         }
         const GAIN: &str = "static_gain";
-        let kept = mechanics.get(GAIN).cloned();
+        const MEASURES: &str = "measures";
+        let [kept, measures] = [GAIN, MEASURES].map(|key| mechanics.get(key).cloned());
         let mut table = Table::new();
         if self.modes.is_empty() {
             table["natural_frequency"] = self.quantity(self.natural_hz, "Hz");
             table["damping_ratio"] = self.quantity(self.damping_ratio, "");
-        } else if let Some(measures) = mechanics.get("measures") {
-            table["measures"] = measures.clone();
+            document.remove(MODES);
+        }
+        if let Some(measures) = measures {
+            table[MEASURES] = measures;
         }
         if let Some(gain) = self.gain {
             table[GAIN] = value(self.static_gain(gain));
