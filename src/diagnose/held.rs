@@ -93,6 +93,7 @@ pub fn hold(case: &Case, unscaled: &FitContext) -> Result<Option<(Case, FitConte
         several: None,
         declared_effects: Vec::new(),
         measures: Motion::Displacement,
+        sees_torques: true,
         recorder: None,
         warnings: [case.warnings.clone(), vec![warning(&context, stiffness)]].concat(),
     };

@@ -103,6 +103,8 @@ pub struct Case {
     pub gain_is_declared: bool,
     /// What is recorded of the stand's motion.
     pub measures: Motion,
+    /// Whether it is known what torques in the stand do to the records.
+    pub sees_torques: bool,
     /// The recorder as declared.
     pub recorder: Option<Fixed>,
     pub units: ChannelUnits,
@@ -189,6 +191,7 @@ pub fn run(mut case: Case, workers: Workers) -> Result<Diagnosis, Failure> {
         several: case.several.clone(),
         gain_is_free: !case.gain_is_declared,
         measures: case.measures,
+        sees_torques: case.sees_torques,
         recorder: case.recorder.clone(),
         units: case.units.clone(),
         held: None,

@@ -48,6 +48,8 @@ pub struct FitContext {
     pub gain_is_free: bool,
     /// What is recorded of the stand's motion.
     pub measures: Motion,
+    /// Whether it is known what torques in the stand do to the records.
+    pub sees_torques: bool,
     /// The recorder, as declared in the stand file.
     pub recorder: Option<Fixed>,
     pub units: ChannelUnits,
@@ -76,14 +78,8 @@ impl FitContext {
     pub fn allows(&self, effect: &EffectForm) -> bool {
         let acts_at_gage = effect.form.stage == Stage::Stand;
         (self.held.is_none() || effect.needs_no_spring())
-            && (!acts_at_gage || self.sees_torques())
+            && (!acts_at_gage || self.sees_torques)
             && effect.most_turns(&self.scales) >= FEWEST_TURNS
-    }
-
-    /// Whether it is known how a torque at the gage moves it, and that is what is recorded.
-    pub fn sees_torques(&self) -> bool {
-        let known = |several: &SeveralModes| several.show_torques();
-        self.measures == Motion::Displacement && self.several.as_ref().is_none_or(known)
     }
 
     /// Number of constants that are moved in any fit.

@@ -148,14 +148,19 @@ impl SearchState {
 
     /// Whether what the plain stand leaves is above the noise floor only because that is the one of white noise: no test sees a
     /// dependence on input or motion, and no effect explains a significant part of the training residual. Beside an effect,
-    /// what is left of it would look the same.
+    /// what is left of it would look the same, and so would torques that were not looked for.
     pub(super) fn is_coloured_noise(&self, model: &ScoredModel, tests: &ResidualTests) -> bool {
         let error = model.compared_rms();
         let may_be = |floor: NoiseFloor| {
             floor.from == NoiseFloorSource::OutOfBand && error <= MOST_COLOURED * floor.rms
         };
         let is_plain = model.effect_names().is_empty();
-        if !is_plain || !self.noise_floor.is_some_and(may_be) || tests.follows_anything() {
+        let sees_torques = model.fitted.structure.context.sees_torques;
+        if !is_plain
+            || !sees_torques
+            || !self.noise_floor.is_some_and(may_be)
+            || tests.follows_anything()
+        {
             return false;
         }
         let round = self.rounds.first();

@@ -36,10 +36,21 @@ pub(super) fn measures(stand: &Stand) -> Result<Motion, Failure> {
 }
 
 /// Says that no torques in the stand are looked for where their effect on the record is not known.
-pub(super) fn torques_unknown(several: Option<&SeveralModes>, measures: Motion) -> Option<Warning> {
+pub(super) fn torques_unknown(
+    several: Option<&SeveralModes>,
+    measures: Motion,
+    rings: bool,
+) -> Option<Warning> {
     let (why, remedy) = match (measures, several) {
         (Motion::Displacement, None) => return None,
-        (Motion::Displacement, Some(several)) if several.show_torques() => return None,
+        (Motion::Displacement, Some(several)) if several.show_torques() => match rings {
+            false => return None,
+            true => (
+                "the motion that free ringing begins with is known of all modes together only"
+                    .to_owned(),
+                "give records with an applied torque, without decays",
+            ),
+        },
         (Motion::Displacement, Some(_)) => (
             "how far they move each mode there does not follow from residues of both signs"
                 .to_owned(),

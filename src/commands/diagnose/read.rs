@@ -90,7 +90,11 @@ pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<(Case, bool), Fail
     warnings.extend(held_out_instead(&mut records, last_is_held_out));
     let several = stand.map(several).transpose()?.flatten();
     let measures = stand.map_or(Ok(Motion::Displacement), measures)?;
-    warnings.extend(torques_unknown(several.as_ref(), measures));
+    let all = records.train.iter().chain(&records.holdout);
+    let rings = all.map(StandRecord::is_free).any(|rings| rings);
+    let torques_unknown = torques_unknown(several.as_ref(), measures, rings);
+    let sees_torques = torques_unknown.is_none();
+    warnings.extend(torques_unknown);
     let case = Case {
         sources: SourceFiles {
             stand: args.stand.as_ref().map(|p| p.shown().to_string()),
@@ -104,6 +108,7 @@ pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<(Case, bool), Fail
         // Free ringing does not show the gain.
         gain_is_declared: gain.is_some() && static_gain(stand).is_none() || args.train.is_empty(),
         measures,
+        sees_torques,
         recorder: stand.and_then(recorder),
         units,
         warnings,

@@ -109,6 +109,6 @@ impl SearchState {
         let context = &model.fitted.structure.context;
         let is_held = context.held.is_some();
         let mut records = self.records.train.iter().chain(&self.records.holdout);
-        !is_held && context.sees_torques() && !records.any(StandRecord::is_free)
+        !is_held && context.sees_torques && !records.any(StandRecord::is_free)
     }
 }
