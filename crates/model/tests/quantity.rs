@@ -426,6 +426,24 @@ fn no_text_makes_the_reader_panic() {
     );
 }
 
+/// 1 kg cm² = 10⁻⁴ kg m², 1 g cm² = 10⁻⁷ kg m². A kilogram-metre that is not squared is a torque to some.
+#[test]
+fn inertias_that_data_sheets_write_as_one_word() {
+    for (text, want) in [
+        ("0.3 kgm²", 0.3),
+        ("0.3 kgm^2", 0.3),
+        ("12 kgcm2", 12e-4),
+        ("5 gcm²", 5e-7),
+        ("7 kgmm²", 7e-6),
+        ("0.3 kg m²", 0.3),
+    ] {
+        let got = Kind::Inertia.parse(text).unwrap();
+        assert!((got / want - 1.0).abs() < 1e-12, "{text}: {got} {want}");
+    }
+    assert!(Kind::Inertia.parse("0.3 kgm").is_err());
+    assert!(Kind::Inertia.parse("0.3 kgm^3").is_err());
+}
+
 /// Worked by hand: 1 lbf in = 4.4482216152605 N × 0.0254 m, 1 ozf = 1/16 lbf, 1 kp = 9.80665 N.
 #[test]
 fn units_of_torque_that_motors_and_screws_are_sold_with() {

@@ -237,9 +237,19 @@ impl<'a> Lexer<'a> {
             self.rest = &self.rest[length..];
             return Ok(Token::Symbol(self.find(&name)?));
         }
-        let symbol = self.find(word)?;
+        let end = self.mass_of_inertia(word).map_or(end, str::len);
+        let symbol = self.find(&self.rest[..end])?;
         self.rest = &self.rest[end..];
         Ok(Token::Symbol(symbol))
+    }
+
+    /// The mass in front of a squared length, as in `kgm2`: data sheets of motors write inertias so.
+    fn mass_of_inertia(&self, word: &str) -> Option<&'static str> {
+        let power = &self.rest[word.len()..];
+        let is_squared = power.strip_prefix('^').unwrap_or(power).starts_with('2');
+        let is_length = |length: &str| matches!(length, "m" | "cm" | "mm");
+        let mut masses = ["kg", "g"].into_iter().filter(|_| is_squared);
+        masses.find(|mass| word.strip_prefix(mass).is_some_and(is_length))
     }
 
     /// Two words that are one unit: `pound-force`, `pound mass`, `deg F`.
