@@ -90,8 +90,8 @@ pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<(Case, bool), Fail
     warnings.extend(held_out_instead(&mut records, last_is_held_out));
     let several = stand.map(several).transpose()?.flatten();
     let measures = stand.map_or(Ok(Motion::Displacement), measures)?;
-    let all = records.train.iter().chain(&records.holdout);
-    let rings = all.map(StandRecord::is_free).any(|rings| rings);
+    let is_free = StandRecord::is_free;
+    let rings = records.train.iter().chain(&records.holdout).any(is_free);
     let torques_unknown = torques_unknown(several.as_ref(), measures, rings);
     let sees_torques = torques_unknown.is_none();
     warnings.extend(torques_unknown);
