@@ -27,6 +27,10 @@ pub struct Diagnose {
     /// Hold-out record of free ringing; may be given several times [default: without --train, the last decay]
     #[arg(long, value_name = "FILE")]
     pub holdout_decay: Vec<PathBuf>,
+    /// Known loads that were put on slowly, a table or a record with the applied and the measured quantity: they give the gain
+    /// that free ringing does not show, and check the effects; may be given several times
+    #[arg(long = "static", value_name = "FILE")]
+    pub static_loads: Vec<PathBuf>,
     /// Channel with the applied quantity: its number as inspect gives it, heading or name; of an MCAP file topic and
     /// field, as '/joint_states.effort[name=motor]', or the field of --topic
     #[arg(long, value_name = "COL", required_unless_present_any = ["decay", "holdout_decay"])]
@@ -76,6 +80,11 @@ impl Diagnose {
 
     /// All records.
     pub fn records(&self) -> Vec<PathBuf> {
-        [self.training_files(), self.held_out_files()].concat()
+        [
+            self.training_files(),
+            self.held_out_files(),
+            self.static_loads.clone(),
+        ]
+        .concat()
     }
 }

@@ -2,6 +2,7 @@
 
 mod decays;
 mod declared;
+mod loads;
 mod page;
 mod read;
 mod refined;
@@ -41,8 +42,9 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
     let mut html = result.open_beside(args.html.as_deref(), &files)?;
     let provenance = html.as_ref().map(|_| provenance(args, stand.as_ref()));
     let provenance = provenance.transpose()?;
-    let (case, is_lossy) = read::read(args, stand.as_ref().map(|(stand, _)| stand))?;
-    if refined.is_some() && stand.is_none() && args.train.is_empty() && !case.units.is_torque {
+    let read = read::read(args, stand.as_ref().map(|(stand, _)| stand))?;
+    let has_gain = !args.train.is_empty() || !read.loads.is_empty() || read.case.units.is_torque;
+    if refined.is_some() && stand.is_none() && !has_gain {
         return Err(decays::no_gain());
     }
     let fits = Progress::new(Task::Fits);
@@ -53,8 +55,9 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
         threads: args.work.thread_count(),
         progress: &progress,
     };
-    let mut diagnosis = diagnose::run(case, workers)?;
+    let mut diagnosis = diagnose::run(read.case, workers)?;
     drop(fits);
+    diagnosis.check_loads(&read.loads, read.declared_gain)?;
     diagnosis.shows_all = args.all;
     if let Some(refined) = &mut refined {
         let declared = stand.as_ref().map(|(stand, text)| (stand, text.as_str()));
@@ -65,7 +68,11 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
     }
     output::print(&diagnosis.document(args.json))?;
     output::finish_all(refined.into_iter().chain(html))?;
-    Ok(conclude(&diagnosis.warnings, is_lossy, &args.strictness))
+    Ok(conclude(
+        &diagnosis.warnings,
+        read.is_lossy,
+        &args.strictness,
+    ))
 }
 
 /// Where the page comes from.

@@ -9,6 +9,7 @@ use super::describe;
 use super::detection::{DetectionLimit, detection_limits};
 use super::guard_models::GuardModel;
 use super::held::HeldBody;
+use super::known_loads::LoadCheck;
 use super::ladder::Ladder;
 use super::moment::ChangedStand;
 use super::noise_floor::NoiseFloorSource;
@@ -55,6 +56,8 @@ pub struct Diagnosis {
     pub explained: Ladder,
     /// Constants of the plain stand.
     pub constants: Vec<StandConstant>,
+    /// Known loads that were put on slowly, and what the stand shows of them; `null` without any.
+    pub known_loads: Option<LoadCheck>,
     /// The effects that were tried: accepted ones first, then by hold-out error.
     pub candidates: Vec<CandidateFit>,
     /// For `nothing-missing`: of each effect the smallest amount that the training records would have shown.
@@ -184,6 +187,7 @@ impl Diagnosis {
             error,
             explained: std::mem::take(&mut found.ladder),
             constants: constants(&case, &found),
+            known_loads: None,
             sources: case.sources,
             next_experiment: describe::next_experiment(
                 &found,

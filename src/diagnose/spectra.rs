@@ -100,7 +100,8 @@ pub fn coherent_share(
     let (mut explained, mut total, mut variance) = (0.0, 0.0, 0.0);
     let power = u.power();
     let least = ONLY_NOISE * power.iter().sum::<f64>() / power.len().max(1) as f64;
-    let memory = memory_samples / (0.5 * length as f64);
+    // A model on the way may have no damping at all.
+    let memory = (memory_samples / (0.5 * length as f64)).min(u.segments.len() as f64);
     let apart = 1 + (1.5 * memory) as usize;
     for k in 0..u.frequencies() {
         let pairs = u.segments.iter().zip(&y.segments);
@@ -236,5 +237,7 @@ mod tests {
         // What answers the input itself still does.
         let (share, _) = coherent_share(&input, &input, 1024, 0.0);
         assert!(share > 0.9, "{share}");
+        // A model that never settles compares nothing with anything.
+        assert_eq!(coherent_share(&input, &input, 1024, f64::INFINITY).0, 0.0);
     }
 }

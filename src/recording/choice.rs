@@ -6,7 +6,7 @@ use torqcomp_model::Unit;
 use super::axis::{UNIFORM, step_of};
 use super::moment::Moment;
 use super::text::CELLS_WITH_UNITS;
-use super::{Channel, RateFrom, Recording, TimeAxis, formats};
+use super::{Channel, RateFrom, Recording, TimeAxis, check_holes, check_size, formats};
 use crate::failure::{ErrorCode, Failure, did_you_mean};
 use crate::io::{ChannelChoice, Reading, digits};
 use crate::print::{list, plural};
@@ -322,6 +322,21 @@ impl Recording {
             unit,
             warnings,
         })
+    }
+
+    /// A channel whose values count as they are, without a time axis, with its unit and what is to be said of it.
+    ///
+    /// # Errors
+    /// If it is not there, has holes or is too large.
+    pub(crate) fn column(
+        &self,
+        choice: &ChannelChoice,
+    ) -> Result<(&Channel, Option<NamedUnit>, Option<Warning>), Failure> {
+        let channel = self.channel(choice)?;
+        check_holes(channel)?;
+        check_size(channel)?;
+        let (unit, warning) = unit_of(choice, &channel.heading, channel.unit.as_ref())?;
+        Ok((channel, unit, warning))
     }
 
     /// The channel that is chosen, whatever its rate.

@@ -22,8 +22,8 @@ pub struct Refined<'a> {
     pub damping_ratio: (f64, Option<f64>),
     /// Of a stand with several modes what was fitted of each, by the keys of its table.
     pub modes: Vec<Vec<(&'static str, Estimate)>>,
-    /// Recorded per applied quantity at rest, in SI units, where it is part of the fit.
-    pub gain: Option<f64>,
+    /// Recorded per applied quantity at rest, in SI units, where it was found, and its standard uncertainty.
+    pub gain: Option<(f64, Option<f64>)>,
     /// Units of record and applied quantity in SI.
     pub units: (&'a str, &'a str),
     /// Unit of the record as its file gives it.
@@ -58,8 +58,8 @@ impl Refined<'_> {
         ]
     }
 
-    /// The static gain with its units, as `"2 V/N"`.
-    fn static_gain(&self, gain: f64) -> String {
+    /// Unit of the static gain, as `V/N`.
+    fn gain_unit(&self) -> String {
         let (recorded, applied) = self.units;
         let one = |unit: &str| if unit.is_empty() { "1" } else { unit }.to_owned();
         let applied = if applied.contains([' ', '/']) {
@@ -67,7 +67,7 @@ impl Refined<'_> {
         } else {
             one(applied)
         };
-        format!("{} {}/{applied}", digits::text(gain, 12), one(recorded))
+        format!("{}/{applied}", one(recorded))
     }
 
     /// A quantity with its standard uncertainty and its source.
@@ -118,7 +118,7 @@ impl Refined<'_> {
             table[MEASURES] = measures;
         }
         if let Some(gain) = self.gain {
-            table[GAIN] = value(self.static_gain(gain));
+            table[GAIN] = self.quantity(gain, &self.gain_unit());
             document.remove("calibration");
         } else if let Some(kept) = kept {
             table[GAIN] = kept;

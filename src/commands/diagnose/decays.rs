@@ -75,13 +75,15 @@ pub fn check_arguments(args: &Diagnose) -> Result<(), Failure> {
     ];
     let given = of_applied.into_iter().find(|(_, value)| value.is_some());
     match given {
-        Some((flag, _)) if args.train.is_empty() => Err(Failure::usage(
-            ErrorCode::ConflictingArguments,
-            format_args!(
-                "{flag} does not apply to --decay, as nothing acts on a stand that rings freely: omit {flag}, or give records with \
-                 an applied quantity with --train"
-            ),
-        )),
+        Some((flag, _)) if args.train.is_empty() && args.static_loads.is_empty() => {
+            Err(Failure::usage(
+                ErrorCode::ConflictingArguments,
+                format_args!(
+                    "{flag} does not apply to --decay, as nothing acts on a stand that rings freely: omit {flag}, or give records with \
+                 an applied quantity with --train or --static"
+                ),
+            ))
+        }
         _ => Ok(()),
     }
 }
@@ -104,6 +106,7 @@ pub fn no_gain() -> Failure {
     Failure::usage(
         ErrorCode::MissingArgument,
         "free ringing does not show the gain, without which a stand file cannot say what an effect in the unit of the record is as a \
-         torque: give --stand FILE with a static_gain or a [calibration], or leave -o out",
+         torque: give known loads with --static FILE and --applied COL, or --stand FILE with a static_gain or a [calibration], or leave \
+         -o out",
     )
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::text::{
     WOULD_SHOW, answer, candidates, cells, constant_rows, error_rows, error_sentences, ladder_rows,
-    limit_rows, share_rows,
+    limit_rows, load_sentences, share_rows,
 };
 use crate::chart::{Chart, Page, Series};
 use crate::diagnose::{
@@ -73,7 +73,8 @@ impl Draft<'_> {
     fn errors(&mut self) {
         self.page.heading("Error before and after");
         self.page.table(&error_rows(self.diagnosis));
-        for sentence in error_sentences(self.diagnosis) {
+        let sentences = error_sentences(self.diagnosis).into_iter();
+        for sentence in sentences.chain(load_sentences(self.diagnosis)) {
             self.page.text(&sentence);
         }
         if self.diagnosis.effects.len() > 1 {

@@ -4,13 +4,15 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use torqcomp_model::simulate::Excitation;
-use torqcomp_model::{Dimension, UnitSystem};
+use torqcomp_model::{Dimension, Estimate, UnitSystem};
 
-use super::decays;
 use super::declared::{declared, declared_effects, measures, recorder, several, torques_unknown};
+use super::{decays, loads};
 use crate::cli::Diagnose;
 use crate::commands::convert;
-use crate::diagnose::{Case, ChannelUnits, InitialState, Records, SourceFiles, StandRecord};
+use crate::diagnose::{
+    Case, ChannelUnits, InitialState, KnownLoads, Records, SourceFiles, StandRecord,
+};
 use crate::failure::{ErrorCode, Failure};
 use crate::file_name::{ShowPath, texts};
 use crate::identify::Motion;
@@ -54,31 +56,73 @@ impl Pair {
             unit_text: None,
         }
     }
+
+    /// The measured channel in SI units; `calibrated` is the stand that converts it to torque.
+    pub(super) fn measured_si(&self, calibrated: Option<&Stand>) -> Result<Vec<f64>, Failure> {
+        let Some(stand) = calibrated else {
+            let factor = self.measured_unit.as_ref().map_or(1.0, |u| u.unit.factor());
+            return Ok(self.measured.iter().map(|y| y * factor).collect());
+        };
+        let calibration = stand.calibration(self.measured_channel(), UnitSystem::Si)?;
+        // The constant of the records is estimated anew, as in records of torque.
+        let chain = Calibration {
+            zero: 0.0,
+            ..calibration
+        };
+        let mut values = self.measured.clone();
+        convert(&chain, &mut values).map_err(|(row, why)| {
+            Failure::failed(ErrorCode::InvalidSample, why)
+                .sample(row + 1)
+                .at(&self.source)
+        })?;
+        Ok(values)
+    }
 }
 
-/// Reads all records, and what the stand file declares of them; whether something of a record was lost.
-pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<(Case, bool), Failure> {
-    let (train, holdout) = pairs(args)?;
+/// What was read.
+pub struct ReadCase {
+    pub case: Case,
+    /// Loads that no effect is fitted to.
+    pub loads: Vec<KnownLoads>,
+    /// The static gain, as far as stand file or units give it, in SI units.
+    pub declared_gain: Option<Estimate>,
+    /// Whether something of a record was lost.
+    pub is_lossy: bool,
+}
+
+/// Reads all records, and what the stand file declares of them.
+pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<ReadCase, Failure> {
+    let (mut train, mut holdout) = pairs(args)?;
+    let loads = loads::pairs(args)?;
+    if let (Some(load), true) = (loads.first(), args.train.is_empty()) {
+        // They say in what the gain is counted.
+        for pair in train.iter_mut().chain(&mut holdout) {
+            pair.applied_unit.clone_from(&load.applied_unit);
+        }
+    }
     let last_is_held_out = args.train.is_empty() && args.held_out_files().is_empty();
     let first = &train[0];
     for other in train.iter().chain(&holdout) {
         check_same_kind(first, other)?;
     }
     refuse_same_samples(&train, &holdout)?;
-    let (units, is_calibrated) = units(first, stand);
+    let (units, is_calibrated) = units(first, stand, first.applied.is_some() || !loads.is_empty());
     let gain = declared_gain(stand, &units);
     let declared = stand
         .map(|stand| declared(stand, gain.unwrap_or(1.0)))
         .transpose()?;
-    let all = train.iter().chain(&holdout);
-    let mut warnings: Vec<Warning> = all.flat_map(|pair| pair.warnings.clone()).collect();
-    let is_lossy = train.iter().chain(&holdout).any(|pair| pair.is_lossy);
+    loads::check_units(&loads, first)?;
+    let all = || train.iter().chain(&holdout).chain(&loads);
+    let mut warnings: Vec<Warning> = all().flat_map(|pair| pair.warnings.clone()).collect();
+    let is_lossy = all().any(|pair| pair.is_lossy);
     let calibrated = stand.filter(|_| is_calibrated);
     warnings.extend(stand.iter().flat_map(|stand| stand.warnings.clone()));
     if let Some(stand) = calibrated {
         let calibration = stand.calibration(train[0].measured_channel(), UnitSystem::Si)?;
         warnings.extend(calibration.warnings);
     }
+    let loads = loads.into_iter().map(|pair| loads::known(pair, calibrated));
+    let loads = loads.collect::<Result<_, _>>()?;
     let convert = |pairs: Vec<Pair>| -> Result<Vec<StandRecord>, Failure> {
         let each = pairs.into_iter();
         each.map(|p| record(p, calibrated, &units)).collect()
@@ -113,7 +157,17 @@ pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<(Case, bool), Fail
         units,
         warnings,
     };
-    Ok((case, is_lossy))
+    Ok(ReadCase {
+        case,
+        loads,
+        declared_gain: gain.map(|gain| {
+            let std = stand
+                .and_then(Stand::static_gain)
+                .and_then(|g| g.relative_std);
+            Estimate::of("", gain, std.map(|std| std * gain.abs()))
+        }),
+        is_lossy,
+    })
 }
 
 /// Holds out the ends of the training records where no record is held out; says what is held out in place of a record that was
@@ -264,17 +318,15 @@ fn static_gain(stand: Option<&Stand>) -> Option<f64> {
     stand?.static_gain().map(|gain| gain.value)
 }
 
-/// Units of the channels, and whether the stand's calibration converts the measured one to torque.
-fn units(pair: &Pair, stand: Option<&Stand>) -> (ChannelUnits, bool) {
+/// Units of the channels, and whether the stand's calibration converts the measured one to torque; `acts` is whether there is
+/// an applied quantity, or known loads.
+fn units(pair: &Pair, stand: Option<&Stand>, acts: bool) -> (ChannelUnits, bool) {
     let channels = [&pair.applied_unit, &pair.measured_unit];
     let [applied_text, measured_text] =
         channels.map(|unit| unit.as_ref().map_or_else(String::new, |u| u.text.clone()));
     let [applied, measured] = channels.map(|unit| unit.as_ref().map(|u| u.unit.dimension()));
     // What does not act has any unit.
-    let applied = match pair.applied {
-        Some(_) => applied,
-        None => Some(TORQUE),
-    };
+    let applied = if acts { applied } else { Some(TORQUE) };
     let factors = channels.map(|unit| unit.as_ref().map_or(1.0, |u| u.unit.factor()));
     let is_torque_stand = static_gain(stand).is_none();
     let signal = pair
@@ -323,30 +375,13 @@ fn record(
     calibrated: Option<&Stand>,
     units: &ChannelUnits,
 ) -> Result<StandRecord, Failure> {
-    let [applied_factor, measured_factor] = units.factors;
+    let applied_factor = units.factors[0];
     let is_free = pair.applied.is_none();
     let applied: Vec<f64> = match &pair.applied {
         Some(applied) => applied.iter().map(|u| u * applied_factor).collect(),
         None => vec![0.0; pair.measured.len()],
     };
-    let measured: Vec<f64> = match calibrated {
-        None => pair.measured.iter().map(|y| y * measured_factor).collect(),
-        Some(stand) => {
-            let calibration = stand.calibration(pair.measured_channel(), UnitSystem::Si)?;
-            // The constant of the records is estimated anew, as in records of torque.
-            let chain = Calibration {
-                zero: 0.0,
-                ..calibration
-            };
-            let mut values = pair.measured;
-            convert(&chain, &mut values).map_err(|(row, why)| {
-                Failure::failed(ErrorCode::InvalidSample, why)
-                    .sample(row + 1)
-                    .at(&pair.source)
-            })?;
-            values
-        }
-    };
+    let measured = pair.measured_si(calibrated)?;
     if !is_free {
         refuse_constant(&pair.source, "applied", &applied)?;
     }

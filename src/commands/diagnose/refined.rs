@@ -47,7 +47,11 @@ pub fn stand_file(
         natural_hz: both(natural_hz),
         damping_ratio: both(damping_ratio),
         modes: modes(model),
-        gain: (context.gain_is_free || held.is_some()).then_some(gain.value()),
+        gain: match &diagnosis.known_loads {
+            _ if context.gain_is_free || held.is_some() => Some(both(gain)),
+            Some(loads) if !context.units.is_torque => Some(loads.gain_si),
+            _ => None,
+        },
         units: (&units.diagnosed, &stand::si_unit(&units.applied)),
         measured_unit: match units.measured.as_str() {
             "" => "1",
@@ -58,10 +62,19 @@ pub fn stand_file(
             constant(|r| r.record.initial.preload),
         ],
         effects: effects.collect(),
-        source: format!("diagnosed: {}", diagnosis.sources.train.join(", ")),
+        source: format!("diagnosed: {}", fitted_files(diagnosis).join(", ")),
         verdict: diagnosis.verdict.name(),
     };
     stand::refine(declared, &refined)
+}
+
+/// The files that the numbers come from.
+fn fitted_files(diagnosis: &Diagnosis) -> Vec<&str> {
+    let loads = diagnosis.known_loads.iter().flat_map(|loads| &loads.files);
+    let train = diagnosis.sources.train.iter().map(String::as_str);
+    train
+        .chain(loads.map(|file| file.source.as_str()))
+        .collect()
 }
 
 /// What was fitted of each mode of a stand with several: shapes stay as they are.

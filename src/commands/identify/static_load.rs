@@ -12,7 +12,7 @@ use crate::file_name::ShowPath;
 use crate::identify::Identification;
 use crate::identify::static_load::{CalibrationStep, LoadUnits, Point, identify, series_of};
 use crate::io::{ChannelChoice, Flags, Input, Reading, digits};
-use crate::recording::{Recording, check_holes, check_size, unit_of};
+use crate::recording::{Recording, unit_of};
 use crate::stand::TransducerSignal;
 use crate::stand::update::Entry;
 use crate::unit::{NamedUnit, RecordedChannel};
@@ -213,10 +213,7 @@ fn column(
     choice: &ChannelChoice,
     warnings: &mut Vec<Warning>,
 ) -> Result<(Vec<f64>, NamedUnit), Failure> {
-    let channel = recording.channel(choice)?;
-    check_holes(channel)?;
-    check_size(channel)?;
-    let (unit, warning) = unit_of(choice, &channel.heading, channel.unit.as_ref())?;
+    let (channel, unit, warning) = recording.column(choice)?;
     warnings.extend(warning);
     let flag = choice.flags.unit.unwrap_or_default();
     let named = RecordedChannel {

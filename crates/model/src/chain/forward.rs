@@ -239,7 +239,7 @@ impl Chain {
         self.record(Signal::Samples(shown), input)
     }
 
-    fn torques(&self) -> Torques<'_> {
+    pub(super) fn torques(&self) -> Torques<'_> {
         self.links.iter().filter_map(Link::torque).collect()
     }
 

@@ -12,6 +12,7 @@
 
 mod forward;
 mod gage_path;
+mod slow_loads;
 
 use std::f64::consts::TAU;
 

@@ -1,0 +1,187 @@
+//! What a stand shows of loads that are put on slowly.
+
+use num_complex::Complex64;
+
+use super::Chain;
+use crate::effects::{Action, SampleClock, Stage};
+use crate::modal::{ModalPart, ModalResponse};
+use crate::mode::Mode;
+use crate::simulate::{Excitation, MotionProgress, MotionState, OngoingMotion, integrate};
+
+/// Periods of the slowest mode over which a load changes to the next.
+const CHANGES: f64 = 2.0;
+/// Such periods that it then stays: what is left of a step with critical damping is `e^(−6π)`, 6e-9 of it.
+const RESTS: f64 = 3.0;
+/// Samples in a period of the fastest mode.
+const PER_PERIOD: f64 = 40.0;
+/// Steps of integration from sample to sample.
+const SUBSTEPS: usize = 2;
+
+impl Chain {
+    /// The record under each of some loads, put on one after the other from no load on, so slowly that nothing swings: dry friction
+    /// and play remember the loads before. What a linear link makes of it is its response at rest; lines and drifts are not in it.
+    ///
+    /// The equations are those of [`simulate`](Self::simulate) with critical damping, which changes nothing at rest, and with a
+    /// smooth change `10 s³ − 15 s⁴ + 6 s⁵` from load to load. A motion that leaves all bounds is NaN.
+    ///
+    /// ```
+    /// use torqcomp_model::{Chain, Link, Mode, effects::Effect};
+    /// let effect = Effect::named("cubic-stiffness").unwrap();
+    /// let torque = Link::of(effect, &effect.forms[0], &[0.25]);
+    /// let mode = Mode { omega_rad_s: 100.0, damping_ratio: 0.01 };
+    /// let chain = Chain::new(mode, 2.0).with_links([torque]);
+    /// // x + x³/4 = 2 u: 2 + 8/4 = 4 and 1 + 1/4 = 5/4.
+    /// let shown = chain.under_slow_loads(&[2.0, 0.625, 0.0]);
+    /// for (shown, by_hand) in shown.iter().zip([2.0, 1.0, 0.0]) {
+    ///     assert!((shown - by_hand).abs() < 1e-6, "{shown}");
+    /// }
+    /// ```
+    #[must_use]
+    pub fn under_slow_loads(&self, loads: &[f64]) -> Vec<f64> {
+        let mut record = match self.has_torques() {
+            true => self.settled(loads),
+            false => loads.iter().map(|load| self.gain * load).collect(),
+        };
+        // No time passes for what drifts.
+        let clock = SampleClock { step_s: 0.0 };
+        for link in self.links.iter().filter(|link| link.stage > Stage::Stand) {
+            let passed: Complex64 = match &link.action {
+                Action::Factor(factor) => factor(&self.stand, 0.0),
+                Action::Recorder { response, .. } => response(0.0),
+                _ => Complex64::ONE,
+            };
+            for sample in &mut record {
+                *sample *= passed.re;
+            }
+            match &link.action {
+                Action::Feedthrough(term) => {
+                    let past = self.gain * term(&self.stand, 0.0).re;
+                    for (sample, load) in record.iter_mut().zip(loads) {
+                        *sample += past * load;
+                    }
+                }
+                Action::Distortion(distortion) => distortion.forward(clock, &mut record),
+                _ => {}
+            }
+        }
+        record
+    }
+
+    /// What the gage shows of the motion at the end of each load.
+    fn settled(&self, loads: &[f64]) -> Vec<f64> {
+        let damped = |part: &ModalPart| ModalPart {
+            mode: Mode {
+                damping_ratio: 1.0,
+                ..part.mode
+            },
+            quadrature: 0.0,
+            ..*part
+        };
+        let parts = self.stand.parts();
+        let Ok(stand) = ModalResponse::new(parts.iter().map(damped).collect()) else {
+            return vec![f64::NAN; loads.len()];
+        };
+        let frequencies = parts.iter().map(|part| part.mode.natural_frequency_hz());
+        let slowest_hz = frequencies.fold(f64::INFINITY, f64::min);
+        let rate_hz = PER_PERIOD * stand.highest_hz();
+        let [changes, rests] =
+            [CHANGES, RESTS].map(|periods| (periods * rate_hz / slowest_hz).ceil() as usize);
+        let input = Excitation::new(course(loads, changes, rests), rate_hz, 0.0, SUBSTEPS);
+        let torques = self.torques();
+        let mut progress =
+            MotionProgress::begin(&torques, (&stand, MotionState::default()), self.shift);
+        let motion = OngoingMotion {
+            stand: &stand,
+            gain: self.gain,
+            shift: self.shift,
+            torques: &torques,
+            progress: &mut progress,
+        };
+        let shown = integrate(&mut [motion], &input, 0..input.samples().len());
+        let ends = shown.iter().flat_map(|shown| shown.chunks(changes + rests));
+        ends.filter_map(|of_load| of_load.last().copied()).collect()
+    }
+}
+
+/// The course of the load: from no load, each changes smoothly to the next within so many samples and stays for so many.
+fn course(loads: &[f64], changes: usize, rests: usize) -> Vec<f64> {
+    let before = std::iter::once(&0.0).chain(loads);
+    let to_next = before.zip(loads).flat_map(|(from, to)| {
+        let part = move |k: usize| {
+            let s = k as f64 / changes as f64;
+            s.powi(3) * (10.0 + s * (6.0 * s - 15.0))
+        };
+        let changing = (1..=changes).map(move |k| from + (to - from) * part(k));
+        changing.chain(std::iter::repeat_n(*to, rests))
+    });
+    to_next.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chain::Link;
+    use crate::effects::Effect;
+
+    const MODE: Mode = Mode {
+        omega_rad_s: 3700.0,
+        damping_ratio: 0.02,
+    };
+
+    fn stand(effect: &str, values: &[f64]) -> Chain {
+        let effect = Effect::named(effect).expect("an effect");
+        Chain::new(MODE, 1.0).with_links([Link::of(effect, &effect.forms[0], values)])
+    }
+
+    fn assert_near(shown: &[f64], want: &[f64]) {
+        for (shown, want) in shown.iter().zip(want) {
+            assert!((shown - want).abs() < 1e-5, "{shown} for {want}");
+        }
+        assert_eq!(shown.len(), want.len());
+    }
+
+    #[test]
+    fn dry_friction_holds_back_whichever_way_it_goes() {
+        // A torque of 0.5 against the motion: the spring takes 0.5 less on the way up, and 0.5 more on the way down; it does not
+        // move for less than twice that.
+        let shown = stand("coulomb-friction", &[0.5])
+            .under_slow_loads(&[0.4, 1.0, 3.0, 2.5, 2.0, 1.0, 0.0, -1.0]);
+        assert_near(&shown, &[0.0, 0.5, 2.5, 2.5, 2.5, 1.5, 0.5, -0.5]);
+    }
+
+    #[test]
+    fn a_gain_and_a_coupling_are_what_they_are_at_rest() {
+        let effect = Effect::named("gain-error").expect("an effect");
+        let gain = || Link::of(effect, &effect.forms[0], &[0.1]);
+        let plain = Chain::new(MODE, 2.0).with_links([gain()]);
+        assert_near(&plain.under_slow_loads(&[1.0, -2.0]), &[2.2, -4.4]);
+        // An amplifier that is coupled through a capacitor shows no load that stays.
+        let effect = Effect::named("capacitive-coupling").expect("an effect");
+        let form = effect.form(Some("ac-coupled")).expect("a form");
+        let coupled = Chain::new(MODE, 2.0).with_links([Link::of(effect, form, &[1.0])]);
+        assert_near(&coupled.under_slow_loads(&[1.0, -2.0]), &[0.0, 0.0]);
+    }
+
+    #[test]
+    fn modes_that_bend_together() {
+        // Of 1 N m at the gage the first mode takes 0.75 and the second 0.25 of the displacement; with the torque x³/4 they
+        // come to rest where x + x³/4 = u, however the modes share it.
+        let part = |omega_rad_s: f64, residue| ModalPart {
+            mode: Mode {
+                omega_rad_s,
+                damping_ratio: 0.01,
+            },
+            residue,
+            quadrature: 0.0,
+            at_gage: Some(residue),
+        };
+        let stand = ModalResponse::new(vec![part(3700.0, 0.75), part(9000.0, 0.25)]);
+        let effect = Effect::named("cubic-stiffness").expect("an effect");
+        let torque = Link::of(effect, &effect.forms[0], &[0.25]);
+        let chain = Chain::new(stand.expect("modes"), 1.0).with_links([torque]);
+        assert_near(
+            &chain.under_slow_loads(&[1.25, 4.0, -4.0]),
+            &[1.0, 2.0, -2.0],
+        );
+    }
+}

@@ -1,0 +1,95 @@
+//! Known loads of a diagnosis, put on slowly.
+
+use std::path::Path;
+
+use super::read::Pair;
+use crate::cli::Diagnose;
+use crate::diagnose::KnownLoads;
+use crate::failure::{ErrorCode, Failure};
+use crate::io::{ChannelChoice, Input, Reading};
+use crate::recording::Recording;
+use crate::stand::Stand;
+use crate::unit::NamedUnit;
+
+/// The loads and readings of each file.
+pub(super) fn pairs(args: &Diagnose) -> Result<Vec<Pair>, Failure> {
+    args.static_loads
+        .iter()
+        .map(|file| pair(args, file))
+        .collect()
+}
+
+fn pair(args: &Diagnose, file: &Path) -> Result<Pair, Failure> {
+    let applied = args.applied.as_deref().ok_or_else(|| {
+        Failure::usage(
+            ErrorCode::MissingArgument,
+            "--static needs --applied COL, the channel with the known loads",
+        )
+    })?;
+    let choices = ChannelChoice::applied_and_measured(
+        [applied, &args.measured],
+        [args.applied_unit.as_deref(), args.measured_unit.as_deref()],
+    );
+    // When a load was put on does not matter, so no time axis is searched for.
+    let reading = Reading {
+        rate_hz: Some(1.0),
+        resample: false,
+        range: None,
+        ..args.reading.clone()
+    };
+    let recording = Recording::read(&Input::of(file), &choices, &reading)?;
+    let [load, gage] = &choices;
+    let (load, applied_unit, of_load) = recording.column(load)?;
+    let (gage, measured_unit, of_gage) = recording.column(gage)?;
+    if load.samples.len() != gage.samples.len() {
+        return Err(Failure::failed(
+            ErrorCode::RecordsDiffer,
+            "the columns differ in length; each load needs a reading",
+        )
+        .at(&recording.source));
+    }
+    Ok(Pair {
+        source: recording.source.clone(),
+        applied: Some(load.samples.clone()),
+        measured: gage.samples.clone(),
+        rate_hz: 1.0,
+        start_s: 0.0,
+        applied_unit,
+        measured_unit,
+        warnings: recording
+            .all_warnings()
+            .into_iter()
+            .chain(of_load)
+            .chain(of_gage)
+            .collect(),
+        is_lossy: recording.lost.is_some(),
+    })
+}
+
+/// Refuses loads or readings that are not of the kind of the records; units of one kind may differ.
+pub(super) fn check_units(loads: &[Pair], record: &Pair) -> Result<(), Failure> {
+    let kind = |unit: &Option<NamedUnit>| unit.as_ref().map(|named| named.unit.dimension());
+    let differs = |load: &&Pair| {
+        kind(&load.applied_unit) != kind(&record.applied_unit)
+            || kind(&load.measured_unit) != kind(&record.measured_unit)
+    };
+    match loads.iter().find(differs) {
+        None => Ok(()),
+        Some(load) => Err(Failure::failed(
+            ErrorCode::RecordsDiffer,
+            format_args!(
+                "{} and {} have their channels in units of different kinds; give --applied-unit and --measured-unit, or convert one \
+                 of them",
+                record.source, load.source
+            ),
+        )),
+    }
+}
+
+/// Loads and readings in SI units; `calibrated` is the stand that converts the readings to torque.
+pub(super) fn known(pair: Pair, calibrated: Option<&Stand>) -> Result<KnownLoads, Failure> {
+    let factor = pair.applied_unit.as_ref().map_or(1.0, |u| u.unit.factor());
+    let applied = pair.applied.iter().flatten().map(|u| u * factor);
+    let measured = pair.measured_si(calibrated)?;
+    KnownLoads::new(pair.source, &applied.collect::<Vec<_>>(), &measured)
+}

@@ -1,0 +1,305 @@
+//! Known loads that were put on slowly, held against what a diagnosis found: the gain that free ringing does not show, and
+//! whether the stand bends under them as the effects say. No effect is fitted to them.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+use torqcomp_model::fit::{FitError, Options, Parameter, minimize};
+use torqcomp_model::{Chain, Estimate};
+
+use super::fit::FittedModel;
+use super::result::Diagnosis;
+use crate::failure::{ErrorCode, Failure};
+use crate::print::{rounded, with_std};
+use crate::warning::Warning;
+
+/// Loads and readings, in SI units, in the order in which they were taken.
+pub struct KnownLoads {
+    pub source: String,
+    pub applied: Vec<f64>,
+    pub measured: Vec<f64>,
+}
+
+/// Most loads of a file that are put on the model one by one; of more, neighbours count with their means.
+const MOST: usize = 256;
+/// Fewest different loads.
+const FEWEST: usize = 3;
+/// Probability with which the scatter about two models differs by chance, up to which one is worse.
+const BY_CHANCE: f64 = 0.01;
+/// Standard uncertainties, and part of the gain, by which two gains differ.
+const GAINS_DIFFER: (f64, f64) = (3.0, 1e-3);
+
+/// What known loads say.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct LoadCheck {
+    /// The static gain by the loads, with the effects that were found.
+    pub gain: f64,
+    /// Its standard uncertainty.
+    pub gain_std: Option<f64>,
+    /// Unit of the gain.
+    pub gain_unit: String,
+    /// Unit of the rms errors.
+    pub unit: String,
+    /// Each file.
+    pub files: Vec<CheckedLoads>,
+    /// The gain in SI units.
+    #[serde(skip)]
+    pub gain_si: (f64, Option<f64>),
+}
+
+/// The errors of two models under the loads of a file; gain and zero are fitted for both.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct CheckedLoads {
+    /// Path of the file.
+    pub source: String,
+    /// Loads that count.
+    pub loads: usize,
+    /// Rms error of the plain stand, which is a straight line.
+    pub before_rms: f64,
+    /// Rms error with the accepted effects.
+    pub after_rms: f64,
+}
+
+impl KnownLoads {
+    /// Loads and readings in SI units.
+    ///
+    /// # Errors
+    /// If there are fewer than three different loads.
+    pub fn new(source: String, applied: &[f64], measured: &[f64]) -> Result<Self, Failure> {
+        let mut different = applied.to_vec();
+        different.sort_by(f64::total_cmp);
+        different.dedup();
+        if different.len() < FEWEST {
+            return Err(Failure::failed(
+                ErrorCode::TooFewSamples,
+                format_args!(
+                    "{} different loads are too few; put on at least {FEWEST}, the empty stand included",
+                    different.len()
+                ),
+            )
+            .at(&source));
+        }
+        let together = applied.len().div_ceil(MOST);
+        let means = |values: &[f64]| -> Vec<f64> {
+            let parts = values.chunks(together);
+            parts
+                .map(|part| part.iter().sum::<f64>() / part.len() as f64)
+                .collect()
+        };
+        Ok(Self {
+            source,
+            applied: means(applied),
+            measured: means(measured),
+        })
+    }
+}
+
+/// The gain by the loads in all files, and the rms of what is left of each.
+struct LoadFit {
+    gain: (f64, Option<f64>),
+    rms: Vec<f64>,
+}
+
+impl LoadFit {
+    /// Fits gain and the zero of each file to a chain with a gain of 1.
+    fn of(loads: &[KnownLoads], chain: &Chain) -> Result<Self, FitError> {
+        let slope = slope(loads);
+        let left = |k: usize, values: &[f64]| -> Vec<f64> {
+            let pushed: Vec<f64> = loads[k]
+                .applied
+                .iter()
+                .map(|u| u * values[0] * slope)
+                .collect();
+            let pairs = loads[k]
+                .measured
+                .iter()
+                .zip(chain.under_slow_loads(&pushed));
+            pairs.map(|(y, x)| y - x - values[k + 1]).collect()
+        };
+        let residuals = |values: &[f64], out: &mut Vec<f64>| {
+            (0..loads.len()).for_each(|k| out.extend(left(k, values)));
+            match out.iter().all(|r| r.is_finite()) {
+                true => Ok(()),
+                false => Err(FitError::Model("the motion diverges".to_owned())),
+            }
+        };
+        let zero = |loads: &KnownLoads| {
+            let size = loads.measured.iter().fold(0.0_f64, |m, y| m.max(y.abs()));
+            Parameter::new("zero", loads.measured[0]).scaled(size.max(f64::MIN_POSITIVE))
+        };
+        let gain = Parameter::new("gain", 1.0);
+        let parameters: Vec<Parameter> = std::iter::once(gain)
+            .chain(loads.iter().map(zero))
+            .collect();
+        let found = minimize(&residuals, &parameters, &Options::default())?;
+        let rms = (0..loads.len()).map(|k| {
+            let left = left(k, &found.values);
+            (left.iter().map(|r| r * r).sum::<f64>() / left.len() as f64).sqrt()
+        });
+        Ok(Self {
+            rms: rms.collect(),
+            gain: (
+                found.values[0] * slope,
+                found.std[0].map(|std| std * slope.abs()),
+            ),
+        })
+    }
+
+    /// The same for the stand of a model; to the uncertainty of the gain comes that of the effects' parameters.
+    fn of_model(loads: &[KnownLoads], fitted: &FittedModel) -> Result<Self, FitError> {
+        let with = |values: &[f64]| {
+            let (mut chain, _) = fitted.structure.model(values);
+            chain.gain = 1.0;
+            Self::of(loads, &chain)
+        };
+        let mut found = with(&fitted.values)?;
+        let (gain, own) = found.gain;
+        let own = own.ok_or_else(|| FitError::Model("any gain fits".to_owned()))?;
+        let mut variance = own * own;
+        for k in fitted.structure.context.plain_count()..fitted.values.len() {
+            if let Some(std) = fitted.std[k] {
+                let mut moved = fitted.values.clone();
+                moved[k] += std;
+                variance += (with(&moved)?.gain.0 - gain).powi(2);
+            }
+        }
+        found.gain.1 = Some(variance.sqrt());
+        Ok(found)
+    }
+
+    /// Sum of squares over all files.
+    fn sum(&self, loads: &[KnownLoads]) -> f64 {
+        let each = self.rms.iter().zip(loads);
+        each.map(|(rms, loads)| rms * rms * loads.applied.len() as f64)
+            .sum()
+    }
+}
+
+/// Slope of the straight lines through the loads of each file, with one slope for all.
+fn slope(loads: &[KnownLoads]) -> f64 {
+    let (mut products, mut squares) = (0.0, 0.0);
+    for file in loads {
+        let count = file.applied.len() as f64;
+        let [u0, y0] = [&file.applied, &file.measured].map(|v| v.iter().sum::<f64>() / count);
+        for (u, y) in file.applied.iter().zip(&file.measured) {
+            products += (u - u0) * (y - y0);
+            squares += (u - u0).powi(2);
+        }
+    }
+    products / squares
+}
+
+impl Diagnosis {
+    /// Holds known loads against the stand that was found; `declared_gain` is that of the stand file or of the units, in SI.
+    ///
+    /// # Errors
+    /// If the stand has no reading at rest, or does not follow the loads.
+    pub fn check_loads(
+        &mut self,
+        loads: &[KnownLoads],
+        declared_gain: Option<Estimate>,
+    ) -> Result<(), Failure> {
+        if loads.is_empty() {
+            return Ok(());
+        }
+        if self.context().held.is_some() {
+            return Err(Failure::failed(
+                ErrorCode::UnsuitableRecord,
+                "--static does not apply: the body moves freely, and under a load that stays it does not come to rest",
+            ));
+        }
+        let follow = |fitted: &FittedModel| {
+            LoadFit::of_model(loads, fitted).map_err(|error| {
+                Failure::failed(
+                    ErrorCode::NotIdentifiable,
+                    format_args!(
+                        "the loads of --static do not give a gain ({error}): the reading does not follow them, or what is recorded \
+                         shows no load that stays"
+                    ),
+                )
+                .at(&loads[0].source)
+            })
+        };
+        let (before, after) = (follow(&self.before.fitted)?, follow(&self.after.fitted)?);
+        let context = self.context();
+        let (gain_unit, per_si) = context.units.gain();
+        let printed = |(gain, std): (f64, Option<f64>)| (gain * per_si, std.map(|s| s * per_si));
+        let (gain, gain_std) = printed(after.gain);
+        let known = match context.gain_is_free {
+            true => Some(self.after.constants()[2].clone()),
+            false => declared_gain,
+        };
+        let known = known.map(|known| printed((known.value(), known.std_uncertainty())));
+        let differ = known.and_then(|known| gains_differ((gain, gain_std), known, &gain_unit));
+        let contradicted = (!self.effects.is_empty())
+            .then(|| contradicted(loads, &before, &after, &self.effects))
+            .flatten();
+        let unit = context.units.per_printed;
+        let files = loads.iter().zip(before.rms.iter().zip(&after.rms));
+        let files = files.map(|(file, (before, after))| CheckedLoads {
+            source: file.source.clone(),
+            loads: file.applied.len(),
+            before_rms: before / unit,
+            after_rms: after / unit,
+        });
+        self.known_loads = Some(LoadCheck {
+            files: files.collect(),
+            gain,
+            gain_std,
+            unit: context.units.printed(),
+            gain_unit,
+            gain_si: after.gain,
+        });
+        self.warnings.extend(differ.into_iter().chain(contradicted));
+        Ok(())
+    }
+}
+
+/// Says that the loads give another gain than is known otherwise.
+fn gains_differ(
+    (gain, gain_std): (f64, Option<f64>),
+    (known, known_std): (f64, Option<f64>),
+    unit: &str,
+) -> Option<Warning> {
+    let std = gain_std.unwrap_or(0.0).hypot(known_std.unwrap_or(0.0));
+    let apart = (gain - known).abs();
+    let (times, part) = GAINS_DIFFER;
+    (apart > times * std && apart > part * known.abs()).then(|| {
+        let by_loads = match gain_std {
+            Some(std) => with_std(gain, std),
+            None => rounded(gain, 6),
+        };
+        Warning::new(
+            "gain-differs",
+            format!(
+                "the known loads give a static gain of {by_loads} {unit}, {} times the {} {unit} that stand file, units or other \
+                 records give: check the calibration and the lever arm of the loads",
+                rounded(gain / known, 4),
+                rounded(known, 6)
+            ),
+        )
+    })
+}
+
+/// Says that the effects are wrong about the loads.
+fn contradicted(
+    loads: &[KnownLoads],
+    before: &LoadFit,
+    after: &LoadFit,
+    effects: &[&str],
+) -> Option<Warning> {
+    let count: usize = loads.iter().map(|file| file.applied.len()).sum();
+    let freedom = count.checked_sub(loads.len() + 1).filter(|n| *n > 0)? as f64;
+    let ratio = after.sum(loads) / before.sum(loads);
+    let law = FisherSnedecor::new(freedom, freedom).ok()?;
+    (ratio.is_finite() && law.sf(ratio) < BY_CHANCE).then(|| {
+        Warning::new(
+            "loads-contradict-effects",
+            format!(
+                "the known loads do not bear out {}: with it the error under them is {} times that of a straight line",
+                effects.join(" and "),
+                rounded(ratio.sqrt(), 3)
+            ),
+        )
+    })
+}
