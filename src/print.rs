@@ -268,6 +268,17 @@ pub fn unit_or_as_recorded(unit: &str) -> &str {
     }
 }
 
+/// The unit of one quantity over another: `V/N`, `V/(N m)`.
+#[must_use]
+pub fn unit_of_quotient((over, under): (&str, &str)) -> String {
+    let one = |unit: &str| if unit.is_empty() { "1" } else { unit }.to_owned();
+    let under = match under.contains([' ', '/']) {
+        true => format!("({under})"),
+        false => one(under),
+    };
+    format!("{}/{under}", one(over))
+}
+
 /// Rows of cells as columns of equal width, the first to the left, the others to the right.
 #[must_use]
 pub fn columns(rows: &[Vec<String>]) -> String {

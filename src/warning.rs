@@ -71,6 +71,8 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["shift-or-effect", "a shift of the applied channel explains the records about as well as the effects that were found", "record both channels with one recorder and the same filters"],
         ["free-body", "the body has no spring: it and the model are both held to the measured motion by a known one, and the errors are those of what acts", "read constants and effects as they are; to have the motion predicted, add the spring that the stand will have"],
         ["no-record-held-out", "no hold-out record was given; the last 30 % of each training record, or the last decay, are held out instead", "give --holdout or --holdout-decay"],
+        ["gain-differs", "known loads give another static gain than stand file, units or other records", "check the calibration and the lever arm of the loads"],
+        ["loads-contradict-effects", "known loads do not bear out the effects that were found", "record hits of other sizes, and look at the loads with identify static"],
         ["records-apart", "no one stand fits both training and hold-out records", "use records of one stand and one setting"],
         ["resampled", "channels with other time stamps were interpolated to one grid", "record them with one clock"],
         ["training-leaves-constants-open", "the training records do not determine all constants", "train on records that excite the resonance"],

@@ -15,20 +15,20 @@ const RATE_HZ: f64 = 2000.0;
 const SAMPLES: usize = 8000;
 const STEPS: usize = 40;
 /// Noise and zero of the gage, in V.
-const NOISE: f64 = 1e-3;
+pub const NOISE: f64 = 1e-3;
 const ZERO: f64 = 0.05;
 /// Beginning and length of a hit, in s.
 const HIT_S: [f64; 2] = [0.1, 0.003];
 
 /// `x'' + 2 ζ ω x' + ω² (x + c x³ + F sgn x') = ω² u`, `x` in V.
-struct Stand {
-    natural_hz: f64,
-    damping_ratio: f64,
-    cubic: f64,
-    friction: f64,
+pub struct Stand {
+    pub natural_hz: f64,
+    pub damping_ratio: f64,
+    pub cubic: f64,
+    pub friction: f64,
 }
 
-const PLAIN: Stand = Stand {
+pub const PLAIN: Stand = Stand {
     natural_hz: 20.0,
     damping_ratio: 0.01,
     cubic: 0.0,
@@ -37,7 +37,7 @@ const PLAIN: Stand = Stand {
 
 impl Stand {
     /// A record of the gage after a hit that swings it to about so many volts.
-    fn hit(&self, volts: f64, seed: u64) -> String {
+    pub fn hit(&self, volts: f64, seed: u64) -> String {
         let omega = TAU * self.natural_hz;
         let h = 1.0 / (RATE_HZ * STEPS as f64);
         // The pulse takes the stand to the speed ω times the swing.
@@ -96,7 +96,7 @@ impl Stand {
     }
 }
 
-fn number(value: &Value) -> f64 {
+pub fn number(value: &Value) -> f64 {
     value.as_f64().expect("a number")
 }
 

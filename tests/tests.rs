@@ -27,6 +27,7 @@ mod golden;
 mod harmonics;
 mod identify;
 mod inspect;
+mod known_loads;
 mod mcap_file;
 mod measuring_chains;
 #[cfg(target_os = "linux")] // the system tells how much memory a process had at most

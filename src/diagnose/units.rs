@@ -1,6 +1,6 @@
 //! Units of the two channels.
 
-use crate::print::unit_or_as_recorded;
+use crate::print::{unit_of_quotient, unit_or_as_recorded};
 
 #[derive(Debug, Clone)]
 pub struct ChannelUnits {
@@ -34,7 +34,7 @@ impl ChannelUnits {
             ("", "") => unit_or_as_recorded("").to_owned(),
             (measured, "") => format!("{measured} per applied unit"),
             ("", applied) => format!("measured unit per {applied}"),
-            (measured, applied) => format!("{measured}/{applied}"),
+            both => unit_of_quotient(both),
         };
         (unit, applied / measured)
     }

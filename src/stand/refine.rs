@@ -8,6 +8,7 @@ use super::update::{COMMON, CORRELATIONS, MODES};
 use super::{Given, MODE_CORRELATIONS, Stand};
 use crate::failure::{ErrorCode, Failure};
 use crate::io::digits;
+use crate::print::unit_of_quotient;
 
 /// A parameter of an effect as it is written: name, text of its value, and of its standard uncertainty.
 pub type WrittenParameter<'a> = (&'a str, String, Option<String>);
@@ -58,18 +59,6 @@ impl Refined<'_> {
         ]
     }
 
-    /// Unit of the static gain, as `V/N`.
-    fn gain_unit(&self) -> String {
-        let (recorded, applied) = self.units;
-        let one = |unit: &str| if unit.is_empty() { "1" } else { unit }.to_owned();
-        let applied = if applied.contains([' ', '/']) {
-            format!("({applied})")
-        } else {
-            one(applied)
-        };
-        format!("{}/{applied}", one(recorded))
-    }
-
     /// A quantity with its standard uncertainty and its source.
     fn quantity(&self, (number, std): (f64, Option<f64>), unit: &str) -> Item {
         let text = |number: f64| format!("{} {unit}", digits::text(number, 9));
@@ -118,7 +107,7 @@ impl Refined<'_> {
             table[MEASURES] = measures;
         }
         if let Some(gain) = self.gain {
-            table[GAIN] = self.quantity(gain, &self.gain_unit());
+            table[GAIN] = self.quantity(gain, &unit_of_quotient(self.units));
             document.remove("calibration");
         } else if let Some(kept) = kept {
             table[GAIN] = kept;
