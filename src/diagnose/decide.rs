@@ -58,25 +58,29 @@ fn is_tied(tried: &[CandidateFit], k: usize, best: usize) -> bool {
     let (Some(one), Some(other)) = (&tried[k].model, &tried[best].model) else {
         return false;
     };
-    let comparison = other.against(one);
-    // Each further parameter fits as much of the noise again.
-    let further = other
-        .parameter_count()
-        .saturating_sub(one.parameter_count());
-    let least = TIED_SIGNIFICANCE * (further.max(1) as f64).sqrt();
-    k == best
-        || comparison.significance() < least
-        || comparison.gain() < TIED_GAIN * other.compared_rms().powi(2)
+    k == best || one.is_no_worse_than(other)
 }
 
-/// Of effects that the records cannot distinguish: those with the fewest parameters, as the criterion takes noise that rings for
-/// more evidence than it is; of these the one with the smallest criterion, or of those close to it the first in the list. So a line at the mains frequency is mains pickup rather than a
-/// shaft that happens to turn so fast, and a lag without a corner is a delay.
+impl ScoredModel {
+    /// Whether it is not significantly worse than the best model.
+    pub(super) fn is_no_worse_than(&self, best: &Self) -> bool {
+        let comparison = best.against(self);
+        // Each further parameter fits as much of the noise again.
+        let further = best
+            .parameter_count()
+            .saturating_sub(self.parameter_count());
+        let least = TIED_SIGNIFICANCE * (further.max(1) as f64).sqrt();
+        comparison.significance() < least
+            || comparison.gain() < TIED_GAIN * best.compared_rms().powi(2)
+    }
+}
+
+/// Of effects that the records cannot distinguish: those with the fewest parameters, in a form that is no worse than their best one,
+/// as the criterion takes noise that rings for more evidence than it is; of these the one with the smallest criterion, or of those
+/// close to it the first in the list. So a line at the mains frequency is mains pickup rather than a shaft that happens to turn so
+/// fast, and a lag without a corner is a delay.
 fn simplest(tried: &[CandidateFit], tied: &[usize]) -> Option<usize> {
-    let count = |k: usize| {
-        let model = tried[k].model.as_ref();
-        model.map_or(usize::MAX, ScoredModel::parameter_count)
-    };
+    let count = |k: usize| tried[k].fewest_parameters;
     let fewest = tied.iter().map(|k| count(*k)).min()?;
     let tied: Vec<usize> = tied
         .iter()

@@ -1,13 +1,14 @@
 //! Effects exchanged for others: one that was found first may only resemble another, or two others, beside those found later.
 
-use torqcomp_model::effects::{EFFECTS, Effect, Form};
+use torqcomp_model::effects::{EFFECTS, Effect, EffectParameter, Form, Stage};
 
 use super::SearchState;
 use super::fit::{FitEffort, fit};
 use super::pairs::best_pairs;
 use super::records::Records;
 use super::score::{BaseModel, ScoredModel};
-use super::search::{FOR_FIRST_EFFECT, SAME, SearchEffort, Workers, refusal, try_effects};
+use super::search::{FOR_FIRST_EFFECT, SAME, SearchEffort, Workers, listed, refusal, try_effects};
+use super::structure::{EffectForm, Structure};
 use crate::parallel::parallel;
 
 /// Most exchanges.
@@ -25,6 +26,9 @@ const FOR_EXCHANGE: SearchEffort = SearchEffort {
 };
 /// The fit of another form, which starts where the present one ended.
 const OTHER_FORM: FitEffort = FitEffort::full(15);
+/// The effect that changes what a load that stays is recorded as, and a load that bends nothing, over the rms of the records.
+const GAIN: &str = "gain-error";
+const SMALL: f64 = 1e-3;
 /// Parameters of an effect from which on it may imitate two others.
 pub const MANY: usize = 3;
 
@@ -100,7 +104,79 @@ impl SearchState {
     }
 }
 
+impl SearchState {
+    /// Gives effects another form beside an error of the gain, where that explains the records better; whether any got one. Whether
+    /// a torque is part of the stand's stiffness, and whether the gage shows it, changes what a load that stays is recorded as:
+    /// beside a gain that is declared wrong, the wrong form may be the best of each alone.
+    pub(super) fn exchange_with_gain(&mut self, coarse: usize, workers: Workers) -> bool {
+        let base = BaseModel::of(self.after.clone(), &self.records);
+        let gain = listed(&base).find(|effect| effect.name == GAIN);
+        let Some(gain) = gain.filter(|_| self.has_room()) else {
+            return false;
+        };
+        let gain = EffectForm {
+            effect: gain,
+            form: &gain.forms[0],
+        };
+        let starts = self.after.with_gain_in_other_forms(gain);
+        let training = self.after.fitted.with_initial_states(&self.records.train);
+        let models = parallel(starts.len(), workers.threads, |k| {
+            let (structure, values) = starts[k].clone();
+            let fitted = fit(structure, &values, &training, OTHER_FORM).ok()?;
+            ScoredModel::of(fitted, &self.records)
+        });
+        let better = models.into_iter().flatten().filter(|model| {
+            refusal(model, &self.after).is_none() && !self.excess().is_too_small(&self.after, model)
+        });
+        let best = better.min_by(|a, b| a.criterion().total_cmp(&b.criterion()));
+        if let Some(best) = &best {
+            self.take(best, coarse);
+        }
+        best.is_some()
+    }
+}
+
 impl ScoredModel {
+    /// Structures with an error of the gain in which one of the effects has another form, and values to start with: as stiff as
+    /// before, and with the gain that makes up for what the other form changes at rest.
+    fn with_gain_in_other_forms(&self, gain: EffectForm) -> Vec<(Structure, Vec<f64>)> {
+        let fitted = &self.fitted;
+        let small = SMALL * fitted.structure.context.scales.rms;
+        let at_rest = |structure: &Structure, values: &[f64]| {
+            let chain = structure.model(values).0;
+            let shown = chain.under_slow_loads(&[small / chain.gain.abs()]);
+            [1.0 + chain.added_stiffness(), shown[0] / small]
+        };
+        let [stiff, shown] = at_rest(&fitted.structure, &fitted.values);
+        let mut next = fitted.structure.context.plain_count();
+        let mut starts = Vec::new();
+        for (k, present) in fitted.structure.effects.iter().enumerate() {
+            let own = next..next + present.moved();
+            next = own.end;
+            if k < fitted.structure.declared || present.form.stage != Stage::Stand {
+                continue;
+            }
+            let forms = present.effect.forms.iter();
+            for form in forms.filter(|form| form.name != present.form.name) {
+                let mut structure = fitted.structure.with(gain);
+                structure.effects[k].form = form;
+                let mut values = fitted.values.clone();
+                let moved = own_in_form(form, present.form, &values[own.clone()]);
+                values.splice(own.clone(), moved);
+                values.push(0.0);
+                let [stiffer, shows] = at_rest(&structure, &values);
+                let (factor, error) = (stiffer / stiff, shown / shows - 1.0);
+                if factor > 0.0 && error.abs() < 1.0 {
+                    values[0] /= factor.sqrt();
+                    let last = values.len() - 1;
+                    values[last] = error;
+                    starts.push((structure, values));
+                }
+            }
+        }
+        starts
+    }
+
     /// The model with each of its effects that another one resembles in its other forms of the same parameters, fitted: a second
     /// mode that takes from the first what it adds is one effect, not a second mode and a gain.
     fn in_other_forms(&self, other: &Effect, records: &Records, threads: usize) -> Vec<Self> {
@@ -131,4 +207,18 @@ fn sorted(model: &ScoredModel) -> Vec<&'static str> {
     let mut names = model.effect_names();
     names.sort_unstable();
     names
+}
+
+/// Values of an effect in another form: those of the same name or, where both have as many, in the same place; otherwise those that
+/// the form starts with.
+fn own_in_form(form: &Form, present: &Form, own: &[f64]) -> Vec<f64> {
+    let (names, have) = (form.parameters, present.parameters);
+    let value = |(i, parameter): (usize, &EffectParameter)| {
+        let same = have.iter().position(|p| p.name == parameter.name);
+        let place = same.or((names.len() == have.len()).then_some(i));
+        let start = || form.starts.first().and_then(|start| start.get(i));
+        let found = place.and_then(|place| own.get(place)).or_else(start);
+        found.copied().unwrap_or(parameter.lower)
+    };
+    names.iter().enumerate().map(value).collect()
 }

@@ -41,6 +41,9 @@ pub struct CandidateFit {
     /// The model with it, if a fit came about.
     #[serde(skip)]
     pub model: Option<ScoredModel>,
+    /// Parameters of the plainest of its forms that are no worse.
+    #[serde(skip)]
+    pub fewest_parameters: usize,
 }
 
 pub fn name_of<S: Serializer>(effect: &&'static Effect, serializer: S) -> Result<S::Ok, S::Error> {
@@ -154,9 +157,8 @@ pub fn try_effects(
     let mut rest = fits.iter();
     let mut tried: Vec<CandidateFit> = effects
         .map(|effect| {
-            let models = rest.by_ref().take(effect.forms.len()).flatten();
-            let best = models.min_by(|a, b| a.criterion().total_cmp(&b.criterion()));
-            CandidateFit::new(effect, &base.scored, best.cloned())
+            let models: Vec<_> = rest.by_ref().take(effect.forms.len()).flatten().collect();
+            CandidateFit::new(effect, &base.scored, &models)
         })
         .collect();
     set_p_values(&mut tried, &base.scored);
@@ -189,7 +191,19 @@ fn set_p_values(tried: &mut [CandidateFit], base: &ScoredModel) {
 }
 
 impl CandidateFit {
-    fn new(effect: &'static Effect, base: &ScoredModel, model: Option<ScoredModel>) -> Self {
+    /// An effect with the fits of its forms.
+    fn new(effect: &'static Effect, base: &ScoredModel, forms: &[&ScoredModel]) -> Self {
+        let best = forms.iter().copied();
+        let best = best.min_by(|a, b| a.criterion().total_cmp(&b.criterion()));
+        let fewest = best.map(|best| {
+            let count = best.parameter_count();
+            let plainer = forms.iter().filter(|form| form.parameter_count() < count);
+            let no_worse = plainer.filter(|form| form.is_no_worse_than(best));
+            no_worse
+                .map(|form| form.parameter_count())
+                .fold(count, usize::min)
+        });
+        let model = best.cloned();
         let last = model
             .as_ref()
             .and_then(|m| m.fitted.structure.effects.last());
@@ -210,6 +224,7 @@ impl CandidateFit {
                 Some(refusal) => refusal.unwrap_or(Reason::Best),
             },
             model,
+            fewest_parameters: fewest.unwrap_or(usize::MAX),
         }
     }
 

@@ -13,7 +13,7 @@ use super::reason::{Reason, Status};
 use super::residual_tests::ResidualTests;
 use super::score::{BaseModel, ScoredModel};
 use super::search::{self, CandidateFit, Round, SAME, Workers, no_gain, refusal, reject_all};
-use super::verdict::{PlainExcess, noise_rms, remains};
+use super::verdict::{PlainExcess, is_above, noise_rms, remains};
 
 /// Most effects that are added.
 const MOST_EFFECTS: usize = 5;
@@ -68,7 +68,7 @@ impl SearchState {
             self.arrive(way);
         }
         // Where what only resembled an effect is gone, what it hid may show, and be exchanged in turn.
-        while self.exchange(coarse, workers) {
+        while self.exchange(coarse, workers) || self.exchange_with_gain(coarse, workers) {
             let count = self.after.effect_names().len();
             while self.has_room() && self.add_another(coarse, workers) {}
             if self.after.effect_names().len() == count {
@@ -181,7 +181,13 @@ impl SearchState {
         let base = BaseModel::of(self.after.clone(), &self.records);
         let round = search::try_all(&base, &self.records, workers);
         let accepted = round.accepted();
-        let next = accepted.filter(|next| !self.excess().is_too_small(&self.after, next));
+        // Where little is left, only what takes nearly all of it.
+        let is_little = !self.is_worthwhile(&self.after, &self.tests);
+        let excess = self.excess();
+        let next = accepted.filter(|next| match is_little {
+            true => excess.is_nearly_taken(&self.after, next),
+            false => !excess.is_too_small(&self.after, next),
+        });
         let next = next.cloned();
         let mut tried = round.tried;
         if next.is_none() {
@@ -203,10 +209,11 @@ impl SearchState {
     }
 
     /// Whether another effect is looked for: not beside a law for which the integration does not converge.
-    fn has_room(&self) -> bool {
+    pub(super) fn has_room(&self) -> bool {
         let count = self.after.effect_names().len();
         let is_open = (1..MOST_EFFECTS).contains(&count) && self.settled;
-        is_open && self.is_worthwhile(&self.after, &self.tests)
+        let is_left = || is_above(&self.after, self.noise_floor);
+        is_open && (self.is_worthwhile(&self.after, &self.tests) || is_left())
     }
 
     /// Whether a model leaves enough for another effect: something above the noise, or a residual that is not noise alone

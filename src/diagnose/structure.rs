@@ -331,9 +331,12 @@ impl Structure {
             Some(several) => several.response(mode, self.values_of_modes(values)),
             None => mode.into(),
         };
-        let mut terms = NuisanceTerms::NONE;
-        let further = response.parts().iter().skip(1);
-        terms.modes.extend(further.map(|part| part.mode));
+        let mut terms = self.context.terms();
+        if self.context.rings_at_start {
+            // What rings tells the frequencies of all modes.
+            let further = response.parts().iter().skip(1);
+            terms.modes = further.map(|part| part.mode).collect();
+        }
         let mut links = Vec::new();
         for (effect, own) in self.effects.iter().zip(self.effect_values(values)) {
             let corners = effect.form.parameters.iter().zip(&own);

@@ -1,5 +1,7 @@
 //! Verdict: whether something is missing, and which effects stand.
 
+use torqcomp_model::effects::Stage;
+
 use super::SearchState;
 use super::ladder::Ladder;
 use super::noise_floor::{NoiseFloor, NoiseFloorSource};
@@ -57,6 +59,11 @@ const MOST_OF_REST: f64 = 0.5;
 /// if it explains this part of what is left: beside an effect that describes its cause exactly, little may be left of much.
 const FAR_ABOVE_NOISE: f64 = 10.0;
 const GREAT_PART_OF_REST: f64 = 1.0 / 3.0;
+/// What takes this part of what is left above the noise, where that is measurable, is named however little of the initial excess it
+/// is: what imitates the rest of another law leaves more. The noise floor errs by some per cent.
+const NEARLY_ALL_OF_REST: f64 = 0.65;
+/// Error power above the noise, in that of the noise, from which on it is measurable.
+const MEASURABLE: f64 = 0.1;
 
 /// What the plain stand leaves, and the noise in it.
 #[derive(Clone, Copy)]
@@ -88,11 +95,25 @@ impl PlainExcess<'_> {
         {
             return false;
         }
+        if self.is_nearly_taken(after, next) {
+            return false;
+        }
         let least = match gain < MOST_OF_REST * left {
             true => SECOND,
             false => SECOND_OF_REST,
         };
         self.share(after, next) < least
+    }
+
+    /// Whether an effect of stand or gage takes nearly all of what a model leaves measurably above the noise. A slow course takes a
+    /// little of everything.
+    pub fn is_nearly_taken(&self, after: &ScoredModel, next: &ScoredModel) -> bool {
+        let left = after.excess_power(noise_rms(self.noise_floor));
+        let gain = after.compared_rms().powi(2) - next.compared_rms().powi(2);
+        let last = next.fitted.structure.effects.last();
+        is_above(after, self.noise_floor)
+            && gain > NEARLY_ALL_OF_REST * left
+            && last.is_some_and(|effect| effect.form.stage <= Stage::Gage)
     }
 
     /// The reason for that.
@@ -103,6 +124,14 @@ impl PlainExcess<'_> {
             rest: MOST_OF_REST,
         }
     }
+}
+
+/// Half-width of the resonance, in its damping, in which noise has lines.
+const RESONANCE: f64 = 10.0;
+
+/// Whether the error is measurably above a noise floor.
+pub fn is_above(model: &ScoredModel, floor: Option<NoiseFloor>) -> bool {
+    floor.is_some_and(|floor| model.excess_power(floor.rms) > MEASURABLE * floor.rms.powi(2))
 }
 
 impl ScoredModel {
@@ -167,6 +196,20 @@ impl SearchState {
         round.is_some_and(|round| !round.iter().any(CandidateFit::is_confirmed))
     }
 
+    /// Whether a line is left beside the effects, above the noise and away from the resonance, in which noise has some of its own.
+    fn leaves_line(&self) -> bool {
+        if !is_above(&self.after, self.noise_floor) {
+            return false;
+        }
+        let mode = self.after.fitted.mode();
+        let natural_hz = mode.natural_frequency_hz();
+        let reach_hz = RESONANCE * mode.damping_ratio * natural_hz;
+        let lines = self.lines_of(&self.after).into_iter();
+        lines
+            .map(|line| (line.frequency_hz - natural_hz).abs())
+            .any(|away_hz| away_hz > reach_hz)
+    }
+
     /// Whether nothing but white noise is left.
     pub(super) fn is_at_noise(&self) -> bool {
         let is_white = self.tests.white && !self.tests.follows_anything();
@@ -205,7 +248,7 @@ impl SearchState {
                 && self.before.compared_rms() > CLEARLY_ABOVE * floor.rms
         });
         if explained >= NAMED || !is_left && !is_known {
-            return match is_left || self.follows_input() {
+            return match is_left || self.follows_input() || self.leaves_line() {
                 true => Verdict::PartlyExplained,
                 false => Verdict::Explained,
             };
