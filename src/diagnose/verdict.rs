@@ -105,15 +105,17 @@ impl PlainExcess<'_> {
         self.share(after, next) < least
     }
 
-    /// Whether an effect of stand or gage takes nearly all of what a model leaves measurably above the noise. A slow course takes a
+    /// Whether further effects of stand or gage take nearly all of what a model leaves measurably above the noise. A slow course takes a
     /// little of everything.
     pub fn is_nearly_taken(&self, after: &ScoredModel, next: &ScoredModel) -> bool {
         let left = after.excess_power(noise_rms(self.noise_floor));
         let gain = after.compared_rms().powi(2) - next.compared_rms().powi(2);
-        let last = next.fitted.structure.effects.last();
+        let present = after.effect_names();
+        let added = next.fitted.structure.added().iter();
+        let mut further = added.filter(|own| !present.contains(&own.effect.name));
         is_above(after, self.noise_floor)
             && gain > NEARLY_ALL_OF_REST * left
-            && last.is_some_and(|effect| effect.form.stage <= Stage::Gage)
+            && further.all(|own| own.form.stage <= Stage::Gage)
     }
 
     /// The reason for that.
