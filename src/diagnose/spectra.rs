@@ -238,6 +238,6 @@ mod tests {
         let (share, _) = coherent_share(&input, &input, 1024, 0.0);
         assert!(share > 0.9, "{share}");
         // A model that never settles compares nothing with anything.
-        assert_eq!(coherent_share(&input, &input, 1024, f64::INFINITY).0, 0.0);
+        assert!(coherent_share(&input, &input, 1024, f64::INFINITY).0.abs() < 1e-12);
     }
 }
