@@ -152,6 +152,8 @@ impl Diagnosis {
         let verdict = found.conclude();
         found.settle_candidates();
         let effects = found.after.effect_names();
+        let declared = case.declared_effects.iter();
+        let declared_effects = declared.map(|e| e.effect.effect.name).collect();
         let detection_limits = match verdict {
             Verdict::NothingMissing => detection_limits(&found.after, &found.records, threads),
             _ => Vec::new(),
@@ -178,11 +180,7 @@ impl Diagnosis {
         Self {
             verdict,
             effects,
-            declared_effects: case
-                .declared_effects
-                .iter()
-                .map(|e| e.effect.effect.name)
-                .collect(),
+            declared_effects,
             input_between_samples: found.records.between().name(),
             error,
             explained: std::mem::take(&mut found.ladder),

@@ -92,26 +92,14 @@ pub struct ReadCase {
 
 /// Reads all records, and what the stand file declares of them.
 pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<ReadCase, Failure> {
-    let (mut train, mut holdout) = pairs(args)?;
-    let loads = loads::pairs(args)?;
-    if let (Some(load), true) = (loads.first(), args.train.is_empty()) {
-        // They say in what the gain is counted.
-        for pair in train.iter_mut().chain(&mut holdout) {
-            pair.applied_unit.clone_from(&load.applied_unit);
-        }
-    }
+    let [train, holdout, loads] = all_pairs(args)?;
     let last_is_held_out = args.train.is_empty() && args.held_out_files().is_empty();
     let first = &train[0];
-    for other in train.iter().chain(&holdout) {
-        check_same_kind(first, other)?;
-    }
-    refuse_same_samples(&train, &holdout)?;
     let (units, is_calibrated) = units(first, stand, first.applied.is_some() || !loads.is_empty());
     let gain = declared_gain(stand, &units);
     let declared = stand
         .map(|stand| declared(stand, gain.unwrap_or(1.0)))
         .transpose()?;
-    loads::check_units(&loads, first)?;
     let all = || train.iter().chain(&holdout).chain(&loads);
     let mut warnings: Vec<Warning> = all().flat_map(|pair| pair.warnings.clone()).collect();
     let is_lossy = all().any(|pair| pair.is_lossy);
@@ -160,14 +148,28 @@ pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<ReadCase, Failure>
     Ok(ReadCase {
         case,
         loads,
-        declared_gain: gain.map(|gain| {
-            let std = stand
-                .and_then(Stand::static_gain)
-                .and_then(|g| g.relative_std);
-            Estimate::of("", gain, std.map(|std| std * gain.abs()))
-        }),
+        declared_gain: gain.map(|gain| with_declared_std(gain, stand)),
         is_lossy,
     })
+}
+
+/// The training and the held-out records, and the known loads, all of one kind.
+fn all_pairs(args: &Diagnose) -> Result<[Vec<Pair>; 3], Failure> {
+    let (mut train, mut holdout) = pairs(args)?;
+    let loads = loads::pairs(args)?;
+    if let (Some(load), true) = (loads.first(), args.train.is_empty()) {
+        // They say in what the gain is counted.
+        for pair in train.iter_mut().chain(&mut holdout) {
+            pair.applied_unit.clone_from(&load.applied_unit);
+        }
+    }
+    let first = &train[0];
+    for other in train.iter().chain(&holdout) {
+        check_same_kind(first, other)?;
+    }
+    refuse_same_samples(&train, &holdout)?;
+    loads::check_units(&loads, first)?;
+    Ok([train, holdout, loads])
 }
 
 /// Holds out the ends of the training records where no record is held out; says what is held out in place of a record that was
@@ -362,6 +364,13 @@ fn units(pair: &Pair, stand: Option<&Stand>, acts: bool) -> (ChannelUnits, bool)
         factors,
     };
     (units, is_calibrated)
+}
+
+/// A declared gain with the standard uncertainty that the stand file gives it.
+fn with_declared_std(gain: f64, stand: Option<&Stand>) -> Estimate {
+    let given = stand.and_then(Stand::static_gain);
+    let relative = given.and_then(|given| given.relative_std);
+    Estimate::of("", gain, relative.map(|std| std * gain.abs()))
 }
 
 /// The static gain as far as it is declared: 1 from torque to torque.
