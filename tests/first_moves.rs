@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use serde_json::Value;
 
-use crate::util::{COMPENSATE, Folder, HARMONICS, assert_close, sampled, steady};
+use crate::util::{COMPENSATE, Folder, HARMONICS, assert_close, codes, sampled, steady};
 
 /// A stand of 60 Hz with a calibration and what else its file says.
 fn stand(more: &str) -> String {
@@ -26,11 +26,6 @@ fn compensated(stand: &str, heading: &str, level: f64) -> (Folder, Value) {
 /// A record of a function of time in s.
 fn over_time(heading: &str, rate_hz: f64, count: usize, value: impl Fn(f64) -> f64) -> String {
     sampled(heading, rate_hz, count, |i| value(i as f64 / rate_hz))
-}
-
-fn codes(report: &Value) -> Vec<&str> {
-    let warnings = report["warnings"].as_array().expect("warnings");
-    warnings.iter().filter_map(|w| w["code"].as_str()).collect()
 }
 
 /// The value of a constant that `identify` found.

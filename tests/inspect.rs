@@ -6,7 +6,7 @@ use std::fmt::Write;
 use serde_json::Value;
 
 use crate::noise::Noise;
-use crate::util::Folder;
+use crate::util::{Folder, codes};
 
 /// White noise of unit variance, seeded.
 fn noise(seed: u64, count: usize) -> Vec<f64> {
@@ -50,11 +50,6 @@ fn inspect(text: &str) -> Value {
     let folder = Folder::new();
     folder.write("in.csv", text);
     folder.json(&["inspect", "in.csv", "--json"])
-}
-
-fn codes(report: &Value) -> Vec<&str> {
-    let warnings = report["warnings"].as_array().expect("warnings");
-    warnings.iter().filter_map(|w| w["code"].as_str()).collect()
 }
 
 #[test]

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use crate::decays::{NOISE, PLAIN, Stand, number};
 use crate::noise::Noise;
-use crate::util::Folder;
+use crate::util::{Folder, codes};
 
 /// Recorded per load, in V/(N m).
 const GAIN: f64 = 0.08;
@@ -55,12 +55,6 @@ fn bent(cubic: f64, pushed: f64) -> f64 {
         }
     }
     low
-}
-
-fn codes(report: &Value) -> Vec<&str> {
-    let warnings = report["warnings"].as_array().expect("warnings");
-
-    warnings.iter().filter_map(|w| w["code"].as_str()).collect()
 }
 
 /// The error under the loads over the noise of the gage, before and after.

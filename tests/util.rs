@@ -59,6 +59,12 @@ pub fn signal(name: &str, child: &std::process::Child) {
     assert!(sent.expect("kill is there").success(), "{name}");
 }
 
+/// The codes of the warnings in a report.
+pub fn codes(report: &Value) -> Vec<&str> {
+    let warnings = report["warnings"].as_array().expect("warnings");
+    warnings.iter().filter_map(|w| w["code"].as_str()).collect()
+}
+
 /// A folder that is removed with its files.
 pub struct Folder(tempfile::TempDir);
 

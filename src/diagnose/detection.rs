@@ -60,7 +60,7 @@ pub fn detection_limits(
 ) -> Vec<DetectionLimit> {
     let base = BaseModel::of(model.clone(), records);
     let training = model.fitted.with_initial_states(&records.train);
-    let effects: Vec<_> = listed(&base).collect();
+    let effects: Vec<_> = listed(&model.fitted.structure).collect();
     let limits = parallel(effects.len(), threads, |k| {
         let effect = effects[k];
         let form = effect.forms.first()?;

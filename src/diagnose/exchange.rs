@@ -109,23 +109,19 @@ impl SearchState {
     /// a torque is part of the stand's stiffness, and whether the gage shows it, changes what a load that stays is recorded as:
     /// beside a gain that is declared wrong, the wrong form may be the best of each alone.
     pub(super) fn exchange_with_gain(&mut self, coarse: usize, workers: Workers) -> bool {
-        let base = BaseModel::of(self.after.clone(), &self.records);
-        let gain = listed(&base).find(|effect| effect.name == GAIN);
-        let Some(gain) = gain.filter(|_| self.has_room()) else {
+        let gain = listed(&self.after.fitted.structure).find(|effect| effect.name == GAIN);
+        let Some(effect) = gain.filter(|_| self.has_room()) else {
             return false;
         };
         let gain = EffectForm {
-            effect: gain,
-            form: &gain.forms[0],
+            effect,
+            form: &effect.forms[0],
         };
         let starts = self.after.with_gain_in_other_forms(gain);
-        let training = self.after.fitted.with_initial_states(&self.records.train);
-        let models = parallel(starts.len(), workers.threads, |k| {
-            let (structure, values) = starts[k].clone();
-            let fitted = fit(structure, &values, &training, OTHER_FORM).ok()?;
-            ScoredModel::of(fitted, &self.records)
-        });
-        let better = models.into_iter().flatten().filter(|model| {
+        let models = self
+            .after
+            .fitted_from(&starts, &self.records, workers.threads);
+        let better = models.into_iter().filter(|model| {
             refusal(model, &self.after).is_none() && !self.excess().is_too_small(&self.after, model)
         });
         let best = better.min_by(|a, b| a.criterion().total_cmp(&b.criterion()));
@@ -181,7 +177,7 @@ impl ScoredModel {
     /// mode that takes from the first what it adds is one effect, not a second mode and a gain.
     fn in_other_forms(&self, other: &Effect, records: &Records, threads: usize) -> Vec<Self> {
         let fitted = &self.fitted;
-        let mut structures = Vec::new();
+        let mut starts = Vec::new();
         for (k, present) in fitted.structure.effects.iter().enumerate() {
             let names = |form: &Form| form.parameters.iter().map(|p| p.name).collect::<Vec<_>>();
             let is_alike = present.effect.resembles(other) && k >= fitted.structure.declared;
@@ -190,12 +186,23 @@ impl ScoredModel {
             for form in forms.filter(|form| names(form) == names(present.form)) {
                 let mut structure = fitted.structure.clone();
                 structure.effects[k].form = form;
-                structures.push(structure);
+                starts.push((structure, fitted.values.clone()));
             }
         }
-        let training = fitted.with_initial_states(&records.train);
-        let fits = parallel(structures.len(), threads, |k| {
-            let fitted = fit(structures[k].clone(), &fitted.values, &training, OTHER_FORM).ok()?;
+        self.fitted_from(&starts, records, threads)
+    }
+
+    /// Fits of other structures that start with given values, and with the motion that this model has at the start of the records.
+    fn fitted_from(
+        &self,
+        starts: &[(Structure, Vec<f64>)],
+        records: &Records,
+        threads: usize,
+    ) -> Vec<Self> {
+        let training = self.fitted.with_initial_states(&records.train);
+        let fits = parallel(starts.len(), threads, |k| {
+            let (structure, values) = &starts[k];
+            let fitted = fit(structure.clone(), values, &training, OTHER_FORM).ok()?;
             Self::of(fitted, records)
         });
         fits.into_iter().flatten().collect()

@@ -4,6 +4,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+use torqcomp_dsp::rms;
 use torqcomp_model::fit::{FitError, Options, Parameter, minimize};
 use torqcomp_model::{Chain, Estimate};
 
@@ -132,10 +133,7 @@ impl LoadFit {
             .chain(loads.iter().map(zero))
             .collect();
         let found = minimize(&residuals, &parameters, &Options::default())?;
-        let rms = (0..loads.len()).map(|k| {
-            let left = left(k, &found.values);
-            (left.iter().map(|r| r * r).sum::<f64>() / left.len() as f64).sqrt()
-        });
+        let rms = (0..loads.len()).map(|k| rms(&left(k, &found.values)));
         Ok(Self {
             rms: rms.collect(),
             gain: (
@@ -296,7 +294,7 @@ fn contradicted(
         Warning::new(
             "loads-contradict-effects",
             format!(
-                "the known loads do not bear out {}: with it the error under them is {} times that of a straight line",
+                "the known loads do not bear out {}: the error under the loads is {} times that of a straight line",
                 effects.join(" and "),
                 rounded(ratio.sqrt(), 3)
             ),

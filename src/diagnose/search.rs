@@ -14,7 +14,7 @@ use super::records::Records;
 use super::score::{BaseModel, EffectParameter, ScoredModel};
 use super::spectra::{SpectralLine, lines_of};
 use super::starts::{Start, best_starts};
-use super::structure::EffectForm;
+use super::structure::{EffectForm, Structure};
 use crate::parallel::parallel;
 
 /// An effect that was tried, in its best form.
@@ -150,7 +150,7 @@ pub fn try_effects(
     records: &Records,
     workers: Workers,
 ) -> Round {
-    let effects = listed(base).filter(|effect| among(effect));
+    let effects = listed(&base.scored.fitted.structure).filter(|effect| among(effect));
     let forms = EffectForm::all(effects.clone());
     let lines = residual_lines(base, records);
     let fits = fit_all(base, &forms, &lines, effort, records, workers);
@@ -167,9 +167,8 @@ pub fn try_effects(
     Round { tried, fits }
 }
 
-/// The effects that may be added to a base model.
-pub fn listed(base: &BaseModel) -> impl Iterator<Item = &'static Effect> + Clone {
-    let structure = &base.scored.fitted.structure;
+/// The effects that may be added to a model.
+pub fn listed(structure: &Structure) -> impl Iterator<Item = &'static Effect> + Clone {
     let context = &structure.context;
     EFFECTS.iter().copied().filter(move |effect| {
         let is_free = context.gain_is_free && effect.name == "gain-error";

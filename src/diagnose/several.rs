@@ -212,8 +212,8 @@ impl SearchState {
     pub(super) fn has_room(&self) -> bool {
         let count = self.after.effect_names().len();
         let is_open = (1..MOST_EFFECTS).contains(&count) && self.settled;
-        let is_left = || is_above(&self.after, self.noise_floor);
-        is_open && (self.is_worthwhile(&self.after, &self.tests) || is_left())
+        let (after, floor) = (&self.after, self.noise_floor);
+        is_open && (self.is_worthwhile(after, &self.tests) || is_above(after, floor))
     }
 
     /// Whether a model leaves enough for another effect: something above the noise, or a residual that is not noise alone

@@ -9,6 +9,7 @@ use super::reason::{Reason, Status};
 use super::residual_tests::ResidualTests;
 use super::score::ScoredModel;
 use super::search::{CandidateFit, reject_all};
+use super::spectra::SpectralLine;
 
 /// How a diagnosis ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
@@ -206,10 +207,9 @@ impl SearchState {
         let mode = self.after.fitted.mode();
         let natural_hz = mode.natural_frequency_hz();
         let reach_hz = RESONANCE * mode.damping_ratio * natural_hz;
-        let lines = self.lines_of(&self.after).into_iter();
-        lines
-            .map(|line| (line.frequency_hz - natural_hz).abs())
-            .any(|away_hz| away_hz > reach_hz)
+        let lines = self.lines_of(&self.after);
+        let is_away = |line: &SpectralLine| (line.frequency_hz - natural_hz).abs() > reach_hz;
+        lines.iter().any(is_away)
     }
 
     /// Whether nothing but white noise is left.

@@ -3,12 +3,7 @@
 use serde_json::Value;
 
 use super::{Noise, TAU, parameter};
-use crate::util::{Folder, assert_close};
-
-fn codes(report: &Value) -> Vec<&str> {
-    let warnings = report["warnings"].as_array().expect("warnings");
-    warnings.iter().filter_map(|w| w["code"].as_str()).collect()
-}
+use crate::util::{Folder, assert_close, codes};
 
 fn has(report: &Value, code: &str) {
     assert!(codes(report).contains(&code), "{code}: {report}");

@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use super::read::Pair;
+use super::read::{Pair, two_columns};
 use crate::cli::Diagnose;
 use crate::diagnose::KnownLoads;
 use crate::failure::{ErrorCode, Failure};
-use crate::io::{ChannelChoice, Input, Reading};
+use crate::io::{Input, Reading};
 use crate::recording::Recording;
 use crate::stand::Stand;
 use crate::unit::NamedUnit;
@@ -20,16 +20,8 @@ pub(super) fn pairs(args: &Diagnose) -> Result<Vec<Pair>, Failure> {
 }
 
 fn pair(args: &Diagnose, file: &Path) -> Result<Pair, Failure> {
-    let applied = args.applied.as_deref().ok_or_else(|| {
-        Failure::usage(
-            ErrorCode::MissingArgument,
-            "--static needs --applied COL, the channel with the known loads",
-        )
-    })?;
-    let choices = ChannelChoice::applied_and_measured(
-        [applied, &args.measured],
-        [args.applied_unit.as_deref(), args.measured_unit.as_deref()],
-    );
+    let needs = "--static needs --applied COL, the channel with the known loads";
+    let choices = two_columns(args, needs)?;
     // When a load was put on does not matter, so no time axis is searched for.
     let reading = Reading {
         rate_hz: Some(1.0),

@@ -209,24 +209,28 @@ fn pairs(args: &Diagnose) -> Result<(Vec<Pair>, Vec<Pair>), Failure> {
     Ok((train, holdout))
 }
 
-fn pair(args: &Diagnose, file: &Path) -> Result<Pair, Failure> {
-    let applied = args.applied.as_deref().ok_or_else(|| {
-        Failure::usage(
-            ErrorCode::MissingArgument,
-            "--train and --holdout need --applied COL, the channel with the applied quantity; records of free ringing without \
-             one are given with --decay and --holdout-decay",
-        )
-    })?;
+/// The columns of applied and measured quantity; `without` is what is said where the first is not named.
+pub(super) fn two_columns(args: &Diagnose, without: &str) -> Result<[ChannelChoice; 2], Failure> {
+    let applied = args.applied.as_deref();
+    let applied = applied.ok_or_else(|| Failure::usage(ErrorCode::MissingArgument, without))?;
     if applied == args.measured {
         return Err(Failure::usage(
             ErrorCode::ConflictingArguments,
             "--applied and --measured name the same column",
         ));
     }
-    let choices = ChannelChoice::applied_and_measured(
+    Ok(ChannelChoice::applied_and_measured(
         [applied, &args.measured],
         [args.applied_unit.as_deref(), args.measured_unit.as_deref()],
-    );
+    ))
+}
+
+fn pair(args: &Diagnose, file: &Path) -> Result<Pair, Failure> {
+    let choices = two_columns(
+        args,
+        "--train and --holdout need --applied COL, the channel with the applied quantity; records of free ringing without one are \
+         given with --decay and --holdout-decay",
+    )?;
     let read = AlignedChannels::read(&Input::of(file), &choices, &args.reading)?;
     let mut channels = read.channels.into_iter();
     let (Some(applied), Some(measured)) = (channels.next(), channels.next()) else {

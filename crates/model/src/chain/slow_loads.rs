@@ -46,15 +46,9 @@ impl Chain {
         // No time passes for what drifts.
         let clock = SampleClock { step_s: 0.0 };
         for link in self.links.iter().filter(|link| link.stage > Stage::Stand) {
-            let passed: Complex64 = match &link.action {
-                Action::Factor(factor) => factor(&self.stand, 0.0),
-                Action::Recorder { response, .. } => response(0.0),
-                _ => Complex64::ONE,
-            };
-            for sample in &mut record {
-                *sample *= passed.re;
-            }
             match &link.action {
+                Action::Factor(factor) => scale(&mut record, factor(&self.stand, 0.0)),
+                Action::Recorder { response, .. } => scale(&mut record, response(0.0)),
                 Action::Feedthrough(term) => {
                     let past = self.gain * term(&self.stand, 0.0).re;
                     for (sample, load) in record.iter_mut().zip(loads) {
@@ -62,7 +56,7 @@ impl Chain {
                     }
                 }
                 Action::Distortion(distortion) => distortion.forward(clock, &mut record),
-                _ => {}
+                Action::Torque { .. } | Action::Lines(_) | Action::Course(_) => {}
             }
         }
         record
@@ -101,6 +95,13 @@ impl Chain {
         let shown = integrate(&mut [motion], &input, 0..input.samples().len());
         let ends = shown.iter().flat_map(|shown| shown.chunks(changes + rests));
         ends.filter_map(|of_load| of_load.last().copied()).collect()
+    }
+}
+
+/// Multiplies samples with a response at rest, which is real.
+fn scale(samples: &mut [f64], response: Complex64) {
+    for sample in samples {
+        *sample *= response.re;
     }
 }
 
