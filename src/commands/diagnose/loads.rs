@@ -22,9 +22,11 @@ pub(super) fn pairs(args: &Diagnose) -> Result<Vec<Pair>, Failure> {
 fn pair(args: &Diagnose, file: &Path) -> Result<Pair, Failure> {
     let needs = "--static needs --applied COL, the channel with the known loads";
     let choices = two_columns(args, needs)?;
-    // When a load was put on does not matter, so no time axis is searched for.
+    // When a load was put on does not matter, so no time axis is searched for, whatever is said of that of the records.
     let reading = Reading {
         rate_hz: Some(1.0),
+        time_column: None,
+        time_unit: None,
         resample: false,
         range: None,
         ..args.reading.clone()
