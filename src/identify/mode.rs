@@ -47,6 +47,11 @@ impl Pole {
     pub(super) fn frequency_hz(&self) -> f64 {
         self.omega_rad_per_s / TAU
     }
+
+    /// Damping ratio ζ.
+    pub(super) fn damping_ratio(&self) -> f64 {
+        self.rate_per_s / self.rate_per_s.hypot(self.omega_rad_per_s)
+    }
 }
 
 /// A pole with its covariance and, from the response to a known input, its residue.

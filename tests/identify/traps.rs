@@ -542,3 +542,37 @@ fn a_period_without_lines_is_refused() {
             .says(2, &["--period"]);
     }
 }
+
+/// A low-pass of second order that overshoots, by its difference equation.
+fn filtered(values: &[f64], corner_hz: f64) -> Vec<f64> {
+    let (ratio, turn) = (0.38_f64, TAU * corner_hz / RATE_HZ);
+    let radius = (-ratio * turn).exp();
+    let [one, two] = [
+        2.0 * radius * (turn * (1.0 - ratio * ratio).sqrt()).cos(),
+        -radius * radius,
+    ];
+    let mut last = [0.0; 2];
+    let step = |v: &f64| {
+        let next = one * last[0] + two * last[1] + (1.0 - one - two) * v;
+        last = [next, last[0]];
+        next
+    };
+    values.iter().map(step).collect()
+}
+
+/// An oscilloscope of 8 bits, an amplifier that settles, and a filter before the converter: nothing of it is the stand's.
+#[test]
+fn what_recorders_add_to_a_decay_is_no_mode() {
+    let whole = ringing(&[(0.2, 1.0)], 0.015, 10_000, 9);
+    let swing = whole.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    let (_, pure) = hits(&[(0.2, 100.0)], 0.0005, 10_000);
+    let step = pure.iter().fold(0.0_f64, |m, v| m.max(v.abs())) / 100.0;
+    let rounded: Vec<f64> = pure.iter().map(|v| (v / step).round() * step).collect();
+    let settles = |(i, v): (usize, &f64)| v + 2.0 * swing * (-(i as f64) / RATE_HZ / 0.3).exp();
+    let settling: Vec<f64> = whole.iter().enumerate().map(settles).collect();
+    for record in [rounded, settling, filtered(&whole, 1000.0)] {
+        let report = decayed(&[record]);
+        rings_right(&report, 0.015);
+        assert_eq!(codes(&report), ["not-anchored"], "{report}");
+    }
+}

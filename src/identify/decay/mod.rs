@@ -1,7 +1,10 @@
 //! Frequencies and damping from free decays (Appendix C, II).
 
+mod attempt;
+mod baseline;
 mod by_hand;
 mod dependence;
+mod first_period;
 mod laws;
 mod modes;
 mod present;
@@ -60,7 +63,9 @@ pub fn identify(
         most: MOST_MODES,
         band_hz: options.band_hz.unwrap_or((0.0, f64::INFINITY)),
     };
-    let (fit, more) = search::search(&mut stretches, &wanted, &lines)?;
+    let found = search::search(&mut stretches, &wanted, &lines)?;
+    let (fit, has_baseline) = (found.fit, found.has_baseline);
+    let more = found.lines;
     lines.extend(more);
     if fit.poles.is_empty() {
         return Err(present::no_mode(&lines));
@@ -86,11 +91,14 @@ pub fn identify(
     }
     result.fit = Some(quality(&fit, &stretches));
     result.method.push(present::method(&fit, stretches.len()));
+    if has_baseline {
+        result.method.push(present::BASELINE.to_owned());
+    }
     present::correlations(&mut result, &reported);
     dependence::damping_law(&mut result, &fit, &stretches)?;
     dependence::amplitude_dependence(&mut result, &fit, &stretches, order[0]);
     present::apart(&mut result, &fit, stretches.len());
-    present::poor(&mut result, &fit, &stretches, order[0]);
+    present::poor(&mut result, &fit, &stretches, (order[0], has_baseline));
     by_hand::compare(&mut result, &fit, &stretches, order[0]);
     present::draw(&mut result, &fit, &stretches);
     Ok((result, stretches))

@@ -54,6 +54,15 @@ impl Stretch {
         }
     }
 
+    /// What is left of it without its first samples.
+    pub(super) fn later(&self, first: usize) -> Self {
+        let part = self.part(first..self.values.len());
+        Self {
+            start_s: self.start_s + self.times_s[first],
+            ..part
+        }
+    }
+
     /// Samples per second.
     pub(super) fn rate_hz(&self) -> f64 {
         (self.times_s.len() - 1) as f64 / self.times_s.last().copied().unwrap_or(1.0)

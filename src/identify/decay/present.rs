@@ -118,6 +118,8 @@ pub(super) fn apart(result: &mut Identification, fit: &ModesFit, stretches: usiz
 const POOR: f64 = 0.3;
 /// The same where the residual falls with the ringing, and its size in the ringing part over that behind it.
 const FALLING: (f64, f64) = (0.03, 4.0);
+/// The same beside a baseline that was taken off.
+const FALLING_BESIDE: (f64, f64) = (0.0, 1.3);
 /// Decay times after which ringing has ended, and a decay must last for there to be more of it.
 const RUNG: f64 = 3.0;
 
@@ -126,12 +128,17 @@ pub(super) fn poor(
     result: &mut Identification,
     fit: &ModesFit,
     stretches: &[Stretch],
-    main: usize,
+    (main, has_baseline): (usize, bool),
 ) {
     let relative = result.fit.as_ref().map_or(0.0, |fit| fit.relative);
     let told = ["not-viscous", "amplitude-dependent", "close-lines"];
     let is_told = result.warnings.iter().any(|w| told.contains(&w.code));
     let falls = falls(fit, stretches, main);
+    let least = if has_baseline {
+        FALLING_BESIDE
+    } else {
+        FALLING
+    };
     if relative > POOR {
         result.warn(
             "poor-fit",
@@ -141,7 +148,7 @@ pub(super) fn poor(
                 rounded(100.0 * relative, 2)
             ),
         );
-    } else if relative > FALLING.0 && falls > FALLING.1 && !is_told {
+    } else if relative > least.0 && falls > least.1 && !is_told {
         result.warn(
             "poor-fit",
             format!(
@@ -178,6 +185,10 @@ pub(super) fn method(fit: &ModesFit, stretches: usize) -> String {
         fit.fit.residuals.len()
     )
 }
+
+/// What is said of a baseline that was taken off.
+pub(super) const BASELINE: &str = "the zero moves while the stand rings (an amplifier that is AC coupled or settles, a part that \
+                                   warms up): it was fitted with a smooth curve and taken off";
 
 /// Names the decay rates and frequencies that are strongly correlated.
 pub(super) fn correlations(result: &mut Identification, fit: &ModesFit) {

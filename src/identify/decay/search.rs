@@ -3,7 +3,8 @@
 use torqcomp_dsp::peaks::Peak;
 use torqcomp_model::fit::FitError;
 
-use super::modes::{ModesFit, Stretch, fit, linear_part};
+use super::attempt::Attempt;
+use super::modes::{ModesFit, Stretch, linear_part};
 use crate::identify::Pole;
 use crate::identify::hum::SteadyLine;
 
@@ -24,10 +25,8 @@ const CLOSE: f64 = 0.03;
 
 /// Power of what is left, over that of the decay, below which no more modes are searched for: 110 dB, more than a
 /// recorder resolves. What is left of computed decays is the rounding of their digits, which decays with them.
-const RESOLVED: f64 = 1e-11;
+pub(super) const RESOLVED: f64 = 1e-11;
 
-/// Lines that are taken off, at most.
-const MOST_LINES: usize = 8;
 /// Harmonics of the mains among which a steady line is looked for.
 const HARMONICS: f64 = 10.0;
 /// How far the mains may be off 50 or 60 Hz.
@@ -47,23 +46,23 @@ const STEADY_STD: f64 = 3.0;
 ///
 /// # Errors
 /// [`FitError`] if there are too few samples. Without a significant mode the fit is empty.
-pub(super) fn search(
+pub(super) fn search<'a>(
     stretches: &mut Vec<Stretch>,
-    wanted: &ModeSearch,
-    taken_off: &[SteadyLine],
-) -> Result<(ModesFit, Vec<SteadyLine>), FitError> {
+    wanted: &'a ModeSearch,
+    taken_off: &'a [SteadyLine],
+) -> Result<Attempt<'a>, FitError> {
     let recorded = stretches.clone();
-    let found = attempt(stretches, wanted, taken_off, false)?;
+    let found = Attempt::of(stretches, wanted, taken_off, false)?;
     if !found.has_tone {
-        return Ok((found.fit, found.lines));
+        return Ok(found);
     }
     let mut without = recorded;
-    let other = attempt(&mut without, wanted, taken_off, true)?;
+    let other = Attempt::of(&mut without, wanted, taken_off, true)?;
     if !decays_clearly(&other.fit, &without) {
-        return Ok((found.fit, found.lines));
+        return Ok(found);
     }
     *stretches = without;
-    Ok((other.fit, other.lines))
+    Ok(other)
 }
 
 /// Standard uncertainties by which the rates of what decays beside a steady line must differ from zero, and the turns that it
@@ -80,115 +79,14 @@ fn decays_clearly(found: &ModesFit, stretches: &[Stretch]) -> bool {
     !found.poles.is_empty() && found.poles.iter().enumerate().all(one)
 }
 
-/// What a search found.
-struct Attempt {
-    fit: ModesFit,
-    /// Lines that were taken off.
-    lines: Vec<SteadyLine>,
-    /// Whether another line than those of the mains is steady.
-    has_tone: bool,
-}
-
-/// Adds modes one by one as long as the criterion falls enough, each starting at the strongest line of the residual.
-/// Lines that do not decay are taken off the stretches: those of the mains where they are found, others from the last fit,
-/// in which the modes do not disturb them.
-fn attempt(
-    stretches: &mut [Stretch],
-    wanted: &ModeSearch,
-    taken_off: &[SteadyLine],
-    takes_tones: bool,
-) -> Result<Attempt, FitError> {
-    let (mut lines, mut tones) = (Vec::new(), Vec::<usize>::new());
-    let (mut has_tone, mut taken) = (false, 0);
-    let mut best = fit(stretches, &[])?;
-    let resolved = RESOLVED * best.fit.sum_of_squares;
-    while best.poles.len() - tones.len() < wanted.count.unwrap_or(wanted.most) {
-        if wanted.count.is_none() && best.fit.sum_of_squares < resolved {
-            break;
-        }
-        let Some(pole) = next_pole(stretches, &best, wanted.band_hz) else {
-            break;
-        };
-        let mut starts = best.poles.clone();
-        starts.push(pole);
-        let next = fit(stretches, &starts)?;
-        let last = best.poles.len();
-        let line = steady(&next, last, stretches);
-        let of_mains = line.filter(|line| line.is_of_mains);
-        let known = taken_off.iter().chain(&lines);
-        if taken < MOST_LINES && (of_mains.is_some() || is_left_of(known, &next, last, stretches)) {
-            take_off(stretches, &next, last);
-            lines.extend(of_mains);
-            taken += 1;
-            best = fit(stretches, &best.poles)?;
-            continue;
-        }
-        let is_clear = gain(&best, &next, stretches) > LEAST_GAIN
-            && next.fit.sum_of_squares < 0.98 * best.fit.sum_of_squares;
-        // Beside a mode it is what its law of damping leaves.
-        let is_tone = is_clear && line.is_some() && close(&next.poles).is_none();
-        has_tone |= is_tone;
-        if is_tone && takes_tones && tones.len() < MOST_LINES {
-            tones.push(last);
-            best = next;
-            continue;
-        }
-        let pays = is_clear && physical(&next, stretches, &tones);
-        if wanted.count.is_none() {
-            if !pays {
-                break;
-            }
-            if let Some(frequency_hz) = close(&next.poles) {
-                best.close_hz = Some(frequency_hz);
-                break;
-            }
-        }
-        best = next;
-    }
-    has_tone |= (0..best.poles.len()).any(|k| steady(&best, k, stretches).is_some());
-    let fit = without_tones(stretches, best, &tones, &mut lines)?;
-    Ok(Attempt {
-        fit,
-        lines,
-        has_tone,
-    })
-}
-
-/// The fit without the tones among its modes, which are taken off the stretches.
-fn without_tones(
-    stretches: &mut [Stretch],
-    found: ModesFit,
-    tones: &[usize],
-    lines: &mut Vec<SteadyLine>,
-) -> Result<ModesFit, FitError> {
-    if tones.is_empty() {
-        return Ok(found);
-    }
-    for k in tones {
-        lines.push(SteadyLine {
-            frequency_hz: found.poles[*k].frequency_hz(),
-            amplitude: largest(&found, *k, stretches),
-            is_of_mains: false,
-        });
-        take_off(stretches, &found, *k);
-    }
-    let modes = (0..found.poles.len()).filter(|k| !tones.contains(k));
-    let modes: Vec<Pole> = modes.map(|k| found.poles[k]).collect();
-    let close_hz = found.close_hz;
-    Ok(ModesFit {
-        close_hz,
-        ..fit(stretches, &modes)?
-    })
-}
-
 /// Amplitude of a mode in the stretch where it is largest.
-fn largest(found: &ModesFit, mode: usize, stretches: &[Stretch]) -> f64 {
+pub(super) fn largest(found: &ModesFit, mode: usize, stretches: &[Stretch]) -> f64 {
     let amplitudes = (0..stretches.len()).map(|s| found.amplitude(mode, s));
     amplitudes.fold(0.0, f64::max)
 }
 
 /// A mode of a fit, if it is a line that does not decay.
-fn steady(found: &ModesFit, place: usize, stretches: &[Stretch]) -> Option<SteadyLine> {
+pub(super) fn steady(found: &ModesFit, place: usize, stretches: &[Stretch]) -> Option<SteadyLine> {
     let pole = found.poles[place];
     let frequency_hz = pole.frequency_hz();
     let std = |k: usize| found.fit.std[2 * place + k];
@@ -212,7 +110,7 @@ fn steady(found: &ModesFit, place: usize, stretches: &[Stretch]) -> Option<Stead
 
 /// Whether a mode of a fit is what is left of a line that was taken off before: near it and much smaller. One that was fitted
 /// before the decay beside it is not taken off whole.
-fn is_left_of<'l>(
+pub(super) fn is_left_of<'l>(
     mut lines: impl Iterator<Item = &'l SteadyLine>,
     found: &ModesFit,
     mode: usize,
@@ -228,7 +126,7 @@ fn is_left_of<'l>(
 }
 
 /// Takes a mode of a fit off the stretches.
-fn take_off(stretches: &mut [Stretch], found: &ModesFit, mode: usize) {
+pub(super) fn take_off(stretches: &mut [Stretch], found: &ModesFit, mode: usize) {
     for s in 0..stretches.len() {
         let line = found.part(stretches, mode, s);
         let values = stretches[s].values.iter_mut();
@@ -243,12 +141,12 @@ fn length_s(stretches: &[Stretch]) -> f64 {
 }
 
 /// Minimum gain for one more mode.
-const LEAST_GAIN: f64 = 20.0;
+pub(super) const LEAST_GAIN: f64 = 20.0;
 
 /// Gain of one more mode, the last of `after`: the reduction of the sum of squares over the power of the noise at the
 /// mode's frequency, less ln n for each parameter (Bayesian information criterion, where that power is known). Noise that
 /// is strongest at the frequency of the first mode counts with its mean power: a stand that rings has a mode.
-fn gain(before: &ModesFit, after: &ModesFit, stretches: &[Stretch]) -> f64 {
+pub(super) fn gain(before: &ModesFit, after: &ModesFit, stretches: &[Stretch]) -> f64 {
     let Some(pole) = after.poles.last() else {
         return 0.0;
     };
@@ -268,7 +166,7 @@ fn gain(before: &ModesFit, after: &ModesFit, stretches: &[Stretch]) -> f64 {
 }
 
 /// Frequency in Hz of a mode that is too close to the last one, if there is one.
-fn close(poles: &[Pole]) -> Option<f64> {
+pub(super) fn close(poles: &[Pole]) -> Option<f64> {
     let last = poles.last()?;
     let near = |p: &&Pole| (p.omega_rad_per_s / last.omega_rad_per_s - 1.0).abs() < CLOSE;
     let found = poles[..poles.len() - 1].iter().find(near)?;
@@ -280,7 +178,7 @@ fn close(poles: &[Pole]) -> Option<f64> {
 const DECAYS: [f64; 2] = [1.0, 2.0];
 
 /// Whether every mode but the tones decays significantly, swings more than once, and differs from the others.
-fn physical(found: &ModesFit, stretches: &[Stretch], tones: &[usize]) -> bool {
+pub(super) fn physical(found: &ModesFit, stretches: &[Stretch], tones: &[usize]) -> bool {
     let length = length_s(stretches);
     let one = |(k, pole): (usize, &Pole)| {
         let rate_std = found.fit.std[2 * k];
@@ -301,7 +199,11 @@ fn physical(found: &ModesFit, stretches: &[Stretch], tones: &[usize]) -> bool {
 }
 
 /// A start for one more mode.
-fn next_pole(stretches: &[Stretch], so_far: &ModesFit, band_hz: (f64, f64)) -> Option<Pole> {
+pub(super) fn next_pole(
+    stretches: &[Stretch],
+    so_far: &ModesFit,
+    band_hz: (f64, f64),
+) -> Option<Pole> {
     let loudest = (0..stretches.len()).max_by(|a, b| {
         let power = |s: usize| so_far.residuals[s].iter().map(|r| r * r).sum::<f64>();
         power(*a).total_cmp(&power(*b))

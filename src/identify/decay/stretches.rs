@@ -6,6 +6,7 @@ use std::ops::Range;
 use torqcomp_dsp::peaks::Line;
 use torqcomp_dsp::quality::clipping::Clipping;
 use torqcomp_dsp::quality::flat_tops::flat_tops;
+use torqcomp_dsp::quality::quantisation::quantisation;
 use torqcomp_dsp::undersample::Undersampling;
 use torqcomp_dsp::{decimate, onset, peaks};
 
@@ -192,7 +193,9 @@ fn cut<'a>(
         let (values, of_mains) = without_mains(record.values, record.rate_hz);
         lines.extend(of_mains);
         let prepared = prepared(record, values, options, result)?;
+        let step = quantisation(record.values).map_or(0.0, |found| found.step);
         for range in onset::decays(&prepared.values) {
+            let range = above_steps(&prepared.values, range, step);
             cuts.add(&prepared, range, (&clipped_s, all.len()));
         }
         all.push(prepared);
@@ -290,6 +293,23 @@ pub(super) fn restarts_s(record: &Ringing) -> Vec<f64> {
         found.extend(later.map(|part| record.times_s[part.start]));
     }
     found
+}
+
+/// Steps of the recorder that a swing must have. Where it has fewer, it is not rounded as if by noise: what is below half a
+/// step reads as rest, which looks like friction.
+const LEAST_STEPS: f64 = 2.0;
+
+/// The part of a decay up to where it swings over less than two steps of the recorder.
+fn above_steps(values: &[f64], range: Range<usize>, step: f64) -> Range<usize> {
+    let mut sorted = values[range.clone()].to_vec();
+    let middle = sorted.len() / 2;
+    let (_, zero, _) = sorted.select_nth_unstable_by(middle, f64::total_cmp);
+    let swings = |value: &f64| (value - *zero).abs() > (LEAST_STEPS - 0.5) * step;
+    let last = values[range.clone()].iter().rposition(swings);
+    match last {
+        Some(last) if last + 1 >= LEAST_SAMPLES => range.start..range.start + last + 1,
+        _ => range,
+    }
 }
 
 /// A stretch cut where it starts again, if its samples are uniform.

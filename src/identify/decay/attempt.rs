@@ -1,0 +1,195 @@
+//! A search for the modes of a decay, one after the other.
+
+use torqcomp_model::fit::FitError;
+
+use super::modes::{ModesFit, Stretch, fit};
+use super::search::{
+    LEAST_GAIN, ModeSearch, RESOLVED, close, gain, is_left_of, largest, next_pole, physical,
+    steady, take_off,
+};
+use super::{baseline, first_period};
+use crate::identify::Pole;
+use crate::identify::hum::SteadyLine;
+
+/// Lines that are taken off, at most.
+const MOST_LINES: usize = 8;
+/// Periods that are cut off the start of a decay, at most, once its modes are known.
+const MOST_PERIODS: usize = 4;
+
+/// What was found so far.
+pub(super) struct Attempt<'a> {
+    pub fit: ModesFit,
+    /// Lines that were taken off.
+    pub lines: Vec<SteadyLine>,
+    /// Whether a baseline that moves was taken off.
+    pub has_baseline: bool,
+    /// Whether another line than those of the mains is steady.
+    pub has_tone: bool,
+    wanted: &'a ModeSearch,
+    /// Lines that were taken off before, and how many since.
+    taken_off: (&'a [SteadyLine], usize),
+    takes_tones: bool,
+    /// Steady lines among the modes.
+    tones: Vec<usize>,
+}
+
+impl<'a> Attempt<'a> {
+    /// Adds modes one by one as long as the criterion falls enough, each starting at the strongest line of the residual.
+    /// Lines that do not decay are taken off the stretches: those of the mains where they are found, others from the last
+    /// fit, in which the modes do not disturb them. So is what the recorder adds: a baseline that moves, and the start of a
+    /// decay in which a filter still follows the hit.
+    ///
+    /// # Errors
+    /// [`FitError`] if there are too few samples.
+    pub fn of(
+        stretches: &mut [Stretch],
+        wanted: &'a ModeSearch,
+        taken_off: &'a [SteadyLine],
+        takes_tones: bool,
+    ) -> Result<Self, FitError> {
+        let mut all = Self {
+            fit: fit(stretches, &[])?,
+            lines: Vec::new(),
+            has_baseline: false,
+            has_tone: false,
+            wanted,
+            taken_off: (taken_off, 0),
+            takes_tones,
+            tones: Vec::new(),
+        };
+        let resolved = RESOLVED * all.fit.fit.sum_of_squares;
+        while all.goes_on(resolved) {
+            let Some(pole) = next_pole(stretches, &all.fit, wanted.band_hz) else {
+                break;
+            };
+            let next = fit(stretches, &[&all.fit.poles[..], &[pole]].concat())?;
+            if !all.is_recorders(stretches, &next)? && !all.is_taken(stretches, next)? {
+                break;
+            }
+        }
+        all.finish(stretches)?;
+        Ok(all)
+    }
+
+    /// Whether more modes are searched for.
+    fn goes_on(&self, resolved: f64) -> bool {
+        let modes = self.fit.poles.len() - self.tones.len();
+        match self.wanted.count {
+            Some(count) => modes < count,
+            None => modes < self.wanted.most && self.fit.fit.sum_of_squares >= resolved,
+        }
+    }
+
+    /// Takes the last line of a fit off if it is none of the stand's. Whether it is not.
+    fn is_recorders(
+        &mut self,
+        stretches: &mut [Stretch],
+        next: &ModesFit,
+    ) -> Result<bool, FitError> {
+        let last = self.fit.poles.len();
+        let of_mains = steady(next, last, stretches).filter(|line| line.is_of_mains);
+        let known = self.taken_off.0.iter().chain(&self.lines);
+        let is_line = of_mains.is_some() || is_left_of(known, next, last, stretches);
+        if is_line && self.taken_off.1 < MOST_LINES {
+            take_off(stretches, next, last);
+            self.lines.extend(of_mains);
+            self.taken_off.1 += 1;
+            self.refit(stretches)?;
+            return Ok(true);
+        }
+        let is_transient = |mode: &Pole| first_period::is_transient(next.poles[last], *mode);
+        let is_filter = self.is_clear(next, stretches)
+            && self.fit.poles.first().is_some_and(is_transient)
+            && first_period::cut_off(stretches, &self.fit, first_period::LARGER);
+        if is_filter {
+            self.refit(stretches)?;
+        }
+        Ok(is_filter)
+    }
+
+    /// Takes a fit with one mode more, or a baseline off, if either is worth it. Whether it was.
+    fn is_taken(&mut self, stretches: &mut [Stretch], next: ModesFit) -> Result<bool, FitError> {
+        let last = self.fit.poles.len();
+        let is_clear = self.is_clear(&next, stretches);
+        // Beside a mode it is what its law of damping leaves.
+        let is_tone =
+            is_clear && steady(&next, last, stretches).is_some() && close(&next.poles).is_none();
+        self.has_tone |= is_tone;
+        if is_tone && self.takes_tones && self.tones.len() < MOST_LINES {
+            self.tones.push(last);
+            self.fit = next;
+            return Ok(true);
+        }
+        let is_slow = |mode: &Pole| baseline::is_slow(next.poles[last], *mode);
+        let is_slow = self.fit.poles.first().is_some_and(is_slow);
+        let pays = is_clear && !is_slow && physical(&next, stretches, &self.tones);
+        if !pays && self.has_more_baseline(stretches)? {
+            return Ok(true);
+        }
+        if self.wanted.count.is_none() {
+            self.fit.close_hz = close(&next.poles).filter(|_| pays);
+            if !pays || self.fit.close_hz.is_some() {
+                return Ok(false);
+            }
+        }
+        self.fit = next;
+        if self.has_baseline {
+            // It was fitted without this mode.
+            baseline::take_off(stretches, &self.fit, true);
+            self.refit(stretches)?;
+        }
+        Ok(true)
+    }
+
+    /// Takes a baseline off if it moves and none was before. Whether it did.
+    fn has_more_baseline(&mut self, stretches: &mut [Stretch]) -> Result<bool, FitError> {
+        let moves = !self.has_baseline && baseline::take_off(stretches, &self.fit, false);
+        if moves {
+            self.has_baseline = true;
+            self.refit(stretches)?;
+        }
+        Ok(moves)
+    }
+
+    /// Takes off what is left of the recorder, and the tones.
+    fn finish(&mut self, stretches: &mut [Stretch]) -> Result<(), FitError> {
+        self.has_more_baseline(stretches)?;
+        for _ in 0..MOST_PERIODS {
+            if !first_period::cut_off(stretches, &self.fit, first_period::TOO_LARGE) {
+                break;
+            }
+            self.refit(stretches)?;
+        }
+        let mut modes = 0..self.fit.poles.len();
+        self.has_tone |= modes.any(|k| steady(&self.fit, k, stretches).is_some());
+        if self.tones.is_empty() {
+            return Ok(());
+        }
+        for k in &self.tones {
+            self.lines.push(SteadyLine {
+                frequency_hz: self.fit.poles[*k].frequency_hz(),
+                amplitude: largest(&self.fit, *k, stretches),
+                is_of_mains: false,
+            });
+            take_off(stretches, &self.fit, *k);
+        }
+        let modes = (0..self.fit.poles.len()).filter(|k| !self.tones.contains(k));
+        self.fit.poles = modes.map(|k| self.fit.poles[k]).collect();
+        self.refit(stretches)
+    }
+
+    /// Fits the modes again to what the stretches have become.
+    fn refit(&mut self, stretches: &[Stretch]) -> Result<(), FitError> {
+        self.fit = ModesFit {
+            close_hz: self.fit.close_hz,
+            ..fit(stretches, &self.fit.poles)?
+        };
+        Ok(())
+    }
+
+    /// Whether one mode more lowers the error clearly.
+    fn is_clear(&self, next: &ModesFit, stretches: &[Stretch]) -> bool {
+        gain(&self.fit, next, stretches) > LEAST_GAIN
+            && next.fit.sum_of_squares < 0.98 * self.fit.fit.sum_of_squares
+    }
+}
