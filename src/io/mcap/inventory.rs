@@ -19,6 +19,7 @@ use super::route::Route;
 use super::schema::Schema;
 use super::schema::leaves::{self, Leaf};
 use super::selection::FieldRequest;
+use super::signal::two_publishers;
 use super::summary;
 use super::time::Stamp;
 use super::units;
@@ -216,10 +217,10 @@ fn numbers_of(channel: &TopicChannel) -> TopicNumbers {
 
 fn choose_topic(file: &str, mut topics: Vec<TopicNumbers>) -> Result<FieldRequest, Failure> {
     topics.sort();
+    topics.dedup();
     let has_numbers = |(_, numbers): &&TopicNumbers| *numbers == Ok(true);
     let with_numbers = topics.iter().filter(has_numbers);
-    let mut names: Vec<_> = with_numbers.map(|(topic, _)| topic.as_str()).collect();
-    names.dedup();
+    let names: Vec<_> = with_numbers.map(|(topic, _)| topic.as_str()).collect();
     match names[..] {
         [topic] => Ok(FieldRequest::Topic(topic.to_owned(), Vec::new())),
         [] => Err(Failure::failed(
@@ -331,6 +332,7 @@ impl Scan {
             .map(|channel| report(channel, self.seen.get(&channel.record.id)))
             .collect();
         channels.sort_by(|a, b| (&a.topic, a.id).cmp(&(&b.topic, b.id)));
+        tell_publishers(&mut channels);
         let first_log_ns = self.seen.values().map(|seen| seen.least_log_ns).min();
         let last_log_ns = self.seen.values().map(|seen| seen.greatest_log_ns).max();
         let last = last_log_ns.and_then(|last| i64::try_from(last).ok());
@@ -385,6 +387,23 @@ impl Scan {
         }
         warnings.extend(summary::conflict(self.channels.conflicts));
         warnings
+    }
+}
+
+/// Says of neighbouring channels of a topic that their messages mix.
+fn tell_publishers(channels: &mut [ChannelReport]) {
+    for place in 1..channels.len() {
+        let [one, other] = [&channels[place - 1], &channels[place]];
+        let is_mixed = match (one.log_ns, other.log_ns) {
+            (Some(a), Some(b)) => one.topic == other.topic && a.0 < b.1 && b.0 < a.1,
+            _ => false,
+        };
+        if is_mixed {
+            let why = two_publishers([one.id, other.id]);
+            for channel in &mut channels[place - 1..=place] {
+                channel.unreadable.get_or_insert_with(|| why.clone());
+            }
+        }
     }
 }
 

@@ -85,6 +85,24 @@ fn everything_in_a_file_is_listed() {
 }
 
 #[test]
+fn two_publishers_on_a_topic_are_said_once_each() {
+    let mut file = File::new(options(None));
+    let float = ("std_msgs/msg/Float64", &b"float64 data"[..]);
+    for id in 1..4 {
+        let topic = if id < 3 { "/x" } else { "/y" };
+        file.channel(id, topic, "cdr+ros2msg", float);
+    }
+    for time in 0..9_u64 {
+        file.message(1 + (time % 3) as u16, time, &float64(1.0));
+    }
+    let inventory = inventory(&file.finish());
+    let is_readable = inventory.channels.iter().map(|c| c.unreadable.is_none());
+    assert_eq!(is_readable.collect::<Vec<_>>(), [false, false, true]);
+    let codes: Vec<_> = inventory.warnings.iter().map(|w| w.code).collect();
+    assert_eq!(codes, ["mcap-unreadable", "mcap-unreadable"]);
+}
+
+#[test]
 fn a_cut_file_is_lossy_and_says_where() {
     let bytes = file(None);
     let inventory = inventory(&bytes[..700]);

@@ -67,6 +67,7 @@ pub(super) struct TopicSignal {
     channel: Arc<TopicChannel>,
     /// For each channel whether it is of the topic.
     is_ours: Vec<Option<bool>>,
+    publishers: Publishers,
     pub selected: SelectedSignal,
     pub options: TimeOptions,
     decoder: Decoder,
@@ -82,6 +83,37 @@ pub(super) struct TopicSignal {
     pub tally: Tally,
     /// The chosen time of the first message minus its log time, in ns.
     pub log_offset_ns: i64,
+}
+
+/// When the messages of each channel of a topic were logged: number, first and last.
+#[derive(Debug, Default)]
+struct Publishers(Vec<(u16, u64, u64)>);
+
+impl Publishers {
+    /// Takes note of a message; the channels, if two of them have messages between each other's.
+    fn note(&mut self, message: &RawMessage) -> Result<(), [u16; 2]> {
+        let (id, at) = (message.channel_id, message.log_time_ns);
+        let all = &mut self.0;
+        let place = all.iter().position(|one| one.0 == id).unwrap_or_else(|| {
+            all.push((id, at, at));
+            all.len() - 1
+        });
+        all[place].1 = all[place].1.min(at);
+        all[place].2 = all[place].2.max(at);
+        let (_, first, last) = all[place];
+        // A recorder that starts anew declares its channels again: one after the other.
+        let others = all.iter().filter(|one| one.0 != id);
+        let mut between = others.filter(|(_, start, end)| first < *end && *start < last);
+        between.next().map_or(Ok(()), |other| Err([other.0, id]))
+    }
+}
+
+/// Says that the messages of two channels of a topic mix.
+pub(super) fn two_publishers([one, other]: [u16; 2]) -> String {
+    format!(
+        "its channels {one} and {other} have messages between each other's: two nodes publish on it, and their samples are not \
+         one signal; record one of them alone, or split the file by channel"
+    )
 }
 
 /// A message kept for later.
@@ -155,6 +187,7 @@ impl TopicSignal {
             name: name.to_owned(),
             channel: Arc::clone(channel),
             is_ours: vec![None; 1 << 16],
+            publishers: Publishers::default(),
             selected,
             options: options.clone(),
             decoder: Decoder::new(encoding, &schema, targets),
@@ -182,6 +215,15 @@ impl TopicSignal {
         if self.is_ours[id] != Some(true) {
             return Ok(false);
         }
+        self.publishers.note(message).map_err(|others| {
+            let why = two_publishers(others);
+            let topic = &self.selected.topic;
+            Failure::failed(
+                ErrorCode::RecordsDiffer,
+                format_args!("topic {topic}: {why}"),
+            )
+            .at(&self.name)
+        })?;
         if self.is_time_chosen {
             self.decode(message);
             return Ok(true);

@@ -219,8 +219,8 @@ fn channels_of_a_topic_are_one_signal_unless_they_differ() {
     file.channel(1, "/x", "cdr+ros2msg", FLOAT64);
     file.channel(2, "/x", "cdr+ros2msg", FLOAT64);
     file.message(1, 1, &float64(1.0));
-    file.message(2, 2, &float64(2.0));
-    file.message(1, 3, &float64(3.0));
+    file.message(1, 2, &float64(2.0));
+    file.message(2, 3, &float64(3.0));
     let (_, values, _) = read(&file.finish(), "/x", "data");
     assert_eq!(values, [1.0, 2.0, 3.0]);
 
@@ -233,6 +233,30 @@ fn channels_of_a_topic_are_one_signal_unless_they_differ() {
     let said = open(&bytes, ("/x", ""), &TimeOptions::default());
     let said = said.err().unwrap().to_string();
     assert!(said.contains("channels of different types"), "{said}");
+}
+
+#[test]
+fn two_publishers_on_a_topic_are_no_signal() {
+    let mut file = File::new(options(None));
+    file.channel(1, "/x", "cdr+ros2msg", FLOAT64);
+    file.channel(2, "/x", "cdr+ros2msg", FLOAT64);
+    file.channel(3, "/y", "cdr+ros2msg", FLOAT64);
+    for time in 1..6_u64 {
+        file.message(1 + (time % 2) as u16, time, &float64(time as f64));
+        file.message(3, time, &float64(-1.0));
+    }
+    let bytes = file.finish();
+    let read = |topic| -> Result<(), Failure> {
+        let mut reader = open(&bytes, (topic, "data"), &TimeOptions::default())?;
+        while reader.next(&mut Vec::new(), &mut Vec::new())? {}
+        Ok(())
+    };
+    let said = read("/x").unwrap_err().to_string();
+    assert!(
+        said.contains("its channels 1 and 2 have messages between"),
+        "{said}"
+    );
+    read("/y").unwrap();
 }
 
 #[test]
