@@ -53,6 +53,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
     ]),
     ("Stand file", &[
         ["residues-do-not-add-up", "the residues of [[modes]] leave much of the response at rest to modes above the band", "residues are parts of 1: check them"],
+        ["diagnosis-incomplete", "the stand file was written by a diagnosis that could not explain its records, or not wholly", "compare with the stand file before on a record with a known torque, or diagnose again with other records"],
         ["scale-in-heading", "the heading of the channel names a scale such as x10, which was not applied", "say the unit with the scale, or rename the column"],
         ["calibration-not-used", "a record in strain was taken through the beam's drawing although a calibration is given", "record in the unit of the calibration"],
         ["damping-above-one", "the damping ratio is above 1", "write 7 % as 0.07"],

@@ -564,3 +564,49 @@ fn ringing_at_another_frequency_than_the_declared_one_is_said() {
         );
     }
 }
+
+/// A mass of 2 kg under a force of two sines, whose motor current is recorded in mA: a factor per A, per mA, and one that
+/// belongs to another quantity.
+#[test]
+fn a_torque_factor_is_in_a_unit_of_its_own() {
+    let folder = Folder::new();
+    let sines = [(20.0, 5.0), (9.0, 12.0)];
+    let mut text = String::from("time [s],position [m],current [mA]\n");
+    for i in 0..8000 {
+        let t = f64::from(i) / 1000.0;
+        let force: f64 = sines.iter().map(|(f, w)| f * (w * t).sin()).sum();
+        let at: f64 = sines
+            .iter()
+            .map(|(f, w)| -f * (w * t).sin() / (2.0 * w * w))
+            .sum();
+        text += &format!("{t:.3},{at:.9},{:.6}\n", 100.0 * force);
+    }
+    folder.write("run.csv", text);
+    let runup = "identify runup run.csv --motion position --torque current --torque-factor";
+    let args: Vec<&str> = runup.split(' ').collect();
+    for factor in ["10 N/A", "0.01 N/mA"] {
+        let report = folder.json(&[&args[..], &[factor, "--json"]].concat());
+        assert_close(constant(&report, "mass"), 2.0, 2e-3);
+    }
+    let ran = folder.run(&[&args[..], &["10 N/V"]].concat());
+    ran.says(1, &["10 N/V", "mA"]);
+}
+
+/// A stand file that a diagnosis wrote without an explanation.
+#[test]
+fn an_unexplained_diagnosis_is_said_where_its_file_is_used() {
+    for (verdict, count) in [
+        ("unexplained", 1),
+        ("partly-explained", 1),
+        ("explained", 0),
+    ] {
+        let (_, report) = compensated(
+            &stand(&format!("[diagnosed]\nverdict = \"{verdict}\"\n")),
+            "torque [N m]",
+            1.0,
+        );
+        let said = codes(&report);
+        let found = said.iter().filter(|code| **code == "diagnosis-incomplete");
+        assert_eq!(found.count(), count, "{verdict}: {said:?}");
+    }
+}

@@ -745,6 +745,19 @@ fn doubtful_numbers_are_asked_or_said() {
         ("U *1000 [V]", true),
         ("U [V]", false),
         ("Ux1 [V]", false),
+        ("U [V] x 0.1", true),
+        ("U × 10 [V]", true),
+        ("U (x1000) [V]", true),
+        ("0.1 x U [V]", true),
+        ("10*U [V]", true),
+        ("U*100 [V]", true),
+        ("U 1e-3 [V]", true),
+        ("U /10 [V]", true),
+        ("U 10^-3 [V]", true),
+        ("box10 U [V]", false),
+        ("motor/10 [V]", false),
+        ("U 100 [V]", false),
+        ("U*2 [V]", false),
     ] {
         folder.write("in.csv", record(heading, None, |c| c));
         let (_, report) = amplitude(&folder, &[]);

@@ -580,6 +580,16 @@ fn a_range_is_taken_by_any_clock() {
             lines[1]
         );
     }
+    let values: String = (0..400).map(|i| format!("{i}\n")).collect();
+    folder.write("values.csv", format!("bridge [V]\n{values}"));
+    let part = ["extract", "values.csv", "--range", "0.01..0.0199"];
+    let ran = folder.run(&[&part[..], &["--rate", "10000"]].concat());
+    assert_eq!(
+        ran.stdout.lines().nth(1),
+        Some("0.01,100.0"),
+        "{}",
+        ran.stderr
+    );
     folder
         .run(&["extract", "zero.csv", "--range", "5..6"])
         .says(1, &["no sample", "0.0399"]);

@@ -108,6 +108,12 @@ impl Reading {
     pub(crate) fn is_partial(&self) -> bool {
         self.range.is_some() || self.fill.is_some_and(|fill| fill != Fill::Refuse)
     }
+
+    /// Whether what lies before a time is left out.
+    pub(crate) fn starts_later(&self) -> bool {
+        let range = self.range.as_ref();
+        range.is_some_and(|range| range.from.is_some())
+    }
 }
 
 /// Which channel of a recording is read, and its unit if the file does not say or is wrong.

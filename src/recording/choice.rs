@@ -247,7 +247,7 @@ pub(crate) struct Selection<'a> {
     pub(crate) rate_hz: f64,
     /// Standard uncertainty of that, if it comes from stamps.
     pub(crate) rate_std_hz: Option<f64>,
-    /// Time of the first sample: 0 if the file does not say, or the rate was given.
+    /// Time of the first sample: 0 if the file does not say, or the rate was given and the record is whole.
     pub(crate) start: Moment,
     /// Unit of the samples, if it is known.
     pub(crate) unit: Option<NamedUnit>,
@@ -285,6 +285,10 @@ impl Recording {
         let mut warnings: Vec<Warning> = warning.into_iter().collect();
         let axis = &channel.axis;
         let (rate_hz, start) = match (reading.rate_hz, axis.rate_hz) {
+            // A part of the record keeps its place.
+            (Some(rate_hz), _) if reading.starts_later() => {
+                (rate_hz, axis.start.unwrap_or_default())
+            }
             (Some(rate_hz), _) => (rate_hz, Moment::default()),
             (None, Some(rate_hz)) => (rate_hz, axis.start.unwrap_or_default()),
             (None, None) => return Err(without_rate(channel)),

@@ -41,7 +41,10 @@ impl ChannelStream {
                 };
                 TimeAxis::of_stream(heading, grid, stamps, &[], reading)?
             }
-            None if reading.rate_hz.is_some() => TimeAxis::given(selection.rate_hz, None),
+            None if reading.rate_hz.is_some() => TimeAxis {
+                start: Some(selection.start),
+                ..TimeAxis::given(selection.rate_hz, None)
+            },
             None => TimeAxis {
                 stamps_s: None,
                 start: Some(selection.start),

@@ -134,7 +134,32 @@ fn oddities(stand: &Stand) -> Vec<Warning> {
     let factor = stand.gage.as_ref().and_then(unusual_gage_factor);
     let gage = modulus.into_iter().chain(factor);
     let order = assumed_order(stand);
-    overdamped.chain(gage).chain(left).chain(order).collect()
+    let open = left_unexplained(stand);
+    overdamped
+        .chain(gage)
+        .chain(left)
+        .chain(order)
+        .chain(open)
+        .collect()
+}
+
+/// A warning if the diagnosis that refined the stand could not explain its records.
+fn left_unexplained(stand: &Stand) -> Option<Warning> {
+    let Diagnosed { verdict, .. } = &stand.diagnosed;
+    let ending = match verdict.as_deref()? {
+        "unexplained" => "could not explain its records",
+        "partly-explained" => "explained its records in part only",
+        _ => return None,
+    };
+    Some(Warning::new(
+        "diagnosis-incomplete",
+        format!(
+            "{}: the diagnosis that wrote this file {ending} ({}): its constants and effects make up for what the model lacks, and \
+             torque taken through it can be worse than through the file before; compare both on a record with a known torque",
+            stand.file,
+            verdict.as_deref().unwrap_or_default(),
+        ),
+    ))
 }
 
 /// A warning if a low-pass is taken for an RC one.
@@ -184,7 +209,7 @@ fn one_calibration(top: &Section, stand: &Stand) -> Result<(), Failure> {
 
 /// What a diagnosis wrote about itself; what is not used is for people.
 fn diagnosed(section: &Section) -> Result<Diagnosed, Failure> {
-    for key in ["applied_unit", "verdict", "records"] {
+    for key in ["applied_unit", "records"] {
         let _ = section.text(key)?;
     }
     let quantity = |key: &'static str| -> Result<f64, Failure> {
@@ -204,6 +229,7 @@ fn diagnosed(section: &Section) -> Result<Diagnosed, Failure> {
     };
     let found = Diagnosed {
         measured_unit: section.text("measured_unit")?.map(str::to_owned),
+        verdict: section.text("verdict")?.map(str::to_owned),
         offset: quantity("offset")?,
         shift: quantity("shift")?,
     };

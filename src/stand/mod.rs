@@ -75,6 +75,8 @@ pub struct Stand {
 pub struct Diagnosed {
     /// Unit of the record.
     pub measured_unit: Option<String>,
+    /// How the diagnosis ended.
+    pub verdict: Option<String>,
     /// Constant in the record, in SI units.
     pub offset: f64,
     /// Displacement by a constant load, in SI units of the record.

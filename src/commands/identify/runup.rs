@@ -14,6 +14,7 @@ use crate::print::short;
 use crate::quality;
 use crate::recording::{AlignedChannel, AlignedChannels};
 use crate::stand::update::Entry;
+use crate::unit::RecordedChannel;
 
 /// Runs the test.
 pub fn run(args: &Runup) -> Result<Outcome, Failure> {
@@ -99,7 +100,7 @@ fn entries(args: &Runup, result: &Identification) -> Result<Vec<Entry>, Failure>
 /// SI units of torque (rotation) or force per unit of the channel.
 fn effort_factor(args: &Runup, torque: &AlignedChannel, turning: bool) -> Result<f64, Failure> {
     let (factor, dimension) = match &args.torque_factor {
-        Some(text) => factor_of(text)?,
+        Some(text) => factor_of(text, torque.channel())?,
         None => {
             let unit = unit_or(torque.channel(), "--torque-unit")?;
             (unit.unit.factor(), unit.unit.dimension())
@@ -127,8 +128,9 @@ fn effort_factor(args: &Runup, torque: &AlignedChannel, turning: bool) -> Result
     }
 }
 
-/// `"35.15 N/V"`: SI units of torque or force per unit of the channel, and their dimension.
-fn factor_of(text: &str) -> Result<(f64, Dimension), Failure> {
+/// `"35.15 N/V"`: SI units of torque or force per number of the channel, and their dimension. A channel without a known unit
+/// is in the unit of the factor.
+fn factor_of(text: &str, channel: RecordedChannel) -> Result<(f64, Dimension), Failure> {
     let wrong = || {
         Failure::usage(
             ErrorCode::InvalidValue,
@@ -140,12 +142,25 @@ fn factor_of(text: &str) -> Result<(f64, Dimension), Failure> {
     };
     let (number, units) = text.trim().split_once(' ').ok_or_else(wrong)?;
     let number: f64 = number.parse().map_err(|_| wrong())?;
-    let (effort, channel) = units.rsplit_once('/').ok_or_else(wrong)?;
-    let effort = Unit::parse(effort).map_err(|_| wrong())?;
-    // The factor applies to the channel's numbers as they are, so the prefix of their unit does not count.
-    Unit::parse(channel).map_err(|_| wrong())?;
+    let (effort, per) = units.rsplit_once('/').ok_or_else(wrong)?;
+    let [effort, per] = [effort, per].map(|text| Unit::parse(text).map_err(|_| wrong()));
+    let (effort, per) = (effort?, per?);
     if !number.is_finite() || number == 0.0 {
         return Err(wrong());
     }
-    Ok((number * effort.factor(), effort.dimension()))
+    let scale = match channel.unit {
+        Some(of) if of.unit.dimension() != per.dimension() => {
+            return Err(Failure::failed(
+                ErrorCode::UnitUnsuitable,
+                format_args!(
+                    "--torque-factor {text} does not go with channel \"{}\", which is in {}; give torque or force per {}, or say \
+                     --torque-unit if the channel is in another unit",
+                    channel.name, of.text, of.text
+                ),
+            ));
+        }
+        Some(of) => of.unit.factor() / per.factor(),
+        None => 1.0,
+    };
+    Ok((number * scale * effort.factor(), effort.dimension()))
 }
