@@ -4,7 +4,7 @@ use torqcomp_dsp::conversion::Conversion;
 use torqcomp_model::{Dimension, Estimate, Kind, RatioOf, Unit, UnitSystem};
 
 use super::static_law::StaticLaw;
-use super::{ConstantStd, Stand, TransducerSignal};
+use super::{ConstantStd, Stand, TransducerSignal, heading_scale};
 use crate::failure::{ErrorCode, Failure};
 use crate::print::rounded;
 use crate::unit::{NamedUnit, OF_FULL_SCALE, RecordedChannel};
@@ -265,7 +265,7 @@ impl Stand {
             warnings: law
                 .warnings
                 .into_iter()
-                .chain(scaled(channel.name))
+                .chain(heading_scale::unapplied(channel.name))
                 .chain(self.unused_zero(signal, named))
                 .collect(),
         })
@@ -359,53 +359,6 @@ impl Stand {
             warnings: Vec::new(),
         })
     }
-}
-
-/// A warning if the heading of a channel names a scale, as `x10`, `*1000`, `× 0.1`, `(x100)`, `/10` or `0.1 x`.
-fn scaled(heading: &str) -> Option<Warning> {
-    let scale = scale_in(heading)?;
-    Some(Warning::new(
-        "scale-in-heading",
-        format!(
-            "the heading \"{heading}\" names a scale, \"{scale}\", which was not applied to the numbers: they were taken as they \
-             are; if that is wrong, rename the column and scale it"
-        ),
-    ))
-}
-
-/// A power of ten beside a mark of multiplication or division.
-fn scale_in(heading: &str) -> Option<String> {
-    let is_mark = |c: char| matches!(c, 'x' | 'X' | '×' | '·' | '*' | '/');
-    let is_power = |number: &str| {
-        let exponent = match number.strip_prefix("10^") {
-            Some(exponent) => exponent.parse().unwrap_or(f64::NAN),
-            None => number.parse().map_or(f64::NAN, f64::log10),
-        };
-        exponent != 0.0 && (exponent - exponent.round()).abs() < 1e-9
-    };
-    let words: Vec<&str> = heading
-        .split(|c: char| c.is_whitespace() || "()[]{},;_".contains(c))
-        .filter(|word| !word.is_empty())
-        .collect();
-    let is_alone = |word: &&str| word.chars().count() == 1 && word.chars().all(is_mark);
-    let is_scale = |word: &&&str| {
-        let mut marks = word.char_indices().filter(|(_, c)| is_mark(*c));
-        let is_beside = marks.any(|(at, mark)| {
-            let (left, right) = (&word[..at], &word[at + mark.len_utf8()..]);
-            // That of `Torque*100` stands between words; that of `box10` or of the topic `motor/10` is part of one.
-            let is_between = !matches!(mark, 'x' | 'X' | '/');
-            (is_power(right) && (is_between || left.is_empty()))
-                || (is_power(left) && (is_between || right.is_empty()))
-        });
-        is_beside || (word.contains(['e', 'E', '^']) && is_power(word))
-    };
-    let pairs = words.windows(2).find(|pair| {
-        (is_alone(&pair[0]) && is_power(pair[1])) || (is_power(pair[0]) && is_alone(&pair[1]))
-    });
-    let single = words.iter().find(is_scale);
-    pairs
-        .map(|pair| pair.join(" "))
-        .or_else(|| single.map(|word| (*word).to_owned()))
 }
 
 /// The question for a unit.
