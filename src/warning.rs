@@ -157,6 +157,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["mains-lines", "lines at multiples of 50 or 60 Hz stand out", "check grounding and shielding, or declare the effect mains-pickup"],
         ["non-finite", "cells hold no number, or no finite one", "repair them, or cut the record there"],
         ["repeated-samples", "samples repeat the one before more often than the resolution explains", "record the source at its own rate"],
+        ["spikes", "one or two samples in a row lie far from those on both sides", "repair them if they mark no value or are drop-outs or glitches"],
         ["stuck-channel", "the signal stands still for a while, or drops out", "check cables and transmitters, and leave that part out"],
     ]),
     ("Reading text", &[

@@ -610,3 +610,23 @@ fn an_unexplained_diagnosis_is_said_where_its_file_is_used() {
         assert_eq!(found.count(), count, "{verdict}: {said:?}");
     }
 }
+
+/// A mark for no value, behind the samples that are looked at more closely.
+#[test]
+fn a_mark_for_no_value_is_said_wherever_it_is() {
+    let folder = Folder::new();
+    folder.write("stand.toml", stand(""));
+    let mut noise = crate::noise::Noise(13);
+    let mut sample = |i: usize| match i {
+        196_607 => -9999.0,
+        _ => 5.0 + (TAU * 0.005 * i as f64).sin() + 0.01 * noise.normal(),
+    };
+    let rows: Vec<f64> = (0..300_000).map(&mut sample).collect();
+    folder.write("in.csv", sampled("T [N m]", 1000.0, 300_000, |i| rows[i]));
+    for more in [&[][..], &["--whole-record"]] {
+        let report = folder.json(&[&COMPENSATE[..], more, &["--force", "--json"]].concat());
+        let warnings = report["warnings"].to_string();
+        assert!(warnings.contains("a sample stands alone"), "{warnings}");
+        assert!(warnings.contains("196.607 s"), "{warnings}");
+    }
+}

@@ -100,6 +100,17 @@ fn every_fault_is_found_with_its_size() {
     assert_eq!(codes(&report), ["stuck-channel"]);
     assert_eq!(report["channels"][0]["stuck"], 12);
 
+    let mut marked: Vec<f64> = good.iter().map(|x| x + 50.0).collect();
+    marked[1500] = -9999.0;
+    marked[4000] = 0.0;
+    let report = inspect(&csv(&times, &[("a_V", &marked)]));
+    assert_eq!(codes(&report), ["spikes"]);
+    let message = report["warnings"][0]["message"].as_str().unwrap();
+    assert!(
+        message.contains("2 places") && message.contains("-9999"),
+        "{message}"
+    );
+
     let chance = noise(3, 6000);
     let mut repeated = good.clone();
     for i in 1..6000 {

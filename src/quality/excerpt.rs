@@ -27,12 +27,12 @@ pub struct Of<'a> {
     pub start: Moment,
     /// Samples in all.
     pub samples: usize,
-    /// Clipping and standstills of all of them.
+    /// Clipping, standstills and spikes of all of them.
     pub faults: Faults,
 }
 
-/// The warnings of [`super::warnings`] about the first samples of a record, clipping and standstills in all of it; that it has
-/// more is said of the others.
+/// The warnings of [`super::warnings`] about the first samples of a record, clipping, standstills and spikes in all of it; that
+/// it has more is said of the others.
 ///
 /// ```
 /// use torqcomp::recording::moment::Moment;
@@ -63,7 +63,7 @@ pub fn warnings(samples: &[f64], of: Of) -> Vec<Warning> {
         );
         let in_all = |warning: &Warning| match warning.code {
             "clipped" => faults.clipping.is_some(),
-            code => code == "stuck-channel",
+            code => matches!(code, "stuck-channel" | "spikes"),
         };
         let of_first = found.iter_mut().filter(|warning| !in_all(warning));
         of_first.for_each(|warning| warning.message += &rest);

@@ -5,6 +5,7 @@ use torqcomp_dsp::quality::finite::{NonFinite, non_finite};
 use torqcomp_dsp::quality::mains::{Mains, mains};
 use torqcomp_dsp::quality::quantisation::{Quantisation, quantisation};
 use torqcomp_dsp::quality::repeats::{Repeats, repeats};
+use torqcomp_dsp::quality::spikes::{Spikes, spikes};
 use torqcomp_dsp::quality::streamed::{Faults, Standstills};
 use torqcomp_dsp::quality::stuck::{constant, standstills};
 use torqcomp_dsp::quality::{Run, is_straight, range};
@@ -46,6 +47,8 @@ pub struct Findings {
     pub clipping: Option<Clipping>,
     /// Where it stands still.
     pub standstills: Option<Standstills>,
+    /// Samples that stand alone.
+    pub spikes: Option<Spikes>,
     /// How often samples repeat.
     pub repeats: Option<Repeats>,
     /// Its resolution.
@@ -74,13 +77,14 @@ impl Findings {
             constant: constant(samples),
             clipping,
             standstills: Standstills::of(&standstills),
+            spikes: Spikes::of(&spikes(samples)),
             repeats: repeats(samples),
             quantisation: quantisation(samples),
             mains: rate_hz.and_then(|rate_hz| mains(samples, rate_hz)),
         }
     }
 
-    /// The first samples of a record, whose clipping and standstills were looked for in all of it.
+    /// The first samples of a record, whose clipping, standstills and spikes were looked for in all of it.
     #[must_use]
     pub fn with(mut self, faults: &Faults) -> Self {
         // A level under noise is looked for at the beginning only.
@@ -92,6 +96,7 @@ impl Findings {
         };
         self.clipping = faults.clipping.or(self.clipping.filter(is_noisy));
         self.standstills = faults.standstills;
+        self.spikes = faults.spikes;
         self
     }
 
@@ -128,6 +133,7 @@ impl Findings {
         let clipping = self.clipping.iter();
         found.extend(clipping.flat_map(|c| clipped_ends(name, unit, c, axis)));
         found.extend(self.standstills.map(|s| stuck(name, unit, &s, axis)));
+        found.extend(self.spikes.map(|s| spiked(name, unit, &s, axis)));
         found.extend(
             self.repeats
                 .filter(|r| r.unexplained == Some(true))
@@ -226,6 +232,27 @@ fn stuck(name: &str, unit: &str, found: &Standstills, axis: &TimeAxis) -> Warnin
             with_unit(longest.value, unit, 6),
             place(axis, longest.start),
             longest.length
+        ),
+    )
+}
+
+fn spiked(name: &str, unit: &str, found: &Spikes, axis: &TimeAxis) -> Warning {
+    let first = found.first;
+    let (places, is_first) = match found.count {
+        1 => ("a sample stands alone".to_owned(), ""),
+        count => (
+            format!("samples stand alone in {count} places"),
+            ", the first",
+        ),
+    };
+    Warning::new(
+        "spikes",
+        format!(
+            "\"{name}\": {places}, far from those on both sides{is_first} at {}, which is {} behind {}: a mark for no value, a \
+             drop-out or a glitch, unless the signal has such pulses; repair them, or leave that part out",
+            place(axis, first.index),
+            with_unit(first.value, unit, 6),
+            with_unit(first.before, unit, 6)
         ),
     )
 }

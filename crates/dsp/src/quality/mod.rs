@@ -11,7 +11,8 @@
 //! | cells that are no finite numbers | [`finite`] |
 //! | clipping | [`clipping`](mod@clipping), under noise [`pile_up`](mod@pile_up), of a decay before a filter [`flat_tops`](mod@flat_tops) |
 //! | a channel that stands still | [`stuck`] |
-//! | both in a stream | [`streamed`] |
+//! | samples that stand alone | [`spikes`](mod@spikes) |
+//! | these three in a stream | [`streamed`] |
 //! | samples that repeat the one before | [`repeats`](mod@repeats) |
 //! | coarse resolution | [`quantisation`](mod@quantisation) |
 //! | mains hum | [`mains`](mod@mains) |
@@ -32,6 +33,7 @@ pub mod repeats;
 pub mod resonance;
 pub mod rounding;
 mod runs;
+pub mod spikes;
 pub mod steps;
 pub mod streamed;
 pub mod stuck;

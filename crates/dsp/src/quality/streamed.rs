@@ -1,7 +1,8 @@
-//! Drop-outs, standstills and clipping of a record that goes by as a stream, piece by piece.
+//! Drop-outs, standstills, spikes and clipping of a record that goes by as a stream, piece by piece.
 
 use super::Run;
 use super::clipping::{Clipping, Rail, clipping};
+use super::spikes::{EVEN, Spike, Spikes, spikes};
 use super::stuck::SHORTEST;
 use super::stuck::standstills;
 
@@ -11,7 +12,7 @@ const PIECE: usize = 1 << 16;
 const OVERLAP: usize = 1 << 10;
 
 /// Faults of a record of any length, in bounded memory. Each piece is judged by itself, as
-/// [`standstills`] and [`clipping`] do with a record of its length.
+/// [`standstills`], [`spikes`] and [`clipping`] do with a record of its length.
 ///
 /// ```
 /// use torqcomp_dsp::quality::streamed::StreamedFaults;
@@ -31,6 +32,8 @@ pub struct StreamedFaults {
     /// Of these, how many were judged.
     judged: usize,
     last: Option<Run>,
+    /// Behind the last spike.
+    behind_spike: usize,
     found: Faults,
     low: Option<f64>,
     high: Option<f64>,
@@ -43,6 +46,8 @@ pub struct Faults {
     pub standstills: Option<Standstills>,
     /// Where it is clipped.
     pub clipping: Option<Clipping>,
+    /// Samples that stand alone.
+    pub spikes: Option<Spikes>,
 }
 
 /// Stretches in which a channel stands still.
@@ -62,6 +67,10 @@ impl Faults {
     pub fn scaled(mut self, scale: f64) -> Self {
         if let Some(found) = &mut self.standstills {
             found.longest.value *= scale;
+        }
+        if let Some(Spikes { first, .. }) = &mut self.spikes {
+            first.value *= scale;
+            first.before *= scale;
         }
         if let Some(found) = &mut self.clipping {
             for rail in [&mut found.low, &mut found.high].into_iter().flatten() {
@@ -133,12 +142,18 @@ impl StreamedFaults {
         let piece = &kept[..count];
         self.lengthen(&piece[self.judged..]);
         if piece.len() > 1 {
-            let Extremes { low, high, step } = Extremes::of(piece);
+            let extremes = Extremes::of(piece);
+            let Extremes {
+                low, high, step, ..
+            } = extremes;
             self.low = Some(self.low.map_or(low, |least| least.min(low)));
             self.high = Some(self.high.map_or(high, |largest| largest.max(high)));
             self.look_at_ends(piece, [low, high]);
             if may_stand_still(piece, step) {
                 self.look_for_standstills(piece);
+            }
+            if step > EVEN * extremes.mean_step {
+                self.look_for_spikes(piece);
             }
         }
         self.kept = kept;
@@ -170,6 +185,19 @@ impl StreamedFaults {
             }
             self.close();
             self.last = Some(run);
+        }
+    }
+
+    fn look_for_spikes(&mut self, piece: &[f64]) {
+        for spike in spikes(piece) {
+            let index = self.first + spike.index;
+            if index < self.behind_spike {
+                continue;
+            }
+            self.behind_spike = index + 1;
+            let first = Spike { index, ..spike };
+            let all = self.found.spikes.get_or_insert(Spikes { count: 0, first });
+            all.count += 1;
         }
     }
 
@@ -234,6 +262,8 @@ struct Extremes {
     high: f64,
     /// Largest step from sample to sample.
     step: f64,
+    /// The mean one.
+    mean_step: f64,
 }
 
 impl Extremes {
@@ -244,13 +274,15 @@ impl Extremes {
         let lesser = |a: f64, b: f64| if a < b { a } else { b };
         let greater = |a: f64, b: f64| if a > b { a } else { b };
         let (mut low, mut high) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
-        let mut step = [0.0; LANES];
+        let (mut step, mut sum) = ([0.0; LANES], [0.0; LANES]);
         let (before, behind) = (piece.chunks_exact(LANES), piece[1..].chunks_exact(LANES));
         for (a, b) in before.zip(behind) {
             for lane in 0..LANES {
                 low[lane] = lesser(a[lane], low[lane]);
                 high[lane] = greater(a[lane], high[lane]);
-                step[lane] = greater((b[lane] - a[lane]).abs(), step[lane]);
+                let size = (b[lane] - a[lane]).abs();
+                step[lane] = greater(size, step[lane]);
+                sum[lane] += size;
             }
         }
         let rest = &piece[(piece.len() - 1) / LANES * LANES..];
@@ -269,6 +301,8 @@ impl Extremes {
                 rest.iter().copied().fold(f64::NEG_INFINITY, f64::max),
                 f64::max,
             ),
+            mean_step: (sum.iter().sum::<f64>() + steps.clone().sum::<f64>())
+                / (piece.len() - 1) as f64,
             step: ends(step, steps.fold(0.0, f64::max), f64::max),
         }
     }
