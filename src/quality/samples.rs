@@ -248,7 +248,7 @@ fn spiked(name: &str, unit: &str, found: &Spikes, axis: &TimeAxis) -> Warning {
     Warning::new(
         "spikes",
         format!(
-            "\"{name}\": {places}, far from those on both sides{is_first} at {}, which is {} behind {}: a mark for no value, a \
+            "\"{name}\": {places}, far from those on both sides{is_first} at {}: {} after {}; a mark for no value, a \
              drop-out or a glitch, unless the signal has such pulses; repair them, or leave that part out",
             place(axis, first.index),
             with_unit(first.value, unit, 6),
