@@ -348,7 +348,7 @@ def json_file(folder):
 
 
 def shapes(folder):
-    """Files without chunks, without summary, with attachments, out of order, cut off."""
+    """Files without chunks, without summary, with attachments, with a publisher that started anew, cut off."""
     variants = {
         "no-chunks": {"use_chunking": False},
         "no-index": {"index_types": IndexType.NONE},
@@ -368,7 +368,7 @@ def shapes(folder):
             second = writer.register_channel("/x", "cdr", schema, {"publisher": "2"})
             for place, (time, value) in enumerate(zip(times(), values)):
                 data = b"\0\1\0\0" + struct.pack("<d", value)
-                writer.add_message(second if place % 2 else first, time, data, time)
+                writer.add_message(second if 2 * place > COUNT else first, time, data, time)
             writer.finish()
         case(folder, f"shape-{name}", "/x", "data", times(), values, time="log")
     whole = (folder / "shape-small-chunks.mcap").read_bytes()
@@ -386,6 +386,19 @@ def shapes(folder):
     )
 
 
+def two_publishers(folder):
+    """Two nodes that publish on one topic at a time: not one signal, so refused."""
+    with open(folder / "two-publishers.mcap", "wb") as out:
+        writer = Writer(out)
+        writer.start("ros2", "proof")
+        schema = writer.register_schema("std_msgs/msg/Float64", "ros2msg", b"float64 data")
+        nodes = [writer.register_channel("/x", "cdr", schema, {"publisher": name}) for name in "12"]
+        for place, time in enumerate(times()):
+            writer.add_message(nodes[place % 2], time, b"\0\1\0\0" + struct.pack("<d", 1.0), time)
+        writer.finish()
+    cases.append({"name": "two-publishers", "topic": "/x", "field": "data", "time": "log", "refused": True})
+
+
 def main():
     folder = Path(sys.argv[1])
     ros2_joints(folder)
@@ -395,6 +408,7 @@ def main():
     protobuf(folder)
     json_file(folder)
     shapes(folder)
+    two_publishers(folder)
     (folder / "cases.json").write_text(json.dumps(cases))
 
 

@@ -20,9 +20,11 @@ def read(torqcomp, folder, case):
     command = [torqcomp, "extract", str(folder / f"{case['name']}.mcap")]
     command += ["--topic", case["topic"], "--field", case["field"], "--time", case["time"]]
     done = subprocess.run([*command, "-o", str(out)], capture_output=True, text=True)
-    expected = 3 if case.get("cut") else 0
+    expected = 3 if case.get("cut") else 1 if case.get("refused") else 0
     if done.returncode != expected:
         sys.exit(f"{case['name']}: exit code {done.returncode}, not {expected}\n{done.stderr}")
+    if case.get("refused"):
+        return None
     with open(out, newline="") as rows:
         reader = csv.reader(rows)
         assert next(reader)[0] == "time_s"
@@ -48,12 +50,15 @@ def compare(case, rows, stored):
 def main():
     folder, torqcomp = Path(sys.argv[1]), sys.argv[2]
     cases = json.loads((folder / "cases.json").read_text())
-    total = 0
+    files = total = 0
     for case in cases:
         rows = read(torqcomp, folder, case)
+        if rows is None:
+            continue
         compare(case, rows, np.load(folder / f"{case['name']}.npz"))
+        files += 1
         total += len(rows)
-    print(f"{len(cases)} files, {total} values read, all equal to the last bit")
+    print(f"{files} files, {total} values read, all equal to the last bit")
 
 
 main()
