@@ -109,13 +109,53 @@ impl Torque for Friction {
     }
 }
 
-/// `asinh(sinh(a) e^{−b})` for `a, b ≥ 0`, also where `sinh(a)` would overflow.
+/// `asinh(sinh(a) e^{−b})` for `a ≥ 0`, also where `sinh(a)` would overflow. It is at work in every step of hundreds of fits; the
+/// library's own `sinh` and `asinh` take twice as long.
 fn decay(a: f64, b: f64) -> f64 {
-    if a < 30.0 {
-        (a.sinh() * (-b).exp()).asinh()
-    } else if a - b > 15.0 {
-        a - b
+    if a.min(a - b) > LARGE {
+        return a - b;
+    }
+    let sine = if a > LARGE {
+        0.5 * (a - b).exp()
+    } else if a < SMALL {
+        (-b).exp() * series(a, [1.0 / 6.0, 1.0 / 20.0, 1.0 / 42.0])
     } else {
-        (0.5 * (a - b).exp()).asinh()
+        let grown = a.exp();
+        0.5 * (grown - grown.recip()) * (-b).exp()
+    };
+    match sine < SMALL {
+        true => series(sine, [-1.0 / 6.0, -9.0 / 20.0, -25.0 / 42.0]),
+        false => (sine + (1.0 + sine * sine).sqrt()).ln(),
+    }
+}
+
+/// Below it, four terms of the series of `sinh` and `asinh` are exact to 1e-14; logarithm and difference lose no more there.
+const SMALL: f64 = 0.03;
+/// Above it, `sinh` is half the exponential to the last bit.
+const LARGE: f64 = 20.0;
+
+/// `x (1 + c₀ x² (1 + c₁ x² (1 + c₂ x²)))`.
+fn series(x: f64, c: [f64; 3]) -> f64 {
+    let square = x * x;
+    x * (1.0 + c[0] * square * (1.0 + c[1] * square * (1.0 + c[2] * square)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::decay;
+
+    #[test]
+    fn the_decay_is_that_of_the_functions_it_is_made_of() {
+        for a in [0.0, 1e-9, 0.01, 0.029, 0.031, 0.2, 1.0, 7.0, 19.0, 25.0] {
+            for b in [-1.0, 0.0, 1e-6, 0.1, 2.0, 9.0, 24.0, 60.0] {
+                let right = (f64::sinh(a) * f64::exp(-b)).asinh();
+                let found = decay(a, b);
+                assert!(
+                    (found - right).abs() <= 3e-14 * right,
+                    "{a} {b}: {found} for {right}"
+                );
+            }
+        }
+        assert_eq!(decay(1000.0, 0.5), 999.5);
     }
 }
