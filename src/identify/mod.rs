@@ -17,6 +17,7 @@ use torqcomp_model::{Covariance, Estimate, Estimates, Kind, Measure, UnitSystem}
 use crate::chart::Chart;
 use crate::warning::Warning;
 pub use mode::{KnownConstant, ModalPole, Pole};
+pub(crate) use motion::GRAVITY;
 pub use motion::Motion;
 
 /// A number with a stable name, such as `inertia`.

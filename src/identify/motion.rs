@@ -14,6 +14,10 @@ pub enum Motion {
     Acceleration,
 }
 
+/// What to write for a channel in `g`.
+pub(crate) const GRAVITY: &str =
+    "g is gram here; for an acceleration in units of standard gravity write g0";
+
 impl Motion {
     /// All of them.
     pub(crate) const ALL: [Self; 3] = [Self::Displacement, Self::Speed, Self::Acceleration];

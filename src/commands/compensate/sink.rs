@@ -186,8 +186,8 @@ fn origin(args: &Compensate, plan: &Plan) -> Result<MessageOrigin, Failure> {
     let Some(origin) = &plan.stream.origin else {
         return Err(Failure::usage(
             ErrorCode::ConflictingArguments,
-            "an MCAP result is a copy of an MCAP input with one channel more, but the input is text; \
-             use --format csv",
+            "an MCAP result is a copy of an MCAP input with one channel more: the input must be MCAP, and its samples as they \
+             are, without --range, --fill or --resample; use --format csv",
         ));
     };
     if args.record.input() == "-" {

@@ -10,7 +10,7 @@ use crate::commands::Outcome;
 use crate::failure::{ErrorCode, Failure};
 use crate::file_name::{self, ShowPath};
 use crate::identify::response::{Driven, RATIO, ResponseOptions, identify};
-use crate::identify::{Identification, Motion, NamedEstimate};
+use crate::identify::{GRAVITY, Identification, Motion, NamedEstimate};
 use crate::io::{ChannelChoice, Input};
 use crate::quality;
 use crate::recording::{AlignedChannel, AlignedChannels};
@@ -53,9 +53,7 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
         })
         .collect();
     let unit = loaded[0].channels[1].unit.as_ref();
-    let by_unit = unit.and_then(|u| Motion::of(u.unit.dimension()));
-    let motion = by_unit.map_or(Motion::Displacement, |(motion, _)| motion);
-    let motion = args.measured_as.unwrap_or(motion);
+    let motion = motion_of(args, &loaded[0].channels[1].name, unit)?;
     let mut result = identify(&records, &options(args, motion))?;
     if let (Some(fit), Some(unit)) = (&mut result.fit, unit) {
         fit.unit.clone_from(&unit.text);
@@ -77,6 +75,25 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
     };
     entries.extend(calibration(args, units, &mut result)?);
     deliver(result, recorded, &args.findings, &entries)
+}
+
+/// What the measured channel is of the motion.
+fn motion_of(args: &Response, name: &str, unit: Option<&NamedUnit>) -> Result<Motion, Failure> {
+    if let Some(motion) = args.measured_as {
+        return Ok(motion);
+    }
+    match unit {
+        Some(unit) if unit.text == "g" => Err(Failure::usage(
+            ErrorCode::UnitUnsuitable,
+            format_args!(
+                "--measured \"{name}\" is in g: {GRAVITY} (--measured-unit g0), and for a mass give --measured-as displacement"
+            ),
+        )),
+        _ => {
+            let by_unit = unit.and_then(|unit| Motion::of(unit.unit.dimension()));
+            Ok(by_unit.map_or(Motion::Displacement, |(motion, _)| motion))
+        }
+    }
 }
 
 /// How the response is evaluated.

@@ -8,7 +8,7 @@ use crate::commands::Outcome;
 use crate::failure::{ErrorCode, Failure};
 use crate::file_name::ShowPath;
 use crate::identify::runup::{Body, FreeRun, RunupOptions, identify};
-use crate::identify::{Identification, Motion};
+use crate::identify::{GRAVITY, Identification, Motion};
 use crate::io::{ChannelChoice, Input};
 use crate::print::short;
 use crate::quality;
@@ -32,9 +32,13 @@ pub fn run(args: &Runup) -> Result<Outcome, Failure> {
             ErrorCode::UnitUnsuitable,
             format_args!(
                 "the unit of the motion \"{}\" is \"{}\"; expected an angle, a length, or their first or second \
-                 derivative",
+                 derivative{}",
                 motion.name,
-                motion_unit.text
+                motion_unit.text,
+                match motion_unit.text == "g" {
+                    true => format!(": {GRAVITY}"),
+                    false => String::new(),
+                }
             ),
         )
     })?;

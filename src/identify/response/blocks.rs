@@ -158,12 +158,10 @@ fn impacts(recorded: &[Driven], result: &mut Identification) -> Result<Set, Fail
     let length = good.iter().map(|(_, range)| range.len()).min().unwrap_or(0);
     let of = |(r, range): &(usize, Range<usize>)| {
         let range = range.start..range.start + length;
-        // The level before the hit is offset.
-        let without = |v: &[f64]| v.iter().map(|x| x - mean(&v[..8])).collect::<Vec<f64>>();
         Transient {
             record: *r,
-            applied: without(&records[*r].applied[range.clone()]),
-            measured: without(&records[*r].measured[range]),
+            applied: force_of_hit(&records[*r].applied[range.clone()]),
+            measured: without_offset(&records[*r].measured[range]),
         }
     };
     let rings = |(r, range): &(usize, Range<usize>)| {
@@ -172,6 +170,24 @@ fn impacts(recorded: &[Driven], result: &mut Identification) -> Result<Set, Fail
     let window = window_for(good.iter().any(rings), length);
     let cut: Vec<Transient> = good.iter().map(of).collect();
     Ok(transients(&cut, records[0].rate_hz, window, result))
+}
+
+/// A signal without its level before the hit.
+fn without_offset(signal: &[f64]) -> Vec<f64> {
+    let level = mean(&signal[..8]);
+    signal.iter().map(|v| v - level).collect()
+}
+
+/// The force of a hit; where nothing but noise is beside it, none is there.
+fn force_of_hit(signal: &[f64]) -> Vec<f64> {
+    let Some(stroke) = frf::stroke_of(signal) else {
+        return without_offset(signal);
+    };
+    let mut force = vec![0.0; signal.len()];
+    for i in stroke.range {
+        force[i] = signal[i] - stroke.rest;
+    }
+    force
 }
 
 /// Every record as one transient, whatever its shape. The spectra are those of the differences from sample to sample over

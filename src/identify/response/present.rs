@@ -139,6 +139,10 @@ fn raw_error(result: &mut Identification, set: &Set, lines: &Lines) {
             .sum::<f64>();
     }
     let percent = 100.0 * sum / set.blocks.len() as f64;
+    // Lines at which all other blocks have no force say nothing.
+    if !percent.is_finite() {
+        return;
+    }
     result.comparisons.push(Comparison {
         method: "the measured response itself, without a model, on held-out data".to_owned(),
         parameters: vec![NamedEstimate::new("held_out_error", "%", percent, None)],

@@ -257,6 +257,66 @@ pub fn near_half_rate(force: &[f64]) -> f64 {
     ((largest - noise) / at(0.0)).max(0.0)
 }
 
+/// Where the force of a hit is, and what it is beside it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stroke {
+    /// Its samples.
+    pub range: Range<usize>,
+    /// Mean behind them.
+    pub rest: f64,
+}
+
+/// Distance from the middle, in standard deviations of the noise, from which a sample is force.
+const LOUD: f64 = 6.0;
+/// Part of the samples of force that belong to it on either side of them, where it is within the noise.
+const MARGIN: usize = 4;
+/// Fewest parts, as long as the hit, of what follows it.
+const PARTS: usize = 4;
+/// Standard deviations by which the scatter of their means may exceed that of white noise.
+const SCATTER: f64 = 5.0;
+
+/// Where the force of a hit is, if nothing but white noise follows it: the means of parts as long as the hit scatter no more
+/// than their samples say. `None` where something slower follows, as where the hammer is coupled by a capacitor.
+///
+/// Its noise there would be taken for force, and make the response too small by the factor `1 + N σ²/|U|²` for `N` samples of
+/// the standard deviation `σ` and a spectrum `U` of the force (D. J. Ewins, *Modal Testing*, 2nd ed., 2000, 3.10: force window).
+///
+/// ```
+/// use torqcomp_dsp::frf::stroke_of;
+/// // 20 samples before a hit of eight, and noise of -0.1, 0 and 0.1 in turn, about 0.5.
+/// let noise = |i: usize| 0.5 + [-0.1, 0.0, 0.1][i % 3];
+/// let hit = |i: usize| if (20..28).contains(&i) { 9.0 } else { 0.0 };
+/// let force: Vec<f64> = (0..1000).map(|i| noise(i) + hit(i)).collect();
+/// let stroke = stroke_of(&force).unwrap();
+/// // A quarter of the eight samples, and one, on either side.
+/// assert_eq!(stroke.range, 17..31);
+/// assert!((stroke.rest - 0.5).abs() < 1e-3);
+/// ```
+#[must_use]
+pub fn stroke_of(force: &[f64]) -> Option<Stroke> {
+    let middle = median(force);
+    let noise = spread(force, middle);
+    let is_force = |v: &f64| (v - middle).abs() > LOUD * noise;
+    let (first, last) = (
+        force.iter().position(is_force)?,
+        force.iter().rposition(is_force)?,
+    );
+    let margin = (last + 1 - first) / MARGIN + 1;
+    let range = first.saturating_sub(margin)..(last + 1 + margin).min(force.len());
+    let quiet = &force[range.end..];
+    let count = quiet.len() / range.end;
+    if count < PARTS {
+        return None;
+    }
+    let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
+    let rest = mean(quiet);
+    let variance = quiet.iter().map(|v| (v - rest).powi(2)).sum::<f64>() / quiet.len() as f64;
+    let parts = quiet.chunks_exact(range.end);
+    let of_means = parts.map(|part| (mean(part) - rest).powi(2)).sum::<f64>() / count as f64;
+    let most = 1.0 + SCATTER * (2.0 / count as f64).sqrt();
+    (of_means * range.end as f64 <= most * variance).then_some(Stroke { range, rest })
+}
+
 /// Largest force of a second stroke over that of the peak, if it exceeds `second` after the force had vanished.
 fn second_stroke(
     size: &impl Fn(usize) -> f64,
