@@ -17,8 +17,8 @@ use torqcomp_model::{Covariance, Estimate, Estimates, Kind, Measure, UnitSystem}
 use crate::chart::Chart;
 use crate::warning::Warning;
 pub use mode::{KnownConstant, ModalPole, Pole};
-pub(crate) use motion::GRAVITY;
 pub use motion::Motion;
+pub(crate) use motion::gravity_hint;
 
 /// A number with a stable name, such as `inertia`.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]

@@ -3,6 +3,8 @@
 use clap::ValueEnum;
 use torqcomp_model::Dimension;
 
+use crate::unit::NamedUnit;
+
 /// What a motion channel measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Motion {
@@ -14,9 +16,11 @@ pub enum Motion {
     Acceleration,
 }
 
-/// What to write for a channel in `g`.
-pub(crate) const GRAVITY: &str =
-    "g is gram here; for an acceleration in units of standard gravity write g0";
+/// What to write for a channel in `g`, if the unit is that.
+pub(crate) fn gravity_hint(unit: &NamedUnit) -> Option<&'static str> {
+    const HINT: &str = "g is gram here; for an acceleration in units of standard gravity write g0";
+    (unit.text == "g").then_some(HINT)
+}
 
 impl Motion {
     /// All of them.

@@ -10,7 +10,7 @@ use crate::commands::Outcome;
 use crate::failure::{ErrorCode, Failure};
 use crate::file_name::{self, ShowPath};
 use crate::identify::response::{Driven, RATIO, ResponseOptions, identify};
-use crate::identify::{GRAVITY, Identification, Motion, NamedEstimate};
+use crate::identify::{Identification, Motion, NamedEstimate, gravity_hint};
 use crate::io::{ChannelChoice, Input};
 use crate::quality;
 use crate::recording::{AlignedChannel, AlignedChannels};
@@ -82,18 +82,16 @@ fn motion_of(args: &Response, name: &str, unit: Option<&NamedUnit>) -> Result<Mo
     if let Some(motion) = args.measured_as {
         return Ok(motion);
     }
-    match unit {
-        Some(unit) if unit.text == "g" => Err(Failure::usage(
+    if let Some(hint) = unit.and_then(gravity_hint) {
+        return Err(Failure::usage(
             ErrorCode::UnitUnsuitable,
             format_args!(
-                "--measured \"{name}\" is in g: {GRAVITY} (--measured-unit g0), and for a mass give --measured-as displacement"
+                "--measured \"{name}\" is in g: {hint} (--measured-unit g0), and for a mass give --measured-as displacement"
             ),
-        )),
-        _ => {
-            let by_unit = unit.and_then(|unit| Motion::of(unit.unit.dimension()));
-            Ok(by_unit.map_or(Motion::Displacement, |(motion, _)| motion))
-        }
+        ));
     }
+    let by_unit = unit.and_then(|unit| Motion::of(unit.unit.dimension()));
+    Ok(by_unit.map_or(Motion::Displacement, |(motion, _)| motion))
 }
 
 /// How the response is evaluated.

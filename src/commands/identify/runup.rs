@@ -8,7 +8,7 @@ use crate::commands::Outcome;
 use crate::failure::{ErrorCode, Failure};
 use crate::file_name::ShowPath;
 use crate::identify::runup::{Body, FreeRun, RunupOptions, identify};
-use crate::identify::{GRAVITY, Identification, Motion};
+use crate::identify::{Identification, Motion, gravity_hint};
 use crate::io::{ChannelChoice, Input};
 use crate::print::short;
 use crate::quality;
@@ -35,10 +35,7 @@ pub fn run(args: &Runup) -> Result<Outcome, Failure> {
                  derivative{}",
                 motion.name,
                 motion_unit.text,
-                match motion_unit.text == "g" {
-                    true => format!(": {GRAVITY}"),
-                    false => String::new(),
-                }
+                gravity_hint(&motion_unit).map_or(String::new(), |hint| format!(": {hint}"))
             ),
         )
     })?;
