@@ -2,6 +2,7 @@
 
 use serde_json::Value;
 
+use crate::mcap_file::{Cdr, McapFile};
 use crate::util::{COMPENSATE, Folder, Ran};
 
 /// Nanoseconds since 1970 at which the records begin: 2024-03-12T13:26:40Z.
@@ -526,6 +527,55 @@ fn stamps_that_samples_share_give_the_rate() {
     );
 }
 
+/// The same in the headers of messages: 2 kHz in whole milliseconds.
+#[test]
+fn header_stamps_that_samples_share_give_the_rate() {
+    let definition = format!(
+        "std_msgs/Header header\nfloat64 torque\n{}\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n",
+        "=".repeat(80)
+    );
+    let mut file = McapFile::new(None, "ros2", "recorder");
+    let schema = ("p/msg/M", "ros2msg", definition.as_bytes());
+    let channel = file.channel("/ft", "cdr", Some(schema));
+    for i in 0..20_000_u64 {
+        let at_ns = 1_700_000_000_000_000_000 + i * 500_000;
+        let mut data = Cdr::new();
+        data.stamp(at_ns / 1_000_000 * 1_000_000);
+        data.text("ft");
+        data.f64(0.1 * (std::f64::consts::TAU * 50.0 * i as f64 / 2000.0).cos());
+        file.message(channel, i as usize, at_ns + i * 7919 % 90_000, &data.0);
+    }
+    let folder = Folder::new();
+    folder.write("record.mcap", file.finish());
+    let read = [
+        "record.mcap",
+        "--topic",
+        "/ft",
+        "--field",
+        "torque",
+        "--unit",
+        "N m",
+    ];
+    let verb = [
+        "harmonics",
+        "--fundamental",
+        "50",
+        "--orders",
+        "1",
+        "--json",
+    ];
+    let args = [&verb[..], &read, &["--stand", "stand.toml"]].concat();
+    let ran = folder.run(&args);
+    let report = json(&ran);
+    assert_eq!(report["rate_hz"].as_f64(), Some(2000.0), "{report}");
+    let recorded = report["components"][0]["recorded"].as_f64().unwrap();
+    assert!((recorded / 0.1 - 1.0).abs() < 1e-6, "{recorded}");
+    assert!(ran.stderr.contains("rounded-time-stamps"), "{}", ran.stderr);
+    let extracted = folder.run(&[&["extract"], &read[..]].concat());
+    let row = extracted.stdout.lines().nth(4).unwrap().to_owned();
+    assert!(row.starts_with("1700000000.0015"), "{row}");
+}
+
 /// A part of a record by seconds, by seconds since 1970, by seconds after its start, and by time of day.
 #[test]
 fn a_range_is_taken_by_any_clock() {
@@ -671,7 +721,6 @@ fn a_record_of_two_samples_is_simulated_or_refused() {
 /// instant in both and in every verb, and phases refer to the same moment.
 #[test]
 fn a_range_is_the_same_instant_in_a_table_and_in_messages() {
-    use crate::mcap_file::McapFile;
     for (first_ns, range) in [
         (0_u64, ["0.25..0.75", "0.25..0.75"]),
         (5_000_000_000, ["5.25..5.75", "5.25..5.75"]),

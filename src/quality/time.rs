@@ -209,7 +209,8 @@ fn jitter(whose: &str, steps: &Steps) -> Option<Warning> {
         "time-jitter",
         format!(
             "{whose}: the time stamps jitter about a step of {} s by {} % rms, {} % at most; \
-             --resample interpolates to a uniform step",
+             --resample interpolates to a uniform step; if the stamps only say when samples arrived, give the recorder's rate \
+             with --rate HZ",
             number(steps.typical_s, 6),
             number(100.0 * jitter.std, 3),
             number(100.0 * jitter.peak, 3)

@@ -34,8 +34,13 @@ pub(super) fn sharpened(
     if later.is_empty() {
         return Some(found);
     }
+    let resolution = |last: f64| 2.0 * f64::EPSILON * (origin.abs() + last.abs());
+    let rows = first.iter().copied().enumerate();
+    // Several rows share a stamp that is rounded coarsely: it does not tell their places.
+    let is_line = uniform_line(rows.clone(), resolution(first[first.len() - 1])).is_some();
     let place = |stamp: f64| ((stamp - start) / step).round().max(0.0) as usize;
-    let mut known: Vec<(usize, f64)> = first.iter().map(|stamp| (place(*stamp), *stamp)).collect();
+    let known = rows.map(|(row, stamp)| (if is_line { row } else { place(stamp) }, stamp));
+    let mut known: Vec<(usize, f64)> = known.collect();
     for stamp in later {
         let steps = (stamp - start) / step;
         let count = steps.round();
@@ -48,8 +53,10 @@ pub(super) fn sharpened(
         }
     }
     let last = known.last()?.1;
-    let resolution = 2.0 * f64::EPSILON * (origin.abs() + last.abs());
-    let line = uniform_line(known.iter().copied(), resolution);
+    let ends = known[..first.len()].iter().chain(known.last());
+    let line = uniform_line(known.iter().copied(), resolution(last))
+        // Where only the end is known, those between are not rounded as the others are.
+        .or_else(|| uniform_line(ends.copied(), resolution(last)));
     Some(match line {
         Some(line) => SampleStep::of_line(&line, last - start),
         // The jitter of both ends counts less over a longer time.

@@ -374,7 +374,10 @@ pub(super) fn is_gap(length: f64, slack: f64) -> bool {
 
 /// The rates between two steps in s, in words.
 pub(crate) fn rates_of([least_s, largest_s]: [f64; 2]) -> String {
-    let hz = |step_s: f64| digits::text(1.0 / step_s, 4);
+    let rate = |step_s: f64, places| digits::text(1.0 / step_s, places);
+    let differ = |places: &u32| rate(least_s, *places) != rate(largest_s, *places);
+    let places = (4..12).find(differ).unwrap_or(12);
+    let hz = |step_s: f64| rate(step_s, places);
     match least_s > 1e-9 * largest_s {
         true => format!("any rate from {} Hz to {} Hz", hz(largest_s), hz(least_s)),
         false => format!("any rate from {} Hz on", hz(largest_s)),
@@ -476,15 +479,19 @@ pub(super) fn check_resampled(rate_hz: f64, recorded_hz: f64) -> Result<(), Fail
 }
 
 fn no_step(heading: &str, times: &[f64]) -> String {
-    if times.len() < 2 {
-        return format!(
-            "the time column \"{heading}\" has {}, so the sampling rate is unknown; give it with --rate HZ",
-            plural(times.len(), "stamp")
-        );
-    }
+    let why = match times {
+        [] | [_] => {
+            return format!(
+                "\"{heading}\" has {}, so the sampling rate is unknown; give it with --rate HZ",
+                plural(times.len(), "stamp")
+            );
+        }
+        _ if times.windows(2).all(|pair| pair[1] <= pair[0]) => "do not rise",
+        _ => "have no usual step: fewer than half of their steps are within 25 % of the median one",
+    };
     format!(
-        "the stamps of the time column \"{heading}\" do not rise; give the rate with --rate HZ, or \
-         another column with --time-column"
+        "the stamps in \"{heading}\" {why}; give the rate with --rate HZ, another column with --time-column, or another clock \
+         of an MCAP file with --time log, publish or header"
     )
 }
 

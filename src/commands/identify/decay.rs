@@ -15,9 +15,10 @@ use crate::file_name::{self, ShowPath};
 use crate::identify::decay::{DecayOptions, Ringing, identify};
 use crate::identify::{Identification, ModalPole};
 use crate::io::{Input, Reading, already_compensated};
-use crate::quality;
+use crate::quality::{self, TimeFindings};
 use crate::recording::{AlignedChannels, Channel, Recording, check_cells, is_uniform};
 use crate::stand::update::Entry;
+use crate::warning::Warning;
 
 /// A recording of decays.
 struct Loaded {
@@ -96,7 +97,13 @@ fn load(args: &Decay, input: &Path, recorded: &mut Recorded) -> Result<Loaded, F
     let clipped = Clipping::of(&chosen.samples)
         .map(|found| quality::clipped_ends(&chosen.name, &unit, &found, &chosen.axis));
     let clipped = clipped.unwrap_or_default();
-    let warnings = [recording.all_warnings(), selection.warnings, clipped].concat();
+    let warnings = [
+        recording.all_warnings(),
+        selection.warnings,
+        clipped,
+        jitter(chosen, &args.reading),
+    ];
+    let warnings = warnings.concat();
     recorded.warn(warnings, recording.lost.is_some());
     // The other channels make room for the fit.
     let channel = recording.channels.swap_remove(place);
@@ -120,15 +127,32 @@ fn ringing(
     is_given: bool,
 ) -> (Vec<f64>, Vec<f64>, Option<f64>) {
     let samples = channel.samples;
-    let stamps = match channel.axis.stamps_s {
-        Some(stamps) if !is_given => Arc::unwrap_or_clone(stamps),
+    let stamps = channel.axis.stamps_s.filter(|_| !is_given);
+    let is_grid = stamps
+        .as_ref()
+        .is_none_or(|stamps| is_uniform(stamps, rate_hz));
+    // Uniform stamps are those of a grid but for their rounding.
+    let times_s = match stamps {
+        Some(stamps) if !is_grid => Arc::unwrap_or_clone(stamps),
         _ => (0..samples.len())
             .map(|i| start_s + i as f64 / rate_hz)
             .collect(),
     };
-    let is_uniform = channel.holes.is_empty() && is_uniform(&stamps, rate_hz);
-    let (times_s, values) = rising(stamps, samples);
+    let is_uniform = is_grid && channel.holes.is_empty();
+    let (times_s, values) = rising(times_s, samples);
     (times_s, values, is_uniform.then_some(rate_hz))
+}
+
+/// A warning about stamps that jitter and are taken as they are: where they only say when samples arrived, one decay looks
+/// like several modes.
+fn jitter(channel: &Channel, reading: &Reading) -> Vec<Warning> {
+    let axis = &channel.axis;
+    let mut found = match reading.rate_hz {
+        None => TimeFindings::of(axis).warnings(&channel.name, axis),
+        Some(_) => Vec::new(),
+    };
+    found.retain(|warning| warning.code == "time-jitter");
+    found
 }
 
 /// The samples that are numbers and later than all before them, with their times.

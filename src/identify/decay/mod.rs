@@ -122,12 +122,9 @@ const NOT_ONE: &str = "a hand or a brake that was put on the stand would look th
 
 /// The residual, over the swing about offset and drift.
 fn quality(fit: &ModesFit, stretches: &[Stretch]) -> FitQuality {
-    let mut swing = Vec::new();
-    for (s, stretch) in stretches.iter().enumerate() {
-        let (c, d) = fit.trend(s);
-        let pairs = stretch.times_s.iter().zip(&stretch.values);
-        swing.extend(pairs.map(|(t, y)| y - c - d * t));
-    }
+    let swing: Vec<f64> = (0..stretches.len())
+        .flat_map(|s| fit.swing(stretches, s))
+        .collect();
     FitQuality {
         rms: fit.fit.rms,
         unit: String::new(),

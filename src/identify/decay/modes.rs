@@ -385,6 +385,16 @@ impl ModesFit {
         (self.fit.values[at], self.fit.values[at + 1])
     }
 
+    /// The samples of a stretch about offset and drift.
+    pub fn swing(&self, stretches: &[Stretch], stretch: usize) -> Vec<f64> {
+        let (offset, drift) = self.trend(stretch);
+        let Stretch {
+            times_s, values, ..
+        } = &stretches[stretch];
+        let pairs = times_s.iter().zip(values);
+        pairs.map(|(t, y)| y - offset - drift * t).collect()
+    }
+
     /// The fitted curve of a stretch.
     pub fn curve(&self, stretches: &[Stretch], stretch: usize) -> Vec<f64> {
         let data = &stretches[stretch].values;

@@ -114,7 +114,7 @@ pub(super) fn apart(result: &mut Identification, fit: &ModesFit, stretches: usiz
     }
 }
 
-/// Residual of a free decay, over its swing, above which the fit is poor.
+/// Residual of a free decay, over its swing in the first decay time, above which the fit is poor.
 const POOR: f64 = 0.3;
 /// The same where the residual falls with the ringing, and its size in the ringing part over that behind it.
 const FALLING: (f64, f64) = (0.03, 4.0);
@@ -130,7 +130,7 @@ pub(super) fn poor(
     stretches: &[Stretch],
     (main, has_baseline): (usize, bool),
 ) {
-    let relative = result.fit.as_ref().map_or(0.0, |fit| fit.relative);
+    let relative = while_ringing(fit, stretches, main);
     let told = ["not-viscous", "amplitude-dependent", "close-lines"];
     let is_told = result.warnings.iter().any(|w| told.contains(&w.code));
     let falls = falls(fit, stretches, main);
@@ -160,6 +160,18 @@ pub(super) fn poor(
             ),
         );
     }
+}
+
+/// Residual over swing in the first decay time of the stretches: what is quiet behind it has no swing but noise.
+fn while_ringing(fit: &ModesFit, stretches: &[Stretch], main: usize) -> f64 {
+    let rung_s = 1.0 / fit.poles[main].rate_per_s.max(f64::MIN_POSITIVE);
+    let (mut residual, mut swing) = (Vec::new(), Vec::new());
+    for (s, stretch) in stretches.iter().enumerate() {
+        let rung = stretch.times_s.partition_point(|t| *t < rung_s);
+        residual.extend_from_slice(&fit.residuals[s][..rung]);
+        swing.extend_from_slice(&fit.swing(stretches, s)[..rung]);
+    }
+    identify::rms(&residual) / identify::rms(&swing)
 }
 
 /// Residual of the first stretch while it rings, over that behind; 0 if it ends before.

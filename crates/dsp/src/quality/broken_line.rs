@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::rounding::{FEWEST, Rounded, quantum, simplest, slopes};
+use super::rounding::{FEWEST, FINE, Rounded, quantum, simplest, slopes};
 
 /// Coarsely rounded stamps of a uniform axis from which samples are missing.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,8 +52,9 @@ impl BrokenLine {
         if stamps_s.len() < FEWEST || !rises {
             return None;
         }
-        let quantum_s = quantum(stamps_s.iter().copied())?;
         let first = stamps_s[0];
+        let span_s = stamps_s[stamps_s.len() - 1] - first;
+        let quantum_s = quantum(FINE, span_s, stamps_s.iter().copied())?;
         let in_quanta = |(i, t): (usize, &f64)| (i as f64, ((t - first) / quantum_s).round());
         let points: Vec<(f64, f64)> = stamps_s.iter().enumerate().map(in_quanta).collect();
         let any = [0.0, f64::INFINITY];

@@ -1,5 +1,7 @@
 //! Time stamps that are uniform but for being rounded.
 
+use std::ops::RangeInclusive;
+
 /// A uniform time axis whose stamps are rounded to a coarse step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rounded {
@@ -81,8 +83,8 @@ pub fn rounded(stamps_s: &[f64]) -> Option<Rounded> {
 }
 
 /// The straight line through stamps (each with its index, both rising or repeated), if these deviate from a line by no
-/// more than their rounding: `|tᵢ − (a + b i)| ≤ 0.6 q`, `q` being the power of ten that all stamps are multiples of, or
-/// that the last and longest of them are, or `resolution_s`, the last bit of a clock.
+/// more than their rounding: `|tᵢ − (a + b i)| ≤ 0.6 q`, `q` being the power of ten up to 1 that all stamps are multiples of, or
+/// that the last and longest of them are, or `resolution_s`, the last bit of a clock, or a power of ten above 1.
 ///
 /// The step of stamps that lie on the line exactly is theirs; else it is taken as [`rounded`] does.
 ///
@@ -112,14 +114,13 @@ pub fn uniform_line(
         return None;
     }
     let (slope_s, farthest_s) = fitted(stamps.clone(), count as f64, first.1);
-    let longest = stamps
-        .clone()
-        .skip(count.saturating_sub(FEWEST))
-        .map(|(_, t)| t);
+    let (times, span_s) = (stamps.clone().map(|(_, t)| t), last - first.1);
+    let longest = times.clone().skip(count.saturating_sub(FEWEST));
     let quantum_s = [
-        quantum(stamps.clone().map(|(_, t)| t)),
-        quantum(longest),
+        quantum(FINE, span_s, times.clone()),
+        quantum(FINE, span_s, longest),
         Some(resolution_s),
+        quantum(COARSEST, span_s, times),
     ]
     .into_iter()
     .flatten()
@@ -253,9 +254,20 @@ pub(super) fn simplest([low_s, high_s]: [f64; 2]) -> f64 {
     }
 }
 
-/// The largest power of ten that all stamps are multiples of, from 1 s to 1 as; none if even these are too large.
-pub(super) fn quantum(stamps_s: impl Iterator<Item = f64> + Clone) -> Option<f64> {
-    (0..19).map(|power| 10_f64.powi(-power)).find(|q| {
+/// Powers of a tenth that stamps are looked at as multiples of: from 1 on, and those above, as of nanoseconds of a clock that
+/// counts milliseconds.
+pub(super) const FINE: RangeInclusive<i32> = 0..=18;
+const COARSEST: RangeInclusive<i32> = -9..=-1;
+
+/// The largest of some powers of a tenth that all stamps are multiples of, and no more than the time that they are part of;
+/// none if even these are too large.
+pub(super) fn quantum(
+    powers: RangeInclusive<i32>,
+    span_s: f64,
+    stamps_s: impl Iterator<Item = f64> + Clone,
+) -> Option<f64> {
+    let powers = powers.map(|power| 10_f64.powi(-power));
+    powers.filter(|q| *q <= 1.1 * span_s).find(|q| {
         stamps_s.clone().all(|t| {
             let multiple = t / q;
             // Stamps in other units than seconds bring the rounding of a product.
@@ -268,6 +280,19 @@ pub(super) fn quantum(stamps_s: impl Iterator<Item = f64> + Clone) -> Option<f64
 mod tests {
     use super::super::testing::noise;
     use super::*;
+
+    #[test]
+    fn the_quantum_does_not_depend_on_the_unit() {
+        // 3 kHz in whole milliseconds, written in s, ms and ns.
+        for (unit, stamps) in [(1e-3, 3000), (1.0, 3000), (1e6, 9)] {
+            let stamps: Vec<f64> = (0..stamps).map(|i| f64::from(i / 3) * unit).collect();
+            let found = rounded(&stamps).unwrap();
+            assert!((found.quantum_s / unit - 1.0).abs() < 1e-12, "{found:?}");
+        }
+        // 1 GHz for 50 ns has no whole seconds to be rounded to.
+        let short: Vec<f64> = (0..50).map(|i| 1e-9 * f64::from(i)).collect();
+        assert_eq!(rounded(&short), None);
+    }
 
     #[test]
     fn exact_and_jittering_axes_are_not_rounded() {
