@@ -117,6 +117,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["zero-drifts", "the reading without load drifts over the test", "warm up for longer, and read the zero of each record"],
         ["restart-in-decay", "the ringing starts again within a decay", "hit once, and check for lost samples and overload"],
         ["second-stroke", "the hammer struck twice; the recorded force includes both strokes", "repeat the hit if the coherence is low"],
+        ["noise-on-force", "noise of a hammer's force is taken for force, and the response comes out too small", "couple the hammer directly (DC), or record so that its signal is at rest after the stroke"],
         ["short-pulse", "pulses of the hammer are so short for the rate that frequencies above half of it fold into their spectrum", "record faster, or hit with a softer tip"],
         ["speed-unknown", "the speed is known but for a constant, so that the offset includes friction", "record position or speed"],
         ["tone-taken-off", "steady lines were fitted beside what rings and taken off", "switch off what runs; record for longer if one of them is the stand's own"],
@@ -140,7 +141,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["time-backwards", "a time stamp lies before the one before it", "split the file there"],
         ["time-falls", "a column named as time falls too often to be time and was taken as a channel", "choose the time with --time-column, or give --rate"],
         ["time-gaps", "samples are missing between time stamps", "use --fill linear for short gaps"],
-        ["time-jitter", "time steps differ by more than 1 %", "use --resample"],
+        ["time-jitter", "time steps differ by more than 1 %", "use --resample, or --rate if the stamps only say when samples arrived"],
         ["time-left-out", "a column named as time does not run as the time of the rows does and was left out", "choose another with --time-column"],
     ]),
     ("Samples", &[

@@ -117,6 +117,32 @@ fn noise_of_the_hammer_takes_nothing_off_the_gain() {
     }
 }
 
+/// Behind a capacitor, the force goes on after each stroke, and its noise stays in: that is said, with its size.
+#[test]
+fn noise_of_a_coupled_hammer_is_said() {
+    let (force, shown) = hits(&HITS, 3e-3, COUNT);
+    let behind = |noise: f64| {
+        let force = noisy(&coupled(&force, 1.0), noise, 3);
+        evaluated(&force, &noisy(&coupled(&shown, 1.0), 2e-4, 20)).0
+    };
+    let quiet = behind(0.012);
+    assert!(!codes(&quiet).contains(&"noise-on-force"), "{quiet}");
+    let noisy = behind(1.2);
+    has(&noisy, "noise-on-force");
+    // N σ²/S²: 5000 samples of 1.2 N, and 15 samples of half a sine of 115 N, which add up to 1100 N.
+    let found = parameter(&noisy, "torque_per_volt").0 / parameter(&quiet, "torque_per_volt").0;
+    let said = noisy["warnings"].to_string();
+    let percent = said
+        .split("about ")
+        .nth(1)
+        .and_then(|rest| rest.split(' ').next());
+    let percent: f64 = percent.unwrap().parse().unwrap();
+    assert!(
+        (percent / (100.0 * (found - 1.0)) - 1.0).abs() < 0.5,
+        "{percent}: {found}"
+    );
+}
+
 #[test]
 fn hum_on_the_bridge_is_no_mode() {
     let (force, shown) = hits(&HITS, 3e-3, COUNT);
@@ -613,4 +639,50 @@ fn gram_for_an_acceleration_is_asked() {
     folder
         .run(&[&args[..], &["--measured-unit", "g0"]].concat())
         .says(0, &[]);
+}
+
+/// Stamps in whole milliseconds, five to a sample or four to five, are those of the recorder's grid; where they jitter, that
+/// is said.
+#[test]
+fn rounded_stamps_of_a_decay_are_uniform_and_jitter_is_said() {
+    let values = ringing(&[(0.1, 1.0)], 0.015, 12_000, 7);
+    let folder = Folder::new();
+    let stamped = |stamp: &dyn Fn(usize) -> f64| {
+        let rows = values.iter().enumerate().map(|(i, v)| (stamp(i), *v));
+        folder.write("in.csv", table(["time_s", "bridge_V"], rows));
+        folder.json(&["identify", "decay", "in.csv", "--json"])
+    };
+    let report = stamped(&|i| (i as f64 / 5.0).floor() * 1e-3);
+    rings_right(&report, 0.015);
+    // Several modes would be numbered.
+    assert_eq!(
+        report["parameters"][0]["name"], "damped_frequency",
+        "{report}"
+    );
+    assert!(!codes(&report).contains(&"time-jitter"), "{report}");
+    let mut noise = Noise(5);
+    let late: Vec<f64> = values.iter().map(|_| noise.normal().abs()).collect();
+    has(
+        &stamped(&|i| i as f64 / RATE_HZ + 2e-5 * late[i]),
+        "time-jitter",
+    );
+}
+
+/// Noise of a tenth of the swing behind a decay that is over soon is no doubt about the decay.
+#[test]
+fn a_quiet_tail_makes_no_poor_fit() {
+    let noise = |seed| {
+        let mut noise = Noise(seed);
+        move |v: &f64| v + 0.1 * noise.normal()
+    };
+    let records: Vec<Vec<f64>> = [3, 4]
+        .map(|seed| {
+            let pure = ringing(&[(0.1, 1.0)], 0.015, 8_000, seed);
+            pure.iter().map(noise(seed)).collect()
+        })
+        .into();
+    for record in records {
+        let report = decayed(&[record]);
+        assert!(!codes(&report).contains(&"poor-fit"), "{report}");
+    }
 }

@@ -164,6 +164,10 @@ fn impacts(recorded: &[Driven], result: &mut Identification) -> Result<Set, Fail
             measured: without_offset(&records[*r].measured[range]),
         }
     };
+    let left = |(r, range): &(usize, Range<usize>)| {
+        noise_left(&records[*r].applied[range.start..range.start + length])
+    };
+    check::noise_on_force(result, &good.iter().map(left).collect::<Vec<f64>>());
     let rings = |(r, range): &(usize, Range<usize>)| {
         still_rings(&records[*r].measured[range.start..range.start + length])
     };
@@ -188,6 +192,14 @@ fn force_of_hit(signal: &[f64]) -> Vec<f64> {
         force[i] = signal[i] - stroke.rest;
     }
     force
+}
+
+/// Part by which the response to a hit is too small by the noise of its force that could not be taken off.
+fn noise_left(signal: &[f64]) -> f64 {
+    match frf::stroke_of(signal) {
+        Some(_) => 0.0,
+        None => frf::noise_share(signal),
+    }
 }
 
 /// Every record as one transient, whatever its shape. The spectra are those of the differences from sample to sample over

@@ -164,6 +164,22 @@ pub(super) fn short_pulses(result: &mut Identification, parts: &[f64]) {
 /// Largest error of the gain by noise in the applied signal from which there is a warning.
 const GAIN_ERROR: f64 = 1e-3;
 
+/// Warns of noise on the force of hits that could not be told from what else follows the stroke.
+pub(super) fn noise_on_force(result: &mut Identification, parts: &[f64]) {
+    let part = parts.iter().sum::<f64>() / parts.len().max(1) as f64;
+    if part > GAIN_ERROR {
+        result.warn(
+            "noise-on-force",
+            format!(
+                "something slow follows the strokes of the hammer (a hammer that is AC coupled, a zero that drifts), so that \
+                 the noise beside them cannot be taken off: the response is about {} % too small by it, which its \
+                 uncertainties do not include; couple the hammer directly (DC), or reduce its noise",
+                rounded(100.0 * part, 2)
+            ),
+        );
+    }
+}
+
 /// Warns where noise enters before the resonance.
 fn noise_before_resonance(result: &mut Identification, gain_error: f64) {
     if gain_error > GAIN_ERROR {

@@ -56,6 +56,8 @@ const NOISE: (f64, f64) = (6.0, 0.06);
 const STANDING: f64 = 0.3;
 /// The same over what half a sine has.
 const LONGER: f64 = 1.5;
+/// Smallest extreme on the other side, over the largest, that can be a limit.
+const OTHER_SIDE: f64 = 0.1;
 /// Fewest such samples.
 const LEAST_STANDING: usize = 4;
 /// Equal consecutive samples that mean clipping.
@@ -195,12 +197,19 @@ fn flat(samples: &[f64], rest: f64) -> bool {
 /// saturates before the converter has noise on its limit. Of each swing beyond half of the extreme, the samples near the
 /// extreme are counted; of half a sine, `arccos(1 − w)/(π/3)` lie within the part w of its peak.
 fn stands(samples: &[f64], rest: f64, noise: f64) -> bool {
-    [1.0, -1.0].into_iter().any(|side| {
+    let extreme = |side: f64| {
+        samples
+            .iter()
+            .map(|v| side * (v - rest))
+            .fold(0.0, f64::max)
+    };
+    let extremes = [1.0, -1.0].map(extreme);
+    let largest = extremes[0].max(extremes[1]);
+    let sides = [1.0, -1.0].into_iter().zip(extremes);
+    // Behind a capacitor, a pulse is followed by a low and long swing to the other side.
+    let mut limits = sides.filter(|(_, extreme)| *extreme > OTHER_SIDE * largest);
+    limits.any(|(side, extreme)| {
         let size = |v: &f64| side * (v - rest);
-        let extreme = samples.iter().map(size).fold(0.0, f64::max);
-        if extreme <= 0.0 {
-            return false;
-        }
         let near = (NOISE.0 * noise / extreme).clamp(LEVEL, NOISE.1);
         let usual = (1.0 - near).acos() / std::f64::consts::FRAC_PI_3;
         let least = STANDING.max(LONGER * usual);
@@ -255,6 +264,36 @@ pub fn near_half_rate(force: &[f64]) -> f64 {
     // The largest of many lines of noise is about twice its rms.
     let noise = 2.5 * noise_of(force) * (pulse.len() as f64).sqrt();
     ((largest - noise) / at(0.0)).max(0.0)
+}
+
+/// Part by which white noise of the force makes the response too small at low frequencies, where it is not taken off:
+/// `N σ²/(N σ² + S²)` for `N` samples of the standard deviation `σ`, that of their second differences, and the sum `S` of the
+/// samples of the stroke (D. J. Ewins, *Modal Testing*, 2nd ed., 2000, 3.10).
+///
+/// ```
+/// use torqcomp_dsp::frf::noise_share;
+/// // Eight samples of 9, so S = 72, among noise of -0.1, 0 and 0.1 in turn, the second differences of which are 0, -0.3
+/// // and 0.3: their median size is 0.3, so σ = 0.3/0.674/√6 = 0.182, and 1000 σ² = 33.
+/// let noise = |i: usize| [-0.1, 0.0, 0.1][i % 3];
+/// let hit = |i: usize| if (20..28).contains(&i) { 9.0 } else { 0.0 };
+/// let force: Vec<f64> = (0..1000).map(|i| noise(i) + hit(i)).collect();
+/// assert!((noise_share(&force) - 33.0 / (33.0 + 72.0 * 72.0)).abs() < 1e-4);
+/// ```
+#[must_use]
+pub fn noise_share(force: &[f64]) -> f64 {
+    let (middle, noise) = (median(force), noise_of(force));
+    let size = |v: &f64| (v - middle).abs();
+    let Some(top) = force.iter().max_by(|a, b| size(a).total_cmp(&size(b))) else {
+        return 0.0;
+    };
+    let sign = (top - middle).signum();
+    let place = force.iter().position(|v| v == top).unwrap_or(0);
+    let is_stroke = |v: &&f64| sign * (**v - middle) > LOUD * noise;
+    let before = force[..place].iter().rev().take_while(is_stroke);
+    let stroke = before.chain(force[place..].iter().take_while(is_stroke));
+    let sum: f64 = stroke.map(|v| v - middle).sum();
+    let of_noise = force.len() as f64 * noise * noise;
+    of_noise / (of_noise + sum * sum)
 }
 
 /// Where the force of a hit is, and what it is beside it.

@@ -11,7 +11,7 @@ mod hits;
 use num_complex::Complex64;
 
 pub use blocks::{Periodic, Window, average_periods, find_period, lines_of, segments, transform};
-pub use hits::{Hit, HitFault, Stroke, find_hits, near_half_rate, stroke_of};
+pub use hits::{Hit, HitFault, Stroke, find_hits, near_half_rate, noise_share, stroke_of};
 
 /// Spectra of one block, at frequencies k times the step, from 0 to half the rate.
 #[derive(Debug, Clone, PartialEq)]
