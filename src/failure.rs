@@ -201,6 +201,15 @@ impl Failure {
         self
     }
 
+    /// What kind of failure it is; `None` of a closed pipe.
+    #[must_use]
+    pub fn code(&self) -> Option<ErrorCode> {
+        match self {
+            Self::Usage(fault) | Self::Failed(fault) => Some(fault.code),
+            Self::ClosedPipe => None,
+        }
+    }
+
     /// The JSON document of the failure; `None` of a closed pipe.
     #[must_use]
     pub fn document(&self) -> Option<ErrorDocument<'_>> {

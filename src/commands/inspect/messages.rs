@@ -33,17 +33,7 @@ fn read_most(place: &Input, reading: &Reading, most: u64) -> Result<Content, Fai
     if let Some(wanted) = &reading.topic {
         keep_topic(&mut inventory, wanted)?;
     }
-    let mut content = Content {
-        recording: Recording {
-            dialect: dialect(&inventory),
-            details: details(&inventory),
-            warnings: inventory.warnings.clone(),
-            ..Recording::empty("mcap", inventory.file.clone())
-        },
-        wholes: Vec::new(),
-        listed: Vec::new(),
-        inventory: None,
-    };
+    let mut content = of_file(&inventory);
     let Numbers {
         listed: numbers,
         choices,
@@ -61,6 +51,10 @@ fn read_most(place: &Input, reading: &Reading, most: u64) -> Result<Content, Fai
     let mut results = results.into_iter().zip(kept);
     for (topic, number, is_read) in numbers {
         let read = is_read.then(|| results.next()).flatten();
+        if let Some((Err(failure), _)) = &read {
+            let said = mixed(topic, failure).into_iter().collect();
+            add_warnings(&mut content.recording.warnings, said, &[]);
+        }
         if let (Some((Ok((selected, summary)), kept)), Some(number)) = (read, number) {
             let (channel, whole) = channel(topic, number, &selected, kept);
             content.recording.channels.push(channel);
@@ -87,6 +81,27 @@ fn read_most(place: &Input, reading: &Reading, most: u64) -> Result<Content, Fai
         content.recording.keep(range)?;
     }
     Ok(content)
+}
+
+/// What is known of a file before its samples are read.
+fn of_file(inventory: &Inventory) -> Content {
+    Content {
+        recording: Recording {
+            dialect: dialect(inventory),
+            details: details(inventory),
+            warnings: inventory.warnings.clone(),
+            ..Recording::empty("mcap", inventory.file.clone())
+        },
+        wholes: Vec::new(),
+        listed: Vec::new(),
+        inventory: None,
+    }
+}
+
+/// A warning about a topic whose messages are not those of one signal, unless that is said of it already.
+fn mixed(topic: &ChannelReport, failure: &Failure) -> Option<Warning> {
+    let is_new = topic.unreadable.is_none() && failure.code() == Some(ErrorCode::RecordsDiffer);
+    is_new.then(|| Warning::new("mcap-unreadable", failure.to_string()))
 }
 
 /// The numbers of a file, and which of them are read.

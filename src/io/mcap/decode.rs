@@ -9,7 +9,7 @@ use super::cdr;
 use super::json;
 use super::path::{self, PathPart};
 use super::protobuf;
-use super::route::{Hop, Route};
+use super::route::{Hop, Lookup, Route};
 use super::schema::Schema;
 use super::time::Stamp;
 use super::tree::TreeTargets;
@@ -260,7 +260,34 @@ pub fn item_names(
 ) -> Option<Vec<String>> {
     let by_name = path::by_name(parts.to_vec(), NOBODY)?;
     let route = Route::find(schema, &by_name).ok()?;
-    match values(encoding, schema, &route, message) {
+    searched(encoding, schema, &route, message)
+}
+
+/// Texts at the end of a way through a message that holds a number; `None` if it cannot be read.
+pub fn texts(
+    encoding: Encoding,
+    schema: &Arc<Schema>,
+    (number, hops): (&Route, &[Hop]),
+    message: &[u8],
+) -> Option<Vec<String>> {
+    let route = Route {
+        lookup: Some(Lookup {
+            hops: hops.to_vec(),
+            name: NOBODY.to_owned(),
+        }),
+        ..number.clone()
+    };
+    searched(encoding, schema, &route, message)
+}
+
+/// All texts among which a name is looked for in vain.
+fn searched(
+    encoding: Encoding,
+    schema: &Arc<Schema>,
+    route: &Route,
+    message: &[u8],
+) -> Option<Vec<String>> {
+    match values(encoding, schema, route, message) {
         Err(Damage::NoName { there, .. }) => Some(there),
         _ => None,
     }

@@ -25,6 +25,7 @@ pub mod decode;
 mod index;
 pub mod inventory;
 mod json;
+mod mixed;
 mod order;
 pub mod path;
 mod protobuf;

@@ -1,5 +1,7 @@
 //! A field as people write it: `wrench.torque.z`, `effort[0]`, `effort[-1]`,
-//! `effort[name=motor_joint]`, `data[:]`.
+//! `effort[name=motor_joint]`, `data[:]`, `data[0::3]`.
+
+use std::fmt;
 
 /// One step into a message.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -8,8 +10,8 @@ pub enum PathPart {
     Name(String),
     /// An item by its place; negative ones count from the end.
     Index(i64),
-    /// All items.
-    All,
+    /// Some items, or all of them: `[:]`, `[0::3]`.
+    Slice(Slice),
     /// The item whose name is known: `[name=motor_joint]`, `[motor_joint]` for short.
     Called {
         /// Field that holds the names, if it was given.
@@ -17,6 +19,73 @@ pub enum PathPart {
         /// The name.
         name: String,
     },
+}
+
+/// Every so many items of a list, from a first one up to a last one: `[start:end:step]` as in Python.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Slice {
+    /// The first item.
+    pub start: usize,
+    /// The one that comes no more.
+    pub end: usize,
+    /// From one to the next.
+    pub step: usize,
+}
+
+impl Slice {
+    /// All items.
+    pub const ALL: Self = Self {
+        start: 0,
+        end: usize::MAX,
+        step: 1,
+    };
+
+    fn parse(word: &str) -> Option<Self> {
+        let mut numbers = word.split(':').map(str::trim);
+        let mut number = |default| match numbers.next() {
+            None | Some("") => Some(default),
+            Some(text) => text.parse().ok(),
+        };
+        let found = Self {
+            start: number(Self::ALL.start)?,
+            end: number(Self::ALL.end)?,
+            step: number(Self::ALL.step)?,
+        };
+        (numbers.next().is_none() && found.start < found.end && found.step > 0).then_some(found)
+    }
+
+    /// Drops the other items.
+    pub fn keep(&self, items: &mut Vec<f64>) {
+        if *self == Self::ALL {
+            return;
+        }
+        items.truncate(self.end);
+        let mut place = 0;
+        items.retain(|_| {
+            let is_kept = place >= self.start && (place - self.start).is_multiple_of(self.step);
+            place += 1;
+            is_kept
+        });
+    }
+}
+
+impl fmt::Display for Slice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let unless = |number: usize, usual| match number == usual {
+            true => String::new(),
+            false => number.to_string(),
+        };
+        write!(
+            f,
+            "{}:{}",
+            unless(self.start, 0),
+            unless(self.end, usize::MAX)
+        )?;
+        match self.step {
+            1 => Ok(()),
+            step => write!(f, ":{step}"),
+        }
+    }
 }
 
 /// Takes a field apart; empty text is the message itself.
@@ -70,8 +139,10 @@ fn bracket(text: &str) -> Option<(&str, &str)> {
 
 fn item(word: &str, text: &str) -> Result<PathPart, String> {
     let word = word.trim();
-    if word == ":" {
-        return Ok(PathPart::All);
+    if word.contains(':')
+        && let Some(slice) = Slice::parse(word)
+    {
+        return Ok(PathPart::Slice(slice));
     }
     if let Ok(index) = word.parse() {
         return Ok(PathPart::Index(index));
@@ -86,8 +157,8 @@ fn item(word: &str, text: &str) -> Result<PathPart, String> {
         .unwrap_or(name);
     if name.is_empty() || key.as_deref() == Some("") || word.contains(':') && key.is_none() {
         return Err(format!(
-            "\"[{word}]\" in \"{text}\" is no choice of an item; write [0], [-1], [name=joint] or \
-             [:] for all"
+            "\"[{word}]\" in \"{text}\" is no choice of an item; write [0], [-1], [name=joint], \
+             [:] for all or [0::3] for every third"
         ));
     }
     let name = name.to_owned();
@@ -96,7 +167,7 @@ fn item(word: &str, text: &str) -> Result<PathPart, String> {
 
 /// A path whose first item of a list, or all of them, become the one of a name.
 pub fn by_name(mut parts: Vec<PathPart>, name: &str) -> Option<Vec<PathPart>> {
-    let is_place = |part: &&mut PathPart| matches!(part, PathPart::Index(_) | PathPart::All);
+    let is_place = |part: &&mut PathPart| matches!(part, PathPart::Index(_) | PathPart::Slice(_));
     *parts.iter_mut().find(is_place)? = PathPart::Called {
         key: None,
         name: name.to_owned(),
@@ -112,7 +183,7 @@ pub fn text(parts: &[PathPart]) -> String {
             PathPart::Name(name) if text.is_empty() => text.push_str(name),
             PathPart::Name(name) => text.push_str(&format!(".{name}")),
             PathPart::Index(index) => text.push_str(&format!("[{index}]")),
-            PathPart::All => text.push_str("[:]"),
+            PathPart::Slice(slice) => text.push_str(&format!("[{slice}]")),
             PathPart::Called { key, name } => {
                 let key = key.as_deref().unwrap_or("name");
                 text.push_str(&format!("[{key}={name}]"));
@@ -129,6 +200,7 @@ mod tests {
     #[test]
     fn every_way_to_write_a_field() {
         let name = |name: &str| PathPart::Name(name.to_owned());
+        let slice = |start, end, step| Slice { start, end, step };
         let called = |key: Option<&str>, name: &str| PathPart::Called {
             key: key.map(str::to_owned),
             name: name.to_owned(),
@@ -145,7 +217,15 @@ mod tests {
                 "a[1][2].b",
                 vec![name("a"), PathPart::Index(1), PathPart::Index(2), name("b")],
             ),
-            ("data[:]", vec![name("data"), PathPart::All]),
+            ("data[:]", vec![name("data"), PathPart::Slice(Slice::ALL)]),
+            (
+                "data[2:9:3]",
+                vec![name("data"), PathPart::Slice(slice(2, 9, 3))],
+            ),
+            (
+                "data[1::3]",
+                vec![name("data"), PathPart::Slice(slice(1, usize::MAX, 3))],
+            ),
             (
                 "effort[name=m_1]",
                 vec![name("effort"), called(Some("name"), "m_1")],
@@ -168,7 +248,7 @@ mod tests {
     #[test]
     fn what_is_no_field_is_refused() {
         for text in [
-            "a..b", "a[", "a[]", "a[=x]", "a[n=]", ".a", "a.", "a[1:2]", "a[0]b",
+            "a..b", "a[", "a[]", "a[=x]", "a[n=]", ".a", "a.", "a[2:1]", "a[0]b",
         ] {
             assert!(parse(text).is_err(), "{text}");
         }

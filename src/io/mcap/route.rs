@@ -1,9 +1,27 @@
 //! The way to a number in messages of one type.
 
-use super::path::{self, PathPart};
+use super::path::{self, PathPart, Slice};
 use super::schema::leaves::{self, Leaf};
 use super::schema::{Field, FieldKind, Number, Schema};
 use crate::failure::did_you_mean;
+
+/// Way to a field in fields, all by their names, and what it is.
+pub(super) fn way<'a>(schema: &'a Schema, names: &[&str]) -> Option<(Vec<Hop>, &'a FieldKind)> {
+    let (last, above) = names.split_last()?;
+    let mut fields = &schema.root().fields;
+    let mut hops = Vec::with_capacity(names.len());
+    for name in above {
+        let place = position(fields, name)?;
+        let FieldKind::Struct(inner) = fields[place].kind else {
+            return None;
+        };
+        hops.push(Hop::Field(place));
+        fields = &schema.structs[inner].fields;
+    }
+    let place = position(fields, last)?;
+    hops.push(Hop::Field(place));
+    Some((hops, &fields[place].kind))
+}
 
 /// Leaves that an error message lists.
 const LISTED: usize = 40;
@@ -37,6 +55,8 @@ pub struct Route {
     pub text: String,
     /// The way.
     pub hops: Vec<Hop>,
+    /// Which of several values count.
+    pub slice: Slice,
     /// What must be found first.
     pub lookup: Option<Lookup>,
     /// FieldKind of number.
@@ -108,6 +128,7 @@ struct RouteWalk<'a> {
     parts: &'a [PathPart],
     kind: FieldKind,
     hops: Vec<Hop>,
+    slice: Slice,
     lookup: Option<Lookup>,
     unit: Option<String>,
     types: Vec<String>,
@@ -125,6 +146,7 @@ impl<'a> RouteWalk<'a> {
             parts,
             kind: FieldKind::Struct(schema.root),
             hops: Vec::new(),
+            slice: Slice::ALL,
             lookup: None,
             unit: None,
             types: vec![schema.root().name.clone()],
@@ -139,10 +161,11 @@ impl<'a> RouteWalk<'a> {
         match &parts[place] {
             PathPart::Name(name) => self.field(place, name),
             PathPart::Index(index) => self.item(place, Hop::Item(*index)),
-            PathPart::All => {
+            PathPart::Slice(slice) => {
                 if self.hops.contains(&Hop::All) {
                     return Err("only one [:] can be in a field".to_owned());
                 }
+                self.slice = *slice;
                 self.item(place, Hop::All)
             }
             PathPart::Called { key, name } => self.called(place, key.as_deref(), name),
@@ -260,6 +283,7 @@ impl<'a> RouteWalk<'a> {
         Ok(Route {
             text,
             hops: self.hops,
+            slice: self.slice,
             lookup: self.lookup,
             number,
             unit: self.unit,

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use super::blocks::{Blocks, Spacing};
 use super::channels::{Channels, TopicChannel};
 use super::clock::ClockCheck;
-use super::decode::{Decoder, Encoding, Reading, Targets, item_names, values};
+use super::decode::{Damage, Decoder, Encoding, Reading, Targets, item_names, values};
+use super::mixed::{Publishers, one_frame, one_row, two_publishers};
 use super::order::Sorter;
 use super::path::{self, PathPart};
 use super::record::RawMessage;
@@ -71,6 +72,8 @@ pub(super) struct TopicSignal {
     pub selected: SelectedSignal,
     pub options: TimeOptions,
     decoder: Decoder,
+    /// The way to the number.
+    route: Route,
     /// The field with the name of its item, if it was asked for by its place and has one.
     pub by_name: Option<String>,
     reading: Reading,
@@ -83,37 +86,6 @@ pub(super) struct TopicSignal {
     pub tally: Tally,
     /// The chosen time of the first message minus its log time, in ns.
     pub log_offset_ns: i64,
-}
-
-/// When the messages of each channel of a topic were logged: number, first and last.
-#[derive(Debug, Default)]
-struct Publishers(Vec<(u16, u64, u64)>);
-
-impl Publishers {
-    /// Takes note of a message; the channels, if two of them have messages between each other's.
-    fn note(&mut self, message: &RawMessage) -> Result<(), [u16; 2]> {
-        let (id, at) = (message.channel_id, message.log_time_ns);
-        let all = &mut self.0;
-        let place = all.iter().position(|one| one.0 == id).unwrap_or_else(|| {
-            all.push((id, at, at));
-            all.len() - 1
-        });
-        all[place].1 = all[place].1.min(at);
-        all[place].2 = all[place].2.max(at);
-        let (_, first, last) = all[place];
-        // A recorder that starts anew declares its channels again: one after the other.
-        let others = all.iter().filter(|one| one.0 != id);
-        let mut between = others.filter(|(_, start, end)| first < *end && *start < last);
-        between.next().map_or(Ok(()), |other| Err([other.0, id]))
-    }
-}
-
-/// Says that the messages of two channels of a topic mix.
-pub(super) fn two_publishers([one, other]: [u16; 2]) -> String {
-    format!(
-        "its channels {one} and {other} have messages between each other's: two nodes publish on it, and their samples are not \
-         one signal; record one of them alone, or split the file by channel"
-    )
 }
 
 /// A message kept for later.
@@ -158,6 +130,7 @@ impl TopicSignal {
         if parts.is_empty() && route.is_whole_list() {
             ask_for_item(encoding, &schema, &route, message.data)?;
         }
+        one_row(encoding, &schema, &route, message.data)?;
         let by_name = by_name(encoding, &schema, (&route, parts), message.data);
         let by_name = by_name.map(|named| {
             let text = std::mem::replace(&mut route, named).text;
@@ -179,7 +152,7 @@ impl TopicSignal {
             },
         };
         let targets = Targets {
-            value: route,
+            value: route.clone(),
             stamp,
             spacing: spacing.hops().cloned(),
         };
@@ -191,6 +164,7 @@ impl TopicSignal {
             selected,
             options: options.clone(),
             decoder: Decoder::new(encoding, &schema, targets),
+            route,
             by_name,
             reading: Reading::default(),
             first: Vec::new(),
@@ -267,6 +241,16 @@ impl TopicSignal {
             return;
         }
         self.tally.place(self.reading.place);
+        let (slice, count) = (self.route.slice, self.reading.values.len());
+        slice.keep(&mut self.reading.values);
+        if slice.start > 0 && count <= slice.start {
+            let damage = Damage::NoItem {
+                index: slice.start as i64,
+                count: count as u64,
+            };
+            self.tally.skip(damage, log_time_ns);
+            return;
+        }
         let time_ns = self.time_ns(log_time_ns, message.publish_time_ns);
         if self.selected.time.choice == TimeChoice::Header {
             self.clock.note(time_ns, log_time_ns);
@@ -291,6 +275,25 @@ impl TopicSignal {
         }
     }
 
+    /// Refuses messages of two frames.
+    fn check_frames(&self, first: &[CopiedMessage]) -> Result<(), Failure> {
+        let data = first.iter().map(|message| &message.data[..]);
+        let layout = self
+            .channel
+            .layout(first.first().map_or(&[][..], |m| &m.data));
+        let Ok((encoding, schema)) = layout else {
+            return Ok(());
+        };
+        one_frame(encoding, &schema, &self.route, data).map_err(|why| {
+            let topic = &self.selected.topic;
+            Failure::failed(
+                ErrorCode::RecordsDiffer,
+                format_args!("topic {topic}: {why}"),
+            )
+            .at(&self.name)
+        })
+    }
+
     /// Takes the time that the user names, or the messages' own stamp if they have one that is set, and
     /// decodes the messages that were held back.
     fn choose_time(&mut self) -> Result<(), Failure> {
@@ -307,6 +310,7 @@ impl TopicSignal {
             .at(&self.name));
         }
         let first = std::mem::take(&mut self.first);
+        self.check_frames(&first)?;
         let is_set = first.iter().any(|message| {
             let read = self.decoder.read(&message.data, &mut self.reading);
             read.is_ok() && self.reading.stamp_ns().is_some_and(|stamp| stamp != 0)

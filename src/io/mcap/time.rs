@@ -1,6 +1,6 @@
 //! Which of a message's times counts.
 
-use super::route::Hop;
+use super::route::{self, Hop};
 use super::schema::leaves::{is_nanoseconds, is_seconds, is_stamp};
 use super::schema::{FieldKind, Schema};
 
@@ -85,18 +85,10 @@ impl Stamp {
     }
 
     fn at(schema: &Schema, names: &[&str]) -> Option<Self> {
-        let mut index = schema.root;
-        let mut hops = Vec::new();
-        for name in names {
-            let fields = &schema.structs[index].fields;
-            let place = fields.iter().position(|field| field.name == *name)?;
-            let FieldKind::Struct(inner) = fields[place].kind else {
-                return None;
-            };
-            hops.push(Hop::Field(place));
-            index = inner;
-        }
-        let fields = &schema.structs[index].fields;
+        let (hops, FieldKind::Struct(index)) = route::way(schema, names)? else {
+            return None;
+        };
+        let fields = &schema.structs[*index].fields;
         // JSON has no order, so the fields are told by their names.
         let place = |is: fn(&str) -> bool| fields.iter().position(|field| is(&field.name));
         let (seconds, nanoseconds) = (place(is_seconds)?, place(is_nanoseconds)?);
@@ -108,7 +100,7 @@ impl Stamp {
             way.push(Hop::Field(place));
             way
         };
-        (is_numbers && (fields.len() == 2 || is_stamp(schema, index))).then(|| Self {
+        (is_numbers && (fields.len() == 2 || is_stamp(schema, *index))).then(|| Self {
             text: names.join("."),
             seconds: way(seconds),
             nanoseconds: way(nanoseconds),
