@@ -73,7 +73,7 @@ def ros2_joints(folder):
             schema = writer.register_msgdef("sensor_msgs/msg/JointState", STAMPED)
             for place, (time, value) in enumerate(zip(times(), values)):
                 message = {
-                    "header": {"stamp": stamp(time), "frame_id": "f" * (place % 5)},
+                    "header": {"stamp": stamp(time), "frame_id": "f" * (5 * place // COUNT)},
                     "name": ["left", "motor_joint"],
                     "position": [] if place % 3 else [1.0],
                     "velocity": [0.5] * (place % 4),
@@ -256,7 +256,7 @@ def ros1_by_rosbags(folder):
                 header=header(
                     seq=place,
                     stamp=time_kind(sec=time // 10**9, nanosec=time % 10**9),
-                    frame_id="abc"[: place % 4],
+                    frame_id="abc"[: 4 * place // COUNT],
                 ),
                 name=["a", "bc"],
                 position=empty,
