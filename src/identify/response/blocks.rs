@@ -154,25 +154,24 @@ fn impacts(recorded: &[Driven], result: &mut Identification) -> Result<Set, Fail
     let folded = |(r, range): &(usize, Range<usize>)| {
         frf::near_half_rate(&recorded[*r].applied[range.clone()])
     };
-    check::short_pulses(result, &good.iter().map(folded).collect::<Vec<f64>>());
+    check::short_pulses(result, mean(&good.iter().map(folded).collect::<Vec<f64>>()));
     let length = good.iter().map(|(_, range)| range.len()).min().unwrap_or(0);
     let of = |(r, range): &(usize, Range<usize>)| {
         let range = range.start..range.start + length;
-        Transient {
+        let (applied, noise) = force_of_hit(&records[*r].applied[range.clone()]);
+        let transient = Transient {
             record: *r,
-            applied: force_of_hit(&records[*r].applied[range.clone()]),
+            applied,
             measured: without_offset(&records[*r].measured[range]),
-        }
+        };
+        (transient, noise)
     };
-    let left = |(r, range): &(usize, Range<usize>)| {
-        noise_left(&records[*r].applied[range.start..range.start + length])
-    };
-    check::noise_on_force(result, &good.iter().map(left).collect::<Vec<f64>>());
     let rings = |(r, range): &(usize, Range<usize>)| {
         still_rings(&records[*r].measured[range.start..range.start + length])
     };
     let window = window_for(good.iter().any(rings), length);
-    let cut: Vec<Transient> = good.iter().map(of).collect();
+    let (cut, noises): (Vec<Transient>, Vec<f64>) = good.iter().map(of).unzip();
+    check::noise_on_force(result, mean(&noises));
     Ok(transients(&cut, records[0].rate_hz, window, result))
 }
 
@@ -182,24 +181,17 @@ fn without_offset(signal: &[f64]) -> Vec<f64> {
     signal.iter().map(|v| v - level).collect()
 }
 
-/// The force of a hit; where nothing but noise is beside it, none is there.
-fn force_of_hit(signal: &[f64]) -> Vec<f64> {
+/// The force of a hit; where nothing but noise is beside it, none is there. Beside it, the part by which the response is too
+/// small by noise that could not be taken off.
+fn force_of_hit(signal: &[f64]) -> (Vec<f64>, f64) {
     let Some(stroke) = frf::stroke_of(signal) else {
-        return without_offset(signal);
+        return (without_offset(signal), frf::noise_share(signal));
     };
     let mut force = vec![0.0; signal.len()];
     for i in stroke.range {
         force[i] = signal[i] - stroke.rest;
     }
-    force
-}
-
-/// Part by which the response to a hit is too small by the noise of its force that could not be taken off.
-fn noise_left(signal: &[f64]) -> f64 {
-    match frf::stroke_of(signal) {
-        Some(_) => 0.0,
-        None => frf::noise_share(signal),
-    }
+    (force, 0.0)
 }
 
 /// Every record as one transient, whatever its shape. The spectra are those of the differences from sample to sample over

@@ -146,8 +146,7 @@ const FOLDED: f64 = 0.01;
 const OF_GAIN: f64 = 1.0 / 3.0;
 
 /// Warns where pulses are so short that frequencies above half the rate fold into their spectrum.
-pub(super) fn short_pulses(result: &mut Identification, parts: &[f64]) {
-    let part = parts.iter().sum::<f64>() / parts.len().max(1) as f64;
+pub(super) fn short_pulses(result: &mut Identification, part: f64) {
     if part > FOLDED {
         result.warn(
             "short-pulse",
@@ -165,8 +164,7 @@ pub(super) fn short_pulses(result: &mut Identification, parts: &[f64]) {
 const GAIN_ERROR: f64 = 1e-3;
 
 /// Warns of noise on the force of hits that could not be told from what else follows the stroke.
-pub(super) fn noise_on_force(result: &mut Identification, parts: &[f64]) {
-    let part = parts.iter().sum::<f64>() / parts.len().max(1) as f64;
+pub(super) fn noise_on_force(result: &mut Identification, part: f64) {
     if part > GAIN_ERROR {
         result.warn(
             "noise-on-force",

@@ -87,25 +87,15 @@ pub(super) fn one_row(
     let (true, Some(PathPart::Name(list))) = (is_all, parts.pop()) else {
         return Ok(());
     };
-    let of_each = |field: &str| {
-        let layout = ["layout", "dim"].map(|name| PathPart::Name(name.to_owned()));
-        let item = [
-            PathPart::Slice(Slice::ALL),
-            PathPart::Name(field.to_owned()),
-        ];
-        [&parts[..], &layout, &item].concat()
-    };
-    let Ok(size) = Route::find(schema, &of_each("size")) else {
+    let sizes = [&parts[..], &path::parse("layout.dim[:].size")?].concat();
+    let Ok(sizes) = Route::find(schema, &sizes) else {
         return Ok(());
     };
-    let sizes = values(encoding, schema, &size, message).unwrap_or_default();
+    let sizes = values(encoding, schema, &sizes, message).unwrap_or_default();
     let long: Vec<f64> = sizes.into_iter().filter(|size| *size > 1.0).collect();
-    let [.., columns] = long[..] else {
+    let [_, .., columns] = long[..] else {
         return Ok(());
     };
-    if long.len() < 2 {
-        return Ok(());
-    }
     let shape: Vec<String> = long.iter().map(f64::to_string).collect();
     parts.push(PathPart::Name(list));
     let list = path::text(&parts);

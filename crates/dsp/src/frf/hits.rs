@@ -282,15 +282,14 @@ pub fn near_half_rate(force: &[f64]) -> f64 {
 #[must_use]
 pub fn noise_share(force: &[f64]) -> f64 {
     let (middle, noise) = (median(force), noise_of(force));
-    let size = |v: &f64| (v - middle).abs();
-    let Some(top) = force.iter().max_by(|a, b| size(a).total_cmp(&size(b))) else {
+    let size = |i: &usize| (force[*i] - middle).abs();
+    let Some(top) = (0..force.len()).max_by(|a, b| size(a).total_cmp(&size(b))) else {
         return 0.0;
     };
-    let sign = (top - middle).signum();
-    let place = force.iter().position(|v| v == top).unwrap_or(0);
+    let sign = (force[top] - middle).signum();
     let is_stroke = |v: &&f64| sign * (**v - middle) > LOUD * noise;
-    let before = force[..place].iter().rev().take_while(is_stroke);
-    let stroke = before.chain(force[place..].iter().take_while(is_stroke));
+    let before = force[..top].iter().rev().take_while(is_stroke);
+    let stroke = before.chain(force[top..].iter().take_while(is_stroke));
     let sum: f64 = stroke.map(|v| v - middle).sum();
     let of_noise = force.len() as f64 * noise * noise;
     of_noise / (of_noise + sum * sum)
