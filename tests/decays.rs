@@ -20,12 +20,13 @@ const ZERO: f64 = 0.05;
 /// Beginning and length of a hit, in s.
 const HIT_S: [f64; 2] = [0.1, 0.003];
 
-/// `x'' + 2 ζ ω x' + ω² (x + c x³ + F sgn x') = ω² u`, `x` in V.
+/// `x'' + 2 ζ ω x' + ω² (x + c x³ + F sgn x' + d x' |x'|) = ω² u`, `x` in V.
 pub struct Stand {
     pub natural_hz: f64,
     pub damping_ratio: f64,
     pub cubic: f64,
     pub friction: f64,
+    pub drag: f64,
 }
 
 pub const PLAIN: Stand = Stand {
@@ -33,6 +34,7 @@ pub const PLAIN: Stand = Stand {
     damping_ratio: 0.01,
     cubic: 0.0,
     friction: 0.0,
+    drag: 0.0,
 };
 
 impl Stand {
@@ -51,7 +53,7 @@ impl Stand {
             }
         };
         let slope = |t: f64, [x, v]: [f64; 2]| {
-            let spring = x + self.cubic * x.powi(3);
+            let spring = x + self.cubic * x.powi(3) + self.drag * v * v.abs();
             [
                 v,
                 push(t) - 2.0 * self.damping_ratio * omega * v - omega * omega * spring,
@@ -185,22 +187,47 @@ fn a_stiffness_that_grows_is_found_with_little_damping() {
     assert!((value - 0.05).abs() < 4.0 * std, "{value} ± {std}");
 }
 
+/// A little of it, and so much that the ringing ends after a few turns.
 #[test]
 fn dry_friction_is_found() {
+    for (natural_hz, damping_ratio, friction) in [
+        (20.0, 0.01, 0.01),
+        (43.0, 0.0155, 0.031),
+        (35.0, 0.009, 0.049),
+    ] {
+        let stand = Stand {
+            natural_hz,
+            damping_ratio,
+            friction,
+            ..PLAIN
+        };
+        let (_, report) = stand.diagnosed(&[]);
+        assert_eq!(report["effects"], serde_json::json!(["coulomb-friction"]));
+        let described = &report["residual"]["described"];
+        assert_eq!(
+            report["verdict"], "explained",
+            "{described} {}",
+            report["suspected"]
+        );
+        let [value, _] = parameter(&report, "coulomb-friction", "torque");
+        assert!((value / friction - 1.0).abs() < 0.01, "{value}");
+    }
+}
+
+#[test]
+fn drag_is_found() {
+    let omega = TAU * 58.0;
     let stand = Stand {
-        friction: 0.01,
+        natural_hz: 58.0,
+        damping_ratio: 0.0274,
+        drag: 0.0374 / omega.powi(2),
         ..PLAIN
     };
     let (_, report) = stand.diagnosed(&[]);
-    assert_eq!(report["effects"], serde_json::json!(["coulomb-friction"]));
-    let described = &report["residual"]["described"];
-    assert_eq!(
-        report["verdict"], "explained",
-        "{described} {}",
-        report["suspected"]
-    );
-    let [value, _] = parameter(&report, "coulomb-friction", "torque");
-    assert!((value / 0.01 - 1.0).abs() < 0.01, "{value}");
+    assert_eq!(report["verdict"], "explained");
+    assert_eq!(report["effects"], serde_json::json!(["quadratic-damping"]));
+    let [value, std] = parameter(&report, "quadratic-damping", "coefficient");
+    assert!((value - stand.drag).abs() < 4.0 * std, "{value} ± {std}");
 }
 
 #[test]

@@ -273,6 +273,24 @@ fn a_point_that_may_stand_between_thousands_is_asked_for() {
     }
 }
 
+/// 4,026 mV beside 1.500 1/min: one of the two marks stands between thousands.
+#[test]
+fn commas_and_points_that_both_read_both_ways_are_asked_for() {
+    let folder = Folder::new();
+    let rows = |speed: &str| -> String {
+        let row = |i: i32| format!("{i};4,{:03};{speed}\n", 26 + i % 200);
+        (0..400).map(row).collect()
+    };
+    let table = |speed: &str| format!("Zeit [ms];Spannung [mV];n [1/min]\n{}", rows(speed));
+    folder.write("both.csv", table("1.500"));
+    let ran = folder.run(&["inspect", "both.csv"]);
+    ran.says(1, &["line 2", "the comma in", "between thousands"]);
+    folder.write("comma.csv", table("1.500,5"));
+    let document = folder.json(&["inspect", "--json", "comma.csv"]);
+    let smallest = |k: usize| document["channels"][k]["smallest"].as_f64();
+    assert_eq!([smallest(0), smallest(1)], [Some(4.026), Some(1500.5)]);
+}
+
 #[test]
 fn a_comma_that_could_be_either_is_asked_for() {
     let folder = Folder::new();

@@ -1,14 +1,18 @@
 //! Columns that a residual is cleared of.
 
+use std::sync::Arc;
+
 use torqcomp_dsp::dot;
 
 /// Part of a column that must be left after the others are taken out of it.
 const LEFT: f64 = 1e-6;
+/// Part above which what is left is orthogonal to within rounding (B. N. Parlett, *The Symmetric Eigenvalue Problem* (1980), 107).
+const MUCH: f64 = 0.5;
 
 /// Columns, made orthonormal one after the other.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Columns {
-    orthonormal: Vec<Vec<f64>>,
+    orthonormal: Vec<Arc<Vec<f64>>>,
     /// The columns as they came, each a combination of the orthonormal ones up to its own:
     /// `raw_k = Σ_j mix[k][j] orthonormal_j`; none for a column that depends on those before.
     mix: Vec<Option<Vec<f64>>>,
@@ -21,25 +25,27 @@ impl Columns {
         self.mix.len()
     }
 
-    /// Adds a column: orthogonalised twice, as once is not enough for nearly dependent ones.
+    /// Adds a column. Where most of it is taken out it is orthogonalised twice, as once is not enough for nearly dependent ones.
     pub fn push(&mut self, mut column: Vec<f64>) {
         let size = dot(&column, &column).sqrt();
         let mut mix = vec![0.0; self.orthonormal.len()];
+        let mut left = size;
         for _ in 0..2 {
             for (share, other) in mix.iter_mut().zip(&self.orthonormal) {
                 let part = dot(&column, other);
                 *share += part;
-                column
-                    .iter_mut()
-                    .zip(other)
-                    .for_each(|(c, o)| *c -= part * o);
+                let both = column.iter_mut().zip(other.iter());
+                both.for_each(|(c, o)| *c -= part * o);
+            }
+            left = dot(&column, &column).sqrt();
+            if left > MUCH * size {
+                break;
             }
         }
-        let left = dot(&column, &column).sqrt();
         let is_new = left > LEFT * size && left > 0.0;
         if is_new {
             column.iter_mut().for_each(|c| *c /= left);
-            self.orthonormal.push(column);
+            self.orthonormal.push(Arc::new(column));
             mix.push(left);
         }
         self.mix.push(is_new.then_some(mix));
@@ -69,7 +75,7 @@ impl Columns {
     /// Sum of the squares that clearing takes out of a residual.
     #[must_use]
     pub fn explained(&self, residual: &[f64]) -> f64 {
-        let part = |column: &Vec<f64>| dot(column, residual).powi(2);
+        let part = |column: &Arc<Vec<f64>>| dot(column, residual).powi(2);
         self.orthonormal.iter().map(part).sum()
     }
 
@@ -79,7 +85,7 @@ impl Columns {
             let part = dot(residual, column);
             residual
                 .iter_mut()
-                .zip(column)
+                .zip(column.iter())
                 .for_each(|(r, c)| *r -= part * c);
             parts.push(part);
         }

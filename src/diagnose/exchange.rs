@@ -1,6 +1,6 @@
 //! Effects exchanged for others: one that was found first may only resemble another, or two others, beside those found later.
 
-use torqcomp_model::effects::{EFFECTS, Effect, EffectParameter, Form, Stage};
+use torqcomp_model::effects::{EFFECTS, Effect, Form, Stage};
 
 use super::SearchState;
 use super::fit::{FitEffort, fit};
@@ -8,6 +8,7 @@ use super::pairs::best_pairs;
 use super::records::Records;
 use super::score::{BaseModel, ScoredModel};
 use super::search::{FOR_FIRST_EFFECT, SAME, SearchEffort, Workers, listed, refusal, try_effects};
+use super::special_cases::own_in_form;
 use super::structure::{EffectForm, Structure};
 use crate::parallel::parallel;
 
@@ -214,18 +215,4 @@ fn sorted(model: &ScoredModel) -> Vec<&'static str> {
     let mut names = model.effect_names();
     names.sort_unstable();
     names
-}
-
-/// Values of an effect in another form: those of the same name or, where both have as many, in the same place; otherwise those that
-/// the form starts with.
-fn own_in_form(form: &Form, present: &Form, own: &[f64]) -> Vec<f64> {
-    let (names, have) = (form.parameters, present.parameters);
-    let value = |(i, parameter): (usize, &EffectParameter)| {
-        let same = have.iter().position(|p| p.name == parameter.name);
-        let place = same.or((names.len() == have.len()).then_some(i));
-        let start = || form.starts.first().and_then(|start| start.get(i));
-        let found = place.and_then(|place| own.get(place)).or_else(start);
-        found.copied().unwrap_or(parameter.lower)
-    };
-    names.iter().enumerate().map(value).collect()
 }

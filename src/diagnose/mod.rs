@@ -42,6 +42,7 @@ mod search;
 mod several;
 mod several_modes;
 mod shift;
+mod special_cases;
 mod spectra;
 mod starts;
 mod stationarity;

@@ -45,7 +45,7 @@ pub struct StandRecord {
 }
 
 /// What a model adds to a record whose phase or size belongs to the record, not to the stand.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct NuisanceTerms {
     /// Frequencies of lines, such as mains pickup.
     pub lines_hz: Vec<f64>,
@@ -65,9 +65,13 @@ impl NuisanceTerms {
         modes: Vec::new(),
     };
 
-    /// Whether there are none but those of the modes, which are the same in all models.
-    pub fn is_empty(&self) -> bool {
-        !self.disturb() && self.decays_per_s.is_empty()
+    /// Those that stay as they are while parameters move.
+    pub fn lasting(self) -> Self {
+        Self {
+            drift_half_waves: self.drift_half_waves,
+            modes: self.modes,
+            ..Self::NONE
+        }
     }
 
     /// Whether something is added that the applied quantity does not cause.
@@ -85,7 +89,7 @@ pub struct StateSlopes {
 }
 
 /// What belongs to a record and not to the stand: it is removed from the record's residual by least squares.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub struct Nuisance {
     columns: Columns,
     /// Index of the first of the two columns of the free motion.
@@ -216,19 +220,21 @@ impl StandRecord {
             nuisance.preload = Some(columns.count());
             columns.push(column);
         }
-        self.with_terms(nuisance, terms)
+        self.with_lasting_terms(&mut nuisance, terms);
+        self.with_moved_terms(nuisance, terms)
     }
 
     /// What belongs to this record beside its motion: a constant and the given terms.
     pub fn nuisance_beside_motion(&self, terms: &NuisanceTerms) -> Nuisance {
         let mut nuisance = Nuisance::default();
         nuisance.columns.push(vec![1.0; self.count()]);
-        self.with_terms(nuisance, terms)
+        self.with_lasting_terms(&mut nuisance, terms);
+        self.with_moved_terms(nuisance, terms)
     }
 
-    fn with_terms(&self, mut nuisance: Nuisance, terms: &NuisanceTerms) -> Nuisance {
+    /// The terms that stay as they are while parameters move.
+    fn with_lasting_terms(&self, nuisance: &mut Nuisance, terms: &NuisanceTerms) {
         let columns = &mut nuisance.columns;
-        let rate_hz = self.rate_hz();
         let count = self.count();
         for wave in 1..=terms.drift_half_waves {
             let turn = PI * wave as f64 / count as f64;
@@ -241,6 +247,13 @@ impl StandRecord {
                 columns.push(column);
             }
         }
+        nuisance.lines = columns.count();
+    }
+
+    /// What belongs to this record, and the terms that parameters move.
+    pub fn with_moved_terms(&self, mut nuisance: Nuisance, terms: &NuisanceTerms) -> Nuisance {
+        let columns = &mut nuisance.columns;
+        let (rate_hz, count) = (self.rate_hz(), self.count());
         for rate_per_s in &terms.decays_per_s {
             let step = rate_per_s / rate_hz;
             columns.push((0..count).map(|i| (-step * i as f64).exp()).collect());

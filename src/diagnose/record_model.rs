@@ -1,5 +1,10 @@
 //! A model that is run on records, and the state at their start that leaves least of them.
 
+use std::f64::consts::PI;
+
+use nalgebra::DMatrix;
+use torqcomp_model::fit::linear::solve;
+use torqcomp_model::simulate::MotionState;
 use torqcomp_model::{Chain, Mode, StandRun};
 
 use super::fit::{MOST_STARTS, RecordResidual, START_SETTLED};
@@ -10,6 +15,8 @@ use super::unexplained::{raw_residual, raw_residuals};
 
 /// Step of the initial state for differences, over the rms of the record.
 const STATE_STEP: f64 = 1e-4;
+/// Fewest samples that show a state.
+const FEWEST: usize = 6;
 /// Parts of a step to a better initial state that are tried.
 const STEPS: [f64; 3] = [1.0, 0.3, 0.1];
 
@@ -97,15 +104,16 @@ impl RecordModel {
     }
 
     /// The residual of a record with the initial state that leaves least of it. A motion that is integrated depends on it in a
-    /// curved way: the search begins with the state that the record has and at rest, and goes on by Gauss's and Newton's steps
-    /// as long as they help. `None` if the motion diverges.
+    /// curved way: the search begins with the state that the record has, at rest, and with what free ringing shows of it, and goes on
+    /// by Gauss's and Newton's steps as long as they help. `None` if the motion diverges.
     pub fn settled(&self, record: &StandRecord) -> Option<RecordResidual> {
         if !self.chain.is_integrated() {
             return self.residual(record.clone());
         }
-        let starts = [record.initial, InitialState::default()];
+        let shown = record.is_free().then(|| self.shown_at_start(record));
+        let starts = [record.initial, InitialState::default()].into_iter();
         let found = starts
-            .into_iter()
+            .chain(shown.flatten())
             .filter_map(|initial| self.residual(record.starting_from(initial)))
             .min_by(|a, b| a.sum_of_squares().total_cmp(&b.sum_of_squares()));
         let mut found = found?;
@@ -122,6 +130,27 @@ impl RecordModel {
             }
         }
         Some(found)
+    }
+
+    /// The state at the first sample that the first half period of free ringing shows: that of a swing about any middle, on the
+    /// side of the record's mean on which it is.
+    fn shown_at_start(&self, record: &StandRecord) -> Option<InitialState> {
+        let measured = record.measured_in_range();
+        let turn = self.free.omega_rad_s / record.rate_hz();
+        let count = ((PI / turn).ceil() as usize).max(FEWEST);
+        let seen = record.measured.get(..count)?;
+        let row = |i| [1.0, (turn * i as f64).cos(), (turn * i as f64).sin()];
+        let rows: Vec<[f64; 3]> = (0..count).map(row).collect();
+        let matrix = DMatrix::from_row_slice(count, 3, rows.as_flattened());
+        let swing = solve(&matrix, seen, None, false).ok()?.values;
+        let mean = measured.iter().sum::<f64>() / measured.len() as f64;
+        Some(InitialState {
+            motion: MotionState {
+                x: swing[0] + swing[1] - mean,
+                speed: self.free.omega_rad_s * swing[2],
+            },
+            ..record.initial
+        })
     }
 
     /// A record with part of the correction of its initial state that its residual shows.

@@ -12,6 +12,7 @@ use super::fit::{FitEffort, FittedModel, fit};
 use super::reason::{Reason, Status};
 use super::records::Records;
 use super::score::{BaseModel, EffectParameter, ScoredModel};
+use super::special_cases::fit_special_cases;
 use super::spectra::{SpectralLine, lines_of};
 use super::starts::{Start, best_starts};
 use super::structure::{EffectForm, Structure};
@@ -296,14 +297,17 @@ pub fn fit_all(
         .unwrap_or(0.0)
         .max(limits.promising * gains.first().copied().unwrap_or(0.0))
         .max(WORTHWHILE * base.scored.train_rms().powi(2));
-    parallel(forms.len(), workers.threads, |k| {
+    let mut fits = parallel(forms.len(), workers.threads, |k| {
         let fit = second[k].as_ref().filter(|f| gain(f) > 0.0)?;
         let full = match gain(fit) >= least {
             true => to_the_end(fit, records),
             false => fit.clone(),
         };
         ScoredModel::of(full, records)
-    })
+    });
+    let promising = (fitted.train_sum, least);
+    fit_special_cases(forms, &mut fits, promising, records, workers);
+    fits
 }
 
 /// A fit carried on as long as the error falls much: where a light damping lets small errors of the frequency add up, it falls

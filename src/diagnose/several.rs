@@ -243,6 +243,7 @@ impl SearchState {
             let Some(less) = without.flatten() else {
                 break;
             };
+            let less = less.simplified(&self.records, threads);
             let others = less.effect_names().join(" + ");
             for tried in self.rounds.iter_mut().flatten() {
                 if tried.effect.name == names[k] && tried.status() == Status::Accepted {

@@ -92,26 +92,25 @@ pub fn best_starts(
     found
 }
 
-/// The effect whose size the backbone gives.
-const BENDS: &str = "cubic-stiffness";
-
-/// The start that the frequency of free ringing over its amplitude gives, for the first effect of a plain stand.
+/// The start that frequency and decay of free ringing over its amplitude give, for the first effect of a plain stand.
 fn from_backbone(structure: &Structure, plain: &[f64], training: &[StandRecord]) -> Option<Start> {
     let [effect] = structure.effects.as_slice() else {
         return None;
     };
-    if effect.effect.name != BENDS || !training.iter().all(StandRecord::is_free) {
+    if !training.iter().all(StandRecord::is_free) {
         return None;
     }
-    let each: Vec<Backbone> = training.iter().map(Backbone::of).collect::<Option<_>>()?;
+    let each = training.iter().map(|r| Backbone::of(r, effect.effect.name));
+    let each: Vec<Backbone> = each.collect::<Option<_>>()?;
     let first = each.first()?;
     let scales = &structure.context.scales;
     let bounds = &effect.form.parameters[0];
-    let size = first.cubic / bounds.size(scales);
+    let size = first.size / bounds.size(scales);
     let mut values = plain.to_vec();
     values[0] = first.omega_rad_s / TAU / scales.natural_hz;
     values[1] = first.damping_ratio;
     values.push(size.clamp(bounds.lower, bounds.upper));
+    values.extend(effect.form.starts[0][1..effect.moved()].iter());
     Some(Start {
         values,
         initial: Some(each.iter().map(Backbone::initial).collect()),

@@ -13,9 +13,7 @@ pub struct Unexplained<'a> {
     structure: &'a Structure,
     records: &'a [StandRecord],
     of_records: &'a OwnOfRecords,
-    /// The mode of the free motion, where that of the parameters is not taken.
-    free: Option<&'a Mode>,
-    /// The nuisance terms of each record in that mode.
+    /// The nuisance terms of each record in the mode of its free motion, where that of the parameters is not taken.
     fixed: Option<Vec<Nuisance>>,
     /// What modes that the fit does not move change of all residuals.
     modes: Option<ModeSlopes>,
@@ -32,13 +30,12 @@ impl<'a> Unexplained<'a> {
             structure,
             records,
             of_records,
-            free,
             fixed: None,
             modes: None,
         };
-        // Without lines, the nuisance terms depend on the parameters by their mode alone.
+        // But for lines, drift and what decays, the nuisance terms depend on the parameters by their mode alone.
         problem.fixed = free.map(|free| {
-            let terms = structure.context.terms();
+            let terms = structure.model(start).1.lasting();
             let of = |(k, r): (usize, &StandRecord)| problem.nuisance(k, r, free, &terms);
             records.iter().enumerate().map(of).collect()
         });
@@ -121,15 +118,19 @@ impl Unexplained<'_> {
             .map(|(((chain, _), _), record)| record.run_of(chain))
             .collect();
         let mut residuals = raw_residuals(&runs, &self.records[k]);
+        // Most of the models differ in nothing that moves these.
+        let mut last: Option<(&NuisanceTerms, Nuisance)> = None;
         for (residual, (((chain, terms), _), record)) in residuals.iter_mut().zip(both()) {
             let Ok(residual) = residual else { continue };
-            match &self.fixed {
-                Some(fixed) if terms.is_empty() => fixed[k].clear(residual),
-                _ => {
-                    let free = self.free.copied().unwrap_or_else(|| chain.free_mode());
-                    self.nuisance(k, record, &free, terms).clear(residual);
-                }
-            }
+            let Some(fixed) = &self.fixed else {
+                let free = chain.free_mode();
+                self.nuisance(k, record, &free, terms).clear(residual);
+                continue;
+            };
+            let known = last.take().filter(|(of, _)| *of == terms);
+            let moved = || record.with_moved_terms(fixed[k].clone(), terms);
+            let (_, nuisance) = last.insert(known.unwrap_or_else(|| (terms, moved())));
+            nuisance.clear(residual);
         }
         residuals
     }

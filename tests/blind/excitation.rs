@@ -226,7 +226,7 @@ impl Excitation {
             Self::Multisine {
                 lines, second_half, ..
             } => {
-                lines.iter().for_each(|line| line.add_to(&mut input));
+                add_lines(lines, &mut input);
                 input.shape(|time_s| step(1.0, *second_half, time_s - length_s / 2.0, 0.01));
                 input.fade_around(length_s, self.is_settled());
             }
@@ -304,23 +304,39 @@ fn step(from: f64, to: f64, time_s: f64, half_width_s: f64) -> [f64; 3] {
     ]
 }
 
-impl Line {
-    /// Adds the line to every node, by turning a phasor that is set anew every 1024 nodes.
-    fn add_to(&self, input: &mut Input) {
-        let omega = TAU * self.frequency_hz;
-        let (turn_sin, turn_cos) = (omega * input.step_s).sin_cos();
-        let (first_s, step_s) = (input.time_s(0), input.step_s);
+/// Adds lines to every node, by turning phasors that are set anew every 1024 nodes. Each turn waits for the one before: eight
+/// lines go side by side.
+fn add_lines(lines: &[Line], input: &mut Input) {
+    let (first_s, step_s) = (input.time_s(0), input.step_s);
+    for some in lines.chunks(8) {
+        let of_each = |of: fn(&Line) -> f64| -> [f64; 8] {
+            std::array::from_fn(|k| some.get(k).map_or(0.0, of))
+        };
+        let size = of_each(|line| line.amplitude);
+        let phase = of_each(|line| line.phase_rad);
+        let omega = of_each(|line| TAU * line.frequency_hz);
+        let turn = omega.map(|omega| (omega * step_s).sin_cos());
         for (block, nodes) in input.nodes.chunks_mut(1024).enumerate() {
             let time_s = first_s + (block * 1024) as f64 * step_s;
-            let (mut sin, mut cos) = (omega * time_s + self.phase_rad).sin_cos();
+            let at = |k: usize| omega[k] * time_s + phase[k];
+            let mut sin: [f64; 8] = std::array::from_fn(|k| at(k).sin());
+            let mut cos: [f64; 8] = std::array::from_fn(|k| at(k).cos());
             for node in nodes {
-                node[0] += self.amplitude * cos;
-                node[1] -= self.amplitude * omega * sin;
-                node[2] -= self.amplitude * omega * omega * cos;
-                (sin, cos) = (
-                    sin * turn_cos + cos * turn_sin,
-                    cos * turn_cos - sin * turn_sin,
-                );
+                let in_all = |of: [f64; 8]| {
+                    let [a, b, c, d, e, f, g, h] = of;
+                    ((a + b) + (c + d)) + ((e + f) + (g + h))
+                };
+                let part = |k: usize| size[k] * cos[k];
+                node[0] += in_all(std::array::from_fn(part));
+                node[1] -= in_all(std::array::from_fn(|k| size[k] * omega[k] * sin[k]));
+                node[2] -= in_all(std::array::from_fn(|k| part(k) * omega[k] * omega[k]));
+                for k in 0..8 {
+                    let (turn_sin, turn_cos) = turn[k];
+                    (sin[k], cos[k]) = (
+                        sin[k] * turn_cos + cos[k] * turn_sin,
+                        cos[k] * turn_cos - sin[k] * turn_sin,
+                    );
+                }
             }
         }
     }

@@ -9,8 +9,8 @@ use crate::failure::{ErrorCode, Failure};
 const GROUP: usize = 3;
 
 /// Refuses a table whose decimal mark may stand between thousands: a comma that reads both ways in all rows, or a point
-/// in a column beside whole numbers of up to three digits. `others` are the tables that read as many rows, with marks
-/// between thousands.
+/// in a column beside whole numbers of up to three digits, or beside commas that read both ways. `others` are the tables
+/// that read as many rows, with marks between thousands.
 ///
 /// # Errors
 /// If the table is such a one.
@@ -23,12 +23,14 @@ pub(super) fn refuse(head: &Head, table: &Table, others: &[&Table]) -> Result<()
     else {
         return Ok(());
     };
-    let (place, name) = match dialect.decimal {
-        b',' => (table.first, "comma"),
-        _ => match grouped_place(head, table, other) {
-            Some(place) => (place, "point"),
-            None => return Ok(()),
-        },
+    let found = if dialect.decimal == b',' {
+        Some((table.first, "comma"))
+    } else {
+        let point = grouped_place(head, table, other).map(|place| (place, "point"));
+        point.or_else(|| comma_place(head, table).map(|place| (place, "comma")))
+    };
+    let Some((place, name)) = found else {
+        return Ok(());
     };
     let shown: String = head.lines[place].text.trim().chars().take(60).collect();
     Err(Failure::failed(
@@ -56,6 +58,17 @@ fn grouped_place(head: &Head, table: &Table, other: Dialect) -> Option<usize> {
     }
     let mut columns = columns.into_iter();
     columns.find_map(|c| c.grouped.filter(|_| c.has_plain && !c.has_others))
+}
+
+/// Where the first number stands that has commas between thousands.
+fn comma_place(head: &Head, table: &Table) -> Option<usize> {
+    let has_comma = |text: &str| {
+        text.contains(',') && matches!(Cell::read(text, table.dialect.decimal), Cell::Grouped(_))
+    };
+    let rows = head.lines.iter().enumerate().skip(table.first);
+    let mut rows = rows.filter(|(_, line)| !is_skipped(&line.text));
+    let found = rows.find(|(_, line)| table.dialect.cells(&line.text).iter().any(|c| has_comma(c)));
+    found.map(|(place, _)| place)
 }
 
 /// What the numbers of a column look like.
