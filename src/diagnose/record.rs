@@ -8,6 +8,7 @@ use torqcomp_model::simulate::{Excitation, MotionState};
 use torqcomp_model::{Chain, Mode, StandRun};
 
 use super::columns::Columns;
+use super::records::EXCLUDED;
 
 /// State of the stand at the first sample of a record.
 #[derive(Debug, Clone, Copy, Default)]
@@ -104,6 +105,8 @@ pub struct Nuisance {
     lines: usize,
 }
 
+/// Fewest samples of a record's beginning: modes and what belongs to the record must not fit all of it.
+const SHORTEST: usize = 200;
 /// Time constants after which the free motion from a record's start is gone.
 pub const DECAYED: f64 = 12.0;
 /// Time constants up to which the range determines that motion: beyond, noise would be amplified by more than `e³` on its
@@ -173,6 +176,17 @@ impl StandRecord {
             },
             measured: Arc::new(self.measured[samples].to_vec()),
             ..self.clone()
+        }
+    }
+
+    /// The beginning of what counts, as a record of its own with the samples that its end needs.
+    pub fn beginning(&self, part: f64) -> Self {
+        let count = ((part * self.count() as f64) as usize).max(SHORTEST);
+        let end = self.range.start + count.min(self.count());
+        let whole = (end + EXCLUDED).min(self.measured.len());
+        Self {
+            range: self.range.start..end,
+            ..self.part(0..whole)
         }
     }
 

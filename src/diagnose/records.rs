@@ -17,7 +17,7 @@ pub struct Records {
 }
 
 /// Samples at both ends that are always excluded: there the extrapolation beyond the record matters most.
-const EXCLUDED: usize = 32;
+pub const EXCLUDED: usize = 32;
 /// Part of a record that is excluded at its start, and at its end: a second mode, a filter or a joint decays more slowly
 /// than the stand, and a complex stiffness responds before its cause.
 const EXCLUDED_PARTS: [f64; 2] = [0.04, 0.01];

@@ -6,10 +6,12 @@ use torqcomp_dsp::sort_by_number;
 use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 use torqcomp_model::effects::{EFFECTS, Effect};
+use torqcomp_model::fit::FitError;
 
 use super::blocks::{Comparison, family_p_values};
 use super::fit::{FitEffort, FittedModel, fit};
 use super::reason::{Reason, Status};
+use super::record::StandRecord;
 use super::records::Records;
 use super::score::{BaseModel, EffectParameter, ScoredModel};
 use super::special_cases::fit_special_cases;
@@ -94,6 +96,8 @@ const FULL_FIT: FitEffort = FitEffort::full(15);
 /// Most full fits in a row, and the sum of squares of one over that of the one before from which on no further one follows.
 const MOST_FULL_FITS: usize = 4;
 const FALLING: f64 = 0.9;
+/// Parts of the records that first fits of a stand with several modes begin with.
+const BEGINNINGS: [f64; 3] = [0.03, 0.1, 0.3];
 
 /// How many forms go on from one stage of fitting to the next.
 pub struct SearchEffort {
@@ -364,15 +368,47 @@ fn first_fits(
     let done = AtomicUsize::new(0);
     parallel(forms.len(), workers.threads, |k| {
         let starts = starts[k].iter().filter(|_| chosen.contains(&k));
-        let fits = starts.filter_map(|start| {
-            let structure = structure.with(forms[k]);
+        let fits = starts.flat_map(|start| {
             let records = start.in_records(&training);
-            fit(structure, &start.values, &records, FIRST_FIT).ok()
+            first_fits_from(&structure.with(forms[k]), &start.values, &records)
         });
         let fits = fits.collect();
         (workers.progress)(done.fetch_add(1, Ordering::Relaxed) + 1, forms.len());
         fits
     })
+}
+
+/// Fits with very few iterations. For the first effect beside several modes another one comes to the records by their beginnings:
+/// errors of frequencies have not added up to turns there.
+fn first_fits_from(
+    structure: &Structure,
+    start: &[f64],
+    records: &[StandRecord],
+) -> Vec<FittedModel> {
+    let has_turns = structure.context.several.is_some() && structure.effects.len() == 1;
+    let is_stepped = has_turns && !records.iter().any(StandRecord::is_free);
+    let at_once = fit(structure.clone(), start, records, FIRST_FIT);
+    let by_beginnings = is_stepped.then(|| from_beginnings(structure.clone(), start, records));
+    [at_once]
+        .into_iter()
+        .chain(by_beginnings)
+        .flatten()
+        .collect()
+}
+
+/// A fit that goes on from beginnings of the records to the whole.
+fn from_beginnings(
+    mut structure: Structure,
+    start: &[f64],
+    records: &[StandRecord],
+) -> Result<FittedModel, FitError> {
+    let mut values = start.to_vec();
+    for part in BEGINNINGS {
+        let beginnings: Vec<StandRecord> = records.iter().map(|r| r.beginning(part)).collect();
+        let found = fit(structure, &values, &beginnings, FIRST_FIT)?;
+        (structure, values) = (found.structure, found.values);
+    }
+    fit(structure, &values, records, FIRST_FIT)
 }
 
 /// Lines that stand out of the residual on the training records.
