@@ -154,6 +154,14 @@ fn other_units_columns_and_time_axes() {
         &[],
     );
     same(
+        "days",
+        format!(
+            "Time [d],bridge_V\n{}",
+            rows(|t, v| format!("{:.16},{v:.9}\n", t / 86_400.0))
+        ),
+        &[],
+    );
+    same(
         "more columns",
         format!(
             "speed_rpm,bridge_V,note,time_s\n{}",
@@ -190,6 +198,26 @@ fn other_units_columns_and_time_axes() {
             "V",
         ],
     );
+}
+
+/// Rows from the last to the first are no record of unknown rate.
+#[test]
+fn rows_in_reverse_order_are_to_be_sorted() {
+    let folder = Folder::new();
+    let upside_down: Vec<String> = rows(|t, v| format!("{t:.4},{v:.9}\n"))
+        .lines()
+        .rev()
+        .map(str::to_owned)
+        .collect();
+    folder.write(
+        "a.csv",
+        format!("time_s,bridge_V\n{}\n", upside_down.join("\n")),
+    );
+    let says = "the time stamps fall from row to row; sort the rows by time";
+    let inspected = folder.run(&["inspect", "a.csv", "--json"]);
+    assert!(inspected.stdout.contains(says), "{}", inspected.stdout);
+    let run = folder.run(&["compensate", "a.csv", "--stand", "stand.toml"]);
+    run.says(1, &[says]);
 }
 
 #[test]

@@ -8,7 +8,9 @@ use torqcomp_dsp::quality::steps::{Event, Events, Steps, broken_steps, rounded_s
 
 use crate::print::plural;
 use crate::print::rounded as number;
-use crate::recording::{COARSE_STAMPS, Channel, TimeAxis, contradicted, rates_of, same_stamps};
+use crate::recording::{
+    COARSE_STAMPS, Channel, REVERSED, TimeAxis, contradicted, falls, rates_of, same_stamps,
+};
 use crate::warning::Warning;
 
 /// Largest deviation of a step, as a part of it, in an axis that counts as uniform.
@@ -121,19 +123,16 @@ fn missing(whose: &str, axis: &TimeAxis) -> Option<Warning> {
     if axis.rate_hz.is_some() {
         return None;
     }
-    let why = match &axis.stamps_s {
+    let given = "what needs a rate refuses it unless one is given with --rate HZ, or the column of stamps with --time-column";
+    let why = match axis.stamps_s.as_deref().map(Vec::as_slice) {
         // A list that no message fills has nothing that a rate could be of.
-        Some(stamps) if stamps.is_empty() => return None,
-        Some(_) => "the time stamps have no usual step",
-        None => "the file has neither time stamps nor a rate",
+        Some([]) => return None,
+        Some(stamps) if falls(stamps) => REVERSED.to_owned(),
+        Some(_) => format!("the time stamps have no usual step; {given}"),
+        None => format!("the file has neither time stamps nor a rate; {given}"),
     };
-    Some(Warning::new(
-        "missing-rate",
-        format!(
-            "{whose}: the sampling rate is unknown, because {why}; what needs a rate refuses it \
-             unless one is given with --rate HZ, or the column of stamps with --time-column"
-        ),
-    ))
+    let message = format!("{whose}: the sampling rate is unknown, because {why}");
+    Some(Warning::new("missing-rate", message))
 }
 
 /// `3 of …, the first at …`; nothing if there are none.

@@ -25,6 +25,15 @@ pub(super) const UNIFORM: f64 = 0.01;
 /// Deviations among which steps are averaged where there are gaps.
 const CLOSE: [f64; 2] = [0.01, 0.05];
 
+/// What rows are that come from the last to the first, and what to do.
+pub const REVERSED: &str =
+    "the time stamps fall from row to row; sort the rows by time, the earliest first";
+
+/// Whether stamps fall all the way.
+pub fn falls(stamps: &[f64]) -> bool {
+    stamps.len() > 2 && stamps.windows(2).all(|pair| pair[1] < pair[0])
+}
+
 /// The time axis of a channel.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TimeAxis {

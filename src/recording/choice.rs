@@ -3,10 +3,10 @@
 use torqcomp_dsp::quality::rate::{Contradiction, contradiction};
 use torqcomp_model::Unit;
 
-use super::axis::{UNIFORM, step_of};
+use super::axis::{REVERSED, UNIFORM, falls, step_of};
 use super::moment::Moment;
 use super::text::CELLS_WITH_UNITS;
-use super::{Channel, RateFrom, Recording, TimeAxis, check_holes, check_size, formats};
+use super::{Channel, RateFrom, Recording, check_holes, check_size, formats};
 use crate::failure::{ErrorCode, Failure, did_you_mean};
 use crate::io::{ChannelChoice, Reading, digits};
 use crate::print::{list, plural};
@@ -379,16 +379,16 @@ impl Channel {
 }
 
 fn without_rate(channel: &Channel) -> Failure {
-    let TimeAxis { stamps_s, .. } = &channel.axis;
-    let why = match stamps_s {
-        Some(_) => "its time stamps have no usual step",
-        None => "the file has neither time stamps nor a rate",
+    let given = "give it with --rate HZ, or name the column of stamps with --time-column";
+    let why = match channel.axis.stamps_s.as_deref() {
+        Some(stamps) if falls(stamps) => REVERSED.to_owned(),
+        Some(_) => format!("its time stamps have no usual step; {given}"),
+        None => format!("the file has neither time stamps nor a rate; {given}"),
     };
     Failure::failed(
         ErrorCode::TimeUnknown,
         format_args!(
-            "the sampling rate of \"{}\" is unknown, because {why}; give it with --rate HZ, or \
-         name the column of stamps with --time-column",
+            "the sampling rate of \"{}\" is unknown, because {why}",
             channel.name
         ),
     )

@@ -3,7 +3,9 @@
 use torqcomp_dsp::quality::broken_line::BrokenLine;
 
 use super::Channel;
-use super::axis::{RateFrom, TimeAxis, UNIFORM, rounding, step_of, without_rounding};
+use super::axis::{
+    REVERSED, RateFrom, TimeAxis, UNIFORM, falls, rounding, step_of, without_rounding,
+};
 use super::checkpoints::sharpened;
 use super::moment::Moment;
 use crate::failure::{ErrorCode, Failure};
@@ -486,6 +488,7 @@ fn no_step(heading: &str, times: &[f64]) -> String {
                 plural(times.len(), "stamp")
             );
         }
+        _ if falls(times) => return format!("\"{heading}\": {REVERSED}"),
         _ if times.windows(2).all(|pair| pair[1] <= pair[0]) => "do not rise",
         _ => "have no usual step: fewer than half of their steps are within 25 % of the median one",
     };

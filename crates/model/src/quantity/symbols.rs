@@ -215,6 +215,7 @@ pub(super) const SYMBOLS: &[Symbol] = &[
     unit(&["ns"], &["nsec", "nanosecond", "nanoseconds"], 1e-9, TIME),
     unit(&[], &["min", "minute", "minutes"], 60.0, TIME),
     unit(&["h", "hr"], &["hour", "hours"], 3600.0, TIME),
+    unit(&["d"], &["day", "days"], 86_400.0, TIME),
     // Angle and cycles: one cycle is 2π rad.
     unit(&[], &["rad", "radian", "radians"], 1.0, ANGLE),
     unit(&["mrad"], &["milliradian", "milliradians"], 1e-3, ANGLE),

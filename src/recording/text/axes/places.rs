@@ -8,7 +8,7 @@ use crate::recording::text::clock::EPOCH_S;
 use crate::recording::text::header::Field;
 use crate::recording::text::rows::ColumnKind;
 use crate::recording::text::units;
-use crate::recording::typical_step;
+use crate::recording::{falls, typical_step};
 
 /// Fewest rows of a first column without a name that rises steadily for it to be taken for time.
 const STEADY_ROWS: usize = 8;
@@ -50,9 +50,14 @@ impl Sources<'_> {
                     || self.is_after_t(*place, used)
             })
             .collect();
-        let named = self.told_by_values(&named, used);
-        if !named.is_empty() {
-            return Ok(TimePlaces::sure(named));
+        let rising = self.told_by_values(&named, used);
+        if !rising.is_empty() {
+            return Ok(TimePlaces::sure(rising));
+        }
+        // Rows from the last to the first.
+        let mut reversed = named.into_iter();
+        if let Some(place) = reversed.find(|place| falls(&self.columns[*place].values)) {
+            return Ok(TimePlaces::sure(vec![place]));
         }
         let by_unit: Vec<usize> = used
             .iter()

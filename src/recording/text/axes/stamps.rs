@@ -348,7 +348,11 @@ impl Sources<'_> {
         if let Some(unit) = self.default_time_unit.and_then(units::read) {
             return (unit.unit.factor(), None);
         }
-        let assumed = format!("\"{}\" gives no unit: seconds were assumed", field.heading);
+        let says = match &field.unit_text {
+            Some(unit) => format!("gives the unit \"{unit}\", which is none of time"),
+            None => "gives no unit".to_owned(),
+        };
+        let assumed = format!("\"{}\" {says}: seconds were assumed", field.heading);
         (1.0, Some(assumed))
     }
 }
