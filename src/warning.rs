@@ -137,6 +137,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["repeated-stamps", "a time stamp equals the one before it", "remove the sample, or give --rate"],
         ["rounded-time-stamps", "the stamps are rounded to a quarter of a step or more; the rate is that of all of them", "nothing, or give --rate if it is known better"],
         ["restarted", "the start of a channel changes within a TDMS file: its samples do not follow each other without a pause", "save each part in a file of its own"],
+        ["stamps-of-arrival", "stamps jitter, and the decay shows that its samples were taken at even times, which are used", "give the recorder's rate with --rate"],
         ["time-assumed", "the time axis is assumed", "confirm it with --time-column and --time-unit, or give --rate"],
         ["time-backwards", "a time stamp lies before the one before it", "split the file there"],
         ["time-falls", "a column named as time falls too often to be time and was taken as a channel", "choose the time with --time-column, or give --rate"],

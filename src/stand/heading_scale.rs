@@ -1,10 +1,11 @@
 //! Scales that the heading of a channel names.
 
+use crate::unit::{NamedUnit, inside_brackets};
 use crate::warning::Warning;
 
-/// A warning if the heading of a channel names a scale, as `x10`, `*1000`, `× 0.1`, `(x100)`, `/10` or `0.1 x`.
+/// A warning if the heading of a channel names a scale, as `x10`, `*1000`, `× 0.1`, `(x100)`, `/10`, `0.1 x` or `[0.1 N m]`.
 pub(super) fn unapplied(heading: &str) -> Option<Warning> {
-    let scale = scale_in(heading)?;
+    let scale = scaled_unit(heading).or_else(|| scale_in(heading))?;
     Some(Warning::new(
         "scale-in-heading",
         format!(
@@ -12,6 +13,15 @@ pub(super) fn unapplied(heading: &str) -> Option<Warning> {
              are; if that is wrong, rename the column and scale it"
         ),
     ))
+}
+
+/// A number before the unit in brackets.
+fn scaled_unit(heading: &str) -> Option<String> {
+    let (_, inside) = inside_brackets(heading)?;
+    let end = inside.find(|c: char| !c.is_ascii_digit() && !".,".contains(c))?;
+    let number: f64 = inside[..end].replace(',', ".").parse().ok()?;
+    let is_scale = number != 1.0 && NamedUnit::parse(inside[end..].trim()).is_some();
+    is_scale.then(|| inside.to_owned())
 }
 
 /// A power of ten beside a mark of multiplication or division.

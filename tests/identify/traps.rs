@@ -641,10 +641,9 @@ fn gram_for_an_acceleration_is_asked() {
         .says(0, &[]);
 }
 
-/// Stamps in whole milliseconds, five to a sample or four to five, are those of the recorder's grid; where they jitter, that
-/// is said.
+/// Stamps in whole milliseconds, five to a sample or four to five, are those of the recorder's grid.
 #[test]
-fn rounded_stamps_of_a_decay_are_uniform_and_jitter_is_said() {
+fn rounded_stamps_of_a_decay_are_uniform() {
     let values = ringing(&[(0.1, 1.0)], 0.015, 12_000, 7);
     let folder = Folder::new();
     let stamped = |stamp: &dyn Fn(usize) -> f64| {
@@ -660,12 +659,46 @@ fn rounded_stamps_of_a_decay_are_uniform_and_jitter_is_said() {
         "{report}"
     );
     assert!(!codes(&report).contains(&"time-jitter"), "{report}");
-    let mut noise = Noise(5);
-    let late: Vec<f64> = values.iter().map(|_| noise.normal().abs()).collect();
-    has(
-        &stamped(&|i| i as f64 / RATE_HZ + 2e-5 * late[i]),
-        "time-jitter",
-    );
+}
+
+/// Samples at even times whose stamps say when they arrived, up to more than a step late, are told from samples that were taken
+/// when their stamps say.
+#[test]
+fn stamps_of_arrival_are_told_by_the_decay() {
+    let even = ringing(&[(0.1, 1.0)], 0.015, 12_000, 7);
+    let folder = Folder::new();
+    for late_s in [2e-5, 1.5e-4] {
+        let mut noise = Noise(5);
+        let late: Vec<f64> = even.iter().map(|_| late_s * noise.uniform()).collect();
+        let stamp = |i: usize| i as f64 / RATE_HZ + late[i];
+        let decayed = |values: &[f64]| {
+            let rows = values.iter().enumerate().map(|(i, v)| (stamp(i), *v));
+            folder.write("in.csv", table(["time_s", "bridge_V"], rows));
+            let report = folder.json(&["identify", "decay", "in.csv", "--json"]);
+            rings_right(&report, 0.015);
+            assert_eq!(
+                report["parameters"][0]["name"], "damped_frequency",
+                "{report}"
+            );
+            report
+        };
+        let arrived = decayed(&even);
+        has(&arrived, "stamps-of-arrival");
+        assert!(!codes(&arrived).contains(&"time-jitter"), "{arrived}");
+        let rate_hz = arrived["rate_hz"].as_f64().unwrap();
+        assert_close(rate_hz, RATE_HZ, 1e-5);
+        let mut noise = Noise(8);
+        let omega = TAU * 180.0;
+        let taken = |i: usize| {
+            let u = stamp(i) - 0.1;
+            let swing = (-0.015 * omega * u).exp() * (omega * (1.0 - 2.25e-4_f64).sqrt() * u).sin();
+            1e-3 * noise.normal() + if u < 0.0 { 0.0 } else { swing }
+        };
+        let taken: Vec<f64> = (0..even.len()).map(taken).collect();
+        let taken = decayed(&taken);
+        has(&taken, "time-jitter");
+        assert!(!codes(&taken).contains(&"stamps-of-arrival"), "{taken}");
+    }
 }
 
 /// Noise of a tenth of the swing behind a decay that is over soon is no doubt about the decay.

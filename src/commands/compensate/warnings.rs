@@ -161,7 +161,8 @@ fn of_length(report: &CompensateReport) -> Option<Warning> {
 /// A warning if the result is many times as large as the record.
 fn of_amplification(noise: &RecordNoise, report: &CompensateReport) -> Option<Warning> {
     let (unit, rms) = (&report.unit, report.result.rms);
-    (rms > AMPLIFIED * noise.in_band_rms).then(|| {
+    let amplifies = report.noise.largest_gain > 1.0;
+    (amplifies && rms > AMPLIFIED * noise.in_band_rms).then(|| {
         Warning::new(
             "mostly-amplified",
             format!(

@@ -6,6 +6,7 @@ use torqcomp_dsp::sort_by_number;
 
 use torqcomp_dsp::quality::clipping::Clipping;
 
+use super::arrivals::{self, EvenTimes};
 use super::constants::{Ratios, from_ratios};
 use super::{Recorded, deliver};
 use crate::cli::identify::Decay;
@@ -27,6 +28,8 @@ struct Loaded {
     rate_hz: Option<f64>,
     values: Vec<f64>,
     unit: String,
+    /// Even times in place of stamps that jitter.
+    even: Option<EvenTimes>,
 }
 
 /// Runs the test.
@@ -37,26 +40,70 @@ pub fn run(args: &Decay) -> Result<Outcome, Failure> {
         .iter()
         .map(|input| load(args, input, &mut recorded))
         .collect::<Result<_, _>>()?;
-    let records: Vec<Ringing> = loaded
-        .iter()
-        .map(|l| Ringing {
-            name: &l.name,
-            times_s: &l.times_s,
-            rate_hz: l.rate_hz,
-            values: &l.values,
-        })
-        .collect();
     let options = DecayOptions {
         modes: args.modes.map(usize::from),
         band_hz: args.band,
     };
-    let (mut result, _) = identify(&records, &options)?;
+    let mut result = identified(&loaded, &options, &mut recorded)?;
     if let Some(fit) = &mut result.fit {
         fit.unit.clone_from(&loaded[0].unit);
     }
     result.label_charts("signal", &loaded[0].unit);
     let entries = entries(args, &mut result)?;
     deliver(result, recorded, &args.findings, &entries)
+}
+
+/// Evaluates the records at their stamps; where these jitter, at even times if that leaves clearly less.
+fn identified(
+    loaded: &[Loaded],
+    options: &DecayOptions,
+    recorded: &mut Recorded,
+) -> Result<Identification, Failure> {
+    let at = |ringing: &dyn for<'a> Fn(&'a Loaded) -> Ringing<'a>| {
+        let records: Vec<Ringing> = loaded.iter().map(ringing).collect();
+        identify(&records, options).map(|(found, _)| found)
+    };
+    let at_stamps = at(&Loaded::at_stamps);
+    let Some(even) = loaded.iter().find_map(|l| l.even.as_ref()) else {
+        return at_stamps;
+    };
+    let found = at(&Loaded::at_even_times).ok();
+    let Some(mut found) = found.filter(|found| arrivals::are_arrivals(&at_stamps, found)) else {
+        return at_stamps;
+    };
+    recorded
+        .warnings
+        .retain(|warning| warning.code != "time-jitter");
+    if loaded[0].even.is_some() {
+        recorded.rate_hz = Some(even.rate_hz);
+        recorded.rate_std_hz = Some(even.rate_std_hz);
+    }
+    found
+        .warnings
+        .push(arrivals::warning(&at_stamps, even.rate_hz));
+    Ok(found)
+}
+
+impl Loaded {
+    fn at_stamps(&self) -> Ringing<'_> {
+        Ringing {
+            name: &self.name,
+            times_s: &self.times_s,
+            rate_hz: self.rate_hz,
+            values: &self.values,
+        }
+    }
+
+    fn at_even_times(&self) -> Ringing<'_> {
+        match &self.even {
+            Some(even) => Ringing {
+                times_s: &even.times_s,
+                rate_hz: Some(even.rate_hz),
+                ..self.at_stamps()
+            },
+            None => self.at_stamps(),
+        }
+    }
 }
 
 /// Reads one recording, without missing samples: the fit needs no uniform steps.
@@ -97,11 +144,13 @@ fn load(args: &Decay, input: &Path, recorded: &mut Recorded) -> Result<Loaded, F
     let clipped = Clipping::of(&chosen.samples)
         .map(|found| quality::clipped_ends(&chosen.name, &unit, &found, &chosen.axis));
     let clipped = clipped.unwrap_or_default();
+    let jitter = jitter(chosen, &args.reading);
+    let jitters = !jitter.is_empty();
     let warnings = [
         recording.all_warnings(),
         selection.warnings,
         clipped,
-        jitter(chosen, &args.reading),
+        jitter,
     ];
     let warnings = warnings.concat();
     recorded.warn(warnings, recording.lost.is_some());
@@ -112,6 +161,7 @@ fn load(args: &Decay, input: &Path, recorded: &mut Recorded) -> Result<Loaded, F
     recorded.add(input, values.len(), rate_hz.map(|hz| (hz, rate_std_hz)));
     Ok(Loaded {
         name: input.shown().to_string(),
+        even: jitters.then(|| EvenTimes::of(&times_s)).flatten(),
         times_s,
         rate_hz,
         values,
@@ -189,6 +239,7 @@ fn resampled(input: &Path, mut aligned: AlignedChannels, recorded: &mut Recorded
         rate_hz: Some(rate_hz),
         values: channel.samples,
         unit: channel.unit.map_or_else(String::new, |u| u.text),
+        even: None,
     }
 }
 

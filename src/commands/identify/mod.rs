@@ -1,5 +1,6 @@
 //! `identify`: constants of the stand from records, with uncertainties.
 
+mod arrivals;
 mod constants;
 mod decay;
 mod modes;

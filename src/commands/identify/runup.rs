@@ -118,6 +118,14 @@ fn effort_factor(args: &Runup, torque: &AlignedChannel, turning: bool) -> Result
             ErrorCode::MissingArgument,
             "a force on a rotating body needs a radius; give it with --radius",
         )),
+        (false, TORQUE, _) => Err(Failure::failed(
+            ErrorCode::UnitUnsuitable,
+            format_args!(
+                "channel \"{}\" is a torque, but \"{}\" moves along a line: name the force there, or the motion as an angle; \
+                 where a drive of known ratio lies between, give --torque-factor, such as \"50 N/(N m)\"",
+                torque.name, args.motion
+            ),
+        )),
         (_, other, _) => Err(Failure::failed(
             ErrorCode::UnitUnsuitable,
             format_args!(

@@ -119,6 +119,10 @@ fn points(
     let loads: Vec<f64> = loads.iter().map(|v| v * load_factor).collect();
     let series = numbers(recording, columns.series.as_ref())?.unwrap_or_else(|| series_of(&loads));
     let positions = numbers(recording, columns.position.as_ref())?;
+    let series = match &positions {
+        Some(positions) => at_mountings(&series, positions),
+        None => series,
+    };
     let stds = stds(args, columns, recording, (&unit, factor))?;
     let counts = [
         Some(readings.len()),
@@ -195,6 +199,20 @@ fn stds(
         )),
         None => Ok(Some(channel.samples.iter().map(|s| s * factor).collect())),
     }
+}
+
+/// Numbers of series that are told apart at each mounting as well: they may begin anew there.
+fn at_mountings(series: &[usize], positions: &[usize]) -> Vec<usize> {
+    let pairs: Vec<(usize, usize)> = positions
+        .iter()
+        .copied()
+        .zip(series.iter().copied())
+        .collect();
+    let mut known = pairs.clone();
+    known.sort_unstable();
+    known.dedup();
+    let number = |pair| known.partition_point(|of| of < pair);
+    pairs.iter().map(number).collect()
 }
 
 /// Values of a column, numbered by first appearance.

@@ -101,7 +101,7 @@ pub(super) fn leakage(result: &mut Identification, set: &Set, fitted: &Modal) {
     let length_s = 1.0 / set.step_hz;
     for pole in &fitted.poles {
         let wider = (std::f64::consts::TAU / (pole.rate_per_s * length_s)).powi(2) / 3.0;
-        if wider > WIDER {
+        if wider > WIDER && pole.rate_per_s > 0.0 {
             result.warn(
                 "leakage",
                 format!(

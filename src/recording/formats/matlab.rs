@@ -378,9 +378,11 @@ fn seconds(time: &Variable, reading: &Reading) -> Result<TimeAxis, Failure> {
     }
     let second = known.as_ref().map_or(1.0, |unit| unit.unit.factor());
     let mut axis = stamped(&time.name, time.values.iter().map(|t| t * second).collect());
-    if known.is_none() && reading.time_column.is_none() {
-        // As of a column of text whose heading says no unit.
-        axis.assumed = None;
+    if known.is_none() {
+        axis.assumed = Some(format!(
+            "\"{}\" gives no unit: seconds were assumed",
+            time.name
+        ));
     }
     axis.stamps_s = axis.stamps_s.map(|stamps| Arc::new(stamps.to_vec()));
     Ok(axis)
