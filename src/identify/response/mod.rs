@@ -72,6 +72,16 @@ pub struct ResponseOptions {
     pub grounded: bool,
 }
 
+impl ResponseOptions {
+    /// The same with a delay if a model has one.
+    fn with_delay_of(&self, modal: Option<&Modal>) -> Self {
+        Self {
+            with_delay: self.with_delay || modal.is_some_and(|modal| modal.delay_s != 0.0),
+            ..*self
+        }
+    }
+}
+
 /// Evaluates records of one stand.
 ///
 /// # Errors
@@ -92,19 +102,10 @@ pub fn identify(records: &[Driven], options: &ResponseOptions) -> Result<Identif
         true => Failure::failed(ErrorCode::UnsuitableRecord, check::LEADS),
         false => failure,
     })?;
-    let late = shift::of(&set, &lines, options, (&data, &coarse))?;
-    let options = &ResponseOptions {
-        with_delay: options.with_delay || late.is_some(),
-        ..*options
-    };
-    let (coarse, held_out) = match late {
-        Some(late) => {
-            shift::warn(&mut result, late.delay_s);
-            let held_out = order::of_given(&set, &lines, options, &late)?;
-            (late, held_out)
-        }
-        None => (coarse, held_out),
-    };
+    let is_asked = options.with_delay;
+    let late = shift::of((&set, &lines), options, (&data, &coarse), &mut result)?;
+    let options = &options.with_delay_of(late.as_ref());
+    let coarse = late.unwrap_or(coarse);
     let is_grounded = options.grounded && coarse.poles.len() > 1;
     let data = Data {
         with_delay: options.with_delay,
@@ -115,7 +116,9 @@ pub fn identify(records: &[Driven], options: &ResponseOptions) -> Result<Identif
         true => without_undamped(&set, &data, coarse, &mut result)?,
         false => coarse,
     };
-    let fitted = final_fit(whole, &set, &lines, &data, &coarse, &mut result)?;
+    let of = (&set, &lines);
+    let fitted = final_fit(whole, of, options, (&data, &coarse), &mut result)?;
+    let options = &options.with_delay_of(Some(&fitted.modal));
     if leads && check::is_out_of_reach(&set, &fitted.modal) {
         return Err(Failure::failed(ErrorCode::UnsuitableRecord, check::LEADS));
     }
@@ -131,7 +134,10 @@ pub fn identify(records: &[Driven], options: &ResponseOptions) -> Result<Identif
         unit: String::new(),
         relative: fitted.relative,
     });
-    result.held_out_errors = held_out;
+    result.held_out_errors = match fitted.modal.delay_s == 0.0 || is_asked {
+        true => held_out,
+        false => order::of_given(&set, &lines, options, &fitted.modal)?,
+    };
     present::method(&mut result, &set, &lines, options, &fitted.modal);
     present::other_constants(&mut result, &set, options, &fitted);
     present::spectra(&mut result, &set, &lines, &fitted.modal);
@@ -217,19 +223,26 @@ const ONE_HIT: &str = "one hit does not show the error of its own force (noise, 
 
 /// The final fit: of the whole records without a window where windows have leakage, or of the averaged response.
 fn final_fit(
-    whole: Option<whole::Whole>,
-    set: &Set,
-    lines: &Lines,
-    data: &Data,
-    coarse: &Modal,
+    mut whole: Option<whole::Whole>,
+    (set, lines): (&Set, &Lines),
+    options: &ResponseOptions,
+    (data, coarse): (&Data, &Modal),
     result: &mut Identification,
 ) -> Result<FinalFit, Failure> {
-    if let Some(fitted) = whole.and_then(|whole| whole.refine(data, coarse, set)) {
+    let refined = match &mut whole {
+        Some(whole) => shift::refined(whole, set, data, coarse)?.map(|fitted| (whole, fitted)),
+        None => None,
+    };
+    if let Some((whole, fitted)) = refined {
         result.method.push(
             "constants fitted to the whole records without a window; the transients of their ends are part of the model"
                 .to_owned(),
         );
-        return Ok(fitted);
+        let late = shift::of_whole(whole, set, options, (data, &fitted))?;
+        if let Some(late) = &late {
+            shift::warn(result, late.modal.delay_s);
+        }
+        return Ok(late.unwrap_or(fitted));
     }
     let mut modal = data.fit(&coarse.poles, Effort::Fine)?;
     check::leakage(result, set, &modal);

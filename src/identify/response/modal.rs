@@ -140,6 +140,15 @@ impl Data {
         linear::solve(&design, &right, None, false)
     }
 
+    /// The model with given poles and delay.
+    ///
+    /// # Errors
+    /// [`FitError`] if there are too few lines.
+    pub fn with(&self, poles: &[Pole], delay_s: f64) -> Result<Modal, FitError> {
+        let linear = self.solve(poles, delay_s)?.values;
+        Ok(self.modal_of(poles, (delay_s, None), &linear))
+    }
+
     /// Fits from starts of the poles.
     ///
     /// # Errors
@@ -425,6 +434,14 @@ impl Modal {
             p,
             Complex64::new(self.linear[2 * k], self.linear[2 * k + 1]),
         )
+    }
+
+    /// Phase of the strongest mode's residue, in rad, and its ω.
+    pub(super) fn strongest_turn(&self) -> Option<(f64, f64)> {
+        let size = |k: &usize| self.pole_and_residue(*k).1.norm() / self.poles[*k].rate_per_s;
+        let strongest = (0..self.poles.len()).max_by(|a, b| size(a).total_cmp(&size(b)))?;
+        let turn = self.pole_and_residue(strongest).1.arg();
+        Some((turn, self.poles[strongest].omega_rad_per_s))
     }
 
     /// Places of the modes of the stand, by rising frequency.

@@ -1,15 +1,26 @@
 //! Channels that are shifted in time against each other.
 
+use std::f64::consts::FRAC_PI_2;
+
 use super::blocks::Set;
 use super::lines::Lines;
 use super::order::grow;
-use super::{Data, Effort, Modal, ResponseOptions};
+use super::whole::Whole;
+use super::{Data, Effort, FinalFit, Modal, ResponseOptions};
 use crate::failure::Failure;
 use crate::identify::Identification;
 use crate::print::rounded;
 
 /// Most modes beside a delay that are tried.
 const MOST_MODES: usize = 3;
+/// Residual of whole records with a delay, over that without, up to which there is one.
+const CLEARLY_LESS: f64 = 0.97;
+/// Sine of the angle by which the strongest mode is turned, from which on a delay is looked for.
+const TURNED: f64 = 0.05;
+/// Angles of the strongest mode by which delays to be tried differ.
+const STEPS_RAD: [f64; 3] = [0.4, 0.1, 0.02];
+/// Residual with a delay that moves, over that with the best one, up to which it is the same fit.
+const AS_GOOD: f64 = 1.001;
 
 /// The fit with a delay, if that explains the response with fewer modes at least as well as `coarse` does without: a delay
 /// is no sum of modes, so that many of them stand for one.
@@ -17,10 +28,10 @@ const MOST_MODES: usize = 3;
 /// # Errors
 /// If there are too few lines.
 pub(super) fn of(
-    set: &Set,
-    lines: &Lines,
+    (set, lines): (&Set, &Lines),
     options: &ResponseOptions,
     (data, coarse): (&Data, &Modal),
+    result: &mut Identification,
 ) -> Result<Option<Modal>, Failure> {
     if data.with_delay || options.modes.is_some() {
         return Ok(None);
@@ -37,10 +48,156 @@ pub(super) fn of(
         };
         late = next;
         if set.error(&late.response, lines) <= enough {
+            warn(result, late.delay_s);
             return Ok(Some(late));
         }
     }
     Ok(None)
+}
+
+/// The fit of whole records with a delay, if that leaves clearly less than `fitted` without, or no more with fewer modes, and turns
+/// the strongest mode to where a torque puts it: `R = ∓j/(2 J ω_d)`.
+///
+/// # Errors
+/// If there are too few lines.
+pub(super) fn of_whole(
+    whole: &mut Whole,
+    set: &Set,
+    options: &ResponseOptions,
+    (data, fitted): (&Data, &FinalFit),
+) -> Result<Option<FinalFit>, Failure> {
+    if data.with_delay {
+        return Ok(None);
+    }
+    let data = Data {
+        with_delay: true,
+        ..data.clone()
+    };
+    let count = fitted.modal.poles.len();
+    let starts = with_fewer_modes(&data, count, options)?;
+    let found = starts.iter().find_map(|start| {
+        let found = whole.refine(&data, start, set)?;
+        (found.relative <= fitted.relative).then_some(found)
+    });
+    if found.is_some() {
+        return Ok(found);
+    }
+    if turned_by(&fitted.modal) < TURNED {
+        return Ok(None);
+    }
+    let found = best_delay(whole, set, &data, &fitted.modal)?;
+    let is_better = |found: &FinalFit| {
+        found.relative < CLEARLY_LESS * fitted.relative
+            && turned_by(&found.modal) < turned_by(&fitted.modal)
+    };
+    Ok(found.filter(is_better))
+}
+
+/// The fit of whole records from that of the averaged response; where delay and modes do not converge together, that with the
+/// best delay. `None` if none converges.
+///
+/// # Errors
+/// If there are too few lines.
+pub(super) fn refined(
+    whole: &mut Whole,
+    set: &Set,
+    data: &Data,
+    coarse: &Modal,
+) -> Result<Option<FinalFit>, Failure> {
+    match whole.refine(data, coarse, set) {
+        None if data.with_delay => best_delay(whole, set, data, coarse),
+        found => Ok(found),
+    }
+}
+
+/// The fit with the delay that leaves least. A delay and the phase of a mode look alike near the resonance, so that steps in both
+/// at once go astray: delays are tried first, and the parabola through three of them gives the next. Then both move together, if
+/// that converges.
+fn best_delay(
+    whole: &mut Whole,
+    set: &Set,
+    data: &Data,
+    modal: &Modal,
+) -> Result<Option<FinalFit>, Failure> {
+    let fixed = Data {
+        with_delay: false,
+        ..data.clone()
+    };
+    let mut best: Option<FinalFit> = None;
+    let mut try_one = |delay_s: f64, best: &mut Option<FinalFit>| -> Result<f64, Failure> {
+        let poles = best.as_ref().map_or(&modal.poles, |best| &best.modal.poles);
+        let Some(found) = whole.refine(&fixed, &fixed.with(poles, delay_s)?, set) else {
+            return Ok(f64::INFINITY);
+        };
+        let left = found.relative.powi(2);
+        if best
+            .as_ref()
+            .is_none_or(|best| found.relative < best.relative)
+        {
+            *best = Some(found);
+        }
+        Ok(left)
+    };
+    for delay_s in [modal.delay_s].into_iter().chain(delays_of(modal)) {
+        try_one(delay_s, &mut best)?;
+    }
+    let Some((_, omega)) = modal.strongest_turn() else {
+        return Ok(best);
+    };
+    for turn in STEPS_RAD {
+        let Some(middle) = &best else { break };
+        let (middle_s, middle, step_s) =
+            (middle.modal.delay_s, middle.relative.powi(2), turn / omega);
+        let before = try_one(middle_s - step_s, &mut best)?;
+        let after = try_one(middle_s + step_s, &mut best)?;
+        let bend = before - 2.0 * middle + after;
+        if bend > 0.0 && bend.is_finite() {
+            try_one(middle_s + 0.5 * step_s * (before - after) / bend, &mut best)?;
+        }
+    }
+    let Some(fixed) = best else { return Ok(None) };
+    let together = whole.refine(data, &fixed.modal, set);
+    let is_as_good = |found: &FinalFit| found.relative < AS_GOOD * fixed.relative;
+    Ok(Some(together.filter(is_as_good).unwrap_or(fixed)))
+}
+
+/// Fits with a delay and 1, 2, … modes, fewer than without.
+fn with_fewer_modes(
+    data: &Data,
+    count: usize,
+    options: &ResponseOptions,
+) -> Result<Vec<Modal>, Failure> {
+    let mut fits: Vec<Modal> = Vec::new();
+    let most = match options.modes {
+        Some(_) => 0,
+        None => MOST_MODES.min(count - 1),
+    };
+    for _ in 0..most {
+        let nothing = data.fit(&[], Effort::Coarse)?;
+        let Some(next) = grow(data, fits.last().unwrap_or(&nothing), options)? else {
+            break;
+        };
+        fits.push(next);
+    }
+    Ok(fits)
+}
+
+/// The delays that turn the strongest mode as a model has it, for a response of either sign.
+fn delays_of(modal: &Modal) -> Vec<f64> {
+    let Some((turn, omega)) = modal.strongest_turn() else {
+        return Vec::new();
+    };
+    let delay = |of: f64| {
+        let late = of - turn;
+        modal.delay_s + late.sin().atan2(late.cos()) / omega
+    };
+    [-FRAC_PI_2, FRAC_PI_2].map(delay).into()
+}
+
+/// Sine of the angle by which the strongest mode is turned.
+fn turned_by(modal: &Modal) -> f64 {
+    let turn = modal.strongest_turn();
+    turn.map_or(0.0, |(turn, _)| turn.cos().abs())
 }
 
 /// Says which channel is late.
@@ -53,7 +210,7 @@ pub(super) fn warn(result: &mut Identification, delay_s: f64) {
         "channels-shifted",
         format!(
             "the {which} channel is about {} ms late against the other: a delay was fitted, as with --delay, which explains \
-             what took more modes without; check that one recorder takes both channels, with the same filters",
+             more than modes alone; check that one recorder takes both channels, with the same filters",
             rounded(1e3 * delay_s.abs(), 3)
         ),
     );

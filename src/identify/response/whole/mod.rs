@@ -82,8 +82,9 @@ impl Whole {
 
     /// Fits them, starting from a fit of the averaged response; `None` if it does not converge or there are too few
     /// lines.
-    pub fn refine(self, shape: &Data, start: &Modal, set: &Set) -> Option<FinalFit> {
-        let Self { records: mut all } = self;
+    pub fn refine(&mut self, shape: &Data, start: &Modal, set: &Set) -> Option<FinalFit> {
+        let all = &mut self.records;
+        all.iter_mut().for_each(|spectra| spectra.weight.fill(1.0));
         let layout = Parameters::of(shape, start.poles.len());
         let enough = |s: &Spectra| s.omega.len() >= LEAST_LINES * layout.columns();
         if start.poles.is_empty() || !all.iter().all(enough) {
@@ -97,7 +98,7 @@ impl Whole {
             let parts = spectra.learn_noise(&layout, &state, record);
             before = before.max(spectra.before_resonance(&parts));
         }
-        let (state, solved) = descend(&layout, &all, state, LAST_STEP.1)?;
+        let (state, solved) = descend(&layout, all, state, LAST_STEP.1)?;
         let delay_s = (state.delay_s, solved.delay_std(&layout));
         let gain_error = largest_gain_error(before);
         let mut covariance = solved.covariance;
@@ -111,7 +112,7 @@ impl Whole {
         let covariance = Covariance::of(covariance);
         foreign::mark(&mut modal, &covariance, set);
         Some(FinalFit {
-            relative: residual_over_measured(&layout, &all, &state),
+            relative: residual_over_measured(&layout, all, &state),
             static_gain_std: super::static_gain_std(&modal, &covariance, layout.searched()),
             modal,
             linear: layout.searched(),
