@@ -754,6 +754,64 @@ fn a_channel_that_is_samples_late_leaves_the_gain_right() {
     }
 }
 
+/// A step has most of its power far below the resonance that it excites. The answer to its ramp is in closed form.
+#[test]
+fn one_step_shows_its_resonance() {
+    const GAIN: f64 = 0.08;
+    let (rate_hz, ratio, rise_s) = (20_000.0, 0.02_f64, 3e-4);
+    for (hz, seed) in [(70.0, 61), (590.0, 62)] {
+        let omega = TAU * hz;
+        let damped = omega * (1.0 - ratio * ratio).sqrt();
+        let ramp = |t: f64| match t > 0.0 {
+            true => {
+                let swing = 2.0 * ratio / omega * (damped * t).cos()
+                    + (2.0 * ratio * ratio - 1.0) / damped * (damped * t).sin();
+                t - 2.0 * ratio / omega + (-ratio * omega * t).exp() * swing
+            }
+            false => 0.0,
+        };
+        let mut noise = Noise(seed);
+        let row = |i: usize| {
+            let t = i as f64 / rate_hz - 0.1;
+            let torque = 10.0 * (t / rise_s).clamp(0.0, 1.0);
+            let shown = GAIN * 10.0 / rise_s * (ramp(t) - ramp(t - rise_s));
+            (
+                torque + 0.01 * noise.normal(),
+                shown + 0.003 * noise.normal(),
+            )
+        };
+        let folder = Folder::new();
+        let rows = table(["torque [N m]", "bridge [V]"], (0..20_000).map(row));
+        folder.write("in.csv", rows);
+        let verb = [
+            "identify", "response", "in.csv", "--rate", "20000", "--json",
+        ];
+        let args = [
+            &verb[..],
+            &[
+                "--applied",
+                "torque",
+                "--measured",
+                "bridge",
+                "--modes",
+                "1",
+            ],
+        ]
+        .concat();
+        let report = folder.json(&args);
+        for (name, right) in [
+            ("natural_frequency", hz),
+            ("damping_ratio", ratio),
+            ("static_gain", GAIN),
+        ] {
+            let (value, std, _) = parameter(&report, name);
+            let std = std.unwrap();
+            let is_right = (value - right).abs() < 4.0 * std && std < 0.02 * right;
+            assert!(is_right, "{hz} Hz, {name}: {value} ± {std}");
+        }
+    }
+}
+
 /// Noise of a tenth of the swing behind a decay that is over soon is no doubt about the decay.
 #[test]
 fn a_quiet_tail_makes_no_poor_fit() {

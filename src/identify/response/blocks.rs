@@ -23,6 +23,8 @@ pub(super) struct Set {
     /// Decay rate in 1/s that the window adds to every mode.
     pub added_rate: f64,
     pub window: Window,
+    /// Whether the spectra are those of differences from sample to sample, over what a difference does to a spectrum.
+    pub of_differences: bool,
 }
 
 impl Set {
@@ -35,6 +37,7 @@ impl Set {
             step_hz,
             added_rate: 0.0,
             window,
+            of_differences: false,
         }
     }
 
@@ -236,6 +239,7 @@ fn whole_transients(recorded: &[Driven], result: &mut Identification) -> Set {
         }
     }
     set.powers = Powers::of(set.blocks.iter(), 0..usize::MAX);
+    set.of_differences = true;
     result
         .method
         .push("each record taken as one transient, whatever its shape".to_owned());

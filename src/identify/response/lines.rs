@@ -1,6 +1,6 @@
 //! The lines of a response that are fitted, and their weights.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use torqcomp_dsp::frf::{Estimator, Powers};
 
@@ -15,7 +15,8 @@ pub(super) type Lines = std::ops::Range<usize>;
 /// Power of an excited line, over that of the strongest.
 const EXCITES: f64 = 1e-3;
 
-/// The given band, or the excited lines.
+/// The given band, or the excited lines. A step has most of its power at its lowest lines, whatever it excites: of transients, that
+/// of their differences counts, and as many lines as can be fitted.
 pub(super) fn band(set: &Set, options: &ResponseOptions) -> Result<Lines, Failure> {
     let lines = set.blocks[0].applied.len();
     let frf = set.powers.response(Estimator::H1);
@@ -25,14 +26,21 @@ pub(super) fn band(set: &Set, options: &ResponseOptions) -> Result<Lines, Failur
             (to / set.step_hz).floor() as usize + 1,
         ),
         None => {
-            let top = frf.applied_power[1..]
-                .iter()
-                .fold(0.0_f64, |m, p| m.max(*p));
-            let on = |k: &usize| frf.applied_power[*k] > EXCITES * top;
-            (
-                (1..lines).find(on).unwrap_or(1),
-                (1..lines).rev().find(on).unwrap_or(1) + 1,
-            )
+            let turn = PI / (lines - 1) as f64;
+            let difference = |k: usize| 2.0 * (1.0 - (turn * k as f64).cos());
+            let power = |k: usize| match set.of_differences {
+                true => frf.applied_power[k] * difference(k),
+                false => frf.applied_power[k],
+            };
+            let top = (1..lines).map(power).fold(0.0, f64::max);
+            let on = |k: &usize| power(*k) > EXCITES * top;
+            let first = (1..lines).find(on).unwrap_or(1);
+            let last = (1..lines).rev().find(on).unwrap_or(1);
+            let excited = first..(last + 1).min(lines - 1);
+            match set.of_differences && excited.len() > MOST_LINES {
+                true => strongest(set, &excited),
+                false => (excited.start, excited.end),
+            }
         }
     };
     let range = from.max(1)..to.min(lines - 1);
@@ -55,8 +63,8 @@ pub(super) const MOST_LINES: usize = 6000;
 /// Lines of the band that is suggested: fewer than are fitted, as its limits are rounded.
 const SUGGESTED: usize = 5800;
 
-/// The band of [`SUGGESTED`] lines in which the measured signal has most power, in Hz.
-pub(super) fn strongest(set: &Set, lines: &Lines) -> (f64, f64) {
+/// The band of [`SUGGESTED`] lines in which the measured signal has most power.
+pub(super) fn strongest(set: &Set, lines: &Lines) -> (usize, usize) {
     let power = |k: usize| -> f64 { set.blocks.iter().map(|b| b.measured[k].norm_sqr()).sum() };
     let powers: Vec<f64> = lines.clone().map(power).collect();
     let mut sum: f64 = powers[..SUGGESTED].iter().sum();
@@ -68,8 +76,7 @@ pub(super) fn strongest(set: &Set, lines: &Lines) -> (f64, f64) {
         }
     }
     let first = lines.start + best.1;
-    let hz = |line: usize| line as f64 * set.step_hz;
-    (hz(first), hz(first + SUGGESTED))
+    (first, first + SUGGESTED)
 }
 
 /// H1, each line weighted with the root of its applied power.

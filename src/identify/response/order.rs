@@ -56,15 +56,15 @@ pub(super) fn order(
 ) -> Result<(Modal, Vec<f64>), Failure> {
     let folds = folds(set);
     if lines.len() > MOST_LINES {
-        let (from_hz, to_hz) = lines::strongest(set, lines);
+        let (from, to) = lines::strongest(set, lines);
         return Err(Failure::failed(
             ErrorCode::TooManySamples,
             format_args!(
                 "{} lines in the band, more than {MOST_LINES}; narrow it to where the response is strongest: \
              --band {}..{}",
                 lines.len(),
-                rounded(from_hz, 4),
-                rounded(to_hz, 4)
+                rounded(from as f64 * set.step_hz, 4),
+                rounded(to as f64 * set.step_hz, 4)
             ),
         ));
     }
