@@ -518,4 +518,11 @@ fn milliseconds_beside_a_clock_of_seconds_are_their_parts() {
     folder
         .run(&COMPENSATE)
         .says(0, &["12000 samples at 5000 Hz"]);
+    // At the rate of a PLC they begin anew so rarely that they seem to rise.
+    let row = |i: usize| format!("10:11:{:02},{},{:.4}\n", 12 + i / 1000, i % 1000, torque(i));
+    let rows: String = (0..3000).map(row).collect();
+    folder.write("in.csv", format!("Time,ms,Torque [Nm]\n{rows}"));
+    folder
+        .run(&[&COMPENSATE[..], &["--force"]].concat())
+        .says(0, &["3000 samples at 1000 Hz"]);
 }

@@ -171,6 +171,18 @@ fn decimal_commas_between_commas_are_asked_about() {
             folder.run(&[&COMPENSATE[..], more].concat()).says(1, &asks);
         }
     }
+    // One column says which of two options it is read by.
+    let single: String = (0..2000)
+        .map(|i| comma(format!("{:.5}\n", torque(i))))
+        .collect();
+    folder.write("single.csv", format!("M1\nNm\n{single}"));
+    let inspect = ["inspect", "single.csv"];
+    folder
+        .run(&inspect)
+        .says(1, &["--decimal ,", "--delimiter ,"]);
+    folder
+        .run(&[&inspect[..], &["--decimal", ","]].concat())
+        .says(0, &[]);
     // Whole numbers under as many headings are whole numbers.
     let counts: String = (0..2000)
         .map(|i| format!("{i},{},{},{}\n", i % 7, i % 10, i % 100))

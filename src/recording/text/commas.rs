@@ -39,6 +39,16 @@ pub(super) fn refuse(head: &Head, table: &Table) -> Result<(), Failure> {
         return Ok(());
     }
     let shown: String = lines[0].trim().chars().take(SHOWN).collect();
+    if pairs == 1 {
+        return Err(Failure::failed(
+            ErrorCode::TextUnclear,
+            format_args!(
+                "is \"{shown}\" one number with a decimal comma, or two whole numbers? Say so with --decimal , or with \
+                 --delimiter ,"
+            ),
+        )
+        .line(head.number(table.first)));
+    }
     Err(Failure::failed(
         ErrorCode::TextUnclear,
         format_args!(

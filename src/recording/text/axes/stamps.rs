@@ -176,7 +176,7 @@ impl Sources<'_> {
                 let is_one = || seconds.iter().all(|second| *second == seconds[0]);
                 !self.is_clock(*p)
                     && values.iter().all(|v| (0.0..1000.0).contains(v))
-                    && (!rises(values) || is_named() && is_one())
+                    && (!rises(values) || begin_anew(values, seconds) || is_named() && is_one())
             })
             .map(|place| Parts {
                 place,
@@ -429,6 +429,13 @@ fn are_days(values: &[f64]) -> bool {
     let ends = [values.first(), values.last()];
     ends.iter().flatten().all(|value| is_date(value))
         && typical_step(values).is_some_and(|step| step < 2e-5)
+}
+
+/// Whether parts fall, and only where the seconds go on.
+fn begin_anew(parts: &[f64], seconds: &[f64]) -> bool {
+    let pairs = parts.windows(2).zip(seconds.windows(2));
+    let mut falls = pairs.filter(|(part, _)| part[1] < part[0]).peekable();
+    falls.peek().is_some() && falls.all(|(_, second)| second[1] > second[0])
 }
 
 fn rises(values: &[f64]) -> bool {
