@@ -32,6 +32,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["band-lost-in-noise", "part of the band does not rise above the record's noise, which the compensation multiplies there", "choose a lower --band"],
         ["components-lost-in-noise", "components do not exceed twice their own uncertainty", "average over a longer record, or take them as zero"],
         ["direction-unknown", "the speed is not significantly different from zero over part of the record, where a friction depends on its sign", "take the torque there as known to the size of the friction only"],
+        ["ends-felt-far", "an effect such as structural damping has no end in time, so that the ends of the record are felt far into it", "leave out more at both ends, or record from rest to rest"],
         ["empty-plot", "no sample lies within --plot-range", "choose a range within the record"],
         ["fundamental-off", "another fundamental near the given one fits the record better", "add --refine"],
         ["lines-decide-band", "the band reaches as far as it does only because of a few narrow lines, which may be picked up", "give the --band that is named if they are no torque"],

@@ -169,3 +169,24 @@ fn a_torque_far_off_the_rated_one_is_warned_about() {
     assert_eq!(below("2000 V"), [true, true]);
     assert_eq!(below("400 V"), [false, false]);
 }
+
+/// A loss in the material is part of the gain that is stated, `|1 − s² + j (2 ζ s + η)|`, and so is that its ends are felt far.
+#[test]
+fn a_loss_in_the_material_is_part_of_the_gain() {
+    let effect = "[[effects]]\nkind = \"structural-damping\"\nloss_factor = 0.05\n";
+    let folder = folder("T [N m]", effect);
+    let args = [&COMPENSATE[..], &["--band", "600", "--json", "--force"]].concat();
+    let report = folder.json(&args);
+    let points = report["noise"]["gain"].as_array().unwrap();
+    assert!(points.len() > 2);
+    for point in points {
+        let s = point["frequency_hz"].as_f64().unwrap() / 590.0;
+        let loss = if s > 0.0 { 0.05 } else { 0.0 };
+        let gain = (1.0 - s * s).hypot(2.0 * 0.02 * s + loss);
+        assert_close(point["gain"].as_f64().unwrap(), gain, 1e-6);
+    }
+    assert!(
+        report["warnings"].to_string().contains("ends-felt-far"),
+        "{report}"
+    );
+}

@@ -188,6 +188,7 @@ impl Plan {
     /// The report as far as it is known before the run.
     fn describe(&self, args: &cli::Compensate, output: &str) -> CompensateReport {
         let (stream, chain, band) = (&self.stream, &self.chain, self.filter.band());
+        let edge_s = self.filter.half_length() as f64 / band.sample_rate_hz();
         CompensateReport {
             input: stream.source.clone(),
             dialect: stream.dialect.clone(),
@@ -219,12 +220,13 @@ impl Plan {
             band: self.band.clone(),
             band_hz: band.top_hz(),
             band_end_hz: band.end_hz(),
-            edge_s: self.filter.half_length() as f64 / band.sample_rate_hz(),
+            edge_s,
             noise: self.noise(),
             warnings: [
                 self.stand.warnings.as_slice(),
                 &chain.warnings,
                 warnings::of_ringing(&self.stand, self.stream.rate_hz).as_slice(),
+                warnings::of_ends(self.undo.as_ref(), edge_s).as_slice(),
             ]
             .concat(),
             ..CompensateReport::default()
@@ -240,7 +242,11 @@ impl Plan {
     }
 
     fn noise(&self) -> NoiseReport {
-        let gain = NoiseGain::of(&self.filter, GAIN_POINTS);
+        let beside = |frequency_hz: f64| {
+            let undo = self.undo.as_ref();
+            undo.map_or(1.0, |undo| undo.gain_beside_filter(frequency_hz))
+        };
+        let gain = NoiseGain::of(&self.filter, beside, GAIN_POINTS);
         let at = |&(frequency_hz, gain): &(f64, f64)| {
             let std = self.std(frequency_hz);
             NoiseAt {

@@ -107,6 +107,24 @@ impl ChainInverse {
         &self.filter
     }
 
+    /// Gain of the way back, over that of the filter, by the factors whose inverse has no end in time; what they block stays.
+    pub(crate) fn gain_beside_filter(&self, frequency_hz: f64) -> f64 {
+        let endless = |link: &Link| self.is_endless(link);
+        1.0 / self.chain.response_of(frequency_hz, endless).norm()
+    }
+
+    /// Whether what is before a record and behind it is felt all through when a factor is divided out.
+    fn is_endless(&self, link: &Link) -> bool {
+        let stand = &self.chain.stand;
+        !link.dies_out(stand) && !link.blocks_constants(stand)
+    }
+
+    /// The first effect of which that is so.
+    pub(crate) fn endless(&self) -> Option<&'static str> {
+        let link = self.links().iter().find(|link| self.is_endless(link));
+        link.map(|link| link.effect)
+    }
+
     /// The links, in the order from torque to record.
     pub(crate) fn links(&self) -> &[Link] {
         self.chain.links()

@@ -31,7 +31,8 @@ pub struct NoiseGain {
 }
 
 impl NoiseGain {
-    /// Noise gain of a filter, its curve at `points` frequencies (at least 2).
+    /// Noise gain of a filter and of a real factor over frequency beside it (`|_| 1.0` if there is none), the curve at `points`
+    /// frequencies (at least 2).
     ///
     /// ```
     /// use std::sync::Arc;
@@ -41,22 +42,31 @@ impl NoiseGain {
     /// // A gain of 3 over 2000 Hz, with an edge of 400 Hz, of a band of 10 kHz: about 3 √0.22.
     /// let band = Band::new(20_000.0, 2000.0)?;
     /// let filter = InverseFilter::design(Arc::new(|_| Complex64::new(3.0, 0.0)), band)?;
-    /// let noise = NoiseGain::of(&filter, 5);
+    /// let noise = NoiseGain::of(&filter, |_| 1.0, 5);
     /// assert!((noise.white / (3.0 * 0.22_f64.sqrt()) - 1.0).abs() < 0.02);
     /// assert_eq!(noise.curve[4], (2000.0, 3.0));
+    /// // Half of that behind a factor of a half.
+    /// let half = NoiseGain::of(&filter, |_| 0.5, 5);
+    /// assert!((half.white / (1.5 * 0.22_f64.sqrt()) - 1.0).abs() < 0.02);
+    /// assert_eq!(half.curve[4], (2000.0, 1.5));
     /// # Ok::<(), torqcomp_dsp::Error>(())
     /// ```
     #[must_use]
-    pub fn of(filter: &InverseFilter, points: usize) -> Self {
+    pub fn of(filter: &InverseFilter, beside: impl Fn(f64) -> f64, points: usize) -> Self {
         let band = filter.band();
-        let gain = |frequency_hz: f64| filter.response(frequency_hz).norm();
+        let alone = |frequency_hz: f64| filter.response(frequency_hz).norm();
+        let gain = |frequency_hz: f64| alone(frequency_hz) * beside(frequency_hz);
         let grid =
             |count: usize, end: f64| (0..count).map(move |i| end * i as f64 / (count - 1) as f64);
         let largest = grid(4097, band.end_hz())
             .map(|f| (gain(f), f))
             .fold((0.0, 0.0), |a, b| if b.0 > a.0 { b } else { a });
+        let power = |of: &dyn Fn(f64) -> f64| -> f64 {
+            grid(4097, band.end_hz()).map(|f| of(f).powi(2)).sum()
+        };
+        let of_filter = filter.taps().iter().map(|g| g * g).sum::<f64>();
         Self {
-            white: filter.taps().iter().map(|g| g * g).sum::<f64>().sqrt(),
+            white: (of_filter * power(&gain) / power(&alone)).sqrt(),
             largest,
             curve: grid(points.max(2), band.top_hz())
                 .map(|f| (f, gain(f)))
@@ -228,7 +238,7 @@ mod tests {
         let out = whole_record(&filter, &noise).unwrap();
         // 200 000 samples in a band of a quarter of the rate fix an rms to about half a per cent.
         let measured = rms(&out[1000..199_000]);
-        let gain = NoiseGain::of(&filter, 2);
+        let gain = NoiseGain::of(&filter, |_| 1.0, 2);
         assert!(
             (gain.white * 0.3 / measured - 1.0).abs() < 0.03,
             "{} {measured}",

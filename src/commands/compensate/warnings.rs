@@ -8,6 +8,7 @@ use torqcomp_model::Mode;
 use super::Seen;
 use super::plot::Traces;
 use super::report::CompensateReport;
+use crate::inverse::ChainInverse;
 use crate::print::{plural, rounded, short};
 use crate::quality::excerpt;
 use crate::stand::{Stand, off_rated};
@@ -74,6 +75,19 @@ pub(super) fn of_ringing(stand: &Stand, rate_hz: f64) -> Option<Warning> {
             ),
         )
     })
+}
+
+/// A warning if the ends of a record are felt beyond those that the filter has.
+pub(super) fn of_ends(undo: Option<&ChainInverse>, edge_s: f64) -> Option<Warning> {
+    let effect = undo?.endless()?;
+    Some(Warning::new(
+        "ends-felt-far",
+        format!(
+            "dividing out \"{effect}\" has no end in time: what was before the record and behind it is felt beyond the first and last \
+             {} s, less only in proportion to the distance; leave out more at both ends, or record from rest to rest",
+            rounded(edge_s, 3)
+        ),
+    ))
 }
 
 /// Natural frequency in Hz and damping ratio of a stand's modes.
