@@ -80,7 +80,7 @@ pub(super) const MOST_STARTS: usize = 8;
 /// effect is corrected in part only, as long as the effect's size is wrong for it.
 pub(super) const START_SETTLED: f64 = 0.01;
 
-/// Fits a model from start values.
+/// Fits a model from start values, or from the bounds of those beyond them.
 ///
 /// # Errors
 /// If the model cannot be evaluated at the start.
@@ -91,6 +91,7 @@ pub fn fit(
     effort: FitEffort,
 ) -> Result<FittedModel, FitError> {
     let mut records = records.to_vec();
+    let start = &inside(&structure, start)[..];
     let start_model = structure.model(start).0;
     let mut free = start_model.free_mode();
     // Where the motion is integrated, its start is corrected instead.
@@ -178,6 +179,13 @@ fn minimize(
         *structure = structure.clone().with_modes(modes);
     }
     Ok((found, modes_move))
+}
+
+/// Values within the bounds of a structure: what may be of either sign in one form of an effect need not be in another.
+fn inside(structure: &Structure, values: &[f64]) -> Vec<f64> {
+    let both = values.iter().zip(structure.bounds());
+    both.map(|(value, [lower, upper])| value.clamp(lower, upper))
+        .collect()
 }
 
 /// The structure's parameters.
