@@ -29,6 +29,15 @@ const CLOSE: [f64; 2] = [0.01, 0.05];
 pub const REVERSED: &str =
     "the time stamps fall from row to row; sort the rows by time, the earliest first";
 
+/// What is assumed of stamps in a column or vector, of whose unit the file says nothing, or nothing of use.
+pub fn seconds_assumed(name: &str, unit: Option<&str>) -> String {
+    let says = match unit {
+        Some(unit) => format!("gives the unit \"{unit}\", which is none of time"),
+        None => "gives no unit".to_owned(),
+    };
+    format!("\"{name}\" {says}: seconds were assumed")
+}
+
 /// Whether stamps fall all the way.
 pub fn falls(stamps: &[f64]) -> bool {
     stamps.len() > 2 && stamps.windows(2).all(|pair| pair[1] < pair[0])

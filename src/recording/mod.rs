@@ -40,7 +40,7 @@ use crate::warning::Warning;
 pub(crate) use aligned::{AlignedChannel, AlignedChannels, resampled};
 pub use all_samples::AllSamples;
 pub(crate) use axis::without_rounding;
-pub use axis::{REVERSED, RateFrom, TimeAxis, falls, typical_step};
+pub use axis::{REVERSED, RateFrom, TimeAxis, falls, seconds_assumed, typical_step};
 pub(crate) use block::Block;
 pub(crate) use choice::{Selection, contradicted, unit_of};
 pub use fill::FilledSpan;

@@ -54,22 +54,26 @@ impl NoiseGain {
     #[must_use]
     pub fn of(filter: &InverseFilter, beside: impl Fn(f64) -> f64, points: usize) -> Self {
         let band = filter.band();
-        let alone = |frequency_hz: f64| filter.response(frequency_hz).norm();
-        let gain = |frequency_hz: f64| alone(frequency_hz) * beside(frequency_hz);
+        let gains = |frequency_hz: f64| {
+            let alone = filter.response(frequency_hz).norm();
+            [alone, alone * beside(frequency_hz)]
+        };
         let grid =
             |count: usize, end: f64| (0..count).map(move |i| end * i as f64 / (count - 1) as f64);
-        let largest = grid(4097, band.end_hz())
-            .map(|f| (gain(f), f))
-            .fold((0.0, 0.0), |a, b| if b.0 > a.0 { b } else { a });
-        let power = |of: &dyn Fn(f64) -> f64| -> f64 {
-            grid(4097, band.end_hz()).map(|f| of(f).powi(2)).sum()
-        };
+        let (mut largest, mut powers) = ((0.0, 0.0), [0.0; 2]);
+        for frequency_hz in grid(4097, band.end_hz()) {
+            let [alone, both] = gains(frequency_hz);
+            powers = [powers[0] + alone.powi(2), powers[1] + both.powi(2)];
+            if both > largest.0 {
+                largest = (both, frequency_hz);
+            }
+        }
         let of_filter = filter.taps().iter().map(|g| g * g).sum::<f64>();
         Self {
-            white: (of_filter * power(&gain) / power(&alone)).sqrt(),
+            white: (of_filter * powers[1] / powers[0]).sqrt(),
             largest,
             curve: grid(points.max(2), band.top_hz())
-                .map(|f| (f, gain(f)))
+                .map(|f| (f, gains(f)[1]))
                 .collect(),
         }
     }

@@ -41,12 +41,8 @@ pub(super) fn of(
         ..data.clone()
     };
     let enough = set.error(&coarse.response, lines);
-    let mut late = data.fit(&[], Effort::Coarse)?;
-    for _ in 1..coarse.poles.len().min(MOST_MODES + 1) {
-        let Some(next) = grow(&data, &late, options)? else {
-            break;
-        };
-        late = next;
+    for late in with_fewer_modes(&data, coarse.poles.len(), options) {
+        let late = late?;
         if set.error(&late.response, lines) <= enough {
             warn(result, late.delay_s);
             return Ok(Some(late));
@@ -73,14 +69,15 @@ pub(super) fn of_whole(
         with_delay: true,
         ..data.clone()
     };
-    let count = fitted.modal.poles.len();
-    let starts = with_fewer_modes(&data, count, options)?;
-    let found = starts.iter().find_map(|start| {
-        let found = whole.refine(&data, start, set)?;
-        (found.relative <= fitted.relative).then_some(found)
-    });
-    if found.is_some() {
-        return Ok(found);
+    let most = match options.modes {
+        Some(_) => 0,
+        None => fitted.modal.poles.len(),
+    };
+    for start in with_fewer_modes(&data, most, options) {
+        let found = whole.refine(&data, &start?, set);
+        if let Some(found) = found.filter(|found| found.relative <= fitted.relative) {
+            return Ok(Some(found));
+        }
     }
     if turned_by(&fitted.modal) < TURNED {
         return Ok(None);
@@ -161,25 +158,23 @@ fn best_delay(
     Ok(Some(together.filter(is_as_good).unwrap_or(fixed)))
 }
 
-/// Fits with a delay and 1, 2, … modes, fewer than without.
+/// Fits with a delay and 1, 2, … modes, fewer than so many, each from the one before.
 fn with_fewer_modes(
     data: &Data,
     count: usize,
     options: &ResponseOptions,
-) -> Result<Vec<Modal>, Failure> {
-    let mut fits: Vec<Modal> = Vec::new();
-    let most = match options.modes {
-        Some(_) => 0,
-        None => MOST_MODES.min(count - 1),
+) -> impl Iterator<Item = Result<Modal, Failure>> {
+    let next = |last: Option<&Modal>| match last {
+        Some(last) => grow(data, last, options),
+        None => grow(data, &data.fit(&[], Effort::Coarse)?, options),
     };
-    for _ in 0..most {
-        let nothing = data.fit(&[], Effort::Coarse)?;
-        let Some(next) = grow(data, fits.last().unwrap_or(&nothing), options)? else {
-            break;
-        };
-        fits.push(next);
-    }
-    Ok(fits)
+    let mut last: Option<Modal> = None;
+    let most = MOST_MODES.min(count.saturating_sub(1));
+    (0..most).map_while(move |_| {
+        let found = next(last.as_ref()).transpose()?;
+        last = found.as_ref().ok().cloned();
+        Some(found)
+    })
 }
 
 /// The delays that turn the strongest mode as a model has it, for a response of either sign.

@@ -2,7 +2,6 @@
 //! axis, and a number named as a rate or a step their rate (MAT-File Format, MathWorks).
 
 use std::io::Cursor;
-use std::sync::Arc;
 
 use super::bytes::{Bytes, Number, Order};
 use super::{
@@ -10,7 +9,7 @@ use super::{
 };
 use crate::failure::{ErrorCode, Failure};
 use crate::io::{Reading, digits};
-use crate::recording::TimeAxis;
+use crate::recording::{TimeAxis, seconds_assumed};
 use crate::unit::NamedUnit;
 
 pub(super) const MATLAB: Format = Format {
@@ -379,11 +378,7 @@ fn seconds(time: &Variable, reading: &Reading) -> Result<TimeAxis, Failure> {
     let second = known.as_ref().map_or(1.0, |unit| unit.unit.factor());
     let mut axis = stamped(&time.name, time.values.iter().map(|t| t * second).collect());
     if known.is_none() {
-        axis.assumed = Some(format!(
-            "\"{}\" gives no unit: seconds were assumed",
-            time.name
-        ));
+        axis.assumed = Some(seconds_assumed(&time.name, None));
     }
-    axis.stamps_s = axis.stamps_s.map(|stamps| Arc::new(stamps.to_vec()));
     Ok(axis)
 }

@@ -6,7 +6,7 @@ use crate::failure::{ErrorCode, Failure};
 use crate::recording::text::clock::{Clock, unwrap_midnights};
 use crate::recording::text::rows::{Column, ColumnKind};
 use crate::recording::text::units;
-use crate::recording::typical_step;
+use crate::recording::{seconds_assumed, typical_step};
 use crate::unit::NamedUnit;
 use torqcomp_model::Unit;
 
@@ -348,11 +348,7 @@ impl Sources<'_> {
         if let Some(unit) = self.default_time_unit.and_then(units::read) {
             return (unit.unit.factor(), None);
         }
-        let says = match &field.unit_text {
-            Some(unit) => format!("gives the unit \"{unit}\", which is none of time"),
-            None => "gives no unit".to_owned(),
-        };
-        let assumed = format!("\"{}\" {says}: seconds were assumed", field.heading);
+        let assumed = seconds_assumed(&field.heading, field.unit_text.as_deref());
         (1.0, Some(assumed))
     }
 }
