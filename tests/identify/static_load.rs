@@ -161,6 +161,36 @@ fn the_last_digit_of_a_display_is_part_of_the_uncertainty() {
     assert!((value - 1.0 / 0.0488).abs() < 2.0 * std.unwrap(), "{value}");
 }
 
+/// Noise of 200 digits over six rows, which can look like a walk of the zero without noise: the digit, which is the
+/// noise of the reading at least, may not enlarge the walk.
+#[test]
+fn the_last_digit_enlarges_no_drift() {
+    let units = LoadUnits {
+        load: "N m".to_owned(),
+        reading: "V".to_owned(),
+    };
+    let mut noise = Noise(8);
+    // 0.2 mV over the root of Σ(x − x̄)² = 70 N² m².
+    let plain = 2e-4 / 70.0_f64.sqrt();
+    for _ in 0..100 {
+        let point = |k: usize| {
+            let load = 2.0 * k as f64;
+            let reading = 0.01 + 0.1 * load + 2e-4 * noise.normal();
+            Point {
+                load,
+                reading: (reading * 1e6).round() / 1e6,
+                std: None,
+                series: 0,
+                position: 0,
+            }
+        };
+        let points: Vec<Point> = (0..6).map(point).collect();
+        let found = identify(&points, 1, &units).unwrap();
+        let std = of(&found, "sensitivity").std().unwrap();
+        assert!(std < 10.0 * plain, "{std} is much more than {plain}");
+    }
+}
+
 /// 0.05 mV from row to row, beside 8 mV at the largest load; without it, nothing is said.
 #[test]
 fn a_zero_that_drifts_is_said() {

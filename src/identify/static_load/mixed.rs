@@ -251,17 +251,20 @@ impl Mixed {
         Some(solved.variance * self.freedom() as f64)
     }
 
-    fn fit(&self, degree: usize, ratios: VarianceRatios) -> Result<LoadCurve, FitError> {
+    fn fit(&self, degree: usize, mut ratios: VarianceRatios) -> Result<LoadCurve, FitError> {
         let singular = || FitError::Model("the loads do not determine the curve".to_owned());
-        let solved = self.solve(ratios).ok_or_else(singular)?;
-        let (digit, rounding) = match resolution(&self.readings) {
-            Some(digit) if !self.is_known => (digit, digit * digit / 12.0),
-            _ => (0.0, 0.0),
-        };
-        let scale = match self.is_known {
-            true => 1.0,
-            false => solved.variance.max(rounding),
-        };
+        let mut solved = self.solve(ratios).ok_or_else(singular)?;
+        let mut scale = if self.is_known { 1.0 } else { solved.variance };
+        let mut shown = 0.0;
+        if let Some(digit) = resolution(&self.readings).filter(|_| !self.is_known) {
+            let rounding = digit * digit / 12.0;
+            if scale < rounding {
+                // Of the reading alone; the other variances keep their sizes.
+                ratios = ratios.map(|ratio| ratio * scale / rounding);
+                solved = self.solve(ratios).ok_or_else(singular)?;
+                (scale, shown) = (rounding, digit);
+            }
+        }
         let spread = |ratio: f64| (ratio * scale).sqrt();
         let std = |k: usize| -> Option<f64> {
             if self.freedom() == 0 && !self.is_known {
@@ -274,11 +277,7 @@ impl Mixed {
             values: solved.values.as_slice()[..=degree].to_vec(),
             std: (0..=degree).map(std).collect(),
             degrees_of_freedom: self.readings.len().saturating_sub(degree + 1),
-            resolution: if solved.variance < rounding {
-                digit
-            } else {
-                0.0
-            },
+            resolution: shown,
             spreads: Spreads {
                 drift: spread(ratios[0]),
                 zero: spread(ratios[1]),
