@@ -11,7 +11,8 @@ use crate::blind::plain_fit::{PlainConstants, fit};
 use crate::blind::setting::setting;
 use crate::blind::sizing::{noise_free, scene};
 use crate::blind::{catalogue, declared, plant};
-use crate::util::{Folder, HERTEL, column};
+use crate::noise::Noise;
+use crate::util::{Folder, HERTEL, column, sampled};
 
 /// Samples of a record of the round trip.
 const COUNT: usize = 12_000;
@@ -344,4 +345,69 @@ fn the_torque_improves_as_the_model_does() {
         }
     }
     assert!(wrong.is_empty(), "{wrong:?}");
+}
+
+/// Record at 50 kHz of a stand with dry friction of 0.3 N m under lines of some 2 N m, 10 N m/V, and the torque: speeds by
+/// steps of 1 µs, where friction stops the body within a step.
+fn sticking() -> (Vec<f64>, Vec<f64>) {
+    let (omega, damping_ratio, friction, step_s) = (TAU * 590.0, 0.02, 0.3, 1e-6);
+    let lines = [
+        (30.0, 0.5),
+        (60.0, 1.0),
+        (120.0, 1.0),
+        (180.0, 0.5),
+        (300.0, 0.3),
+    ];
+    let mut noise = Noise(7);
+    let (mut x, mut speed) = (0.0, 0.0_f64);
+    let (mut record, mut torque) = (Vec::new(), Vec::new());
+    for k in 0..500_000 {
+        let phase = |hz: f64| TAU * hz * f64::from(k) * step_s + hz;
+        let applied: f64 = lines.iter().map(|(hz, a)| a * phase(*hz).sin()).sum();
+        if k >= 100_000 && k % 20 == 0 {
+            record.push(x / 10.0 + 1e-5 * noise.normal());
+            torque.push(applied);
+        }
+        let free = omega * omega * (applied - x) - 2.0 * damping_ratio * omega * speed;
+        let moved = speed + step_s * free;
+        let stopped = moved.abs() - step_s * omega * omega * friction;
+        speed = moved.signum() * stopped.max(0.0);
+        x += step_s * speed;
+    }
+    (record, torque)
+}
+
+/// Where the body rests, dry friction takes any value up to its size: however narrow the band, this is said, with what it
+/// leaves uncertain.
+#[test]
+fn friction_at_rest_is_uncertain_by_its_size() {
+    let (record, torque) = sticking();
+    let folder = Folder::new();
+    folder.write(
+        "record.csv",
+        sampled("volts (V)", 50_000.0, record.len(), |k| record[k]),
+    );
+    folder.write(
+        "stand.toml",
+        "schema = \"torqcomp.stand/1\"\n[mechanics]\nnatural_frequency = \"590 Hz\"\ndamping_ratio = 0.02\n\
+         [calibration]\ntorque_per_volt = \"10 N m/V\"\n[[effects]]\nkind = \"coulomb-friction\"\ntorque = \"0.3 N m\"\n",
+    );
+    for band in ["900", "2500", "6000"] {
+        let args = "compensate record.csv --stand stand.toml -o out.csv --force --json --band";
+        let args: Vec<&str> = args.split(' ').chain([band]).collect();
+        let report = folder.json(&args);
+        let warnings = report["warnings"].as_array().unwrap().iter();
+        let text = warnings
+            .filter(|w| w["code"] == "direction-unknown")
+            .map(|w| w["message"].as_str().unwrap())
+            .next()
+            .unwrap_or_else(|| panic!("{band} Hz: {report}"));
+        let said: f64 = text.split(' ').rev().nth(6).unwrap().parse().unwrap();
+        let found = column(&folder.read("out.csv"), "compensated_torque_n_m");
+        let error = rms((4000..16_000).map(|k| found[k] - torque[k]));
+        assert!(
+            (0.5..1.5).contains(&(error / said)),
+            "{band} Hz: {error} N m beside {said}: {text}"
+        );
+    }
 }

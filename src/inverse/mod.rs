@@ -23,7 +23,7 @@ use torqcomp_model::effects::{
 use crate::failure::{ErrorCode, Failure};
 use crate::stand::Stand;
 
-pub(crate) use motion::Carried;
+pub(crate) use motion::{AtRest, Carried};
 pub(crate) use spread::{ResultStd, Spread};
 pub(crate) use windows::RecordWindow;
 
@@ -57,9 +57,8 @@ pub(crate) struct InverseResult {
     pub lost: Vec<(&'static str, Unrecovered)>,
     /// Lines that were subtracted.
     pub lines: Vec<FoundLine>,
-    /// Part of the record in which the speed is not significantly different from zero, where a torque depends on its
-    /// sign.
-    pub stuck: Option<f64>,
+    /// Where the speed is not significantly different from zero, if a torque depends on its sign.
+    pub at_rest: Option<AtRest>,
     /// Highest frequency that curves and torques have seen.
     pub seen_to_hz: Option<f64>,
     /// What the torques in the stand leave to the next window of a long record.
@@ -399,7 +398,7 @@ impl Pass<'_> {
         };
         self.lose(links[hides.unwrap_or(0)].effect, lost);
         if torques.iter().any(|torque| torque.switches()) {
-            self.result.stuck = Some(found.stuck);
+            self.result.at_rest = Some(found.at_rest);
         }
         let seen = self.result.seen_to_hz.unwrap_or(f64::INFINITY);
         self.result.seen_to_hz = Some(band.top_hz().min(seen));

@@ -5,6 +5,7 @@
 //! not alias; memory moves on from the record's start. The applied quantity follows as
 //! `G u = x''/ω₀² + 2ζ x'/ω₀ + x + n` (the linear part by its response).
 
+use std::f64::consts::TAU;
 use std::ops::Range;
 
 use num_complex::Complex64;
@@ -33,6 +34,34 @@ pub struct View<'a> {
     pub speed_std: f64,
 }
 
+/// Where a torque that depends on the sign of the speed is known up to its size only.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct AtRest {
+    /// Part of the record.
+    pub part: f64,
+    /// Mean over the record of the variance of the torque, which takes all values up to its size there: a third of the
+    /// size squared.
+    pub variance: f64,
+}
+
+impl AtRest {
+    /// Of two stretches.
+    pub fn plus(self, other: Self) -> Self {
+        Self {
+            part: self.part + other.part,
+            variance: self.variance + other.variance,
+        }
+    }
+
+    /// Over a multiple of the length.
+    pub fn times(self, factor: f64) -> Self {
+        Self {
+            part: self.part * factor,
+            variance: self.variance * factor,
+        }
+    }
+}
+
 /// Displacement and torques at the samples.
 #[derive(Debug, Default)]
 pub struct Motion {
@@ -42,8 +71,8 @@ pub struct Motion {
     pub torque: Vec<f64>,
     /// Samples at which the gage's signal does not determine the displacement.
     pub hidden: Vec<usize>,
-    /// Part of the record in which the speed is within two standard uncertainties of zero.
-    pub stuck: f64,
+    /// Where the speed is within two standard uncertainties of zero.
+    pub at_rest: AtRest,
     /// Where the next window goes on, if one does.
     pub next: Option<Carried>,
 }
@@ -87,7 +116,7 @@ pub fn motion(
         memories: Vec::new(),
         gage_path,
         kept: None,
-        stuck: 0,
+        at_rest: AtRest::default(),
         found: Motion::default(),
     };
     if let Some(before) = beside.before {
@@ -104,13 +133,14 @@ pub fn motion(
             .collect();
         walk.block(&window, start, block.min(signal.len() - start));
         if start < last {
-            walk.found.stuck = walk.stuck as f64;
+            walk.found.at_rest = walk.at_rest;
         }
         if let Some((end, margin)) = beside.end.filter(|(end, _)| *end == start + block) {
             walk.found.next = Some(walk.carried(end - margin..end));
         }
     }
-    walk.found.stuck /= ((last - first) * view.factor) as f64;
+    let steps = ((last - first) * view.factor) as f64;
+    walk.found.at_rest = walk.found.at_rest.times(1.0 / steps);
     walk.found
 }
 
@@ -123,7 +153,8 @@ struct MotionPass<'a> {
     gage_path: GagePath<'a>,
     /// Torques of the end of the block before.
     kept: Option<Vec<f64>>,
-    stuck: usize,
+    /// Summed over the steps.
+    at_rest: AtRest,
     found: Motion,
 }
 
@@ -166,10 +197,15 @@ impl MotionPass<'_> {
     fn torques(&mut self, lines: &[Complex64], count: usize) -> Vec<f64> {
         let (band, factor) = (self.view.band, self.view.factor);
         let x = self.fine.refined(lines, |f| Complex64::from(band.gain(f)));
-        let speed = self.fine.refined(lines, |f| {
-            Complex64::new(0.0, std::f64::consts::TAU * f * band.gain(f))
-        });
+        let speed = self
+            .fine
+            .refined(lines, |f| Complex64::new(0.0, TAU * f * band.gain(f)));
         let (first, last) = (self.margin * factor, (self.margin + count) * factor);
+        let rest = 2.0
+            * self
+                .view
+                .speed_std
+                .hypot(self.speed_beyond(lines, first..last));
         if self.memories.is_empty() {
             let begin = |torque: &&dyn Torque| torque.begin(x[first] + self.view.shift);
             self.memories = self.torques.iter().map(begin).collect();
@@ -184,7 +220,9 @@ impl MotionPass<'_> {
             }
             let change = 0.5 * (speed[(i + 1).min(x.len() - 1)] - speed[i - 1]);
             torque[i] = self.sum(&mut memories, x[i], speed[i], change);
-            self.stuck += usize::from(i < last && speed[i].abs() < 2.0 * self.view.speed_std);
+            if i < last && speed[i].abs() < rest {
+                self.at_rest = self.at_rest.plus(self.unknown(&memories, x[i], rest));
+            }
         }
         self.memories = after;
         match &self.kept {
@@ -196,6 +234,40 @@ impl MotionPass<'_> {
         }
         self.kept = Some(torque[last - first..last].to_vec());
         torque
+    }
+
+    /// What is unknown of the torques at a step at rest.
+    fn unknown(&self, memories: &[Memory], x: f64, rest: f64) -> AtRest {
+        let x = x + self.view.shift;
+        let half = |(torque, memory): (&&dyn Torque, &Memory)| {
+            let towards = |speed: f64| torque.value(&mut memory.clone(), x, speed);
+            0.5 * (towards(rest) - towards(-rest))
+        };
+        let pairs = self.torques.iter().zip(memories);
+        let switching = pairs.filter(|(torque, _)| torque.switches());
+        let size: f64 = switching.map(half).sum();
+        AtRest {
+            part: 1.0,
+            variance: size * size / 3.0,
+        }
+    }
+
+    /// Rms of the speed beyond the band, if a torque switches with its sign. Where the speed changes its slope, as at a
+    /// body that comes to rest, its spectrum falls with the square of the frequency: beyond a band there is 1/√7 of what is
+    /// in its last octave.
+    fn speed_beyond(&self, lines: &[Complex64], part: Range<usize>) -> f64 {
+        if !self.torques.iter().any(|torque| torque.switches()) {
+            return 0.0;
+        }
+        let band = self.view.band;
+        let octave = self
+            .fine
+            .refined(lines, |hz| match hz > 0.5 * band.top_hz() {
+                true => Complex64::new(0.0, TAU * hz * band.gain(hz)),
+                false => Complex64::ZERO,
+            });
+        let square: f64 = octave[part.clone()].iter().map(|v| v * v).sum();
+        (square / part.len() as f64 / 7.0).sqrt()
     }
 
     fn sum(&self, memories: &mut [Memory], x: f64, speed: f64, change: f64) -> f64 {

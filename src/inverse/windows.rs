@@ -114,8 +114,8 @@ impl InverseResult {
             }
         }
         self.lines.extend(further.lines);
-        let stuck = further.stuck.map(|stuck| stuck * part);
-        self.stuck = stuck.map(|stuck| self.stuck.unwrap_or(0.0) + stuck);
+        let at_rest = further.at_rest.map(|rest| rest.times(part));
+        self.at_rest = at_rest.map(|rest| rest.plus(self.at_rest.unwrap_or_default()));
         self.seen_to_hz = further.seen_to_hz;
     }
 }
@@ -170,8 +170,9 @@ mod tests {
             // The largest torque is above 100 N m.
             assert!(largest < 1e-3, "{effect}: {largest}");
             assert_eq!(joined.seen_to_hz, whole.seen_to_hz);
-            let stuck = joined.stuck.unwrap_or(0.0) - whole.stuck.unwrap_or(0.0);
-            assert!(stuck.abs() < 1e-4, "{effect}: {stuck}");
+            let part = |result: &InverseResult| result.at_rest.unwrap_or_default().part;
+            let apart = part(&joined) - part(&whole);
+            assert!(apart.abs() < 1e-4, "{effect}: {apart}");
         }
     }
 

@@ -220,13 +220,15 @@ fn describe(report: &mut CompensateReport, undone: &InverseResult, scales: &Scal
             ),
         ));
     }
-    if let Some(stuck) = undone.stuck.filter(|stuck| *stuck > STUCK) {
+    if let Some(rest) = undone.at_rest.filter(|rest| rest.part > STUCK) {
         report.warnings.push(Warning::new(
             "direction-unknown",
             format!(
                 "over {} % of the record the speed is not significantly different from zero: the direction of the \
-                 friction, and so its part of the torque, is unknown there",
-                rounded(100.0 * stuck, 2)
+                 friction is unknown there, and its part of the torque uncertain by {} {} (rms over the record)",
+                rounded(100.0 * rest.part, 2),
+                rounded(rest.variance.sqrt() * scales.printed.abs(), 2),
+                report.unit
             ),
         ));
     }
