@@ -1,4 +1,4 @@
-# What the rules of the verbs share.
+# Shared by the rules of the verbs.
 
 RESULTS = config["results"].rstrip("/")
 PARTS = config["parts"]
@@ -10,12 +10,12 @@ wildcard_constraints:
 
 
 def log_of_part(verb):
-    """The file that is there once a part is done."""
+    """The file that exists once a part is done."""
     return f"{RESULTS}/{verb}.parts/{{part}}-of-{PARTS}.jsonl"
 
 
 def options_of(verb):
     """The options of a verb; none if it is not run."""
     options = config["verbs"].get(verb, {"options": ""})["options"]
-    # As a function, so that braces of --name are not taken for wildcards.
+    # A function, so that braces in --name are not interpreted as wildcards.
     return lambda wildcards: options

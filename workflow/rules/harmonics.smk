@@ -1,4 +1,4 @@
-# Component torques of each recording. Recordings before compensation need --stand among the options.
+# Component torques of each recording. Uncompensated recordings need --stand in the options.
 
 
 rule harmonics:

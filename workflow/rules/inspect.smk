@@ -1,4 +1,4 @@
-# What each recording holds and what is wrong with it.
+# Contents and faults of each recording.
 
 
 rule inspect:

@@ -1,4 +1,4 @@
-# The table of all recordings of a verb, and whether too many of them failed.
+# The table of all recordings of a verb, and a check that not too many of them failed.
 
 import csv
 
@@ -16,12 +16,12 @@ rule merge:
     params:
         torqcomp=config["torqcomp"],
         manifests=lambda wildcards: f"{RESULTS}/{wildcards.verb}/torqcomp-manifest.*-of-{PARTS}.jsonl",
-    # The code is 1 if recordings failed, too; then the table is there.
+    # The exit code is 1 also if recordings failed; the table exists then.
     shell:
         "{params.torqcomp:q} merge {params.manifests:q} -o {output:q} || test -e {output:q}"
 
 
-# A rule of its own, as Snakemake removes the outputs of one that fails.
+# A separate rule, since Snakemake removes the outputs of a rule that fails.
 rule check:
     input:
         RESULTS + "/{verb}.csv",
