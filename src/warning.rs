@@ -116,6 +116,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["one-weight", "one load beside no load shows no curve", "apply other loads as well"],
         ["poor-fit", "the model leaves much of the data unexplained", "check the columns; choose another range, band or degree"],
         ["zero-drifts", "the reading without load drifts over the test", "warm up for longer, and read the zero of each record"],
+        ["driven-at-first", "the first part of a decay is not free ringing: a soft push, a hand, or a load that is let go slowly", "hit briefly, or give the free ringing with --range"],
         ["restart-in-decay", "the ringing starts again within a decay", "hit once, and check for lost samples and overload"],
         ["second-stroke", "the hammer struck twice; the recorded force includes both strokes", "repeat the hit if the coherence is low"],
         ["noise-on-force", "noise of a hammer's force is taken for force, and the response comes out too small", "couple the hammer directly (DC), or record so that its signal is at rest after the stroke"],

@@ -1,6 +1,7 @@
 //! `identify` through the binary, and its estimators on simulated records. The records are made here,
 //! from closed forms or by small steps, with no code of the estimators.
 
+mod beginnings;
 mod decay;
 mod files;
 mod response;

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use crate::peaks;
+
 /// Number of blocks of a record.
 const BLOCKS: usize = 400;
 /// Fewest samples of a block.
@@ -18,6 +20,8 @@ const FALLS: f64 = 1.1;
 const ALIKE: f64 = 0.173;
 /// Blocks before a hit that it is compared with.
 const BEFORE: usize = 4;
+/// Means in a period of the strongest line, among which a hit is looked for that samples do not show in their noise.
+const A_PERIOD: f64 = 6.0;
 
 /// The stretches of free ringing: each begins at the largest swing after a hit and ends before the next hit or at the end.
 /// Ringing from the first sample on is a stretch, too.
@@ -28,50 +32,109 @@ const BEFORE: usize = 4;
 /// let record: Vec<f64> = (0..2000).map(decay).collect();
 /// assert_eq!(torqcomp_dsp::onset::decays(&record), [500..2000]);
 /// ```
+///
+/// In noise of a tenth of the swing, means of a sixth of a period show where the decay begins:
+///
+/// ```
+/// let noise = |i: i32| 0.1 * f64::from(i * 7919 % 1001 - 500) / 290.0;
+/// let decay = |i: i32| if i < 500 { 0.0 } else { (-0.002 * f64::from(i - 500)).exp() * (0.1 * f64::from(i - 500)).sin() };
+/// let record: Vec<f64> = (0..4000).map(|i| decay(i) + noise(i)).collect();
+/// let found = torqcomp_dsp::onset::decays(&record);
+/// assert!(found.len() == 1 && found[0].start.abs_diff(516) < 16, "{found:?}");
+/// ```
 #[must_use]
 pub fn decays(samples: &[f64]) -> Vec<Range<usize>> {
-    let block = (samples.len() / BLOCKS).max(LEAST_BLOCK);
-    let swings: Vec<f64> = samples.chunks(block).map(swing).collect();
-    let largest = swings.iter().fold(0.0_f64, |m, s| m.max(*s));
-    if largest == 0.0 {
-        return Vec::new();
+    let found = Onsets::of(samples);
+    if found.ranges.len() != 1 || !found.rings_first {
+        return found.ranges;
     }
-    let floor = {
-        let mut sorted = swings.clone();
-        sorted.sort_by(f64::total_cmp);
-        sorted[sorted.len() / 20]
+    // No hit was found, which noise may have hidden.
+    let factor = samples_in_mean(samples);
+    let chunks = samples.chunks_exact(factor);
+    let means: Vec<f64> = chunks.map(mean).collect();
+    let of_means = Onsets::of(&means);
+    if factor == 1 || of_means.rings_first || of_means.ranges.is_empty() {
+        return found.ranges;
+    }
+    let end = |range: &Range<usize>| match range.end == means.len() {
+        true => samples.len(),
+        false => range.end * factor,
     };
-    let mut hits = Vec::new();
-    for i in 1..swings.len() {
-        let before = &swings[i.saturating_sub(BEFORE)..i];
-        let quiet = before.iter().fold(floor, |m, s| m.max(*s));
-        let recent = hits.last().is_some_and(|h| i - h <= BEFORE);
-        if swings[i] > SIZE * largest && swings[i] > RISE * quiet && !recent {
-            hits.push(i);
+    let ranges = of_means.ranges.iter();
+    ranges
+        .map(|range| range.start * factor..end(range))
+        .collect()
+}
+
+fn mean(samples: &[f64]) -> f64 {
+    samples.iter().sum::<f64>() / samples.len().max(1) as f64
+}
+
+/// Samples in a sixth of a period of the strongest line.
+fn samples_in_mean(samples: &[f64]) -> usize {
+    let middle = mean(samples);
+    let about: Vec<f64> = samples.iter().map(|v| v - middle).collect();
+    let lowest = 2.0 / samples.len() as f64;
+    let line = peaks::strongest(&about, 1.0, lowest, 0.5);
+    line.map_or(1, |peak| (1.0 / (A_PERIOD * peak.frequency_hz)) as usize)
+        .max(1)
+}
+
+/// Stretches of free ringing by the swing of blocks.
+#[derive(Default)]
+struct Onsets {
+    ranges: Vec<Range<usize>>,
+    /// Whether the first one begins with the record.
+    rings_first: bool,
+}
+
+impl Onsets {
+    fn of(samples: &[f64]) -> Self {
+        let block = (samples.len() / BLOCKS).max(LEAST_BLOCK);
+        let swings: Vec<f64> = samples.chunks(block).map(swing).collect();
+        let largest = swings.iter().fold(0.0_f64, |m, s| m.max(*s));
+        if largest == 0.0 {
+            return Self::default();
+        }
+        let floor = {
+            let mut sorted = swings.clone();
+            sorted.sort_by(f64::total_cmp);
+            sorted[sorted.len() / 20]
+        };
+        let mut hits = Vec::new();
+        for i in 1..swings.len() {
+            let before = &swings[i.saturating_sub(BEFORE)..i];
+            let quiet = before.iter().fold(floor, |m, s| m.max(*s));
+            let recent = hits.last().is_some_and(|h| i - h <= BEFORE);
+            if swings[i] > SIZE * largest && swings[i] > RISE * quiet && !recent {
+                hits.push(i);
+            }
+        }
+        // Ringing from the first sample on is one more, if it has decayed before the first hit.
+        let rings_first = hits.first().is_none_or(|hit| {
+            let ended = swings[hit.saturating_sub(BEFORE)..*hit].iter();
+            *hit > BEFORE
+                && swings[0] > SIZE * largest
+                && swings[0] > RISE * ended.fold(floor, |m, s| m.max(*s))
+        });
+        let starts: Vec<usize> = rings_first
+            .then_some(0)
+            .into_iter()
+            .chain(hits.iter().map(|hit| hit * block))
+            .collect();
+        let ends = starts[1..]
+            .iter()
+            .map(|s| s.saturating_sub(block))
+            .chain([samples.len()]);
+        let ranges = starts.iter().zip(ends);
+        let ranges = ranges.map(|(start, end)| peak_after(samples, *start, end, block)..end);
+        Self {
+            ranges: ranges
+                .filter(|range| range.len() >= 4 * LEAST_BLOCK)
+                .collect(),
+            rings_first,
         }
     }
-    // Ringing from the first sample on is one more, if it has decayed before the first hit.
-    let rings_first = hits.first().is_none_or(|hit| {
-        let ended = swings[hit.saturating_sub(BEFORE)..*hit].iter();
-        *hit > BEFORE
-            && swings[0] > SIZE * largest
-            && swings[0] > RISE * ended.fold(floor, |m, s| m.max(*s))
-    });
-    let starts: Vec<usize> = rings_first
-        .then_some(0)
-        .into_iter()
-        .chain(hits.iter().map(|hit| hit * block))
-        .collect();
-    let ends = starts[1..]
-        .iter()
-        .map(|s| s.saturating_sub(block))
-        .chain([samples.len()]);
-    starts
-        .iter()
-        .zip(ends)
-        .map(|(start, end)| peak_after(samples, *start, end, block)..end)
-        .filter(|range| range.len() >= 4 * LEAST_BLOCK)
-        .collect()
 }
 
 /// Samples of a stretch up to twice the time after which its ringing is lost in the noise; all of them where the swing still
@@ -114,7 +177,7 @@ pub fn until_noise(samples: &[f64]) -> usize {
 /// Whether neighbours are much alike: a sine of at least 15 samples a period in little noise.
 /// Of white noise the ratio is 2 (J. von Neumann, Ann. Math. Statist. 12 (1941) 367), of a sine `2 − 2 cos ω`.
 fn is_slow(samples: &[f64]) -> bool {
-    let mean = samples.iter().sum::<f64>() / samples.len().max(1) as f64;
+    let mean = mean(samples);
     let power: f64 = samples.iter().map(|v| (v - mean).powi(2)).sum();
     let steps: f64 = samples
         .windows(2)
@@ -136,7 +199,7 @@ fn swing(block: &[f64]) -> f64 {
 /// The sample farthest from the final level of the stretch, within its first blocks.
 fn peak_after(samples: &[f64], start: usize, end: usize, block: usize) -> usize {
     let tail = &samples[start + (end - start) * 3 / 4..end];
-    let rest = tail.iter().sum::<f64>() / tail.len().max(1) as f64;
+    let rest = mean(tail);
     let near = &samples[start..end.min(start + 2 * (BEFORE + 1) * block)];
     let far = |i: &usize| (near[*i] - rest).abs();
     let peak = (0..near.len()).max_by(|a, b| far(a).total_cmp(&far(b)));

@@ -1,5 +1,6 @@
 //! Frequencies and damping from free decays (Appendix C, II).
 
+mod anew;
 mod attempt;
 mod baseline;
 mod by_hand;
@@ -64,6 +65,8 @@ pub fn identify(
         band_hz: options.band_hz.unwrap_or((0.0, f64::INFINITY)),
     };
     let found = search::search(&mut stretches, &wanted, &lines)?;
+    let (found, beginnings) = anew::cut(found, &mut stretches, (&wanted, &lines))?;
+    present::beginnings(&mut result, &beginnings);
     let (fit, has_baseline) = (found.fit, found.has_baseline);
     let more = found.lines;
     lines.extend(more);

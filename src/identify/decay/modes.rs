@@ -378,6 +378,21 @@ impl ModesFit {
         part
     }
 
+    /// The fitted curve of a stretch at a time from its start, which may lie before it.
+    pub fn value_at(&self, stretch: usize, time_s: f64) -> f64 {
+        let modes = self.poles.len();
+        let at = 2 * modes + stretch * (2 * modes + TREND);
+        let (offset, drift) = self.trend(stretch);
+        let mut value = offset + drift * time_s;
+        for (k, pole) in self.poles.iter().enumerate() {
+            let (a, b) = (self.fit.values[at + 2 * k], self.fit.values[at + 2 * k + 1]);
+            turns(&[time_s], *pole, |_, turn| {
+                value += a * turn.re + b * turn.im
+            });
+        }
+        value
+    }
+
     /// Offset and drift per second of a stretch.
     pub fn trend(&self, stretch: usize) -> (f64, f64) {
         let modes = self.poles.len();

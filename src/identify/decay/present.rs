@@ -1,6 +1,8 @@
 //! Warnings, method and charts of a decay.
 
+use super::anew::Beginning;
 use super::modes::{ModesFit, Stretch};
+use super::stretches::OWN_PARTS;
 use crate::chart::{Chart, Series};
 use crate::failure::{ErrorCode, Failure};
 use crate::identify::hum::{SteadyLine, listed};
@@ -77,6 +79,25 @@ pub(super) fn restart(times_s: &[f64], consequence: &str) -> Option<Warning> {
             named.join(", ")
         ),
     ))
+}
+
+/// Warns of ringing that begins anew.
+pub(super) fn beginnings(result: &mut Identification, all: &[Beginning]) {
+    let times = |rings: bool| {
+        let of_kind = all.iter().filter(move |b| b.rings_before == rings);
+        of_kind.map(|b| b.time_s).collect::<Vec<_>>()
+    };
+    result.warnings.extend(restart(&times(true), OWN_PARTS));
+    if let Some(last) = times(false).last() {
+        result.warn(
+            "driven-at-first",
+            format!(
+                "up to {} s the motion is not the free ringing that follows, but driven by what set it off (a soft push, a \
+                 hand, a load that is let go slowly): it is left out; hit briefly, or give the free ringing with --range",
+                rounded(*last, 5)
+            ),
+        );
+    }
 }
 
 /// Relative distance of modes that can be one mode of two stands.

@@ -280,7 +280,7 @@ impl Cuts {
 }
 
 /// What a restart means where its parts are decays of their own.
-const OWN_PARTS: &str = "the parts before and after that are fitted as decays of their own; hit once and take your hand off the \
+pub(super) const OWN_PARTS: &str = "the parts before and after that are fitted as decays of their own; hit once and take your hand off the \
                          stand";
 
 /// Times at which a decay of a record starts again.
