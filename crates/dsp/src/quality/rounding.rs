@@ -258,12 +258,12 @@ pub(super) fn simplest([low_s, high_s]: [f64; 2]) -> f64 {
     }
 }
 
-/// Negative powers of ten tried as quanta of stamps, from 1 down; the larger ones serve, for example, nanoseconds of a
-/// clock that counts milliseconds.
+/// Exponents k of the quanta 10⁻ᵏ tried for stamps: from 1 down, and those above 1, as for nanoseconds of a clock that
+/// counts milliseconds.
 pub(super) const FINE: RangeInclusive<i32> = 0..=18;
 const COARSEST: RangeInclusive<i32> = -9..=-1;
 
-/// The largest of some negative powers of ten of which all stamps are multiples and which does not exceed their time
+/// The largest of some powers 10⁻ᵏ of which all stamps are multiples and which does not exceed their time
 /// span; `None` if even these are too large.
 pub(super) fn quantum(
     powers: RangeInclusive<i32>,
