@@ -21,10 +21,10 @@
 //! ν = 2 u²/var(u),   var(u) = 2 u²/n + (∂u/∂a)ᵀ (v/n) Γ⁻¹ (∂u/∂a),   ∂S/∂a_k = 2 S Re(e^(−j2πfk)/(1 − Σ a_m e^(−j2πfm)))
 //! ```
 //!
-//! An autoregression does not resolve a narrow peak. Where one is expected, the spectrum is multiplied by its ratio to
-//! the residuals' local power around each frequency, `Σ_b |R|² / Σ_b E|R|²` over the bins b within a half-width, and
-//! `var(u) = (m/n) Σ_f ū(f)²` with `ū` the contributions to u averaged over the same bins and m the length of the
-//! transform.
+//! An autoregression does not resolve a narrow peak. Where one is expected, the spectrum is multiplied by the ratio
+//! of the residuals' power to its expectation around each frequency, `Σ_b |R|² / Σ_b E|R|²` over the bins b within a
+//! half-width, and `var(u) = (m/n) Σ_f ū(f)²` with `ū` the contributions to u averaged over the same bins and m the
+//! length of the transform.
 //!
 //! Γ: autocovariances of the noise, p by p. (JCGM 100:2008, G.4; P. J. Brockwell, R. A. Davis, Time Series, 1991, 8.1.)
 

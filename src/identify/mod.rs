@@ -127,6 +127,7 @@ impl NamedEstimates {
         self.covariance.correlation(i, j)
     }
 
+    /// Pairs with a correlation of at least [`STRONG`].
     pub(crate) fn correlations(&self) -> Vec<Correlation> {
         let names: Vec<&str> = self.list.iter().map(|c| c.name.as_str()).collect();
         correlations(&names, &self.covariance)

@@ -1,3 +1,5 @@
+//! The `[[effects]]` of a stand file.
+
 use std::sync::Arc;
 
 use num_complex::Complex64;

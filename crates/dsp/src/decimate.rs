@@ -17,6 +17,7 @@ pub const PASS: f64 = 0.2;
 /// A record at a lower rate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Decimated {
+    /// Its samples.
     pub samples: Vec<f64>,
     /// Index of the first of them in the record.
     pub first: usize,

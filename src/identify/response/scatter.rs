@@ -48,8 +48,8 @@ const REACH: usize = 40;
 const SILENT: f64 = 1e-3;
 /// Number of lines on each side over which the power of the errors is averaged.
 const NEIGHBOURS: usize = 5;
-/// Fraction, as a divisor, of the lines below the Nyquist frequency used for noise and aliasing of the applied
-/// signal.
+/// Divisor of the number of lines that gives those, just below the Nyquist frequency, used for noise and aliasing
+/// of the applied signal.
 const TOP: usize = 10;
 /// Correlation of the noise amplitude of half-overlapping Hann-weighted segments.
 const SHARED: f64 = 1.0 / 6.0;

@@ -55,7 +55,9 @@ where
 
 /// Residuals and derivatives from two closures.
 pub struct WithJacobian<R, J> {
+    /// The residuals.
     pub residuals: R,
+    /// Their derivatives.
     pub jacobian: J,
 }
 
