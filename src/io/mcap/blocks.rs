@@ -1,24 +1,24 @@
-//! Times of the samples in messages that hold many.
+//! Times of the samples in messages with several of them.
 
 use super::route::{Hop, Route};
 use super::schema::{FieldKind, Schema};
 use crate::failure::did_you_mean;
 
-/// How far samples within a message are apart.
+/// Spacing of the samples within a message.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Spacing {
     /// Every message holds one sample.
     Single,
-    /// A field says it: seconds per unit of the field, or its reciprocal for a rate.
+    /// Given by a field: seconds per unit of the field, or its reciprocal for a rate.
     Field {
-        /// Way to it.
+        /// Path to it.
         hops: Vec<Hop>,
         /// Seconds per unit; of the reciprocal if the field is a rate.
         seconds: f64,
         /// Whether the field is a rate.
         is_rate: bool,
     },
-    /// Samples lie evenly from one message's time to the next one's.
+    /// Samples are evenly spaced between the times of consecutive messages.
     Even,
 }
 
