@@ -29,7 +29,7 @@ fn folder(heading: &str, more: &str) -> Folder {
     folder
 }
 
-/// The arguments of both verbs.
+/// The arguments of both commands.
 fn verbs() -> [Vec<&'static str>; 2] {
     let harmonics = [&HARMONICS[..], &["20", "--orders", "1"]].concat();
     [COMPENSATE.to_vec(), harmonics]

@@ -31,7 +31,7 @@ const OTHER_FORM: FitEffort = FitEffort::full(15);
 /// The effect that changes the recorded value of a constant load.
 const GAIN: &str = "gain-error";
 const SMALL: f64 = 1e-3;
-/// Number of parameters above which an effect may imitate two others.
+/// Minimum number of parameters of an effect that may imitate two others.
 pub const MANY: usize = 3;
 
 impl SearchState {

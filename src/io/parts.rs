@@ -14,7 +14,7 @@ use super::storage;
 static OPEN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 /// Folders in which this run has looked for orphaned files.
 static TIDIED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
-/// Number of open files above which removed ones are purged from the list.
+/// Number of open files from which on removed ones are purged from the list.
 const MOST_OPEN: usize = 256;
 /// Prefix and suffix of the names of all of them.
 const PREFIX: &str = ".torqcomp-";

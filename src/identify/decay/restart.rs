@@ -17,7 +17,7 @@ const ORDER: usize = 16;
 const A_PERIOD: f64 = 20.0;
 /// Number of averaged samples before a moment used for comparison.
 const BEFORE: usize = 160;
-/// Averaged samples at the start of a segment, beyond the order, that are searched for samples preceding the
+/// Averaged samples at the start of a segment, including the order, that are searched for samples preceding the
 /// decay.
 const LEAD: usize = 4 * ORDER;
 /// Oscillation amplitude of such a start, relative to the whole, below which it is at rest.

@@ -26,7 +26,7 @@ pub struct Break {
 const COARSE: f64 = 0.25;
 /// Minimum average number of samples between breaks; more frequent breaks are jitter.
 const BETWEEN_BREAKS: usize = 50;
-/// Number of consecutive breaks allowed.
+/// Number of breaks allowed beyond that average.
 const AT_ONCE: usize = 3;
 /// Relative difference within which steps equal that of the line, whose slope is uncertain for few stamps.
 const EQUAL: f64 = 0.05;
